@@ -1,0 +1,200 @@
+"""Dry friction that sticks and slides: bearings, clutches, brakes."""
+
+from __future__ import annotations
+
+from components.interfaces import CompliantWithRelativeStates, ShaftInHousing
+from modelica_like.language import (
+    Component,
+    Equations,
+    Events,
+    Expr,
+    Input,
+    Mode,
+    Parameter,
+    Variable,
+    all_of,
+    der,
+    interpolate,
+    negate,
+    param,
+    signal_in,
+    var,
+    where,
+)
+
+Rows = tuple[tuple[float, float], ...]
+
+
+class DryFriction(Component, partial=True):
+    """Two surfaces that stick until the static friction is exceeded, and then slide against the sliding friction.
+
+    While they stick, friction is no function of the speed but whatever keeps the relative acceleration at zero; so the
+    speed stays a state in every mode (Otter, Elmqvist, Mattsson: Hybrid modeling in Modelica based on the synchronous
+    data flow principle, CACSD 1999). A surface that breaks away holds the sliding friction of standstill until it
+    moves. Surfaces that no force presses together are free.
+
+    A subclass names its slip speed and its friction variable, and gives the laws of sliding and static friction.
+    """
+
+    peak: Parameter = param("1", "static friction over sliding friction at standstill", default=1.0, min=1)
+    mode = Mode("free", "stuck", "start_forward", "start_backward", "forward", "backward", description="friction mode")
+
+    @property
+    def slip(self) -> Expr:
+        """Speed of sliding."""
+        raise NotImplementedError
+
+    @property
+    def friction(self) -> Expr:
+        """Friction torque or force, against forward sliding."""
+        raise NotImplementedError
+
+    def sliding_friction(self, speed: Expr | float) -> Expr:
+        """Return the friction while sliding forward at a speed."""
+        raise NotImplementedError
+
+    def static_friction(self) -> Expr:
+        """Return the largest friction of surfaces that stick."""
+        return self.peak * self.sliding_friction(0)
+
+    def idle_friction(self) -> Expr | float:
+        """Return the friction of free surfaces."""
+        return 0.0
+
+    def equations(self) -> Equations:
+        yield from super().equations()
+        at_rest = self.sliding_friction(0)
+        yield self.mode.choose(
+            free=self.friction - self.idle_friction(),
+            stuck=der(self.slip),
+            start_forward=self.friction - at_rest,
+            start_backward=self.friction + at_rest,
+            forward=self.friction - self.sliding_friction(self.slip),
+            backward=self.friction + self.sliding_friction(-self.slip),
+        ) == 0  # fmt: skip
+
+    def events(self) -> Events:
+        mode, slip, static = self.mode, self.slip, self.static_friction()
+        pressed = static > 0
+        yield mode.initially("forward", when=all_of(pressed, slip > 0))
+        yield mode.initially("backward", when=all_of(pressed, slip < 0))
+        yield mode.initially("stuck", when=pressed)
+        yield mode.go(("stuck", "start_forward", "start_backward", "forward", "backward"), "free", when=negate(pressed))
+        yield mode.go("free", "forward", when=all_of(pressed, slip > 0))
+        yield mode.go("free", "backward", when=all_of(pressed, slip < 0))
+        yield mode.go("free", "stuck", when=pressed)
+        yield mode.go("stuck", "start_forward", when=self.friction > static)
+        yield mode.go("stuck", "start_backward", when=self.friction < -static)
+        yield mode.go("start_forward", "forward", when=slip > 0)
+        yield mode.go("start_backward", "backward", when=slip < 0)
+        yield mode.go("start_forward", "stuck", when=der(slip) < 0, reset={slip: 0})
+        yield mode.go("start_backward", "stuck", when=der(slip) > 0, reset={slip: 0})
+        yield mode.go("forward", "stuck", when=slip < 0, reset={slip: 0})
+        yield mode.go("backward", "stuck", when=slip > 0, reset={slip: 0})
+
+    def loss_power(self) -> Expr:
+        return self.friction * self.slip
+
+
+class PressedFriction(DryFriction, partial=True):
+    """Friction surfaces pressed together by a normal force.
+
+    Friction torque cgeo·mu(slip)·fn with the normal force fn = fn_max·f_normalized. For N surfaces with the radii r_i
+    and r_o, cgeo = N·(r_i + r_o)/2 (uniform wear). Where only the torque of the closed surfaces is known, it is given
+    as `capacity` instead. A residual drag torque acts whenever the surfaces slide.
+    """
+
+    f_normalized: Input = signal_in("1", "normal force over fn_max; the surfaces are free at 0", default=1.0)
+    fn_max: Parameter = param("N", "normal force at f_normalized = 1", min=0)
+    cgeo: Parameter = param("m", "friction radius times number of friction surfaces", default=1.0, min=0)
+    mu_pos: Rows = ((0.0, 0.5),)
+    """Rows of slip speed in w_scale and sliding friction coefficient."""
+    smooth: bool = False
+    """Interpolate mu_pos with a continuous slope."""
+    w_scale: Parameter = param("rad/s", "slip speed that counts as 1 in mu_pos", default=1.0)
+    capacity: Parameter = param("N.m", "sliding torque at f_normalized = 1; replaces fn_max, cgeo and mu_pos", min=0)
+    tau_drag: Parameter = param("N.m", "residual drag torque", default=0.0, min=0)
+
+    def mu(self, speed: Expr | float) -> Expr | float:
+        """Return the coefficient of sliding friction."""
+        speeds, values = zip(*self.mu_pos, strict=True)
+        return interpolate(speed / self.w_scale, speeds, values, smooth=self.smooth)
+
+    def sliding_friction(self, speed: Expr | float) -> Expr:
+        if self.given("capacity"):
+            return self.capacity * self.f_normalized + self.tau_drag
+        return self.cgeo * self.mu(speed) * (self.fn_max * self.f_normalized) + self.tau_drag
+
+
+class Clutch(PressedFriction, CompliantWithRelativeStates):
+    """Friction clutch between two shafts."""
+
+    w_rel: Variable = var("rad/s", "slip speed", state="always")
+
+    @property
+    def slip(self) -> Expr:
+        return self.w_rel
+
+    @property
+    def friction(self) -> Expr:
+        return self.tau
+
+
+class MultiPlateClutch(Clutch):
+    """Wet multi-plate clutch with a measured friction law.
+
+    The coefficient of sliding friction falls with the cube of the distance to its minimum, and rises linearly above it.
+    The coefficient of static friction is a separate value (M. Pajor, M. Hoffman: Dynamika rozruchu układu ze sprzęgłem,
+    Politechnika Szczecińska, after K. Marchelek: Dynamika obrabiarek, 4.4.2).
+    """
+
+    mu_min: Parameter = param("1", "smallest coefficient of sliding friction", min=0)
+    w_min: Parameter = param("rad/s", "slip speed there", min=0)
+    curvature: Parameter = param("s3/rad3", "factor of the cube below w_min", min=0)
+    slope: Parameter = param("s/rad", "slope above w_min")
+    mu_static: Parameter = param("1", "coefficient of static friction", min=0)
+
+    def mu(self, speed: Expr | float) -> Expr | float:
+        below = self.w_min - speed
+        return self.mu_min + where(below > 0, self.curvature * below**3, -self.slope * below)
+
+    def static_friction(self) -> Expr:
+        return self.cgeo * self.mu_static * (self.fn_max * self.f_normalized) + self.tau_drag
+
+
+class Brake(PressedFriction, ShaftInHousing):
+    """Friction brake: a clutch between a shaft and the housing."""
+
+    w: Variable = var("rad/s", "speed of the shaft relative to the housing", state="always")
+
+    @property
+    def slip(self) -> Expr:
+        return self.w
+
+    @property
+    def friction(self) -> Expr:
+        return self.tau
+
+
+class BearingFriction(DryFriction, ShaftInHousing):
+    """Friction of a bearing: a torque against the rotation that depends on the speed, with stiction."""
+
+    w: Variable = var("rad/s", "speed of the shaft relative to the housing", state="always")
+    tau_pos: Rows = ((0.0, 1.0),)
+    """Rows of speed in w_scale and friction torque in tau_scale."""
+    smooth: bool = False
+    """Interpolate tau_pos with a continuous slope."""
+    w_scale: Parameter = param("rad/s", "speed that counts as 1 in tau_pos", default=1.0)
+    tau_scale: Parameter = param("N.m", "torque that counts as 1 in tau_pos", default=1.0)
+
+    @property
+    def slip(self) -> Expr:
+        return self.w
+
+    @property
+    def friction(self) -> Expr:
+        return self.tau
+
+    def sliding_friction(self, speed: Expr | float) -> Expr:
+        speeds, torques = zip(*self.tau_pos, strict=True)
+        return self.tau_scale * interpolate(speed / self.w_scale, speeds, torques, smooth=self.smooth)

@@ -1,0 +1,52 @@
+"""Rigid masses."""
+
+from __future__ import annotations
+
+from components.interfaces import Flange, LinearFlange
+from modelica_like.language import Component, Equations, Expr, Parameter, Variable, der, param, var
+
+
+class Inertia(Component):
+    """Rigid rotating mass.
+
+    The acceleration torque J·der(w) is the sum of both cut torques.
+    """
+
+    flange_a = Flange("left end", free=True)
+    flange_b = Flange("right end", free=True)
+    J: Parameter = param("kg.m2", "moment of inertia", min=0)
+    phi: Variable = var("rad", "angle")
+    w: Variable = var("rad/s", "speed")
+
+    def equations(self) -> Equations:
+        a, b = self.flange_a, self.flange_b
+        yield a.phi == self.phi
+        yield b.phi == self.phi
+        yield der(self.phi) == self.w
+        yield self.J * der(self.w) == a.tau + b.tau
+
+    def stored_energy(self) -> Expr:
+        return 0.5 * self.J * self.w**2
+
+
+class Mass(Component):
+    """Rigid sliding mass.
+
+    The acceleration force m·der(v) is the sum of both cut forces.
+    """
+
+    flange_a = LinearFlange("left end", free=True)
+    flange_b = LinearFlange("right end", free=True)
+    m: Parameter = param("kg", "mass", min=0)
+    s: Variable = var("m", "position")
+    v: Variable = var("m/s", "velocity")
+
+    def equations(self) -> Equations:
+        a, b = self.flange_a, self.flange_b
+        yield a.s == self.s
+        yield b.s == self.s
+        yield der(self.s) == self.v
+        yield self.m * der(self.v) == a.f + b.f
+
+    def stored_energy(self) -> Expr:
+        return 0.5 * self.m * self.v**2

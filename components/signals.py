@@ -1,0 +1,227 @@
+"""Signals: functions of time that drive sources, clutches and brakes.
+
+Where a signal jumps or has a kink there is a time event, so that the solver never steps across it.
+"""
+
+from __future__ import annotations
+
+from math import pi
+
+from modelica_like.language import (
+    Component,
+    Discrete,
+    Equations,
+    Events,
+    Expr,
+    Input,
+    Mode,
+    Output,
+    Parameter,
+    discrete,
+    exp,
+    interpolate,
+    param,
+    signal_in,
+    signal_out,
+    sin,
+    where,
+)
+from modelica_like.language.formula import parse_formula
+
+_NEVER = 1e30
+
+
+class Constant(Component):
+    """Constant signal."""
+
+    k: Parameter = param("*", "value")
+    y: Output = signal_out("*", "signal")
+
+    def equations(self) -> Equations:
+        yield self.y == self.k
+
+
+class Product(Component):
+    """Product of two signals."""
+
+    u1: Input = signal_in("*", "first factor")
+    u2: Input = signal_in("*", "second factor")
+    y: Output = signal_out("*", "signal")
+
+    def equations(self) -> Equations:
+        yield self.y == self.u1 * self.u2
+
+
+class Started(Component, partial=True):
+    """Signal that keeps a value until it starts."""
+
+    offset: Parameter = param("*", "value before the start", default=0.0)
+    start_time: Parameter = param("s", "time of the start", default=0.0)
+    y: Output = signal_out("*", "signal")
+    stage = Mode("waiting", "running", description="before or after the start")
+
+    def running(self, elapsed: Expr) -> Expr:
+        """Return what is added to the offset after the start."""
+        raise NotImplementedError
+
+    def equations(self) -> Equations:
+        elapsed = self.time - self.start_time
+        yield self.y == self.offset + self.stage.choose(waiting=0, running=self.running(elapsed))
+
+    def events(self) -> Events:
+        yield self.stage.initially("running", when=self.time >= self.start_time)
+        yield self.stage.go("waiting", "running", at=self.start_time)
+
+
+class Step(Started):
+    """Signal that jumps."""
+
+    height: Parameter = param("*", "height of the jump", default=1.0)
+
+    def running(self, elapsed: Expr) -> Expr:
+        return self.height
+
+
+class Sine(Started):
+    """Sine signal."""
+
+    amplitude: Parameter = param("*", "amplitude", default=1.0)
+    f: Parameter = param("Hz", "frequency", min=0)
+    phase: Parameter = param("rad", "angle at the start", default=0.0)
+
+    def running(self, elapsed: Expr) -> Expr:
+        return self.amplitude * sin(2 * pi * self.f * elapsed + self.phase)
+
+
+class CoilForce(Started):
+    """Force of an electromagnet whose coil is switched on.
+
+    The current rises as 1 - exp(-t/T) with the time constant T of the coil, the force as its square.
+    """
+
+    amplitude: Parameter = param("*", "final value", default=1.0)
+    T: Parameter = param("s", "time constant of the coil current", min=0)
+
+    def running(self, elapsed: Expr) -> Expr:
+        return self.amplitude * (1 - exp(-elapsed / self.T)) ** 2
+
+
+class TimeFormula(Component):
+    """Signal given as a formula of time, e.g. `72.5*(1 - exp(-time/0.07))`.
+
+    In the formula, `time` is the time in units of time_scale; its value counts in units of scale.
+    """
+
+    formula: str
+    """Arithmetic of `time` with numbers, pi, sqrt, abs, sin, cos, tan, exp, log, tanh, min, max."""
+    scale: Parameter = param("*", "what counts as 1", default=1.0)
+    time_scale: Parameter = param("s", "time that counts as 1", default=1.0)
+    y: Output = signal_out("*", "signal")
+
+    def equations(self) -> Equations:
+        known = {"time": self.time / self.time_scale}
+        yield self.y == self.scale * parse_formula(self.formula).evaluate(known.__getitem__)
+
+
+class Ramp(Component):
+    """Signal that rises linearly and then keeps its value."""
+
+    height: Parameter = param("*", "height of the ramp", default=1.0)
+    duration: Parameter = param("s", "duration of the ramp", min=1e-12)
+    offset: Parameter = param("*", "value before the ramp", default=0.0)
+    start_time: Parameter = param("s", "start of the ramp", default=0.0)
+    y: Output = signal_out("*", "signal")
+    stage = Mode("before", "rising", "after", description="part of the ramp")
+
+    def equations(self) -> Equations:
+        part = (self.time - self.start_time) / self.duration
+        yield self.y == self.offset + self.height * self.stage.choose(before=0, rising=part, after=1)
+
+    def events(self) -> Events:
+        end = self.start_time + self.duration
+        yield self.stage.initially("after", when=self.time >= end)
+        yield self.stage.initially("rising", when=self.time >= self.start_time)
+        yield self.stage.go("before", "rising", at=self.start_time)
+        yield self.stage.go("rising", "after", at=end)
+
+
+class Periodic(Component, partial=True):
+    """Signal that repeats a shape: at low value in between."""
+
+    amplitude: Parameter = param("*", "height of the shape", default=1.0)
+    period: Parameter = param("s", "time of one period", min=1e-12)
+    periods: Parameter = param("1", "number of periods; negative: no end", default=-1.0)
+    offset: Parameter = param("*", "low value", default=0.0)
+    start_time: Parameter = param("s", "start of the first period", default=0.0)
+    y: Output = signal_out("*", "signal")
+    done: Discrete = discrete("1", "number of completed shapes")
+
+    def begin(self) -> Expr:
+        """Return when the next shape begins."""
+        unlimited = where(self.periods < 0, 1, where(self.done < self.periods, 1, 0))
+        return self.start_time + self.period * where(unlimited > 0, self.done, _NEVER)
+
+
+class Pulse(Periodic):
+    """Rectangular pulses."""
+
+    width: Parameter = param("1", "high part of the period", default=0.5, min=0, max=1)
+    stage = Mode("low", "high", description="part of the period")
+
+    def equations(self) -> Equations:
+        yield self.y == self.offset + self.stage.choose(low=0, high=self.amplitude)
+
+    def events(self) -> Events:
+        begin = self.begin()
+        yield self.stage.go("low", "high", at=begin)
+        yield self.stage.go("high", "low", at=begin + self.width * self.period, reset={self.done: self.done + 1})
+
+
+class Trapezoid(Periodic):
+    """Trapezoidal pulses."""
+
+    rising: Parameter = param("s", "duration of the rise", min=1e-12)
+    width: Parameter = param("s", "duration at the high value", min=0)
+    falling: Parameter = param("s", "duration of the fall", min=1e-12)
+    stage = Mode("low", "rising", "high", "falling", description="part of the period")
+
+    def equations(self) -> Equations:
+        elapsed = self.time - self.begin()
+        rise = elapsed / self.rising
+        fall = 1 - (elapsed - self.rising - self.width) / self.falling
+        shape = self.stage.choose(low=0, rising=rise, high=1, falling=fall)
+        yield self.y == self.offset + self.amplitude * shape
+
+    def events(self) -> Events:
+        begin = self.begin()
+        high = begin + self.rising
+        fall = high + self.width
+        yield self.stage.go("low", "rising", at=begin)
+        yield self.stage.go("rising", "high", at=high)
+        yield self.stage.go("high", "falling", at=fall)
+        yield self.stage.go("falling", "low", at=fall + self.falling, reset={self.done: self.done + 1})
+
+
+class Table(Component):
+    """Signal that interpolates in a table of time and value; beyond its ends the last slope goes on."""
+
+    table: tuple[tuple[float, float], ...]
+    """Rows of time in units of time_scale and value in units of scale."""
+    smooth: bool = False
+    """Interpolate with a continuous slope instead of straight lines."""
+    scale: Parameter = param("*", "what counts as 1 in the values", default=1.0)
+    time_scale: Parameter = param("s", "what counts as 1 in the times", default=1.0)
+    y: Output = signal_out("*", "signal")
+    row: Discrete = discrete("1", "number of the last row that was passed", start=-1.0)
+    kinks = Mode("ahead", description="rows still ahead")
+
+    def equations(self) -> Equations:
+        times, values = zip(*self.table, strict=True)
+        yield self.y == self.scale * interpolate(self.time / self.time_scale, times, values, smooth=self.smooth)
+
+    def events(self) -> Events:
+        following = _NEVER
+        for k in range(len(self.table) - 1, -1, -1):
+            following = where(self.row < k, self.table[k][0], following)
+        if not self.smooth:
+            yield self.kinks.go("ahead", "ahead", at=following * self.time_scale, reset={self.row: self.row + 1})

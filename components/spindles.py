@@ -1,0 +1,63 @@
+"""Spindles and slides: from rotation to translation."""
+
+from __future__ import annotations
+
+from math import pi
+
+from components.friction import DryFriction
+from components.interfaces import Flange, LinearFlange
+from modelica_like.language import Component, Equations, Expr, Parameter, Variable, der, param, var
+
+
+class BallScrew(Component):
+    """Ball screw without loss, elasticity and backlash: one turn moves the nut by the lead.
+
+    A positive torque on the spindle pushes the nut in positive direction.
+    """
+
+    flange_r = Flange("spindle")
+    flange_t = LinearFlange("nut")
+    inlet, outlet = "flange_r", "flange_t"
+    lead: Parameter = param("m", "travel per turn")
+
+    def equations(self) -> Equations:
+        yield 2 * pi * self.flange_t.s == self.lead * self.flange_r.phi
+        yield 2 * pi * self.flange_r.tau == -self.lead * self.flange_t.f
+
+
+class MachineTable(DryFriction):
+    """Machine table on a slideway: a mass with a constant process force, and dry friction with stiction."""
+
+    flange_a = LinearFlange("drive side", free=True)
+    flange_b = LinearFlange("far side", free=True)
+    m: Parameter = param("kg", "mass of table and workpiece", min=0)
+    f_load: Parameter = param("N", "process force against positive motion", default=0.0)
+    f_friction: Parameter = param("N", "sliding friction of the slideway", default=0.0, min=0)
+    s: Variable = var("m", "position")
+    v: Variable = var("m/s", "velocity", state="always")
+    f: Variable = var("N", "friction force against positive motion")
+
+    @property
+    def slip(self) -> Expr:
+        return self.v
+
+    @property
+    def friction(self) -> Expr:
+        return self.f
+
+    def sliding_friction(self, speed: Expr | float) -> Expr:
+        return self.f_friction
+
+    def equations(self) -> Equations:
+        yield from super().equations()
+        a, b = self.flange_a, self.flange_b
+        yield a.s == self.s
+        yield b.s == self.s
+        yield der(self.s) == self.v
+        yield self.m * der(self.v) == a.f + b.f - self.f_load - self.f
+
+    def stored_energy(self) -> Expr:
+        return 0.5 * self.m * self.v**2
+
+    def source_power(self) -> Expr:
+        return -self.f_load * self.v

@@ -1,0 +1,163 @@
+"""Elastic and damping elements, with and without backlash."""
+
+from __future__ import annotations
+
+from components.interfaces import (
+    Compliant,
+    CompliantWithRelativeStates,
+    LinearCompliant,
+    LinearCompliantWithRelativeStates,
+)
+from modelica_like.language import Equations, Events, Expr, Mode, Parameter, maximum, minimum, param
+
+
+class Spring(Compliant):
+    """Torsion spring: the torque is proportional to the twist."""
+
+    c: Parameter = param("N.m/rad", "stiffness", min=0)
+    phi_rel0: Parameter = param("rad", "relative angle without torque", default=0.0)
+
+    def equations(self) -> Equations:
+        yield from super().equations()
+        yield self.tau == self.c * (self.phi_rel - self.phi_rel0)
+
+    def stored_energy(self) -> Expr:
+        return 0.5 * self.c * (self.phi_rel - self.phi_rel0) ** 2
+
+
+class Damper(CompliantWithRelativeStates):
+    """Viscous damper: the torque is proportional to the relative speed."""
+
+    d: Parameter = param("N.m.s/rad", "damping coefficient", min=0)
+
+    def equations(self) -> Equations:
+        yield from super().equations()
+        yield self.tau == self.d * self.w_rel
+
+    def loss_power(self) -> Expr:
+        return self.d * self.w_rel**2
+
+
+class SpringDamper(CompliantWithRelativeStates):
+    """Torsion spring and viscous damper side by side, e.g. an elastic coupling."""
+
+    c: Parameter = param("N.m/rad", "stiffness", min=0)
+    d: Parameter = param("N.m.s/rad", "damping coefficient", min=0)
+    phi_rel0: Parameter = param("rad", "relative angle without torque", default=0.0)
+
+    def equations(self) -> Equations:
+        yield from super().equations()
+        yield self.tau == self.c * (self.phi_rel - self.phi_rel0) + self.d * self.w_rel
+
+    def stored_energy(self) -> Expr:
+        return 0.5 * self.c * (self.phi_rel - self.phi_rel0) ** 2
+
+    def loss_power(self) -> Expr:
+        return self.d * self.w_rel**2
+
+
+class ElastoBacklash(CompliantWithRelativeStates):
+    """Backlash in series with a spring and a damper side by side, e.g. a pair of gear flanks or a claw coupling.
+
+    Inside the backlash there is no torque. In contact, with the deformation x, spring torque c·x and damper torque
+    d·der(x) add, but the damper torque is limited to the spring torque: so the torque rises from zero when the flanks
+    meet, and it never pulls (Modelica Standard Library, Rotational.ElastoBacklash). Where a fast separation leaves the
+    flank behind, the energy of its deformation is counted as lost. Without backlash take a `SpringDamper`.
+    """
+
+    c: Parameter = param("N.m/rad", "stiffness in contact", min=0)
+    d: Parameter = param("N.m.s/rad", "damping coefficient in contact", default=0.0, min=0)
+    b: Parameter = param("rad", "total backlash", min=1e-10)
+    phi_rel0: Parameter = param("rad", "relative angle in the middle of the backlash", default=0.0)
+    contact = Mode("gap", "forward", "backward", description="flanks in contact")
+
+    @property
+    def phi_diff(self) -> Expr:
+        """Relative angle from the middle of the backlash."""
+        return self.phi_rel - self.phi_rel0
+
+    def contact_torque(self, deformation: Expr, rate: Expr) -> Expr:
+        """Return the torque of flanks that press forward."""
+        spring = self.c * deformation
+        return maximum(0, spring + minimum(spring, self.d * rate))
+
+    def equations(self) -> Equations:
+        yield from super().equations()
+        yield self.tau == self.contact.choose(
+            gap=0,
+            forward=self.contact_torque(self.phi_diff - 0.5 * self.b, self.w_rel),
+            backward=-self.contact_torque(-self.phi_diff - 0.5 * self.b, -self.w_rel),
+        )
+
+    def events(self) -> Events:
+        half = 0.5 * self.b
+        yield self.contact.initially("forward", when=self.phi_diff > half)
+        yield self.contact.initially("backward", when=self.phi_diff < -half)
+        yield self.contact.go("gap", "forward", when=self.phi_diff > half)
+        yield self.contact.go("gap", "backward", when=self.phi_diff < -half)
+        yield self.contact.go("forward", "gap", when=self.phi_diff < half)
+        yield self.contact.go("backward", "gap", when=self.phi_diff > -half)
+
+    def spring_torque(self) -> Expr:
+        """Return the elastic part of the torque."""
+        half = 0.5 * self.b
+        forward, backward = self.c * (self.phi_diff - half), self.c * (self.phi_diff + half)
+        return self.contact.choose(gap=0, forward=forward, backward=backward)
+
+    def stored_energy(self) -> Expr:
+        return 0.5 * self.spring_torque() ** 2 / self.c
+
+    def loss_power(self) -> Expr:
+        return (self.tau - self.spring_torque()) * self.w_rel
+
+
+class ElastoBacklash2(ElastoBacklash):
+    """Backlash whose damper acts in full as soon as the flanks meet: the torque may jump there, but it never pulls."""
+
+    def contact_torque(self, deformation: Expr, rate: Expr) -> Expr:
+        return maximum(0, self.c * deformation + self.d * rate)
+
+
+class TranslationalSpring(LinearCompliant):
+    """Spring: the force is proportional to the extension."""
+
+    c: Parameter = param("N/m", "stiffness", min=0)
+    s_rel0: Parameter = param("m", "relative position without force", default=0.0)
+
+    def equations(self) -> Equations:
+        yield from super().equations()
+        yield self.f == self.c * (self.s_rel - self.s_rel0)
+
+    def stored_energy(self) -> Expr:
+        return 0.5 * self.c * (self.s_rel - self.s_rel0) ** 2
+
+
+class TranslationalDamper(LinearCompliantWithRelativeStates):
+    """Viscous damper: the force is proportional to the relative velocity."""
+
+    d: Parameter = param("N.s/m", "damping coefficient", min=0)
+
+    def equations(self) -> Equations:
+        yield from super().equations()
+        yield self.f == self.d * self.v_rel
+
+    def loss_power(self) -> Expr:
+        return self.d * self.v_rel**2
+
+
+class TranslationalSpringDamper(LinearCompliantWithRelativeStates):
+    """Spring and viscous damper side by side."""
+
+    c: Parameter = param("N/m", "stiffness", min=0)
+    d: Parameter = param("N.s/m", "damping coefficient", min=0)
+    s_rel0: Parameter = param("m", "relative position without force", default=0.0)
+
+    def equations(self) -> Equations:
+        yield from super().equations()
+        yield self.f == self.c * (self.s_rel - self.s_rel0) + self.d * self.v_rel
+
+    def stored_energy(self) -> Expr:
+        return 0.5 * self.c * (self.s_rel - self.s_rel0) ** 2
+
+    def loss_power(self) -> Expr:
+        return self.d * self.v_rel**2

@@ -1,0 +1,1 @@
+"""Acausal component models of drive-trains."""

@@ -1,0 +1,184 @@
+"""One family of errors: what happened, where, why, and what to do about it."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """A place in a source file: a line of Python or of a netlist.
+
+    Attributes:
+        file: path of the file, as it was opened.
+        line: line number, counted from one; zero if it is not known.
+        text: the source text of the statement, on one line.
+    """
+
+    file: str
+    line: int = 0
+    text: str = ""
+
+    def __str__(self) -> str:
+        place = Path(self.file).name + (f":{self.line}" if self.line else "")
+        return f"{place} `{self.text}`" if self.text else place
+
+
+class ModelicaLikeError(Exception):
+    """Base of all errors of this package.
+
+    Args:
+        what: one sentence that says what is wrong and names the component.
+        where: source places, most relevant first.
+        why: one sentence with the reason, where it is not obvious.
+        advice: one sentence that says what to do.
+    """
+
+    def __init__(
+        self, what: str, *, where: Source | Iterable[Source] = (), why: str = "", advice: str = ""
+    ) -> None:
+        super().__init__(what)
+        self.what = what
+        self.where: tuple[Source, ...] = (where,) if isinstance(where, Source) else tuple(where)
+        self.why = why
+        self.advice = advice
+
+    def __str__(self) -> str:
+        lines = [self.what]
+        lines += [f"  in {source}" for source in self.where]
+        lines += [text for text in (self.why, self.advice) if text]
+        return "\n".join(lines)
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return _rebuild, (type(self), self.what, self.where, self.why, self.advice)
+
+
+def _rebuild(
+    kind: type[ModelicaLikeError], what: str, where: tuple[Source, ...], why: str, advice: str
+) -> ModelicaLikeError:
+    return kind(what, where=where, why=why, advice=advice)
+
+
+class LanguageError(ModelicaLikeError):
+    """A component class is declared in a way that means nothing."""
+
+
+class ComponentUnbalanced(LanguageError):
+    """A component has not as many equations as unknowns of its own."""
+
+
+class UnitError(ModelicaLikeError):
+    """A unit is unknown, or a value has the wrong one."""
+
+
+class UnitMismatch(UnitError):
+    """The two sides of an equation or of a connection differ in dimension."""
+
+
+class ValueOutOfRange(ModelicaLikeError):
+    """A value is not finite, or outside the declared range."""
+
+
+class UnknownName(ModelicaLikeError):
+    """A name of a component, connector, parameter, variable or type does not exist."""
+
+
+class DuplicateName(ModelicaLikeError):
+    """A name is used twice."""
+
+
+class MissingValue(ModelicaLikeError):
+    """A parameter without default, or an input, has no value."""
+
+
+class NetlistError(ModelicaLikeError):
+    """A netlist file cannot be read, or does not have the form of a netlist."""
+
+
+class CyclicAssembly(NetlistError):
+    """A netlist contains itself, or parameters depend on each other in a circle."""
+
+
+class WrongConnection(ModelicaLikeError):
+    """Connectors of different kinds, or two outputs, are joined."""
+
+
+class FreeFlange(ModelicaLikeError):
+    """A connector that must be connected is free."""
+
+
+class WiringErrors(ModelicaLikeError):
+    """Several errors of the wiring, told together."""
+
+    def __init__(
+        self, what: str, *, errors: Sequence[ModelicaLikeError] = (), where: Iterable[Source] = (),
+        why: str = "", advice: str = "",
+    ) -> None:  # fmt: skip
+        super().__init__(what, where=where, why=why, advice=advice)
+        self.errors = tuple(errors)
+
+    def __str__(self) -> str:
+        return "\n\n".join(str(error) for error in self.errors)
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return raise_together_or_one, (self.errors,)
+
+
+def raise_together_or_one(errors: Sequence[ModelicaLikeError]) -> ModelicaLikeError:
+    """Return the only error as it is, several as one `WiringErrors`."""
+    if len(errors) == 1:
+        return errors[0]
+    return WiringErrors(f"{len(errors)} errors", errors=errors)
+
+
+class StructureError(ModelicaLikeError):
+    """The equations cannot determine the unknowns."""
+
+
+class Underdetermined(StructureError):
+    """There are more unknowns than equations for them."""
+
+
+class Overdetermined(StructureError):
+    """There are more equations than unknowns in them."""
+
+
+class InitializationError(ModelicaLikeError):
+    """Start values are missing, contradict each other, or cannot be found."""
+
+
+class MissingStart(InitializationError):
+    """The initialisation lacks an equation."""
+
+
+class ContradictingStart(InitializationError):
+    """Start values contradict each other by the equations of the model."""
+
+
+class SolveError(ModelicaLikeError):
+    """The simulation cannot go on."""
+
+
+class SingularAtStart(SolveError):
+    """A block of equations has no unique solution at the start or after an event."""
+
+
+class Chattering(SolveError):
+    """Modes switch without end."""
+
+
+class StepFailed(SolveError):
+    """The integrator gave up."""
+
+
+class MissingExtra(ModelicaLikeError):
+    """An optional package is not installed."""
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """Return `; did you mean 'sun'?` for the known name nearest to `name`, or an empty string."""
+    near = difflib.get_close_matches(name, list(known), n=1, cutoff=0.55)
+    return f"; did you mean '{near[0]}'?" if near else ""

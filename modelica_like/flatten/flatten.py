@@ -1,0 +1,242 @@
+"""From a component tree to flat equations."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi as ca
+
+from modelica_like.errors import MissingValue, ModelicaLikeError, Source, raise_together_or_one
+from modelica_like.flatten.model import (
+    FlatDiscrete, FlatModel, FlatVariable, Instance, LinearEquation, Origin, StartValue,
+)  # fmt: skip
+from modelica_like.flatten.parameters import Parameters
+from modelica_like.flatten.template import Template, template_of, unit_of_field
+from modelica_like.flatten.wiring import Wiring
+from modelica_like.language.component import Component
+from modelica_like.language.declared import Declared
+from modelica_like.language.expr import TIME
+from modelica_like.language.fields import Discrete, Input, Output, Parameter, Variable
+from modelica_like.units import ONE
+
+_WIRE = Source("")
+
+
+def flatten(root: Component) -> FlatModel:
+    """Write out all equations of a component tree.
+
+    Args:
+        root: the model; its own inputs become inputs of the flat model.
+
+    Raises:
+        WiringErrors, WrongConnection, FreeFlange, MissingValue: everything wrong with the wiring, told together.
+        LanguageError, UnitMismatch: a component class is declared wrongly.
+        CyclicAssembly: parameters depend on each other in a circle.
+    """
+    return _Flattener(root).run()
+
+
+class _Flattener:
+    def __init__(self, root: Component) -> None:
+        self.root = root
+        self.wiring = Wiring()
+        self.parameters = Parameters(root)
+        self.variables: list[FlatVariable] = []
+        self.variable_of: dict[tuple[int, str], int] = {}
+        self.nodes: list[tuple[int, int]] = []
+        self.derivative: dict[int, int] = {}
+        self.discretes: list[FlatDiscrete] = []
+        self.discrete_of: dict[tuple[int, str], int] = {}
+        self.linear: list[LinearEquation] = []
+        self.starts: list[StartValue] = []
+        self.inputs: list[int] = []
+        self.errors: list[ModelicaLikeError] = []
+
+    def run(self) -> FlatModel:
+        templates = self._elaborate()
+        for component, _ in templates:
+            self._declare(component)
+        self.nodes = [(k, 0) for k in range(len(self.variables))]
+        instances = [self._instance(component, template) for component, template in templates]
+        self._connect()
+        for component, _ in templates:
+            self._bind_inputs(component)
+            self._read_starts(component)
+            self.wiring.check_free(component)
+        self.wiring.check_signal_units()
+        errors = [*self.errors, *self.wiring.errors]
+        if errors:
+            raise raise_together_or_one(errors)
+        general = self._split_linear(instances)
+        d = ca.vertcat(*(ca.SX.sym(one.path) for one in self.discretes))
+        return FlatModel(
+            name=self.root.label, variables=self.variables, nodes=self.nodes, derivative=self.derivative,
+            parameters=self.parameters.flat, p=self.parameters.symbols(), q=self.parameters.expressions(),
+            discretes=self.discretes, d=d, time=ca.SX(TIME), instances=instances, linear=self.linear,
+            general=general, starts=self.starts, inputs=self.inputs,
+            components={component.path: component for component, _ in templates},
+        )  # fmt: skip
+
+    def _elaborate(self) -> list[tuple[Component, Template]]:
+        """Find all templates, owners first: what an owner connects decides which optional connectors its parts have."""
+        found: list[tuple[Component, Template]] = []
+        for component in self.root.walk():
+            for part in component.parts.values():
+                for connector in part.connectors.values():
+                    connector.__dict__["_used"] = not connector.optional
+            template = template_of(component)
+            found.append((component, template))
+            for statement in template.connections:
+                self.wiring.add(component, statement)
+            for name, unit in template.inferred.items():
+                self.wiring.inferred[id(component), name] = unit
+        return found
+
+    # -- declarations ------------------------------------------------------------------------------------------------
+
+    def _declare(self, component: Component) -> None:
+        path = component.path
+        prefix = f"{path}." if path else ""
+        for name, field in component.fields.items():
+            if isinstance(field, Variable):
+                kind = "input" if isinstance(field, Input) else "output" if isinstance(field, Output) else "local"
+                self._declare_variable(component, name, prefix + name, kind, field)
+            elif isinstance(field, Discrete):
+                self._declare_discrete(component, name, prefix + name, field)
+            elif isinstance(field, Parameter):
+                self.parameters.declare(component, name, prefix + name)
+        for name, mode in component.modes.items():
+            self.discrete_of[id(component), name] = len(self.discretes)
+            start = mode.number(component.start_mode(name))
+            self.discretes.append(FlatDiscrete(prefix + name, ONE, mode.description, start, mode.names))
+        for end, connector in component.connectors.items():
+            if connector.used:
+                for name, field in connector.fields.items():
+                    if isinstance(field, Variable):
+                        kind = "flow" if field.is_flow else "potential"
+                        self._declare_variable(connector, name, f"{prefix}{end}.{name}", kind, field)
+
+    def _declare_variable(self, owner: Declared, name: str, path: str, kind: str, field: Variable) -> None:
+        self.variable_of[id(owner), name] = len(self.variables)
+        unit = self.wiring.inferred.get((id(owner), name)) or unit_of_field(owner, name)
+        self.variables.append(
+            FlatVariable(path, unit, field.description, kind, field.state, field.guess, field.nominal, field.min, field.max)
+        )
+
+    def _declare_discrete(self, component: Component, name: str, path: str, field: Discrete) -> None:
+        value = component.start(name)
+        scope = component._owner if name in component._starts else component
+        start = 0.0 if value is None else self.parameters.evaluate(value, scope or component, path)
+        self.discrete_of[id(component), name] = len(self.discretes)
+        self.discretes.append(FlatDiscrete(path, field.unit, field.description, start))
+
+    # -- instances ---------------------------------------------------------------------------------------------------
+
+    def _instance(self, component: Component, template: Template) -> Instance:
+        nodes = [self._node(self._variable(component, slot.path), slot.order) for slot in template.slots]
+        parameters = [self._parameter(component, name) for name in template.parameters]
+        discretes = [self.discrete_of[self._owner(component, name)] for name in template.discretes]
+        return Instance(component.path, template, tuple(nodes), tuple(parameters), tuple(discretes))
+
+    def _owner(self, component: Component, path: str) -> tuple[int, str]:
+        """Return identity and field name for a path relative to a component."""
+        owner: Any = component
+        *names, name = path.split(".")
+        for step in names:
+            owner = owner.connectors[step] if step in owner.connectors else owner.parts[step]
+        return id(owner), name
+
+    def _variable(self, component: Component, path: str) -> int:
+        return self.variable_of[self._owner(component, path)]
+
+    def _parameter(self, component: Component, path: str) -> int:
+        *names, name = path.split(".")
+        return self.parameters.position(component.find(".".join(names)), name)
+
+    def _node(self, variable: int, order: int) -> int:
+        node = variable
+        for level in range(1, order + 1):
+            if node not in self.derivative:
+                self.derivative[node] = len(self.nodes)
+                self.nodes.append((variable, level))
+            node = self.derivative[node]
+        return node
+
+    # -- equations ---------------------------------------------------------------------------------------------------
+
+    def _connect(self) -> None:
+        for ends in self.wiring.sets():
+            connectors = [self.wiring.connectors[end] for end in ends]
+            source = self.wiring.sources[ends[0]]
+            for name, field in connectors[0].fields.items():
+                if not isinstance(field, Variable):
+                    continue
+                nodes = [self.variable_of[id(connector), name] for connector in connectors]
+                origin = Origin(" – ".join(connector.path for connector in connectors), "connection", source)
+                if field.is_flow:
+                    signs = [1.0 if seen_outside else -1.0 for _, seen_outside in ends]
+                    self.linear.append(LinearEquation(tuple(zip(nodes, signs, strict=True)), 0.0, origin))
+                else:
+                    for node in nodes[1:]:
+                        self.linear.append(LinearEquation(((nodes[0], 1.0), (node, -1.0)), 0.0, origin))
+        for component in self.root.walk():
+            for connector in component.connectors.values():
+                if connector.used and not self.wiring.is_connected(connector):
+                    self._end_flows(connector.path, connector)
+        for driver, sink, source in self.wiring.signals:
+            nodes = [self.variable_of[id(symbol.owner), symbol.name] for symbol in (driver, sink)]
+            origin = Origin(self.variables[nodes[1]].path, "connection", source)
+            self.linear.append(LinearEquation(((nodes[0], 1.0), (nodes[1], -1.0)), 0.0, origin))
+
+    def _end_flows(self, path: str, connector: Any) -> None:
+        for name, field in connector.fields.items():
+            if isinstance(field, Variable) and field.is_flow:
+                node = self.variable_of[id(connector), name]
+                self.linear.append(LinearEquation(((node, 1.0),), 0.0, Origin(path, "free end", _WIRE)))
+
+    def _bind_inputs(self, component: Component) -> None:
+        for name, field in component.fields.items():
+            if not isinstance(field, Input) or (id(component), name) in self.wiring.driven:
+                continue
+            node = self.variable_of[id(component), name]
+            path = self.variables[node].path
+            if component is self.root:
+                self.inputs.append(node)
+            elif component.value(name) is not None:
+                value = self.parameters.q(self.parameters.declare(component, name, path))
+                self.linear.append(LinearEquation(((node, 1.0),), -value, Origin(path, "value", _WIRE)))
+            else:
+                self.errors.append(
+                    MissingValue(f"{path} is an input without a value.", advice="Connect it or give it a value.")
+                )
+
+    def _read_starts(self, component: Component) -> None:
+        for name, value in component._starts.items():
+            field = component.fields[name]
+            if isinstance(field, Variable):
+                node = self.variable_of[id(component), name]
+                path = self.variables[node].path
+                start = self.parameters.evaluate(value, component._owner or component, path)
+                origin = Origin(path, "start value", _WIRE)
+                self.starts.append(StartValue(node, start, value.fixed, origin))
+
+    def _split_linear(self, instances: list[Instance]) -> list[tuple[int, int]]:
+        """Move the components' linear equations to the linear ones; return the others."""
+        q = self.parameters.expressions()
+        general: list[tuple[int, int]] = []
+        for number, instance in enumerate(instances):
+            template = instance.template
+            values: Any = None
+            for row, form in enumerate(template.linear):
+                if form is None:
+                    general.append((number, row))
+                    continue
+                if values is None and template.coefficients.numel_out(0):
+                    values = template.coefficients(q[list(instance.parameters)])
+                number_of = lambda c, values=values: c if isinstance(c, float) else values[int(c)]  # noqa: E731
+                terms = tuple(
+                    (instance.nodes[slot], number_of(c)) for slot, c in zip(form.slots, form.coefficients, strict=True)
+                )
+                origin = Origin(instance.path, template.component, template.sources[row])
+                self.linear.append(LinearEquation(terms, number_of(form.constant), origin, (number, row)))
+        return general

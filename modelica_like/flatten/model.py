@@ -1,0 +1,186 @@
+"""The flat model: every variable by its path, every equation with its origin, no hierarchy left."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import casadi as ca
+
+from modelica_like.errors import Source
+from modelica_like.flatten.template import Template
+from modelica_like.language.component import Component
+from modelica_like.language.fields import StatePreference
+from modelica_like.units import Unit
+
+
+@dataclass(frozen=True, slots=True)
+class FlatVariable:
+    """A continuous variable; `kind` is local, output, input, potential or flow."""
+
+    path: str
+    unit: Unit
+    description: str
+    kind: str
+    state: StatePreference
+    guess: float
+    nominal: float
+    min: float | None
+    max: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class FlatParameter:
+    """An independent parameter with its value in SI units."""
+
+    path: str
+    unit: Unit
+    description: str
+    value: float
+    min: float | None
+    max: float | None
+    tunable: bool
+
+
+@dataclass(frozen=True, slots=True)
+class FlatDiscrete:
+    """A mode (with `names`) or a discrete value (without); `start` is a number or an expression of parameters."""
+
+    path: str
+    unit: Unit
+    description: str
+    start: Any
+    names: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Origin:
+    """Where an equation comes from: path and type of the component, and the source line."""
+
+    path: str
+    kind: str
+    source: Source
+
+    def __str__(self) -> str:
+        return f"{self.path or self.kind}: {self.source}" if self.source.file else (self.path or self.kind)
+
+
+@dataclass(frozen=True, slots=True)
+class LinearEquation:
+    """sum(coefficient * node) + constant = 0, with coefficients of parameters only.
+
+    Attributes:
+        row: (instance, row) if it is also a row of a template's residual.
+    """
+
+    terms: tuple[tuple[int, Any], ...]
+    constant: Any
+    origin: Origin
+    row: tuple[int, int] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Instance:
+    """A component in the flat model: where its template's slots, parameters and discretes are."""
+
+    path: str
+    template: Template
+    nodes: tuple[int, ...]
+    parameters: tuple[int, ...]
+    discretes: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class StartValue:
+    """A fixed or guessed start value; `value` is a number or an expression of parameters."""
+
+    node: int
+    value: Any
+    fixed: bool
+    origin: Origin
+
+
+@dataclass(frozen=True, eq=False)
+class FlatModel:
+    """Flat equations over nodes; node k < len(variables) is variable k, later nodes are derivatives.
+
+    Attributes:
+        nodes: (variable, order) of every node.
+        derivative: node -> node of its time derivative.
+        p: symbols of the independent parameters.
+        q: expressions of all parameters that instances use (positions in `Instance.parameters`).
+        d: symbols of modes and discrete values.
+        linear: connection equations, bindings and the components' own linear equations.
+        general: (instance, row) of the remaining equations.
+        inputs: variables that come from outside.
+        components: the tree the model was made from.
+    """
+
+    name: str
+    variables: list[FlatVariable]
+    nodes: list[tuple[int, int]]
+    derivative: dict[int, int]
+    parameters: list[FlatParameter]
+    p: Any
+    q: Any
+    discretes: list[FlatDiscrete]
+    d: Any
+    time: Any
+    instances: list[Instance]
+    linear: list[LinearEquation]
+    general: list[tuple[int, int]]
+    starts: list[StartValue]
+    inputs: list[int]
+    components: dict[str, Component] = field(repr=False)
+
+    def node_name(self, node: int) -> str:
+        """Return the name of a node: `motor.phi`, `der(motor.phi)`."""
+        variable, order = self.nodes[node]
+        return f"{'der(' * order}{self.variables[variable].path}{')' * order}"
+
+    def origin(self, instance: int, row: int) -> Origin:
+        """Return where an equation of an instance comes from."""
+        one = self.instances[instance]
+        return Origin(one.path, one.template.component, one.template.sources[row])
+
+    def __str__(self) -> str:
+        unknowns = len(self.variables) - len(self.inputs)
+        return (
+            f"FlatModel {self.name}: {len(self.linear) + len(self.general)} equations, {unknowns} unknowns, "
+            f"{len(self.parameters)} parameters, {len(self.discretes)} discrete values"
+        )
+
+
+def evaluate(model: FlatModel, function: str, values: Any, slots: str = "nodes") -> dict[int, Any]:
+    """Evaluate one function of every instance's template.
+
+    Args:
+        function: name of the function in `Template`.
+        values: symbolic vector with one entry per node.
+
+    Returns:
+        For every instance the column of results.
+    """
+    groups: dict[int, list[int]] = {}
+    for number, instance in enumerate(model.instances):
+        groups.setdefault(id(instance.template), []).append(number)
+    results: dict[int, Any] = {}
+    for members in groups.values():
+        call: ca.Function = getattr(model.instances[members[0]].template, function)
+        if call.numel_out(0) == 0:
+            continue
+        v = _gather(values, [model.instances[k].nodes for k in members])
+        p = _gather(model.q, [model.instances[k].parameters for k in members])
+        d = _gather(model.d, [model.instances[k].discretes for k in members])
+        t = ca.repmat(model.time, 1, len(members))
+        columns = ca.horzsplit(call.map(len(members))(v, p, d, t))
+        results.update(zip(members, columns, strict=True))
+    return results
+
+
+def _gather(vector: Any, rows: list[tuple[int, ...]]) -> Any:
+    height = len(rows[0])
+    if height == 0:
+        return ca.SX(0, len(rows))
+    flat = [k for row in rows for k in row]
+    return ca.reshape(vector[flat], height, len(rows))

@@ -1,0 +1,120 @@
+"""Parameters of the flat model: independent ones, and those that follow from others."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi as ca
+
+from modelica_like.errors import CyclicAssembly, MissingValue
+from modelica_like.flatten.model import FlatParameter
+from modelica_like.flatten.template import unit_of_field
+from modelica_like.language.component import Component
+from modelica_like.language.declared import unknown
+from modelica_like.language.expr import leaf_id
+from modelica_like.language.fields import Input, Parameter, Value
+from modelica_like.unitcheck import Dimensions, check_expression
+
+
+class Parameters:
+    """Collects parameters while the tree is flattened.
+
+    Every declared parameter has a position in the vector q; those with a value of their own also one in p.
+    """
+
+    def __init__(self, root: Component) -> None:
+        self.root = root
+        self.flat: list[FlatParameter] = []
+        self._symbols: list[Any] = []
+        self._q: list[Any] = []
+        self._position: dict[tuple[int, str], int] = {}
+        self._open: list[str] = []
+        self._by_leaf: dict[int, int] = {}
+        self._dimensions = Dimensions(lambda leaf: self.flat[self._by_leaf[leaf_id(leaf)]].unit)
+
+    def declare(self, component: Component, name: str, path: str) -> int | None:
+        """Give a parameter its place in q; None if it has no value."""
+        key = id(component), name
+        if key in self._position:
+            return self._position[key]
+        value = component.value(name)
+        if value is None:
+            return None
+        if value.formula is None:
+            expression = self._independent(component, name, path, value)
+        else:
+            expression = self._dependent(component, name, path, value)
+        self._position[key] = len(self._q)
+        self._q.append(expression)
+        return self._position[key]
+
+    def _independent(self, component: Component, name: str, path: str, value: Value) -> Any:
+        field = component.fields[name]
+        symbol = ca.SX.sym(path)
+        self._by_leaf[leaf_id(symbol)] = len(self.flat)
+        unit = unit_of_field(component, name)
+        tunable = field.tunable if isinstance(field, Parameter) else True
+        number = value.number if value.number is not None else 0.0
+        self.flat.append(FlatParameter(path, unit, field.description, number, field.min, field.max, tunable))
+        self._symbols.append(symbol)
+        return symbol
+
+    def _dependent(self, component: Component, name: str, path: str, value: Value) -> Any:
+        if path in self._open:
+            circle = " → ".join([*self._open[self._open.index(path) :], path])
+            raise CyclicAssembly(f"Parameters depend on each other in a circle: {circle}.", advice="Give one a number.")
+        self._open.append(path)
+        # A value given in an assembly speaks the assembly's names, a default those of the component itself.
+        scope = component._owner if name in component._values and isinstance(component._owner, Component) else component
+        expression = self.evaluate(value, scope, path)
+        self._open.pop()
+        return expression
+
+    def evaluate(self, value: Value, scope: Any, label: str) -> Any:
+        """Return the number or the expression of a value.
+
+        Raises:
+            UnknownName: the formula uses a parameter that does not exist.
+            UnitMismatch: the formula has another dimension than it should.
+            CyclicAssembly: the formula needs itself.
+        """
+        if value.formula is None:
+            return value.number
+        expression = ca.SX(value.formula.evaluate(lambda path: self._look_up(scope, path, label)))
+        check_expression(expression, value.unit, self._dimensions, f"{label} = {value.formula}")
+        return expression
+
+    def _look_up(self, scope: Component, path: str, label: str) -> Any:
+        owner_path, _, name = path.rpartition(".")
+        owner = scope.find(owner_path)
+        field = owner.fields.get(name)
+        if not isinstance(field, Parameter | Input):
+            known = [key for key, one in owner.fields.items() if isinstance(one, Parameter)]
+            raise unknown("parameter", f"{label}: {owner.label}", path, known)
+        full = f"{owner.path}.{name}" if owner.path else name
+        return self._q[self.position(owner, name, full)]
+
+    def position(self, component: Component, name: str, path: str = "") -> int:
+        """Return the position of a parameter in q.
+
+        Raises:
+            MissingValue: it has no value.
+        """
+        label = path or (f"{component.path}.{name}" if component.path else name)
+        position = self.declare(component, name, label)
+        if position is None:
+            kind = type(component).__name__
+            raise MissingValue(f"{label} ({kind}) has no value.", advice=f"Give it one: {name} = …")
+        return position
+
+    def q(self, position: int | None) -> Any:
+        """Return one entry of q."""
+        return 0.0 if position is None else self._q[position]
+
+    def symbols(self) -> Any:
+        """Return the vector p."""
+        return ca.vertcat(*self._symbols) if self._symbols else ca.SX(0, 1)
+
+    def expressions(self) -> Any:
+        """Return the vector q."""
+        return ca.vertcat(*map(ca.SX, self._q)) if self._q else ca.SX(0, 1)

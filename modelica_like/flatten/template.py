@@ -1,0 +1,370 @@
+"""Templates: the equations of a component class, written out once and used for all its instances."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Any, cast
+
+import casadi as ca
+
+from modelica_like.errors import ComponentUnbalanced, LanguageError, ModelicaLikeError, Source, raise_together_or_one
+from modelica_like.flatten.conditions import guard_of
+from modelica_like.language.component import Component
+from modelica_like.language.declared import Declared
+from modelica_like.language.equation import (
+    Connection, Equation, FreeEnd, StartMode, Transition, as_event, as_statement, located,
+)  # fmt: skip
+from modelica_like.language.expr import TIME, Symbol, is_expression, symbols_in
+from modelica_like.language.fields import Field, Input, Parameter, Variable
+from modelica_like.unitcheck import Dimensions, check_equation, check_expression
+from modelica_like.units import ANY, ONE, Unit, parse_unit
+
+_SECOND = parse_unit("s")
+_WATT, _JOULE = parse_unit("W"), parse_unit("J")
+
+
+@dataclass(frozen=True)
+class Slot:
+    """A symbol of a template: path from the component, and order of differentiation."""
+
+    path: str
+    order: int = 0
+
+
+@dataclass(frozen=True)
+class LinearForm:
+    """sum(coefficients * slots) + constant = 0; coefficients are functions of parameters.
+
+    Attributes:
+        slots: numbers of the slots.
+        coefficients: a number, or the position in `Template.coefficients`.
+        constant: likewise.
+    """
+
+    slots: tuple[int, ...]
+    coefficients: tuple[float | str, ...]
+    constant: float | str
+
+
+@dataclass(frozen=True)
+class TransitionForm:
+    """A transition without its expressions.
+
+    Attributes:
+        mode: path of the mode from the component.
+        sources: numbers of the modes it leaves.
+        target: number of the mode it enters.
+        timed: whether it is a time event.
+        index: position in the guards, or in the moments.
+        resets: pairs of what is reset (slot path) and the position in the resets.
+    """
+
+    mode: str
+    sources: tuple[int, ...]
+    target: int
+    timed: bool
+    index: int
+    resets: tuple[tuple[str, int], ...]
+    source: Source
+
+
+@dataclass(frozen=True)
+class Template:
+    """The equations of a component, as CasADi functions of (v, p, d, t).
+
+    v are the slots, p the parameters, d modes and discrete values, t time.
+    """
+
+    component: str
+    slots: tuple[Slot, ...]
+    parameters: tuple[str, ...]
+    discretes: tuple[str, ...]
+    residual: ca.Function
+    sources: tuple[Source, ...]
+    incidence: tuple[tuple[int, ...], ...]
+    linear: tuple[LinearForm | None, ...]
+    coefficients: ca.Function
+    transitions: tuple[TransitionForm, ...]
+    guards: ca.Function
+    moments: ca.Function
+    resets: ca.Function
+    start_modes: tuple[tuple[str, int, Source], ...]
+    start_conditions: ca.Function
+    energy_slots: tuple[Slot, ...]
+    energy: ca.Function
+    connections: tuple[Connection | FreeEnd, ...] = field(compare=False)
+    inferred: dict[str, Unit] = field(compare=False)
+
+
+class Names:
+    """Symbols of a component in a fixed order, by kind."""
+
+    def __init__(self, root: Component) -> None:
+        self.root = root
+        self.variables: dict[Slot, Symbol] = {}
+        self.parameters: dict[str, Symbol] = {}
+        self.discretes: dict[str, Symbol] = {}
+
+    def add(self, expressions: Iterable[Any]) -> None:
+        for expression in expressions:
+            if not is_expression(expression):
+                continue
+            for symbol in symbols_in(expression):
+                if symbol is not TIME:
+                    self._add(symbol)
+
+    def _add(self, symbol: Symbol) -> None:
+        path = relative_path(symbol.owner, self.root, symbol.name)
+        kind = symbol.owner.fields.get(symbol.name)
+        if isinstance(kind, Variable):
+            self.variables.setdefault(Slot(path, symbol.order), symbol)
+        elif isinstance(kind, Parameter):
+            self.parameters.setdefault(path, symbol)
+        else:
+            self.discretes.setdefault(path, symbol)
+
+    def function(self, name: str, outputs: list[Any]) -> ca.Function:
+        inputs = [ca.vertcat(*map(ca.SX, group.values())) for group in (self.variables, self.parameters, self.discretes)]
+        return ca.Function(name, [*inputs, ca.SX(TIME)], [ca.vertcat(*(ca.SX(e) for e in outputs))], ["v", "p", "d", "t"], [name])
+
+
+def relative_path(owner: Declared, root: Component, name: str) -> str:
+    """Return the dotted path of a field of `owner`, seen from `root`."""
+    names = [name]
+    node: Declared | None = owner
+    while node is not root:
+        if node is None:
+            raise LanguageError(f"{root.label} uses '{name}' of a component that is not part of it.")
+        names.append(node._name)
+        node = node._owner
+    return ".".join(reversed(names))
+
+
+def template_of(component: Component) -> Template:
+    """Return the template of a component; leaf components of one class and structure share theirs.
+
+    Raises:
+        LanguageError, UnitMismatch, ComponentUnbalanced: the class is declared wrongly.
+    """
+    if component.parts or component.fields is not component._class_fields:
+        return _build(component)
+    cache: dict[Any, Template] = _class_cache(type(component))
+    key = _structural_key(component)
+    if key not in cache:
+        cache[key] = _build(component)
+    return cache[key]
+
+
+def _class_cache(kind: type[Component]) -> dict[Any, Template]:
+    if "_templates" not in vars(kind):
+        kind._templates = {}  # type: ignore[attr-defined]
+    return vars(kind)["_templates"]
+
+
+def _structural_key(component: Component) -> tuple[Any, ...]:
+    structural = tuple(component.__dict__[name] for name in component._structural)
+    used = tuple(name for name, connector in component.connectors.items() if connector.used)
+    given = tuple(name for name, field in component.fields.items() if field.default is None and component.given(name))
+    units = tuple(str(unit_of_field(component, name)) for name, f in component.fields.items() if f.unit == ANY)
+    return structural, used, given, units
+
+
+def unit_of_field(owner: Declared, name: str) -> Unit:
+    """Return the unit of a field: as declared, or that of its value where `*` is declared."""
+    declared = owner.fields[name].unit
+    if declared == ANY and isinstance(owner, Component) and isinstance(owner.fields[name], Parameter | Input):
+        value = owner.value(name)
+        return ANY if value is None else value.unit
+    return declared
+
+
+def _build(component: Component) -> Template:
+    kind = type(component).__name__
+    statements = [as_statement(item, source, kind) for item, source in located(component.equations())]
+    events = [as_event(item, source, kind) for item, source in located(component.events())]
+    equations = [s for s in statements if isinstance(s, Equation)]
+    wiring = tuple(s for s in statements if isinstance(s, Connection | FreeEnd))
+    _check_balance(component, equations)
+    inferred = _check_units(component, equations, events)
+    residuals = [e.left - e.right for e in equations]
+    transitions = [e for e in events if isinstance(e, Transition)]
+    starts = [e for e in events if isinstance(e, StartMode)]
+    guards = [ca.SX(0) if t.when is None else guard_of(t.when, t.source) for t in transitions]
+    moments = [ca.SX(0) if t.at is None else t.at for t in transitions]
+    resets = [(target, value) for t in transitions for target, value in t.reset.items()]
+    names = Names(component)
+    names.add([*residuals, *guards, *moments, *(x for pair in resets for x in pair), *(s.when for s in starts)])
+    names.add(ca.SX(s.mode.symbol) for s in (*transitions, *starts))
+    energy, energy_terms = Names(component), _energy_terms(component)
+    energy.parameters, energy.discretes = names.parameters, names.discretes
+    energy.add(energy_terms)
+    residual = names.function("residual", residuals)
+    linear, coefficients = _linear_forms(names, residuals)
+    return Template(
+        component=kind,
+        slots=tuple(names.variables),
+        parameters=tuple(names.parameters),
+        discretes=tuple(names.discretes),
+        residual=residual,
+        sources=tuple(e.source for e in equations),
+        incidence=_rows(residual.jac_sparsity(0, 0)),
+        linear=linear,
+        coefficients=coefficients,
+        transitions=_transition_forms(component, transitions),
+        guards=names.function("guards", guards),
+        moments=names.function("moments", moments),
+        resets=names.function("resets", [value for _, value in resets]),
+        start_modes=tuple((_mode_path(component, s), s.mode.mode.number(s.target), s.source) for s in starts),
+        start_conditions=names.function("start_conditions", [s.when for s in starts]),
+        energy_slots=tuple(energy.variables),
+        energy=energy.function("energy", energy_terms),
+        connections=wiring,
+        inferred=inferred,
+    )
+
+
+def _mode_path(component: Component, statement: Transition | StartMode) -> str:
+    symbol = statement.mode.symbol
+    return relative_path(symbol.owner, component, symbol.name)
+
+
+def _transition_forms(component: Component, transitions: list[Transition]) -> tuple[TransitionForm, ...]:
+    forms: list[TransitionForm] = []
+    position = 0
+    for index, t in enumerate(transitions):
+        resets: list[tuple[str, int]] = []
+        for target in t.reset:
+            symbol = symbols_in(target)[0]
+            resets.append((relative_path(symbol.owner, component, symbol.name), position))
+            position += 1
+        numbers = tuple(t.mode.mode.number(name) for name in t.sources)
+        forms.append(
+            TransitionForm(
+                _mode_path(component, t), numbers, t.mode.mode.number(t.target), t.at is not None, index, tuple(resets), t.source
+            )
+        )
+    return tuple(forms)
+
+
+def _energy_terms(component: Component) -> list[Any]:
+    """Stored energy, loss, source power, then the power into each connector."""
+    terms: list[Any] = [component.stored_energy(), component.loss_power(), component.source_power()]
+    terms += [connector.power() if connector.used else 0.0 for connector in component.connectors.values()]
+    return [ca.SX(cast(Any, term)) for term in terms]
+
+
+def _rows(sparsity: ca.Sparsity) -> tuple[tuple[int, ...], ...]:
+    rows: list[list[int]] = [[] for _ in range(sparsity.size1())]
+    for row, column in zip(*sparsity.get_triplet(), strict=True):
+        rows[row].append(column)
+    return tuple(tuple(sorted(row)) for row in rows)
+
+
+def _linear_forms(names: Names, residuals: list[Any]) -> tuple[tuple[LinearForm | None, ...], ca.Function]:
+    """Find the equations that are linear in all their slots, with coefficients that only parameters determine."""
+    v = ca.vertcat(*map(ca.SX, names.variables.values()))
+    p = ca.vertcat(*map(ca.SX, names.parameters.values()))
+    others = ca.vertcat(v, *map(ca.SX, names.discretes.values()), ca.SX(TIME))
+    values: list[Any] = []
+
+    def entry(expression: Any) -> float | str:
+        if expression.is_constant():
+            return float(expression)
+        values.append(expression)
+        return str(len(values) - 1)
+
+    forms: list[LinearForm | None] = []
+    for residual in residuals:
+        residual = ca.SX(residual)
+        jacobian = ca.jacobian(residual, v) if v.numel() else ca.SX(1, 0)
+        constant = ca.substitute(residual, v, ca.SX.zeros(v.shape)) if v.numel() else residual
+        if any(ca.which_depends(ca.vertcat(*jacobian.nonzeros(), constant), others, 1, True)):
+            forms.append(None)
+            continue
+        columns = jacobian.sparsity().get_triplet()[1]
+        entries = tuple(entry(ca.SX(e)) for e in jacobian.nonzeros())
+        forms.append(LinearForm(tuple(columns), entries, entry(constant)))
+    return tuple(forms), ca.Function("coefficients", [p], [ca.vertcat(*values)])
+
+
+def _check_balance(component: Component, equations: list[Equation]) -> None:
+    own = [n for n, f in component.fields.items() if isinstance(f, Variable) and not isinstance(f, Input)]
+    flows: list[str] = []
+    if not component.parts:
+        for name, connector in component.connectors.items():
+            if connector.used:
+                flows += [f"{name}.{n}" for n, f in connector.fields.items() if isinstance(f, Variable) and f.is_flow]
+    if len(equations) == len(own) + len(flows) or (component.parts and not own and not equations):
+        return
+    unknowns = [*own, *flows]
+    kind = type(component).__name__
+    what = f"{kind} declares {len(equations)} equation{'s' if len(equations) != 1 else ''} for {len(unknowns)} unknowns ({', '.join(unknowns)})."
+    base = type(component).__mro__[1]
+    missing = len(equations) < len(unknowns) and base is not Component and issubclass(base, Component)
+    if missing and base.equations is not Component.equations:
+        advice = f"Its base {base.__name__} has equations of its own: is `yield from super().equations()` missing?"
+    elif len(equations) < len(unknowns):
+        advice = "Each own variable, output and flow needs one: is a `yield` missing?"
+    else:
+        advice = "Each own variable, output and flow takes one: remove an equation, or declare the missing unknown."
+    where = equations[-1].source if equations else ()
+    raise ComponentUnbalanced(what, where=where, advice=advice)
+
+
+def _check_units(component: Component, equations: list[Equation], events: list[Any]) -> dict[str, Unit]:
+    """Check every equation; return the units that `*` outputs take from their equations."""
+    inferred: dict[str, Unit] = {}
+
+    def unit_of(leaf: Any) -> Unit:
+        symbol = symbols_in(leaf)[0]
+        if symbol is TIME:
+            return _SECOND
+        declared = symbol.owner.fields.get(symbol.name)
+        if not isinstance(declared, Field):
+            return ONE
+        unit = unit_of_field(symbol.owner, symbol.name)
+        if unit == ANY and symbol.owner is component:
+            unit = inferred.get(symbol.name, ANY)
+        return unit if unit == ANY or symbol.order == 0 else unit / _SECOND**symbol.order
+
+    dimensions = Dimensions(unit_of)
+    kind = type(component).__name__
+    errors: list[ModelicaLikeError] = []
+
+    def attempt(check: Any, *arguments: Any) -> None:
+        try:
+            check(*arguments)
+        except ModelicaLikeError as error:
+            errors.append(error)
+
+    for equation in equations:
+        attempt(_infer, component, equation, dimensions, inferred)
+        attempt(check_equation, equation.left, equation.right, dimensions, kind, equation.source)
+    for event in events:
+        if event.when is not None:
+            attempt(check_expression, event.when, ONE, dimensions, f"{kind}, condition", event.source)
+        for target, value in getattr(event, "reset", {}).items():
+            attempt(check_equation, target, ca.SX(value), dimensions, kind, event.source)
+    for label, term, unit in (
+        ("stored_energy", component.stored_energy(), _JOULE),
+        ("loss_power", component.loss_power(), _WATT),
+        ("source_power", component.source_power(), _WATT),
+    ):
+        attempt(check_expression, term, unit, dimensions, f"{kind}.{label}")
+    if errors:
+        raise raise_together_or_one(errors)
+    return inferred
+
+
+def _infer(component: Component, equation: Equation, dimensions: Dimensions, inferred: dict[str, Unit]) -> None:
+    left = cast(Any, equation.left)
+    if not left.is_symbolic():
+        return
+    symbol = symbols_in(equation.left)[0]
+    if symbol.owner is component and symbol.order == 0 and symbol.name in component.fields:
+        if component.fields[symbol.name].unit == ANY and isinstance(component.fields[symbol.name], Variable):
+            unit = dimensions.unit_or_any(equation.right)
+            if unit != ANY:
+                inferred.setdefault(symbol.name, unit)
+

@@ -1,0 +1,164 @@
+"""Connection sets: who is joined to whom, and which equations follow."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from modelica_like.errors import FreeFlange, ModelicaLikeError, Source, WrongConnection
+from modelica_like.flatten.template import unit_of_field
+from modelica_like.language.component import Component
+from modelica_like.language.declared import Connector
+from modelica_like.language.equation import Connection, FreeEnd
+from modelica_like.language.expr import Symbol
+from modelica_like.language.fields import Input, Output, Variable
+from modelica_like.units import Unit, same_dimension
+
+End = tuple[int, bool]
+"""A connector (its id) seen from inside or from outside (True) its component."""
+
+
+@dataclass
+class Wiring:
+    """All connections of a model, collected from the root downwards."""
+
+    parent: dict[End, End] = field(default_factory=dict)
+    connectors: dict[End, Connector] = field(default_factory=dict)
+    sources: dict[End, Source] = field(default_factory=dict)
+    signals: list[tuple[Symbol, Symbol, Source]] = field(default_factory=list)
+    driven: dict[tuple[int, str], Source] = field(default_factory=dict)
+    freed: set[int] = field(default_factory=set)
+    errors: list[ModelicaLikeError] = field(default_factory=list)
+    inferred: dict[tuple[int, str], Unit] = field(default_factory=dict)
+
+    def add(self, scope: Component, statement: Connection | FreeEnd) -> None:
+        """Take in what a component says about the connectors of its parts and its own."""
+        if isinstance(statement, FreeEnd):
+            self.freed.add(id(statement.connector))
+            return
+        if any(isinstance(end, Symbol) for end in statement.ends):
+            self._add_signals(scope, statement)
+            return
+        ends = [end for end in statement.ends if isinstance(end, Connector)]
+        for end in ends:
+            if type(end) is not type(ends[0]):
+                self.errors.append(_different_kinds(ends[0], end, statement.source))
+                return
+        keys = [self._key(scope, end, statement.source) for end in ends]
+        for key in keys[1:]:
+            self.parent[self._root(key)] = self._root(keys[0])
+
+    def _key(self, scope: Component, connector: Connector, source: Source) -> End:
+        connector.__dict__["_used"] = True
+        key = (id(connector), connector._owner is not scope)
+        self.parent.setdefault(key, key)
+        self.connectors[key] = connector
+        self.sources.setdefault(key, source)
+        return key
+
+    def _root(self, end: End) -> End:
+        while self.parent[end] != end:
+            self.parent[end] = self.parent[self.parent[end]]
+            end = self.parent[end]
+        return end
+
+    def sets(self) -> Iterator[list[End]]:
+        """Yield the connection sets."""
+        groups: dict[End, list[End]] = {}
+        for end in self.parent:
+            groups.setdefault(self._root(end), []).append(end)
+        yield from groups.values()
+
+    def is_connected(self, connector: Connector) -> bool:
+        """Tell whether something is connected to it from outside its component."""
+        return (id(connector), True) in self.parent
+
+    def _add_signals(self, scope: Component, statement: Connection) -> None:
+        signals = [end for end in statement.ends if isinstance(end, Symbol)]
+        others = [end for end in statement.ends if not isinstance(end, Symbol)]
+        if others:
+            self.errors.append(
+                WrongConnection(
+                    f"connect joins the signal {_name(signals[0])} with the connector {others[0].label}.",
+                    where=statement.source, advice="Signals go to signals: use a sensor or a source between.",
+                )  # fmt: skip
+            )
+            return
+        drivers = [s for s in signals if _drives(scope, s)]
+        if len(drivers) != 1:
+            names = ", ".join(_name(s) for s in signals)
+            what = "no output" if not drivers else f"{len(drivers)} outputs ({', '.join(map(_name, drivers))})"
+            self.errors.append(
+                WrongConnection(
+                    f"The connection of {names} has {what}.",
+                    where=statement.source, advice="Connect one output with any number of inputs.",
+                )  # fmt: skip
+            )
+            return
+        for sink in signals:
+            if sink is not drivers[0]:
+                self._drive(sink, drivers[0], statement.source)
+
+    def _drive(self, sink: Symbol, driver: Symbol, source: Source) -> None:
+        key = (id(sink.owner), sink.name)
+        if key in self.driven:
+            self.errors.append(
+                WrongConnection(
+                    f"The input {_name(sink)} is connected twice.", where=(source, self.driven[key]),
+                    advice="Keep one connection; add signals in a component of their own.",
+                )  # fmt: skip
+            )
+            return
+        self.driven[key] = source
+        self.signals.append((driver, sink, source))
+
+    def check_signal_units(self) -> None:
+        """Compare the units along signal connections, after all templates are known."""
+        for driver, sink, source in self.signals:
+            units = [self._unit(symbol) for symbol in (driver, sink)]
+            if not same_dimension(*units):
+                self.errors.append(
+                    WrongConnection(
+                        f"{_name(driver)} is in {units[0]}, {_name(sink)} expects {units[1]}.",
+                        where=source, advice="Give the source's parameters in that unit.",
+                    )  # fmt: skip
+                )
+
+    def _unit(self, symbol: Symbol) -> Unit:
+        return self.inferred.get((id(symbol.owner), symbol.name)) or unit_of_field(symbol.owner, symbol.name)
+
+    def check_free(self, component: Component) -> None:
+        """Collect an error for every connector that must be connected and is not."""
+        for name, connector in component.connectors.items():
+            if connector.may_be_free or self.is_connected(connector) or id(connector) in self.freed:
+                continue
+            flows = [n for n, f in connector.fields.items() if isinstance(f, Variable) and f.is_flow]
+            carries = "torque" if "tau" in flows else "force" if "f" in flows else "flow"
+            label = component.label
+            self.errors.append(
+                FreeFlange(
+                    f"{label}.{name} is free, so {label} ({type(component).__name__}) carries no {carries}.",
+                    advice=f"Connect it, or say free({label}.{name}).",
+                )
+            )
+
+
+def _drives(scope: Component, symbol: Symbol) -> bool:
+    kind = symbol.owner.fields[symbol.name]
+    return isinstance(kind, Input) if symbol.owner is scope else isinstance(kind, Output)
+
+
+def _name(symbol: Symbol) -> str:
+    owner = symbol.owner.path
+    return f"{owner}.{symbol.name}" if owner else symbol.name
+
+
+def _different_kinds(first: Connector, second: Connector, source: Source) -> WrongConnection:
+    kinds = [f"{type(c).__name__} ({', '.join(f.unit_text for f in c.fields.values())})" for c in (first, second)]
+    names = {type(first).__name__, type(second).__name__}
+    between = "A spindle or rack goes between." if names == {"Flange", "LinearFlange"} else "Join connectors of one kind."
+    article = "An" if kinds[0][0] in "AEIOU" else "A"
+    return WrongConnection(
+        f"connect({first.label}, {second.label}): {article.lower()} {kinds[0]} cannot join a {kinds[1]}. {between}",
+        where=source,
+    )

@@ -1,0 +1,156 @@
+"""Components put together without a class of their own: what a netlist becomes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+from modelica_like.errors import DuplicateName, ModelicaLikeError, Source
+from modelica_like.language.component import Component
+from modelica_like.language.declared import Connector, unknown
+from modelica_like.language.equation import NOWHERE, Connection, Equations, FreeEnd, connect, free, series
+from modelica_like.language.expr import Expr, Symbol, symbol_of
+from modelica_like.language.fields import Field, Parameter, Variable, param
+
+
+class Assembly(Component):
+    """Parts and their connections, named at run time.
+
+    Wires are kept as text (`"clutch.flange_a"`), as in a netlist; they are resolved when the model is used.
+    """
+
+    def __init__(
+        self, name: str = "", *, parts: Mapping[str, Component | list[Component]] | None = None,
+        connect: Mapping[str, Sequence[str]] | None = None, series: Mapping[str, Sequence[str]] | None = None,
+        free: Sequence[str] = (), parameters: Mapping[str, Any] | None = None, description: str = "",
+    ) -> None:  # fmt: skip
+        self.__dict__.update(_own_fields={}, _own_connectors=(), _wires={}, _chains={}, _free=(), _places={})
+        super().__init__()
+        self.__dict__.update(_name=name, description=description, simulate={}, origin="")
+        for key, value in (parameters or {}).items():
+            self.add_parameter(key, value)
+        for key, part in (parts or {}).items():
+            setattr(self, key, part)
+        self._wires: dict[str, tuple[str, ...]] = {key: tuple(ends) for key, ends in (connect or {}).items()}
+        self._chains: dict[str, tuple[str, ...]] = {key: tuple(ends) for key, ends in (series or {}).items()}
+        self._free: tuple[str, ...] = tuple(free)
+
+    def add_parameter(self, name: str, value: Any) -> None:
+        """Declare a parameter of the assembly; its unit is that of its value."""
+        if name in self.fields or name in self._parts:
+            raise DuplicateName(f"{self.label}: '{name}' is already the name of something else.")
+        field: Parameter = param("*")
+        field.owner, field.name = self.label, name
+        field.default = value
+        field.read(value)
+        self._own_fields[name] = field
+
+    def expose(self, name: str, end: str) -> None:
+        """Make an inner connector an outer one of the assembly."""
+        inner = self._resolve(end)
+        if isinstance(inner, Symbol):
+            raise unknown("connector", self.label, end, [])
+        setattr(self, name, type(inner)(inner.description, free=inner.may_be_free))
+        self._own_connectors = (*self._own_connectors, (name, end))
+
+    def place(self, key: str, source: Source) -> None:
+        """Remember where in the netlist a wire, series or part stands."""
+        self._places[key] = source
+
+    def source_of(self, key: str) -> Source:
+        """Return where in the netlist a wire, series or part stands."""
+        return self._places.get(key, NOWHERE)
+
+    @property
+    def fields(self) -> dict[str, Field]:
+        """Declared fields, with the assembly's own parameters."""
+        return {**self._class_fields, **self._own_fields}
+
+    @property
+    def wires(self) -> dict[str, tuple[str, ...]]:
+        """Connections by name."""
+        return self._wires
+
+    @property
+    def chains(self) -> dict[str, tuple[str, ...]]:
+        """Series by name."""
+        return self._chains
+
+    @property
+    def free_ends(self) -> tuple[str, ...]:
+        """Connectors that stay unconnected on purpose."""
+        return self._free
+
+    @property
+    def exposed(self) -> tuple[tuple[str, str], ...]:
+        """Outer connectors and the inner ones they stand for."""
+        return self._own_connectors
+
+    def __getattr__(self, name: str) -> Expr:
+        if name in self.__dict__.get("_own_fields", {}):
+            return symbol_of(self, name)
+        raise AttributeError(f"{type(self).__name__} '{self.__dict__.get('_name', '')}' has no '{name}'")
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if name in self.__dict__.get("_own_fields", {}):
+            self.give(name, value)
+        else:
+            super().__setattr__(name, value)
+
+    def equations(self) -> Equations:
+        errors: list[ModelicaLikeError] = []
+        for key, ends in self._wires.items():
+            yield from self._statements(f"connect.{key}", errors, lambda ends=ends: [self._connection(ends)])
+        for key, names in self._chains.items():
+            yield from self._statements(f"series.{key}", errors, lambda names=names: self._series(names))
+        for end in self._free:
+            yield from self._statements(f"free.{end}", errors, lambda end=end: [free(self._connector(end))])
+        for name, end in self._own_connectors:
+            yield from self._statements(
+                f"expose.{name}", errors, lambda name=name, end=end: [connect(self._connectors[name], self._connector(end))]
+            )
+        if errors:
+            from modelica_like.errors import raise_together_or_one
+
+            raise raise_together_or_one(errors)
+
+    def _statements(self, key: str, errors: list[ModelicaLikeError], make: Any) -> Equations:
+        source = self.source_of(key)
+        try:
+            statements: list[Connection | FreeEnd] = list(make())
+        except ModelicaLikeError as error:
+            error.where = error.where or ((source,) if source is not NOWHERE else ())
+            errors.append(error)
+            return
+        yield from (replace(statement, source=source) for statement in statements)
+
+    def _connection(self, ends: Sequence[str]) -> Connection:
+        return connect(*(self._resolve(end) for end in ends))
+
+    def _series(self, names: Sequence[str]) -> list[Any]:
+        components: list[Component] = []
+        for name in names:
+            part = self._parts.get(name)
+            components += part if isinstance(part, list) else [self.find(name)]
+        return list(series(*components))
+
+    def _connector(self, path: str) -> Connector:
+        end = self._resolve(path)
+        if isinstance(end, Connector):
+            return end
+        raise unknown("connector", self.label, path, [])
+
+    def _resolve(self, path: str) -> Connector | Symbol:
+        """Find the connector or signal at a path."""
+        owner_path, _, name = path.rpartition(".")
+        owner = self.find(owner_path)
+        if name in owner.connectors:
+            return owner.connectors[name]
+        if name in owner.fields and isinstance(owner.fields[name], Variable):
+            return symbol_of(owner, name)
+        signals = [key for key, field in owner.fields.items() if type(field).__name__ in ("Input", "Output")]
+        label = f"{owner.label} ({type(owner).__name__})" if owner_path else owner.label
+        if name in owner.parts:
+            raise unknown("connector", label, name, [f"{name}.{c}" for c in owner.parts[name].connectors])
+        raise unknown("connector", label, name, [*owner.connectors, *signals])

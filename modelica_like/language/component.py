@@ -1,0 +1,319 @@
+"""Components: declarations, parts and values."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar, cast, dataclass_transform
+
+from modelica_like.errors import DuplicateName, LanguageError, ModelicaLikeError
+from modelica_like.language.declared import Connector, Declared, caller, unknown
+from modelica_like.language.expr import TIME, Expr
+from modelica_like.language.fields import Discrete, Field, Input, Parameter, Value, param, require_identifier
+from modelica_like.language.mode import Mode
+
+if TYPE_CHECKING:
+    from modelica_like.language.equation import Equations, Events
+
+
+@dataclass_transform(kw_only_default=True, field_specifiers=(param,))
+class Component(Declared):
+    """A machine element: declared fields, connectors and parts, with equations between them.
+
+    Keywords of the constructor give parameters and inputs their values, variables their start values, structural fields
+    and replaceable parts something else than their default.
+    """
+
+    inlet: ClassVar[str] = ""
+    outlet: ClassVar[str] = ""
+    _partial: ClassVar[bool] = True
+    _class_connectors: ClassVar[dict[str, Connector]] = {}
+    _class_parts: ClassVar[dict[str, Component | list[Component]]] = {}
+    _replaceable: ClassVar[frozenset[str]] = frozenset()
+    _structural: ClassVar[dict[str, Any]] = {}
+    _class_modes: ClassVar[dict[str, Mode]] = {}
+
+    def __init_subclass__(cls, partial: bool = False, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        cls._partial = partial
+        own = {name: value for name, value in vars(cls).items() if not name.startswith("_")}
+        annotations = {
+            name: text
+            for name, text in vars(cls).get("__annotations__", {}).items()
+            if not str(text).startswith(("ClassVar", "typing.ClassVar")) and not name.startswith("_")
+        }
+        # A class may extend several bases, as in Modelica: everything is collected along the whole line of ancestors.
+        ancestors = [base for base in reversed(cls.__mro__[1:]) if issubclass(base, Component)]
+        cls._class_connectors = _of_kind(cls, Connector)
+        cls._class_modes = _of_kind(cls, Mode)
+        parts = {name: value for name, value in own.items() if _is_part(value)}
+        cls._class_parts = {name: part for base in ancestors for name, part in base._class_parts.items()} | parts
+        cls._replaceable = frozenset(parts.keys() & annotations).union(*(base._replaceable for base in ancestors))
+        declared = (Field, Connector, Mode)
+        plain = {n: own.get(n, _REQUIRED) for n in annotations if not isinstance(own.get(n), declared) and n not in parts}
+        cls._structural = {name: value for base in ancestors for name, value in base._structural.items()} | plain
+        for name in (*cls._class_fields, *cls._class_connectors, *cls._class_modes, *cls._class_parts):
+            require_identifier(name, cls.__name__)
+
+    def __init__(self, **values: Any) -> None:
+        if self._partial:
+            raise LanguageError(
+                f"{type(self).__name__} is partial: it is only a base of other components.", where=caller()
+            )
+        self._values: dict[str, Value] = {}
+        self._starts: dict[str, Value] = {}
+        self._start_modes: dict[str, str] = {}
+        self._parts: dict[str, Component | list[Component]] = {}
+        self._connectors: dict[str, Connector] = {}
+        for name, connector in self._class_connectors.items():
+            self._adopt_connector(name, connector)
+        for name, part in self._class_parts.items():
+            setattr(self, name, values.pop(name) if name in values and name in self._replaceable else part)
+        for name, default in self._structural.items():
+            self._set_structural(name, values.pop(name, default))
+        for name, value in values.items():
+            self.give(name, value)
+        self.build()
+
+    # -- what authors write ------------------------------------------------------------------------------------------
+
+    def build(self) -> None:
+        """Assign parts whose number or type depends on structural fields."""
+
+    def equations(self) -> Equations:
+        """Yield the equations and connections."""
+        return iter(())
+
+    def events(self) -> Events:
+        """Yield the transitions of the modes."""
+        return iter(())
+
+    def stored_energy(self) -> Expr | float:
+        """Energy in J that the component stores."""
+        return 0.0
+
+    def loss_power(self) -> Expr | float:
+        """Power in W that the component dissipates."""
+        return 0.0
+
+    def source_power(self) -> Expr | float:
+        """Power in W that the component brings into the model from outside."""
+        return 0.0
+
+    @property
+    def time(self) -> Expr:
+        """Time in s."""
+        return TIME
+
+    def given(self, name: str) -> bool:
+        """Tell whether a parameter or input has a value (its own or a default)."""
+        return name in self._values or self.fields[name].default is not None
+
+    # -- values ------------------------------------------------------------------------------------------------------
+
+    def give(self, name: str, value: Any) -> None:
+        """Set a parameter, input, start value, start mode, structural field or replaceable part by name.
+
+        Raises:
+            UnknownName: there is no such declaration.
+            UnitError, ValueOutOfRange, NetlistError: the value does not fit.
+        """
+        if name in self.fields:
+            self.set_value(self.fields[name], value)
+        elif name in self._class_modes:
+            self._class_modes[name].__set__(self, value)
+        elif name in self._structural:
+            self._set_structural(name, value)
+            self.build()
+        elif name in self._parts and name in self._replaceable and _is_part(value):
+            setattr(self, name, value)
+        elif name in self._parts:
+            raise LanguageError(
+                f"{self.label}.{name} cannot be replaced.", where=caller(),
+                advice=f"Annotate the part in {type(self).__name__} to make it replaceable, or set its values by path.",
+            )  # fmt: skip
+        else:
+            known = [*self.fields, *self._class_modes, *self._structural, *self._replaceable]
+            error = unknown("parameter or variable", type(self).__name__, name, known)
+            error.where = (caller(),)
+            raise error
+
+    def set_value(self, field: Field, value: Any) -> None:
+        """Store the value of a declared field; called by the fields themselves."""
+        try:
+            understood = field.read(value)
+        except ModelicaLikeError as error:
+            if not error.where:
+                error.where = (caller(),)
+            raise
+        store = self._values if isinstance(field, Parameter | Input) else self._starts
+        store[field.name] = understood
+
+    def set_start_mode(self, name: str, target: str) -> None:
+        """Store the mode at the start."""
+        self._start_modes[name] = target
+
+    def _set_structural(self, name: str, value: Any) -> None:
+        if value is _REQUIRED:
+            raise LanguageError(f"{type(self).__name__} needs a value for {name}.", where=caller())
+        self.__dict__[name] = _frozen(value)
+
+    def value(self, name: str) -> Value | None:
+        """Return the value of a parameter or input: given, default, or None."""
+        if name in self._values:
+            return self._values[name]
+        field = self.fields[name]
+        return None if field.default is None else field.read(field.default)
+
+    def start(self, name: str) -> Value | None:
+        """Return the start value of a variable or discrete value: given, default of a discrete value, or None."""
+        if name in self._starts:
+            return self._starts[name]
+        field = self.fields[name]
+        return field.read(field.default) if isinstance(field, Discrete) else None
+
+    def start_mode(self, name: str) -> str:
+        """Return the name of the mode at the start."""
+        return self._start_modes.get(name, self._class_modes[name].start)
+
+    # -- the tree ----------------------------------------------------------------------------------------------------
+
+    @property
+    def connectors(self) -> dict[str, Connector]:
+        """Connectors by name."""
+        return self._connectors
+
+    @property
+    def modes(self) -> dict[str, Mode]:
+        """Declared modes by name."""
+        return self._class_modes
+
+    @property
+    def parts(self) -> dict[str, Component]:
+        """Parts by name; parts of arrays as `name[1]`, `name[2]`, …"""
+        named: dict[str, Component] = {}
+        for name, part in self._parts.items():
+            if isinstance(part, list):
+                named.update({f"{name}[{k}]": element for k, element in enumerate(part, 1)})
+            else:
+                named[name] = part
+        return named
+
+    def walk(self) -> Iterator[Component]:
+        """Yield this component and all parts below it, owners first."""
+        pending: list[Component] = [self]
+        while pending:
+            component = pending.pop()
+            yield component
+            if component._parts:
+                pending.extend(reversed(component.parts.values()))
+
+    def find(self, path: str) -> Component:
+        """Return the part at a dotted path.
+
+        Raises:
+            UnknownName: there is no such part.
+        """
+        component = self
+        for name in path.split(".") if path else ():
+            parts = component.parts
+            if name not in parts:
+                raise unknown("part", component.label, name, list(parts))
+            component = parts[name]
+        return component
+
+    def set(self, path: str, value: Any) -> None:
+        """Set a value by its path: `drive.set("clutch.mu", 0.3)`.
+
+        Raises:
+            UnknownName: there is no such part, parameter or variable.
+        """
+        owner, _, name = path.rpartition(".")
+        self.find(owner).give(name, value)
+
+    def inlet_connector(self) -> Connector:
+        """Return the connector that `series` joins to the part before."""
+        return self._end("inlet", ("flange_a", "flange"))
+
+    def outlet_connector(self) -> Connector:
+        """Return the connector that `series` joins to the part after."""
+        return self._end("outlet", ("flange_b", "flange"))
+
+    def _end(self, which: str, usual: tuple[str, ...]) -> Connector:
+        names = (getattr(type(self), which),) if getattr(type(self), which) else usual
+        for name in names:
+            if name in self._connectors:
+                return self._connectors[name]
+        raise unknown(which, f"{self.label} ({type(self).__name__})", " or ".join(names), list(self._connectors))
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if _is_part(value):
+            self._adopt(name, value)
+        elif isinstance(value, Connector):
+            self._adopt_connector(name, value)
+        elif name in self._structural:
+            self.give(name, value)
+        elif name.startswith("_") or isinstance(getattr(type(self), name, None), Field | Mode):
+            super().__setattr__(name, value)
+        else:
+            self.give(name, value)
+
+    def _adopt(self, name: str, value: Component | list[Component]) -> None:
+        if name in self.fields or name in self._connectors or name in self._structural or hasattr(Component, name):
+            raise DuplicateName(f"{self.label}: '{name}' is already the name of something else.", where=caller())
+        require_identifier(name, type(self).__name__)
+        if isinstance(value, list):
+            adopted: Any = [self._owned(f"{name}[{k}]", part) for k, part in enumerate(value, 1)]
+        else:
+            adopted = self._owned(name, value)
+        self._parts[name] = adopted
+        self.__dict__[name] = adopted
+
+    def _owned(self, name: str, part: Component) -> Component:
+        twin = part.copy()
+        twin.__dict__.update(_owner=self, _name=name)
+        return twin
+
+    def _adopt_connector(self, name: str, connector: Connector) -> None:
+        twin = connector._detached_copy()
+        twin.__dict__.update(_owner=self, _name=name)
+        self._connectors[name] = twin
+        self.__dict__[name] = twin
+
+    def copy(self) -> Self:
+        """Return an independent copy of this component and its parts, without an owner."""
+        twin = self._detached_copy()
+        fresh = {key: dict(self.__dict__[key]) for key in ("_values", "_starts", "_start_modes")}
+        twin.__dict__.update(fresh, _parts={}, _connectors={})
+        for name, connector in self._connectors.items():
+            twin._adopt_connector(name, connector)
+        for name, part in self._parts.items():
+            twin._adopt(name, part)
+        return twin
+
+    def __repr__(self) -> str:
+        values = [f"{name}={value.given!r}" for name, value in (*self._values.items(), *self._starts.items())]
+        return f"{type(self).__name__}({', '.join(values)})"
+
+
+_REQUIRED = object()
+_Kind = TypeVar("_Kind")
+
+
+def _is_part(value: object) -> bool:
+    if isinstance(value, list):
+        elements = cast("list[object]", value)
+        return bool(elements) and all(isinstance(element, Component) for element in elements)
+    return isinstance(value, Component)
+
+
+def _of_kind(cls: type, kind: type[_Kind]) -> dict[str, _Kind]:
+    lineage = reversed(cls.__mro__)
+    return {name: value for base in lineage for name, value in vars(base).items() if isinstance(value, kind)}
+
+
+def _frozen(value: Any) -> Any:
+    """Make lists hashable, so that structural values can be compared."""
+    if isinstance(value, list | tuple):
+        return tuple(_frozen(item) for item in cast("list[Any]", value))
+    return value
+

@@ -1,0 +1,108 @@
+"""Common base of connectors and components: declared fields, and a place in the tree."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, ClassVar, Self
+
+from modelica_like.errors import Source, UnknownName, did_you_mean
+from modelica_like.language.expr import Expr
+from modelica_like.language.fields import Field
+
+_PACKAGE = str(Path(__file__).parent.parent)
+
+
+class Declared:
+    """Something with declared fields that has an owner and a name in it."""
+
+    _class_fields: ClassVar[dict[str, Field]] = {}
+    _owner: Declared | None = None
+    _name: str = ""
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        lineage = reversed(cls.__mro__)
+        cls._class_fields = {name: f for base in lineage for name, f in vars(base).items() if isinstance(f, Field)}
+
+    @property
+    def fields(self) -> dict[str, Field]:
+        """Declared parameters, variables, signals and discrete values, by name."""
+        return self._class_fields
+
+    def is_constant(self, name: str) -> bool:
+        """Tell whether a field keeps its value between events."""
+        from modelica_like.language.fields import Variable
+
+        return not isinstance(self.fields.get(name), Variable)
+
+    @property
+    def path(self) -> str:
+        """Dotted name from the root of the tree; empty for the root itself."""
+        names: list[str] = []
+        node: Declared | None = self
+        while node is not None and node._owner is not None:
+            names.append(node._name)
+            node = node._owner
+        return ".".join(reversed(names))
+
+    @property
+    def label(self) -> str:
+        """Name for messages: the path, or the type for the root."""
+        return self.path or self._name or type(self).__name__
+
+    def __getstate__(self) -> dict[str, Any]:
+        # Symbols are identities of one process; the values are what counts.
+        return {key: value for key, value in self.__dict__.items() if key != "_symbols"}
+
+    def _detached_copy(self) -> Self:
+        twin = object.__new__(type(self))
+        twin.__dict__.update(self.__getstate__())
+        twin.__dict__["_owner"] = None
+        return twin
+
+
+class Connector(Declared):
+    """Where components are joined: potentials (`var`) become equal, flows (`flow`) sum to zero.
+
+    Args:
+        description: which end of the component this is.
+        free: it may stay unconnected (its flows are then zero).
+        optional: it exists only where something is connected to it.
+    """
+
+    def __init__(self, description: str = "", *, free: bool = False, optional: bool = False) -> None:
+        self.description = description
+        self.may_be_free = free or optional
+        self.optional = optional
+        self._used = not optional
+
+    @property
+    def used(self) -> bool:
+        """Whether an optional connector is connected."""
+        return self._used
+
+    def power(self) -> Expr | float:
+        """Power in W that flows into the component."""
+        return 0.0
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {self.label}>"
+
+
+def caller() -> Source:
+    """Return the nearest place on the stack outside this package."""
+    frame = sys._getframe(1)
+    while frame.f_back is not None and frame.f_code.co_filename.startswith(_PACKAGE):
+        frame = frame.f_back
+    from modelica_like.language.equation import source_of
+
+    return source_of(frame.f_code, frame.f_lasti)
+
+
+def unknown(kind: str, label: str, name: str, known: Iterator[str] | list[str]) -> UnknownName:
+    """Build the error for a name that does not exist."""
+    names = list(known)
+    listing = f" It has {', '.join(names)}." if names else " It has none."
+    return UnknownName(f"{label} has no {kind} '{name}'{did_you_mean(name, names) or '.'}{listing}")

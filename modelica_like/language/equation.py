@@ -1,0 +1,199 @@
+"""What `equations()` and `events()` yield, each with the place it comes from."""
+
+from __future__ import annotations
+
+import linecache
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from itertools import islice
+from pathlib import Path
+from types import CodeType, GeneratorType
+from typing import TYPE_CHECKING, Any, cast
+
+import casadi as ca
+
+from modelica_like.errors import LanguageError, Source
+from modelica_like.language.expr import Expr, Symbol
+
+if TYPE_CHECKING:
+    from modelica_like.language.component import Component, Connector
+    from modelica_like.language.mode import BoundMode
+
+_HERE = str(Path(__file__).parent)
+NOWHERE = Source("")
+
+
+@dataclass(frozen=True, eq=False)
+class Connection:
+    """Connectors of one kind, or an output and inputs, that are joined."""
+
+    ends: tuple[Connector | Symbol, ...]
+    source: Source = NOWHERE
+
+
+@dataclass(frozen=True, eq=False)
+class FreeEnd:
+    """A connector that stays unconnected on purpose."""
+
+    connector: Connector
+    source: Source = NOWHERE
+
+
+@dataclass(frozen=True, eq=False)
+class Equation:
+    """An equation `left == right`."""
+
+    left: Expr
+    right: Expr
+    source: Source = NOWHERE
+
+
+@dataclass(frozen=True, eq=False)
+class Transition:
+    """Change of a mode at an event.
+
+    Attributes:
+        mode: the mode that changes.
+        sources: names of the modes it may leave.
+        target: name of the mode it enters.
+        when: condition of a state event, or None.
+        at: time of a time event in s, or None.
+        reset: new values of states and discrete values.
+    """
+
+    mode: BoundMode
+    sources: tuple[str, ...]
+    target: str
+    when: Expr | None
+    at: Expr | None
+    reset: Mapping[Expr, Any]
+    source: Source = NOWHERE
+
+
+@dataclass(frozen=True, eq=False)
+class StartMode:
+    """Choice of a mode at the start."""
+
+    mode: BoundMode
+    target: str
+    when: Expr
+    source: Source = NOWHERE
+
+
+Statement = Equation | Connection | FreeEnd
+EventStatement = Transition | StartMode
+Equations = Iterator["Expr | Connection | FreeEnd"]
+"""What `equations()` returns."""
+Events = Iterator["Transition | StartMode"]
+"""What `events()` returns."""
+
+
+def connect(first: Connector | Expr, *others: Connector | Expr) -> Connection:
+    """Join connectors of one kind, or one output with inputs.
+
+    Raises:
+        LanguageError: fewer than two ends, or an end that is neither a connector nor a signal.
+    """
+    from modelica_like.language.component import Connector
+
+    ends = (first, *others)
+    for end in ends:
+        if not isinstance(end, Connector | Symbol):
+            raise LanguageError(
+                f"connect() was given {end!r}, which is neither a connector nor a signal.",
+                advice="Connect flanges with flanges, an output with inputs.",
+            )
+    if not others:
+        raise LanguageError("connect() was given only one end.", advice="Name at least two.")
+    return Connection(cast(Any, ends))
+
+
+def series(*parts: Component) -> Equations:
+    """Connect the outlet of each part with the inlet of the next."""
+    for left, right in zip(parts, parts[1:], strict=False):
+        yield connect(left.outlet_connector(), right.inlet_connector())
+
+
+def free(connector: Connector) -> FreeEnd:
+    """Say that a connector stays unconnected on purpose."""
+    return FreeEnd(connector)
+
+
+def located(generator: Iterator[Any]) -> Iterator[tuple[Any, Source]]:
+    """Run a generator and pair what it yields with the place of the `yield` in the user's file."""
+    if not isinstance(generator, GeneratorType):
+        for item in generator:
+            yield item, NOWHERE
+        return
+    for item in generator:
+        yield item, _place(generator)
+
+
+def _place(generator: GeneratorType[Any, Any, Any]) -> Source:
+    while True:
+        inner = generator.gi_yieldfrom
+        if not isinstance(inner, GeneratorType) or inner.gi_code.co_filename.startswith(_HERE):
+            break
+        generator = inner
+    frame = generator.gi_frame
+    if frame is None:
+        return NOWHERE
+    return source_of(frame.f_code, frame.f_lasti)
+
+
+def source_of(code: CodeType, instruction: int) -> Source:
+    """Return the source place of a byte-code instruction."""
+    line, end_line, column, end_column = next(islice(code.co_positions(), instruction // 2, None))
+    if line is None:
+        return Source(code.co_filename, code.co_firstlineno)
+    lines = [linecache.getline(code.co_filename, n).rstrip("\n") for n in range(line, (end_line or line) + 1)]
+    if lines and end_column is not None and column is not None:
+        lines[-1] = lines[-1].encode()[:end_column].decode(errors="ignore")
+        lines[0] = lines[0].encode()[column:].decode(errors="ignore")
+    return Source(code.co_filename, line, " ".join(" ".join(lines).split()))
+
+
+def as_equation(item: Any, source: Source, component: str) -> Equation:
+    """Take `left == right` apart.
+
+    Raises:
+        LanguageError: the item is not an equation, or both sides are the same.
+    """
+    if isinstance(item, ca.SX) and item.is_scalar():
+        if item.op() == ca.OP_EQ:
+            return Equation(cast(Expr, item.dep(0)), cast(Expr, item.dep(1)), source)
+        if item.is_constant():
+            raise LanguageError(
+                f"{component} has an equation whose two sides are the same, or only numbers.",
+                where=source, advice="An equation relates unknowns: left == right.",
+            )  # fmt: skip
+    if isinstance(item, bool):
+        raise LanguageError(
+            f"{component} has an equation that Python evaluated to {item}.",
+            where=source, advice="Keep a symbol on the left: `self.tau == 0`, not `0 == self.tau`.",
+        )  # fmt: skip
+    raise LanguageError(
+        f"{component}.equations() yields {type(item).__name__} instead of an equation.",
+        where=source, advice="Yield `left == right`, `connect(…)` or `free(…)`, or `yield from series(…)`.",
+    )  # fmt: skip
+
+
+def as_statement(item: Any, source: Source, component: str) -> Statement:
+    """Read what `equations()` yielded."""
+    if isinstance(item, Connection | FreeEnd):
+        return item if item.source is not NOWHERE else replace(item, source=source)
+    return as_equation(item, source, component)
+
+
+def as_event(item: Any, source: Source, component: str) -> EventStatement:
+    """Read what `events()` yielded.
+
+    Raises:
+        LanguageError: it is neither a transition nor a choice of the start mode.
+    """
+    if isinstance(item, Transition | StartMode):
+        return replace(item, source=source)
+    raise LanguageError(
+        f"{component}.events() yields {type(item).__name__} instead of a transition.",
+        where=source, advice="Yield `mode.go(…)` or `mode.initially(…)`.",
+    )  # fmt: skip

@@ -1,0 +1,99 @@
+"""Expressions and symbols: a typed face of `casadi.SX`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, cast
+from weakref import WeakValueDictionary
+
+import casadi as ca
+
+if TYPE_CHECKING:
+
+    class Expr:
+        """Scalar symbolic expression (at run time a `casadi.SX`)."""
+
+        def __add__(self, other: Scalar) -> Expr: ...
+        def __radd__(self, other: Scalar) -> Expr: ...
+        def __sub__(self, other: Scalar) -> Expr: ...
+        def __rsub__(self, other: Scalar) -> Expr: ...
+        def __mul__(self, other: Scalar) -> Expr: ...
+        def __rmul__(self, other: Scalar) -> Expr: ...
+        def __truediv__(self, other: Scalar) -> Expr: ...
+        def __rtruediv__(self, other: Scalar) -> Expr: ...
+        def __pow__(self, other: Scalar) -> Expr: ...
+        def __rpow__(self, other: Scalar) -> Expr: ...
+        def __neg__(self) -> Expr: ...
+        def __pos__(self) -> Expr: ...
+        def __abs__(self) -> Expr: ...
+        def __lt__(self, other: Scalar) -> Expr: ...
+        def __le__(self, other: Scalar) -> Expr: ...
+        def __gt__(self, other: Scalar) -> Expr: ...
+        def __ge__(self, other: Scalar) -> Expr: ...
+        def __eq__(self, other: Scalar) -> Expr: ...  # type: ignore[override]
+        def __ne__(self, other: Scalar) -> Expr: ...  # type: ignore[override]
+        def __hash__(self) -> int: ...
+
+    Scalar = Expr | float
+else:
+    Expr = ca.SX
+    Scalar = object
+
+
+class Symbol(Expr):
+    """A named leaf of expressions that knows which field of which component it stands for.
+
+    Attributes:
+        owner: the component or connector that declares the field; None for time.
+        name: name of the field.
+        order: how often it is differentiated in time (0: the variable itself).
+    """
+
+    owner: Any
+    name: str
+    order: int
+
+    def __init__(self, owner: Any, name: str, order: int = 0) -> None:
+        label = f"{'der(' * order}{name}{')' * order}"
+        super().__init__(ca.SX.sym(label))
+        self.owner = owner
+        self.name = name
+        self.order = order
+        _symbols[leaf_id(self)] = self
+
+    def derivative(self) -> Symbol:
+        """Return the symbol of the time derivative, one order higher."""
+        return symbol_of(self.owner, self.name, self.order + 1)
+
+
+# CasADi's leaves carry no payload; this identity map (entries live as long as their component) finds the symbol of a leaf.
+_symbols: WeakValueDictionary[int, Symbol] = WeakValueDictionary()
+
+
+def leaf_id(leaf: Expr) -> int:
+    """Return the identity of a leaf of an expression."""
+    return int(cast(Any, leaf).element_hash())
+
+
+def symbol_of(owner: Any, name: str, order: int = 0) -> Symbol:
+    """Return the symbol for a field of `owner`, always the same one."""
+    cache = owner.__dict__.get("_symbols")
+    if cache is None:
+        cache = owner.__dict__["_symbols"] = {}
+    symbol = cache.get((name, order))
+    if symbol is None:
+        symbol = cache[name, order] = Symbol(owner, name, order)
+    return symbol
+
+
+def symbols_in(expression: Expr) -> list[Symbol]:
+    """Return the symbols that occur in an expression."""
+    return [_symbols[leaf_id(leaf)] for leaf in ca.symvar(ca.SX(cast(Any, expression)))]
+
+
+TIME = Symbol(None, "time")
+"""Time in seconds, the independent variable of every model."""
+
+
+def is_expression(value: object) -> bool:
+    """Tell whether `value` is symbolic rather than a number."""
+    return isinstance(value, ca.SX)

@@ -1,0 +1,256 @@
+"""Declarations in a class body: parameters, variables, signals and discrete values."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal, Self, overload
+
+from modelica_like.errors import LanguageError, ValueOutOfRange
+from modelica_like.language.expr import Expr, symbol_of
+from modelica_like.language.formula import Formula, as_formula, parse_formula
+from modelica_like.units import ANY, Unit, parse_unit, read_quantity, to_si
+
+if TYPE_CHECKING:
+    import pint
+
+StatePreference = Literal["always", "prefer", "default", "avoid"]
+
+
+@dataclass(frozen=True)
+class Guess:
+    """A start value that the initialisation may change."""
+
+    value: Any
+
+
+def guess(value: Quantity) -> Any:
+    """Mark a start value as a guess: where the solver begins, not what it must find."""
+    return Guess(value)
+
+
+@dataclass(frozen=True, slots=True)
+class Value:
+    """What a parameter, input or start value was given.
+
+    Attributes:
+        given: as the user wrote it.
+        number: value in SI units, or None if it follows from a formula.
+        formula: how it follows from parameters of the owner's assembly, or None.
+        unit: declared unit; for a declared unit `*` the unit of the given quantity.
+        fixed: False for a guessed start value.
+    """
+
+    given: Any
+    number: float | None
+    formula: Formula | None
+    unit: Unit
+    fixed: bool = True
+
+
+class Field:
+    """Base of all declarations with a unit."""
+
+    name: str = ""
+    owner: str = ""
+    default: Any = None
+
+    def __init__(
+        self, unit: str, description: str = "", *, default: Any = None,
+        min: float | None = None, max: float | None = None, nominal: float = 1.0,
+    ) -> None:  # fmt: skip
+        self.unit_text = unit
+        self.description = description
+        self.default = default
+        self.min = min
+        self.max = max
+        self.nominal = nominal
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.owner = owner.__name__
+        self.name = name
+
+    @property
+    def unit(self) -> Unit:
+        """Declared unit; parsed on first use."""
+        return parse_unit(self.unit_text)
+
+    @property
+    def label(self) -> str:
+        """Name for messages: `Inertia.J`."""
+        return f"{self.owner}.{self.name}"
+
+    def read(self, given: Any) -> Value:
+        """Understand a value: a number, a quantity with a unit, or a formula.
+
+        Raises:
+            UnitError: the quantity has another dimension.
+            ValueOutOfRange: not finite, or outside min and max.
+            NetlistError: the text is neither a quantity nor a formula.
+        """
+        fixed = not isinstance(given, Guess)
+        raw = given if fixed else given.value
+        if isinstance(raw, Formula | Field):
+            return Value(raw, None, as_formula(raw), self.unit, fixed)
+        if isinstance(raw, str):
+            quantity = read_quantity(raw)
+            if quantity is None:
+                return Value(raw, None, parse_formula(raw), self.unit, fixed)
+            if self.unit == ANY:
+                return Value(raw, self._checked(to_si(raw, quantity[1], self.label), raw), None, quantity[1], fixed)
+        return Value(raw, self._checked(to_si(raw, self.unit, self.label), raw), None, self.unit, fixed)
+
+    def _checked(self, number: float, given: Any) -> float:
+        low = -float("inf") if self.min is None else self.min
+        high = float("inf") if self.max is None else self.max
+        if low <= number <= high:
+            return number
+        bound = f"at least {low:g}" if number < low else f"at most {high:g}"
+        unit = "" if self.unit_text in ("1", "*") else f" {self.unit_text}"
+        raise ValueOutOfRange(f"{self.label} = {given} is out of range: it must be {bound}{unit}.")
+
+
+if TYPE_CHECKING:
+    Quantity = float | int | str | Formula | Field | Expr | pint.Quantity
+else:
+    Quantity = object
+
+
+class _Symbolic(Field):
+    """A declaration whose value in equations is a symbol."""
+
+    if TYPE_CHECKING:
+
+        @overload
+        def __get__(self, instance: None, owner: type) -> Self: ...
+        @overload
+        def __get__(self, instance: object, owner: type) -> Expr: ...
+
+    def __get__(self, instance: Any, owner: type) -> Any:
+        return self if instance is None else symbol_of(instance, self.name)
+
+    def __set__(self, instance: Any, value: Quantity) -> None:
+        instance.set_value(self, value)
+
+
+class Parameter(_Symbolic):
+    """Constant during a run; tunable, differentiable, an FMU parameter."""
+
+    tunable = True
+
+    def __add__(self, other: Quantity) -> Formula:
+        return Formula("+", (as_formula(self), as_formula(other)))
+
+    def __radd__(self, other: Quantity) -> Formula:
+        return Formula("+", (as_formula(other), as_formula(self)))
+
+    def __sub__(self, other: Quantity) -> Formula:
+        return Formula("-", (as_formula(self), as_formula(other)))
+
+    def __rsub__(self, other: Quantity) -> Formula:
+        return Formula("-", (as_formula(other), as_formula(self)))
+
+    def __mul__(self, other: Quantity) -> Formula:
+        return Formula("*", (as_formula(self), as_formula(other)))
+
+    def __rmul__(self, other: Quantity) -> Formula:
+        return Formula("*", (as_formula(other), as_formula(self)))
+
+    def __truediv__(self, other: Quantity) -> Formula:
+        return Formula("/", (as_formula(self), as_formula(other)))
+
+    def __rtruediv__(self, other: Quantity) -> Formula:
+        return Formula("/", (as_formula(other), as_formula(self)))
+
+    def __neg__(self) -> Formula:
+        return Formula("neg", (as_formula(self),))
+
+
+class Variable(_Symbolic):
+    """Unknown that changes continuously; potential or flow in a connector.
+
+    Attributes:
+        state: how much it wants to be a state.
+        guess: where the solver begins to look for its start value (SI).
+        is_flow: whether it sums to zero in a connection.
+    """
+
+    def __init__(
+        self, unit: str, description: str = "", *, state: StatePreference = "default", guess: float = 0.0,
+        is_flow: bool = False, **bounds: Any,
+    ) -> None:  # fmt: skip
+        super().__init__(unit, description, **bounds)
+        self.state = state
+        self.guess = guess
+        self.is_flow = is_flow
+
+
+class Input(Variable):
+    """Causal signal that comes from outside the component."""
+
+
+class Output(Variable):
+    """Causal signal that the component determines."""
+
+
+class Discrete(_Symbolic):
+    """Number that changes only at events."""
+
+
+def param(
+    unit: str, description: str = "", *, default: Any = None,
+    min: float | None = None, max: float | None = None, nominal: float = 1.0, tunable: bool = True,
+) -> Any:  # fmt: skip
+    """Declare a parameter.
+
+    Args:
+        unit: in Modelica notation, e.g. `kg.m2`; `1` for none; `*` takes the unit of the value.
+        description: one phrase.
+        default: number in that unit, quantity or formula; without it the parameter must be given, unless the class asks `given()`.
+        min: smallest allowed value, SI.
+        max: largest allowed value, SI.
+        nominal: order of magnitude, SI.
+        tunable: False: it cannot change after compilation.
+    """
+    parameter = Parameter(unit, description, default=default, min=min, max=max, nominal=nominal)
+    parameter.tunable = tunable
+    return parameter
+
+
+def var(
+    unit: str, description: str = "", *, state: StatePreference = "default", guess: float = 0.0,
+    min: float | None = None, max: float | None = None, nominal: float = 1.0,
+) -> Any:  # fmt: skip
+    """Declare an unknown; as a keyword of the constructor it takes a fixed start value or a `guess(…)`."""
+    return Variable(unit, description, state=state, guess=guess, min=min, max=max, nominal=nominal)
+
+
+def flow(unit: str, description: str = "", *, nominal: float = 1.0) -> Any:
+    """Declare a flow variable of a connector, positive into the component."""
+    return Variable(unit, description, is_flow=True, nominal=nominal)
+
+
+def signal_in(
+    unit: str, description: str = "", *, default: Any = None, min: float | None = None, max: float | None = None
+) -> Any:
+    """Declare a causal input; `default` is its value when nothing is connected."""
+    return Input(unit, description, default=default, min=min, max=max)
+
+
+def signal_out(unit: str, description: str = "", *, nominal: float = 1.0) -> Any:
+    """Declare a causal output."""
+    return Output(unit, description, nominal=nominal)
+
+
+def discrete(unit: str, description: str = "", *, start: Any = 0.0) -> Any:
+    """Declare a number that changes only at events; `start` is a number, a quantity or a formula of the component's parameters."""
+    return Discrete(unit, description, default=start)
+
+
+def require_identifier(name: str, where: str) -> None:
+    """Refuse names that would clash with the component's own methods.
+
+    Raises:
+        LanguageError: the name is private or reserved.
+    """
+    if name.startswith("_") or not name.isidentifier():
+        raise LanguageError(f"{where} declares '{name}'.", advice="Names begin with a letter.")

@@ -1,0 +1,149 @@
+"""Formulas: parameters that follow from other parameters, as text (`"2*J"`) or in a class body (`2 * J`)."""
+
+from __future__ import annotations
+
+import ast
+import math
+import operator
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+
+from modelica_like.errors import NetlistError, did_you_mean
+
+_MAX_LENGTH = 2000
+_BINARY: dict[type[ast.operator], str] = {
+    ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Pow: "**",
+}  # fmt: skip
+_OPERATIONS: dict[str, Callable[..., Any]] = {
+    "+": operator.add, "-": operator.sub, "*": operator.mul, "/": operator.truediv, "**": operator.pow,
+    "neg": operator.neg, "sqrt": ca.sqrt, "abs": ca.fabs, "sin": ca.sin, "cos": ca.cos, "tan": ca.tan,
+    "exp": ca.exp, "log": ca.log, "tanh": ca.tanh, "min": ca.fmin, "max": ca.fmax,
+}  # fmt: skip
+_FUNCTIONS = ("sqrt", "abs", "sin", "cos", "tan", "exp", "log", "tanh", "min", "max")
+_CONSTANTS = {"pi": math.pi}
+_PRECEDENCE = {"+": 1, "-": 1, "*": 2, "/": 2, "neg": 3, "**": 4}
+
+
+@dataclass(frozen=True)
+class Formula:
+    """Expression tree over named parameters.
+
+    Attributes:
+        operation: `number`, `name`, an operator, or a function name.
+        operands: one float, one dotted path (or the parameter's declaration), or the operand formulas.
+    """
+
+    operation: str
+    operands: tuple[Any, ...]
+
+    def names(self) -> Iterator[str]:
+        """Yield the dotted paths of the parameters it needs."""
+        if self.operation == "name":
+            yield self._name()
+        for operand in self.operands:
+            if isinstance(operand, Formula):
+                yield from operand.names()
+
+    def evaluate(self, lookup: Callable[[str], Any]) -> Any:
+        """Compute the value; `lookup` gives the value (a number or an expression) of a path."""
+        if self.operation == "number":
+            return self.operands[0]
+        if self.operation == "name":
+            return lookup(self._name())
+        return _OPERATIONS[self.operation](*(operand.evaluate(lookup) for operand in self.operands))
+
+    def _name(self) -> str:
+        # In a class body a parameter is used before the class, and so its name, exists: it is asked for late.
+        named = self.operands[0]
+        return named if isinstance(named, str) else named.name
+
+    def __str__(self) -> str:
+        return self._text(0)
+
+    def _text(self, outer: int) -> str:
+        if self.operation == "number":
+            return repr(self.operands[0])
+        if self.operation == "name":
+            return self._name()
+        if self.operation in _FUNCTIONS:
+            return f"{self.operation}({', '.join(str(operand) for operand in self.operands)})"
+        own = _PRECEDENCE[self.operation]
+        if self.operation == "neg":
+            text = f"-{self.operands[0]._text(own)}"
+        elif self.operation == "**":
+            text = f"{self.operands[0]._text(own + 1)}**{self.operands[1]._text(own)}"
+        else:
+            text = f"{self.operands[0]._text(own)} {self.operation} {self.operands[1]._text(own + 1)}"
+        return f"({text})" if own < outer else text
+
+
+def as_formula(value: Any) -> Formula:
+    """Turn a number, a formula or a parameter declaration into a formula."""
+    if isinstance(value, Formula):
+        return value
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        return Formula("number", (float(value),))
+    if hasattr(value, "unit_text"):
+        return Formula("name", (value,))
+    raise NetlistError(f"'{value!r}' cannot stand in a formula of parameters.")
+
+
+def parse_formula(text: str) -> Formula:
+    """Read a formula from text; only arithmetic, names, `pi` and a few functions are understood.
+
+    Raises:
+        NetlistError: the text is not such a formula.
+    """
+    if len(text) > _MAX_LENGTH:
+        raise NetlistError(f"A formula of {len(text)} characters is too long (at most {_MAX_LENGTH}).")
+    try:
+        tree = ast.parse(text.strip(), mode="eval")
+    except (SyntaxError, ValueError, MemoryError, RecursionError):
+        raise _not_a_formula(text) from None
+    return _convert(tree.body, text)
+
+
+def _not_a_formula(text: str, why: str = "") -> NetlistError:
+    return NetlistError(
+        f"'{text}' is neither a quantity nor a formula{'; ' + why if why else ''}.",
+        advice='A quantity is a number with a unit ("8.5 kg.cm2"), a formula is arithmetic of parameters ("2*J").',
+    )
+
+
+def _convert(node: ast.expr, text: str) -> Formula:
+    if isinstance(node, ast.Constant) and isinstance(node.value, int | float) and not isinstance(node.value, bool):
+        return Formula("number", (float(node.value),))
+    if isinstance(node, ast.BinOp) and type(node.op) in _BINARY:
+        return Formula(_BINARY[type(node.op)], (_convert(node.left, text), _convert(node.right, text)))
+    if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
+        return Formula("neg", (_convert(node.operand, text),))
+    if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.UAdd):
+        return _convert(node.operand, text)
+    if isinstance(node, ast.Name | ast.Attribute | ast.Subscript):
+        path = _path(node, text)
+        return Formula("number", (_CONSTANTS[path],)) if path in _CONSTANTS else Formula("name", (path,))
+    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and not node.keywords:
+        return _call(node, node.func.id, text)
+    raise _not_a_formula(text)
+
+
+def _call(node: ast.Call, name: str, text: str) -> Formula:
+    if name not in _FUNCTIONS:
+        raise _not_a_formula(text, f"there is no function '{name}'{did_you_mean(name, _FUNCTIONS).rstrip('?')}")
+    wanted = 2 if name in ("min", "max") else 1
+    if len(node.args) != wanted:
+        raise _not_a_formula(text, f"{name} takes {wanted} argument{'s' if wanted > 1 else ''}")
+    return Formula(name, tuple(_convert(argument, text) for argument in node.args))
+
+
+def _path(node: ast.expr, text: str) -> str:
+    if isinstance(node, ast.Name):
+        return node.id
+    if isinstance(node, ast.Attribute):
+        return f"{_path(node.value, text)}.{node.attr}"
+    if isinstance(node, ast.Subscript) and isinstance(node.slice, ast.Constant) and isinstance(node.slice.value, int):
+        return f"{_path(node.value, text)}[{node.slice.value}]"
+    raise _not_a_formula(text)

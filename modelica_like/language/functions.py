@@ -1,0 +1,173 @@
+"""Mathematical functions of expressions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, cast
+
+import casadi as ca
+
+from modelica_like.errors import LanguageError
+from modelica_like.language.expr import TIME, Expr, Scalar, Symbol, symbols_in
+
+
+def _sx(value: Scalar) -> Any:
+    return ca.SX(cast(Any, value))
+
+
+def der(expression: Expr) -> Expr:
+    """Return the time derivative of a variable, or of an expression of variables (by the chain rule)."""
+    if isinstance(expression, Symbol) and expression is not TIME:
+        return expression.derivative()
+    total: Any = 0.0
+    for symbol in symbols_in(expression):
+        rate: Any = 1.0 if symbol is TIME else _rate(symbol)
+        total = total + ca.jacobian(_sx(expression), symbol) * rate
+    return total
+
+
+def _rate(symbol: Symbol) -> Expr | float:
+    constant = symbol.owner.is_constant(symbol.name)
+    return 0.0 if constant else symbol.derivative()
+
+
+def sin(x: Scalar) -> Expr:
+    """Sine of an angle in rad."""
+    return ca.sin(_sx(x))
+
+
+def cos(x: Scalar) -> Expr:
+    """Cosine of an angle in rad."""
+    return ca.cos(_sx(x))
+
+
+def tan(x: Scalar) -> Expr:
+    """Tangent of an angle in rad."""
+    return ca.tan(_sx(x))
+
+
+def atan2(y: Scalar, x: Scalar) -> Expr:
+    """Angle in rad of the point (x, y)."""
+    return ca.atan2(_sx(y), _sx(x))
+
+
+def exp(x: Scalar) -> Expr:
+    """Exponential function."""
+    return ca.exp(_sx(x))
+
+
+def log(x: Scalar) -> Expr:
+    """Natural logarithm."""
+    return ca.log(_sx(x))
+
+
+def sqrt(x: Scalar) -> Expr:
+    """Square root."""
+    return ca.sqrt(_sx(x))
+
+
+def tanh(x: Scalar) -> Expr:
+    """Hyperbolic tangent."""
+    return ca.tanh(_sx(x))
+
+
+def absolute(x: Scalar) -> Expr:
+    """Absolute value."""
+    return ca.fabs(_sx(x))
+
+
+def sign(x: Scalar) -> Expr:
+    """Sign: -1, 0 or 1."""
+    return ca.sign(_sx(x))
+
+
+def minimum(x: Scalar, y: Scalar) -> Expr:
+    """Return the smaller of two values, without an event."""
+    return ca.fmin(_sx(x), _sx(y))
+
+
+def maximum(x: Scalar, y: Scalar) -> Expr:
+    """Return the larger of two values, without an event."""
+    return ca.fmax(_sx(x), _sx(y))
+
+
+def where(condition: Expr, then: Scalar, otherwise: Scalar) -> Expr:
+    """Choose by a condition, without an event; the branch not taken may be undefined."""
+    return ca.if_else(condition, _sx(then), _sx(otherwise))
+
+
+def all_of(*conditions: Expr) -> Expr:
+    """All conditions hold."""
+    result: Any = conditions[0]
+    for condition in conditions[1:]:
+        result = ca.logic_and(result, condition)
+    return result
+
+
+def any_of(*conditions: Expr) -> Expr:
+    """At least one condition holds."""
+    result: Any = conditions[0]
+    for condition in conditions[1:]:
+        result = ca.logic_or(result, condition)
+    return result
+
+
+def negate(condition: Expr) -> Expr:
+    """The condition does not hold."""
+    return ca.logic_not(condition)
+
+
+def interpolate(x: Scalar, xs: Sequence[float], ys: Sequence[float], smooth: bool = False) -> Expr:
+    """Interpolate in a table.
+
+    Args:
+        x: where to look up.
+        xs: abscissae, strictly increasing, at least one.
+        ys: values at the abscissae.
+        smooth: False: piecewise linear. True: continuous slope (cubic Hermite with Fritsch-Carlson slopes, no overshoot).
+
+    Beyond the ends the last slope goes on.
+
+    Raises:
+        LanguageError: lengths differ, or `xs` does not increase.
+    """
+    if len(xs) != len(ys) or not xs or any(b <= a for a, b in zip(xs, xs[1:], strict=False)):
+        raise LanguageError(
+            f"A table has the abscissae {list(xs)} and the values {list(ys)}.",
+            advice="Give both the same length, and let the abscissae increase strictly.",
+        )
+    if len(xs) == 1:
+        return _sx(ys[0])
+    slopes = _monotone_slopes(xs, ys) if smooth else None
+    x = _sx(x)
+    pieces = [_piece(x, xs, ys, slopes, k) for k in range(len(xs) - 1)]
+    result: Any = pieces[0]
+    for start, piece in zip(xs[1:-1], pieces[1:], strict=True):
+        result = ca.if_else(x < start, result, piece)
+    if slopes is not None:
+        result = ca.if_else(x < xs[0], ys[0] + slopes[0] * (x - xs[0]), result)
+        result = ca.if_else(x > xs[-1], ys[-1] + slopes[-1] * (x - xs[-1]), result)
+    return result
+
+
+def _piece(x: Any, xs: Sequence[float], ys: Sequence[float], slopes: list[float] | None, k: int) -> Any:
+    width = xs[k + 1] - xs[k]
+    rise = ys[k + 1] - ys[k]
+    if slopes is None:
+        return ys[k] + (x - xs[k]) * (rise / width)
+    s = (x - xs[k]) / width
+    a, b = slopes[k] * width, slopes[k + 1] * width
+    return ys[k] + s * (a + s * (3 * rise - 2 * a - b + s * (a + b - 2 * rise)))
+
+
+def _monotone_slopes(xs: Sequence[float], ys: Sequence[float]) -> list[float]:
+    """Slopes after Fritsch and Butland (1984): the weighted harmonic mean of the neighbouring secants."""
+    widths = [b - a for a, b in zip(xs, xs[1:], strict=False)]
+    secants = [(d - c) / h for c, d, h in zip(ys, ys[1:], widths, strict=False)]
+    slopes = [secants[0]]
+    for (h0, h1), (s0, s1) in zip(
+        zip(widths, widths[1:], strict=False), zip(secants, secants[1:], strict=False), strict=True
+    ):
+        weight0, weight1 = 2 * h1 + h0, h1 + 2 * h0
+        slopes.append(0.0 if s0 * s1 <= 0 else (weight0 + weight1) / (weight0 / s0 + weight1 / s1))
+    return [*slopes, secants[-1]]

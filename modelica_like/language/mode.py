@@ -1,0 +1,130 @@
+"""Modes: discrete states that switch equations at events."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Self, cast, overload
+
+import casadi as ca
+
+from modelica_like.errors import LanguageError, UnknownName, did_you_mean
+from modelica_like.language.equation import StartMode, Transition
+from modelica_like.language.expr import Expr, Scalar, Symbol, symbol_of
+
+
+class Mode:
+    """A discrete state that is one of a few names.
+
+    Args:
+        names: the modes; their position is their number.
+        start: the mode at the start, unless `initially` chooses another.
+        description: one phrase.
+    """
+
+    name: str = ""
+    owner: str = ""
+
+    def __init__(self, *names: str, start: str | None = None, description: str = "") -> None:
+        self.names = names
+        self.start = names[0] if start is None else start
+        self.description = description
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.owner = owner.__name__
+        self.name = name
+        if len(set(self.names)) != len(self.names) or not self.names:
+            raise LanguageError(f"{self.label} needs distinct names, not {self.names}.")
+        self.number(self.start)
+
+    @property
+    def label(self) -> str:
+        """Name for messages: `Clutch.plates`."""
+        return f"{self.owner}.{self.name}"
+
+    if TYPE_CHECKING:
+
+        @overload
+        def __get__(self, instance: None, owner: type) -> Self: ...
+        @overload
+        def __get__(self, instance: object, owner: type) -> BoundMode: ...
+
+    def __get__(self, instance: Any, owner: type) -> Any:
+        return self if instance is None else BoundMode(self, symbol_of(instance, self.name))
+
+    def __set__(self, instance: Any, value: str) -> None:
+        self.number(value)
+        instance.set_start_mode(self.name, value)
+
+    def number(self, name: str) -> int:
+        """Return the number of a mode.
+
+        Raises:
+            UnknownName: there is no such mode.
+        """
+        if name not in self.names:
+            raise UnknownName(
+                f"{self.label} has no mode '{name}'{did_you_mean(name, self.names)} It has {', '.join(self.names)}."
+            )
+        return self.names.index(name)
+
+
+class BoundMode:
+    """The mode of one component, as `equations()` and `events()` use it."""
+
+    def __init__(self, mode: Mode, symbol: Symbol) -> None:
+        self.mode = mode
+        self.symbol = symbol
+
+    def is_(self, *names: str) -> Expr:
+        """Condition: the mode is one of `names`."""
+        condition: Any = None
+        for name in names:
+            this: Any = self.symbol == self.mode.number(name)
+            condition = this if condition is None else ca.logic_or(condition, this)
+        return condition
+
+    def choose(self, *, otherwise: Scalar | None = None, **expressions: Scalar) -> Expr:
+        """Return the expression of the active mode; the others may be undefined.
+
+        Args:
+            otherwise: expression of all modes that are not named.
+            expressions: one expression per mode.
+
+        Raises:
+            LanguageError: a mode has no expression.
+        """
+        missing = [name for name in self.mode.names if name not in expressions]
+        if missing and otherwise is None:
+            raise LanguageError(
+                f"{self.mode.label}.choose() lacks an expression for {', '.join(missing)}.",
+                advice="Give one for each mode, or `otherwise=`.",
+            )
+        total: Any = 0
+        for name, expression in expressions.items():
+            total = total + ca.if_else(self.symbol == self.mode.number(name), cast(Any, expression), 0)
+        if missing and otherwise is not None:
+            total = total + ca.if_else(self.is_(*missing), cast(Any, otherwise), 0)
+        return total
+
+    def go(
+        self, source: str | tuple[str, ...], target: str, *, when: Expr | None = None, at: Scalar | None = None,
+        reset: Mapping[Expr, Scalar] | None = None,
+    ) -> Transition:  # fmt: skip
+        """Declare a transition: a state event (`when`) or a time event (`at`).
+
+        Raises:
+            UnknownName: a mode does not exist.
+            LanguageError: neither or both of `when` and `at` are given.
+        """
+        sources = self.mode.names if source == "*" else (source,) if isinstance(source, str) else source
+        for name in (*sources, target):
+            self.mode.number(name)
+        if (when is None) == (at is None):
+            raise LanguageError(f"{self.mode.label}.go(…, '{target}') needs either `when=` or `at=`.")
+        moment = None if at is None else cast(Expr, ca.SX(cast(Any, at)))
+        return Transition(self, sources, target, when, moment, dict(reset or {}))
+
+    def initially(self, target: str, *, when: Expr) -> StartMode:
+        """Declare the mode at the start, if the condition holds there."""
+        self.mode.number(target)
+        return StartMode(self, target, when)

@@ -1,0 +1,284 @@
+"""The plain data of one netlist file: read from TOML and checked for its form, before any component exists."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from modelica_like.errors import (
+    DuplicateName,
+    ModelicaLikeError,
+    NetlistError,
+    Source,
+    UnknownName,
+    did_you_mean,
+    raise_together_or_one,
+)
+from modelica_like.netlist.locate import Lines, locate
+from modelica_like.units import parse_unit, to_si
+
+MAX_BYTES = 2_000_000
+START_KINDS = ("given", "rest", "steady")
+
+
+@dataclass
+class Document:
+    """One netlist file.
+
+    Attributes:
+        lines: where its keys stand.
+        parts: tables with `is`, or lists of such tables, by name.
+        start: fixed start values by path.
+        guess: guessed start values by path.
+        expose: inner connectors by the name of the outer one.
+        simulate: options of a run, as written.
+    """
+
+    lines: Lines
+    name: str
+    description: str = ""
+    parameters: dict[str, Any] = field(default_factory=dict)
+    parts: dict[str, Any] = field(default_factory=dict)
+    series: dict[str, list[str]] = field(default_factory=dict)
+    connect: dict[str, list[str]] = field(default_factory=dict)
+    start: dict[str, Any] = field(default_factory=dict)
+    guess: dict[str, Any] = field(default_factory=dict)
+    free: list[str] = field(default_factory=list)
+    expose: dict[str, str] = field(default_factory=dict)
+    simulate: dict[str, Any] = field(default_factory=dict)
+
+
+def read_text(path: Path) -> str:
+    """Return the text of a netlist file.
+
+    Raises:
+        NetlistError: the file is missing, is no text, or is too large.
+    """
+    try:
+        if not path.is_file():
+            what = "is a folder" if path.is_dir() else "does not exist"
+            raise NetlistError(f"The netlist '{path}' {what}.{_neighbours(path)}")
+        with path.open("rb") as file:
+            data = file.read(MAX_BYTES + 1)
+    except OSError as error:
+        raise NetlistError(f"The netlist '{path}' cannot be read: {error.strerror}.") from None
+    if len(data) > MAX_BYTES:
+        raise NetlistError(
+            f"'{path.name}' is larger than {MAX_BYTES // 10**6} MB; no netlist is.", where=Source(str(path))
+        )
+    try:
+        return data.decode("utf-8-sig").replace("\r\n", "\n")
+    except UnicodeDecodeError as error:
+        place = Source(str(path), data.count(b"\n", 0, error.start) + 1)
+        raise NetlistError(f"'{path.name}' is not a text file (UTF-8).", where=place) from None
+
+
+def _neighbours(path: Path) -> str:
+    try:
+        names = [file.name for file in path.parent.glob("*.toml")] if path.parent.is_dir() else []
+    except OSError:
+        names = []
+    return did_you_mean(path.name, names).removeprefix(";").replace("did", "Did")
+
+
+def parse(text: str, file: str) -> Document:
+    """Read the text of a netlist and check its form.
+
+    Args:
+        text: TOML.
+        file: path of the file, for messages.
+
+    Raises:
+        NetlistError: the text is not TOML, or has not the form of a netlist.
+        DuplicateName: a name is used twice.
+        WiringErrors: several errors.
+    """
+    lines = locate(text, file)
+    if not text.strip():
+        raise NetlistError(
+            f"'{Path(file).name}' is empty.", where=Source(file), advice="A netlist has at least one part in [parts]."
+        )
+    try:
+        data = tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise _not_toml(str(error), lines) from None
+    errors: list[ModelicaLikeError] = []
+    document = _document(data, lines, errors)
+    if errors:
+        raise raise_together_or_one(errors)
+    return document
+
+
+def _not_toml(message: str, lines: Lines) -> ModelicaLikeError:
+    if lines.repeated:
+        path, first, second = lines.repeated[0]
+        section, *rest = path
+        what = f"'{'.'.join(rest)}' in [{section}]" if rest else f"'{section}'"
+        return DuplicateName(f"{what} is declared twice.", where=dict.fromkeys([lines.line(first), lines.line(second)]))
+    match = re.search(r"^(.*) \(at (?:line (\d+), column \d+|end of document)\)$", message)
+    number = int(match.group(2)) if match and match.group(2) else len(lines.text)
+    reason = match.group(1) if match else "nested too deep"
+    place = lines.line(number)
+    return NetlistError(f"'{Path(lines.file).name}' is not TOML: {reason[:1].lower()}{reason[1:]}.", where=place)
+
+
+# --- the form -------------------------------------------------------------------------------------------------------
+
+
+def _document(data: dict[str, Any], lines: Lines, errors: list[ModelicaLikeError]) -> Document:
+    document = Document(lines, Path(lines.file).stem)
+    for key, value in data.items():
+        try:
+            if key not in _READERS:
+                known = ", ".join(_READERS)
+                raise UnknownName(f"A netlist has no entry '{key}'{did_you_mean(key, _READERS) or '.'} It has {known}.")
+            setattr(document, key, _READERS[key](key, value, lines, errors))
+        except ModelicaLikeError as error:
+            errors.append(_placed(error, lines.source(key)))
+    for name in document.parts.keys() & document.parameters.keys():
+        places = (lines.source("parameters", name), lines.source("parts", name))
+        errors.append(DuplicateName(f"'{name}' is both a parameter and a part.", where=places))
+    if not document.parts and not errors:
+        errors.append(
+            NetlistError(f"{document.name} has no parts.", where=Source(lines.file), advice="Declare them in [parts].")
+        )
+    return document
+
+
+def _placed(error: ModelicaLikeError, source: Source) -> ModelicaLikeError:
+    error.where = error.where or (source,)
+    return error
+
+
+def _text(key: str, value: Any, lines: Lines, errors: list[ModelicaLikeError]) -> str:
+    if not isinstance(value, str):
+        raise NetlistError(f"{key} must be a text.")
+    return value
+
+
+def _table(key: str, value: Any) -> dict[str, Any]:
+    if not isinstance(value, dict):
+        raise NetlistError(f"{key} must be a table: [{key}].")
+    return value
+
+
+def _each(
+    check: Callable[[str, Any], Any], flat: bool = False
+) -> Callable[[str, Any, Lines, list[ModelicaLikeError]], dict[str, Any]]:
+    """Make the reader of a table whose entries have one form; `flat` joins dotted keys to paths."""
+
+    def read(key: str, value: Any, lines: Lines, errors: list[ModelicaLikeError]) -> dict[str, Any]:
+        result: dict[str, Any] = {}
+        entries = _flattened(_table(key, value)) if flat else _table(key, value)
+        for name, entry in entries.items():
+            try:
+                result[name] = check(f"{key}.{name}", entry)
+            except ModelicaLikeError as error:
+                errors.append(_placed(error, lines.source(key, name)))
+        return result
+
+    return read
+
+
+def _flattened(table: Mapping[str, Any], before: str = "") -> dict[str, Any]:
+    flat: dict[str, Any] = {}
+    for name, value in table.items():
+        flat.update(_flattened(value, f"{before}{name}.") if isinstance(value, dict) else {f"{before}{name}": value})
+    return flat
+
+
+def _value(key: str, value: Any) -> Any:
+    if isinstance(value, bool) or not isinstance(value, int | float | str):
+        raise NetlistError(f'{key} must be a number or a text with a unit, such as "10 N.m".')
+    return value
+
+
+def _name(key: str, value: Any) -> str:
+    if not isinstance(value, str):
+        raise NetlistError(f"{key} must be a text.")
+    return value
+
+
+def _names(key: str, value: Any) -> list[str]:
+    if not isinstance(value, list) or not all(isinstance(name, str) for name in value):
+        raise NetlistError(f"{key} must be a list of names.")
+    return value
+
+
+def _ends(key: str, value: Any) -> list[str]:
+    if len(_names(key, value)) < 2:
+        raise NetlistError(f"{key} must name at least two ends.")
+    return value
+
+
+def _part(key: str, value: Any) -> Any:
+    tables = value if isinstance(value, list) and value else [value]
+    for table in tables:
+        if not isinstance(table, dict):
+            raise NetlistError(f'{key} must be a table: {{ is = "Inertia", J = "1 kg.m2" }}.')
+        if not isinstance(table.get("is"), str):
+            raise NetlistError(f"{key} has no type.", advice='Say what it is, such as is = "Inertia".')
+        count = table.get("count", 1)
+        if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= 100_000:
+            raise NetlistError(f"{key}: count = {count} must be a whole number from 1 to 100000.")
+    return value
+
+
+def _free(key: str, value: Any, lines: Lines, errors: list[ModelicaLikeError]) -> list[str]:
+    return _names(key, value)
+
+
+def _option(key: str, value: Any) -> Any:
+    name = key.rpartition(".")[2]
+    if name not in _OPTIONS:
+        raise UnknownName(
+            f"[simulate] has no '{name}'{did_you_mean(name, _OPTIONS) or '.'} It has {', '.join(_OPTIONS)}."
+        )
+    return _OPTIONS[name](key, value)
+
+
+def _duration(key: str, value: Any) -> Any:
+    seconds = to_si(value, parse_unit("s"), key)
+    if seconds <= 0:
+        raise NetlistError(f"{key} = {value} must be positive.")
+    return value
+
+
+def _start_kind(key: str, value: Any) -> str:
+    if value not in START_KINDS:
+        raise NetlistError(f"{key} = {value!r} must be one of {', '.join(START_KINDS)}.")
+    return value
+
+
+def _rtol(key: str, value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 1e-14 <= value <= 0.1:
+        raise NetlistError(f"{key} = {value} must be a number from 1e-14 to 0.1.")
+    return float(value)
+
+
+def _points(key: str, value: Any) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= 1_000_000:
+        raise NetlistError(f"{key} = {value} must be a whole number from 1 to 1000000.")
+    return value
+
+
+_OPTIONS: Mapping[str, Callable[[str, Any], Any]] = {
+    "until": _duration, "start": _start_kind, "rtol": _rtol, "points": _points,
+}  # fmt: skip
+_READERS: Mapping[str, Callable[[str, Any, Lines, list[ModelicaLikeError]], Any]] = {
+    "name": _text,
+    "description": _text,
+    "parameters": _each(_value),
+    "parts": _each(_part),
+    "series": _each(_ends),
+    "connect": _each(_ends),
+    "start": _each(_value, flat=True),
+    "guess": _each(_value, flat=True),
+    "free": _free,
+    "expose": _each(_name),
+    "simulate": _each(_option),
+}

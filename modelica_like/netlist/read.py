@@ -1,0 +1,192 @@
+"""From netlist files to a tree of components."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from modelica_like.errors import (
+    CyclicAssembly,
+    ModelicaLikeError,
+    NetlistError,
+    Source,
+    UnknownName,
+    WiringErrors,
+    raise_together_or_one,
+)
+from modelica_like.language import Assembly, Component, Variable, guess
+from modelica_like.language.fields import Discrete
+from modelica_like.netlist.document import Document, parse, read_text
+from modelica_like.netlist.registry import find_type
+
+_MAX_PARTS = 200_000
+
+
+def load(path: str | Path) -> Assembly:
+    """Read a netlist file and the netlists it uses.
+
+    Args:
+        path: a TOML file.
+
+    Raises:
+        NetlistError: the file cannot be read, or is no netlist.
+        CyclicAssembly: it contains itself.
+        ModelicaLikeError: types, values or paths in it are wrong; several errors come as `WiringErrors`.
+    """
+    return _Loader().load(Path(path), ())
+
+
+def loads(text: str, file: str = "netlist.toml") -> Assembly:
+    """Read a netlist from text; see `load`.
+
+    Args:
+        text: TOML.
+        file: what to call it in messages; netlists used as parts are looked for beside it.
+    """
+    return _Loader().build(parse(text, file), (Path(file).resolve(),))
+
+
+class _Loader:
+    """Builds assemblies; every file is read once."""
+
+    def __init__(self) -> None:
+        self.assemblies: dict[Path, Assembly] = {}
+        self.parts = 0
+
+    def load(self, path: Path, chain: tuple[Path, ...]) -> Assembly:
+        key = path.resolve()
+        if key in chain:
+            names = " contains ".join(file.name for file in (*chain[chain.index(key) :], key))
+            raise CyclicAssembly(f"A netlist contains itself: {names}.", advice="Take one of them out.")
+        if key not in self.assemblies:
+            self.assemblies[key] = self.build(parse(read_text(path), str(path)), (*chain, key))
+        return self.assemblies[key]
+
+    def build(self, document: Document, chain: tuple[Path, ...]) -> Assembly:
+        """Make the assembly of one file; all its errors are raised together."""
+        assembly = Assembly(
+            document.name, connect=document.connect, series=document.series, free=document.free,
+            description=document.description,
+        )  # fmt: skip
+        assembly.__dict__.update(origin=str(chain[-1]), simulate=document.simulate)
+        task = _Task(document, assembly, chain, self)
+        task.run()
+        if task.errors:
+            raise raise_together_or_one(task.errors)
+        return assembly
+
+    def count(self, number: int) -> None:
+        """Refuse netlists that multiply without bounds."""
+        self.parts += number
+        if self.parts > _MAX_PARTS:
+            raise NetlistError(f"The netlist has more than {_MAX_PARTS} parts.")
+
+
+class _Task:
+    """Fills the assembly of one document and collects the errors with their lines."""
+
+    def __init__(self, document: Document, assembly: Assembly, chain: tuple[Path, ...], loader: _Loader) -> None:
+        self.document = document
+        self.assembly = assembly
+        self.chain = chain
+        self.loader = loader
+        self.errors: list[ModelicaLikeError] = []
+
+    def run(self) -> None:
+        """Go through the sections, so that each finds what it refers to."""
+        self._each("parameters", self.document.parameters, self.assembly.add_parameter)
+        self._each("parts", self.document.parts, self._add_part)
+        if not self.errors:
+            self._each("start", self.document.start, self._start)
+            self._each("guess", self.document.guess, lambda path, value: self._start(path, guess(value)))
+            self._each("expose", self.document.expose, self.assembly.expose)
+        for section in ("connect", "series", "expose"):
+            for name in getattr(self.document, section):
+                self.assembly.place(f"{section}.{name}", self.document.lines.source(section, name))
+        for end in self.document.free:
+            self.assembly.place(f"free.{end}", self.document.lines.source("free"))
+
+    def _each(self, section: str, entries: Mapping[str, Any], action: Callable[[str, Any], None]) -> None:
+        for name, entry in entries.items():
+            try:
+                action(name, entry)
+            except CyclicAssembly as error:
+                error.where = (self.document.lines.source(section, name), *error.where)
+                raise
+            except ModelicaLikeError as error:
+                self._collect(error, self.document.lines.source(section, name))
+
+    def _collect(self, error: ModelicaLikeError, source: Source) -> None:
+        if isinstance(error, WiringErrors):
+            self.errors.extend(error.errors)
+            return
+        # An error from a netlist inside keeps its own place; the place on Python's stack says nothing here.
+        if not any(place.file.endswith(".toml") for place in error.where):
+            error.where = (source,)
+        self.errors.append(error)
+
+    def _add_part(self, name: str, entry: Any) -> None:
+        if isinstance(entry, list):
+            part: Any = [self._part(f"{name}[{k}]", table) for k, table in enumerate(entry, 1)]
+        else:
+            part = self._part(name, entry)
+            part = [part] * entry["count"] if "count" in entry else part
+        setattr(self.assembly, name, part)
+        self.assembly.place(f"parts.{name}", self.document.lines.source("parts", name))
+
+    def _part(self, name: str, table: Mapping[str, Any]) -> Component:
+        values = {key: value for key, value in table.items() if key not in ("is", "count")}
+        kind = table["is"]
+        if kind.endswith(".toml"):
+            part: Component = self.loader.load(Path(self.document.lines.file).parent / kind, self.chain).copy()
+        else:
+            part = new_component(find_type(kind), values)
+        for key, value in values.items():
+            self._give(part, key, value, f"{name}.{key}")
+        self.loader.count(table.get("count", 1) * sum(1 for _ in part.walk()))
+        return part
+
+    def _give(self, part: Component, key: str, value: Any, label: str) -> None:
+        """Set a value, a replaceable part (a table with `is`), or values inside a part (a table without)."""
+        if not isinstance(value, dict):
+            part.set(key, value)
+        elif "is" in value:
+            part.give(key, self._part(label, value))
+        else:
+            for inner, inner_value in value.items():
+                self._give(part.find(key), inner, inner_value, f"{label}.{inner}")
+
+    def _start(self, path: str, value: Any) -> None:
+        owner_path, _, name = path.rpartition(".")
+        owner = self.assembly.find(owner_path)
+        can_start = name in owner.modes or isinstance(owner.fields.get(name), Variable | Discrete)
+        if not can_start and (name in owner.fields or name in owner._structural):
+            raise UnknownName(
+                f"{path} is a parameter, not a variable.", advice="Give its value where the part is declared."
+            )
+        owner.give(name, value)
+
+
+def new_component(kind: type[Component], values: dict[str, Any]) -> Component:
+    """Make a component; its structural fields must be known at once, because they decide which parts it has."""
+    structural = {key: values.pop(key) for key in kind._structural if key in values}
+    for key, value in structural.items():
+        _check_structural(kind, key, value)
+    try:
+        return kind(**structural)
+    except (TypeError, ValueError, LookupError, ArithmeticError) as error:
+        given = ", ".join(f"{key} = {value!r}" for key, value in structural.items())
+        raise NetlistError(f"{kind.__name__} cannot be made with {given}: {error}.") from error
+
+
+def _check_structural(kind: type[Component], key: str, value: Any) -> None:
+    default = kind._structural[key]
+    wanted = type(default)
+    if wanted not in (bool, int, float, str) or (
+        isinstance(value, wanted) and isinstance(value, bool) == (wanted is bool)
+    ):
+        return
+    if not (wanted is float and isinstance(value, int) and not isinstance(value, bool)):
+        names = {bool: "true or false", int: "a whole number", float: "a number", str: "a text"}
+        raise NetlistError(f"{kind.__name__}.{key} = {value!r} must be {names[wanted]}.")

@@ -1,0 +1,172 @@
+"""From a tree of components to a netlist: the inverse of reading."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import tomlkit
+from tomlkit.items import Item, Table
+
+from modelica_like.errors import NetlistError
+from modelica_like.language import Assembly, Component
+from modelica_like.language.fields import Field, Value
+from modelica_like.language.formula import Formula
+from modelica_like.netlist.convert import as_assembly
+from modelica_like.netlist.read import load, new_component
+from modelica_like.netlist.registry import type_name
+
+
+def save(component: Component, path: str | Path) -> None:
+    """Write a component as a netlist file; see `dumps`."""
+    path = Path(path)
+    path.write_text(dumps(component, folder=path.parent), encoding="utf-8")
+
+
+def dumps(component: Component, *, folder: str | Path = ".") -> str:
+    """Write a component as the text of a netlist; what reads it back is the same tree.
+
+    Args:
+        component: an assembly, or a component that has only parts and wires.
+        folder: where the text will lie; netlists used as parts are named relative to it.
+
+    Raises:
+        NetlistError: the component has what no netlist can hold, such as equations of its own.
+    """
+    assembly = component if isinstance(component, Assembly) else as_assembly(component)
+    return tomlkit.dumps(_Writer(Path(folder)).document(assembly))
+
+
+class _Writer:
+    """Collects the sections; start values of all levels go to `[start]` and `[guess]`."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.start: dict[str, Any] = {}
+        self.guess: dict[str, Any] = {}
+
+    def document(self, assembly: Assembly) -> tomlkit.TOMLDocument:
+        parts = {name: self.part(name, part) for name, part in assembly._parts.items()}
+        sections: dict[str, Mapping[str, Any]] = {
+            "parameters": {name: plain(_given(assembly, name).given) for name in assembly.fields},
+            "parts": {name: _inline(entry) for name, entry in parts.items()},
+            "series": {name: list(ends) for name, ends in assembly.chains.items()},
+            "connect": {name: list(ends) for name, ends in assembly.wires.items()},
+            "expose": dict(assembly.exposed),
+            "start": self.start,
+            "guess": self.guess,
+            "simulate": assembly.__dict__["simulate"],
+        }
+        document = tomlkit.document()
+        document.add("name", tomlkit.item(assembly._name))
+        if assembly.__dict__["description"]:
+            document.add("description", tomlkit.item(assembly.__dict__["description"]))
+        if assembly.free_ends:
+            document.add("free", tomlkit.item(list(assembly.free_ends)))
+        for name, entries in sections.items():
+            if entries:
+                document.add(name, _table(entries))
+        return document
+
+    def part(self, path: str, part: Component | list[Component]) -> Any:
+        if not isinstance(part, list):
+            return self.entry(path, part)
+        entries = [self.entry(f"{path}[{k}]", element) for k, element in enumerate(part, 1)]
+        same = all(entry == entries[0] for entry in entries)
+        return {"is": entries[0].pop("is"), "count": len(entries), **entries[0]} if same else entries
+
+    def entry(self, path: str, part: Component) -> dict[str, Any]:
+        """Return the table of one part: its type, and what differs from a new one of that type."""
+        if isinstance(part, Assembly):
+            return {"is": self.file_of(part), **self.changes(path, part, load(part.__dict__["origin"]))}
+        structural = {key: plain(part.__dict__[key]) for key in part._structural}
+        reference = new_component(type(part), dict(structural))
+        different = {key: value for key, value in structural.items() if _frozen(value) != part._structural[key]}
+        return {"is": type_name(type(part)), **different, **self.changes(path, part, reference)}
+
+    def file_of(self, assembly: Assembly) -> str:
+        origin = assembly.__dict__["origin"]
+        if not origin:
+            raise NetlistError(
+                f"{assembly.label} is an assembly without a file, so a netlist cannot name it.",
+                advice="Save it to a file of its own, load that file, and use it as the part.",
+            )
+        relative = Path(os.path.relpath(origin, self.folder.resolve())).as_posix()
+        return relative if relative.startswith(".") else f"./{relative}"
+
+    def changes(self, path: str, part: Component, reference: Component) -> dict[str, Any]:
+        """Return the values that differ from those of `reference`; start values go to their sections."""
+        table = {
+            name: plain(value.given) for name, value in part._values.items() if value != reference._values.get(name)
+        }
+        for name, value in part._starts.items():
+            if value != reference._starts.get(name):
+                section = self.start if value.fixed else self.guess
+                section[f"{path}.{name}"] = plain(value.given)
+        for name in part.modes:
+            if part.start_mode(name) != reference.start_mode(name):
+                self.start[f"{path}.{name}"] = part.start_mode(name)
+        known = reference.parts
+        for name, inner in part.parts.items():
+            if type(inner) is not type(known[name]):
+                table[name] = self.entry(f"{path}.{name}", inner)
+            elif change := self.changes(f"{path}.{name}", inner, known[name]):
+                table[name] = change
+        return table
+
+
+def _frozen(value: Any) -> Any:
+    """Return lists as the tuples that structural defaults are."""
+    return tuple(_frozen(item) for item in value) if isinstance(value, list) else value
+
+
+def _given(component: Component, name: str) -> Value:
+    value = component.value(name)
+    if value is None:
+        raise NetlistError(f"{component.label}.{name} has no value.")
+    return value
+
+
+def plain(value: Any) -> Any:
+    """Return a value as TOML has it; numbers and texts stay as the user wrote them.
+
+    Raises:
+        NetlistError: TOML has nothing for it.
+    """
+    if isinstance(value, bool | int | float | str):
+        return value
+    if isinstance(value, Formula):
+        return str(value)
+    if isinstance(value, Field):
+        return value.name
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    if hasattr(value, "magnitude"):
+        units = ".".join(f"{name}^({power})" if power != 1 else name for name, power in value.unit_items())
+        return f"{float(value.magnitude)!r} {units}"
+    if hasattr(value, "tolist"):
+        return value.tolist()
+    raise NetlistError(f"{value!r} cannot be written to a netlist.")
+
+
+def _table(entries: Mapping[str, Any]) -> Table:
+    table = tomlkit.table()
+    for name, entry in entries.items():
+        table.add(tomlkit.key(name), entry if isinstance(entry, Item) else tomlkit.item(entry))
+    return table
+
+
+def _inline(entry: Any) -> Any:
+    if isinstance(entry, list):
+        array = tomlkit.array()
+        for element in entry:
+            array.append(_inline(element))
+        return array.multiline(True) if entry and isinstance(entry[0], dict) else array
+    if not isinstance(entry, dict):
+        return entry
+    table = tomlkit.inline_table()
+    for name, value in entry.items():
+        table.append(tomlkit.key(name), _inline(value))
+    return table

@@ -1,0 +1,187 @@
+"""Alias elimination: variables that are equal up to a factor become one, together with their derivatives."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+
+from modelica_like.flatten.model import FlatModel, LinearEquation
+
+
+@dataclass(frozen=True)
+class Aliases:
+    """Result of the alias elimination.
+
+    Attributes:
+        root: class representative of every node.
+        factor: value of a node = factor * value of its root.
+        known: roots whose value is a number or an expression of parameters.
+        derivative: root -> (root, factor) of its derivative: der(root) = factor * root.
+        remaining: positions in `FlatModel.linear` of the equations that still say something.
+        contradictions: positions of the equations without any unknown left.
+    """
+
+    root: list[int]
+    factor: list[float]
+    known: dict[int, Any]
+    derivative: dict[int, tuple[int, float]]
+    remaining: list[int]
+    contradictions: list[int]
+
+
+def find_aliases(model: FlatModel) -> Aliases:
+    """Merge nodes by the linear equations with one or two unknowns and numeric coefficients."""
+    return _Elimination(model).run()
+
+
+def is_number(value: Any) -> bool:
+    """Tell whether a coefficient is a number rather than an expression of parameters."""
+    return isinstance(value, float | int)
+
+
+def _is_zero(value: Any) -> bool:
+    return float(value) == 0.0 if is_number(value) else bool(value.is_zero())
+
+
+class _Elimination:
+    """Union-find with factors; merging two classes also merges their derivatives."""
+
+    def __init__(self, model: FlatModel) -> None:
+        count = len(model.nodes)
+        self.model = model
+        self.parent = list(range(count))
+        self.factor = [1.0] * count
+        self.known: dict[int, Any] = {}
+        self.derivative: dict[int, tuple[int, float]] = {n: (d, 1.0) for n, d in model.derivative.items()}
+        self.integral: dict[int, int] = {d: n for n, d in model.derivative.items()}
+        self.watchers: dict[int, set[int]] = {}
+        self.queue = deque(range(len(model.linear)))
+        self.remaining: set[int] = set()
+        self.contradictions: list[int] = []
+        self.inputs = set(model.inputs)
+
+    def run(self) -> Aliases:
+        queued = set(self.queue)
+        while self.queue:
+            number = self.queue.popleft()
+            queued.discard(number)
+            for affected in self._consider(number):
+                if affected not in queued:
+                    queued.add(affected)
+                    self.queue.append(affected)
+        nodes = range(len(self.model.nodes))
+        found = [self.find(node) for node in nodes]
+        return Aliases(
+            root=[root for root, _ in found], factor=[factor for _, factor in found], known=self.known,
+            derivative={self.find(n)[0]: self._derivative(n) for n in self.derivative if self.find(n)[0] == n},
+            remaining=sorted(self.remaining), contradictions=self.contradictions,
+        )  # fmt: skip
+
+    def _derivative(self, root: int) -> tuple[int, float]:
+        node, factor = self.derivative[root]
+        target, more = self.find(node)
+        return target, factor * more
+
+    def find(self, node: int) -> tuple[int, float]:
+        """Return root and factor of a node, and shorten the way there."""
+        trail: list[int] = []
+        while self.parent[node] != node:
+            trail.append(node)
+            node = self.parent[node]
+        factor = 1.0
+        for step in reversed(trail):
+            factor *= self.factor[step]
+            self.parent[step], self.factor[step] = node, factor
+        return node, factor
+
+    def _reduce(self, equation: LinearEquation) -> tuple[dict[int, Any], Any]:
+        terms: dict[int, Any] = {}
+        constant = equation.constant
+        for node, coefficient in equation.terms:
+            root, factor = self.find(node)
+            if root in self.known:
+                constant = constant + coefficient * factor * self.known[root]
+            else:
+                terms[root] = terms.get(root, 0.0) + coefficient * factor
+        return {root: c for root, c in terms.items() if not _is_zero(c)}, constant
+
+    def _consider(self, number: int) -> set[int]:
+        """Use an equation if it is simple enough; return the equations that become simpler by it."""
+        equation = self.model.linear[number]
+        terms, constant = self._reduce(equation)
+        self.remaining.discard(number)
+        if not terms:
+            self.contradictions.append(number)
+            return set()
+        numeric = all(is_number(c) for c in terms.values())
+        if len(terms) == 1 and numeric:
+            ((root, coefficient),) = terms.items()
+            if root not in self.integral and root not in self.inputs:
+                return self._learn(root, -constant / coefficient if not _is_zero(constant) else 0.0)
+        if len(terms) == 2 and numeric and _is_zero(constant):
+            (first, a), (second, b) = terms.items()
+            if self._may_merge(first, second):
+                return self._merge(first, second, -b / a)
+        self.remaining.add(number)
+        for root in terms:
+            self.watchers.setdefault(root, set()).add(number)
+        return set()
+
+    def _learn(self, root: int, value: Any) -> set[int]:
+        """A class has a constant value, its derivatives are zero."""
+        self.known[root] = value
+        affected = self.watchers.pop(root, set())
+        if root in self.derivative:
+            below, _ = self._derivative(root)
+            self.integral.pop(below, None)
+            if below not in self.known:
+                affected |= self._learn(below, 0.0)
+        return affected
+
+    def _may_merge(self, first: int, second: int) -> bool:
+        if first in self.inputs and second in self.inputs:
+            return False
+        # A class that were the derivative of two unknowns would have two integrals; such an equation stays.
+        both = first in self.integral and second in self.integral
+        return not both or self._integral_root(first) == self._integral_root(second)
+
+    def _integral_root(self, root: int) -> int:
+        return self.find(self.integral[root])[0]
+
+    def _merge(self, first: int, second: int, ratio: float) -> set[int]:
+        """first = ratio * second."""
+        keep, drop, factor = (first, second, 1.0 / ratio) if self._rank(first) >= self._rank(second) else (second, first, ratio)
+        self.parent[drop], self.factor[drop] = keep, factor
+        affected = self.watchers.pop(drop, set())
+        self.watchers.setdefault(keep, set()).update(affected)
+        if drop in self.inputs:
+            self.inputs.add(keep)
+        if drop in self.integral:
+            self.integral.setdefault(keep, self.integral.pop(drop))
+        if drop in self.derivative:
+            node, times = self.derivative.pop(drop)
+            if keep in self.derivative:
+                affected |= self._merge_derivatives(keep, node, times / factor)
+            else:
+                # der(keep) = der(drop) / factor = times / factor * node
+                self.derivative[keep] = (node, times / factor)
+                self.integral[self.find(node)[0]] = keep
+        return affected
+
+    def _merge_derivatives(self, keep: int, node: int, times: float) -> set[int]:
+        """der(keep) is known twice: times * node, and what is stored."""
+        first, a = self._derivative(keep)
+        second, more = self.find(node)
+        b = times * more
+        if first == second:
+            return set()
+        return self._merge(first, second, b / a)
+
+    def _rank(self, root: int) -> tuple[bool, bool, int]:
+        variable, order = self.model.nodes[root]
+        one = self.model.variables[variable]
+        preference = ("avoid", "default", "prefer", "always").index(one.state)
+        return root in self.inputs, root in self.integral, preference * 2 + (order == 0)

@@ -1,0 +1,224 @@
+"""Solve the equations in block lower triangular order: explicitly where possible, else by tearing."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass, field
+from typing import Any
+
+import casadi as ca
+
+from modelica_like.structure.isolate import isolate
+
+SMALL = 3
+"""Torn linear blocks up to this size are solved symbolically; larger ones stay implicit."""
+
+
+@dataclass(frozen=True)
+class Block:
+    """Equations that must be solved together.
+
+    Attributes:
+        equations: positions in the residual.
+        unknowns: positions in the unknowns.
+        tears: unknowns that are guessed while the others follow one from another.
+        kind: `explicit`, `linear` (tears solved symbolically) or `implicit` (tears become algebraic variables z).
+    """
+
+    equations: tuple[int, ...]
+    unknowns: tuple[int, ...]
+    tears: tuple[int, ...]
+    kind: str
+
+
+@dataclass
+class Solved:
+    """Solution of all blocks.
+
+    Attributes:
+        order: unknowns with the expressions that give them, each in terms of earlier ones, states and z.
+        z: unknowns that stay implicit.
+        alg: their residuals.
+        determinants: (block number, expression) whose zero makes a block singular.
+    """
+
+    blocks: list[Block] = field(default_factory=list)
+    order: list[tuple[int, Any]] = field(default_factory=list)
+    z: list[int] = field(default_factory=list)
+    alg: list[Any] = field(default_factory=list)
+    determinants: list[tuple[int, Any]] = field(default_factory=list)
+
+
+class BlockSolver:
+    """Solves a square system block by block.
+
+    Args:
+        residual: column of residuals.
+        unknowns: column of symbols to solve for.
+        constants: column of the symbols that never change during a run (parameters): a coefficient of only these is a safe divisor.
+        volatile: column of all other symbols a coefficient may depend on (states, unknowns, modes, time).
+    """
+
+    def __init__(self, residual: Any, unknowns: Any, volatile: Any) -> None:
+        self.residual = residual
+        self.unknowns = unknowns
+        self.jacobian = ca.jacobian(residual, unknowns)
+        self.rows = _entries_by_row(self.jacobian)
+        self.safe = self._safe_entries(volatile)
+        self.solved = Solved()
+
+    def _safe_entries(self, volatile: Any) -> set[tuple[int, int]]:
+        """Entries of the Jacobian that depend on parameters only: they cannot vanish on the way."""
+        entries = ca.vertcat(*self.jacobian.nonzeros()) if self.jacobian.nnz() else ca.SX(0, 1)
+        moving = ca.which_depends(entries, volatile, 1, True) if entries.numel() else []
+        rows, columns = self.jacobian.sparsity().get_triplet()
+        return {(r, c) for r, c, moves in zip(rows, columns, moving, strict=True) if not moves}
+
+    def run(self) -> Solved:
+        """Solve all blocks."""
+        _, row_order, column_order, row_starts, column_starts, _, _ = self.jacobian.sparsity().btf()
+        count = len(row_starts) - 1
+        for number in range(count):
+            rows = row_order[row_starts[number] : row_starts[number + 1]]
+            columns = column_order[column_starts[number] : column_starts[number + 1]]
+            self._solve(tuple(rows), tuple(columns))
+        return self.solved
+
+    def _solve(self, rows: tuple[int, ...], columns: tuple[int, ...]) -> None:
+        if len(rows) == 1 and (rows[0], columns[0]) in self.safe:
+            expression = self._explicit(rows[0], columns[0])
+            if expression is not None:
+                self.solved.order.append((columns[0], expression))
+                self.solved.blocks.append(Block(rows, columns, (), "explicit"))
+                return
+        sequence, tears, rest = self._tear(rows, columns)
+        self._solve_torn(rows, columns, sequence, tears, rest)
+
+    def _explicit(self, row: int, column: int) -> Any | None:
+        """Solve one equation for one unknown that it contains linearly with a safe coefficient."""
+        residual, unknown = self.residual[row], self.unknowns[column]
+        expression = isolate(residual, unknown)
+        if expression is None:
+            slope = self.rows[row][column]
+            rest = ca.substitute(residual, unknown, ca.SX(0))
+            expression = -rest / slope
+        return expression
+
+    def _tear(
+        self, rows: tuple[int, ...], columns: tuple[int, ...]
+    ) -> tuple[list[tuple[int, int]], list[int], list[int]]:
+        """Find a sequence of (equation, unknown) to solve one after the other, the torn unknowns, and the equations left."""
+        inside = set(columns)
+        open_unknowns = {r: {c for c in self.rows[r] if c in inside} for r in rows}
+        users: dict[int, list[int]] = {}
+        for row, unknowns in open_unknowns.items():
+            for column in unknowns:
+                users.setdefault(column, []).append(row)
+        sequence: list[tuple[int, int]] = []
+        tears: list[int] = []
+        used: set[int] = set()
+        done: set[int] = set()
+        ready = deque(r for r in rows if self._solvable(r, open_unknowns[r]))
+
+        def settle(column: int) -> None:
+            done.add(column)
+            for row in users[column]:
+                open_unknowns[row].discard(column)
+                if row not in used and self._solvable(row, open_unknowns[row]):
+                    ready.append(row)
+
+        while len(done) < len(columns):
+            if ready:
+                row = ready.popleft()
+                if row in used or not self._solvable(row, open_unknowns[row]):
+                    continue
+                column = next(iter(open_unknowns[row]))
+                used.add(row)
+                sequence.append((row, column))
+                settle(column)
+            else:
+                tear = self._best_tear(rows, used, open_unknowns, users)
+                tears.append(tear)
+                settle(tear)
+        return sequence, tears, [r for r in rows if r not in used]
+
+    def _solvable(self, row: int, unknowns: set[int]) -> bool:
+        return len(unknowns) == 1 and (row, next(iter(unknowns))) in self.safe
+
+    def _best_tear(
+        self, rows: tuple[int, ...], used: set[int], open_unknowns: dict[int, set[int]], users: dict[int, list[int]]
+    ) -> int:
+        """Take the unknown of the shortest open equations, most used and least safe to solve for."""
+        shortest = min((len(open_unknowns[r]) for r in rows if r not in used and open_unknowns[r]), default=0)
+        scores: dict[int, tuple[int, int, int]] = {}
+        for row in rows:
+            if row in used or not open_unknowns[row]:
+                continue
+            for column in open_unknowns[row]:
+                near, count, _ = scores.get(column, (0, 0, 0))
+                scores[column] = (near + (len(open_unknowns[row]) == shortest), len(users[column]), -column)
+        return max(scores, key=lambda column: scores[column])
+
+    def _solve_torn(
+        self, rows: tuple[int, ...], columns: tuple[int, ...], sequence: list[tuple[int, int]], tears: list[int], rest: list[int]
+    ) -> None:
+        inner = [(column, self._explicit(row, column)) for row, column in sequence]
+        remaining = self._substitute([self.residual[row] for row in rest], inner)
+        guesses = ca.vertcat(*(self.unknowns[column] for column in tears))
+        slopes = ca.jacobian(ca.vertcat(*remaining), guesses)
+        linear = not any(ca.which_depends(ca.vertcat(*slopes.nonzeros()), guesses, 1, True)) if slopes.nnz() else False
+        number = len(self.solved.blocks)
+        if linear and len(tears) <= SMALL:
+            constants = ca.substitute(ca.vertcat(*remaining), guesses, ca.SX.zeros(len(tears)))
+            solution, determinant = cramer(ca.densify(slopes), -constants)
+            self.solved.determinants.append((number, determinant))
+            self.solved.order += [(column, solution[k]) for k, column in enumerate(tears)]
+            kind = "linear"
+        else:
+            self.solved.determinants.append((number, ca.det(ca.densify(slopes)) if len(tears) <= SMALL else ca.SX(1)))
+            self.solved.z += tears
+            self.solved.alg += remaining
+            kind = "implicit"
+        self.solved.order += inner
+        self.solved.blocks.append(Block(rows, columns, tuple(tears), kind))
+
+    def _substitute(self, expressions: list[Any], inner: list[tuple[int, Any]]) -> list[Any]:
+        if not inner:
+            return expressions
+        symbols = [self.unknowns[column] for column, _ in inner]
+        _, replaced = ca.substitute_inplace(symbols, [expression for _, expression in inner], expressions, False)
+        return list(replaced)
+
+
+def cramer(matrix: Any, right: Any) -> tuple[Any, Any]:
+    """Solve a small linear system by Cramer's rule: no pivot is divided by that could vanish in some mode.
+
+    Returns:
+        The solution and the determinant.
+    """
+    size = matrix.shape[0]
+    determinant = _determinant(matrix, list(range(size)), list(range(size)))
+    solution = []
+    for column in range(size):
+        replaced = ca.SX(matrix)
+        replaced[:, column] = right
+        solution.append(_determinant(replaced, list(range(size)), list(range(size))) / determinant)
+    return ca.vertcat(*solution), determinant
+
+
+def _determinant(matrix: Any, rows: list[int], columns: list[int]) -> Any:
+    if len(rows) == 1:
+        return matrix[rows[0], columns[0]]
+    total: Any = 0
+    for k, column in enumerate(columns):
+        minor = _determinant(matrix, rows[1:], columns[:k] + columns[k + 1 :])
+        term = matrix[rows[0], column] * minor
+        total = total + term if k % 2 == 0 else total - term
+    return total
+
+
+def _entries_by_row(matrix: Any) -> list[dict[int, Any]]:
+    rows: list[dict[int, Any]] = [{} for _ in range(matrix.shape[0])]
+    for row, column, entry in zip(*matrix.sparsity().get_triplet(), matrix.nonzeros(), strict=True):
+        rows[row][column] = entry
+    return rows

@@ -1,0 +1,114 @@
+"""Pantelides' algorithm: which equations must be differentiated, and how often."""
+
+from __future__ import annotations
+
+from modelica_like.errors import StructureError
+from modelica_like.structure.system import System
+
+_MAX_INDEX = 8
+
+
+def prefer_relative_states(system: System) -> None:
+    """Give preferred variables as many derivatives as the kinematic constraint they stand in allows.
+
+    A relative angle `phi_rel = phi_b - phi_a` is then differentiated along with the angles of the inertias and can become a state in their
+    place: absolute angles grow without bound, and with them the error that a relative tolerance allows.
+    """
+    for _, terms in system.linear_rows:
+        if not terms or any(system.levels[level].order for level in terms):
+            continue
+        wishes = [level for level in terms if _wish(system, level) >= 2]
+        for level in wishes:
+            others = [len(system.chains[system.levels[o].chain]) for o in terms if o != level]
+            while others and len(system.chains[system.levels[level].chain]) < min(others):
+                system.add_level(system.levels[level].chain)
+
+
+def _wish(system: System, level: int) -> int:
+    return max(system.levels[n].preference for n in system.chains[system.levels[level].chain])
+
+
+class Pantelides:
+    """Finds how often each equation is differentiated; extends the chains of the system where needed.
+
+    Args:
+        system: structurally nonsingular (over chains).
+        incidence: level numbers in each equation.
+
+    Attributes:
+        counts: how often each equation is differentiated.
+
+    Source: Pantelides, SIAM J. Sci. Stat. Comput. 9 (1988) 213-231.
+    """
+
+    def __init__(self, system: System, incidence: list[list[int]]) -> None:
+        self.system = system
+        self.counts = [0] * len(incidence)
+        self._levels = [list(row) for row in incidence]
+        self._root = list(range(len(incidence)))
+        self._derived: dict[int, int] = {}
+        self._equation_of: dict[int, int] = {}
+        self._level_of: dict[int, int] = {}
+        self._known = set(system.inputs)
+        for equation in range(len(incidence)):
+            self._match(equation)
+
+    def _match(self, equation: int) -> None:
+        while True:
+            equations, levels, found = self._augment(equation)
+            if found:
+                return
+            for level in levels:
+                if self.system.derivative(level) is None:
+                    self.system.add_level(self.system.levels[level].chain)
+            for one in equations:
+                self._differentiate(one)
+            for level in levels:
+                self._assign(self._above(level), self._derived[self._equation_of[level]])
+            equation = self._derived[equation]
+
+    def _augment(self, start: int) -> tuple[list[int], dict[int, int], bool]:
+        """Search an augmenting path for an equation among the highest derivatives; return what was reached."""
+        equations = [start]
+        came_from: dict[int, int] = {}
+        for equation in equations:
+            for level in self._levels[equation]:
+                if level in came_from or level in self._known or self.system.derivative(level) is not None:
+                    continue
+                came_from[level] = equation
+                if level not in self._equation_of:
+                    self._flip(came_from, level, start)
+                    return equations, came_from, True
+                equations.append(self._equation_of[level])
+        return equations, came_from, False
+
+    def _flip(self, came_from: dict[int, int], level: int, start: int) -> None:
+        while True:
+            equation = came_from[level]
+            released = self._level_of.get(equation)
+            self._assign(level, equation)
+            if equation == start or released is None:
+                return
+            level = released
+
+    def _assign(self, level: int, equation: int) -> None:
+        self._equation_of[level] = equation
+        self._level_of[equation] = level
+
+    def _above(self, level: int) -> int:
+        above = self.system.derivative(level)
+        return self.system.add_level(self.system.levels[level].chain) if above is None else above
+
+    def _differentiate(self, equation: int) -> None:
+        root = self._root[equation]
+        self.counts[root] += 1
+        if self.counts[root] > _MAX_INDEX:
+            raise StructureError(
+                f"An equation would have to be differentiated more than {_MAX_INDEX} times.",
+                where=self.system.origins[root].source,
+                advice="Look for a motion that is prescribed twice, or a derivative that nothing determines.",
+            )
+        lifted = (self.system.derivative(level) for level in self._levels[equation])
+        self._derived[equation] = len(self._levels)
+        self._levels.append(sorted({*self._levels[equation], *(level for level in lifted if level is not None)}))
+        self._root.append(root)

@@ -1,0 +1,68 @@
+"""Solve one equation for one unknown by undoing operations from the outside inwards."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi as ca
+
+from modelica_like.language.expr import leaf_id
+
+_MAX_NODES = 60
+
+
+def isolate(residual: Any, unknown: Any) -> Any | None:
+    """Return the expression of `unknown` that makes `residual` zero.
+
+    Only an unknown that occurs once, under sums, signs and products with expressions of other symbols, is isolated; it keeps
+    the arithmetic as the author wrote it. None if that is not possible.
+    """
+    trail = _find(residual, leaf_id(unknown))
+    if trail is None:
+        return None
+    result: Any = ca.SX(0)
+    for node, position in trail:
+        result = _undo(node, position, result)
+        if result is None:
+            return None
+    return result
+
+
+def _find(root: Any, target: int) -> list[tuple[Any, int]] | None:
+    """Return the way from the root to the only occurrence: pairs of a node and the operand to go to."""
+    found: list[tuple[Any, int]] | None = None
+    pending: list[tuple[Any, list[tuple[Any, int]]]] = [(root, [])]
+    visited = 0
+    while pending:
+        node, trail = pending.pop()
+        visited += 1
+        if visited > _MAX_NODES:
+            return None
+        if node.is_leaf():
+            if node.is_symbolic() and node.element_hash() == target:
+                if found is not None:
+                    return None
+                found = trail
+            continue
+        for position in range(node.n_dep()):
+            pending.append((node.dep(position), [*trail, (node, position)]))
+    return found
+
+
+def _undo(node: Any, position: int, value: Any) -> Any | None:
+    """Solve `node == value` for the operand at `position`."""
+    operation = node.op()
+    if operation == ca.OP_NEG:
+        return -value
+    if operation == ca.OP_TWICE:
+        return value / 2
+    other = node.dep(1 - position) if node.n_dep() == 2 else None
+    if operation == ca.OP_ADD:
+        return value - other
+    if operation == ca.OP_SUB:
+        return value + other if position == 0 else other - value
+    if operation == ca.OP_MUL:
+        return value / other
+    if operation == ca.OP_DIV and position == 0:
+        return value * other
+    return None

@@ -1,0 +1,227 @@
+"""From flat equations to an index-1 system: states x with derivatives, and what stays implicit (z)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+
+from modelica_like.errors import StructureError
+from modelica_like.flatten.model import FlatModel, Origin
+from modelica_like.structure.alias import find_aliases
+from modelica_like.structure.blocks import Block, BlockSolver, Solved
+from modelica_like.structure.diagnose import check_solvable
+from modelica_like.structure.index import Pantelides, prefer_relative_states
+from modelica_like.structure.states import select_states
+from modelica_like.structure.system import System, build_system
+
+
+@dataclass(frozen=True)
+class Notice:
+    """Something worth knowing about the structure that is not an error."""
+
+    text: str
+
+
+@dataclass(frozen=True, eq=False)
+class ReducedDae:
+    """Index-1 system: der(x) = ode(x, z, p, d, t), 0 = alg(x, z, p, d, t).
+
+    Attributes:
+        states: names of x.
+        implicit: names of z.
+        x: state symbols.
+        z: implicit symbols.
+        ode: derivatives of x.
+        alg: residuals for z.
+        inputs: symbols of the model's inputs.
+        values: expression of every node of the flat model in x, z, inputs, p, d and t.
+        blocks: blocks of the triangular form, with the names of their unknowns and the origins of their equations.
+        determinants: (names, origins, expression) whose zero makes a block singular.
+        index: structural index of the equations before the reduction.
+        differentiated: origins of the differentiated equations.
+    """
+
+    flat: FlatModel
+    states: tuple[str, ...]
+    implicit: tuple[str, ...]
+    x: Any
+    z: Any
+    u: Any
+    ode: Any
+    alg: Any
+    values: Any
+    guesses: tuple[float, ...]
+    nominals: tuple[float, ...]
+    z_guesses: tuple[float, ...]
+    blocks: tuple[Block, ...]
+    determinants: tuple[tuple[tuple[str, ...], tuple[Origin, ...], Any], ...]
+    index: int
+    differentiated: tuple[Origin, ...]
+
+    def __str__(self) -> str:
+        kinds = [block.kind for block in self.blocks]
+        largest = max((len(block.unknowns) for block in self.blocks), default=0)
+        return (
+            f"ReducedDae {self.flat.name}: {len(self.states)} states ({', '.join(self.states)}), "
+            f"{len(self.implicit)} implicit, index {self.index}, {len(kinds)} blocks (largest {largest})"
+        )
+
+    @property
+    def notices(self) -> tuple[Notice, ...]:
+        """What a reader should know: a high index and the states that were kept."""
+        if not self.differentiated:
+            return ()
+        places = list(dict.fromkeys(o.path or o.kind for o in self.differentiated))
+        couple = "couples" if len(places) == 1 else "couple"
+        count = len(self.differentiated)
+        return (
+            Notice(
+                f"Index {self.index}: {' and '.join(places[:4])}{' …' if len(places) > 4 else ''} {couple} motions rigidly. "
+                f"{count} constraint{'s' if count > 1 else ''} differentiated; states kept: {', '.join(self.states)}."
+            ),
+        )
+
+
+def reduce(flat: FlatModel) -> ReducedDae:
+    """Reduce flat equations to an index-1 system.
+
+    Raises:
+        Underdetermined, Overdetermined: the equations cannot determine the unknowns.
+    """
+    aliases = find_aliases(flat)
+    system = build_system(flat, aliases)
+    prefer_relative_states(system)
+    contradictions = [flat.linear[k].origin for k in aliases.contradictions]
+    check_solvable(system, _incidence(system), contradictions)
+    counts = Pantelides(system, _incidence(system)).counts
+    states = select_states(system, counts, _top_slopes(system, counts))
+    residual, origins = _differentiate(system, counts)
+    unknowns = _unknowns(system, states)
+    solved = BlockSolver(residual, _column(system, unknowns), _volatile(system)).run()
+    return _assemble(system, counts, states, unknowns, origins, solved)
+
+
+def _column(system: System, levels: list[int]) -> Any:
+    return ca.vertcat(*(system.symbols[n] for n in levels)) if levels else ca.SX(0, 1)
+
+
+def _volatile(system: System) -> Any:
+    return ca.vertcat(*system.symbols, system.model.d, system.model.time)
+
+
+def _incidence(system: System) -> list[list[int]]:
+    """Level numbers in each residual."""
+    symbols = _column(system, list(range(len(system.symbols))))
+    function = ca.Function("residual", [symbols, system.model.p, system.model.d, system.model.time], [system.residual])
+    rows: list[list[int]] = [[] for _ in range(system.residual.numel())]
+    for row, column in zip(*function.jac_sparsity(0, 0).get_triplet(), strict=True):
+        rows[row].append(column)
+    return rows
+
+
+def _top_slopes(system: System, counts: list[int]) -> list[dict[int, float]]:
+    """Derivative of each fully differentiated equation by the highest level of each chain, at a generic point."""
+    slopes: list[dict[int, float]] = [{} for _ in counts]
+    rows = [k for k, count in enumerate(counts) if count]
+    if not rows:
+        return slopes
+    model = system.model
+    symbols = _column(system, list(range(len(system.symbols))))
+    # d e^(c) / d v^(d) equals d e / d v^(d - c), so the original equations are enough.
+    jacobian = ca.jacobian(system.residual[rows], symbols)
+    function = ca.Function("slopes", [symbols, model.p, model.d, model.time], [jacobian])
+    point = [0.3 + 0.61803398875 * (k % 7 + 1) for k in range(len(system.symbols))]
+    starts = [one.start if isinstance(one.start, int | float) else 0.0 for one in model.discretes]
+    values = function(point, [one.value for one in model.parameters], starts, 0.0)
+    for place, column, value in zip(*values.sparsity().get_triplet(), values.nonzeros(), strict=True):
+        level = system.levels[column]
+        row = rows[place]
+        if level.order + counts[row] == len(system.chains[level.chain]) - 1:
+            slopes[row][level.chain] = slopes[row].get(level.chain, 0.0) + float(value)
+    return slopes
+
+
+def _differentiate(system: System, counts: list[int]) -> tuple[Any, list[Origin]]:
+    """Append the derivatives of the equations that must be differentiated."""
+    residuals = [system.residual]
+    origins = list(system.origins)
+    rows = list(range(len(counts)))
+    current = system.residual
+    model = system.model
+    times = 1
+    while keep := [k for k, row in enumerate(rows) if counts[row] >= times]:
+        current, rows = current[keep], [rows[k] for k in keep]
+        _check_inputs(system, current, rows)
+        moving = [n for n in range(len(system.levels)) if system.derivative(n) is not None]
+        rates = _column(system, [number for n in moving if (number := system.derivative(n)) is not None])
+        by_time = ca.jtimes(current, model.time, ca.SX(1))
+        current = ca.jtimes(current, _column(system, moving), rates) + by_time
+        residuals.append(current)
+        origins += [system.origins[row] for row in rows]
+        times += 1
+    return ca.vertcat(*residuals), origins
+
+
+def _check_inputs(system: System, equations: Any, rows: list[int]) -> None:
+    if not system.inputs:
+        return
+    inputs = _column(system, system.inputs)
+    for place, depends in enumerate(ca.which_depends(equations, inputs, 1, True)):
+        if depends:
+            origin = system.origins[rows[place]]
+            names = ", ".join(system.levels[n].name for n in system.inputs)
+            raise StructureError(
+                f"{origin.path or origin.kind}: the derivative of an input ({names}) would be needed.",
+                where=origin.source,
+                advice="Give the derivative as an input of its own, or filter the input before it prescribes a motion.",
+            )
+
+
+def _unknowns(system: System, states: list[int]) -> list[int]:
+    known = {*states, *system.inputs}
+    return [n for n in range(len(system.levels)) if n not in known]
+
+
+def _assemble(
+    system: System, counts: list[int], states: list[int], unknowns: list[int], origins: list[Origin], solved: Solved
+) -> ReducedDae:
+    model, levels = system.model, system.levels
+    symbols = [system.symbols[unknowns[k]] for k, _ in solved.order]
+    determinants = [expression for _, expression in solved.determinants]
+    everything = _column(system, list(range(len(levels))))
+    results: list[Any] = [everything, *solved.alg, *determinants]
+    if symbols:
+        _, results = ca.substitute_inplace(symbols, [e for _, e in solved.order], results, False)
+    level_values = results[0]
+    alg = results[1 : 1 + len(solved.alg)]
+    place = ca.Function("nodes", [everything, model.p], [system.node_values])
+    z_levels = [unknowns[k] for k in solved.z]
+    rates = [level_values[n] for s in states if (n := system.derivative(s)) is not None]
+    blocks = solved.blocks
+    return ReducedDae(
+        flat=model,
+        states=tuple(levels[s].name for s in states),
+        implicit=tuple(levels[n].name for n in z_levels),
+        x=_column(system, states),
+        z=_column(system, z_levels),
+        u=_column(system, system.inputs),
+        ode=ca.vertcat(*rates) if rates else ca.SX(0, 1),
+        alg=ca.vertcat(*alg) if alg else ca.SX(0, 1),
+        values=place(level_values, model.p),
+        guesses=tuple(levels[s].guess for s in states),
+        nominals=tuple(levels[s].nominal for s in states),
+        z_guesses=tuple(levels[n].guess for n in z_levels),
+        blocks=tuple(blocks),
+        determinants=tuple(
+            (
+                tuple(levels[unknowns[k]].name for k in blocks[number].unknowns),
+                tuple(origins[k] for k in blocks[number].equations),
+                results[1 + len(solved.alg) + k],
+            )
+            for k, (number, _) in enumerate(solved.determinants)
+        ),
+        index=max(counts, default=0) + 1,
+        differentiated=tuple(system.origins[k] for k, count in enumerate(counts) if count),
+    )

@@ -1,0 +1,93 @@
+"""State selection: dummy derivatives, chosen by preference and by the numbers."""
+
+from __future__ import annotations
+
+from modelica_like.errors import Overdetermined
+from modelica_like.structure.system import System
+
+_TINY = 1e-9
+
+
+def select_states(system: System, counts: list[int], slopes: list[dict[int, float]]) -> list[int]:
+    """Choose the levels that become states.
+
+    Args:
+        system: with all levels that the differentiated equations need.
+        counts: how often each equation is differentiated.
+        slopes: for every equation the derivative of its highest differentiation by the highest level of each chain, as numbers at a generic point.
+
+    Returns:
+        Level numbers, in the order of declaration.
+
+    Raises:
+        Overdetermined: the constraints are dependent.
+
+    Source: Mattsson and Söderlind, SIAM J. Sci. Comput. 14 (1993) 677-692.
+    """
+    known = set(system.inputs)
+    dummies: set[int] = set()
+    stage = 1
+    candidates = [c for c, chain in enumerate(system.chains) if len(chain) > 1 and chain[0] not in known]
+    while rows := [e for e, count in enumerate(counts) if count >= stage]:
+        columns = [c for c in candidates if len(system.chains[c]) > stage]
+        columns.sort(key=lambda c: (_preference(system, c, stage), -c))
+        chosen = _independent(rows, columns, slopes)
+        if len(chosen) < len(rows):
+            raise _dependent(system, [e for e in rows if e not in chosen.values()])
+        dummies.update(system.chains[c][-1 - stage] for c in chosen)
+        candidates = list(chosen)
+        stage += 1
+    highest = {chain[-1] for chain in system.chains}
+    return [n for n in range(len(system.levels)) if n not in dummies and n not in highest and n not in known]
+
+
+def _preference(system: System, chain: int, stage: int) -> int:
+    return system.levels[system.chains[chain][-1 - stage]].preference
+
+
+def _independent(rows: list[int], columns: list[int], slopes: list[dict[int, float]]) -> dict[int, int]:
+    """Take columns in their order as long as they are linearly independent; return column -> pivot row."""
+    entries: dict[int, dict[int, float]] = {c: {} for c in columns}
+    for row in rows:
+        for column, slope in slopes[row].items():
+            if column in entries and slope:
+                entries[column][row] = slope
+    reduced: dict[int, dict[int, float]] = {}
+    chosen: dict[int, int] = {}
+    for column in columns:
+        if len(chosen) == len(rows):
+            break
+        vector = _reduce(dict(entries[column]), reduced)
+        if vector:
+            pivot = max(vector, key=lambda r: abs(vector[r]))
+            reduced[pivot] = vector
+            chosen[column] = pivot
+    return chosen
+
+
+def _reduce(vector: dict[int, float], reduced: dict[int, dict[int, float]]) -> dict[int, float]:
+    """Eliminate the pivot rows of earlier columns; what is left is independent of them."""
+    scale = max((abs(value) for value in vector.values()), default=0.0)
+    done: set[int] = set()
+    while pivots := [row for row in vector if row in reduced and row not in done]:
+        pivot = pivots[0]
+        done.add(pivot)
+        factor = vector[pivot] / reduced[pivot][pivot]
+        for row, value in reduced[pivot].items():
+            vector[row] = vector.get(row, 0.0) - factor * value
+            if row in done and row != pivot:
+                done.discard(row)
+        vector.pop(pivot)
+        vector = {row: value for row, value in vector.items() if abs(value) > _TINY * scale}
+    return vector
+
+
+def _dependent(system: System, equations: list[int]) -> Overdetermined:
+    origins = [system.origins[e] for e in equations]
+    places = ", ".join(dict.fromkeys(o.path or o.kind for o in origins))
+    return Overdetermined(
+        f"The motion is constrained twice: the constraint of {places} follows from others.",
+        where=[o.source for o in origins],
+        why="Rigid parts form a loop, or two parts fix the same speed.",
+        advice="Remove one, or put a spring or clutch between.",
+    )

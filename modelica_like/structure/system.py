@@ -1,0 +1,193 @@
+"""The equation system after alias elimination: chains of derivatives, and residuals in them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import casadi as ca
+
+from modelica_like.flatten.model import FlatModel, Origin, evaluate
+from modelica_like.structure.alias import Aliases
+
+PREFERENCES = ("avoid", "default", "prefer", "always")
+
+
+@dataclass(slots=True)
+class Level:
+    """One derivative of a chain: `order` times differentiated.
+
+    Attributes:
+        name: the shortest name of the variables it stands for.
+        preference: how much it wants to be a state (0: avoid … 3: always).
+    """
+
+    chain: int
+    order: int
+    name: str
+    preference: int
+    nominal: float
+    guess: float
+
+
+@dataclass
+class System:
+    """Residuals over levels.
+
+    Attributes:
+        levels: all unknowns, highest derivatives included.
+        chains: for every chain the numbers of its levels by order.
+        symbols: one symbol per level.
+        residual: column of residuals.
+        origins: where each residual comes from.
+        node_level: for every node (level number, factor), or None if it is known.
+        node_values: expression of every node in level symbols and parameters.
+        inputs: level numbers of the model's inputs.
+    """
+
+    model: FlatModel
+    levels: list[Level]
+    chains: list[list[int]]
+    symbols: list[Any]
+    residual: Any
+    origins: list[Origin]
+    node_level: list[tuple[int, float] | None]
+    node_values: Any
+    inputs: list[int] = field(default_factory=list)
+    linear_rows: list[tuple[int, dict[int, float]]] = field(default_factory=list)
+
+    def add_level(self, chain: int) -> int:
+        """Extend a chain by one derivative."""
+        below = self.levels[self.chains[chain][-1]]
+        number = len(self.levels)
+        self.levels.append(Level(chain, below.order + 1, f"der({below.name})", 1, below.nominal, 0.0))
+        self.symbols.append(ca.SX.sym(self.levels[-1].name))
+        self.chains[chain].append(number)
+        return number
+
+    def derivative(self, level: int) -> int | None:
+        """Return the next level of the chain, if there is one."""
+        one = self.levels[level]
+        chain = self.chains[one.chain]
+        return chain[one.order + 1] if one.order + 1 < len(chain) else None
+
+
+def build_system(model: FlatModel, aliases: Aliases) -> System:
+    """Replace every node by its class, and collect the equations that remain."""
+    levels, chains, place = _chains(model, aliases)
+    node_level = _node_levels(model, aliases, place)
+    _name_levels(model, levels, node_level)
+    symbols = [ca.SX.sym(level.name) for level in levels]
+    node_values = _node_values(model, aliases, node_level, symbols)
+    system = System(model, levels, chains, symbols, None, [], node_level, node_values)
+    inputs = {aliases.root[node] for node in model.inputs}
+    system.inputs = sorted(place[root][0] for root in inputs)
+    _collect_residuals(system, aliases)
+    return system
+
+
+def _chains(model: FlatModel, aliases: Aliases) -> tuple[list[Level], list[list[int]], dict[int, tuple[int, float]]]:
+    """Number the classes along their derivatives; `place` gives each class (level, factor)."""
+    roots = dict.fromkeys(root for root in aliases.root if root not in aliases.known)
+    below = {target for root, (target, _) in aliases.derivative.items() if root in roots}
+    levels: list[Level] = []
+    chains: list[list[int]] = []
+    place: dict[int, tuple[int, float]] = {}
+    for base in roots:
+        if base in below:
+            continue
+        numbers: list[int] = []
+        root, factor = base, 1.0
+        while True:
+            # The level's symbol is the exact derivative of the level above: root = symbol / factor.
+            place[root] = (len(levels), 1.0 / factor)
+            numbers.append(len(levels))
+            levels.append(Level(len(chains), len(numbers) - 1, "", 0, 1.0, 0.0))
+            if root not in aliases.derivative:
+                break
+            root, times = aliases.derivative[root]
+            factor = factor * times
+        chains.append(numbers)
+    return levels, chains, place
+
+
+def _node_levels(
+    model: FlatModel, aliases: Aliases, place: dict[int, tuple[int, float]]
+) -> list[tuple[int, float] | None]:
+    result: list[tuple[int, float] | None] = []
+    for node in range(len(model.nodes)):
+        root = aliases.root[node]
+        if root in aliases.known:
+            result.append(None)
+        else:
+            level, factor = place[root]
+            result.append((level, aliases.factor[node] * factor))
+    return result
+
+
+def _name_levels(model: FlatModel, levels: list[Level], node_level: list[tuple[int, float] | None]) -> None:
+    best: dict[int, tuple[Any, ...]] = {}
+    for node, placed in enumerate(node_level):
+        if placed is None:
+            continue
+        level, factor = placed
+        variable, order = model.nodes[node]
+        one = model.variables[variable]
+        preference = PREFERENCES.index(one.state)
+        rank = (order, one.kind in ("potential", "flow"), factor != 1.0, -preference, one.path.count("."), node)
+        if order == 0:
+            levels[level].preference = max(levels[level].preference, preference)
+        if level not in best or rank < best[level]:
+            best[level] = rank
+            levels[level].name = model.node_name(node)
+            levels[level].nominal = one.nominal
+            levels[level].guess = one.guess / factor if order == 0 else 0.0
+
+
+def _node_values(
+    model: FlatModel, aliases: Aliases, node_level: list[tuple[int, float] | None], symbols: list[Any]
+) -> Any:
+    vector = ca.vertcat(*symbols) if symbols else ca.SX(0, 1)
+    placed = [pair or (0, 0.0) for pair in node_level]
+    if symbols:
+        values = vector[[level for level, _ in placed]] * ca.SX(ca.DM([factor for _, factor in placed]))
+        values = ca.densify(values)
+    else:
+        values = ca.SX.zeros(len(placed))
+    for node, pair in enumerate(node_level):
+        if pair is None:
+            values[node] = aliases.factor[node] * aliases.known[aliases.root[node]]
+    return values
+
+
+def _collect_residuals(system: System, aliases: Aliases) -> None:
+    model = system.model
+    columns = evaluate(model, "residual", system.node_values)
+    residuals: list[Any] = []
+    for instance, row in model.general:
+        residuals.append(columns[instance][row])
+        system.origins.append(model.origin(instance, row))
+    for number in aliases.remaining:
+        equation = model.linear[number]
+        system.linear_rows.append((len(residuals), _level_terms(system, equation.terms)))
+        if equation.row is not None:
+            residuals.append(columns[equation.row[0]][equation.row[1]])
+        else:
+            total = equation.constant
+            for node, coefficient in equation.terms:
+                total = total + coefficient * system.node_values[node]
+            residuals.append(total)
+        system.origins.append(equation.origin)
+    system.residual = ca.vertcat(*residuals) if residuals else ca.SX(0, 1)
+
+
+def _level_terms(system: System, terms: tuple[tuple[int, Any], ...]) -> dict[int, float]:
+    """Numeric coefficients by level; empty if one is not a number."""
+    found: dict[int, float] = {}
+    for node, coefficient in terms:
+        placed = system.node_level[node]
+        if not isinstance(coefficient, float):
+            return {}
+        if placed is not None:
+            found[placed[0]] = found.get(placed[0], 0.0) + coefficient * placed[1]
+    return found

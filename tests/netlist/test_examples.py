@@ -1,0 +1,36 @@
+"""Every netlist of the examples reads, fits the schema, and is written back without loss."""
+
+import tomllib
+from pathlib import Path
+
+import jsonschema
+import pytest
+
+from modelica_like.netlist import dumps, load, loads, schema
+
+EXAMPLES = sorted((Path(__file__).parents[2] / "examples").rglob("*.toml"))
+
+
+@pytest.fixture(scope="module")
+def validator() -> jsonschema.Draft202012Validator:
+    jsonschema.Draft202012Validator.check_schema(schema())
+    return jsonschema.Draft202012Validator(schema())
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+def test_example_is_read_and_written_without_loss(path: Path, validator: jsonschema.Draft202012Validator) -> None:
+    original = load(path)
+    text = dumps(original, folder=path.parent)
+    again = loads(text, str(path.parent / "again.toml"))
+    assert dumps(again, folder=path.parent) == text
+    assert [part.path for part in again.walk()] == [part.path for part in original.walk()]
+    for ours, theirs in zip(again.walk(), original.walk(), strict=True):
+        assert type(ours) is type(theirs)
+        assert ours._values == theirs._values
+        assert ours._starts == theirs._starts
+        assert ours._start_modes == theirs._start_modes
+        assert all(ours.__dict__[key] == theirs.__dict__[key] for key in ours._structural)
+    assert (again.wires, again.chains, again.free_ends) == (original.wires, original.chains, original.free_ends)
+    assert again.simulate == original.simulate
+    validator.validate(tomllib.loads(path.read_text(encoding="utf-8")))
+    validator.validate(tomllib.loads(text))
