@@ -15,6 +15,7 @@ from modelica_like.language import (
     all_of,
     der,
     interpolate,
+    maximum,
     negate,
     param,
     signal_in,
@@ -69,8 +70,9 @@ class DryFriction(Component, partial=True):
             stuck=der(self.slip),
             start_forward=self.friction - at_rest,
             start_backward=self.friction + at_rest,
-            forward=self.friction - self.sliding_friction(self.slip),
-            backward=self.friction + self.sliding_friction(-self.slip),
+            # On the way to an event the speed may run a little past zero, where the laws of friction mean nothing.
+            forward=self.friction - self.sliding_friction(maximum(self.slip, 0)),
+            backward=self.friction + self.sliding_friction(maximum(-self.slip, 0)),
         ) == 0  # fmt: skip
 
     def events(self) -> Events:

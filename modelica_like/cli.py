@@ -42,6 +42,13 @@ def told(debug: bool) -> Iterator[None]:
         if debug:
             raise
         _fail(f"{error.filename or 'A file'}: {error.strerror or error}.", BAD_INPUT)
+    except (typer.Exit, typer.Abort, typer.BadParameter):
+        raise
+    except Exception as error:
+        if debug:
+            raise
+        what = f"{type(error).__name__}: {error}"
+        _fail(f"This should not happen: {what}\nRun again with --debug, and report what it shows.", SOLVE_FAILED)
 
 
 def exit_code(error: ModelicaLikeError) -> int:
@@ -65,18 +72,12 @@ def out() -> Console:
 
 
 @app.command()
-def check(
-    netlist: Netlist,
-    assignments: Assignments = None,
-    *,
-    blocks: Annotated[bool, typer.Option("--blocks", help="List all blocks of equations.")] = False,
-    debug: Debug = False,
-) -> None:
+def check(netlist: Netlist, assignments: Assignments = None, *, debug: Debug = False) -> None:
     """Check a netlist: equations, unknowns, states, index, blocks, energy terms."""
     with told(debug):
         from modelica_like.report.structure import structure_report
 
-        out().print(structure_report(_load(netlist, assignments), blocks=blocks))
+        out().print(structure_report(_load(netlist, assignments)))
 
 
 @app.command()

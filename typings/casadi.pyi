@@ -1,4 +1,4 @@
-# CasADi carries no type information; its matrices and functions are classes here so that they can be named in signatures.
+# CasADi carries no type information; its matrices and functions are classes here, so that signatures can name them.
 from typing import Any
 
 class _Untyped(Any):

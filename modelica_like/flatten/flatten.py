@@ -211,14 +211,19 @@ class _Flattener:
                 )
 
     def _read_starts(self, component: Component) -> None:
-        for name, value in component._starts.items():
-            field = component.fields[name]
-            if isinstance(field, Variable):
-                node = self.variable_of[id(component), name]
-                path = self.variables[node].path
-                start = self.parameters.evaluate(value, component._owner or component, path)
-                origin = Origin(path, "start value", _WIRE)
-                self.starts.append(StartValue(node, start, value.fixed, origin))
+        for name, field in component.fields.items():
+            if not isinstance(field, Variable) or isinstance(field, Input):
+                continue
+            given = component._starts.get(name)
+            if given is None and field.default is None:
+                continue
+            value = field.read(field.default) if given is None else given
+            node = self.variable_of[id(component), name]
+            path = self.variables[node].path
+            scope = component if given is None else component._owner or component
+            start = self.parameters.evaluate(value, scope, path)
+            strength = "default" if given is None else "fixed" if value.fixed else "guess"
+            self.starts.append(StartValue(node, start, strength))
 
     def _split_linear(self, instances: list[Instance]) -> list[tuple[int, int]]:
         """Move the components' linear equations to the linear ones; return the others."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal
 
 import casadi as ca
 
@@ -92,12 +92,15 @@ class Instance:
 
 @dataclass(frozen=True, slots=True)
 class StartValue:
-    """A fixed or guessed start value; `value` is a number or an expression of parameters."""
+    """A start value: a number or an expression of parameters.
+
+    Attributes:
+        strength: `fixed` (must hold), `default` (holds where nothing else determines the variable), `guess`.
+    """
 
     node: int
     value: Any
-    fixed: bool
-    origin: Origin
+    strength: Literal["fixed", "default", "guess"]
 
 
 @dataclass(frozen=True, eq=False)

@@ -217,11 +217,22 @@ def param(
 
 
 def var(
-    unit: str, description: str = "", *, state: StatePreference = "default", guess: float = 0.0,
+    unit: str, description: str = "", *, state: StatePreference = "default", guess: float = 0.0, default: Any = None,
     min: float | None = None, max: float | None = None, nominal: float = 1.0,
 ) -> Any:  # fmt: skip
-    """Declare an unknown; as a keyword of the constructor it takes a fixed start value or a `guess(…)`."""
-    return Variable(unit, description, state=state, guess=guess, min=min, max=max, nominal=nominal)
+    """Declare an unknown; as a keyword of the constructor it takes a fixed start value or a `guess(…)`.
+
+    Args:
+        unit: in Modelica notation.
+        description: one phrase.
+        state: how much it wants to be a state.
+        guess: where the solver begins to look for its start value, SI.
+        default: start value where nothing else determines it, e.g. 0 for the angle of a prescribed speed.
+        min: smallest sensible value, SI.
+        max: largest sensible value, SI.
+        nominal: order of magnitude, SI.
+    """
+    return Variable(unit, description, state=state, guess=guess, default=default, min=min, max=max, nominal=nominal)
 
 
 def flow(unit: str, description: str = "", *, nominal: float = 1.0) -> Any:

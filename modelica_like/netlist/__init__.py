@@ -31,6 +31,6 @@ def save(component: Component, path: str | Path) -> None:
 
 def schema() -> dict[str, Any]:
     """Return the JSON schema of netlists with all installed component types."""
-    from modelica_like.netlist.schema import schema as generate
+    from modelica_like.netlist.json_schema import schema as generate
 
     return generate()

@@ -44,16 +44,17 @@ def describe(kind: type[Component]) -> RenderableType:
     text = inspect.cleandoc(kind.__doc__ or "")
     bases = [base.__name__ for base in kind.__mro__[1:] if issubclass(base, Component) and base is not Component]
     heading = Text.assemble((kind.__name__, "bold"), f"  {kind.__module__}", f"  ({', '.join(bases)})" if bases else "")
-    sections: list[RenderableType] = [heading, Padding(Text(text), (1, 0))]
+    sections: list[RenderableType] = [heading, Text(text)]
     for title, sort in (
-        ("parameters", Parameter), ("inputs", Input), ("outputs", Output), ("variables", Variable), ("discrete values", Discrete),
+        ("parameters", Parameter), ("inputs", Input), ("outputs", Output), ("variables", Variable),
+        ("discrete values", Discrete),
     ):  # fmt: skip
         fields = [field for field in kind._class_fields.values() if _sort(field) is sort]
         if fields:
             sections.append(_fields(title, fields))
     sections += [made for made in (_structure(kind), _connectors(kind), _modes(kind), _parts(kind)) if made.row_count]
     sections.append(_statements(kind))
-    return Group(*(Padding(section, (0, 0, 1, 0)) for section in sections))
+    return Group(*(Padding(section, (0, 0, 1, 0), expand=False) for section in sections))
 
 
 def _sort(field: Field) -> type[Field]:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import operator
 from collections import deque
 from dataclasses import dataclass, field
+from functools import reduce
 from typing import Any
 
 import casadi as ca
@@ -12,6 +14,9 @@ from modelica_like.structure.isolate import isolate
 
 SMALL = 3
 """Torn linear blocks up to this size are solved symbolically; larger ones stay implicit."""
+
+_UNIT = 1e-150
+"""Keeps the relative size of a single coefficient defined where it is zero."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +44,7 @@ class Solved:
         order: unknowns with the expressions that give them, each in terms of earlier ones, states and z.
         z: unknowns that stay implicit.
         alg: their residuals.
-        determinants: (block number, expression) whose zero makes a block singular.
+        determinants: (block number, expression) of relative determinants: a block is singular where one is zero.
     """
 
     blocks: list[Block] = field(default_factory=list)
@@ -55,8 +60,8 @@ class BlockSolver:
     Args:
         residual: column of residuals.
         unknowns: column of symbols to solve for.
-        constants: column of the symbols that never change during a run (parameters): a coefficient of only these is a safe divisor.
-        volatile: column of all other symbols a coefficient may depend on (states, unknowns, modes, time).
+        volatile: column of the symbols that change during a run (states, unknowns, modes, time); a coefficient without them, of
+            parameters only, is a safe divisor.
     """
 
     def __init__(self, residual: Any, unknowns: Any, volatile: Any) -> None:
@@ -170,12 +175,15 @@ class BlockSolver:
         number = len(self.solved.blocks)
         if linear and len(tears) <= SMALL:
             constants = ca.substitute(ca.vertcat(*remaining), guesses, ca.SX.zeros(len(tears)))
-            solution, determinant = cramer(ca.densify(slopes), -constants)
-            self.solved.determinants.append((number, determinant))
+            matrix = ca.densify(slopes)
+            solution, determinant = cramer(matrix, -constants)
+            # Relative to Hadamard's bound, so that "nearly zero" has a meaning without units.
+            norms = ca.vertsplit(ca.sqrt(ca.sum2(matrix**2))) if len(tears) > 1 else [ca.fabs(determinant)]
+            bound = reduce(operator.mul, norms) + _UNIT
+            self.solved.determinants.append((number, determinant / bound))
             self.solved.order += [(column, solution[k]) for k, column in enumerate(tears)]
             kind = "linear"
         else:
-            self.solved.determinants.append((number, ca.det(ca.densify(slopes)) if len(tears) <= SMALL else ca.SX(1)))
             self.solved.z += tears
             self.solved.alg += remaining
             kind = "implicit"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import casadi as ca
@@ -37,6 +37,7 @@ class ReducedDae:
         alg: residuals for z.
         inputs: symbols of the model's inputs.
         values: expression of every node of the flat model in x, z, inputs, p, d and t.
+        node_states: for every node (position in x, factor) if it is a state up to a factor, else None.
         blocks: blocks of the triangular form, with the names of their unknowns and the origins of their equations.
         determinants: (names, origins, expression) whose zero makes a block singular.
         index: structural index of the equations before the reduction.
@@ -52,6 +53,7 @@ class ReducedDae:
     ode: Any
     alg: Any
     values: Any
+    node_states: tuple[tuple[int, float] | None, ...]
     guesses: tuple[float, ...]
     nominals: tuple[float, ...]
     z_guesses: tuple[float, ...]
@@ -59,6 +61,29 @@ class ReducedDae:
     determinants: tuple[tuple[tuple[str, ...], tuple[Origin, ...], Any], ...]
     index: int
     differentiated: tuple[Origin, ...]
+    system: System = field(repr=False)
+    level_values: Any = field(repr=False)
+
+    def rate(self, variable: int) -> Any:
+        """Return the time derivative of a flat variable, in x, z, inputs, p, d and t."""
+        placed = self.system.node_level[variable]
+        if placed is None:
+            return ca.SX(0)
+        level, factor = placed
+        above = self.system.derivative(level)
+        if above is not None:
+            return self.level_values[above] * factor
+        return self.total_derivative(self.values[variable])
+
+    def total_derivative(self, expressions: Any) -> Any:
+        """Return the time derivative of expressions in x, z, p, d and t along the solution (inputs held)."""
+        time = self.flat.time
+        rates = ca.jtimes(expressions, self.x, self.ode) + ca.jtimes(expressions, time, ca.SX(1))
+        if self.z.numel() and ca.depends_on(expressions, self.z):
+            drift = ca.jtimes(self.alg, self.x, self.ode) + ca.jtimes(self.alg, time, ca.SX(1))
+            z_rates = -ca.solve(ca.densify(ca.jacobian(self.alg, self.z)), drift)
+            rates = rates + ca.jtimes(expressions, self.z, z_rates)
+        return rates
 
     def __str__(self) -> str:
         kinds = [block.kind for block in self.blocks]
@@ -210,6 +235,7 @@ def _assemble(
         ode=ca.vertcat(*rates) if rates else ca.SX(0, 1),
         alg=ca.vertcat(*alg) if alg else ca.SX(0, 1),
         values=place(level_values, model.p),
+        node_states=_node_states(system, states),
         guesses=tuple(levels[s].guess for s in states),
         nominals=tuple(levels[s].nominal for s in states),
         z_guesses=tuple(levels[n].guess for n in z_levels),
@@ -224,4 +250,11 @@ def _assemble(
         ),
         index=max(counts, default=0) + 1,
         differentiated=tuple(system.origins[k] for k, count in enumerate(counts) if count),
+        system=system,
+        level_values=level_values,
     )
+
+
+def _node_states(system: System, states: list[int]) -> tuple[tuple[int, float] | None, ...]:
+    position = {level: k for k, level in enumerate(states)}
+    return tuple((position[p[0]], p[1]) if p is not None and p[0] in position else None for p in system.node_level)

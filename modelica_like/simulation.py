@@ -1,0 +1,97 @@
+"""The whole chain as one call."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from modelica_like.compile import CompiledDae, compile
+from modelica_like.errors import UnitError, ValueOutOfRange
+from modelica_like.flatten import flatten
+from modelica_like.initialize import StartKind, initialize
+from modelica_like.language import Component
+from modelica_like.solve.events import EventLoop, Progress
+from modelica_like.solve.options import Options
+from modelica_like.solve.solution import Solution, Statistics
+from modelica_like.structure import reduce
+from modelica_like.units import parse_unit, to_si
+
+_SECOND = parse_unit("s")
+
+Model = Component | CompiledDae | str | Path
+
+
+def build(drive: Model) -> CompiledDae:
+    """Compile a component tree or a netlist file; a compiled model is returned as it is.
+
+    Raises:
+        ModelicaLikeError: something is wrong with the model; the message says what, where and what to do.
+    """
+    if isinstance(drive, CompiledDae):
+        return drive
+    if isinstance(drive, str | Path):
+        from modelica_like.netlist import load
+
+        drive = load(drive)
+    return compile(reduce(flatten(drive)))
+
+
+def simulate(
+    drive: Model, until: float | str | None = None, *, parameters: Mapping[str, Any] | None = None,
+    start: StartKind | None = None, t0: float = 0.0, rtol: float | None = None, atol: float | None = None,
+    points: int | None = None, options: Options | None = None, progress: Progress | None = None,
+) -> Solution:  # fmt: skip
+    """Simulate a drive.
+
+    Args:
+        drive: a component, a netlist file, or a compiled model.
+        until: end time, a number in s or a quantity; by default what the netlist says.
+        parameters: other values of parameters and inputs by path; nothing is compiled again.
+        start: `given`, `rest` (what has no start value begins at zero) or `steady`.
+        t0: start time in s.
+        rtol: relative tolerance.
+        atol: absolute tolerance, in nominal values.
+        points: number of equal intervals of the results.
+        options: all options together; the arguments before win.
+        progress: called with the time reached.
+
+    Raises:
+        ModelicaLikeError: the model or a value is wrong, or the simulation cannot go on.
+    """
+    model = build(drive)
+    if parameters:
+        model = model.with_parameters(dict(parameters))
+    settings = model.settings
+    end = _seconds(until if until is not None else settings.get("until"))
+    chosen = _options(options or Options(), settings, rtol=rtol, atol=atol, points=points)
+    if end <= t0:
+        raise ValueOutOfRange(f"The end time {end:g} s is not after the start time {t0:g} s.")
+    begin = time.perf_counter()
+    first = initialize(model, t0, start or settings.get("start", "given"))
+    loop = EventLoop(model, chosen, first, end, progress)
+    record = loop.run()
+    seconds = time.perf_counter() - begin
+    counts = loop.integrator
+    statistics = Statistics(counts.steps, counts.evaluations, counts.calls, len(record.events), seconds)
+    return Solution(model, chosen, tuple(record.segments), tuple(record.events), statistics)
+
+
+def _seconds(until: float | str | None) -> float:
+    if until is None:
+        raise ValueOutOfRange(
+            "There is no end time.", advice='Say simulate(…, until="2 s"), or put `until` under [simulate] in the netlist.'
+        )
+    try:
+        return to_si(until, _SECOND, "until")
+    except UnitError as error:
+        error.advice = error.advice or 'Give seconds or a time, e.g. until="2 s".'
+        raise
+
+
+def _options(base: Options, settings: Mapping[str, Any], **given: float | None) -> Options:
+    values = {name: getattr(base, name) for name in Options.__dataclass_fields__}
+    values.update({name: settings[name] for name in ("rtol", "atol", "points") if name in settings})
+    values.update({name: value for name, value in given.items() if value is not None})
+    return Options(**values)

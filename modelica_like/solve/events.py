@@ -1,0 +1,288 @@
+"""The event loop: smooth segments by IDAS, events located and iterated between them."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+
+import numpy as np
+
+from modelica_like.compile import CompiledDae, CompiledTransition, Vector
+from modelica_like.errors import Chattering, StepFailed
+from modelica_like.initialize import Point, call, check_singular, solve_implicit, variable_slopes
+from modelica_like.solve.guards import Guards, candidates, locate
+from modelica_like.solve.idas import Integrator
+from modelica_like.solve.options import Options
+from modelica_like.solve.recorder import Event, Recorder
+
+_FIRST_PANEL = 8
+_GROWTH = 4
+_CHATTER_EVENTS = 50
+_CHATTER_WINDOW = 1e-6
+_SAME_TIME = 1e-12
+_MAX_HALVINGS = 30
+
+Progress = Callable[[float], None]
+
+
+class EventLoop:
+    """Runs a model from a start point to the end.
+
+    Args:
+        model: the compiled model.
+        options: tolerances and number of results.
+        start: consistent start.
+        end: end time in s.
+        progress: called with the time reached.
+    """
+
+    def __init__(self, model: CompiledDae, options: Options, start: Point, end: float, progress: Progress | None = None) -> None:
+        self.model = model
+        self.options = options
+        self.now = start
+        self.begin = start.t
+        self.end = end
+        self.step = (end - start.t) / options.points
+        self.progress = progress
+        self.integrator = Integrator(model, options)
+        self.guards = Guards(model)
+        self.record = Recorder()
+        self.panel = _FIRST_PANEL if self.guards.count else options.points
+        self._recent: deque[Event] = deque(maxlen=_CHATTER_EVENTS)
+        self._timed = [t for t in model.transitions if t.timed]
+
+    def run(self) -> Recorder:
+        """Simulate.
+
+        Raises:
+            Chattering, StepFailed, SingularAtStart: the run cannot go on.
+        """
+        self._iterate([*self._due(), *self._rising()])
+        self.record.begin(self.now)
+        while self.now.t < self.end:
+            self._advance(min(self._next_moment(), self.end))
+            if self.progress is not None:
+                self.progress(self.now.t)
+        self.record.end(self.now.d)
+        return self.record
+
+    # -- smooth pieces -----------------------------------------------------------------------------------------------
+
+    def _advance(self, stop: float) -> None:
+        """Integrate up to `stop` at most, ending earlier at an event or at the end of a panel."""
+        first = self.now
+        times, x, z = self._panel(stop)
+        if self.guards.count and self._stop_at_event(times, x, z):
+            return
+        self.record.add(times, x, z)
+        self.now = Point(float(times[-1]), x[:, -1].copy(), z[:, -1].copy(), first.d)
+        if self.guards.count and len(times) >= self.panel:
+            self.panel = self.panel * _GROWTH
+        if times[-1] == stop:
+            due = self._due()
+            if due:
+                self._event([*due, *self._rising()])
+
+    def _panel(self, stop: float) -> tuple[Vector, Vector, Vector]:
+        """Integrate one panel.
+
+        A panel that spans several results may run past an event, where the equations of the old mode mean nothing and may blow up; then a
+        shorter one ends before.
+        """
+        while True:
+            span, outputs = self._next_panel(stop)
+            arrives = self.now.t + span >= stop - _SAME_TIME * max(1.0, abs(stop))
+            span = stop - self.now.t if arrives else span
+            try:
+                x, z = self.integrator.run(self.now, span, outputs)
+            except StepFailed:
+                if not self.guards.count:
+                    raise
+                if outputs == 1:
+                    return self._short_piece(span)
+                self.panel = max(1, outputs // _GROWTH)
+                continue
+            times = self.now.t + span * np.arange(1, outputs + 1) / outputs
+            if outputs > 1:
+                self._snap(times)
+            if arrives:
+                times[-1] = stop
+            return times, x, z
+
+    def _short_piece(self, span: float) -> tuple[Vector, Vector, Vector]:
+        """Integrate a part of the distance to the next result, as long as possible."""
+        for halvings in range(1, _MAX_HALVINGS):
+            piece = span / 2**halvings
+            try:
+                x, z = self.integrator.run(self.now, piece)
+            except StepFailed:
+                if halvings + 1 == _MAX_HALVINGS:
+                    raise
+                continue
+            return np.array([self.now.t + piece]), x, z
+        raise AssertionError
+
+    def _next_panel(self, stop: float) -> tuple[float, int]:
+        """Choose length and number of results: results lie on the regular grid, except where an event ends a segment."""
+        position = (self.now.t - self.begin) / self.step
+        nearest = round(position)
+        if abs(position - nearest) > 1e-9 * max(1.0, position):
+            to_grid = self.begin + (np.floor(position) + 1) * self.step
+            return min(to_grid, stop) - self.now.t, 1
+        whole = int(np.floor((stop - self.now.t) / self.step + 1e-9))
+        if whole == 0:
+            return stop - self.now.t, 1
+        outputs = min(whole, self.panel)
+        if self.guards.count:
+            outputs = 1 << (outputs.bit_length() - 1)
+        return outputs * self.step, outputs
+
+    def _snap(self, times: Vector) -> None:
+        """Put times exactly on the regular grid, so that they do not collect rounding errors."""
+        numbers = np.rint((times - self.begin) / self.step)
+        on_grid = np.abs((times - self.begin) / self.step - numbers) < 1e-7
+        times[on_grid] = self.begin + (self.end - self.begin) * (numbers[on_grid] / self.options.points)
+
+    def _stop_at_event(self, times: Vector, x: Vector, z: Vector) -> bool:
+        """Look for guards that become positive; if one does, go there and handle the event."""
+        first = self.now
+        all_times = np.concatenate([[first.t], times])
+        all_x = np.concatenate([first.x[:, None], x], axis=1)
+        all_z = np.concatenate([first.z[:, None], z], axis=1)
+        values, rates = self.guards.along(all_times, all_x, all_z, first.d)
+        # What the last event left positive did not want to fire: it is on its way down.
+        values[:, 0] = np.minimum(values[:, 0], 0.0)
+        active = self.guards.active(first.d)
+        found = candidates(values, rates, active, float(np.max(np.diff(all_times))))
+        while found:
+            k = found[0].interval
+            group = [one for one in found if one.interval == k]
+            base = Point(float(all_times[k]), all_x[:, k], all_z[:, k], first.d)
+            located = locate(
+                lambda span, base=base: self._trial(base, span),
+                float(all_times[k + 1] - all_times[k]), (values[:, k], rates[:, k]), (values[:, k + 1], rates[:, k + 1]), group, base.t,
+            )  # fmt: skip
+            if located is not None:
+                if k > 0:
+                    self.record.add(all_times[1 : k + 1], all_x[:, 1 : k + 1], all_z[:, 1 : k + 1])
+                self.now = located.point
+                self.record.add(np.array([self.now.t]), self.now.x[:, None], self.now.z[:, None])
+                self._event([*(self.guards.state_events[g] for g in located.guards), *self._due()])
+                return True
+            found = [one for one in found if one.interval > k]
+        return False
+
+    def _trial(self, base: Point, span: float) -> tuple[Point, Vector, Vector]:
+        if span <= 0.0:
+            point = base.copy()
+        else:
+            x, z = self.integrator.run(base, span)
+            point = Point(base.t + span, x[:, 0], z[:, 0], base.d)
+        return point, *self.guards.at(point)
+
+    # -- events ------------------------------------------------------------------------------------------------------
+
+    def _next_moment(self) -> float:
+        """Time of the next time event, or infinity."""
+        if not self._timed:
+            return np.inf
+        moments = call(self.model, self.model.moments, self.now)
+        ahead = [moments[t.index] for t in self._timed if self._is_source(t) and moments[t.index] > self._just_after()]
+        return float(min(ahead, default=np.inf))
+
+    def _due(self) -> list[CompiledTransition]:
+        """Time events whose time has come."""
+        if not self._timed:
+            return []
+        moments = call(self.model, self.model.moments, self.now)
+        return [t for t in self._timed if self._is_source(t) and moments[t.index] <= self._just_after()]
+
+    def _just_after(self) -> float:
+        return self.now.t + _SAME_TIME * max(1.0, abs(self.now.t))
+
+    def _is_source(self, transition: CompiledTransition) -> bool:
+        return int(self.now.d[transition.mode]) in transition.sources
+
+    def _rising(self) -> list[CompiledTransition]:
+        """State events that want to fire now: positive, or about to be within the time resolution."""
+        if not self.guards.count:
+            return []
+        values, rates = self.guards.at(self.now)
+        wants = self.guards.active(self.now.d) & (self.guards.later(self.now.t, values, rates) > 0)
+        return [self.guards.state_events[k] for k in np.flatnonzero(wants)]
+
+    def _event(self, wanting: list[CompiledTransition]) -> None:
+        """Handle an event: close the segment, change modes until nothing fires, begin the next segment."""
+        self.record.end(self.now.d)
+        self.now = self.now.copy()
+        self._iterate(wanting)
+        self.record.begin(self.now)
+        self.panel = _FIRST_PANEL if self.guards.count else self.options.points
+        if len(self.record.events) > self.options.max_events:
+            raise self._chattering(f"There were more than {self.options.max_events} events")
+
+    def _iterate(self, wanting: list[CompiledTransition]) -> None:
+        for _ in range(self.options.iterations):
+            if not wanting:
+                return
+            self._fire(wanting)
+            solve_implicit(self.model, self.now)
+            check_singular(self.model, self.now)
+            wanting = [*self._due(), *self._rising()]
+        raise self._chattering(f"Modes still switch after {self.options.iterations} rounds at one instant")
+
+    def _fire(self, wanting: list[CompiledTransition]) -> None:
+        """Carry out transitions together; of one mode only the one declared first."""
+        values = call(self.model, self.model.resets, self.now)
+        chosen: dict[int, CompiledTransition] = {}
+        for transition in sorted(wanting, key=self.model.transitions.index):
+            if self._is_source(transition):
+                chosen.setdefault(transition.mode, transition)
+        targets: list[tuple[int, float]] = []
+        x, d = self.now.x.copy(), self.now.d.copy()
+        for transition in chosen.values():
+            self._note(transition)
+            d[transition.mode] = transition.target
+            for reset in transition.resets:
+                if reset.kind == "state":
+                    x[reset.index] = values[reset.value] / reset.factor
+                elif reset.kind == "discrete":
+                    d[reset.index] = values[reset.value]
+                else:
+                    targets.append((reset.target, values[reset.value]))
+        self.now.x, self.now.d = x, d
+        if targets:
+            self._project(targets)
+
+    def _project(self, targets: list[tuple[int, float]]) -> None:
+        """Move the states as little as possible, so that variables that follow from them take new values."""
+        nodes = [self.model.reset_nodes[k] for k, _ in targets]
+        present = call(self.model, self.model.variables, self.now)[nodes]
+        slopes = variable_slopes(self.model, self.now, nodes)
+        change = np.array([value for _, value in targets]) - present
+        self.now.x = self.now.x + np.linalg.lstsq(slopes, change, rcond=None)[0]
+
+    def _note(self, transition: CompiledTransition) -> None:
+        mode = self.model.flat_discretes[transition.mode]
+        before = mode.names[int(self.now.d[transition.mode])]
+        event = Event(self.now.t, mode.path, before, mode.names[transition.target], transition.source)
+        self.record.events.append(event)
+        self._recent.append(event)
+        window = _CHATTER_WINDOW * (self.end - self.begin)
+        if len(self._recent) == _CHATTER_EVENTS and self.now.t - self._recent[0].time < window:
+            raise self._chattering("Events follow each other ever faster")
+
+    def _chattering(self, why: str) -> Chattering:
+        recent = list(self._recent)
+        counts: dict[str, list[Event]] = {}
+        for event in recent:
+            counts.setdefault(event.mode, []).append(event)
+        mode, events = max(counts.items(), key=lambda item: len(item[1]))
+        names = " ⇄ ".join(dict.fromkeys(name for event in events for name in (event.before, event.after)))
+        times = f"{events[0].time:.9g}…{events[-1].time:.9g}"
+        return Chattering(
+            f"{mode} switched {len(events)} times in t = {times} s ({names}).",
+            where=list(dict.fromkeys(event.source for event in events))[:3], why=f"{why}.",
+            advice="Give the switching a hysteresis (a peak above 1 in friction), or smooth what drives it.",
+        )  # fmt: skip
+

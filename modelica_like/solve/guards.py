@@ -1,0 +1,197 @@
+"""Guards along a segment: where does a transition want to fire?"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from modelica_like.compile import CompiledDae, Vector
+from modelica_like.initialize import Point
+
+RESOLUTION = 1e-10
+"""Time resolution of events relative to max(1 s, |t|): the sign of a guard is taken that much later, so that a guard that just left zero counts by its direction."""
+
+_LOCATED = 1e-13
+_MAX_TRIALS = 60
+
+
+class Guards:
+    """Evaluates guards and their rates, and knows which are active in which mode."""
+
+    def __init__(self, model: CompiledDae) -> None:
+        self.model = model
+        self.state_events = [t for t in model.transitions if not t.timed]
+        self.count = len(self.state_events)
+        self._mode = np.array([t.mode for t in self.state_events], int)
+        largest = max((len(one.names) for one in model.flat_discretes), default=1)
+        self._sources = np.zeros((self.count, max(largest, 1)), bool)
+        for k, transition in enumerate(self.state_events):
+            self._sources[k, list(transition.sources)] = True
+
+    def active(self, d: Vector) -> Any:
+        """Which guards may fire, by the modes."""
+        if not self.count:
+            return np.zeros(0, bool)
+        return self._sources[np.arange(self.count), d[self._mode].astype(int)]
+
+    def at(self, point: Point) -> tuple[Vector, Vector]:
+        """Guards and rates at a point."""
+        times = np.array([point.t])
+        values, rates = self.along(times, point.x[:, None], point.z[:, None], point.d)
+        return values[:, 0], rates[:, 0]
+
+    def along(self, times: Vector, x: Vector, z: Vector, d: Vector) -> tuple[Vector, Vector]:
+        """Guards and rates at many times with the same modes; shapes (guards, times)."""
+        arguments = (times[None, :], x, z, self.model.p, self.model.u, d)
+        values, rates = np.array(self.model.guards(*arguments)), np.array(self.model.guard_rates(*arguments))
+        return np.nan_to_num(values, nan=-1.0), np.nan_to_num(rates, nan=0.0, posinf=0.0, neginf=0.0)
+
+    @staticmethod
+    def later(t: float, values: Vector, rates: Vector) -> Vector:
+        """Guards as they are one time resolution later."""
+        return values + rates * (RESOLUTION * max(1.0, abs(t)))
+
+
+@dataclass
+class Candidate:
+    """An interval in which a guard becomes positive, at its end or in between."""
+
+    guard: int
+    interval: int
+    inside: bool
+
+
+def candidates(values: Vector, rates: Vector, active: Any, step: float) -> list[Candidate]:
+    """Find the first interval in which active guards become positive.
+
+    Args:
+        values: guards at successive times, shape (guards, times).
+        rates: their time derivatives.
+        active: which guards count.
+        step: longest distance of two times in s.
+    """
+    before, after = values[:, :-1], values[:, 1:]
+    crossing = (before <= 0) & (after > 0) & active[:, None]
+    humps = (before <= 0) & (after <= 0) & (rates[:, :-1] > 0) & (rates[:, 1:] < 0) & active[:, None]
+    if np.any(humps):
+        humps &= _peak(before, after, rates[:, :-1] * step, rates[:, 1:] * step) > -0.1 * (np.abs(before) + np.abs(after))
+    intervals = np.flatnonzero(np.any(crossing | humps, axis=0))
+    if not intervals.size:
+        return []
+    found: list[Candidate] = []
+    for k in intervals:
+        found += [Candidate(int(g), int(k), False) for g in np.flatnonzero(crossing[:, k])]
+        found += [Candidate(int(g), int(k), True) for g in np.flatnonzero(humps[:, k])]
+    return found
+
+
+def _peak(g0: Vector, g1: Vector, r0: Vector, r1: Vector) -> Vector:
+    """Largest value of the cubic through both ends with the given slopes (sampled)."""
+    s = np.linspace(0.05, 0.95, 19).reshape(-1, 1, 1)
+    h = (1 + 2 * s) * (1 - s) ** 2 * g0 + s * (1 - s) ** 2 * r0 + s * s * (3 - 2 * s) * g1 + s * s * (s - 1) * r1
+    return np.max(h, axis=0)
+
+
+Trial = Callable[[float], tuple[Point, Vector, Vector]]
+"""Integrates from the beginning of the interval by a time and gives the point there with guards and rates."""
+
+
+@dataclass
+class Located:
+    """An event: where, and which guards are at zero there."""
+
+    point: Point
+    guards: list[int]
+
+
+def locate(trial: Trial, span: float, first: tuple[Vector, Vector], last: tuple[Vector, Vector], group: list[Candidate], t: float) -> Located | None:
+    """Find the earliest time in (0, span] at which a guard of the group becomes positive.
+
+    Safeguarded Newton iterations on re-integrations from the beginning of the interval.
+
+    Args:
+        trial: integrates into the interval.
+        span: length of the interval in s.
+        first: guards and rates at its beginning.
+        last: guards and rates at its end.
+        group: the guards that become positive in the interval.
+        t: time of its beginning.
+
+    Returns:
+        The event, or None if a guard only came near zero.
+    """
+    watched = np.array(sorted({one.guard for one in group}))
+    low, high = 0.0, span
+    if not np.any(last[0][watched] > 0):
+        top = _positive_top(trial, span, first, last, group)
+        if top is None:
+            return None
+        high = top
+    tolerance = _LOCATED * max(1.0, abs(t))
+    guess = min(_first_guess(first, last, group, span), high)
+    best: tuple[Point, Vector, Vector] | None = None
+    for _ in range(_MAX_TRIALS):
+        point, values, rates = trial(guess)
+        if np.any(values[watched] > 0):
+            high, best = guess, (point, values, rates)
+        else:
+            low = guess
+        step = _newton(values, rates, watched)
+        if step is not None and abs(step) <= tolerance:
+            return _event(point, values, rates, watched, tolerance)
+        if high - low <= tolerance:
+            break
+        target = guess + step if step is not None else -1.0
+        guess = target if low < target < high else 0.5 * (low + high)
+    return _event(*(best or trial(high)), watched, tolerance)
+
+
+def _positive_top(trial: Trial, span: float, first: tuple[Vector, Vector], last: tuple[Vector, Vector], group: list[Candidate]) -> float | None:
+    """Look for a time at which a guard that rises and falls again is positive; None if it stays below zero."""
+    for one in group:
+        g, low, high = one.guard, 0.0, span
+        guess = _cubic(first[0][g], last[0][g], first[1][g] * span, last[1][g] * span, inside=True) * span
+        for _ in range(_MAX_TRIALS):
+            _, values, rates = trial(guess)
+            if values[g] > 0:
+                return guess
+            low, high = (guess, high) if rates[g] > 0 else (low, guess)
+            # What is left of the rise cannot reach zero any more.
+            if values[g] + abs(rates[g]) * (high - low) < 0 or high - low < 1e-12:
+                break
+            guess = 0.5 * (low + high)
+    return None
+
+
+def _event(point: Point, values: Vector, rates: Vector, watched: Any, tolerance: float) -> Located:
+    near = [int(g) for g in watched if values[g] > 0 or (rates[g] > 0 and -values[g] <= 10 * tolerance * rates[g])]
+    return Located(point, near)
+
+
+def _newton(values: Vector, rates: Vector, watched: Any) -> float | None:
+    """Newton step to the earliest zero of the rising guards."""
+    steps = [-values[g] / rates[g] for g in watched if rates[g] > 0]
+    return min(steps) if steps else None
+
+
+def _first_guess(first: tuple[Vector, Vector], last: tuple[Vector, Vector], group: list[Candidate], span: float) -> float:
+    guesses: list[float] = []
+    for one in group:
+        g = one.guard
+        roots = _cubic(first[0][g], last[0][g], first[1][g] * span, last[1][g] * span, one.inside)
+        guesses.append(roots * span)
+    return min(guesses)
+
+
+def _cubic(g0: float, g1: float, r0: float, r1: float, inside: bool) -> float:
+    """Earliest rising zero (or, if `inside`, the top) of the cubic Hermite interpolant in (0, 1)."""
+    a, b, c = 2 * g0 - 2 * g1 + r0 + r1, -3 * g0 + 3 * g1 - 2 * r0 - r1, r0
+    if inside:
+        tops = [s.real for s in np.roots([3 * a, 2 * b, c]) if abs(s.imag) < 1e-12 and 0 < s.real < 1 and 6 * a * s.real + 2 * b < 0]
+        return min(tops, default=0.5)
+    zeros = [s.real for s in np.roots([a, b, c, g0]) if abs(s.imag) < 1e-9 and 1e-12 < s.real < 1]
+    rising = [s for s in zeros if 3 * a * s * s + 2 * b * s + c > 0]
+    return min(rising, default=0.5)

@@ -1,0 +1,34 @@
+"""Options of a simulation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from modelica_like.errors import ValueOutOfRange
+
+
+@dataclass(frozen=True)
+class Options:
+    """How precisely, and how finely, to simulate.
+
+    Attributes:
+        rtol: relative tolerance of the integrator, per step.
+        atol: absolute tolerance, in units of each variable's nominal value.
+        points: number of equal intervals of the results.
+        max_steps: largest number of integrator steps between two results.
+        max_events: largest number of events in a run.
+        iterations: largest number of event rounds at one instant.
+    """
+
+    rtol: float = 1e-7
+    atol: float = 1e-9
+    points: int = 500
+    max_steps: int = 100_000
+    max_events: int = 100_000
+    iterations: int = 20
+
+    def __post_init__(self) -> None:
+        for name, low, high in (("rtol", 1e-14, 0.1), ("atol", 1e-20, 1.0), ("points", 1, 10_000_000)):
+            value = getattr(self, name)
+            if not low <= value <= high:
+                raise ValueOutOfRange(f"{name} = {value:g} is out of range: it must be between {low:g} and {high:g}.")

@@ -1,0 +1,87 @@
+"""What a run leaves behind: smooth segments and the events between them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from modelica_like.compile import Vector
+from modelica_like.errors import Source
+from modelica_like.initialize import Point
+
+
+@dataclass(frozen=True)
+class Event:
+    """A mode change.
+
+    Attributes:
+        time: in s.
+        mode: path of the mode, e.g. `clutch.mode`.
+        before: name of the mode that was left.
+        after: name of the mode that was entered.
+        source: the transition's place in its component.
+    """
+
+    time: float
+    mode: str
+    before: str
+    after: str
+    source: Source
+
+    def __str__(self) -> str:
+        return f"{self.time:.9g} s  {self.mode}: {self.before} → {self.after}"
+
+
+@dataclass(frozen=True)
+class Segment:
+    """A smooth piece of the solution with fixed modes; both ends included.
+
+    Attributes:
+        times: shape (n,), in s.
+        x: states, shape (nx, n).
+        z: implicit unknowns, shape (nz, n).
+        d: modes and discrete values.
+    """
+
+    times: Vector
+    x: Vector
+    z: Vector
+    d: Vector
+
+    @property
+    def start(self) -> Point:
+        """First point."""
+        return self.point(0)
+
+    def point(self, k: int) -> Point:
+        """Return one point."""
+        return Point(float(self.times[k]), self.x[:, k].copy(), self.z[:, k].copy(), self.d)
+
+
+@dataclass
+class Recorder:
+    """Collects points into segments, and events."""
+
+    segments: list[Segment] = field(default_factory=list)
+    events: list[Event] = field(default_factory=list)
+    _times: list[Vector] = field(default_factory=list)
+    _x: list[Vector] = field(default_factory=list)
+    _z: list[Vector] = field(default_factory=list)
+
+    def begin(self, point: Point) -> None:
+        """Begin a segment at a point."""
+        self._times, self._x, self._z = [], [], []
+        self.add(np.array([point.t]), point.x[:, None], point.z[:, None])
+
+    def add(self, times: Vector, x: Vector, z: Vector) -> None:
+        """Append points; shapes (n,), (nx, n), (nz, n)."""
+        self._times.append(times)
+        self._x.append(x)
+        self._z.append(z)
+
+    def end(self, d: Vector) -> None:
+        """Close the segment."""
+        self.segments.append(
+            Segment(np.concatenate(self._times), np.concatenate(self._x, axis=1), np.concatenate(self._z, axis=1), d.copy())
+        )

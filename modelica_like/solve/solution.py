@@ -1,0 +1,228 @@
+"""The result of a simulation."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from modelica_like.compile import CompiledDae, Vector
+from modelica_like.errors import MissingExtra, UnknownName, ValueOutOfRange, did_you_mean
+from modelica_like.language.expr import Symbol
+from modelica_like.solve.idas import Integrator
+from modelica_like.solve.options import Options
+from modelica_like.solve.recorder import Event, Segment
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+
+ENERGY_TERMS = ("stored_energy", "loss_power", "source_power")
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """What a run took.
+
+    Attributes:
+        steps: integrator steps.
+        evaluations: evaluations of the equations.
+        integrations: calls of the integrator (panels and event locations).
+        events: mode changes.
+        seconds: wall time of initialisation and integration.
+    """
+
+    steps: int
+    evaluations: int
+    integrations: int
+    events: int
+    seconds: float
+
+
+class Values(Mapping[str, float]):
+    """All variables at one instant, by path."""
+
+    def __init__(self, solution: Solution, time: float, column: Vector, discrete: Vector) -> None:
+        self.time = time
+        self._solution = solution
+        self._column = column
+        self._discrete = discrete
+
+    def __getitem__(self, key: str | Any) -> float:
+        path = self._solution.path(key)
+        model = self._solution.model
+        if path in model.position:
+            return float(self._column[model.position[path]])
+        if path in model.discrete_position:
+            return float(self._discrete[model.discrete_position[path]])
+        return float(self._solution[path][0])
+
+    def __iter__(self) -> Iterator[str]:
+        model = self._solution.model
+        yield from model.position
+        yield from model.discrete_position
+
+    def __len__(self) -> int:
+        return len(self._solution.model.flat_variables) + len(self._solution.model.flat_discretes)
+
+    def __repr__(self) -> str:
+        return f"<{len(self)} values at t = {self.time:g} s>"
+
+
+@dataclass(eq=False)
+class Solution:
+    """Trajectories of all variables of the unreduced model, in SI units.
+
+    Attributes:
+        model: the compiled model with the parameter values of the run.
+        options: the options of the run.
+        segments: smooth pieces with fixed modes.
+        events: mode changes.
+        statistics: what the run took.
+    """
+
+    model: CompiledDae
+    options: Options
+    segments: tuple[Segment, ...]
+    events: tuple[Event, ...]
+    statistics: Statistics
+    _cache: dict[str, Any] = field(default_factory=dict, repr=False)
+
+    @property
+    def time(self) -> Vector:
+        """Times of the results in s: a regular grid, and both sides of every event."""
+        if "time" not in self._cache:
+            self._cache["time"] = np.concatenate([s.times for s in self.segments])
+        return self._cache["time"]
+
+    def path(self, key: str | Symbol) -> str:
+        """Return the path of a variable given by its path or as `drive.clutch.tau`."""
+        if isinstance(key, Symbol):
+            owner = key.owner.path
+            name = f"{owner}.{key.name}" if owner else key.name
+            return f"{'der(' * key.order}{name}{')' * key.order}"
+        return str(getattr(getattr(key, "symbol", None), "owner", None) and self.path(key.symbol) or key)
+
+    def __getitem__(self, key: str | Any) -> Vector:
+        """Return a trajectory, shape (len(time),).
+
+        Args:
+            key: path of a variable, mode, discrete value, parameter, or of an energy term (`clutch.loss_power`), or a component's attribute.
+
+        Raises:
+            UnknownName: there is no such variable.
+        """
+        path = self.path(key)
+        if path == "time":
+            return self.time
+        model = self.model
+        if path in model.position:
+            return self._variables()[model.position[path]]
+        if path in model.discrete_position:
+            row = model.discrete_position[path]
+            return np.concatenate([np.full(len(s.times), s.d[row]) for s in self.segments])
+        if path in model.parameter_position:
+            return np.full(len(self.time), model.p[model.parameter_position[path]])
+        owner, _, term = path.rpartition(".")
+        if term in ENERGY_TERMS and owner in model.components:
+            return self._energy_terms()[model.components.index(owner), ENERGY_TERMS.index(term)]
+        known = [*model.position, *model.discrete_position, *model.parameter_position]
+        raise UnknownName(f"{model.name} has no variable '{path}'{did_you_mean(path, known) or '.'}")
+
+    def __contains__(self, key: object) -> bool:
+        path = self.path(key)  # type: ignore[arg-type]
+        model = self.model
+        return path in model.position or path in model.discrete_position or path in model.parameter_position
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Paths of all variables, modes and discrete values."""
+        return (*self.model.position, *self.model.discrete_position)
+
+    def _arguments(self) -> tuple[Any, ...]:
+        x = np.concatenate([s.x for s in self.segments], axis=1)
+        z = np.concatenate([s.z for s in self.segments], axis=1)
+        d = np.concatenate([np.repeat(s.d[:, None], len(s.times), axis=1) for s in self.segments], axis=1)
+        return self.time[None, :], x, z, self.model.p, self.model.u, d
+
+    def _variables(self) -> Vector:
+        if "variables" not in self._cache:
+            self._cache["variables"] = np.array(self.model.variables(*self._arguments()))
+        return self._cache["variables"]
+
+    def _energy_terms(self) -> Vector:
+        """Energy terms, shape (components, terms, times)."""
+        if "energy" not in self._cache:
+            count = len(self.time)
+            flat = np.array(self.model.energy(*self._arguments()))
+            self._cache["energy"] = flat.reshape(len(self.model.components), count, 4).transpose(0, 2, 1)
+        return self._cache["energy"]
+
+    def at(self, t: float) -> Values:
+        """Return all variables at a time, integrated there from the result before (right side of an event).
+
+        Raises:
+            ValueOutOfRange: the time is not within the run.
+        """
+        first, last = float(self.time[0]), float(self.time[-1])
+        if not first <= t <= last:
+            raise ValueOutOfRange(f"t = {t:g} s is not within the run, {first:g} s to {last:g} s.")
+        segment = next(s for s in reversed(self.segments) if s.times[0] <= t)
+        k = int(np.searchsorted(segment.times, t, side="right")) - 1
+        point = segment.point(k)
+        if t > point.t:
+            x, z = Integrator(self.model, self.options).run(point, t - point.t)
+            point.t, point.x, point.z = t, x[:, 0], z[:, 0]
+        return self._values(point.t, point.x, point.z, point.d)
+
+    @property
+    def final(self) -> Values:
+        """All variables at the end."""
+        segment = self.segments[-1]
+        return self._values(float(segment.times[-1]), segment.x[:, -1], segment.z[:, -1], segment.d)
+
+    def _values(self, t: float, x: Vector, z: Vector, d: Vector) -> Values:
+        column = np.array(self.model.variables(t, x, z, self.model.p, self.model.u, d)).ravel()
+        return Values(self, t, column, d)
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """Return a table with time as index and one column per variable.
+
+        Raises:
+            MissingExtra: pandas is not installed.
+        """
+        try:
+            import pandas
+        except ImportError:
+            raise _missing("pandas") from None
+        columns = {name: self[name] for name in self.names}
+        return pandas.DataFrame(columns, index=pandas.Index(self.time, name="time"))
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Return a dataset over time, with units and descriptions as attributes.
+
+        Raises:
+            MissingExtra: xarray is not installed.
+        """
+        try:
+            import xarray
+        except ImportError:
+            raise _missing("xarray") from None
+        info = {v.path: {"units": str(v.unit), "long_name": v.description} for v in (*self.model.flat_variables, *self.model.flat_discretes)}
+        arrays = {name: ("time", self[name], info[name]) for name in self.names}
+        return xarray.Dataset(arrays, coords={"time": ("time", self.time, {"units": "s"})})
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_cache": {}}
+
+    def __repr__(self) -> str:
+        return (
+            f"<Solution of {self.model.name}: {len(self.model.flat_variables)} variables, t = {self.time[0]:g} … {self.time[-1]:g} s, "
+            f"{len(self.events)} mode changes, {self.statistics.steps} steps in {self.statistics.seconds * 1e3:.1f} ms>"
+        )
+
+
+def _missing(package: str) -> MissingExtra:
+    return MissingExtra(f"{package} is not installed.", advice='Install it with: pip install "modelica-like[data]"')
