@@ -81,6 +81,39 @@ def check(netlist: Netlist, assignments: Assignments = None, *, debug: Debug = F
 
 
 @app.command()
+def simulate(
+    netlist: Netlist, assignments: Assignments = None, *,
+    until: Annotated[str | None, typer.Option(metavar="TIME", help="End time, e.g. 2s; otherwise that of the netlist.")] = None,
+    csv: Annotated[Path | None, typer.Option(metavar="FILE", help="Write all trajectories as a table.")] = None,
+    points: Annotated[int | None, typer.Option(metavar="N", help="Number of equal intervals of the results (500).")] = None,
+    units: Annotated[bool, typer.Option("--units", help="Units in a second header line of the table.")] = False,
+    plot: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw the results: .png, .svg or .pdf.")] = None,
+    show: Annotated[list[str] | None, typer.Option(metavar="PATTERN", help="What to draw, e.g. '*.w'.")] = None,
+    debug: Debug = False,
+) -> None:  # fmt: skip
+    """Simulate a netlist: events, energy balance, results as table and picture."""
+    with told(debug):
+        from modelica_like.report.progress import Bar
+        from modelica_like.report.run import run_report
+        from modelica_like.simulation import build
+        from modelica_like.simulation import simulate as run
+
+        model = build(_load(netlist, assignments))
+        with Bar(until or model.settings.get("until")) as bar:
+            solution = run(model, until, points=points, progress=bar)
+        out().print(run_report(solution))
+        if csv:
+            from modelica_like.report.files import write_csv
+
+            write_csv(solution, csv, units=units)
+        if plot:
+            from modelica_like.report.plots import plot as draw
+            from modelica_like.report.plots import save_plot
+
+            save_plot(draw(solution, show or ()), plot)
+
+
+@app.command()
 def describe(
     kind: Annotated[str, typer.Argument(metavar="TYPE", help="type as a netlist names it", show_default=False)],
     *, debug: Debug = False,

@@ -1,5 +1,6 @@
 """The language of component authors: declarations, equations, events, connections."""
 
+from modelica_like.errors import LanguageError as LanguageError
 from modelica_like.language.assembly import Assembly as Assembly
 from modelica_like.language.component import Component as Component
 from modelica_like.language.declared import Connector as Connector
@@ -23,6 +24,7 @@ from modelica_like.language.fields import param as param
 from modelica_like.language.fields import signal_in as signal_in
 from modelica_like.language.fields import signal_out as signal_out
 from modelica_like.language.fields import var as var
+from modelica_like.language.formula import parse_formula as parse_formula
 from modelica_like.language.functions import absolute as absolute
 from modelica_like.language.functions import all_of as all_of
 from modelica_like.language.functions import any_of as any_of

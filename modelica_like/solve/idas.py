@@ -34,10 +34,27 @@ _PANEL_STEPS = 5000
 """Steps between two results of a panel; a panel that needs more has probably run past an event, and is divided."""
 
 
+def scaled_problem(model: CompiledDae) -> dict[str, Any]:
+    """Return the equations in scaled time s in [0, 1], t = t0 + s*span, with parameters (t0, span, p, u, d).
+
+    Besides what `casadi.integrator` takes: `inner`, the arguments of the model's functions, and `span`.
+    """
+    if "scaled" not in model._cache:
+        arguments = model.arguments
+        s, t0, span = ca.SX.sym("s"), ca.SX.sym("t0"), ca.SX.sym("span")
+        x, z, p, u, d = (arguments[name] for name in ("x", "z", "p", "u", "d"))
+        inner = [t0 + s * span, x, z, p, u, d]
+        model._cache["scaled"] = {
+            "t": s, "x": x, "z": z, "p": ca.vertcat(t0, span, p, u, d),
+            "ode": span * model.ode(*inner), "alg": model.alg(*inner), "inner": inner, "span": span,
+        }  # fmt: skip
+    return model._cache["scaled"]
+
+
 class Integrator:
     """Integrates a model over one interval with fixed modes; its IDAS instances are kept with the model.
 
-    Time is scaled to s in [0, 1] with t = t0 + s*span, so that one instance serves intervals of any place and length.
+    Time is scaled, so that one instance serves intervals of any place and length.
     """
 
     def __init__(self, model: CompiledDae, options: Options) -> None:
@@ -52,21 +69,9 @@ class Integrator:
         key = "idas", outputs, self.options.rtol, self.options.atol, self.options.max_steps
         cache = self.model._cache
         if key not in cache:
-            cache[key] = ca.integrator("segment", "idas", self._problem(), 0, [k / outputs for k in range(1, outputs + 1)], self._settings(outputs))
+            problem = {name: value for name, value in scaled_problem(self.model).items() if name not in ("inner", "span")}
+            cache[key] = ca.integrator("segment", "idas", problem, 0, [k / outputs for k in range(1, outputs + 1)], self._settings(outputs))
         return cache[key]
-
-    def _problem(self) -> dict[str, Any]:
-        cache = self.model._cache
-        if "scaled" not in cache:
-            arguments = self.model.arguments
-            s, t0, span = ca.SX.sym("s"), ca.SX.sym("t0"), ca.SX.sym("span")
-            x, z, p, u, d = (arguments[name] for name in ("x", "z", "p", "u", "d"))
-            inner = [t0 + s * span, x, z, p, u, d]
-            cache["scaled"] = {
-                "t": s, "x": x, "z": z, "p": ca.vertcat(t0, span, p, u, d),
-                "ode": span * self.model.ode(*inner), "alg": self.model.alg(*inner),
-            }  # fmt: skip
-        return cache["scaled"]
 
     def _settings(self, outputs: int) -> dict[str, Any]:
         nominal = self.model.nominals

@@ -11,6 +11,7 @@ import numpy as np
 from modelica_like.compile import CompiledDae, Vector
 from modelica_like.errors import MissingExtra, UnknownName, ValueOutOfRange, did_you_mean
 from modelica_like.language.expr import Symbol
+from modelica_like.solve.energy import EnergyBalance, energy_balance
 from modelica_like.solve.idas import Integrator
 from modelica_like.solve.options import Options
 from modelica_like.solve.recorder import Event, Segment
@@ -186,6 +187,12 @@ class Solution:
     def _values(self, t: float, x: Vector, z: Vector, d: Vector) -> Values:
         column = np.array(self.model.variables(t, x, z, self.model.p, self.model.u, d)).ravel()
         return Values(self, t, column, d)
+
+    def energy(self) -> EnergyBalance:
+        """Return the energy balance of every component over the run."""
+        if "balance" not in self._cache:
+            self._cache["balance"] = energy_balance(self.model, self.segments)
+        return self._cache["balance"]
 
     def to_pandas(self) -> pandas.DataFrame:
         """Return a table with time as index and one column per variable.

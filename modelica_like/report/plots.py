@@ -1,0 +1,147 @@
+"""Pictures of trajectories."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from modelica_like.errors import NetlistError, UnknownName, did_you_mean
+from modelica_like.report.files import unit_of
+from modelica_like.solve.recorder import Event
+from modelica_like.solve.solution import Solution
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_QUANTITIES = {
+    "rad/s": "speed", "N.m": "torque", "m/s": "velocity", "N": "force", "rad": "angle", "m": "position", "W": "power",
+    "J": "energy", "rad/s2": "acceleration", "A": "current", "V": "voltage", "K": "temperature",
+}  # fmt: skip
+_USUAL = ("rad/s", "N.m", "m/s", "N")
+_MOST = 6
+_MOST_EVENTS = 40
+_STYLE: Mapping[str, Any] = {
+    "font.size": 9, "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True, "grid.color": "#e4e4e4",
+    "grid.linewidth": 0.6, "axes.axisbelow": True, "axes.edgecolor": "#666666", "xtick.color": "#444444",
+    "ytick.color": "#444444", "lines.linewidth": 1.5, "legend.frameon": False, "legend.fontsize": 8,
+}  # fmt: skip
+# Okabe and Ito's palette: distinct also for colour-blind readers.
+_COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
+
+
+def plot(solution: Solution, patterns: Sequence[str] = (), *, title: str = "") -> Figure:
+    """Draw trajectories over time, one panel per unit, with events as dotted lines.
+
+    Args:
+        solution: the run.
+        patterns: names or patterns (`*.w`) of what to draw; by default speeds, torques and forces of the parts.
+        title: heading; by default the name of the model.
+
+    Raises:
+        UnknownName: nothing fits a pattern.
+    """
+    import matplotlib as mpl
+    from matplotlib.figure import Figure
+
+    groups = _by_unit(solution, chosen(solution, patterns))
+    with mpl.rc_context(dict(_STYLE)):
+        figure = Figure(figsize=(8.0, 0.8 + 2.1 * max(len(groups), 1)), layout="constrained", dpi=150)
+        panels = figure.subplots(max(len(groups), 1), 1, sharex=True, squeeze=False)[:, 0]
+        for axes, (unit, names) in zip(panels, groups.items(), strict=False):
+            _draw(axes, solution, unit, names)
+        _mark_events(panels, solution.events)
+        panels[-1].set_xlabel("time in s")
+        panels[-1].set_xlim(solution.time[0], solution.time[-1])
+        figure.suptitle(title or solution.model.name, x=0.01, ha="left", fontsize=11, fontweight="bold")
+    return figure
+
+
+def save_plot(figure: Figure, path: Path) -> None:
+    """Write a picture; the ending of the file chooses the format.
+
+    Raises:
+        NetlistError: matplotlib does not know the format.
+        OSError: the file cannot be written.
+    """
+    known = figure.canvas.get_supported_filetypes()
+    if path.suffix.lstrip(".") not in known:
+        raise NetlistError(f"'{path.name}': a picture can be {', '.join(sorted(known))}.")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(path)
+
+
+def chosen(solution: Solution, patterns: Sequence[str]) -> list[str]:
+    """Return the names that fit the patterns, or a sensible choice if there are none.
+
+    Raises:
+        UnknownName: nothing fits a pattern.
+    """
+    if not patterns:
+        return _usual(solution)
+    names: dict[str, None] = {}
+    for pattern in patterns:
+        fitting = [name for name in solution.names if name == pattern or fnmatchcase(name, pattern)]
+        if not fitting:
+            hint = did_you_mean(pattern, solution.names) or "."
+            raise UnknownName(f"{solution.model.name} has no variable '{pattern}'{hint}")
+        names.update(dict.fromkeys(fitting))
+    return list(names)
+
+
+def _usual(solution: Solution) -> list[str]:
+    """Choose speeds, torques and forces of parts; curves that coincide are drawn once, and those at rest not at all."""
+    names: list[str] = []
+    for unit in _USUAL:
+        curves: dict[bytes, str] = {}
+        for variable in solution.model.flat_variables:
+            values = solution[variable.path]
+            if variable.kind in ("local", "output") and str(variable.unit) == unit and np.any(values):
+                scale = float(np.abs(values).max())
+                curves.setdefault(np.round(values / scale, 6).tobytes() + f"{scale:.6g}".encode(), variable.path)
+        names += list(curves.values())[:_MOST]
+    return names
+
+
+def _by_unit(solution: Solution, names: Sequence[str]) -> dict[str, list[str]]:
+    groups: dict[str, list[str]] = {}
+    for name in names:
+        groups.setdefault(unit_of(solution, name), []).append(name)
+    return groups
+
+
+def _draw(axes: Axes, solution: Solution, unit: str, names: Sequence[str]) -> None:
+    for k, name in enumerate(names):
+        style = "-" if k < len(_COLOURS) else "--"
+        axes.plot(solution.time, solution[name], style, label=name, color=_COLOURS[k % len(_COLOURS)])
+    quantity = _QUANTITIES.get(unit, "value")
+    spelled = unit.replace(".", "\u00b7")
+    axes.set_ylabel(quantity if unit == "1" else f"{quantity} in {spelled}")
+    axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
+
+
+def _mark_events(panels: Sequence[Axes], events: Sequence[Event]) -> None:
+    if len(events) > _MOST_EVENTS:
+        return
+    for axes in panels:
+        for event in events:
+            axes.axvline(event.time, color="#999999", linewidth=0.8, linestyle=":", zorder=0)
+    for event in _spaced(events, 0.025 * float(np.ptp(panels[0].dataLim.intervalx))):
+        text = f"{event.mode.rpartition('.')[0]} {event.after}"
+        panels[0].annotate(
+            text, (event.time, 1.0), xycoords=("data", "axes fraction"), xytext=(2, 1), textcoords="offset points",
+            rotation=25, ha="left", va="bottom", fontsize=7, color="#666666",
+        )  # fmt: skip
+
+
+def _spaced(events: Sequence[Event], gap: float) -> list[Event]:
+    """Return the last event of each instant, as far as there is room for a label between them."""
+    shown: list[Event] = []
+    for event in {event.time: event for event in events}.values():
+        if not shown or event.time - shown[-1].time > gap:
+            shown.append(event)
+    return shown

@@ -1,0 +1,54 @@
+"""A progress bar that appears only when a run takes long."""
+
+from __future__ import annotations
+
+import time
+from types import TracebackType
+from typing import Self
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+from modelica_like.errors import ModelicaLikeError
+from modelica_like.units import parse_unit, to_si
+
+_PATIENCE = 0.5
+_INTERVAL = 0.1
+
+
+class Bar:
+    """Shows on stderr how far a simulation has come; to be used as its `progress`.
+
+    Args:
+        until: end time, a number in s or a quantity; what cannot be read is left to the simulation to tell.
+    """
+
+    def __init__(self, until: float | str | None) -> None:
+        try:
+            self._end = to_si(until, parse_unit("s"), "until")
+        except ModelicaLikeError:
+            self._end = 0.0
+        self._next = time.perf_counter() + _PATIENCE
+        self._progress: Progress | None = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __call__(self, reached: float) -> None:
+        """Note the time reached, in s."""
+        now = time.perf_counter()
+        if now < self._next or self._end <= 0:
+            return
+        self._next = now + _INTERVAL
+        if self._progress is None:
+            columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:>3.0f} %"), TimeRemainingColumn())
+            self._progress = Progress(*columns, console=Console(stderr=True), transient=True)
+            self._progress.add_task("simulating", total=self._end)
+            self._progress.start()
+        self._progress.update(self._progress.task_ids[0], completed=reached)
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._progress is not None:
+            self._progress.stop()
