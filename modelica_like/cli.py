@@ -83,9 +83,9 @@ def check(netlist: Netlist, assignments: Assignments = None, *, debug: Debug = F
 @app.command()
 def simulate(
     netlist: Netlist, assignments: Assignments = None, *,
-    until: Annotated[str | None, typer.Option(metavar="TIME", help="End time, e.g. 2s; otherwise that of the netlist.")] = None,
+    until: Annotated[str | None, typer.Option(metavar="TIME", help="End time, e.g. 2s; else the netlist's.")] = None,
     csv: Annotated[Path | None, typer.Option(metavar="FILE", help="Write all trajectories as a table.")] = None,
-    points: Annotated[int | None, typer.Option(metavar="N", help="Number of equal intervals of the results (500).")] = None,
+    points: Annotated[int | None, typer.Option(metavar="N", help="Number of equal intervals of the results.")] = None,
     units: Annotated[bool, typer.Option("--units", help="Units in a second header line of the table.")] = False,
     plot: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw the results: .png, .svg or .pdf.")] = None,
     show: Annotated[list[str] | None, typer.Option(metavar="PATTERN", help="What to draw, e.g. '*.w'.")] = None,
@@ -145,6 +145,18 @@ def library(*, debug: Debug = False) -> None:
         from modelica_like.report.types import library_table
 
         out().print(library_table(library_types()))
+
+
+@app.command()
+def demo(
+    pictures: Annotated[Path, typer.Option(metavar="FOLDER", help="Where to write the pictures.")] = Path("build/demo"),
+    *, debug: Debug = False,
+) -> None:  # fmt: skip
+    """Run the start-ups of the examples against their published values."""
+    with told(debug):
+        from modelica_like.demo import run_demo
+
+        run_demo(out(), pictures)
 
 
 def _load(netlist: Path, assignments: list[str] | None) -> Any:

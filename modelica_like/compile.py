@@ -69,6 +69,7 @@ class CompiledDae:
         variables: all flat variables, in the order of `names`.
         guards: one per state event, positive where it wants to fire.
         guard_rates: their time derivatives along the solution.
+        guards_soon: guards as they will be one time resolution later.
         moments: times of the time events.
         resets: new values at events.
         reset_nodes: variables that are reset but are neither states nor discrete.
@@ -93,6 +94,7 @@ class CompiledDae:
     variables: ca.Function
     guards: ca.Function
     guard_rates: ca.Function
+    guards_soon: ca.Function
     moments: ca.Function
     resets: ca.Function
     reset_nodes: tuple[int, ...]
@@ -148,6 +150,11 @@ class CompiledDae:
     def arguments(self) -> dict[str, Any]:
         """Fresh symbols for the arguments of the functions."""
         return {name: ca.SX.sym(name, self.ode.size1_in(k)) for k, name in enumerate(self.ode.name_in())}
+
+    def guards_along(self, count: int) -> ca.Function:
+        """Guards and guard rates at `count` times, as one function."""
+        both = ca.Function("guards_and_rates", (a := list(self.arguments.values())), [self.guards(*a), self.guard_rates(*a)])
+        return both.map(count)
 
     def with_parameters(self, values: dict[str, Any]) -> CompiledDae:
         """Return the same model with other parameter values; nothing is compiled again.
@@ -216,6 +223,7 @@ def compile(reduced: ReducedDae) -> CompiledDae:
         variables=build.function("variables", reduced.values[: len(flat.variables)]),
         guards=build.function("guards", guards),
         guard_rates=build.function("guard_rates", reduced.total_derivative(guards)),
+        guards_soon=build.function("guards_soon", _soon(reduced, guards)),
         moments=build.function("moments", moments),
         resets=build.function("resets", resets),
         reset_nodes=tuple(targets),
@@ -238,6 +246,28 @@ def compile(reduced: ReducedDae) -> CompiledDae:
         settings=dict(getattr(flat.components.get(""), "simulate", {})),
         _reduced=reduced,
     )
+
+
+def _soon(reduced: ReducedDae, guards: Any) -> Any:
+    """Follow guards for one time resolution. Relations that are joined go each their own way: one that stays at zero never counts as true."""
+    relations: list[Any] = []
+    _joined(guards, relations.append)
+    if not relations:
+        return guards
+    stacked = ca.vertcat(*relations)
+    ahead = TIME_RESOLUTION * ca.fmax(1.0, ca.fabs(reduced.flat.time))
+    later = iter(ca.vertsplit(stacked + ahead * reduced.total_derivative(stacked)))
+    return _joined(guards, lambda _: next(later))
+
+
+def _joined(guards: Any, relation: Callable[[Any], Any]) -> Any:
+    """Rebuild guards with something else in the place of every relation."""
+
+    def rebuilt(guard: Any) -> Any:
+        join = _JOINS.get(guard.op())
+        return join(rebuilt(guard.dep(0)), rebuilt(guard.dep(1))) if join else relation(guard)
+
+    return ca.vertcat(*(rebuilt(guard) for guard in ca.vertsplit(guards)))
 
 
 def _plain(discrete: FlatDiscrete) -> FlatDiscrete:

@@ -7,6 +7,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from modelica_like.buffers import buffered
 from modelica_like.compile import CompiledDae, StartEntry, Vector
 from modelica_like.errors import ContradictingStart, InitializationError, MissingStart, SingularAtStart
 
@@ -33,7 +34,8 @@ class Point:
 
 def call(model: CompiledDae, function: Any, point: Point) -> Vector:
     """Evaluate a function of the model at a point; the result is flat."""
-    return np.asarray(function(point.t, point.x, point.z, model.p, model.u, point.d), float).ravel()
+    fast = buffered(model._cache, function.name(), lambda: function)
+    return fast(point.t, point.x, point.z, model.p, model.u, point.d)[0]
 
 
 def initialize(model: CompiledDae, t0: float = 0.0, start: StartKind = "given") -> Point:

@@ -17,7 +17,7 @@ def run_report(solution: Solution) -> RenderableType:
     parts: list[RenderableType] = [f"[bold]{escape(solution.model.name)}[/]  {_span(solution)}"]
     if solution.events:
         parts += ["", events_table(solution)]
-    parts += ["", energy_table(solution), "", f"[dim]{statistics_line(solution)}[/]"]
+    parts += ["", energy_table(solution), "", f"[dim]{closure_line(solution)}\n{statistics_line(solution)}[/]"]
     return Group(*parts)
 
 
@@ -27,7 +27,7 @@ def _span(solution: Solution) -> str:
 
 def events_table(solution: Solution) -> Table:
     """Return the mode changes; of many only the first and the last."""
-    made = table(f"{len(solution.events)} mode changes", "time in s>", "mode", "from", "to", "because of")
+    made = table(_mode_changes(len(solution.events)), "time in s>", "mode", "from", "to", "because of")
     events = list(solution.events)
     for k, event in enumerate(events):
         if len(events) > _SHOWN and k == _SHOWN // 2:
@@ -39,13 +39,23 @@ def events_table(solution: Solution) -> Table:
 
 
 def energy_table(solution: Solution) -> Table:
-    """Return the energy balance: per component what came in, was stored, lost and delivered, in J."""
+    """Return the energy balance: per component what came in, was delivered, stored and lost, in J."""
     balance = solution.energy()
-    made = table("energy balance in J", "component", "in>", "stored>", "lost>", "from outside>")
-    for path, item in balance.components.items():
-        if max(abs(item.inflow), abs(item.stored), abs(item.lost), abs(item.source)) > 0:
-            made.add_row(escape(path or solution.model.name), *(_energy(v) for v in (item.inflow, item.stored, item.lost, item.source)))
+    made = table("energy balance in J", "component", "in>", "from outside>", "stored>", "lost>")
+    for row in balance:
+        values = (row.inflow, row.source, row.stored, row.lost)
+        if any(values):
+            made.add_row(escape(row.component or solution.model.name), *map(_energy, values))
+    made.add_section()
+    totals = (balance.source, balance.stored, balance.lost)
+    made.add_row("total", "", *map(_energy, totals), style="bold")
     return made
+
+
+def closure_line(solution: Solution) -> str:
+    """Return how well the energy balance closes."""
+    balance = solution.energy()
+    return f"The energy balance closes to {balance.closure:.1e} of {balance.throughput:.6g} J."
 
 
 def _energy(value: float) -> str:
@@ -57,5 +67,9 @@ def statistics_line(solution: Solution) -> str:
     counts = solution.statistics
     return (
         f"{counts.steps} steps, {counts.evaluations} evaluations, {counts.integrations} integrations, "
-        f"{counts.events} mode changes in {counts.seconds:.3f} s"
+        f"{_mode_changes(counts.events)} in {counts.seconds:.3f} s"
     )
+
+
+def _mode_changes(count: int) -> str:
+    return "1 mode change" if count == 1 else f"{count} mode changes"

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from modelica_like.buffers import buffered
 from modelica_like.compile import CompiledDae, Vector
 from modelica_like.initialize import Point
 
@@ -45,8 +46,10 @@ class Guards:
 
     def along(self, times: Vector, x: Vector, z: Vector, d: Vector) -> tuple[Vector, Vector]:
         """Guards and rates at many times with the same modes; shapes (guards, times)."""
-        arguments = (times[None, :], x, z, self.model.p, self.model.u, d)
-        values, rates = np.array(self.model.guards(*arguments)), np.array(self.model.guard_rates(*arguments))
+        model, count = self.model, len(times)
+        fast = buffered(model._cache, ("guards", count), lambda: model.guards_along(count))
+        p, u, modes = (np.tile(vector, count) for vector in (model.p, model.u, d))
+        values, rates = (v.reshape(count, -1).T for v in fast(times, x.ravel("F"), z.ravel("F"), p, u, modes))
         return np.nan_to_num(values, nan=-1.0), np.nan_to_num(rates, nan=0.0, posinf=0.0, neginf=0.0)
 
     @staticmethod

@@ -10,6 +10,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from modelica_like.buffers import BufferedFunction, buffered
 from modelica_like.compile import CompiledDae, Vector
 from modelica_like.errors import StepFailed
 from modelica_like.initialize import Point, call
@@ -65,13 +66,14 @@ class Integrator:
         self.evaluations = 0
         self._tail = np.concatenate([model.p, model.u])
 
-    def _instance(self, outputs: int) -> ca.Function:
+    def _instance(self, outputs: int) -> BufferedFunction:
         key = "idas", outputs, self.options.rtol, self.options.atol, self.options.max_steps
-        cache = self.model._cache
-        if key not in cache:
-            problem = {name: value for name, value in scaled_problem(self.model).items() if name not in ("inner", "span")}
-            cache[key] = ca.integrator("segment", "idas", problem, 0, [k / outputs for k in range(1, outputs + 1)], self._settings(outputs))
-        return cache[key]
+        return buffered(self.model._cache, key, lambda: self._make(outputs), results=(0, 1))
+
+    def _make(self, outputs: int) -> ca.Function:
+        problem = {name: value for name, value in scaled_problem(self.model).items() if name not in ("inner", "span")}
+        grid = [k / outputs for k in range(1, outputs + 1)]
+        return ca.integrator("segment", "idas", problem, 0, grid, self._settings(outputs))
 
     def _settings(self, outputs: int) -> dict[str, Any]:
         nominal = self.model.nominals
@@ -101,14 +103,14 @@ class Integrator:
         said = io.StringIO()
         try:
             with redirect_stderr(said):
-                result = instance(x0=start.x, z0=start.z, p=p)
+                x, z = instance(start.x, start.z, p)
         except RuntimeError as error:
             raise self._failed(start, span, f"{said.getvalue()} {error}") from None
-        self._count(instance.stats())
-        x, z = np.array(result["xf"]), np.array(result["zf"])
+        self._count(instance.statistics())
+        x, z = x.reshape(outputs, -1).T, z.reshape(outputs, -1).T
         if not np.all(np.isfinite(x[:, -1])):
             raise self._failed(start, span, "IDA_REP_RES_ERR")
-        return x, z.reshape(len(self.model.implicit), outputs)
+        return x, z
 
     def _count(self, statistics: dict[str, Any]) -> None:
         self.steps += int(statistics["nsteps"])
