@@ -131,6 +131,8 @@ class PressedFriction(DryFriction, partial=True):
 class Clutch(PressedFriction, CompliantWithRelativeStates):
     """Friction clutch between two shafts."""
 
+    # No torque depends on the angle by which a clutch has slipped.
+    phi_rel: Variable = var("rad", "relative angle, flange_b.phi - flange_a.phi", state="prefer", default=0)
     w_rel: Variable = var("rad/s", "slip speed", state="always")
 
     @property

@@ -21,12 +21,12 @@ from modelica_like.language import (
     exp,
     interpolate,
     param,
+    parse_formula,
     signal_in,
     signal_out,
     sin,
     where,
 )
-from modelica_like.language.formula import parse_formula
 
 _NEVER = 1e30
 

@@ -74,6 +74,7 @@ class TorqueStep(TorqueSource):
 class SpeedSource(OneFlange, partial=True):
     """Speed between the housing and a shaft, whatever torque it takes."""
 
+    phi: Variable = var("rad", "angle of the shaft relative to the housing", default=0)
     w: Variable = var("rad/s", "speed")
 
     def speed(self) -> Expr:

@@ -8,7 +8,7 @@ from components.interfaces import (
     LinearCompliant,
     LinearCompliantWithRelativeStates,
 )
-from modelica_like.language import Equations, Events, Expr, Mode, Parameter, maximum, minimum, param
+from modelica_like.language import Equations, Events, Expr, Mode, Parameter, param
 
 
 class Spring(Compliant):
@@ -56,13 +56,12 @@ class SpringDamper(CompliantWithRelativeStates):
         return self.d * self.w_rel**2
 
 
-class ElastoBacklash(CompliantWithRelativeStates):
+class Backlash(CompliantWithRelativeStates, partial=True):
     """Backlash in series with a spring and a damper side by side, e.g. a pair of gear flanks or a claw coupling.
 
-    Inside the backlash there is no torque. In contact, with the deformation x, spring torque c·x and damper torque
-    d·der(x) add, but the damper torque is limited to the spring torque: so the torque rises from zero when the flanks
-    meet, and it never pulls (Modelica Standard Library, Rotational.ElastoBacklash). Where a fast separation leaves the
-    flank behind, the energy of its deformation is counted as lost. Without backlash take a `SpringDamper`.
+    Inside the backlash there is no torque, and flanks that touch never pull: where a fast separation leaves the flank
+    behind, the energy of its deformation is counted as lost. A subclass says how hard pressed flanks press. Without
+    backlash take a `SpringDamper`.
     """
 
     c: Parameter = param("N.m/rad", "stiffness in contact", min=0)
@@ -76,18 +75,25 @@ class ElastoBacklash(CompliantWithRelativeStates):
         """Relative angle from the middle of the backlash."""
         return self.phi_rel - self.phi_rel0
 
-    def contact_torque(self, deformation: Expr, rate: Expr) -> Expr:
-        """Return the torque of flanks that press forward."""
-        spring = self.c * deformation
-        return maximum(0, spring + minimum(spring, self.d * rate))
+    @property
+    def spring(self) -> Expr:
+        """Elastic part of the torque that presses the flanks together."""
+        half = 0.5 * self.b
+        forward, backward = self.c * (self.phi_diff - half), self.c * (-self.phi_diff - half)
+        return self.contact.choose(gap=0, forward=forward, backward=backward)
+
+    @property
+    def damper(self) -> Expr:
+        """Viscous part of the torque that presses the flanks together."""
+        return self.contact.choose(gap=0, forward=self.d * self.w_rel, backward=-self.d * self.w_rel)
+
+    def pressure(self) -> Expr:
+        """Return the torque that presses the flanks together."""
+        raise NotImplementedError
 
     def equations(self) -> Equations:
         yield from super().equations()
-        yield self.tau == self.contact.choose(
-            gap=0,
-            forward=self.contact_torque(self.phi_diff - 0.5 * self.b, self.w_rel),
-            backward=-self.contact_torque(-self.phi_diff - 0.5 * self.b, -self.w_rel),
-        )
+        yield self.tau == self.contact.choose(gap=0, forward=self.pressure(), backward=-self.pressure())
 
     def events(self) -> Events:
         half = 0.5 * self.b
@@ -98,24 +104,49 @@ class ElastoBacklash(CompliantWithRelativeStates):
         yield self.contact.go("forward", "gap", when=self.phi_diff < half)
         yield self.contact.go("backward", "gap", when=self.phi_diff > -half)
 
-    def spring_torque(self) -> Expr:
-        """Return the elastic part of the torque."""
-        half = 0.5 * self.b
-        forward, backward = self.c * (self.phi_diff - half), self.c * (self.phi_diff + half)
-        return self.contact.choose(gap=0, forward=forward, backward=backward)
-
     def stored_energy(self) -> Expr:
-        return 0.5 * self.spring_torque() ** 2 / self.c
+        return 0.5 * self.spring**2 / self.c
 
     def loss_power(self) -> Expr:
-        return (self.tau - self.spring_torque()) * self.w_rel
+        elastic = self.contact.choose(gap=0, forward=self.spring, backward=-self.spring)
+        return (self.tau - elastic) * self.w_rel
 
 
-class ElastoBacklash2(ElastoBacklash):
-    """Backlash whose damper acts in full as soon as the flanks meet: the torque may jump there, but it never pulls."""
+class ElastoBacklash(Backlash):
+    """Backlash whose damper torque is limited to the spring torque, so that the torque rises from zero on contact.
 
-    def contact_torque(self, deformation: Expr, rate: Expr) -> Expr:
-        return maximum(0, self.c * deformation + self.d * rate)
+    Modelica Standard Library, Rotational.ElastoBacklash.
+    """
+
+    flanks = Mode("pressed", "meeting", "leaving", description="spring and damper, damper limited, left behind")
+
+    def pressure(self) -> Expr:
+        return self.flanks.choose(pressed=self.spring + self.damper, meeting=2 * self.spring, leaving=0)
+
+    def events(self) -> Events:
+        yield from super().events()
+        spring, damper = self.spring, self.damper
+        yield self.flanks.go("pressed", "meeting", when=damper > spring)
+        yield self.flanks.go("meeting", "pressed", when=damper < spring)
+        yield self.flanks.go("pressed", "leaving", when=damper < -spring)
+        yield self.flanks.go("leaving", "pressed", when=damper > -spring)
+
+
+class ElastoBacklash2(Backlash):
+    """Backlash whose damper acts in full as soon as the flanks meet: the torque may jump there.
+
+    Modelica Standard Library, Rotational.ElastoBacklash2.
+    """
+
+    flanks = Mode("pressed", "leaving", description="spring and damper, left behind")
+
+    def pressure(self) -> Expr:
+        return self.flanks.choose(pressed=self.spring + self.damper, leaving=0)
+
+    def events(self) -> Events:
+        yield from super().events()
+        yield self.flanks.go("pressed", "leaving", when=self.damper < -self.spring)
+        yield self.flanks.go("leaving", "pressed", when=self.damper > -self.spring)
 
 
 class TranslationalSpring(LinearCompliant):

@@ -75,9 +75,10 @@ def out() -> Console:
 def check(netlist: Netlist, assignments: Assignments = None, *, debug: Debug = False) -> None:
     """Check a netlist: equations, unknowns, states, index, blocks, energy terms."""
     with told(debug):
+        assembly = _load(netlist, assignments)
         from modelica_like.report.structure import structure_report
 
-        out().print(structure_report(_load(netlist, assignments)))
+        out().print(structure_report(assembly))
 
 
 @app.command()
@@ -89,26 +90,29 @@ def simulate(
     units: Annotated[bool, typer.Option("--units", help="Units in a second header line of the table.")] = False,
     plot: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw the results: .png, .svg or .pdf.")] = None,
     show: Annotated[list[str] | None, typer.Option(metavar="PATTERN", help="What to draw, e.g. '*.w'.")] = None,
+    energy: Annotated[bool, typer.Option(help="Tell the energy balance; it takes another, more precise run.")] = True,
     debug: Debug = False,
 ) -> None:  # fmt: skip
     """Simulate a netlist: events, energy balance, results as table and picture."""
     with told(debug):
+        # What is wrong in the file is told before the solver is loaded.
+        assembly = _load(netlist, assignments)
         from modelica_like.report.progress import Bar
         from modelica_like.report.run import run_report
         from modelica_like.simulation import build
         from modelica_like.simulation import simulate as run
 
-        model = build(_load(netlist, assignments))
+        model = build(assembly)
         with Bar(until or model.settings.get("until")) as bar:
             solution = run(model, until, points=points, progress=bar)
-        out().print(run_report(solution))
+        out().print(run_report(solution, energy=energy))
         if csv:
             from modelica_like.report.files import write_csv
 
             write_csv(solution, csv, units=units)
         if plot:
-            from modelica_like.report.plots import plot as draw
-            from modelica_like.report.plots import save_plot
+            from modelica_like.solve.plot import plot as draw
+            from modelica_like.solve.plot import save_plot
 
             save_plot(draw(solution, show or ()), plot)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -12,10 +13,16 @@ import numpy as np
 from modelica_like.errors import LanguageError, Source, UnknownName, did_you_mean
 from modelica_like.flatten.model import FlatDiscrete, FlatModel, FlatParameter, FlatVariable, Origin, evaluate
 from modelica_like.flatten.template import TransitionForm
+from modelica_like.start_system import start_system
 from modelica_like.structure.reduce import ReducedDae
 from modelica_like.units import to_si
 
 Vector = np.ndarray[Any, np.dtype[np.float64]]
+
+TIME_RESOLUTION = 1e-10
+"""Time resolution of events relative to max(1 s, |t|): guards are judged that much later, so that one that just left zero counts by its direction."""
+
+_JOINS: dict[int, Callable[[Any, Any], Any]] = {ca.OP_FMIN: ca.fmin, ca.OP_FMAX: ca.fmax}
 
 
 @dataclass(frozen=True)
@@ -75,7 +82,11 @@ class CompiledDae:
         reset_nodes: variables that are reset but are neither states nor discrete.
         start_conditions: one per choice of a start mode.
         start_values: as many as `starts`.
+        start_system: of (t, x, y, z, p, u, d) with y the variables that start values need: y itself, the Jacobian by (x, y, z) and the values
+            of [explicit equations for y, implicit equations, variables with start values].
+        start_nodes: variables at the end of the start system.
         discrete_starts: start of d.
+        derived: parameters that follow from others, of p only.
         determinants: relative determinants; zero where a block is singular.
         p: parameter values.
         components: paths of the components of the energy balance.
@@ -86,6 +97,7 @@ class CompiledDae:
     implicit: tuple[str, ...]
     flat_variables: tuple[FlatVariable, ...]
     flat_parameters: tuple[FlatParameter, ...]
+    flat_derived: tuple[FlatParameter, ...]
     flat_discretes: tuple[FlatDiscrete, ...]
     inputs: tuple[int, ...]
     ode: ca.Function
@@ -100,7 +112,10 @@ class CompiledDae:
     reset_nodes: tuple[int, ...]
     start_conditions: ca.Function
     start_values: ca.Function
+    start_system: ca.Function
+    start_nodes: tuple[int, ...]
     discrete_starts: ca.Function
+    derived: ca.Function
     determinants: ca.Function
     transitions: tuple[CompiledTransition, ...]
     start_modes: tuple[tuple[int, int, Source], ...]
@@ -135,6 +150,11 @@ class CompiledDae:
         return {parameter.path: k for k, parameter in enumerate(self.flat_parameters)}
 
     @cached_property
+    def derived_position(self) -> dict[str, int]:
+        """Position of every parameter that follows from others by its path."""
+        return {parameter.path: k for k, parameter in enumerate(self.flat_derived)}
+
+    @cached_property
     def discrete_position(self) -> dict[str, int]:
         """Position of every mode and discrete value by its path."""
         return {discrete.path: k for k, discrete in enumerate(self.flat_discretes)}
@@ -163,7 +183,8 @@ class CompiledDae:
             values: by path, numbers in SI units or quantities with a unit.
 
         Raises:
-            UnknownName: there is no such independent parameter.
+            UnknownName: there is no such parameter.
+            LanguageError: it follows from others, or is not tunable.
             UnitError, ValueOutOfRange: the value does not fit.
         """
         p, u = self.p.copy(), self.u.copy()
@@ -171,15 +192,18 @@ class CompiledDae:
         for path, value in values.items():
             if path in self.parameter_position:
                 one = self.flat_parameters[self.parameter_position[path]]
-                p[self.parameter_position[path]] = _in_range(one, to_si(value, one.unit, path), value)
+                if not one.tunable:
+                    raise LanguageError(f"{path} cannot change after compilation.", advice="Set it in the model and build that again.")
+                p[self.parameter_position[path]] = one.checked(to_si(value, one.unit, path), value)
             elif path in inputs:
                 u[inputs[path]] = to_si(value, self.flat_variables[self.inputs[inputs[path]]].unit, path)
+            elif path in self.derived_position:
+                raise LanguageError(f"{path} follows from other parameters.", advice="Set those.")
             else:
                 known = [*self.parameter_position, *inputs]
-                raise UnknownName(
-                    f"{self.name} has no parameter '{path}'{did_you_mean(path, known) or '.'}",
-                    advice="Parameters that follow from others cannot be set; set those.",
-                )
+                raise UnknownName(f"{self.name} has no parameter '{path}'{did_you_mean(path, known) or '.'}")
+        for one, number in zip(self.flat_derived, self.derived(p).full().ravel(), strict=True):
+            one.checked(float(number), f"{number:g}")
         twin = replace(self, p=p, u=u)
         twin.__dict__.update({k: v for k, v in self.__dict__.items() if k not in twin.__dict__})
         return twin
@@ -189,17 +213,6 @@ class CompiledDae:
             _ = self.energy  # symbols do not pickle, functions do
         state = {key: value for key, value in self.__dict__.items() if key != "arguments"}
         return {**state, "_reduced": None, "_cache": {}}
-
-
-def _in_range(parameter: FlatParameter, number: float, given: Any) -> float:
-    from modelica_like.errors import ValueOutOfRange
-
-    low = -np.inf if parameter.min is None else parameter.min
-    high = np.inf if parameter.max is None else parameter.max
-    if not low <= number <= high:
-        bound = f"at least {low:g}" if number < low else f"at most {high:g}"
-        raise ValueOutOfRange(f"{parameter.path} = {given} is out of range: it must be {bound} {parameter.unit}.")
-    return number
 
 
 def compile(reduced: ReducedDae) -> CompiledDae:
@@ -215,6 +228,7 @@ def compile(reduced: ReducedDae) -> CompiledDae:
         implicit=reduced.implicit,
         flat_variables=tuple(flat.variables),
         flat_parameters=tuple(flat.parameters),
+        flat_derived=tuple(flat.derived),
         flat_discretes=tuple(_plain(one) for one in flat.discretes),
         inputs=tuple(flat.inputs),
         ode=build.function("ode", reduced.ode),
@@ -229,7 +243,10 @@ def compile(reduced: ReducedDae) -> CompiledDae:
         reset_nodes=tuple(targets),
         start_conditions=build.function("start_conditions", conditions),
         start_values=build.function("start_values", ca.vertcat(*(ca.SX(s.value) for s in flat.starts))),
+        start_system=start_system(reduced),
+        start_nodes=tuple(dict.fromkeys(s.node for s in flat.starts)),
         discrete_starts=build.function("discrete_starts", ca.vertcat(*(ca.SX(one.start) for one in flat.discretes))),
+        derived=ca.Function("derived", [flat.p], [ca.densify(ca.SX(flat.formulas))], ["p"], ["derived"]),
         determinants=build.function("determinants", determinants),
         transitions=transitions,
         start_modes=start_modes,
@@ -250,10 +267,10 @@ def compile(reduced: ReducedDae) -> CompiledDae:
 
 def _soon(reduced: ReducedDae, guards: Any) -> Any:
     """Follow guards for one time resolution. Relations that are joined go each their own way: one that stays at zero never counts as true."""
-    relations: list[Any] = []
-    _joined(guards, relations.append)
-    if not relations:
+    if not guards.numel():
         return guards
+    relations: list[Any] = []
+    _joined(guards, lambda relation: relations.append(relation) or relation)
     stacked = ca.vertcat(*relations)
     ahead = TIME_RESOLUTION * ca.fmax(1.0, ca.fabs(reduced.flat.time))
     later = iter(ca.vertsplit(stacked + ahead * reduced.total_derivative(stacked)))

@@ -14,10 +14,10 @@ from rich.table import Table
 from modelica_like.compile import CompiledDae
 from modelica_like.errors import NetlistError
 from modelica_like.netlist import load
-from modelica_like.report.plots import plot, save_plot
 from modelica_like.report.run import closure_line, energy_table, events_table, statistics_line
 from modelica_like.report.types import table
 from modelica_like.simulation import build, simulate
+from modelica_like.solve.plot import plot, save_plot
 from modelica_like.solve.solution import Solution
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
@@ -188,8 +188,9 @@ def pages(examples: Path, pictures: Path) -> Iterator[RenderableType]:
         picture = pictures / f"{k}_{run.model.name}.png"
         save_plot(plot(run, title=case.title), picture)
         source = f"[dim]expected: {case.source}[/]"
-        line = f"[dim]{closure_line(run)}\n{statistics_line(run)}; {seconds:.2f} s with reading and compiling\npicture: {picture}[/]"
-        yield Group(comparison(case, runs), source, "", events_table(run), "", energy_table(run), "", line, "")
+        taken = f"[dim]{statistics_line(run)}; {seconds:.2f} s with reading and compiling\npicture: {picture}[/]"
+        energy = (energy_table(run), f"[dim]{closure_line(run)}[/]")
+        yield Group(comparison(case, runs), source, "", events_table(run), "", *energy, "", taken, "")
 
 
 def run_demo(console: Console, pictures: Path) -> None:

@@ -67,11 +67,13 @@ class _Flattener:
         errors = [*self.errors, *self.wiring.errors]
         if errors:
             raise raise_together_or_one(errors)
+        self.parameters.check_derived()
         general = self._split_linear(instances)
         d = ca.vertcat(*(ca.SX.sym(one.path) for one in self.discretes))
         return FlatModel(
             name=self.root.label, variables=self.variables, nodes=self.nodes, derivative=self.derivative,
             parameters=self.parameters.flat, p=self.parameters.symbols(), q=self.parameters.expressions(),
+            derived=self.parameters.derived, formulas=self.parameters.formulas(),
             discretes=self.discretes, d=d, time=ca.SX(TIME), instances=instances, linear=self.linear,
             general=general, starts=self.starts, inputs=self.inputs,
             components={component.path: component for component, _ in templates},

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import casadi as ca
 
-from modelica_like.errors import Source
+from modelica_like.errors import Source, ValueOutOfRange
 from modelica_like.flatten.template import Template
 from modelica_like.language.component import Component
 from modelica_like.language.fields import StatePreference
@@ -31,7 +32,7 @@ class FlatVariable:
 
 @dataclass(frozen=True, slots=True)
 class FlatParameter:
-    """An independent parameter with its value in SI units."""
+    """A parameter with its value in SI units."""
 
     path: str
     unit: Unit
@@ -40,6 +41,22 @@ class FlatParameter:
     min: float | None
     max: float | None
     tunable: bool
+
+    def checked(self, number: float, given: object) -> float:
+        """Return the number if it is finite and within min and max.
+
+        Raises:
+            ValueOutOfRange: it is not.
+        """
+        if not math.isfinite(number):
+            raise ValueOutOfRange(f"{self.path} must be a finite number, not {number:g}.")
+        low = -math.inf if self.min is None else self.min
+        high = math.inf if self.max is None else self.max
+        if low <= number <= high:
+            return number
+        bound = f"at least {low:g}" if number < low else f"at most {high:g}"
+        unit = "" if str(self.unit) in ("1", "*") else f" {self.unit}"
+        raise ValueOutOfRange(f"{self.path} = {given} is out of range: it must be {bound}{unit}.")
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,6 +128,7 @@ class FlatModel:
         nodes: (variable, order) of every node.
         derivative: node -> node of its time derivative.
         p: symbols of the independent parameters.
+        derived: parameters that follow from others, and `formulas`: their expressions in p.
         q: expressions of all parameters that instances use (positions in `Instance.parameters`).
         d: symbols of modes and discrete values.
         linear: connection equations, bindings and the components' own linear equations.
@@ -126,6 +144,8 @@ class FlatModel:
     parameters: list[FlatParameter]
     p: Any
     q: Any
+    derived: list[FlatParameter]
+    formulas: Any
     discretes: list[FlatDiscrete]
     d: Any
     time: Any

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
 from typing import Any
 
 import casadi as ca
@@ -25,6 +27,8 @@ class Parameters:
     def __init__(self, root: Component) -> None:
         self.root = root
         self.flat: list[FlatParameter] = []
+        self.derived: list[FlatParameter] = []
+        self._formulas: list[Any] = []
         self._symbols: list[Any] = []
         self._q: list[Any] = []
         self._position: dict[tuple[int, str], int] = {}
@@ -68,6 +72,9 @@ class Parameters:
         scope = component._owner if name in component._values and isinstance(component._owner, Component) else component
         expression = self.evaluate(value, scope, path)
         self._open.pop()
+        field = component.fields[name]
+        self.derived.append(FlatParameter(path, value.unit, field.description, math.nan, field.min, field.max, False))
+        self._formulas.append(expression)
         return expression
 
     def evaluate(self, value: Value, scope: Any, label: str) -> Any:
@@ -110,6 +117,21 @@ class Parameters:
     def q(self, position: int | None) -> Any:
         """Return one entry of q."""
         return 0.0 if position is None else self._q[position]
+
+    def check_derived(self) -> None:
+        """Compute the parameters that follow from others.
+
+        Raises:
+            ValueOutOfRange: one is not finite, or outside its min and max.
+        """
+        if self.derived:
+            numbers = ca.Function("derived", [self.symbols()], [self.formulas()])([one.value for one in self.flat])
+            pairs = zip(self.derived, numbers.full().ravel(), strict=True)
+            self.derived = [replace(one, value=one.checked(float(number), f"{number:g}")) for one, number in pairs]
+
+    def formulas(self) -> Any:
+        """Return the expressions of the parameters that follow from others."""
+        return ca.vertcat(*self._formulas) if self._formulas else ca.SX(0, 1)
 
     def symbols(self) -> Any:
         """Return the vector p."""

@@ -53,6 +53,8 @@ class Component(Declared):
         cls._structural = {name: value for base in ancestors for name, value in base._structural.items()} | plain
         for name in (*cls._class_fields, *cls._class_connectors, *cls._class_modes, *cls._class_parts):
             require_identifier(name, cls.__name__)
+        for mode in cls._class_modes.values():
+            mode.check()
 
     def __init__(self, **values: Any) -> None:
         if self._partial:
@@ -254,11 +256,14 @@ class Component(Declared):
             self.give(name, value)
         elif name.startswith("_") or isinstance(getattr(type(self), name, None), Field | Mode):
             super().__setattr__(name, value)
+        elif value == [] and name not in self.fields:
+            self._adopt(name, [])  # an array whose structural field says none
         else:
             self.give(name, value)
 
     def _adopt(self, name: str, value: Component | list[Component]) -> None:
-        if name in self.fields or name in self._connectors or name in self._structural or hasattr(Component, name):
+        taken = (self.fields, self._connectors, self._structural, self._class_modes)
+        if any(name in names for names in taken) or hasattr(Component, name):
             raise DuplicateName(f"{self.label}: '{name}' is already the name of something else.", where=caller())
         require_identifier(name, type(self).__name__)
         if isinstance(value, list):

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, Self, overload
 
-from modelica_like.errors import LanguageError, ValueOutOfRange
+from modelica_like.errors import LanguageError, UnitError, ValueOutOfRange
 from modelica_like.language.expr import Expr, symbol_of
-from modelica_like.language.formula import Formula, as_formula, parse_formula
+from modelica_like.language.formula import Arithmetic, Formula, as_formula, parse_formula
 from modelica_like.units import ANY, Unit, parse_unit, read_quantity, to_si
 
 if TYPE_CHECKING:
@@ -92,12 +92,18 @@ class Field:
         if isinstance(raw, Formula | Field):
             return Value(raw, None, as_formula(raw), self.unit, fixed)
         if isinstance(raw, str):
-            quantity = read_quantity(raw)
+            quantity = self._quantity(raw)
             if quantity is None:
                 return Value(raw, None, parse_formula(raw), self.unit, fixed)
             if self.unit == ANY:
                 return Value(raw, self._checked(to_si(raw, quantity[1], self.label), raw), None, quantity[1], fixed)
         return Value(raw, self._checked(to_si(raw, self.unit, self.label), raw), None, self.unit, fixed)
+
+    def _quantity(self, text: str) -> tuple[float, Unit] | None:
+        try:
+            return read_quantity(text)
+        except UnitError as error:
+            raise UnitError(f"{self.label} = '{text}': {error.what}", advice=error.advice) from None
 
     def _checked(self, number: float, given: Any) -> float:
         low = -float("inf") if self.min is None else self.min
@@ -132,37 +138,10 @@ class _Symbolic(Field):
         instance.set_value(self, value)
 
 
-class Parameter(_Symbolic):
+class Parameter(_Symbolic, Arithmetic):
     """Constant during a run; tunable, differentiable, an FMU parameter."""
 
     tunable = True
-
-    def __add__(self, other: Quantity) -> Formula:
-        return Formula("+", (as_formula(self), as_formula(other)))
-
-    def __radd__(self, other: Quantity) -> Formula:
-        return Formula("+", (as_formula(other), as_formula(self)))
-
-    def __sub__(self, other: Quantity) -> Formula:
-        return Formula("-", (as_formula(self), as_formula(other)))
-
-    def __rsub__(self, other: Quantity) -> Formula:
-        return Formula("-", (as_formula(other), as_formula(self)))
-
-    def __mul__(self, other: Quantity) -> Formula:
-        return Formula("*", (as_formula(self), as_formula(other)))
-
-    def __rmul__(self, other: Quantity) -> Formula:
-        return Formula("*", (as_formula(other), as_formula(self)))
-
-    def __truediv__(self, other: Quantity) -> Formula:
-        return Formula("/", (as_formula(self), as_formula(other)))
-
-    def __rtruediv__(self, other: Quantity) -> Formula:
-        return Formula("/", (as_formula(other), as_formula(self)))
-
-    def __neg__(self) -> Formula:
-        return Formula("neg", (as_formula(self),))
 
 
 class Variable(_Symbolic):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import math
 import operator
+import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -14,6 +15,8 @@ import casadi as ca
 from modelica_like.errors import NetlistError, did_you_mean
 
 _MAX_LENGTH = 2000
+_MAX_DEPTH = 150
+_SHOWN = 80
 _BINARY: dict[type[ast.operator], str] = {
     ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Pow: "**",
 }  # fmt: skip
@@ -27,8 +30,46 @@ _CONSTANTS = {"pi": math.pi}
 _PRECEDENCE = {"+": 1, "-": 1, "*": 2, "/": 2, "neg": 3, "**": 4}
 
 
+class Arithmetic:
+    """Operators that build formulas in a class body: `2 * J`, `z_ring / z_sun - 1`."""
+
+    def __add__(self, other: Any) -> Formula:
+        return _binary("+", self, other)
+
+    def __radd__(self, other: Any) -> Formula:
+        return _binary("+", other, self)
+
+    def __sub__(self, other: Any) -> Formula:
+        return _binary("-", self, other)
+
+    def __rsub__(self, other: Any) -> Formula:
+        return _binary("-", other, self)
+
+    def __mul__(self, other: Any) -> Formula:
+        return _binary("*", self, other)
+
+    def __rmul__(self, other: Any) -> Formula:
+        return _binary("*", other, self)
+
+    def __truediv__(self, other: Any) -> Formula:
+        return _binary("/", self, other)
+
+    def __rtruediv__(self, other: Any) -> Formula:
+        return _binary("/", other, self)
+
+    def __pow__(self, other: Any) -> Formula:
+        return _binary("**", self, other)
+
+    def __neg__(self) -> Formula:
+        return Formula("neg", (as_formula(self),))
+
+
+def _binary(operation: str, left: Any, right: Any) -> Formula:
+    return Formula(operation, (as_formula(left), as_formula(right)))
+
+
 @dataclass(frozen=True)
-class Formula:
+class Formula(Arithmetic):
     """Expression tree over named parameters.
 
     Attributes:
@@ -50,7 +91,8 @@ class Formula:
     def evaluate(self, lookup: Callable[[str], Any]) -> Any:
         """Compute the value; `lookup` gives the value (a number or an expression) of a path."""
         if self.operation == "number":
-            return self.operands[0]
+            # In CasADi's arithmetic 1/0 and (-1)**0.5 are values that a check finds, in Python's they are exceptions.
+            return ca.SX(self.operands[0])
         if self.operation == "name":
             return lookup(self._name())
         return _OPERATIONS[self.operation](*(operand.evaluate(lookup) for operand in self.operands))
@@ -100,22 +142,35 @@ def parse_formula(text: str) -> Formula:
     if len(text) > _MAX_LENGTH:
         raise NetlistError(f"A formula of {len(text)} characters is too long (at most {_MAX_LENGTH}).")
     try:
-        tree = ast.parse(text.strip(), mode="eval")
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            tree = ast.parse(text.strip(), mode="eval")
     except (SyntaxError, ValueError, MemoryError, RecursionError):
         raise _not_a_formula(text) from None
+    if _depth(tree) > _MAX_DEPTH:
+        raise _not_a_formula(text, "it is nested too deeply")
     return _convert(tree.body, text)
 
 
+def _depth(tree: ast.AST) -> int:
+    layer, depth = [tree], 0
+    while layer:
+        layer = [child for node in layer for child in ast.iter_child_nodes(node)]
+        depth += 1
+    return depth
+
+
 def _not_a_formula(text: str, why: str = "") -> NetlistError:
+    shown = text if len(text) <= _SHOWN else f"{text[:_SHOWN]}…"
     return NetlistError(
-        f"'{text}' is neither a quantity nor a formula{'; ' + why if why else ''}.",
+        f"'{shown}' is neither a quantity nor a formula{'; ' + why if why else ''}.",
         advice='A quantity is a number with a unit ("8.5 kg.cm2"), a formula is arithmetic of parameters ("2*J").',
     )
 
 
 def _convert(node: ast.expr, text: str) -> Formula:
     if isinstance(node, ast.Constant) and isinstance(node.value, int | float) and not isinstance(node.value, bool):
-        return Formula("number", (float(node.value),))
+        return Formula("number", (_finite(node.value, text),))
     if isinstance(node, ast.BinOp) and type(node.op) in _BINARY:
         return Formula(_BINARY[type(node.op)], (_convert(node.left, text), _convert(node.right, text)))
     if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
@@ -128,6 +183,16 @@ def _convert(node: ast.expr, text: str) -> Formula:
     if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and not node.keywords:
         return _call(node, node.func.id, text)
     raise _not_a_formula(text)
+
+
+def _finite(value: float, text: str) -> float:
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
+    if math.isinf(number):
+        raise _not_a_formula(text, "a number in it is too large")
+    return number
 
 
 def _call(node: ast.Call, name: str, text: str) -> Formula:

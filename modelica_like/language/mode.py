@@ -32,6 +32,14 @@ class Mode:
     def __set_name__(self, owner: type, name: str) -> None:
         self.owner = owner.__name__
         self.name = name
+
+    def check(self) -> None:
+        """Check the declaration; not in `__set_name__`, from which Python 3.11 lets no exception out as it is.
+
+        Raises:
+            LanguageError: no names, or one twice.
+            UnknownName: the start is none of them.
+        """
         if len(set(self.names)) != len(self.names) or not self.names:
             raise LanguageError(f"{self.label} needs distinct names, not {self.names}.")
         self.number(self.start)

@@ -123,6 +123,8 @@ def _not_toml(message: str, lines: Lines) -> ModelicaLikeError:
     number = int(match.group(2)) if match and match.group(2) else len(lines.text)
     reason = match.group(1) if match else "nested too deep"
     place = lines.line(number)
+    if match and (key := re.search(r"^Duplicate inline table key '(.*)'$", match.group(1))):
+        return DuplicateName(f"{key.group(1)} is given twice.", where=place)
     return NetlistError(f"'{Path(lines.file).name}' is not TOML: {reason[:1].lower()}{reason[1:]}.", where=place)
 
 

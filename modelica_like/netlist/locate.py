@@ -12,14 +12,15 @@ _MAX_DEPTH = 20
 _MAX_TEXT = 120
 Path = tuple[str, ...]
 
-_TOKEN = re.compile(
-    r"""(?P<comment>\#[^\n]*)
-    |(?P<string>\"{3}(?:[^"\\]|\\.|"(?!""))*+(?:\"{3,5}|\Z) | '{3}(?:[^']|'(?!''))*+(?:'{3,5}|\Z)
-        |"(?:[^"\\\n]|\\.)*+"? | '[^'\n]*+'?)
-    |(?P<open>[\[{]) | (?P<close>[\]}]) | (?P<newline>\n) | (?P<equals>=) | (?P<comma>,) | (?P<dot>\.)
-    |(?P<word>[^\s"'\#\[\]{}=,.]+) | (?P<space>[ \t\r\f\v]+) | (?P<other>.)""",
+_STRING = r"""(?P<string>\"{3}(?:[^"\\]|\\.|"(?!""))*+(?:\"{3,5}|\Z) | '{3}(?:[^']|'(?!''))*+(?:'{3,5}|\Z)
+        |"(?:[^"\\\n]|\\.)*+"? | '[^'\n]*+'?)"""
+_COMMON = rf"""(?P<comment>\#[^\n]*+) | {_STRING} | (?P<open>[\[{{]) | (?P<close>[\]}}]) | (?P<newline>\n)"""
+_KEY = re.compile(
+    rf"""{_COMMON} | (?P<equals>=) | (?P<dot>\.) | (?P<space>[ \t\r]++) | (?P<word>[^"'\#\[\]{{}}\n=.\s]++)
+        | (?P<other>.)""",
     re.VERBOSE | re.DOTALL,
 )
+_VALUE = re.compile(rf"""{_COMMON} | (?P<other>[^"'\#\[\]{{}}\n]++)""", re.VERBOSE | re.DOTALL)
 
 
 @dataclass
@@ -73,35 +74,19 @@ def locate(text: str, file: str) -> Lines:
     """
     lines = Lines(file, text.split("\n"))
     table: Path = ()
-    tables: set[Path] = set()
+    closed: set[Path] = set()  # tables that may not be opened again: headers, and keys with a value
     for number, tokens in _statements(text, lines):
         kinds = [kind for kind, _ in tokens]
         if kinds[:1] == ["open"]:
             table = _keys(tokens)
             is_element = kinds[:2] == ["open", "open"]
-            lines.add(table, number, table=is_element or table not in tables)
-            tables.add(table)
-        elif "equals" in kinds:
-            _add_assignment(lines, table, tokens, number)
+            lines.add(table, number, table=is_element or table not in closed)
+            closed.add(table)
+        elif kinds[-1:] == ["equals"]:
+            path = (*table, *_keys(tokens))
+            lines.add(path, number)
+            closed.add(path)
     return lines
-
-
-def _add_assignment(lines: Lines, table: Path, tokens: list[tuple[str, str]], number: int) -> None:
-    """Remember the key of `key = value`, and the keys of a value `{ key = value, ... }` on the same line."""
-    equals = [index for index, (kind, _) in enumerate(tokens) if kind == "equals"]
-    outer = (*table, *_keys(tokens[: equals[0]]))
-    lines.add(outer, number)
-    seen: set[Path] = set()
-    depth = 0
-    for index, (kind, _) in enumerate(tokens):
-        depth += (kind == "open") - (kind == "close")
-        if depth != 1 or kind != "equals" or tokens[equals[0] + 1][1] != "{":
-            continue
-        start = max(k for k in range(index) if tokens[k][0] in ("open", "comma"))
-        inner = _keys(tokens[start + 1 : index])
-        if inner in seen:
-            lines.repeated.append(((*outer, *inner), number, number))
-        seen.add(inner)
 
 
 def _keys(tokens: list[tuple[str, str]]) -> Path:
@@ -109,24 +94,24 @@ def _keys(tokens: list[tuple[str, str]]) -> Path:
 
 
 def _statements(text: str, lines: Lines) -> Iterator[tuple[int, list[tuple[str, str]]]]:
-    """Yield the first line and the tokens of each statement: a header or an assignment."""
-    number, first, depth, dots = 1, 1, 0, 0
+    """Yield the first line of each statement with the tokens of its header, or of its key and the `=` after it."""
+    number, first, depth, position = 1, 1, 0, 0
     tokens: list[tuple[str, str]] = []
-    for match in _TOKEN.finditer(text):
+    in_value = False
+    while match := (_VALUE if in_value else _KEY).match(text, position):
         kind, token = match.lastgroup or "other", match.group()
-        if kind in ("space", "comment"):
-            continue
+        position = match.end()
         depth = max(depth + (kind == "open") - (kind == "close"), 0)
-        dots = dots + 1 if kind == "dot" else dots if kind in ("word", "string") else 0
-        if max(depth, dots) > _MAX_DEPTH:
-            raise NetlistError("Brackets or keys are nested too deep for a netlist.", where=Source(lines.file, number))
         if kind == "newline" and depth == 0:
             if tokens:
                 yield first, tokens
-            tokens = []
-        elif kind != "newline":
+            tokens, in_value = [], False
+        elif not in_value and kind not in ("space", "comment", "newline"):
             first = first if tokens else number
             tokens.append((kind, token))
+            in_value = kind == "equals"
+        if depth > _MAX_DEPTH or len(tokens) > 2 * _MAX_DEPTH:
+            raise NetlistError("Brackets or keys are nested too deep for a netlist.", where=Source(lines.file, number))
         number += token.count("\n")
     if tokens:
         yield first, tokens

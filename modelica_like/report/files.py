@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from modelica_like.solve.plot import unit_of
 from modelica_like.solve.solution import Solution
 
 
@@ -31,11 +32,3 @@ def write_csv(solution: Solution, path: Path, *, units: bool = False) -> None:
             writer.writerow(["s", *(unit_of(solution, name) for name in solution.names)])
         for row in np.column_stack(columns).tolist():
             writer.writerow(map(repr, row))
-
-
-def unit_of(solution: Solution, name: str) -> str:
-    """Return the coherent SI unit of a variable; that of a mode is `1`."""
-    model = solution.model
-    if name in model.position:
-        return str(model.flat_variables[model.position[name]].unit)
-    return str(model.flat_discretes[model.discrete_position[name]].unit)

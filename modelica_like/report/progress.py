@@ -17,13 +17,15 @@ _INTERVAL = 0.1
 
 
 class Bar:
-    """Shows on stderr how far a simulation has come; to be used as its `progress`.
+    """Shows how far a simulation has come; to be used as its `progress`.
 
     Args:
         until: end time, a number in s or a quantity; what cannot be read is left to the simulation to tell.
+        console: where to show it, by default stderr; a console that is no terminal gets nothing.
     """
 
-    def __init__(self, until: float | str | None) -> None:
+    def __init__(self, until: float | str | None, console: Console | None = None) -> None:
+        self._console = Console(stderr=True) if console is None else console
         try:
             self._end = to_si(until, parse_unit("s"), "until")
         except ModelicaLikeError:
@@ -37,7 +39,7 @@ class Bar:
     def __call__(self, reached: float) -> None:
         """Note the time reached, in s."""
         now = time.perf_counter()
-        if now < self._next or self._end <= 0:
+        if now < self._next or self._end <= 0 or not self._console.is_terminal:
             return
         self._next = now + _INTERVAL
         if self._progress is None:
@@ -47,7 +49,7 @@ class Bar:
                 TextColumn("{task.percentage:>3.0f} %"),
                 TimeRemainingColumn(),
             )
-            self._progress = Progress(*columns, console=Console(stderr=True), transient=True)
+            self._progress = Progress(*columns, console=self._console, transient=True)
             self._progress.add_task("simulating", total=self._end)
             self._progress.start()
         self._progress.update(self._progress.task_ids[0], completed=reached)

@@ -12,12 +12,19 @@ from modelica_like.solve.solution import Solution
 _SHOWN = 20
 
 
-def run_report(solution: Solution) -> RenderableType:
-    """Return events, energy balance and statistics of a run."""
+def run_report(solution: Solution, *, energy: bool = True) -> RenderableType:
+    """Return events, energy balance and statistics of a run.
+
+    Args:
+        solution: the run.
+        energy: False: leave out the energy balance, which integrates the run once more.
+    """
     parts: list[RenderableType] = [f"[bold]{escape(solution.model.name)}[/]  {_span(solution)}"]
     if solution.events:
         parts += ["", events_table(solution)]
-    parts += ["", energy_table(solution), "", f"[dim]{closure_line(solution)}\n{statistics_line(solution)}[/]"]
+    if energy:
+        parts += ["", energy_table(solution), f"[dim]{closure_line(solution)}[/]"]
+    parts += ["", f"[dim]{statistics_line(solution)}[/]"]
     return Group(*parts)
 
 
@@ -39,16 +46,18 @@ def events_table(solution: Solution) -> Table:
 
 
 def energy_table(solution: Solution) -> Table:
-    """Return the energy balance: per component what came in, was delivered, stored and lost, in J."""
+    """Return the energy balance in J; of many components only those that exchanged most."""
     balance = solution.energy()
     made = table("energy balance in J", "component", "in>", "from outside>", "stored>", "lost>")
-    for row in balance:
-        values = (row.inflow, row.source, row.stored, row.lost)
-        if any(values):
-            made.add_row(escape(row.component or solution.model.name), *map(_energy, values))
+    rows = {row.component: (row.inflow, row.source, row.stored, row.lost) for row in balance}
+    active = [name for name, values in rows.items() if any(values)]
+    largest = set(sorted(active, key=lambda name: max(map(abs, rows[name])), reverse=True)[:_SHOWN])
+    for name in (name for name in active if name in largest):
+        made.add_row(escape(name or solution.model.name), *map(_energy, rows[name]))
+    if len(active) > _SHOWN:
+        made.add_row(f"… {len(active) - _SHOWN} more")
     made.add_section()
-    totals = (balance.source, balance.stored, balance.lost)
-    made.add_row("total", "", *map(_energy, totals), style="bold")
+    made.add_row("total", "", *map(_energy, (balance.source, balance.stored, balance.lost)), style="bold")
     return made
 
 

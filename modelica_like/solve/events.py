@@ -207,8 +207,7 @@ class EventLoop:
         """State events that want to fire now: positive, or about to be within the time resolution."""
         if not self.guards.count:
             return []
-        values, rates = self.guards.at(self.now)
-        wants = self.guards.active(self.now.d) & (self.guards.later(self.now.t, values, rates) > 0)
+        wants = self.guards.active(self.now.d) & (self.guards.soon(self.now) > 0)
         return [self.guards.state_events[k] for k in np.flatnonzero(wants)]
 
     def _event(self, wanting: list[CompiledTransition]) -> None:

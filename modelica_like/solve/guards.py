@@ -10,10 +10,7 @@ import numpy as np
 
 from modelica_like.buffers import buffered
 from modelica_like.compile import CompiledDae, Vector
-from modelica_like.initialize import Point
-
-RESOLUTION = 1e-10
-"""Time resolution of events relative to max(1 s, |t|): the sign of a guard is taken that much later, so that a guard that just left zero counts by its direction."""
+from modelica_like.initialize import Point, call
 
 _LOCATED = 1e-13
 _MAX_TRIALS = 60
@@ -52,10 +49,9 @@ class Guards:
         values, rates = (v.reshape(count, -1).T for v in fast(times, x.ravel("F"), z.ravel("F"), p, u, modes))
         return np.nan_to_num(values, nan=-1.0), np.nan_to_num(rates, nan=0.0, posinf=0.0, neginf=0.0)
 
-    @staticmethod
-    def later(t: float, values: Vector, rates: Vector) -> Vector:
-        """Guards as they are one time resolution later."""
-        return values + rates * (RESOLUTION * max(1.0, abs(t)))
+    def soon(self, point: Point) -> Vector:
+        """Guards as they will be one time resolution later."""
+        return np.nan_to_num(call(self.model, self.model.guards_soon, point), nan=-1.0)
 
 
 @dataclass

@@ -126,16 +126,19 @@ class Solution:
             return np.concatenate([np.full(len(s.times), s.d[row]) for s in self.segments])
         if path in model.parameter_position:
             return np.full(len(self.time), model.p[model.parameter_position[path]])
+        if path in model.derived_position:
+            return np.full(len(self.time), float(model.derived(model.p)[model.derived_position[path]]))
         owner, _, term = path.rpartition(".")
         if term in ENERGY_TERMS and owner in model.components:
             return self._energy_terms()[model.components.index(owner), ENERGY_TERMS.index(term)]
-        known = [*model.position, *model.discrete_position, *model.parameter_position]
+        known = [*model.position, *model.discrete_position, *model.parameter_position, *model.derived_position]
         raise UnknownName(f"{model.name} has no variable '{path}'{did_you_mean(path, known) or '.'}")
 
     def __contains__(self, key: object) -> bool:
         path = self.path(key)  # type: ignore[arg-type]
         model = self.model
-        return path in model.position or path in model.discrete_position or path in model.parameter_position
+        known = (model.position, model.discrete_position, model.parameter_position, model.derived_position)
+        return any(path in one for one in known)
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -40,6 +40,8 @@ class ReducedDae:
         node_states: for every node (position in x, factor) if it is a state up to a factor, else None.
         blocks: blocks of the triangular form, with the names of their unknowns and the origins of their equations.
         determinants: (names, origins, expression) whose zero makes a block singular.
+        level_values: expression of every level in x, z, inputs, p, d and t.
+        explicit: (level, expression) of the explicit unknowns, each in states, z and earlier ones.
         index: structural index of the equations before the reduction.
         differentiated: origins of the differentiated equations.
     """
@@ -63,6 +65,7 @@ class ReducedDae:
     differentiated: tuple[Origin, ...]
     system: System = field(repr=False)
     level_values: Any = field(repr=False)
+    explicit: tuple[tuple[int, Any], ...] = field(repr=False)
 
     def rate(self, variable: int) -> Any:
         """Return the time derivative of a flat variable, in x, z, inputs, p, d and t."""
@@ -252,6 +255,7 @@ def _assemble(
         differentiated=tuple(system.origins[k] for k, count in enumerate(counts) if count),
         system=system,
         level_values=level_values,
+        explicit=tuple((unknowns[k], expression) for k, expression in solved.order),
     )
 
 

@@ -43,6 +43,10 @@ MESSAGES = {
         '[parameters]\na = 1\n[parts]\na = { is = "Inertia" }\n',
         "'a' is both a parameter and a part.\n  in bad.toml:2 `a = 1`\n  in bad.toml:4 `a = { is = \"Inertia\" }`",
     ),
+    "a value given twice": (
+        '[parts]\na = { is = "Inertia", J = 1, J = 2 }\n',
+        'J is given twice.\n  in bad.toml:2 `a = { is = "Inertia", J = 1, J = 2 }`',
+    ),
     "unknown entry": (
         '[part]\na = { is = "Inertia" }\n',
         "A netlist has no entry 'part'; did you mean 'parts'? "

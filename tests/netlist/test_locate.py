@@ -55,9 +55,9 @@ def test_the_text_of_the_line_comes_with_it() -> None:
 
 def test_repetitions_are_found() -> None:
     assert locate("[a]\nx = 1\ny = 2\nx = 3\n", "f.toml").repeated == [(("a", "x"), 2, 4)]
-    assert locate("[a]\nx = { k = 1, k = 2 }\n", "f.toml").repeated == [(("a", "x", "k"), 2, 2)]
     assert locate("[a]\nx = 1\n[a]\ny = 2\n", "f.toml").repeated == [(("a",), 1, 3)]
-    assert locate("[a]\nx = 1\n[a.b]\ny = 2\n", "f.toml").repeated == []
+    assert locate("[a]\nx = {}\n[a.x]\ny = 2\n", "f.toml").repeated == [(("a", "x"), 2, 3)]
+    assert locate("[a]\nx = 1\n[a.b]\ny = 2\n[a.b.c]\n[[r]]\n[[r]]\n", "f.toml").repeated == []
 
 
 def test_a_right_text_has_no_repetitions_by_mistake() -> None:
@@ -75,6 +75,8 @@ HOSTILE = {
     "broken string": 'x = "' + "\\" * 2_000_000,
     "triple quotes": 'x = """' + '\\"""' * 500_000,
     "commas": "x = " + "," * 300_000,
+    "entries": "x = {" + "a = 1, " * 200_000,
+    "words": "a " * 500_000,
     "equals": "=" * 300_000,
 }
 

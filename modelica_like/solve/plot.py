@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from modelica_like.errors import NetlistError, UnknownName, did_you_mean
-from modelica_like.report.files import unit_of
 from modelica_like.solve.recorder import Event
 from modelica_like.solve.solution import Solution
 
@@ -25,7 +24,7 @@ _QUANTITIES = {
 _USUAL = ("rad/s", "N.m", "m/s", "N")
 _MOST = 6
 _MOST_EVENTS = 40
-_STYLE: Mapping[str, Any] = {
+_STYLE: Any = {
     "font.size": 9, "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True, "grid.color": "#e4e4e4",
     "grid.linewidth": 0.6, "axes.axisbelow": True, "axes.edgecolor": "#666666", "xtick.color": "#444444",
     "ytick.color": "#444444", "lines.linewidth": 1.5, "legend.frameon": False, "legend.fontsize": 8,
@@ -49,12 +48,12 @@ def plot(solution: Solution, patterns: Sequence[str] = (), *, title: str = "") -
     from matplotlib.figure import Figure
 
     groups = _by_unit(solution, chosen(solution, patterns))
-    with mpl.rc_context(dict(_STYLE)):
+    with mpl.rc_context(_STYLE):
         figure = Figure(figsize=(8.0, 0.8 + 2.1 * max(len(groups), 1)), layout="constrained", dpi=150)
         panels = figure.subplots(max(len(groups), 1), 1, sharex=True, squeeze=False)[:, 0]
         for axes, (unit, names) in zip(panels, groups.items(), strict=False):
             _draw(axes, solution, unit, names)
-        _mark_events(panels, solution.events)
+        _mark_events(list(panels), solution.events)
         panels[-1].set_xlabel("time in s")
         panels[-1].set_xlim(solution.time[0], solution.time[-1])
         figure.suptitle(title or solution.model.name, x=0.01, ha="left", fontsize=11, fontweight="bold")
@@ -105,6 +104,14 @@ def _usual(solution: Solution) -> list[str]:
                 curves.setdefault(np.round(values / scale, 6).tobytes() + f"{scale:.6g}".encode(), variable.path)
         names += list(curves.values())[:_MOST]
     return names
+
+
+def unit_of(solution: Solution, name: str) -> str:
+    """Return the coherent SI unit of a variable; that of a mode is `1`."""
+    model = solution.model
+    if name in model.position:
+        return str(model.flat_variables[model.position[name]].unit)
+    return str(model.flat_discretes[model.discrete_position[name]].unit)
 
 
 def _by_unit(solution: Solution, names: Sequence[str]) -> dict[str, list[str]]:

@@ -1,0 +1,68 @@
+"""Consistent start values and modes."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+
+from modelica_like.compile import CompiledDae, Vector
+from modelica_like.initialize.point import Point as Point
+from modelica_like.initialize.point import call as call
+from modelica_like.initialize.point import check_singular as check_singular
+from modelica_like.initialize.point import solve_implicit as solve_implicit
+from modelica_like.initialize.point import variable_slopes as variable_slopes
+from modelica_like.initialize.start import StartProblem
+from modelica_like.initialize.steady import solve_steady
+
+StartKind = Literal["given", "rest", "steady"]
+
+_MODE_ROUNDS = 5
+
+
+def initialize(model: CompiledDae, t0: float = 0.0, start: StartKind = "given") -> Point:
+    """Find consistent start values.
+
+    Args:
+        model: the compiled model.
+        t0: start time in s.
+        start: `given`: the start values of the model determine everything; `rest`: states without a start value begin at zero;
+            `steady`: all derivatives are zero, except of states that nothing depends on.
+
+    Returns:
+        The start; events at t0 have not happened yet.
+
+    Raises:
+        MissingStart: start values are missing.
+        ContradictingStart: start values contradict each other.
+        InitializationError: the solver did not find a solution.
+        SingularAtStart: the equations have no unique solution.
+    """
+    point = Point(t0, model.guesses.copy(), model.z_guesses.copy(), np.zeros(len(model.flat_discretes)))
+    point.d = call(model, model.discrete_starts, point)
+    problem = StartProblem(model, point)
+    # The modes depend on the states, in the steady state the states also on the modes.
+    for _ in range(_MODE_ROUNDS):
+        if start == "steady":
+            problem.apply(point)
+            solve_steady(model, point)
+        else:
+            problem.solve(point, rest=start == "rest")
+        modes = _start_modes(model, point)
+        if np.array_equal(modes, point.d):
+            break
+        point.d = modes
+    solve_implicit(model, point)
+    check_singular(model, point)
+    return point
+
+
+def _start_modes(model: CompiledDae, point: Point) -> Vector:
+    """Choose modes by their start conditions: the first that holds wins."""
+    d = point.d.copy()
+    decided: set[int] = set()
+    for holds, (mode, target, _) in zip(call(model, model.start_conditions, point), model.start_modes, strict=True):
+        if holds and mode not in decided:
+            decided.add(mode)
+            d[mode] = target
+    return d

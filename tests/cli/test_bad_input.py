@@ -1,0 +1,94 @@
+"""Every kind of bad input, through the command: one block of sentences with file and line, exit code 2, at once."""
+
+import re
+import resource
+import subprocess
+import sys
+from functools import lru_cache
+from pathlib import Path
+
+import pytest
+
+DRIVE = """
+[parts]
+motor = { is = "ConstantSpeed", w_fixed = "100 rpm", phi = 0 }
+shaft = { is = "SpringDamper", c = 100, d = 1, phi_rel = 0 }
+rotor = { is = "Inertia", J = "1 kg.m2", w = 0 }
+[series]
+drive = ["motor", "shaft", "rotor"]
+[simulate]
+until = "1 s"
+"""
+
+
+def changed(old: str, new: str) -> str:
+    assert old in DRIVE
+    return DRIVE.replace(old, new)
+
+
+BAD = {
+    "unknown type": (
+        changed('"Inertia"', '"Inertja"'),
+        5,
+        "There is no component type 'Inertja'; did you mean 'Inertia'?",
+    ),
+    "unknown flange": (
+        DRIVE + '[connect]\nw = ["rotor.flange_c", "shaft.flange_b"]\n',
+        11,
+        "has no connector 'flange_c'; did you mean 'flange_",
+    ),
+    "wrong unit": (changed('"1 kg.m2"', '"1 kg.m"'), 5, "Inertia.J expects kg.m2; '1 kg.m' is kg.m."),
+    "duplicate name": (DRIVE + '[parts.rotor]\nis = "Inertia"\n', 5, "'rotor' in [parts] is declared twice."),
+    "free flange": (changed('"motor", ', ""), 0, "motor.flange"),
+    "two speed sources": (
+        changed("[series]", 'second = { is = "ConstantSpeed", w_fixed = 1 }\n[series]')
+        + '[connect]\nw = ["second.flange", "motor.flange"]\n',
+        0,
+        "motor",
+    ),
+    "missing start value": (changed(", w = 0", ""), 0, "rotor"),
+    "cyclic sub-assembly": (
+        DRIVE + '[parts.inner]\nis = "./bad.toml"\n',
+        10,
+        "A netlist contains itself: bad.toml contains bad.toml.",
+    ),
+    "parameter out of range": (
+        changed('"1 kg.m2"', "-1"),
+        5,
+        "Inertia.J = -1 is out of range: it must be at least 0 kg.m2.",
+    ),
+    "nan": (changed('"1 kg.m2"', "nan"), 5, "Inertia.J must be a finite number, not nan."),
+    "empty": ("", 0, "'bad.toml' is empty."),
+    "not TOML": (changed('is = "Inertia"', "is Inertia"), 5, "'bad.toml' is not TOML:"),
+    "brackets": ("[" * 10_000_000, 0, "'bad.toml' is larger than 2 MB; no netlist is."),
+    "fewer brackets": ("x = " + "[" * 1_900_000, 0, "Brackets or keys are nested too deep for a netlist."),
+}
+
+
+@pytest.mark.parametrize(("text", "line", "message"), BAD.values(), ids=BAD.keys())
+def test_bad_input(text: str, line: int, message: str, tmp_path: Path) -> None:
+    (tmp_path / "bad.toml").write_text(text)
+    command = [sys.executable, "-m", "modelica_like", "simulate", "bad.toml"]
+    before = processor_seconds()
+    result = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=20)
+    seconds = processor_seconds() - before
+    assert result.returncode == 2
+    assert result.stdout == ""
+    assert message in result.stderr
+    assert "Traceback" not in result.stderr
+    assert re.search(rf"in bad\.toml:{line} `" if line else r"in \w+\.(toml|py)", result.stderr)
+    assert seconds < 1.0 + import_seconds()
+
+
+def processor_seconds() -> float:
+    """Time of all finished child processes on the processor; other load on the machine does not count."""
+    usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return usage.ru_utime + usage.ru_stime
+
+
+@lru_cache(maxsize=1)
+def import_seconds() -> float:
+    """Processor time of Python with CasADi and NumPy, which no message can undercut."""
+    before = processor_seconds()
+    subprocess.run([sys.executable, "-c", "import casadi, numpy"], check=True)
+    return processor_seconds() - before

@@ -1,0 +1,168 @@
+"""The commands check and simulate: what they print and write, and their exit codes."""
+
+import csv
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from modelica_like import simulate
+from modelica_like.cli import app
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+DIRECT = str(EXAMPLES / "machine_table_direct.toml")
+
+PENDULUM = """
+[parts]
+wall = { is = "Fixed" }
+spring = { is = "SpringDamper", c = "100 N.m/rad", d = "0.5 N.m.s/rad" }
+mass = { is = "Inertia", J = "1 kg.m2", w = 1 }
+[series]
+chain = ["wall", "spring", "mass"]
+[start]
+"mass.phi" = 0.1
+[simulate]
+until = "1 s"
+"""
+
+
+@pytest.fixture
+def run() -> CliRunner:
+    return CliRunner()
+
+
+@pytest.fixture
+def pendulum(tmp_path: Path) -> str:
+    (tmp_path / "pendulum.toml").write_text(PENDULUM)
+    return str(tmp_path / "pendulum.toml")
+
+
+def test_check_tells_the_structure(run: CliRunner) -> None:
+    result = run.invoke(app, ["check", DIRECT])
+    assert result.exit_code == 0
+    rows = {line.split("  ")[0]: line.split() for line in result.stdout.splitlines() if line}
+    assert rows["equations"][1] == rows["unknowns"][1]
+    assert rows["states"][1:] == ["3", "motor.phi,", "clutch.phi_rel,", "clutch.w_rel"]
+    assert rows["modes"][1:] == ["1", "clutch.mode"]
+    assert rows["index"][1] == "3"
+    assert rows["stored"][1:] == ["hub,", "spindle,", "table"]
+    assert rows["dissipated"][1:] == ["clutch"]
+    assert "states kept: motor.phi, clutch.phi_rel, clutch.w_rel" in result.stdout.replace("\n", " ")
+
+
+def test_simulate_tells_events_and_energy(run: CliRunner) -> None:
+    result = run.invoke(app, ["simulate", DIRECT])
+    assert result.exit_code == 0
+    assert "1 mode change\n" in "\n".join(line.rstrip() for line in result.stdout.splitlines())
+    rows = {line.split()[0]: line.split() for line in result.stdout.splitlines() if line}
+    assert rows["0.2"][1:4] == ["clutch.mode", "backward", "stuck"]
+    assert rows["0.2"][4].startswith("friction.py:")
+    assert float(rows["clutch"][4]) == pytest.approx(5452.8196, rel=1e-6)
+    assert "The energy balance closes to" in result.stdout
+    assert result.stderr == ""
+
+
+def test_the_energy_balance_can_be_left_out(run: CliRunner, pendulum: str) -> None:
+    assert "energy balance" in run.invoke(app, ["simulate", pendulum]).stdout
+    assert "energy balance" not in run.invoke(app, ["simulate", pendulum, "--no-energy"]).stdout
+
+
+def test_set_and_until_change_the_run(run: CliRunner) -> None:
+    result = run.invoke(
+        app, ["simulate", DIRECT, "--set", "clutch.capacity=50 N.m", "--set", "load_torque=0", "--until", "100 ms"]
+    )
+    assert result.exit_code == 0
+    assert "0 s to 0.1 s" in result.stdout
+    assert "mode change" not in result.stdout.replace("0 mode changes in", "")
+
+
+def test_the_table_has_one_column_per_variable_and_both_sides_of_events(run: CliRunner, tmp_path: Path) -> None:
+    file = tmp_path / "out.csv"
+    assert run.invoke(app, ["simulate", DIRECT, "--csv", str(file)]).exit_code == 0
+    with file.open(newline="") as stream:
+        rows = list(csv.reader(stream))
+    solution = simulate(DIRECT)
+    assert rows[0] == ["time", *solution.names]
+    values = np.array(rows[1:], float)
+    assert values.shape == (len(solution.time), 1 + len(solution.names))
+    times = values[:, 0]
+    assert {*np.linspace(0, 0.4, 501).round(12)} <= {*times.round(12)}
+    repeated = np.flatnonzero(np.diff(times) == 0)
+    torque = values[:, rows[0].index("clutch.tau")]
+    assert [(torque[k], torque[k + 1]) for k in repeated] == [pytest.approx((-86.784324, -15.0), rel=1e-6)]
+    assert np.array_equal(torque, solution["clutch.tau"])
+
+
+def test_units_stand_in_a_second_header_line_if_asked_for(run: CliRunner, pendulum: str, tmp_path: Path) -> None:
+    file = tmp_path / "out.csv"
+    assert run.invoke(app, ["simulate", pendulum, "--csv", str(file), "--units", "--points", "7"]).exit_code == 0
+    with file.open(newline="") as stream:
+        names, units, *rows = list(csv.reader(stream))
+    by_name = dict(zip(names, units, strict=True))
+    assert (by_name["time"], by_name["mass.w"], by_name["spring.tau"]) == ("s", "rad/s", "N.m")
+    assert len(rows) == 8
+
+
+@pytest.mark.parametrize("ending", ["png", "svg", "pdf"])
+def test_the_picture_is_written(run: CliRunner, pendulum: str, tmp_path: Path, ending: str) -> None:
+    file = tmp_path / "new" / f"out.{ending}"
+    assert run.invoke(app, ["simulate", pendulum, "--plot", str(file), "--show", "mass.*"]).exit_code == 0
+    assert file.read_bytes()[:4] in (b"\x89PNG", b"<?xm", b"%PDF")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "message"),
+    [
+        (["check", "nowhere.toml"], 2, "The netlist 'nowhere.toml' does not exist."),
+        (["simulate", "PENDULUM", "--set", "mass.K=1"], 2, "Inertia has no parameter or variable 'K'"),
+        (
+            ["simulate", "PENDULUM", "--set", "mass.J=-1"],
+            2,
+            "Inertia.J = -1 is out of range: it must be at least 0 kg.m2.",
+        ),
+        (["simulate", "PENDULUM", "--set", "mass.J=1 kg"], 2, "Inertia.J expects kg.m2; '1 kg' is kg."),
+        (["simulate", "PENDULUM", "--set", "mass.J"], 2, "'mass.J' is not PATH=VALUE"),
+        (["simulate", "PENDULUM", "--until", "2 m"], 2, "until expects s; '2 m' is m."),
+        (["simulate", "PENDULUM", "--until", "-1"], 2, "The end time -1 s is not after the start time 0 s."),
+        (["simulate", "PENDULUM", "--points", "0"], 2, "points = 0 is out of range"),
+        (["simulate", "PENDULUM", "--plot", "x.doc"], 2, "'x.doc': a picture can be"),
+        (
+            ["simulate", "PENDULUM", "--plot", "x.png", "--show", "mas.w"],
+            2,
+            "has no variable 'mas.w'; did you mean 'mass.w'?",
+        ),
+        (
+            ["simulate", "PENDULUM", "--csv", "no/such/folder/x.csv"],
+            2,
+            "no/such/folder/x.csv: No such file or directory.",
+        ),
+        (["simulate"], 2, "Missing argument 'NETLIST'"),
+        (["simulat", "x"], 2, "No such command 'simulat'"),
+    ],
+    ids=lambda value: " ".join(value[2:]) or " ".join(value) if isinstance(value, list) else None,
+)
+def test_wrong_input_is_told_without_a_traceback(
+    run: CliRunner,
+    pendulum: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    arguments: list[str],
+    code: int,
+    message: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    result = run.invoke(app, [pendulum if argument == "PENDULUM" else argument for argument in arguments])
+    assert result.exit_code == code
+    assert message in result.stderr
+    assert "Traceback" not in result.stderr
+
+
+def test_the_module_is_the_command() -> None:
+    result = subprocess.run(
+        [sys.executable, "-m", "modelica_like", "describe", "Nothing"], capture_output=True, text=True, check=False
+    )
+    assert result.returncode == 2
+    assert result.stderr.startswith("There is no component type 'Nothing'.")
