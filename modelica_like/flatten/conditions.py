@@ -18,8 +18,8 @@ def guard_of(condition: Any, source: Source) -> Any:
     Raises:
         LanguageError: the condition is not made of relations.
     """
-    operation = condition.op() if not condition.is_constant() else None
-    if operation is None:
+    operation = condition.op() if isinstance(condition, ca.SX) else None
+    if operation is not None and condition.is_constant():
         return ca.SX(1.0 if float(condition) else -1.0)
     if operation == ca.OP_LT:
         return condition.dep(1) - condition.dep(0)

@@ -8,7 +8,7 @@ import casadi as ca
 
 from modelica_like.errors import MissingValue, ModelicaLikeError, Source, raise_together_or_one
 from modelica_like.flatten.model import (
-    FlatDiscrete, FlatModel, FlatVariable, Instance, LinearEquation, Origin, StartValue,
+    Coefficient, FlatDiscrete, FlatModel, FlatVariable, Instance, LinearEquation, Origin, StartValue,
 )  # fmt: skip
 from modelica_like.flatten.parameters import Parameters
 from modelica_like.flatten.template import Template, template_of, unit_of_field
@@ -229,21 +229,15 @@ class _Flattener:
 
     def _split_linear(self, instances: list[Instance]) -> list[tuple[int, int]]:
         """Move the components' linear equations to the linear ones; return the others."""
-        q = self.parameters.expressions()
         general: list[tuple[int, int]] = []
         for number, instance in enumerate(instances):
             template = instance.template
-            values: Any = None
             for row, form in enumerate(template.linear):
                 if form is None:
                     general.append((number, row))
                     continue
-                if values is None and template.coefficients.numel_out(0):
-                    values = template.coefficients(q[list(instance.parameters)])
-                number_of = lambda c, values=values: c if isinstance(c, float) else values[int(c)]  # noqa: E731
-                terms = tuple(
-                    (instance.nodes[slot], number_of(c)) for slot, c in zip(form.slots, form.coefficients, strict=True)
-                )
+                values = [c if isinstance(c, float) else Coefficient(number, int(c)) for c in (*form.coefficients, form.constant)]
+                terms = tuple(zip((instance.nodes[slot] for slot in form.slots), values, strict=False))
                 origin = Origin(instance.path, template.component, template.sources[row])
-                self.linear.append(LinearEquation(terms, number_of(form.constant), origin, (number, row)))
+                self.linear.append(LinearEquation(terms, values[-1], origin, (number, row)))
         return general

@@ -83,14 +83,29 @@ class Origin:
 
 
 @dataclass(frozen=True, slots=True)
+class Coefficient:
+    """A coefficient that parameters determine; `FlatModel.coefficient` works out its expression, which is rarely needed.
+
+    Attributes:
+        instance: number of the instance.
+        position: position in the template's coefficients.
+    """
+
+    instance: int
+    position: int
+
+
+@dataclass(frozen=True, slots=True)
 class LinearEquation:
     """sum(coefficient * node) + constant = 0, with coefficients of parameters only.
 
     Attributes:
+        terms: pairs of a node and its coefficient, a number or a `Coefficient`.
+        constant: a number, a `Coefficient`, or an expression of parameters.
         row: (instance, row) if it is also a row of a template's residual.
     """
 
-    terms: tuple[tuple[int, Any], ...]
+    terms: tuple[tuple[int, float | Coefficient], ...]
     constant: Any
     origin: Origin
     row: tuple[int, int] | None = None
@@ -160,6 +175,13 @@ class FlatModel:
         """Return the name of a node: `motor.phi`, `der(motor.phi)`."""
         variable, order = self.nodes[node]
         return f"{'der(' * order}{self.variables[variable].path}{')' * order}"
+
+    def coefficient(self, value: Any) -> Any:
+        """Return a coefficient as a number or an expression of parameters."""
+        if not isinstance(value, Coefficient):
+            return value
+        one = self.instances[value.instance]
+        return one.template.coefficients(self.q[list(one.parameters)])[value.position]
 
     def origin(self, instance: int, row: int) -> Origin:
         """Return where an equation of an instance comes from."""

@@ -181,8 +181,8 @@ def unit_of_field(owner: Declared, name: str) -> Unit:
 
 def _build(component: Component) -> Template:
     kind = type(component).__name__
-    statements = [as_statement(item, source, kind) for item, source in located(component.equations())]
-    events = [as_event(item, source, kind) for item, source in located(component.events())]
+    statements = [as_statement(item, source, kind) for item, source in located(component.equations(), f"{kind}.equations()")]
+    events = [as_event(item, source, kind) for item, source in located(component.events(), f"{kind}.events()")]
     equations = [s for s in statements if isinstance(s, Equation)]
     wiring = tuple(s for s in statements if isinstance(s, Connection | FreeEnd))
     _check_balance(component, equations)

@@ -14,6 +14,7 @@ class Matching:
         self.columns = columns
         self._rows: list[list[int]] = []
         self._row_of: dict[int, int] = {}
+        self._column_of: dict[int, int] = {}
 
     @property
     def size(self) -> int:
@@ -39,11 +40,11 @@ class Matching:
         return False
 
     def _flip(self, came_from: dict[int, int], column: int, start: int) -> None:
-        held = {row: column for column, row in self._row_of.items() if column in came_from}
         while True:
             row = came_from[column]
-            released = held.get(row)
+            released = self._column_of.get(row)
             self._row_of[column] = row
+            self._column_of[row] = column
             if row == start or released is None:
                 return
             column = released
@@ -54,12 +55,11 @@ class Matching:
         for row in set(self._row_of.values()):
             for column in self._rows[row]:
                 users.setdefault(column, []).append(row)
-        column_of = {row: column for column, row in self._row_of.items()}
         pending = [column for column in range(self.columns) if column not in self._row_of]
         reached = set(pending)
         for column in pending:
             for row in users.get(column, ()):
-                other = column_of[row]
+                other = self._column_of[row]
                 if other not in reached:
                     reached.add(other)
                     pending.append(other)

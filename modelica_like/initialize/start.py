@@ -173,15 +173,14 @@ class _StartSystem:
         place = {column: k for k, column in enumerate(self.columns)}
         self.own = ny + nz
         pattern = model.start_system.sparsity_out(1)
-        rows: list[list[int]] = [[] for _ in range(pattern.size1())]
+        self.rows: list[list[int]] = [[] for _ in range(pattern.size1())]
         for row, column in zip(*pattern.get_triplet(), strict=True):
             if column in place:
-                rows[row].append(place[column])
-        self.rows = rows
+                self.rows[row].append(place[column])
         self.matching = Matching(len(self.columns))
         # The explicit equations determine their own variables, the implicit ones z; start values must find something else.
         for k in range(self.own):
-            self.matching.add([len(free) + k, *rows[k]])
+            self.matching.add([len(free) + k, *self.rows[k]])
 
     def accept(self, node: int) -> bool:
         """Add a start value if it determines something that is still open."""
@@ -205,8 +204,8 @@ class _StartSystem:
         wanted = [*range(self.own), *(self.own + self.nodes[node] for node, _ in given)]
         target = np.array([0.0] * self.own + [value for _, value in given])
         point.x[zero] = 0.0
-        active = [k for k, column in enumerate(self.columns) if column not in set(zero)]
-        columns = [self.columns[k] for k in active]
+        held = set(zero)
+        columns = [column for column in self.columns if column not in held]
         y = np.zeros(model.start_system.size1_out(0))
         nx, ny = len(model.states), len(y)
         state = np.concatenate([point.x, y, point.z])

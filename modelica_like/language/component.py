@@ -256,7 +256,7 @@ class Component(Declared):
             self.give(name, value)
         elif name.startswith("_") or isinstance(getattr(type(self), name, None), Field | Mode):
             super().__setattr__(name, value)
-        elif value == [] and name not in self.fields:
+        elif isinstance(value, list) and not value and name not in self.fields:
             self._adopt(name, [])  # an array whose structural field says none
         else:
             self.give(name, value)

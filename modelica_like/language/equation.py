@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import linecache
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any, cast
 import casadi as ca
 
 from modelica_like.errors import LanguageError, Source
-from modelica_like.language.expr import Expr, Symbol
+from modelica_like.language.expr import TIME, Expr, Symbol, symbols_in
+from modelica_like.language.fields import Discrete, Input, Variable
 
 if TYPE_CHECKING:
     from modelica_like.language.component import Component, Connector
@@ -115,12 +116,32 @@ def series(*parts: Component) -> Equations:
 
 
 def free(connector: Connector) -> FreeEnd:
-    """Say that a connector stays unconnected on purpose."""
+    """Say that a connector stays unconnected on purpose.
+
+    Raises:
+        LanguageError: it is not a connector.
+    """
+    from modelica_like.language.component import Connector
+
+    if not isinstance(connector, Connector):
+        raise LanguageError(f"free() was given {connector!r}, which is not a connector.", advice="Name a flange, as in free(self.gear.ring).")
     return FreeEnd(connector)
 
 
-def located(generator: Iterator[Any]) -> Iterator[tuple[Any, Source]]:
-    """Run a generator and pair what it yields with the place of the `yield` in the user's file."""
+def located(generator: Iterator[Any], label: str = "equations()") -> Iterator[tuple[Any, Source]]:
+    """Run a generator and pair what it yields with the place of the `yield` in the user's file.
+
+    Args:
+        generator: what `equations()` or `events()` returned.
+        label: name of that method, for messages.
+
+    Raises:
+        LanguageError: it is not iterable.
+    """
+    if not isinstance(generator, Iterable) or isinstance(generator, ca.SX):
+        raise LanguageError(
+            f"{label} returns {type(generator).__name__} instead of yielding equations or events.", advice="Is a `yield` missing?"
+        )
     if not isinstance(generator, GeneratorType):
         for item in generator:
             yield item, NOWHERE
@@ -191,9 +212,32 @@ def as_event(item: Any, source: Source, component: str) -> EventStatement:
     Raises:
         LanguageError: it is neither a transition nor a choice of the start mode.
     """
+    if isinstance(item, Transition):
+        _check_transition(item, source, component)
     if isinstance(item, Transition | StartMode):
         return replace(item, source=source)
     raise LanguageError(
         f"{component}.events() yields {type(item).__name__} instead of a transition.",
         where=source, advice="Yield `mode.go(…)` or `mode.initially(…)`.",
     )  # fmt: skip
+
+
+def _check_transition(transition: Transition, source: Source, component: str) -> None:
+    """Check that the time of a time event is known ahead, and that only variables and discrete values are reset."""
+    moving = [] if transition.at is None else [s for s in symbols_in(transition.at) if s is TIME or isinstance(_field(s), Variable)]
+    if moving:
+        raise LanguageError(
+            f"{component}: the time of an event depends on {moving[0].name}, so it is not known ahead.",
+            where=source, advice="Write it as a state event, `when=…`.",
+        )  # fmt: skip
+    for target in transition.reset:
+        field = _field(target) if isinstance(target, Symbol) and target is not TIME and target.order == 0 else None
+        if not isinstance(field, Variable | Discrete) or isinstance(field, Input):
+            raise LanguageError(
+                f"{component}: a reset gives {target} a value, which is neither a variable nor a discrete value.",
+                where=source, advice="Reset variables of this component, as in reset={self.w: 0}; a mode changes by the target of `go`.",
+            )  # fmt: skip
+
+
+def _field(symbol: Symbol) -> Any:
+    return symbol.owner.fields.get(symbol.name)

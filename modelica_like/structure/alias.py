@@ -97,16 +97,25 @@ class _Elimination:
             self.parent[step], self.factor[step] = node, factor
         return node, factor
 
-    def _reduce(self, equation: LinearEquation) -> tuple[dict[int, Any], Any]:
-        terms: dict[int, Any] = {}
-        constant = equation.constant
+    def _reduce(self, equation: LinearEquation) -> tuple[dict[int, float | None], Any]:
+        """Return coefficients by root and the constant; None for a coefficient that is no number."""
+        terms: dict[int, float | None] = {}
+        constants: list[tuple[Any, Any]] = [(equation.constant, 1.0)]
         for node, coefficient in equation.terms:
             root, factor = self.find(node)
             if root in self.known:
-                constant = constant + coefficient * factor * self.known[root]
-            else:
-                terms[root] = terms.get(root, 0.0) + coefficient * factor
-        return {root: c for root, c in terms.items() if not _is_zero(c)}, constant
+                constants.append((coefficient, factor * self.known[root]))
+                continue
+            before = terms.get(root, 0.0)
+            terms[root] = before + coefficient * factor if is_number(coefficient) and before is not None else None
+        return {root: c for root, c in terms.items() if c != 0.0}, self._sum(constants)
+
+    def _sum(self, products: list[tuple[Any, Any]]) -> Any:
+        total: Any = 0.0
+        for coefficient, value in products:
+            if not _is_zero(value) and not (is_number(coefficient) and coefficient == 0.0):
+                total = total + self.model.coefficient(coefficient) * value
+        return total
 
     def _consider(self, number: int) -> set[int]:
         """Use an equation if it is simple enough; return the equations that become simpler by it."""
@@ -116,13 +125,13 @@ class _Elimination:
         if not terms:
             self.contradictions.append(number)
             return set()
-        numeric = all(is_number(c) for c in terms.values())
-        if len(terms) == 1 and numeric:
-            ((root, coefficient),) = terms.items()
+        numbers = {root: c for root, c in terms.items() if c is not None}
+        if len(terms) == len(numbers) == 1:
+            ((root, coefficient),) = numbers.items()
             if root not in self.integral and root not in self.inputs:
                 return self._learn(root, -constant / coefficient if not _is_zero(constant) else 0.0)
-        if len(terms) == 2 and numeric and _is_zero(constant):
-            (first, a), (second, b) = terms.items()
+        if len(terms) == len(numbers) == 2 and _is_zero(constant):
+            (first, a), (second, b) = numbers.items()
             if self._may_merge(first, second):
                 return self._merge(first, second, -b / a)
         self.remaining.add(number)

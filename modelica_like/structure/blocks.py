@@ -65,8 +65,8 @@ class BlockSolver:
     """
 
     def __init__(self, residual: Any, unknowns: Any, volatile: Any) -> None:
-        self.residual = residual
-        self.unknowns = unknowns
+        self.residual = ca.vertsplit(residual) if residual.numel() else []
+        self.unknowns = ca.vertsplit(unknowns) if unknowns.numel() else []
         self.jacobian = ca.jacobian(residual, unknowns)
         self.rows = _entries_by_row(self.jacobian)
         self.safe = self._safe_entries(volatile)

@@ -162,7 +162,7 @@ def _node_values(
 
 def _collect_residuals(system: System, aliases: Aliases) -> None:
     model = system.model
-    columns = evaluate(model, "residual", system.node_values)
+    columns = {k: ca.vertsplit(column) for k, column in evaluate(model, "residual", system.node_values).items()}
     residuals: list[Any] = []
     for instance, row in model.general:
         residuals.append(columns[instance][row])
@@ -173,9 +173,9 @@ def _collect_residuals(system: System, aliases: Aliases) -> None:
         if equation.row is not None:
             residuals.append(columns[equation.row[0]][equation.row[1]])
         else:
-            total = equation.constant
+            total = model.coefficient(equation.constant)
             for node, coefficient in equation.terms:
-                total = total + coefficient * system.node_values[node]
+                total = total + model.coefficient(coefficient) * system.node_values[node]
             residuals.append(total)
         system.origins.append(equation.origin)
     system.residual = ca.vertcat(*residuals) if residuals else ca.SX(0, 1)
