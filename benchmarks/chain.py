@@ -1,6 +1,7 @@
-"""Elastic chain of N inertias: build time, and simulation against a hand-written CasADi IDAS integrator of the same chain.
+"""Elastic chain of N inertias: build time, and simulation against hand-written CasADi IDAS.
 
-Run with `python benchmarks/chain.py [N …]`. Ratios are measured in the same run, best of several; times are for orientation only.
+Run with `python benchmarks/chain.py [N …]`. Ratios are measured in the same run, best of several; times are for
+orientation only.
 """
 
 from __future__ import annotations
@@ -28,11 +29,13 @@ class Chain(Component):
     n: int = 10
 
     def build(self) -> None:
+        """Make the masses and springs."""
         self.masses = [Inertia(J=J, w=1.0 if k == 0 else 0.0) for k in range(self.n)]
         self.springs = [SpringDamper(c=C, d=D, phi_rel=0.0) for _ in range(self.n - 1)]
         self.masses[0].phi = 0.0
 
     def equations(self) -> Equations:
+        """Join them."""
         for left, spring, right in zip(self.masses, self.springs, self.masses[1:], strict=False):
             yield connect(left.flange_b, spring.flange_a)
             yield connect(spring.flange_b, right.flange_a)
@@ -68,13 +71,16 @@ def measure(n: int) -> str:
     options = {"rtol": RTOL, "atol": ATOL, "points": POINTS}
     simulate(model, UNTIL, **options)
     own_seconds, run = best(lambda: simulate(model, UNTIL, **options), repeats)
-    hand_build, (function, x0, p) = best(lambda: hand_written(n), repeats)
+    _, (function, x0, p) = best(lambda: hand_written(n), repeats)
     function(x0=x0, p=p)
     hand_seconds, result = best(lambda: function(x0=x0, p=p), repeats)
-    difference = float(np.max(np.abs(np.array(result["xf"])[n:, -1] - [run.final[f"masses[{k}].w"] for k in range(1, n + 1)])))
+    difference = float(
+        np.max(np.abs(np.array(result["xf"])[n:, -1] - [run.final[f"masses[{k}].w"] for k in range(1, n + 1)]))
+    )
     return (
         f"{n:6d}  build {build_seconds:8.3f} s ({build_seconds / n * 1e3:6.3f} ms per link)   "
-        f"simulate {own_seconds * 1e3:9.2f} ms   hand-written {hand_seconds * 1e3:9.2f} ms   ratio {own_seconds / hand_seconds:5.2f}   "
+        f"simulate {own_seconds * 1e3:9.2f} ms   hand-written {hand_seconds * 1e3:9.2f} ms   "
+        f"ratio {own_seconds / hand_seconds:5.2f}   "
         f"largest difference in speed {difference:.1e} rad/s"
     )
 

@@ -1,4 +1,7 @@
-"""Acausal component models of drive-trains: written once, simulated, differentiated and exported from one description."""
+"""Acausal component models of drive-trains.
+
+Written once, simulated, differentiated and exported from one description.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +9,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from modelica_like.compile import CompiledDae as CompiledDae
+    from modelica_like.compiled import CompiledDae as CompiledDae
     from modelica_like.errors import ModelicaLikeError as ModelicaLikeError
     from modelica_like.language import Assembly as Assembly
     from modelica_like.language import Component as Component
@@ -20,7 +23,7 @@ __version__ = "0.1.0"
 
 _HOME = {
     "Assembly": "modelica_like.language",
-    "CompiledDae": "modelica_like.compile",
+    "CompiledDae": "modelica_like.compiled",
     "Component": "modelica_like.language",
     "ModelicaLikeError": "modelica_like.errors",
     "Options": "modelica_like.solve.options",
@@ -30,7 +33,17 @@ _HOME = {
     "simulate": "modelica_like.simulation",
 }
 
-__all__ = ["Assembly", "CompiledDae", "Component", "ModelicaLikeError", "Options", "Solution", "build", "load", "simulate"]
+__all__ = [
+    "Assembly",
+    "CompiledDae",
+    "Component",
+    "ModelicaLikeError",
+    "Options",
+    "Solution",
+    "build",
+    "load",
+    "simulate",
+]
 
 
 def __getattr__(name: str) -> Any:

@@ -37,9 +37,7 @@ class ModelicaLikeError(Exception):
         advice: one sentence that says what to do.
     """
 
-    def __init__(
-        self, what: str, *, where: Source | Iterable[Source] = (), why: str = "", advice: str = ""
-    ) -> None:
+    def __init__(self, what: str, *, where: Source | Iterable[Source] = (), why: str = "", advice: str = "") -> None:
         super().__init__(what)
         self.what = what
         self.where: tuple[Source, ...] = (where,) if isinstance(where, Source) else tuple(where)

@@ -7,7 +7,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from modelica_like.compile import CompiledDae, compile
+from modelica_like.compile import compile
+from modelica_like.compiled import CompiledDae
 from modelica_like.errors import UnitError, ValueOutOfRange
 from modelica_like.flatten import flatten
 from modelica_like.initialize import StartKind, initialize
@@ -81,7 +82,8 @@ def simulate(
 def _seconds(until: float | str | None) -> float:
     if until is None:
         raise ValueOutOfRange(
-            "There is no end time.", advice='Say simulate(…, until="2 s"), or put `until` under [simulate] in the netlist.'
+            "There is no end time.",
+            advice='Say simulate(…, until="2 s"), or put `until` under [simulate] in the netlist.',
         )
     try:
         return to_si(until, _SECOND, "until")

@@ -12,7 +12,8 @@ from modelica_like.structure.reduce import ReducedDae
 def start_system(reduced: ReducedDae) -> ca.Function:
     """Build the start system.
 
-    A variable such as the speed of the last mass of a chain is the sum of all relative speeds. Written out, N such variables are N^2 terms; with the
+    A variable such as the speed of the last mass of a chain is the sum of all relative speeds. Written out, N such
+    variables are N^2 terms; with the
     variables in between as unknowns y of their own, the system stays as sparse as the chain.
 
     Returns:
@@ -29,7 +30,9 @@ def start_system(reduced: ReducedDae) -> ca.Function:
     unknowns = ca.vertcat(reduced.x, y, reduced.z)
     arguments = [flat.time, reduced.x, y, reduced.z, flat.p, reduced.u, flat.d]
     results = [y, ca.jacobian(values, unknowns), values]
-    return ca.Function("start_system", arguments, results, ["t", "x", "y", "z", "p", "u", "d"], ["variables", "jacobian", "values"])
+    return ca.Function(
+        "start_system", arguments, results, ["t", "x", "y", "z", "p", "u", "d"], ["variables", "jacobian", "values"]
+    )
 
 
 def _node_value(reduced: ReducedDae, node: int) -> Any:

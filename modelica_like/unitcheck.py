@@ -113,7 +113,7 @@ def _is_choice(node: Any) -> bool:
 
 
 def _common(left: Unit, right: Unit, what: str) -> Unit:
-    if _MIXED in (left, right) and ANY not in (left, right) or not same_dimension(left, right):
+    if (_MIXED in (left, right) and ANY not in (left, right)) or not same_dimension(left, right):
         raise _Clash(left, right, what)
     return right if left == ANY else left
 
@@ -131,9 +131,7 @@ def _power(base: Unit, exponent_unit: Unit, exponent: Any) -> Unit:
     return _common(base, ONE, "the base of a variable power and a number")
 
 
-def check_equation(
-    left: Expr, right: Expr, dimensions: Dimensions, component: str, source: Source
-) -> None:
+def check_equation(left: Expr, right: Expr, dimensions: Dimensions, component: str, source: Source) -> None:
     """Check that both sides of an equation have the same dimension.
 
     Raises:

@@ -7,11 +7,19 @@ from typing import Any
 import casadi as ca
 
 from modelica_like.errors import MissingValue, ModelicaLikeError, Source, raise_together_or_one
+from modelica_like.flatten.checks import unit_of_field
 from modelica_like.flatten.model import (
-    Coefficient, FlatDiscrete, FlatModel, FlatVariable, Instance, LinearEquation, Origin, StartValue,
+    Coefficient,
+    FlatDiscrete,
+    FlatModel,
+    FlatVariable,
+    Instance,
+    LinearEquation,
+    Origin,
+    StartValue,
 )  # fmt: skip
 from modelica_like.flatten.parameters import Parameters
-from modelica_like.flatten.template import Template, template_of, unit_of_field
+from modelica_like.flatten.template import Template, template_of
 from modelica_like.flatten.wiring import Wiring
 from modelica_like.language.component import Component
 from modelica_like.language.declared import Declared
@@ -122,7 +130,9 @@ class _Flattener:
         self.variable_of[id(owner), name] = len(self.variables)
         unit = self.wiring.inferred.get((id(owner), name)) or unit_of_field(owner, name)
         self.variables.append(
-            FlatVariable(path, unit, field.description, kind, field.state, field.guess, field.nominal, field.min, field.max)
+            FlatVariable(
+                path, unit, field.description, kind, field.state, field.guess, field.nominal, field.min, field.max
+            )
         )
 
     def _declare_discrete(self, component: Component, name: str, path: str, field: Discrete) -> None:
@@ -236,7 +246,10 @@ class _Flattener:
                 if form is None:
                     general.append((number, row))
                     continue
-                values = [c if isinstance(c, float) else Coefficient(number, int(c)) for c in (*form.coefficients, form.constant)]
+                values = [
+                    c if isinstance(c, float) else Coefficient(number, int(c))
+                    for c in (*form.coefficients, form.constant)
+                ]
                 terms = tuple(zip((instance.nodes[slot] for slot in form.slots), values, strict=False))
                 origin = Origin(instance.path, template.component, template.sources[row])
                 self.linear.append(LinearEquation(terms, values[-1], origin, (number, row)))

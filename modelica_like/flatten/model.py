@@ -84,7 +84,9 @@ class Origin:
 
 @dataclass(frozen=True, slots=True)
 class Coefficient:
-    """A coefficient that parameters determine; `FlatModel.coefficient` works out its expression, which is rarely needed.
+    """A coefficient that parameters determine.
+
+    `FlatModel.coefficient` works out its expression, which is rarely needed.
 
     Attributes:
         instance: number of the instance.
@@ -196,10 +198,11 @@ class FlatModel:
         )
 
 
-def evaluate(model: FlatModel, function: str, values: Any, slots: str = "nodes") -> dict[int, Any]:
+def evaluate(model: FlatModel, function: str, values: Any) -> dict[int, Any]:
     """Evaluate one function of every instance's template.
 
     Args:
+        model: the flat model.
         function: name of the function in `Template`.
         values: symbolic vector with one entry per node.
 

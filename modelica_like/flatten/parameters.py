@@ -9,8 +9,8 @@ from typing import Any
 import casadi as ca
 
 from modelica_like.errors import CyclicAssembly, MissingValue
+from modelica_like.flatten.checks import unit_of_field
 from modelica_like.flatten.model import FlatParameter
-from modelica_like.flatten.template import unit_of_field
 from modelica_like.language.component import Component
 from modelica_like.language.declared import unknown
 from modelica_like.language.expr import leaf_id

@@ -8,20 +8,24 @@ from typing import Any, cast
 
 import casadi as ca
 
-from modelica_like.errors import ComponentUnbalanced, LanguageError, ModelicaLikeError, Source, raise_together_or_one
+from modelica_like.errors import LanguageError, Source
+from modelica_like.flatten.checks import check_balance, check_units, unit_of_field
 from modelica_like.flatten.conditions import guard_of
 from modelica_like.language.component import Component
 from modelica_like.language.declared import Declared
 from modelica_like.language.equation import (
-    Connection, Equation, FreeEnd, StartMode, Transition, as_event, as_statement, located,
-)  # fmt: skip
+    Connection,
+    Equation,
+    FreeEnd,
+    StartMode,
+    Transition,
+    as_event,
+    as_statement,
+    located,
+)
 from modelica_like.language.expr import TIME, Symbol, is_expression, symbols_in
-from modelica_like.language.fields import Field, Input, Parameter, Variable
-from modelica_like.unitcheck import Dimensions, check_equation, check_expression
-from modelica_like.units import ANY, ONE, Unit, parse_unit
-
-_SECOND = parse_unit("s")
-_WATT, _JOULE = parse_unit("W"), parse_unit("J")
+from modelica_like.language.fields import Parameter, Variable
+from modelica_like.units import ANY, Unit
 
 
 @dataclass(frozen=True)
@@ -107,6 +111,7 @@ class Names:
         self.discretes: dict[str, Symbol] = {}
 
     def add(self, expressions: Iterable[Any]) -> None:
+        """Take in the symbols of some expressions."""
         for expression in expressions:
             if not is_expression(expression):
                 continue
@@ -125,8 +130,13 @@ class Names:
             self.discretes.setdefault(path, symbol)
 
     def function(self, name: str, outputs: list[Any]) -> ca.Function:
-        inputs = [ca.vertcat(*map(ca.SX, group.values())) for group in (self.variables, self.parameters, self.discretes)]
-        return ca.Function(name, [*inputs, ca.SX(TIME)], [ca.vertcat(*(ca.SX(e) for e in outputs))], ["v", "p", "d", "t"], [name])
+        """Make a function of all names so far."""
+        inputs = [
+            ca.vertcat(*map(ca.SX, group.values())) for group in (self.variables, self.parameters, self.discretes)
+        ]
+        return ca.Function(
+            name, [*inputs, ca.SX(TIME)], [ca.vertcat(*(ca.SX(e) for e in outputs))], ["v", "p", "d", "t"], [name]
+        )
 
 
 def relative_path(owner: Declared, root: Component, name: str) -> str:
@@ -170,23 +180,16 @@ def _structural_key(component: Component) -> tuple[Any, ...]:
     return structural, used, given, units
 
 
-def unit_of_field(owner: Declared, name: str) -> Unit:
-    """Return the unit of a field: as declared, or that of its value where `*` is declared."""
-    declared = owner.fields[name].unit
-    if declared == ANY and isinstance(owner, Component) and isinstance(owner.fields[name], Parameter | Input):
-        value = owner.value(name)
-        return ANY if value is None else value.unit
-    return declared
-
-
 def _build(component: Component) -> Template:
     kind = type(component).__name__
-    statements = [as_statement(item, source, kind) for item, source in located(component.equations(), f"{kind}.equations()")]
+    statements = [
+        as_statement(item, source, kind) for item, source in located(component.equations(), f"{kind}.equations()")
+    ]
     events = [as_event(item, source, kind) for item, source in located(component.events(), f"{kind}.events()")]
     equations = [s for s in statements if isinstance(s, Equation)]
     wiring = tuple(s for s in statements if isinstance(s, Connection | FreeEnd))
-    _check_balance(component, equations)
-    inferred = _check_units(component, equations, events)
+    check_balance(component, equations)
+    inferred = check_units(component, equations, events)
     residuals = [e.left - e.right for e in equations]
     transitions = [e for e in events if isinstance(e, Transition)]
     starts = [e for e in events if isinstance(e, StartMode)]
@@ -241,7 +244,13 @@ def _transition_forms(component: Component, transitions: list[Transition]) -> tu
         numbers = tuple(t.mode.mode.number(name) for name in t.sources)
         forms.append(
             TransitionForm(
-                _mode_path(component, t), numbers, t.mode.mode.number(t.target), t.at is not None, index, tuple(resets), t.source
+                _mode_path(component, t),
+                numbers,
+                t.mode.mode.number(t.target),
+                t.at is not None,
+                index,
+                tuple(resets),
+                t.source,
             )
         )
     return tuple(forms)
@@ -286,85 +295,3 @@ def _linear_forms(names: Names, residuals: list[Any]) -> tuple[tuple[LinearForm 
         entries = tuple(entry(ca.SX(e)) for e in jacobian.nonzeros())
         forms.append(LinearForm(tuple(columns), entries, entry(constant)))
     return tuple(forms), ca.Function("coefficients", [p], [ca.vertcat(*values)])
-
-
-def _check_balance(component: Component, equations: list[Equation]) -> None:
-    own = [n for n, f in component.fields.items() if isinstance(f, Variable) and not isinstance(f, Input)]
-    flows: list[str] = []
-    if not component.parts:
-        for name, connector in component.connectors.items():
-            if connector.used:
-                flows += [f"{name}.{n}" for n, f in connector.fields.items() if isinstance(f, Variable) and f.is_flow]
-    if len(equations) == len(own) + len(flows) or (component.parts and not own and not equations):
-        return
-    unknowns = [*own, *flows]
-    kind = type(component).__name__
-    what = f"{kind} declares {len(equations)} equation{'s' if len(equations) != 1 else ''} for {len(unknowns)} unknowns ({', '.join(unknowns)})."
-    base = type(component).__mro__[1]
-    missing = len(equations) < len(unknowns) and base is not Component and issubclass(base, Component)
-    if missing and base.equations is not Component.equations:
-        advice = f"Its base {base.__name__} has equations of its own: is `yield from super().equations()` missing?"
-    elif len(equations) < len(unknowns):
-        advice = "Each own variable, output and flow needs one: is a `yield` missing?"
-    else:
-        advice = "Each own variable, output and flow takes one: remove an equation, or declare the missing unknown."
-    where = equations[-1].source if equations else ()
-    raise ComponentUnbalanced(what, where=where, advice=advice)
-
-
-def _check_units(component: Component, equations: list[Equation], events: list[Any]) -> dict[str, Unit]:
-    """Check every equation; return the units that `*` outputs take from their equations."""
-    inferred: dict[str, Unit] = {}
-
-    def unit_of(leaf: Any) -> Unit:
-        symbol = symbols_in(leaf)[0]
-        if symbol is TIME:
-            return _SECOND
-        declared = symbol.owner.fields.get(symbol.name)
-        if not isinstance(declared, Field):
-            return ONE
-        unit = unit_of_field(symbol.owner, symbol.name)
-        if unit == ANY and symbol.owner is component:
-            unit = inferred.get(symbol.name, ANY)
-        return unit if unit == ANY or symbol.order == 0 else unit / _SECOND**symbol.order
-
-    dimensions = Dimensions(unit_of)
-    kind = type(component).__name__
-    errors: list[ModelicaLikeError] = []
-
-    def attempt(check: Any, *arguments: Any) -> None:
-        try:
-            check(*arguments)
-        except ModelicaLikeError as error:
-            errors.append(error)
-
-    for equation in equations:
-        attempt(_infer, component, equation, dimensions, inferred)
-        attempt(check_equation, equation.left, equation.right, dimensions, kind, equation.source)
-    for event in events:
-        if event.when is not None:
-            attempt(check_expression, event.when, ONE, dimensions, f"{kind}, condition", event.source)
-        for target, value in getattr(event, "reset", {}).items():
-            attempt(check_equation, target, ca.SX(value), dimensions, kind, event.source)
-    for label, term, unit in (
-        ("stored_energy", component.stored_energy(), _JOULE),
-        ("loss_power", component.loss_power(), _WATT),
-        ("source_power", component.source_power(), _WATT),
-    ):
-        attempt(check_expression, term, unit, dimensions, f"{kind}.{label}")
-    if errors:
-        raise raise_together_or_one(errors)
-    return inferred
-
-
-def _infer(component: Component, equation: Equation, dimensions: Dimensions, inferred: dict[str, Unit]) -> None:
-    left = cast(Any, equation.left)
-    if not left.is_symbolic():
-        return
-    symbol = symbols_in(equation.left)[0]
-    if symbol.owner is component and symbol.order == 0 and symbol.name in component.fields:
-        if component.fields[symbol.name].unit == ANY and isinstance(component.fields[symbol.name], Variable):
-            unit = dimensions.unit_or_any(equation.right)
-            if unit != ANY:
-                inferred.setdefault(symbol.name, unit)
-

@@ -6,10 +6,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from modelica_like.errors import FreeFlange, ModelicaLikeError, Source, WrongConnection
-from modelica_like.flatten.template import unit_of_field
+from modelica_like.flatten.checks import unit_of_field
 from modelica_like.language.component import Component
 from modelica_like.language.declared import Connector
-from modelica_like.language.equation import Connection, FreeEnd
+from modelica_like.language.assembly import Assembly
+from modelica_like.language.equation import NOWHERE, Connection, FreeEnd
 from modelica_like.language.expr import Symbol
 from modelica_like.language.fields import Input, Output, Variable
 from modelica_like.units import Unit, same_dimension
@@ -80,8 +81,9 @@ class Wiring:
             self.errors.append(
                 WrongConnection(
                     f"connect joins the signal {_name(signals[0])} with the connector {others[0].label}.",
-                    where=statement.source, advice="Signals go to signals: use a sensor or a source between.",
-                )  # fmt: skip
+                    where=statement.source,
+                    advice="Signals go to signals: use a sensor or a source between.",
+                )
             )
             return
         drivers = [s for s in signals if _drives(scope, s)]
@@ -91,8 +93,9 @@ class Wiring:
             self.errors.append(
                 WrongConnection(
                     f"The connection of {names} has {what}.",
-                    where=statement.source, advice="Connect one output with any number of inputs.",
-                )  # fmt: skip
+                    where=statement.source,
+                    advice="Connect one output with any number of inputs.",
+                )
             )
             return
         for sink in signals:
@@ -104,9 +107,10 @@ class Wiring:
         if key in self.driven:
             self.errors.append(
                 WrongConnection(
-                    f"The input {_name(sink)} is connected twice.", where=(source, self.driven[key]),
+                    f"The input {_name(sink)} is connected twice.",
+                    where=(source, self.driven[key]),
                     advice="Keep one connection; add signals in a component of their own.",
-                )  # fmt: skip
+                )
             )
             return
         self.driven[key] = source
@@ -120,8 +124,9 @@ class Wiring:
                 self.errors.append(
                     WrongConnection(
                         f"{_name(driver)} is in {units[0]}, {_name(sink)} expects {units[1]}.",
-                        where=source, advice="Give the source's parameters in that unit.",
-                    )  # fmt: skip
+                        where=source,
+                        advice="Give the source's parameters in that unit.",
+                    )
                 )
 
     def _unit(self, symbol: Symbol) -> Unit:
@@ -134,10 +139,12 @@ class Wiring:
                 continue
             flows = [n for n, f in connector.fields.items() if isinstance(f, Variable) and f.is_flow]
             carries = "torque" if "tau" in flows else "force" if "f" in flows else "flow"
-            label = component.label
+            label, owner = component.label, component._owner
+            place = owner.source_of(f"parts.{component._name}") if isinstance(owner, Assembly) else NOWHERE
             self.errors.append(
                 FreeFlange(
                     f"{label}.{name} is free, so {label} ({type(component).__name__}) carries no {carries}.",
+                    where=place if place.file else (),
                     advice=f"Connect it, or say free({label}.{name}).",
                 )
             )
@@ -156,7 +163,9 @@ def _name(symbol: Symbol) -> str:
 def _different_kinds(first: Connector, second: Connector, source: Source) -> WrongConnection:
     kinds = [f"{type(c).__name__} ({', '.join(f.unit_text for f in c.fields.values())})" for c in (first, second)]
     names = {type(first).__name__, type(second).__name__}
-    between = "A spindle or rack goes between." if names == {"Flange", "LinearFlange"} else "Join connectors of one kind."
+    between = (
+        "A spindle or rack goes between." if names == {"Flange", "LinearFlange"} else "Join connectors of one kind."
+    )
     article = "An" if kinds[0][0] in "AEIOU" else "A"
     return WrongConnection(
         f"connect({first.label}, {second.label}): {article.lower()} {kinds[0]} cannot join a {kinds[1]}. {between}",

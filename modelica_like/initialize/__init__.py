@@ -6,14 +6,15 @@ from typing import Literal
 
 import numpy as np
 
-from modelica_like.compile import CompiledDae, Vector
+from modelica_like.compiled import CompiledDae, Vector
+from modelica_like.errors import InitializationError
 from modelica_like.initialize.point import Point as Point
 from modelica_like.initialize.point import call as call
 from modelica_like.initialize.point import check_singular as check_singular
 from modelica_like.initialize.point import solve_implicit as solve_implicit
 from modelica_like.initialize.point import variable_slopes as variable_slopes
 from modelica_like.initialize.start import StartProblem
-from modelica_like.initialize.steady import solve_steady
+from modelica_like.initialize.steady import check_modes_hold, solve_steady
 
 StartKind = Literal["given", "rest", "steady"]
 
@@ -26,7 +27,8 @@ def initialize(model: CompiledDae, t0: float = 0.0, start: StartKind = "given") 
     Args:
         model: the compiled model.
         t0: start time in s.
-        start: `given`: the start values of the model determine everything; `rest`: states without a start value begin at zero;
+        start: `given`: the start values of the model determine everything; `rest`: states without a start value begin
+            at zero;
             `steady`: all derivatives are zero, except of states that nothing depends on.
 
     Returns:
@@ -41,6 +43,9 @@ def initialize(model: CompiledDae, t0: float = 0.0, start: StartKind = "given") 
     point = Point(t0, model.guesses.copy(), model.z_guesses.copy(), np.zeros(len(model.flat_discretes)))
     point.d = call(model, model.discrete_starts, point)
     problem = StartProblem(model, point)
+    if start == "steady":
+        problem.apply(point)
+        point.d = _start_modes(model, point)
     # The modes depend on the states, in the steady state the states also on the modes.
     for _ in range(_MODE_ROUNDS):
         if start == "steady":
@@ -52,9 +57,22 @@ def initialize(model: CompiledDae, t0: float = 0.0, start: StartKind = "given") 
         if np.array_equal(modes, point.d):
             break
         point.d = modes
+    else:
+        raise _unsettled(model, point)
     solve_implicit(model, point)
     check_singular(model, point)
+    if start == "steady":
+        check_modes_hold(model, point)
     return point
+
+
+def _unsettled(model: CompiledDae, point: Point) -> InitializationError:
+    pairs = zip(model.flat_discretes, point.d, _start_modes(model, point), strict=True)
+    names = [one.path for one, old, new in pairs if old != new]
+    return InitializationError(
+        f"The modes at the start do not settle: {', '.join(names)} and the start values change each other in a circle.",
+        advice="Give start values of states, which no mode changes.",
+    )
 
 
 def _start_modes(model: CompiledDae, point: Point) -> Vector:

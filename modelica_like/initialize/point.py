@@ -1,4 +1,7 @@
-"""A point of the solution: evaluate functions there, solve the implicit equations, check that the blocks are regular."""
+"""A point of the solution.
+
+Evaluate functions there, solve the implicit equations, check that the blocks are regular.
+"""
 
 from __future__ import annotations
 
@@ -9,11 +12,10 @@ import casadi as ca
 import numpy as np
 
 from modelica_like.buffers import buffered
-from modelica_like.compile import CompiledDae, Vector
+from modelica_like.compiled import CompiledDae, Vector
 from modelica_like.errors import InitializationError, SingularAtStart
 
 _MAX_NEWTON = 50
-_MAX_MODE_ROUNDS = 5
 
 
 @dataclass
@@ -96,7 +98,10 @@ def _singular(model: CompiledDae, point: Point, blocks: list[tuple[str, ...]], w
         why = "Its equations do not determine all of its unknowns there."
         advice = 'Start elsewhere, or let other variables be states (state="always").'
     return SingularAtStart(
-        f"The Jacobian is singular at t = {point.t:.9g} s in block {number} ({shown}).", where=where, why=why, advice=advice
+        f"The Jacobian is singular at t = {point.t:.9g} s in block {number} ({shown}).",
+        where=where,
+        why=why,
+        advice=advice,
     )
 
 
@@ -109,5 +114,7 @@ def variable_slopes(model: CompiledDae, point: Point, nodes: list[int]) -> Vecto
         outputs = [ca.jacobian(variables, x), ca.jacobian(variables, z), ca.jacobian(alg, x), ca.jacobian(alg, z)]
         model._cache["slopes"] = ca.Function("slopes", call_arguments, outputs)
     parts = model._cache["slopes"](point.t, point.x, point.z, model.p, model.u, point.d)
-    by_x, by_z, alg_x, alg_z = (np.asarray(part[nodes, :].full() if k < 2 else part.full()) for k, part in enumerate(parts))
+    by_x, by_z, alg_x, alg_z = (
+        np.asarray(part[nodes, :].full() if k < 2 else part.full()) for k, part in enumerate(parts)
+    )
     return by_x - by_z @ np.linalg.solve(alg_z, alg_x) if model.implicit else by_x

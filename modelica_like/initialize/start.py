@@ -8,7 +8,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from modelica_like.compile import CompiledDae, StartEntry, Vector
+from modelica_like.compiled import CompiledDae, StartEntry, Vector
 from modelica_like.errors import ContradictingStart, InitializationError, MissingStart
 from modelica_like.initialize.matching import Matching
 from modelica_like.initialize.point import Point, call, solve_implicit
@@ -26,9 +26,11 @@ class Rows:
 
 
 class StartProblem:
-    """Start values of states are taken as they are; those of other variables are equations for the states that are left.
+    """From start values to states.
 
-    The equations are solved together with the explicit equations between states and those variables (as sparse as the model itself), and with
+    Those of states are taken as they are; those of other variables are equations for the states that are left.
+    The equations are solved together with the explicit equations between states and those variables (as sparse as the
+    model itself), and with
     the implicit ones.
     """
 
@@ -72,8 +74,8 @@ class StartProblem:
         number, other = self.state_value(entry), self.state_value(earlier)
         if abs(number - other) > _CONSISTENT * (1.0 + abs(other)):
             raise ContradictingStart(
-                f"{self.name(earlier)} = {self.value(earlier):g} and {self.name(entry)} = {self.value(entry):g} contradict "
-                "each other: they are the same motion.",
+                f"{self.name(earlier)} = {self.value(earlier):g} and {self.name(entry)} = {self.value(entry):g} "
+                "contradict each other: they are the same motion.",
                 advice="Remove one of the two start values.",
             )
 
@@ -132,7 +134,9 @@ class StartProblem:
         fixed = [e for e in self.model.starts if e.strength == "fixed" and e is not entry]
         partners = [f"{self.name(e)} = {present[e.node]:g}" for e in fixed if self._coupled(entry, e)]
         what = f"{self.name(entry)} = {value:g}"
-        together = f"{' and '.join([*partners[:2], what])} contradict each other" if partners else f"{what} cannot be met"
+        together = (
+            f"{' and '.join([*partners[:2], what])} contradict each other" if partners else f"{what} cannot be met"
+        )
         raise ContradictingStart(
             f"{together}: {self.name(entry)} follows to be {actual:g}.",
             where=[o.source for o in self.model.differentiated if o.source.file][:3],
@@ -155,8 +159,10 @@ class StartProblem:
             shown = ", ".join(names[:8]) + (", …" if len(names) > 8 else "")
             which = "" if count == len(names) else f"{count} of "
             what = f"{count} equations: give {which}{shown} start values"
+        parts = dict.fromkeys(name.removeprefix("der(").rstrip(")").rpartition(".")[0] for name in names)
         return MissingStart(
             f"Initialisation (not the model) lacks {what}.",
+            where=[self.model.places[part] for part in parts if part in self.model.places][:3],
             advice='Or start from rest (start = "rest") or in the steady state (start = "steady").',
         )
 
@@ -178,7 +184,8 @@ class _StartSystem:
             if column in place:
                 self.rows[row].append(place[column])
         self.matching = Matching(len(self.columns))
-        # The explicit equations determine their own variables, the implicit ones z; start values must find something else.
+        # The explicit equations determine their own variables, the implicit ones z; start values must find something
+        # else.
         for k in range(self.own):
             self.matching.add([len(free) + k, *self.rows[k]])
 

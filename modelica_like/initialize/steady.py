@@ -5,16 +5,18 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 
-from modelica_like.compile import CompiledDae
+from modelica_like.compiled import CompiledDae
 from modelica_like.errors import InitializationError
-from modelica_like.initialize.point import Point
+from modelica_like.initialize.point import Point, call
 
 _MAX_NEWTON = 50
 _STEADY = 1e-6
 
 
 def solve_steady(model: CompiledDae, point: Point) -> None:
-    """Find states with zero derivatives near `point`; states that nothing depends on (absolute angles) keep their value.
+    """Find states with zero derivatives near `point`.
+
+    States that nothing depends on (absolute angles) keep their value.
 
     Raises:
         InitializationError: there is no steady state near it.
@@ -42,3 +44,20 @@ def solve_steady(model: CompiledDae, point: Point) -> None:
             f"No steady state was found at t = {point.t:g} s: {name} keeps changing.",
             advice="Check that the drive can be in equilibrium there, or give start values instead.",
         )
+
+
+def check_modes_hold(model: CompiledDae, point: Point) -> None:
+    """Check that no mode changes at once: surfaces that stick against too large a torque are not in equilibrium.
+
+    Raises:
+        InitializationError: one does.
+    """
+    guards = call(model, model.guards, point)
+    for one in model.transitions:
+        mode, present = model.flat_discretes[one.mode], int(point.d[one.mode])
+        if not one.timed and present in one.sources and guards[one.index] > 0:
+            raise InitializationError(
+                f"No steady state was found at t = {point.t:g} s: {mode.path} does not stay {mode.names[present]}.",
+                where=one.source,
+                advice="Give guesses near the motion that is steady, such as guess(100) for a speed.",
+            )

@@ -99,6 +99,7 @@ class Assembly(Component):
             super().__setattr__(name, value)
 
     def equations(self) -> Equations:
+        """Yield the connections; what is wrong with them is told together."""
         errors: list[ModelicaLikeError] = []
         for key, ends in self._wires.items():
             yield from self._statements(f"connect.{key}", errors, lambda ends=ends: [self._connection(ends)])
@@ -108,7 +109,9 @@ class Assembly(Component):
             yield from self._statements(f"free.{end}", errors, lambda end=end: [free(self._connector(end))])
         for name, end in self._own_connectors:
             yield from self._statements(
-                f"expose.{name}", errors, lambda name=name, end=end: [connect(self._connectors[name], self._connector(end))]
+                f"expose.{name}",
+                errors,
+                lambda name=name, end=end: [connect(self._connectors[name], self._connector(end))],
             )
         if errors:
             from modelica_like.errors import raise_together_or_one

@@ -49,7 +49,9 @@ class Component(Declared):
         cls._class_parts = {name: part for base in ancestors for name, part in base._class_parts.items()} | parts
         cls._replaceable = frozenset(parts.keys() & annotations).union(*(base._replaceable for base in ancestors))
         declared = (Field, Connector, Mode)
-        plain = {n: own.get(n, _REQUIRED) for n in annotations if not isinstance(own.get(n), declared) and n not in parts}
+        plain = {
+            n: own.get(n, _REQUIRED) for n in annotations if not isinstance(own.get(n), declared) and n not in parts
+        }
         cls._structural = {name: value for base in ancestors for name, value in base._structural.items()} | plain
         for name in (*cls._class_fields, *cls._class_connectors, *cls._class_modes, *cls._class_parts):
             require_identifier(name, cls.__name__)
@@ -191,7 +193,7 @@ class Component(Declared):
 
     @property
     def parts(self) -> dict[str, Component]:
-        """Parts by name; parts of arrays as `name[1]`, `name[2]`, …"""
+        """Parts by name; parts of arrays as `name[1]`, `name[2]` and so on."""
         named: dict[str, Component] = {}
         for name, part in self._parts.items():
             if isinstance(part, list):
@@ -321,4 +323,3 @@ def _frozen(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return tuple(_frozen(item) for item in cast("list[Any]", value))
     return value
-

@@ -5,7 +5,7 @@ from __future__ import annotations
 import linecache
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from itertools import islice
+from itertools import islice, pairwise
 from pathlib import Path
 from types import CodeType, GeneratorType
 from typing import TYPE_CHECKING, Any, cast
@@ -111,7 +111,7 @@ def connect(first: Connector | Expr, *others: Connector | Expr) -> Connection:
 
 def series(*parts: Component) -> Equations:
     """Connect the outlet of each part with the inlet of the next."""
-    for left, right in zip(parts, parts[1:], strict=False):
+    for left, right in pairwise(parts):
         yield connect(left.outlet_connector(), right.inlet_connector())
 
 
@@ -124,7 +124,10 @@ def free(connector: Connector) -> FreeEnd:
     from modelica_like.language.component import Connector
 
     if not isinstance(connector, Connector):
-        raise LanguageError(f"free() was given {connector!r}, which is not a connector.", advice="Name a flange, as in free(self.gear.ring).")
+        raise LanguageError(
+            f"free() was given {connector!r}, which is not a connector.",
+            advice="Name a flange, as in free(self.gear.ring).",
+        )
     return FreeEnd(connector)
 
 
@@ -140,7 +143,8 @@ def located(generator: Iterator[Any], label: str = "equations()") -> Iterator[tu
     """
     if not isinstance(generator, Iterable) or isinstance(generator, ca.SX):
         raise LanguageError(
-            f"{label} returns {type(generator).__name__} instead of yielding equations or events.", advice="Is a `yield` missing?"
+            f"{label} returns {type(generator).__name__} instead of yielding equations or events.",
+            advice="Is a `yield` missing?",
         )
     if not isinstance(generator, GeneratorType):
         for item in generator:
@@ -224,7 +228,11 @@ def as_event(item: Any, source: Source, component: str) -> EventStatement:
 
 def _check_transition(transition: Transition, source: Source, component: str) -> None:
     """Check that the time of a time event is known ahead, and that only variables and discrete values are reset."""
-    moving = [] if transition.at is None else [s for s in symbols_in(transition.at) if s is TIME or isinstance(_field(s), Variable)]
+    moving = (
+        []
+        if transition.at is None
+        else [s for s in symbols_in(transition.at) if s is TIME or isinstance(_field(s), Variable)]
+    )
     if moving:
         raise LanguageError(
             f"{component}: the time of an event depends on {moving[0].name}, so it is not known ahead.",
@@ -235,8 +243,9 @@ def _check_transition(transition: Transition, source: Source, component: str) ->
         if not isinstance(field, Variable | Discrete) or isinstance(field, Input):
             raise LanguageError(
                 f"{component}: a reset gives {target} a value, which is neither a variable nor a discrete value.",
-                where=source, advice="Reset variables of this component, as in reset={self.w: 0}; a mode changes by the target of `go`.",
-            )  # fmt: skip
+                where=source,
+                advice="Reset variables of this component, as in reset={self.w: 0}; `go` itself changes the mode.",
+            )
 
 
 def _field(symbol: Symbol) -> Any:

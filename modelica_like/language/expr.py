@@ -65,7 +65,8 @@ class Symbol(Expr):
         return symbol_of(self.owner, self.name, self.order + 1)
 
 
-# CasADi's leaves carry no payload; this identity map (entries live as long as their component) finds the symbol of a leaf.
+# CasADi's leaves carry no payload; this identity map (entries live as long as their component) finds the symbol of a
+# leaf.
 _symbols: WeakValueDictionary[int, Symbol] = WeakValueDictionary()
 
 

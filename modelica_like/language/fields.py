@@ -184,7 +184,8 @@ def param(
     Args:
         unit: in Modelica notation, e.g. `kg.m2`; `1` for none; `*` takes the unit of the value.
         description: one phrase.
-        default: number in that unit, quantity or formula; without it the parameter must be given, unless the class asks `given()`.
+        default: number in that unit, quantity or formula; without it the parameter must be given, unless the class
+            asks `given()`.
         min: smallest allowed value, SI.
         max: largest allowed value, SI.
         nominal: order of magnitude, SI.
@@ -232,7 +233,10 @@ def signal_out(unit: str, description: str = "", *, nominal: float = 1.0) -> Any
 
 
 def discrete(unit: str, description: str = "", *, start: Any = 0.0) -> Any:
-    """Declare a number that changes only at events; `start` is a number, a quantity or a formula of the component's parameters."""
+    """Declare a number that changes only at events.
+
+    `start` is a number, a quantity or a formula of the component's parameters.
+    """
     return Discrete(unit, description, default=start)
 
 

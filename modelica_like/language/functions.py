@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from typing import Any, cast
 
@@ -124,14 +125,15 @@ def interpolate(x: Scalar, xs: Sequence[float], ys: Sequence[float], smooth: boo
         x: where to look up.
         xs: abscissae, strictly increasing, at least one.
         ys: values at the abscissae.
-        smooth: False: piecewise linear. True: continuous slope (cubic Hermite with Fritsch-Carlson slopes, no overshoot).
+        smooth: False: piecewise linear. True: continuous slope (cubic Hermite with Fritsch-Carlson slopes, no
+            overshoot).
 
     Beyond the ends the last slope goes on.
 
     Raises:
         LanguageError: lengths differ, or `xs` does not increase.
     """
-    if len(xs) != len(ys) or not xs or any(b <= a for a, b in zip(xs, xs[1:], strict=False)):
+    if len(xs) != len(ys) or not xs or any(b <= a for a, b in itertools.pairwise(xs)):
         raise LanguageError(
             f"A table has the abscissae {list(xs)} and the values {list(ys)}.",
             advice="Give both the same length, and let the abscissae increase strictly.",
@@ -162,12 +164,10 @@ def _piece(x: Any, xs: Sequence[float], ys: Sequence[float], slopes: list[float]
 
 def _monotone_slopes(xs: Sequence[float], ys: Sequence[float]) -> list[float]:
     """Slopes after Fritsch and Butland (1984): the weighted harmonic mean of the neighbouring secants."""
-    widths = [b - a for a, b in zip(xs, xs[1:], strict=False)]
+    widths = [b - a for a, b in itertools.pairwise(xs)]
     secants = [(d - c) / h for c, d, h in zip(ys, ys[1:], widths, strict=False)]
     slopes = [secants[0]]
-    for (h0, h1), (s0, s1) in zip(
-        zip(widths, widths[1:], strict=False), zip(secants, secants[1:], strict=False), strict=True
-    ):
+    for (h0, h1), (s0, s1) in zip(itertools.pairwise(widths), itertools.pairwise(secants), strict=True):
         weight0, weight1 = 2 * h1 + h0, h1 + 2 * h0
         slopes.append(0.0 if s0 * s1 <= 0 else (weight0 + weight1) / (weight0 / s0 + weight1 / s1))
     return [*slopes, secants[-1]]

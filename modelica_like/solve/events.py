@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from modelica_like.compile import CompiledDae, CompiledTransition, Vector
+from modelica_like.compiled import CompiledDae, CompiledTransition, Vector
 from modelica_like.errors import Chattering, StepFailed
 from modelica_like.initialize import Point, call, check_singular, solve_implicit, variable_slopes
 from modelica_like.solve.guards import Guards, candidates, locate
@@ -36,7 +36,9 @@ class EventLoop:
         progress: called with the time reached.
     """
 
-    def __init__(self, model: CompiledDae, options: Options, start: Point, end: float, progress: Progress | None = None) -> None:
+    def __init__(
+        self, model: CompiledDae, options: Options, start: Point, end: float, progress: Progress | None = None
+    ) -> None:
         self.model = model
         self.options = options
         self.now = start
@@ -86,7 +88,8 @@ class EventLoop:
     def _panel(self, stop: float) -> tuple[Vector, Vector, Vector]:
         """Integrate one panel.
 
-        A panel that spans several results may run past an event, where the equations of the old mode mean nothing and may blow up; then a
+        A panel that spans several results may run past an event, where the equations of the old mode mean nothing and
+        may blow up; then a
         shorter one ends before.
         """
         while True:
@@ -123,7 +126,10 @@ class EventLoop:
         raise AssertionError
 
     def _next_panel(self, stop: float) -> tuple[float, int]:
-        """Choose length and number of results: results lie on the regular grid, except where an event ends a segment."""
+        """Choose length and number of results.
+
+        Results lie on the regular grid, except where an event ends a segment.
+        """
         position = (self.now.t - self.begin) / self.step
         nearest = round(position)
         if abs(position - nearest) > 1e-9 * max(1.0, position):
@@ -160,8 +166,12 @@ class EventLoop:
             base = Point(float(all_times[k]), all_x[:, k], all_z[:, k], first.d)
             located = locate(
                 lambda span, base=base: self._trial(base, span),
-                float(all_times[k + 1] - all_times[k]), (values[:, k], rates[:, k]), (values[:, k + 1], rates[:, k + 1]), group, base.t,
-            )  # fmt: skip
+                float(all_times[k + 1] - all_times[k]),
+                (values[:, k], rates[:, k]),
+                (values[:, k + 1], rates[:, k + 1]),
+                group,
+                base.t,
+            )
             if located is not None:
                 if k > 0:
                     self.record.add(all_times[1 : k + 1], all_x[:, 1 : k + 1], all_z[:, 1 : k + 1])
@@ -264,7 +274,7 @@ class EventLoop:
     def _note(self, transition: CompiledTransition) -> None:
         mode = self.model.flat_discretes[transition.mode]
         before = mode.names[int(self.now.d[transition.mode])]
-        event = Event(self.now.t, mode.path, before, mode.names[transition.target], transition.source)
+        event = Event(float(self.now.t), mode.path, before, mode.names[transition.target], transition.source)
         self.record.events.append(event)
         self._recent.append(event)
         window = _CHATTER_WINDOW * (self.end - self.begin)
@@ -284,4 +294,3 @@ class EventLoop:
             where=list(dict.fromkeys(event.source for event in events))[:3], why=f"{why}.",
             advice="Give the switching a hysteresis (a peak above 1 in friction), or smooth what drives it.",
         )  # fmt: skip
-

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from modelica_like.buffers import buffered
-from modelica_like.compile import CompiledDae, Vector
+from modelica_like.compiled import CompiledDae, Vector
 from modelica_like.initialize import Point, call
 
 _LOCATED = 1e-13
@@ -76,7 +76,9 @@ def candidates(values: Vector, rates: Vector, active: Any, step: float) -> list[
     crossing = (before <= 0) & (after > 0) & active[:, None]
     humps = (before <= 0) & (after <= 0) & (rates[:, :-1] > 0) & (rates[:, 1:] < 0) & active[:, None]
     if np.any(humps):
-        humps &= _peak(before, after, rates[:, :-1] * step, rates[:, 1:] * step) > -0.1 * (np.abs(before) + np.abs(after))
+        humps &= _peak(before, after, rates[:, :-1] * step, rates[:, 1:] * step) > -0.1 * (
+            np.abs(before) + np.abs(after)
+        )
     intervals = np.flatnonzero(np.any(crossing | humps, axis=0))
     if not intervals.size:
         return []
@@ -106,7 +108,14 @@ class Located:
     guards: list[int]
 
 
-def locate(trial: Trial, span: float, first: tuple[Vector, Vector], last: tuple[Vector, Vector], group: list[Candidate], t: float) -> Located | None:
+def locate(
+    trial: Trial,
+    span: float,
+    first: tuple[Vector, Vector],
+    last: tuple[Vector, Vector],
+    group: list[Candidate],
+    t: float,
+) -> Located | None:
     """Find the earliest time in (0, span] at which a guard of the group becomes positive.
 
     Safeguarded Newton iterations on re-integrations from the beginning of the interval.
@@ -148,7 +157,9 @@ def locate(trial: Trial, span: float, first: tuple[Vector, Vector], last: tuple[
     return _event(*(best or trial(high)), watched, tolerance)
 
 
-def _positive_top(trial: Trial, span: float, first: tuple[Vector, Vector], last: tuple[Vector, Vector], group: list[Candidate]) -> float | None:
+def _positive_top(
+    trial: Trial, span: float, first: tuple[Vector, Vector], last: tuple[Vector, Vector], group: list[Candidate]
+) -> float | None:
     """Look for a time at which a guard that rises and falls again is positive; None if it stays below zero."""
     for one in group:
         g, low, high = one.guard, 0.0, span
@@ -176,7 +187,9 @@ def _newton(values: Vector, rates: Vector, watched: Any) -> float | None:
     return min(steps) if steps else None
 
 
-def _first_guess(first: tuple[Vector, Vector], last: tuple[Vector, Vector], group: list[Candidate], span: float) -> float:
+def _first_guess(
+    first: tuple[Vector, Vector], last: tuple[Vector, Vector], group: list[Candidate], span: float
+) -> float:
     guesses: list[float] = []
     for one in group:
         g = one.guard
@@ -189,7 +202,11 @@ def _cubic(g0: float, g1: float, r0: float, r1: float, inside: bool) -> float:
     """Earliest rising zero (or, if `inside`, the top) of the cubic Hermite interpolant in (0, 1)."""
     a, b, c = 2 * g0 - 2 * g1 + r0 + r1, -3 * g0 + 3 * g1 - 2 * r0 - r1, r0
     if inside:
-        tops = [s.real for s in np.roots([3 * a, 2 * b, c]) if abs(s.imag) < 1e-12 and 0 < s.real < 1 and 6 * a * s.real + 2 * b < 0]
+        tops = [
+            s.real
+            for s in np.roots([3 * a, 2 * b, c])
+            if abs(s.imag) < 1e-12 and 0 < s.real < 1 and 6 * a * s.real + 2 * b < 0
+        ]
         return min(tops, default=0.5)
     zeros = [s.real for s in np.roots([a, b, c, g0]) if abs(s.imag) < 1e-9 and 1e-12 < s.real < 1]
     rising = [s for s in zeros if 3 * a * s * s + 2 * b * s + c > 0]

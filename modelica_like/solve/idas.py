@@ -11,7 +11,7 @@ import casadi as ca
 import numpy as np
 
 from modelica_like.buffers import BufferedFunction, buffered
-from modelica_like.compile import CompiledDae, Vector
+from modelica_like.compiled import CompiledDae, Vector
 from modelica_like.errors import StepFailed
 from modelica_like.initialize import Point, call
 from modelica_like.solve.options import Options
@@ -81,7 +81,8 @@ class Integrator:
             "reltol": self.options.rtol,
             "abstol": self.options.atol * (float(np.min(nominal)) if nominal.size else 1.0),
             "max_num_steps": self.options.max_steps if outputs == 1 else min(self.options.max_steps, _PANEL_STEPS),
-            # Left alone, IDAS begins with a step of 1e-10 and takes thirty more to reach its stride, at every event anew.
+            # Left alone, IDAS begins with a step of 1e-10 and takes thirty more to reach its stride, at every event
+            # anew.
             "step0": _FIRST_STEP,
         }
 
@@ -89,7 +90,8 @@ class Integrator:
         """Integrate from `start` over `span` seconds.
 
         Returns:
-            States and implicit unknowns at `outputs` equidistant times, the last at the end; shapes (nx, outputs), (nz, outputs).
+            States and implicit unknowns at `outputs` equidistant times, the last at the end; shapes (nx, outputs),
+            (nz, outputs).
 
         Raises:
             StepFailed: IDAS gave up.
@@ -141,5 +143,5 @@ class Integrator:
         return StepFailed(
             f"IDAS gave up at about t = {moment:.9g} s: {reason}{f' ({flag})' if flag else ''}.",
             why=f"{worst} changes fastest relative to its tolerance.",
-            advice="Look for a very stiff spring, a vanishing mass, or a speed that grows without bound; then try other tolerances.",
+            advice="Look for a stiff spring, a vanishing mass or a speed without bound; then try other tolerances.",
         )

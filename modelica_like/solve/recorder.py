@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from modelica_like.compile import Vector
+from modelica_like.compiled import Vector
 from modelica_like.errors import Source
 from modelica_like.initialize import Point
 
@@ -83,5 +83,7 @@ class Recorder:
     def end(self, d: Vector) -> None:
         """Close the segment."""
         self.segments.append(
-            Segment(np.concatenate(self._times), np.concatenate(self._x, axis=1), np.concatenate(self._z, axis=1), d.copy())
+            Segment(
+                np.concatenate(self._times), np.concatenate(self._x, axis=1), np.concatenate(self._z, axis=1), d.copy()
+            )
         )

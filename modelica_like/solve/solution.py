@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from modelica_like.compile import CompiledDae, Vector
+from modelica_like.compiled import CompiledDae, Vector
 from modelica_like.errors import MissingExtra, UnknownName, ValueOutOfRange, did_you_mean
 from modelica_like.language.expr import Symbol
 from modelica_like.solve.energy import EnergyBalance, energy_balance
@@ -19,6 +19,7 @@ from modelica_like.solve.recorder import Event, Segment
 if TYPE_CHECKING:
     import pandas
     import xarray
+    from matplotlib.figure import Figure
 
 ENERGY_TERMS = ("stored_energy", "loss_power", "source_power")
 
@@ -104,13 +105,14 @@ class Solution:
             owner = key.owner.path
             name = f"{owner}.{key.name}" if owner else key.name
             return f"{'der(' * key.order}{name}{')' * key.order}"
-        return str(getattr(getattr(key, "symbol", None), "owner", None) and self.path(key.symbol) or key)
+        return str((getattr(getattr(key, "symbol", None), "owner", None) and self.path(key.symbol)) or key)
 
     def __getitem__(self, key: str | Any) -> Vector:
         """Return a trajectory, shape (len(time),).
 
         Args:
-            key: path of a variable, mode, discrete value, parameter, or of an energy term (`clutch.loss_power`), or a component's attribute.
+            key: path of a variable, mode, discrete value, parameter, or of an energy term (`clutch.loss_power`), or a
+                component's attribute.
 
         Raises:
             UnknownName: there is no such variable.
@@ -161,7 +163,7 @@ class Solution:
         if "energy" not in self._cache:
             count = len(self.time)
             flat = np.array(self.model.energy(*self._arguments()))
-            self._cache["energy"] = flat.reshape(len(self.model.components), count, 4).transpose(0, 2, 1)
+            self._cache["energy"] = flat.reshape(len(self.model.components), count, 5).transpose(0, 2, 1)
         return self._cache["energy"]
 
     def at(self, t: float) -> Values:
@@ -197,6 +199,20 @@ class Solution:
             self._cache["balance"] = energy_balance(self.model, self.segments)
         return self._cache["balance"]
 
+    def plot(self, *patterns: str, title: str = "") -> Figure:
+        """Draw trajectories over time, one panel per unit, with events as dotted lines.
+
+        Args:
+            patterns: names or patterns (`*.w`) of what to draw; by default speeds, torques and forces of the parts.
+            title: heading; by default the name of the model.
+
+        Raises:
+            UnknownName: nothing fits a pattern.
+        """
+        from modelica_like.solve.plot import plot
+
+        return plot(self, patterns, title=title)
+
     def to_pandas(self) -> pandas.DataFrame:
         """Return a table with time as index and one column per variable.
 
@@ -220,7 +236,10 @@ class Solution:
             import xarray
         except ImportError:
             raise _missing("xarray") from None
-        info = {v.path: {"units": str(v.unit), "long_name": v.description} for v in (*self.model.flat_variables, *self.model.flat_discretes)}
+        info = {
+            v.path: {"units": str(v.unit), "long_name": v.description}
+            for v in (*self.model.flat_variables, *self.model.flat_discretes)
+        }
         arrays = {name: ("time", self[name], info[name]) for name in self.names}
         return xarray.Dataset(arrays, coords={"time": ("time", self.time, {"units": "s"})})
 
@@ -228,8 +247,9 @@ class Solution:
         return {**self.__dict__, "_cache": {}}
 
     def __repr__(self) -> str:
+        span = f"t = {self.time[0]:g} … {self.time[-1]:g} s"
         return (
-            f"<Solution of {self.model.name}: {len(self.model.flat_variables)} variables, t = {self.time[0]:g} … {self.time[-1]:g} s, "
+            f"<Solution of {self.model.name}: {len(self.model.flat_variables)} variables, {span}, "
             f"{len(self.events)} mode changes, {self.statistics.steps} steps in {self.statistics.seconds * 1e3:.1f} ms>"
         )
 

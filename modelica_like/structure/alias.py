@@ -6,8 +6,6 @@ from collections import deque
 from dataclasses import dataclass
 from typing import Any
 
-import casadi as ca
-
 from modelica_like.flatten.model import FlatModel, LinearEquation
 
 
@@ -161,8 +159,10 @@ class _Elimination:
         return self.find(self.integral[root])[0]
 
     def _merge(self, first: int, second: int, ratio: float) -> set[int]:
-        """first = ratio * second."""
-        keep, drop, factor = (first, second, 1.0 / ratio) if self._rank(first) >= self._rank(second) else (second, first, ratio)
+        """First = ratio * second."""
+        keep, drop, factor = (
+            (first, second, 1.0 / ratio) if self._rank(first) >= self._rank(second) else (second, first, ratio)
+        )
         self.parent[drop], self.factor[drop] = keep, factor
         affected = self.watchers.pop(drop, set())
         self.watchers.setdefault(keep, set()).update(affected)

@@ -60,7 +60,8 @@ class BlockSolver:
     Args:
         residual: column of residuals.
         unknowns: column of symbols to solve for.
-        volatile: column of the symbols that change during a run (states, unknowns, modes, time); a coefficient without them, of
+        volatile: column of the symbols that change during a run (states, unknowns, modes, time); a coefficient
+            without them, of
             parameters only, is a safe divisor.
     """
 
@@ -112,7 +113,10 @@ class BlockSolver:
     def _tear(
         self, rows: tuple[int, ...], columns: tuple[int, ...]
     ) -> tuple[list[tuple[int, int]], list[int], list[int]]:
-        """Find a sequence of (equation, unknown) to solve one after the other, the torn unknowns, and the equations left."""
+        """Find a sequence of (equation.
+
+        Unknown) to solve one after the other, the torn unknowns, and the equations left.
+        """
         inside = set(columns)
         open_unknowns = {r: {c for c in self.rows[r] if c in inside} for r in rows}
         users: dict[int, list[int]] = {}
@@ -160,12 +164,17 @@ class BlockSolver:
             if row in used or not open_unknowns[row]:
                 continue
             for column in open_unknowns[row]:
-                near, count, _ = scores.get(column, (0, 0, 0))
+                near = scores.get(column, (0, 0, 0))[0]
                 scores[column] = (near + (len(open_unknowns[row]) == shortest), len(users[column]), -column)
         return max(scores, key=lambda column: scores[column])
 
     def _solve_torn(
-        self, rows: tuple[int, ...], columns: tuple[int, ...], sequence: list[tuple[int, int]], tears: list[int], rest: list[int]
+        self,
+        rows: tuple[int, ...],
+        columns: tuple[int, ...],
+        sequence: list[tuple[int, int]],
+        tears: list[int],
+        rest: list[int],
     ) -> None:
         inner = [(column, self._explicit(row, column)) for row, column in sequence]
         remaining = self._substitute([self.residual[row] for row in rest], inner)

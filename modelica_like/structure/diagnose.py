@@ -20,7 +20,12 @@ def check_solvable(system: System, incidence: list[list[int]], contradictions: l
     """
     inputs = {system.levels[n].chain for n in system.inputs}
     columns = {chain: k for k, chain in enumerate(c for c in range(len(system.chains)) if c not in inputs)}
-    pairs = {(row, columns[c]) for row, levels in enumerate(incidence) for n in levels if (c := system.levels[n].chain) in columns}
+    pairs = {
+        (row, columns[c])
+        for row, levels in enumerate(incidence)
+        for n in levels
+        if (c := system.levels[n].chain) in columns
+    }
     chains = list(columns)
     sparsity = ca.Sparsity.triplet(len(incidence), len(chains), [r for r, _ in pairs], [c for _, c in pairs])
     _, rows, cols, _, _, coarse_rows, coarse_cols = sparsity.btf()
@@ -32,7 +37,13 @@ def check_solvable(system: System, incidence: list[list[int]], contradictions: l
     if contradictions:
         raise _contradiction(contradictions)
     if len(under_cols) > len(under_rows):
-        raise _underdetermined(system, len(incidence), len(chains), [system.origins[r] for r in under_rows], [chains[c] for c in under_cols])
+        raise _underdetermined(
+            system,
+            len(incidence),
+            len(chains),
+            [system.origins[r] for r in under_rows],
+            [chains[c] for c in under_cols],
+        )
 
 
 def _chain_name(system: System, chain: int) -> str:
@@ -48,7 +59,9 @@ def _places(origins: list[Origin]) -> list[Source]:
     return list(dict.fromkeys(o.source for o in origins if o.source.file))[:_SHOWN]
 
 
-def _underdetermined(system: System, equations: int, unknowns: int, origins: list[Origin], chains: list[int]) -> Underdetermined:
+def _underdetermined(
+    system: System, equations: int, unknowns: int, origins: list[Origin], chains: list[int]
+) -> Underdetermined:
     names = [_chain_name(system, c) for c in chains]
     missing = len(chains) - len(origins)
     if origins:
@@ -65,8 +78,9 @@ def _underdetermined(system: System, equations: int, unknowns: int, origins: lis
 def _overdetermined(system: System, origins: list[Origin], chains: list[int]) -> Overdetermined:
     names = _list([_chain_name(system, c) for c in chains]) or "none"
     parts = list(dict.fromkeys(o.path or o.kind for o in origins))
+    unknowns = f"{len(chains)} unknown{'s' if len(chains) != 1 else ''}"
     return Overdetermined(
-        f"{len(origins)} equations determine only {len(chains)} unknown{'s' if len(chains) != 1 else ''} ({names}): {_list(parts)}.",
+        f"{len(origins)} equations determine only {unknowns} ({names}): {_list(parts)}.",
         where=_places(origins),
         why="Two rigid parts fix the same speed or torque.",
         advice="Remove one, or put a spring or clutch between.",

@@ -11,7 +11,8 @@ _MAX_INDEX = 8
 def prefer_relative_states(system: System) -> None:
     """Give preferred variables as many derivatives as the kinematic constraint they stand in allows.
 
-    A relative angle `phi_rel = phi_b - phi_a` is then differentiated along with the angles of the inertias and can become a state in their
+    A relative angle `phi_rel = phi_b - phi_a` is then differentiated along with the angles of the inertias and can
+    become a state in their
     place: absolute angles grow without bound, and with them the error that a relative tolerance allows.
     """
     for _, terms in system.linear_rows:

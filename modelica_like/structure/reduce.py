@@ -106,7 +106,7 @@ class ReducedDae:
         count = len(self.differentiated)
         return (
             Notice(
-                f"Index {self.index}: {' and '.join(places[:4])}{' …' if len(places) > 4 else ''} {couple} motions rigidly. "
+                f"Index {self.index}: {' and '.join(places[:4])}{' …' if len(places) > 4 else ''} {couple} motions. "
                 f"{count} constraint{'s' if count > 1 else ''} differentiated; states kept: {', '.join(self.states)}."
             ),
         )

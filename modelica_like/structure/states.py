@@ -14,7 +14,8 @@ def select_states(system: System, counts: list[int], slopes: list[dict[int, floa
     Args:
         system: with all levels that the differentiated equations need.
         counts: how often each equation is differentiated.
-        slopes: for every equation the derivative of its highest differentiation by the highest level of each chain, as numbers at a generic point.
+        slopes: for every equation the derivative of its highest differentiation by the highest level of each chain,
+            as numbers at a generic point.
 
     Returns:
         Level numbers, in the order of declaration.

@@ -157,7 +157,7 @@ def test_flanks_never_pull_and_close_their_energy(x: float, v: float, d: float, 
     drive = shaft(wall=Fixed(), gap=kind(c=300.0, d=d, b=0.4), mass=Inertia(J=0.5, phi=x, w=v))
     run = simulate(drive, "0.4 s", points=200)
     assert np.all(run["gap.tau"] * np.sign(run["gap.phi_rel"]) >= -1e-9)
-    assert np.all(run["gap.loss_power"] >= -1e-9)
+    assert np.all(run["gap.loss_power"] >= -1e-6)
     assert run.energy().closure < 1e-8
 
 

@@ -1,0 +1,115 @@
+"""Checks of one component class: as many equations as unknowns, and dimensions that fit."""
+
+from __future__ import annotations
+
+from typing import Any, cast
+
+import casadi as ca
+
+from modelica_like.errors import ComponentUnbalanced, ModelicaLikeError, raise_together_or_one
+from modelica_like.language.component import Component
+from modelica_like.language.declared import Declared
+from modelica_like.language.equation import Equation
+from modelica_like.language.expr import TIME, symbols_in
+from modelica_like.language.fields import Field, Input, Parameter, Variable
+from modelica_like.unitcheck import Dimensions, check_equation, check_expression
+from modelica_like.units import ANY, ONE, Unit, parse_unit
+
+_SECOND = parse_unit("s")
+_WATT, _JOULE = parse_unit("W"), parse_unit("J")
+
+
+def unit_of_field(owner: Declared, name: str) -> Unit:
+    """Return the unit of a field: as declared, or that of its value where `*` is declared."""
+    declared = owner.fields[name].unit
+    if declared == ANY and isinstance(owner, Component) and isinstance(owner.fields[name], Parameter | Input):
+        value = owner.value(name)
+        return ANY if value is None else value.unit
+    return declared
+
+
+def check_balance(component: Component, equations: list[Equation]) -> None:
+    """Check that a component has as many equations as unknowns of its own.
+
+    Raises:
+        ComponentUnbalanced: it has not.
+    """
+    own = [n for n, f in component.fields.items() if isinstance(f, Variable) and not isinstance(f, Input)]
+    flows: list[str] = []
+    if not component.parts:
+        for name, connector in component.connectors.items():
+            if connector.used:
+                flows += [f"{name}.{n}" for n, f in connector.fields.items() if isinstance(f, Variable) and f.is_flow]
+    if len(equations) == len(own) + len(flows) or (component.parts and not own and not equations):
+        return
+    unknowns = [*own, *flows]
+    kind = type(component).__name__
+    count = f"{len(equations)} equation{'s' if len(equations) != 1 else ''}"
+    what = f"{kind} declares {count} for {len(unknowns)} unknowns ({', '.join(unknowns)})."
+    base = type(component).__mro__[1]
+    missing = len(equations) < len(unknowns) and base is not Component and issubclass(base, Component)
+    if missing and base.equations is not Component.equations:
+        advice = f"Its base {base.__name__} has equations of its own: is `yield from super().equations()` missing?"
+    elif len(equations) < len(unknowns):
+        advice = "Each own variable, output and flow needs one: is a `yield` missing?"
+    else:
+        advice = "Each own variable, output and flow takes one: remove an equation, or declare the missing unknown."
+    where = equations[-1].source if equations else ()
+    raise ComponentUnbalanced(what, where=where, advice=advice)
+
+
+def check_units(component: Component, equations: list[Equation], events: list[Any]) -> dict[str, Unit]:
+    """Check every equation; return the units that `*` outputs take from their equations."""
+    inferred: dict[str, Unit] = {}
+
+    def unit_of(leaf: Any) -> Unit:
+        symbol = symbols_in(leaf)[0]
+        if symbol is TIME:
+            return _SECOND
+        declared = symbol.owner.fields.get(symbol.name)
+        if not isinstance(declared, Field):
+            return ONE
+        unit = unit_of_field(symbol.owner, symbol.name)
+        if unit == ANY and symbol.owner is component:
+            unit = inferred.get(symbol.name, ANY)
+        return unit if unit == ANY or symbol.order == 0 else unit / _SECOND**symbol.order
+
+    dimensions = Dimensions(unit_of)
+    kind = type(component).__name__
+    errors: list[ModelicaLikeError] = []
+
+    def attempt(check: Any, *arguments: Any) -> None:
+        try:
+            check(*arguments)
+        except ModelicaLikeError as error:
+            errors.append(error)
+
+    for equation in equations:
+        attempt(_infer, component, equation, dimensions, inferred)
+        attempt(check_equation, equation.left, equation.right, dimensions, kind, equation.source)
+    for event in events:
+        if event.when is not None:
+            attempt(check_expression, event.when, ONE, dimensions, f"{kind}, condition", event.source)
+        for target, value in getattr(event, "reset", {}).items():
+            attempt(check_equation, target, ca.SX(value), dimensions, kind, event.source)
+    for label, term, unit in (
+        ("stored_energy", component.stored_energy(), _JOULE),
+        ("loss_power", component.loss_power(), _WATT),
+        ("source_power", component.source_power(), _WATT),
+    ):
+        attempt(check_expression, term, unit, dimensions, f"{kind}.{label}")
+    if errors:
+        raise raise_together_or_one(errors)
+    return inferred
+
+
+def _infer(component: Component, equation: Equation, dimensions: Dimensions, inferred: dict[str, Unit]) -> None:
+    left = cast(Any, equation.left)
+    if not left.is_symbolic():
+        return
+    symbol = symbols_in(equation.left)[0]
+    declared = component.fields.get(symbol.name) if symbol.owner is component and symbol.order == 0 else None
+    if isinstance(declared, Variable) and declared.unit == ANY:
+        unit = dimensions.unit_or_any(equation.right)
+        if unit != ANY:
+            inferred.setdefault(symbol.name, unit)
