@@ -65,14 +65,13 @@ class DryFriction(Component, partial=True):
     def equations(self) -> Equations:
         yield from super().equations()
         at_rest = self.sliding_friction(0)
+        # On the way to an event the speed may run a little past zero, where the laws of friction mean nothing.
+        forward = self.sliding_friction(maximum(self.slip, 0))
+        backward = self.sliding_friction(maximum(-self.slip, 0))
         yield self.mode.choose(
-            free=self.friction - self.idle_friction(),
-            stuck=der(self.slip),
-            start_forward=self.friction - at_rest,
-            start_backward=self.friction + at_rest,
-            # On the way to an event the speed may run a little past zero, where the laws of friction mean nothing.
-            forward=self.friction - self.sliding_friction(maximum(self.slip, 0)),
-            backward=self.friction + self.sliding_friction(maximum(-self.slip, 0)),
+            free=self.friction - self.idle_friction(), stuck=der(self.slip),
+            start_forward=self.friction - at_rest, start_backward=self.friction + at_rest,
+            forward=self.friction - forward, backward=self.friction + backward,
         ) == 0  # fmt: skip
 
     def events(self) -> Events:

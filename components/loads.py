@@ -6,7 +6,7 @@ from components.friction import DryFriction
 from components.interfaces import OneFlange
 from modelica_like.language import Equations, Expr, Parameter, Variable, der, maximum, param, var, where
 
-_STANDSTILL = 1e-12
+_STANDSTILL = 1e-20
 
 
 class SpeedDependentLoad(DryFriction, OneFlange):
@@ -31,7 +31,7 @@ class SpeedDependentLoad(DryFriction, OneFlange):
         return self.tau
 
     def sliding_friction(self, speed: Expr | float) -> Expr:
-        # For p < 1 the slope at standstill is infinite; below a tiny speed the power is held constant.
+        # For p < 1 the slope at standstill is infinite; below a tiny speed it is held constant.
         relative = maximum(speed / self.w_ref, _STANDSTILL)
         return self.a + self.b * (relative**self.p - _STANDSTILL**self.p)
 

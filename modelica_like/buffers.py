@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from threading import get_ident
-from typing import Any
+from typing import Any, cast
 
 import casadi as ca
 import numpy as np
@@ -28,9 +28,9 @@ class BufferedFunction:
         self._results = [np.zeros(function.nnz_out(k)) for k in wanted]
         self._buffer, self._evaluate = function.buffer()
         for k, array in enumerate(self._arguments):
-            self._buffer.set_arg(k, memoryview(array))
+            self._buffer.set_arg(k, memoryview(cast(Any, array)))
         for k, array in zip(wanted, self._results, strict=True):
-            self._buffer.set_res(k, memoryview(array))
+            self._buffer.set_res(k, memoryview(cast(Any, array)))
 
     def __call__(self, *arguments: Any) -> list[Vector]:
         """Evaluate; arguments and results are flat (columns one after the other)."""

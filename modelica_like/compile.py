@@ -105,7 +105,9 @@ def _joined(guards: Any, relation: Callable[[Any], Any]) -> Any:
 def _places(flat: FlatModel) -> dict[str, Source]:
     """Where the parts of netlists stand."""
     owners = {path: (one._owner, one._name) for path, one in flat.components.items()}
-    found = {path: owner.source_of(f"parts.{name}") for path, (owner, name) in owners.items() if isinstance(owner, Assembly)}
+    found = {
+        path: owner.source_of(f"parts.{name}") for path, (owner, name) in owners.items() if isinstance(owner, Assembly)
+    }
     return {path: source for path, source in found.items() if source.file}
 
 

@@ -7,6 +7,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+_SHOWN = 160
+
 
 @dataclass(frozen=True, slots=True)
 class Source:
@@ -24,7 +26,8 @@ class Source:
 
     def __str__(self) -> str:
         place = Path(self.file).name + (f":{self.line}" if self.line else "")
-        return f"{place} `{self.text}`" if self.text else place
+        text = self.text if len(self.text) <= _SHOWN else f"{self.text[: _SHOWN - 1]}…"
+        return f"{place} `{text}`" if text else place
 
 
 class ModelicaLikeError(Exception):

@@ -83,6 +83,9 @@ class Dimensions:
             return units[0] if _MIXED not in units and same_dimension(*units) else _MIXED
         if operation in _SUMS:
             return _common(units[0], units[1], "the terms of a sum")
+        if operation == ca.OP_ATAN2:
+            _common(units[0], units[1], "the coordinates of an angle")
+            return ONE
         if operation in _RELATIONS:
             _common(units[0], units[1], "the sides of a comparison")
             return ONE
@@ -143,7 +146,9 @@ def check_equation(left: Expr, right: Expr, dimensions: Dimensions, component: s
     except _Clash as clash:
         raise UnitMismatch(f"{place}: {clash.what} differ: {clash.left} and {clash.right}.") from None
     if _MIXED in units and ANY not in units:
-        raise UnitMismatch(f"{place}: the modes' branches differ in unit; write them as `choose(…) == 0`.")
+        raise UnitMismatch(
+            f"{place}: the branches of choose(…) or where(…) differ in unit; they only stand in `… == 0`."
+        )
     if not same_dimension(*units):
         raise UnitMismatch(f"{place}: left {units[0]}, right {units[1]}.")
 

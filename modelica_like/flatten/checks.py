@@ -90,6 +90,8 @@ def check_units(component: Component, equations: list[Equation], events: list[An
     for event in events:
         if event.when is not None:
             attempt(check_expression, event.when, ONE, dimensions, f"{kind}, condition", event.source)
+        if getattr(event, "at", None) is not None:
+            attempt(check_expression, event.at, _SECOND, dimensions, f"{kind}, time of an event", event.source)
         for target, value in getattr(event, "reset", {}).items():
             attempt(check_equation, target, ca.SX(value), dimensions, kind, event.source)
     for label, term, unit in (
@@ -104,12 +106,12 @@ def check_units(component: Component, equations: list[Equation], events: list[An
 
 
 def _infer(component: Component, equation: Equation, dimensions: Dimensions, inferred: dict[str, Unit]) -> None:
-    left = cast(Any, equation.left)
-    if not left.is_symbolic():
-        return
-    symbol = symbols_in(equation.left)[0]
-    declared = component.fields.get(symbol.name) if symbol.owner is component and symbol.order == 0 else None
-    if isinstance(declared, Variable) and declared.unit == ANY:
-        unit = dimensions.unit_or_any(equation.right)
-        if unit != ANY:
-            inferred.setdefault(symbol.name, unit)
+    for side, other in ((equation.left, equation.right), (equation.right, equation.left)):
+        if not cast(Any, side).is_symbolic():
+            continue
+        symbol = symbols_in(side)[0]
+        declared = component.fields.get(symbol.name) if symbol.owner is component and symbol.order == 0 else None
+        if isinstance(declared, Variable) and declared.unit == ANY:
+            unit = dimensions.unit_or_any(other)
+            if unit != ANY:
+                inferred.setdefault(symbol.name, unit)

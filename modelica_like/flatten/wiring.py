@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 
 from modelica_like.errors import FreeFlange, ModelicaLikeError, Source, WrongConnection
 from modelica_like.flatten.checks import unit_of_field
-from modelica_like.language.component import Component
-from modelica_like.language.declared import Connector
 from modelica_like.language.assembly import Assembly
+from modelica_like.language.component import Component
+from modelica_like.language.declared import Connector, Declared
 from modelica_like.language.equation import NOWHERE, Connection, FreeEnd
 from modelica_like.language.expr import Symbol
 from modelica_like.language.fields import Input, Output, Variable
@@ -34,6 +34,18 @@ class Wiring:
 
     def add(self, scope: Component, statement: Connection | FreeEnd) -> None:
         """Take in what a component says about the connectors of its parts and its own."""
+        ends = (statement.connector,) if isinstance(statement, FreeEnd) else statement.ends
+        for end in ends:
+            if not _is_within(end, scope):
+                label = _name(end) if isinstance(end, Symbol) else end.label
+                self.errors.append(
+                    WrongConnection(
+                        f"{scope.label} connects {label} of a component that is not part of it.",
+                        where=statement.source,
+                        advice="Name parts as self.…, so that the copy of this owner is meant.",
+                    )
+                )
+                return
         if isinstance(statement, FreeEnd):
             self.freed.add(id(statement.connector))
             return
@@ -83,6 +95,16 @@ class Wiring:
                     f"connect joins the signal {_name(signals[0])} with the connector {others[0].label}.",
                     where=statement.source,
                     advice="Signals go to signals: use a sensor or a source between.",
+                )
+            )
+            return
+        wrong = [s for s in signals if not isinstance(s.owner.fields.get(s.name), Input | Output)]
+        if wrong:
+            self.errors.append(
+                WrongConnection(
+                    f"connect joins {_name(wrong[0])}, which is neither an input nor an output.",
+                    where=statement.source,
+                    advice="Connect one output with any number of inputs; a sensor makes a signal of a variable.",
                 )
             )
             return
@@ -148,6 +170,13 @@ class Wiring:
                     advice=f"Connect it, or say free({label}.{name}).",
                 )
             )
+
+
+def _is_within(end: Connector | Symbol, scope: Component) -> bool:
+    node: Declared | None = end.owner if isinstance(end, Symbol) else end
+    while node is not None and node is not scope:
+        node = node._owner
+    return node is scope
 
 
 def _drives(scope: Component, symbol: Symbol) -> bool:

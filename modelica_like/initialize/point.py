@@ -47,6 +47,7 @@ def solve_implicit(model: CompiledDae, point: Point) -> None:
     """
     if not model.implicit:
         return
+    change = np.inf
     for _ in range(_MAX_NEWTON):
         residual = call(model, model.alg, point)
         jacobian = np.asarray(model.alg_jacobian(point.t, point.x, point.z, model.p, model.u, point.d).full())
@@ -54,9 +55,10 @@ def solve_implicit(model: CompiledDae, point: Point) -> None:
             raise _singular(model, point, [tuple(model.implicit)], ())
         step = np.linalg.solve(jacobian, -residual)
         point.z = point.z + step
-        if np.max(np.abs(step) / (1.0 + np.abs(point.z))) < 1e-13:
+        change = float(np.max(np.abs(step) / (1.0 + np.abs(point.z))))
+        if change < 1e-13:
             return
-    if np.max(np.abs(step) / (1.0 + np.abs(point.z))) > 1e-9:
+    if not change <= 1e-9:
         raise InitializationError(
             f"The equations for {', '.join(model.implicit)} were not solved at t = {point.t:.9g} s.",
             advice="Give guesses near the solution.",
@@ -72,7 +74,7 @@ def check_singular(model: CompiledDae, point: Point) -> None:
     determinants = call(model, model.determinants, point)
     for value, (names, origins) in zip(determinants, model.singular, strict=True):
         if not np.isfinite(value) or abs(value) < 1e-12:
-            raise _singular(model, point, [names], tuple(o.source for o in origins))
+            raise _singular(model, point, [names], tuple(dict.fromkeys(o.source for o in origins)))
     rates = call(model, model.ode, point)
     for name, rate in zip(model.states, rates, strict=True):
         if not np.isfinite(rate):

@@ -216,6 +216,7 @@ class _StartSystem:
         y = np.zeros(model.start_system.size1_out(0))
         nx, ny = len(model.states), len(y)
         state = np.concatenate([point.x, y, point.z])
+        error = np.zeros(len(target))
         for _ in range(_MAX_NEWTON):
             _, jacobian, values = model.start_system(
                 point.t, state[:nx], state[nx : nx + ny], state[nx + ny :], model.p, model.u, point.d

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
-from modelica_like.errors import DuplicateName, ModelicaLikeError, Source
+from modelica_like.errors import DuplicateName, ModelicaLikeError, Source, raise_together_or_one
 from modelica_like.language.component import Component
 from modelica_like.language.declared import Connector, unknown
 from modelica_like.language.equation import NOWHERE, Connection, Equations, FreeEnd, connect, free, series
@@ -20,6 +21,13 @@ class Assembly(Component):
     Wires are kept as text (`"clutch.flange_a"`), as in a netlist; they are resolved when the model is used.
     """
 
+    _own_fields: dict[str, Field]
+    _own_connectors: tuple[tuple[str, str], ...]
+    _wires: dict[str, tuple[str, ...]]
+    _chains: dict[str, tuple[str, ...]]
+    _free: tuple[str, ...]
+    _places: dict[str, Source]
+
     def __init__(
         self, name: str = "", *, parts: Mapping[str, Component | list[Component]] | None = None,
         connect: Mapping[str, Sequence[str]] | None = None, series: Mapping[str, Sequence[str]] | None = None,
@@ -32,9 +40,9 @@ class Assembly(Component):
             self.add_parameter(key, value)
         for key, part in (parts or {}).items():
             setattr(self, key, part)
-        self._wires: dict[str, tuple[str, ...]] = {key: tuple(ends) for key, ends in (connect or {}).items()}
-        self._chains: dict[str, tuple[str, ...]] = {key: tuple(ends) for key, ends in (series or {}).items()}
-        self._free: tuple[str, ...] = tuple(free)
+        self._wires = {key: tuple(ends) for key, ends in (connect or {}).items()}
+        self._chains = {key: tuple(ends) for key, ends in (series or {}).items()}
+        self._free = tuple(free)
 
     def add_parameter(self, name: str, value: Any) -> None:
         """Declare a parameter of the assembly; its unit is that of its value."""
@@ -101,35 +109,37 @@ class Assembly(Component):
     def equations(self) -> Equations:
         """Yield the connections; what is wrong with them is told together."""
         errors: list[ModelicaLikeError] = []
-        for key, ends in self._wires.items():
-            yield from self._statements(f"connect.{key}", errors, lambda ends=ends: [self._connection(ends)])
-        for key, names in self._chains.items():
-            yield from self._statements(f"series.{key}", errors, lambda names=names: self._series(names))
-        for end in self._free:
-            yield from self._statements(f"free.{end}", errors, lambda end=end: [free(self._connector(end))])
-        for name, end in self._own_connectors:
-            yield from self._statements(
-                f"expose.{name}",
-                errors,
-                lambda name=name, end=end: [connect(self._connectors[name], self._connector(end))],
-            )
+        for key, make in self._wiring():
+            source = self.source_of(key)
+            try:
+                statements = make()
+            except ModelicaLikeError as error:
+                error.where = error.where or ((source,) if source is not NOWHERE else ())
+                errors.append(error)
+            else:
+                yield from (replace(statement, source=source) for statement in statements)
         if errors:
-            from modelica_like.errors import raise_together_or_one
-
             raise raise_together_or_one(errors)
 
-    def _statements(self, key: str, errors: list[ModelicaLikeError], make: Any) -> Equations:
-        source = self.source_of(key)
-        try:
-            statements: list[Connection | FreeEnd] = list(make())
-        except ModelicaLikeError as error:
-            error.where = error.where or ((source,) if source is not NOWHERE else ())
-            errors.append(error)
-            return
-        yield from (replace(statement, source=source) for statement in statements)
+    def _wiring(self) -> Iterator[tuple[str, Callable[[], list[Any]]]]:
+        """Yield every entry of the netlist with what makes its statements."""
+        for key, ends in self._wires.items():
+            yield f"connect.{key}", partial(self._connection, ends)
+        for key, names in self._chains.items():
+            yield f"series.{key}", partial(self._series, names)
+        for end in self._free:
+            yield f"free.{end}", partial(self._free_end, end)
+        for name, end in self._own_connectors:
+            yield f"expose.{name}", partial(self._exposed, name, end)
 
-    def _connection(self, ends: Sequence[str]) -> Connection:
-        return connect(*(self._resolve(end) for end in ends))
+    def _free_end(self, path: str) -> list[FreeEnd]:
+        return [free(self._connector(path))]
+
+    def _exposed(self, name: str, path: str) -> list[Connection]:
+        return [connect(self._connectors[name], self._connector(path))]
+
+    def _connection(self, ends: Sequence[str]) -> list[Connection]:
+        return [connect(*(self._resolve(end) for end in ends))]
 
     def _series(self, names: Sequence[str]) -> list[Any]:
         components: list[Component] = []

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import sys
+import inspect
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, ClassVar, Self
@@ -41,8 +41,8 @@ class Declared:
     def path(self) -> str:
         """Dotted name from the root of the tree; empty for the root itself."""
         names: list[str] = []
-        node: Declared | None = self
-        while node is not None and node._owner is not None:
+        node: Declared = self
+        while node._owner is not None:
             names.append(node._name)
             node = node._owner
         return ".".join(reversed(names))
@@ -93,7 +93,8 @@ class Connector(Declared):
 
 def caller() -> Source:
     """Return the nearest place on the stack outside this package."""
-    frame = sys._getframe(1)
+    frame = inspect.currentframe()
+    assert frame is not None
     while frame.f_back is not None and frame.f_code.co_filename.startswith(_PACKAGE):
         frame = frame.f_back
     from modelica_like.language.equation import source_of

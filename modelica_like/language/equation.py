@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import linecache
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import islice, pairwise
 from pathlib import Path
+from tokenize import COMMENT, TokenError, generate_tokens
 from types import CodeType, GeneratorType
 from typing import TYPE_CHECKING, Any, cast
 
@@ -115,7 +117,7 @@ def series(*parts: Component) -> Equations:
         yield connect(left.outlet_connector(), right.inlet_connector())
 
 
-def free(connector: Connector) -> FreeEnd:
+def free(connector: Any) -> FreeEnd:
     """Say that a connector stays unconnected on purpose.
 
     Raises:
@@ -131,7 +133,7 @@ def free(connector: Connector) -> FreeEnd:
     return FreeEnd(connector)
 
 
-def located(generator: Iterator[Any], label: str = "equations()") -> Iterator[tuple[Any, Source]]:
+def located(generator: Any, label: str = "equations()") -> Iterator[tuple[Any, Source]]:
     """Run a generator and pair what it yields with the place of the `yield` in the user's file.
 
     Args:
@@ -146,24 +148,18 @@ def located(generator: Iterator[Any], label: str = "equations()") -> Iterator[tu
             f"{label} returns {type(generator).__name__} instead of yielding equations or events.",
             advice="Is a `yield` missing?",
         )
-    if not isinstance(generator, GeneratorType):
-        for item in generator:
-            yield item, NOWHERE
-        return
-    for item in generator:
-        yield item, _place(generator)
+    items: Iterator[Any] = iter(cast("Iterable[Any]", generator))
+    for item in items:
+        yield item, _place(items)
 
 
-def _place(generator: GeneratorType[Any, Any, Any]) -> Source:
-    while True:
-        inner = generator.gi_yieldfrom
-        if not isinstance(inner, GeneratorType) or inner.gi_code.co_filename.startswith(_HERE):
-            break
-        generator = inner
-    frame = generator.gi_frame
-    if frame is None:
-        return NOWHERE
-    return source_of(frame.f_code, frame.f_lasti)
+def _place(items: object) -> Source:
+    """Return where a generator stands now: its own line, or that of the generator it delegates to."""
+    frame = None
+    while isinstance(items, GeneratorType) and not items.gi_code.co_filename.startswith(_HERE):
+        frame = items.gi_frame
+        items = cast(object, items.gi_yieldfrom)
+    return NOWHERE if frame is None else source_of(frame.f_code, frame.f_lasti)
 
 
 def source_of(code: CodeType, instruction: int) -> Source:
@@ -175,7 +171,21 @@ def source_of(code: CodeType, instruction: int) -> Source:
     if lines and end_column is not None and column is not None:
         lines[-1] = lines[-1].encode()[:end_column].decode(errors="ignore")
         lines[0] = lines[0].encode()[column:].decode(errors="ignore")
-    return Source(code.co_filename, line, " ".join(" ".join(lines).split()))
+    text = lines[0] if len(lines) == 1 else _without_comments(lines)
+    return Source(code.co_filename, line, " ".join(text.split()))
+
+
+def _without_comments(lines: list[str]) -> str:
+    """Join the lines of a statement; a comment would swallow the lines after it."""
+    kept = list(lines)
+    try:
+        for token in generate_tokens(iter([f"{line}\n" for line in lines]).__next__):
+            if token.type == COMMENT:
+                row, column = token.start
+                kept[row - 1] = kept[row - 1][:column]
+    except (TokenError, SyntaxError):
+        pass
+    return " ".join(kept)
 
 
 def as_equation(item: Any, source: Source, component: str) -> Equation:
@@ -186,7 +196,8 @@ def as_equation(item: Any, source: Source, component: str) -> Equation:
     """
     if isinstance(item, ca.SX) and item.is_scalar():
         if item.op() == ca.OP_EQ:
-            return Equation(cast(Expr, item.dep(0)), cast(Expr, item.dep(1)), source)
+            sides = cast(Expr, item.dep(0)), cast(Expr, item.dep(1))
+            return Equation(*(reversed(sides) if _is_turned(*sides, source.text) else sides), source=source)
         if item.is_constant():
             raise LanguageError(
                 f"{component} has an equation whose two sides are the same, or only numbers.",
@@ -201,6 +212,16 @@ def as_equation(item: Any, source: Source, component: str) -> Equation:
         f"{component}.equations() yields {type(item).__name__} instead of an equation.",
         where=source, advice="Yield `left == right`, `connect(…)` or `free(…)`, or `yield from series(…)`.",
     )  # fmt: skip
+
+
+def _is_turned(left: Any, right: Any, text: str) -> bool:
+    """Tell whether Python exchanged the sides.
+
+    It asks a symbol on the right side first, as the class of symbols is derived from that of expressions.
+    """
+    written = [side.strip() for side in text.removeprefix("yield").split("==")]
+    plain = [re.fullmatch(r"[\w.\[\]]+", side) is not None for side in written]
+    return left.is_symbolic() and not right.is_symbolic() and plain == [False, True]
 
 
 def as_statement(item: Any, source: Source, component: str) -> Statement:

@@ -54,7 +54,7 @@ class Symbol(Expr):
 
     def __init__(self, owner: Any, name: str, order: int = 0) -> None:
         label = f"{'der(' * order}{name}{')' * order}"
-        super().__init__(ca.SX.sym(label))
+        super().__init__(ca.SX.sym(label))  # pyright: ignore[reportCallIssue] -- Expr is casadi.SX at run time
         self.owner = owner
         self.name = name
         self.order = order
@@ -77,13 +77,10 @@ def leaf_id(leaf: Expr) -> int:
 
 def symbol_of(owner: Any, name: str, order: int = 0) -> Symbol:
     """Return the symbol for a field of `owner`, always the same one."""
-    cache = owner.__dict__.get("_symbols")
-    if cache is None:
-        cache = owner.__dict__["_symbols"] = {}
-    symbol = cache.get((name, order))
-    if symbol is None:
-        symbol = cache[name, order] = Symbol(owner, name, order)
-    return symbol
+    cache: dict[tuple[str, int], Symbol] = owner.__dict__.setdefault("_symbols", {})
+    if (name, order) not in cache:
+        cache[name, order] = Symbol(owner, name, order)
+    return cache[name, order]
 
 
 def symbols_in(expression: Expr) -> list[Symbol]:

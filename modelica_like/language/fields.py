@@ -10,9 +10,6 @@ from modelica_like.language.expr import Expr, symbol_of
 from modelica_like.language.formula import Arithmetic, Formula, as_formula, parse_formula
 from modelica_like.units import ANY, Unit, parse_unit, read_quantity, to_si
 
-if TYPE_CHECKING:
-    import pint
-
 StatePreference = Literal["always", "prefer", "default", "avoid"]
 
 
@@ -116,7 +113,7 @@ class Field:
 
 
 if TYPE_CHECKING:
-    Quantity = float | int | str | Formula | Field | Expr | pint.Quantity
+    Quantity = float | int | str | Formula | Field | Expr
 else:
     Quantity = object
 
@@ -158,7 +155,7 @@ class Variable(_Symbolic):
         is_flow: bool = False, **bounds: Any,
     ) -> None:  # fmt: skip
         super().__init__(unit, description, **bounds)
-        self.state = state
+        self.state: StatePreference = state
         self.guess = guess
         self.is_flow = is_flow
 

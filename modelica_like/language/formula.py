@@ -8,7 +8,7 @@ import operator
 import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 import casadi as ca
 
@@ -20,10 +20,12 @@ _SHOWN = 80
 _BINARY: dict[type[ast.operator], str] = {
     ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Pow: "**",
 }  # fmt: skip
-_OPERATIONS: dict[str, Callable[..., Any]] = {
-    "+": operator.add, "-": operator.sub, "*": operator.mul, "/": operator.truediv, "**": operator.pow,
-    "neg": operator.neg, "sqrt": ca.sqrt, "abs": ca.fabs, "sin": ca.sin, "cos": ca.cos, "tan": ca.tan,
-    "exp": ca.exp, "log": ca.log, "tanh": ca.tanh, "min": ca.fmin, "max": ca.fmax,
+_Operation = Callable[..., Any]
+_OPERATIONS: dict[str, _Operation] = {
+    "+": operator.add, "-": operator.sub, "*": operator.mul, "neg": operator.neg,
+    "/": cast(_Operation, operator.truediv), "**": cast(_Operation, operator.pow),
+    "sqrt": ca.sqrt, "abs": ca.fabs, "sin": ca.sin, "cos": ca.cos, "tan": ca.tan, "exp": ca.exp, "log": ca.log,
+    "tanh": ca.tanh, "min": ca.fmin, "max": ca.fmax,
 }  # fmt: skip
 _FUNCTIONS = ("sqrt", "abs", "sin", "cos", "tan", "exp", "log", "tanh", "min", "max")
 _CONSTANTS = {"pi": math.pi}

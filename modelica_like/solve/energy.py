@@ -30,8 +30,8 @@ class EnergyRow:
         stored: change of its stored energy.
         lost: dissipated.
         at_events: part of `stored` that changed at once, in resets at events.
-        residual: integral of power in + source power - loss - rate of the stored energy; zero if the component's equations keep the
-            balance, whatever the precision of the integration.
+        residual: integral of power in + source power - loss - rate of the stored energy; zero if the component's
+            equations keep the balance, whatever the precision of the integration.
         drift: what the stored energy changed in excess of the integral of its rate: the integration error.
     """
 
@@ -99,7 +99,14 @@ class EnergyBalance:
             if any((row.inflow, row.source, row.stored, row.lost))
         ]
         total = f"{'total':{width}}  {'':12}  {self.source:12.6g}  {self.stored:12.6g}  {self.lost:12.6g}"
-        return "\n".join([head, *lines, total, f"closes to {self.closure:.1e} of {self.throughput:.6g} J (integration error {self.drift:.1e})"])
+        return "\n".join(
+            [
+                head,
+                *lines,
+                total,
+                f"closes to {self.closure:.1e} of {self.throughput:.6g} J (integration error {self.drift:.1e})",
+            ]
+        )
 
 
 def energy_balance(model: CompiledDae, segments: tuple[Segment, ...]) -> EnergyBalance:
@@ -133,7 +140,7 @@ def _stored(model: CompiledDae, point: Point) -> Vector:
 
 
 def _integrate(model: CompiledDae, segment: Segment) -> tuple[Vector, Point]:
-    """Return the integrals of loss, source power, inflow and rate of all components, shape (4, components), and the end."""
+    """Return the integrals of loss, source power, inflow and rate of all components, and the end."""
     span = float(segment.times[-1] - segment.times[0])
     start, end = segment.start, segment.point(-1)
     if span <= 0.0:

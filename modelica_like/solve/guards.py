@@ -183,7 +183,7 @@ def _event(point: Point, values: Vector, rates: Vector, watched: Any, tolerance:
 
 def _newton(values: Vector, rates: Vector, watched: Any) -> float | None:
     """Newton step to the earliest zero of the rising guards."""
-    steps = [-values[g] / rates[g] for g in watched if rates[g] > 0]
+    steps = [float(-values[g] / rates[g]) for g in watched if rates[g] > 0]
     return min(steps) if steps else None
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from modelica_like.compiled import CompiledDae, Vector
 from modelica_like.errors import MissingExtra, UnknownName, ValueOutOfRange, did_you_mean
 from modelica_like.language.expr import Symbol
+from modelica_like.language.mode import BoundMode
 from modelica_like.solve.energy import EnergyBalance, energy_balance
 from modelica_like.solve.idas import Integrator
 from modelica_like.solve.options import Options
@@ -99,13 +100,15 @@ class Solution:
             self._cache["time"] = np.concatenate([s.times for s in self.segments])
         return self._cache["time"]
 
-    def path(self, key: str | Symbol) -> str:
-        """Return the path of a variable given by its path or as `drive.clutch.tau`."""
+    def path(self, key: Any) -> str:
+        """Return the path of a variable given by its path, as `drive.clutch.tau` or `drive.clutch.mode`."""
+        if isinstance(key, BoundMode):
+            key = key.symbol
         if isinstance(key, Symbol):
             owner = key.owner.path
             name = f"{owner}.{key.name}" if owner else key.name
             return f"{'der(' * key.order}{name}{')' * key.order}"
-        return str((getattr(getattr(key, "symbol", None), "owner", None) and self.path(key.symbol)) or key)
+        return str(key)
 
     def __getitem__(self, key: str | Any) -> Vector:
         """Return a trajectory, shape (len(time),).

@@ -6,7 +6,9 @@ from collections import deque
 from dataclasses import dataclass
 from typing import Any
 
-from modelica_like.flatten.model import FlatModel, LinearEquation
+from modelica_like.flatten.model import Coefficient, FlatModel, LinearEquation
+
+_ROUNDING = 1e-13
 
 
 @dataclass(frozen=True)
@@ -98,6 +100,7 @@ class _Elimination:
     def _reduce(self, equation: LinearEquation) -> tuple[dict[int, float | None], Any]:
         """Return coefficients by root and the constant; None for a coefficient that is no number."""
         terms: dict[int, float | None] = {}
+        sizes: dict[int, float] = {}
         constants: list[tuple[Any, Any]] = [(equation.constant, 1.0)]
         for node, coefficient in equation.terms:
             root, factor = self.find(node)
@@ -105,8 +108,14 @@ class _Elimination:
                 constants.append((coefficient, factor * self.known[root]))
                 continue
             before = terms.get(root, 0.0)
-            terms[root] = before + coefficient * factor if is_number(coefficient) and before is not None else None
-        return {root: c for root, c in terms.items() if c != 0.0}, self._sum(constants)
+            if before is None or isinstance(coefficient, Coefficient):
+                terms[root] = None
+            else:
+                terms[root] = before + coefficient * factor
+                sizes[root] = sizes.get(root, 0.0) + abs(coefficient * factor)
+        # Terms that cancel but for rounding leave no unknown.
+        left = {root: c for root, c in terms.items() if c is None or abs(c) > _ROUNDING * sizes[root]}
+        return left, self._sum(constants)
 
     def _sum(self, products: list[tuple[Any, Any]]) -> Any:
         total: Any = 0.0

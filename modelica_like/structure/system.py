@@ -150,7 +150,8 @@ def _node_values(
     vector = ca.vertcat(*symbols) if symbols else ca.SX(0, 1)
     placed = [pair or (0, 0.0) for pair in node_level]
     if symbols:
-        values = vector[[level for level, _ in placed]] * ca.SX(ca.DM([factor for _, factor in placed]))
+        # A vector of one entry, indexed by a list, gives a row.
+        values = ca.vec(vector[[level for level, _ in placed]]) * ca.SX(ca.DM([factor for _, factor in placed]))
         values = ca.densify(values)
     else:
         values = ca.SX.zeros(len(placed))

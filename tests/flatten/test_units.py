@@ -95,16 +95,16 @@ def test_right_equations(equation):
     [
         (lambda c: c.tau == c.x, "left N.m, right m."),
         (lambda c: c.tau == 1, "left N.m, right 1."),
-        (lambda c: c.J * der(c.w) == c.P, "left kg.m2.rad/s2, right W."),
+        (lambda c: c.J * der(c.w) == 2 * c.P, "left kg.m2.rad/s2, right W."),
         (lambda c: c.tau == c.tau + c.x, "the terms of a sum differ: N.m and m."),
         (lambda c: c.tau == maximum(c.tau, c.x), "the terms of a sum differ: N.m and m."),
         (lambda c: c.tau == c.tau * sin(c.x), "the argument of a function and a number differ: m and 1."),
         (lambda c: c.k == exp(c.tau), "the argument of a function and a number differ: N.m and 1."),
         (lambda c: c.f == where(c.x > c.phi, c.f, 0), "the sides of a comparison differ: rad and m."),
-        (lambda c: c.f == where(c.x > 0, c.f, c.x), "the terms of a sum differ"),
+        (lambda c: c.f == where(c.x > 0, c.f, c.x), "the branches of choose(…) or where(…) differ in unit"),
         (lambda c: c.k == c.k**c.x, "an exponent and a number differ: m and 1."),
         (lambda c: c.x == c.x**c.k, "the base of a variable power and a number differ: m and 1."),
-        (lambda c: c.f == c.mode.choose(a=c.x, b=c.tau), "the modes' branches differ in unit; write them as `choose(…) == 0`."),
+        (lambda c: c.f == c.mode.choose(a=c.x, b=c.tau), "the branches of choose(…) or where(…) differ in unit; they only stand in `… == 0`."),
         (lambda c: c.w == der(c.x), "left rad/s, right m/s."),
         (lambda c: c.phi == cos(c.phi) * c.time, "left rad, right s."),
     ],
@@ -114,6 +114,19 @@ def test_wrong_equations(equation, message):
         check(equation)
     assert message in caught.value.what
     assert caught.value.what.startswith("Questioned, test_units.py:")
+
+
+def test_the_sides_are_told_as_they_are_written():
+    """Python asks the symbol on the right first, and would exchange the sides."""
+
+    class Written(Things):
+        def equations(self) -> Equations:
+            yield self.J * der(self.w) == self.P
+            for name in ("phi", "w", "tau", "x", "f"):
+                yield getattr(self, name) == 0
+
+    with pytest.raises(UnitMismatch, match=r"`yield self.J \* der\(self.w\) == self.P`: left kg.m2.rad/s2, right W\."):
+        flatten(Written())
 
 
 def test_all_wrong_equations_of_a_class_are_told_together():
@@ -162,7 +175,7 @@ def test_energies_and_powers_are_checked(law, message):
         (lambda c: c.mode.go("a", "b", when=c.x > c.tau), "condition: the sides of a comparison differ"),
         (lambda c: c.mode.go("a", "b", when=c.x > 1), "condition: the sides of a comparison differ"),
         (lambda c: c.mode.go("a", "b", when=c.x > 0, reset={c.x: c.tau}), "left m, right N.m."),
-        (lambda c: c.mode.go("a", "b", at=c.x_at), "left m, right s|expects s"),
+        (lambda c: c.mode.go("a", "b", at=c.x_at), r"Eventful, time of an event expects s; the expression is m\."),
         (lambda c: c.mode.initially("b", when=c.x > c.tau), "condition: the sides of a comparison differ"),
     ],
 )
