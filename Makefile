@@ -1,5 +1,6 @@
 # make demo   the machine-table and machine-tool start-ups, computed against published values
 # make test   everything that continuous integration runs
+# make benchmark   times as ratios to hand-written baselines of the same run
 
 PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11; do \
 	$$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$p && break; done)
@@ -25,6 +26,11 @@ layers: .venv/installed-dev
 
 pytest: .venv/installed-dev
 	$(BIN)/python -m pytest -q -n auto
+
+benchmark: .venv/installed-dev
+	$(BIN)/python benchmarks/import_time.py
+	$(BIN)/python benchmarks/coupled_clutches.py
+	$(BIN)/python benchmarks/chain.py 10 100 1000 5000
 
 format: .venv/installed-dev
 	$(BIN)/ruff check --fix

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from components.interfaces import CompliantWithRelativeStates, ShaftInHousing
+from components.thermal import Lossy
 from modelica_like.language import (
-    Component,
     Equations,
     Events,
     Expr,
@@ -26,7 +26,7 @@ from modelica_like.language import (
 Rows = tuple[tuple[float, float], ...]
 
 
-class DryFriction(Component, partial=True):
+class DryFriction(Lossy, partial=True):
     """Two surfaces that stick until the static friction is exceeded, and then slide against the sliding friction.
 
     While they stick, friction is no function of the speed but whatever keeps the relative acceleration at zero; so the
@@ -58,6 +58,14 @@ class DryFriction(Component, partial=True):
         """Return the largest friction of surfaces that stick."""
         return self.peak * self.sliding_friction(0)
 
+    def breaks_forward(self) -> Expr:
+        """Return the condition on which surfaces that stick begin to slide forward."""
+        return self.friction > self.static_friction()
+
+    def breaks_backward(self) -> Expr:
+        """Return the condition on which surfaces that stick begin to slide backward."""
+        return self.friction < -self.static_friction()
+
     def idle_friction(self) -> Expr | float:
         """Return the friction of free surfaces."""
         return 0.0
@@ -75,8 +83,8 @@ class DryFriction(Component, partial=True):
         ) == 0  # fmt: skip
 
     def events(self) -> Events:
-        mode, slip, static = self.mode, self.slip, self.static_friction()
-        pressed = static > 0
+        mode, slip = self.mode, self.slip
+        pressed = self.static_friction() > 0
         yield mode.initially("forward", when=all_of(pressed, slip > 0))
         yield mode.initially("backward", when=all_of(pressed, slip < 0))
         yield mode.initially("stuck", when=pressed)
@@ -84,8 +92,8 @@ class DryFriction(Component, partial=True):
         yield mode.go("free", "forward", when=all_of(pressed, slip > 0))
         yield mode.go("free", "backward", when=all_of(pressed, slip < 0))
         yield mode.go("free", "stuck", when=pressed)
-        yield mode.go("stuck", "start_forward", when=self.friction > static)
-        yield mode.go("stuck", "start_backward", when=self.friction < -static)
+        yield mode.go("stuck", "start_forward", when=self.breaks_forward())
+        yield mode.go("stuck", "start_backward", when=self.breaks_backward())
         yield mode.go("start_forward", "forward", when=slip > 0)
         yield mode.go("start_backward", "backward", when=slip < 0)
         yield mode.go("start_forward", "stuck", when=der(slip) < 0, reset={slip: 0})
@@ -93,7 +101,7 @@ class DryFriction(Component, partial=True):
         yield mode.go("forward", "stuck", when=slip < 0, reset={slip: 0})
         yield mode.go("backward", "stuck", when=slip > 0, reset={slip: 0})
 
-    def loss_power(self) -> Expr:
+    def dissipation(self) -> Expr:
         return self.friction * self.slip
 
 

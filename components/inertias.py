@@ -38,13 +38,15 @@ class Mass(Component):
     flange_a = LinearFlange("left end", free=True)
     flange_b = LinearFlange("right end", free=True)
     m: Parameter = param("kg", "mass", min=0)
+    L: Parameter = param("m", "distance from left to right end; without a value both ends are at s")
     s: Variable = var("m", "position")
     v: Variable = var("m/s", "velocity")
 
     def equations(self) -> Equations:
         a, b = self.flange_a, self.flange_b
-        yield a.s == self.s
-        yield b.s == self.s
+        half = 0.5 * self.L if self.given("L") else 0.0
+        yield a.s == self.s - half
+        yield b.s == self.s + half
         yield der(self.s) == self.v
         yield self.m * der(self.v) == a.f + b.f
 

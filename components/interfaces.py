@@ -134,3 +134,48 @@ class ShaftInHousing(Supported, partial=True):
         yield der(self.phi) == self.w
         yield self.tau == a.tau + b.tau
         yield from self.support_torque(a.tau + b.tau)
+
+
+class LinearSupported(Component, partial=True):
+    """Element with a housing, which stands still unless something is connected to it."""
+
+    support = LinearFlange("housing", optional=True)
+
+    @property
+    def s_support(self) -> Expr | float:
+        """Position of the housing."""
+        return self.support.s if self.support.used else 0.0
+
+    def support_force(self, slide_force: Expr) -> Equations:
+        """Yield the balance of the housing: it carries what the slides bring in."""
+        if self.support.used:
+            yield self.support.f == -slide_force
+
+
+class LinearOneFlange(LinearSupported, partial=True):
+    """Element between one slide end and the housing."""
+
+    flange = LinearFlange("slide end")
+    s: Variable = var("m", "position of the slide relative to the housing")
+
+    def equations(self) -> Equations:
+        yield self.s == self.flange.s - self.s_support
+        yield from self.support_force(self.flange.f)
+
+
+class SlideInHousing(LinearSupported, partial=True):
+    """Rigid slide without mass that feels a force from the housing."""
+
+    flange_a = LinearFlange("left end", free=True)
+    flange_b = LinearFlange("right end", free=True)
+    s: Variable = var("m", "position of the slide relative to the housing")
+    v: Variable = var("m/s", "velocity of the slide relative to the housing")
+    f: Variable = var("N", "force of the housing against forward motion")
+
+    def equations(self) -> Equations:
+        a, b = self.flange_a, self.flange_b
+        yield self.s == a.s - self.s_support
+        yield b.s == a.s
+        yield der(self.s) == self.v
+        yield self.f == a.f + b.f
+        yield from self.support_force(a.f + b.f)

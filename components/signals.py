@@ -14,12 +14,15 @@ from modelica_like.language import (
     Events,
     Expr,
     Input,
+    LanguageError,
     Mode,
     Output,
     Parameter,
+    any_of,
     discrete,
     exp,
     interpolate,
+    maximum,
     param,
     parse_formula,
     signal_in,
@@ -119,8 +122,16 @@ class TimeFormula(Component):
     y: Output = signal_out("*", "signal")
 
     def equations(self) -> Equations:
-        known = {"time": self.time / self.time_scale}
-        yield self.y == self.scale * parse_formula(self.formula).evaluate(known.__getitem__)
+        yield self.y == self.scale * parse_formula(self.formula).evaluate(self.lookup)
+
+    def lookup(self, name: str) -> Expr:
+        """Return what a name in the formula stands for."""
+        if name != "time":
+            raise LanguageError(
+                f"The formula '{self.formula}' of {self.label} uses '{name}', but it can use only `time`.",
+                advice="Write the number, or use a signal component with parameters.",
+            )
+        return self.time / self.time_scale
 
 
 class Ramp(Component):
@@ -158,8 +169,8 @@ class Periodic(Component, partial=True):
 
     def begin(self) -> Expr:
         """Return when the next shape begins."""
-        unlimited = where(self.periods < 0, 1, where(self.done < self.periods, 1, 0))
-        return self.start_time + self.period * where(unlimited > 0, self.done, _NEVER)
+        goes_on = any_of(self.periods < 0, self.done < self.periods)
+        return self.start_time + self.period * where(goes_on, self.done, _NEVER)
 
 
 class Pulse(Periodic):
@@ -220,8 +231,11 @@ class Table(Component):
         yield self.y == self.scale * interpolate(self.time / self.time_scale, times, values, smooth=self.smooth)
 
     def events(self) -> Events:
-        following = _NEVER
-        for k in range(len(self.table) - 1, -1, -1):
-            following = where(self.row < k, self.table[k][0], following)
+        now, following, passed = self.time / self.time_scale, _NEVER, -1.0
+        for k, (moment, _) in reversed(list(enumerate(self.table))):
+            following = where(self.row < k, moment, following)
+            passed = passed + where(now < moment, 0, 1)
         if not self.smooth:
-            yield self.kinks.go("ahead", "ahead", at=following * self.time_scale, reset={self.row: self.row + 1})
+            # A run may start late: then all rows before count as passed at once.
+            ahead = {self.row: maximum(self.row + 1, passed)}
+            yield self.kinks.go("ahead", "ahead", at=following * self.time_scale, reset=ahead)

@@ -5,7 +5,7 @@ A positive torque or force drives the connected part in positive direction.
 
 from __future__ import annotations
 
-from components.interfaces import LinearFlange, OneFlange
+from components.interfaces import LinearFlange, LinearOneFlange, OneFlange
 from modelica_like.language import (
     Component,
     Equations,
@@ -108,20 +108,19 @@ class ConstantSpeed(SpeedSource):
         return self.w_fixed
 
 
-class ForceSource(Component, partial=True):
+class ForceSource(LinearOneFlange, partial=True):
     """Force between the housing and a slide."""
-
-    flange = LinearFlange("slide end")
 
     def force(self) -> Expr:
         """Return the force on the connected part."""
         raise NotImplementedError
 
     def equations(self) -> Equations:
+        yield from super().equations()
         yield self.flange.f == -self.force()
 
     def source_power(self) -> Expr:
-        return self.force() * der(self.flange.s)
+        return self.force() * der(self.s)
 
 
 class Force(ForceSource):

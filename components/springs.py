@@ -8,6 +8,7 @@ from components.interfaces import (
     LinearCompliant,
     LinearCompliantWithRelativeStates,
 )
+from components.thermal import Lossy
 from modelica_like.language import Equations, Events, Expr, Mode, Parameter, param
 
 
@@ -25,7 +26,7 @@ class Spring(Compliant):
         return 0.5 * self.c * (self.phi_rel - self.phi_rel0) ** 2
 
 
-class Damper(CompliantWithRelativeStates):
+class Damper(Lossy, CompliantWithRelativeStates):
     """Viscous damper: the torque is proportional to the relative speed."""
 
     d: Parameter = param("N.m.s/rad", "damping coefficient", min=0)
@@ -34,11 +35,11 @@ class Damper(CompliantWithRelativeStates):
         yield from super().equations()
         yield self.tau == self.d * self.w_rel
 
-    def loss_power(self) -> Expr:
+    def dissipation(self) -> Expr:
         return self.d * self.w_rel**2
 
 
-class SpringDamper(CompliantWithRelativeStates):
+class SpringDamper(Lossy, CompliantWithRelativeStates):
     """Torsion spring and viscous damper side by side, e.g. an elastic coupling."""
 
     c: Parameter = param("N.m/rad", "stiffness", min=0)
@@ -52,11 +53,11 @@ class SpringDamper(CompliantWithRelativeStates):
     def stored_energy(self) -> Expr:
         return 0.5 * self.c * (self.phi_rel - self.phi_rel0) ** 2
 
-    def loss_power(self) -> Expr:
+    def dissipation(self) -> Expr:
         return self.d * self.w_rel**2
 
 
-class Backlash(CompliantWithRelativeStates, partial=True):
+class Backlash(Lossy, CompliantWithRelativeStates, partial=True):
     """Backlash in series with a spring and a damper side by side, e.g. a pair of gear flanks or a claw coupling.
 
     Inside the backlash there is no torque, and flanks that touch never pull: where a fast separation leaves the flank
@@ -107,7 +108,7 @@ class Backlash(CompliantWithRelativeStates, partial=True):
     def stored_energy(self) -> Expr:
         return 0.5 * self.spring**2 / self.c
 
-    def loss_power(self) -> Expr:
+    def dissipation(self) -> Expr:
         elastic = self.contact.choose(gap=0, forward=self.spring, backward=-self.spring)
         return (self.tau - elastic) * self.w_rel
 
@@ -163,7 +164,7 @@ class TranslationalSpring(LinearCompliant):
         return 0.5 * self.c * (self.s_rel - self.s_rel0) ** 2
 
 
-class TranslationalDamper(LinearCompliantWithRelativeStates):
+class TranslationalDamper(Lossy, LinearCompliantWithRelativeStates):
     """Viscous damper: the force is proportional to the relative velocity."""
 
     d: Parameter = param("N.s/m", "damping coefficient", min=0)
@@ -172,11 +173,11 @@ class TranslationalDamper(LinearCompliantWithRelativeStates):
         yield from super().equations()
         yield self.f == self.d * self.v_rel
 
-    def loss_power(self) -> Expr:
+    def dissipation(self) -> Expr:
         return self.d * self.v_rel**2
 
 
-class TranslationalSpringDamper(LinearCompliantWithRelativeStates):
+class TranslationalSpringDamper(Lossy, LinearCompliantWithRelativeStates):
     """Spring and viscous damper side by side."""
 
     c: Parameter = param("N/m", "stiffness", min=0)
@@ -190,5 +191,5 @@ class TranslationalSpringDamper(LinearCompliantWithRelativeStates):
     def stored_energy(self) -> Expr:
         return 0.5 * self.c * (self.s_rel - self.s_rel0) ** 2
 
-    def loss_power(self) -> Expr:
+    def dissipation(self) -> Expr:
         return self.d * self.v_rel**2

@@ -1,0 +1,98 @@
+"""Heat: ports through which losses leave, thermal masses, conduction, fixed temperatures."""
+
+from __future__ import annotations
+
+from modelica_like.language import Component, Connector, Equations, Expr, Parameter, Variable, der, flow, param, var
+
+_ROOM = 293.15
+
+
+class HeatPort(Connector):
+    """Where heat enters: temperature, and the heat flow into the component."""
+
+    T: Variable = var("K", "temperature", guess=_ROOM, nominal=300.0)
+    Q_flow: Variable = flow("W", "heat flow, positive into the component")
+
+    def power(self) -> Expr:
+        return self.Q_flow
+
+
+class Lossy(Component, partial=True):
+    """Element that turns work into heat.
+
+    With its heat port connected the loss flows out there, into the thermal part of the model; otherwise it leaves the
+    model. A subclass says how much it is.
+    """
+
+    heat_port = HeatPort("where the loss goes as heat", optional=True)
+
+    def dissipation(self) -> Expr:
+        """Return the power in W that becomes heat."""
+        raise NotImplementedError
+
+    def equations(self) -> Equations:
+        yield from super().equations()
+        if self.heat_port.used:
+            yield self.heat_port.Q_flow == -self.dissipation()
+
+    def loss_power(self) -> Expr | float:
+        return 0.0 if self.heat_port.used else self.dissipation()
+
+
+class ThermalMass(Component):
+    """Body of one temperature that stores heat, e.g. the lining of a clutch: C·der(T) is the heat flow into it.
+
+    Its stored energy counts from 20 °C.
+    """
+
+    port = HeatPort("surface")
+    C: Parameter = param("J/K", "heat capacity", min=0)
+    T: Variable = var("K", "temperature", nominal=300.0, guess=_ROOM)
+    T_zero: Parameter = param("K", "temperature of no stored energy", default=_ROOM)
+
+    def equations(self) -> Equations:
+        yield self.port.T == self.T
+        yield self.C * der(self.T) == self.port.Q_flow
+
+    def stored_energy(self) -> Expr:
+        return self.C * (self.T - self.T_zero)
+
+
+class FixedTemperature(Component):
+    """Surroundings that keep their temperature, whatever heat they take."""
+
+    port = HeatPort("surface")
+    T: Parameter = param("K", "temperature", default=_ROOM, min=0)
+
+    def equations(self) -> Equations:
+        yield self.port.T == self.T
+
+    def source_power(self) -> Expr:
+        return -self.port.Q_flow
+
+
+class HeatSource(Component):
+    """Prescribed heat flow into the connected body."""
+
+    port = HeatPort("surface")
+    Q_flow: Parameter = param("W", "heat flow into the connected body")
+
+    def equations(self) -> Equations:
+        yield self.port.Q_flow == -self.Q_flow
+
+    def source_power(self) -> Expr:
+        return self.Q_flow
+
+
+class ThermalConductor(Component):
+    """Heat conduction or convection without storage: the heat flow is proportional to the difference in temperature."""
+
+    port_a = HeatPort("one side")
+    port_b = HeatPort("other side")
+    inlet, outlet = "port_a", "port_b"
+    G: Parameter = param("W/K", "thermal conductance; for convection the coefficient times the area", min=0)
+
+    def equations(self) -> Equations:
+        a, b = self.port_a, self.port_b
+        yield a.Q_flow == self.G * (a.T - b.T)
+        yield a.Q_flow + b.Q_flow == 0

@@ -1,0 +1,132 @@
+"""Alias elimination against linear algebra."""
+
+import casadi as ca
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from modelica_like.errors import Source
+from modelica_like.flatten.model import FlatModel, FlatVariable, LinearEquation, Origin
+from modelica_like.structure.alias import find_aliases
+from modelica_like.units import ONE
+
+ORIGIN = Origin("", "test", Source(""))
+
+
+def model(orders: list[int], rows: list[dict[int, float]], constants: list[float] | None = None) -> FlatModel:
+    """Flat model of variables of which some are differentiated, with linear equations over the nodes."""
+    variables = [FlatVariable(f"x{k}", ONE, "", "local", "default", 0.0, 1.0, None, None) for k in range(len(orders))]
+    nodes = [(k, 0) for k in range(len(orders))]
+    derivative: dict[int, int] = {}
+    for k, order in enumerate(orders):
+        node = k
+        for level in range(1, order + 1):
+            derivative[node] = len(nodes)
+            nodes.append((k, level))
+            node = derivative[node]
+    given = constants or [0.0] * len(rows)
+    linear = [LinearEquation(tuple(row.items()), c, ORIGIN) for row, c in zip(rows, given, strict=True)]
+    none = ca.SX(0, 1)
+    return FlatModel(
+        name="test", variables=variables, nodes=nodes, derivative=derivative, parameters=[], p=none, q=none, derived=[],
+        formulas=none, discretes=[], d=none, time=ca.SX.sym("t"), instances=[], linear=linear, general=[], starts=[],
+        inputs=[], components={},
+    )  # fmt: skip
+
+
+coefficients = st.sampled_from([1.0, -1.0, 2.0, -0.5, 3.0, 0.1])
+
+
+@st.composite
+def systems(draw: st.DrawFn) -> tuple[int, list[dict[int, float]]]:
+    """Equations with one to three unknowns; some follow from others."""
+    size = draw(st.integers(2, 8))
+    rows: list[dict[int, float]] = []
+    for _ in range(draw(st.integers(1, 10))):
+        chosen = draw(st.lists(st.integers(0, size - 1), min_size=1, max_size=draw(st.sampled_from([1, 2, 2, 2, 3])), unique=True))
+        rows.append({k: draw(coefficients) for k in chosen})
+    if len(rows) > 1 and draw(st.booleans()):
+        first, second = rows[0], rows[1]
+        rows.append({k: first.get(k, 0.0) - 0.1 * second.get(k, 0.0) for k in {**first, **second}})
+    return size, rows
+
+
+def null_space(matrix: np.ndarray) -> np.ndarray:
+    _, values, vectors = np.linalg.svd(matrix)
+    rank = int(np.sum(values > 1e-9))
+    return vectors[rank:].T
+
+
+@given(systems())
+@settings(deadline=None, max_examples=300)
+def test_every_solution_of_the_equations_fulfils_the_aliases_and_none_is_lost(system):
+    size, rows = system
+    matrix = np.array([[row.get(k, 0.0) for k in range(size)] for row in rows])
+    found = find_aliases(model([0] * size, rows))
+    free = sorted({root for root in found.root if root not in found.known})
+    # What the elimination says: x = embedding @ (free roots).
+    embedding = np.zeros((size, len(free)))
+    for k, (root, factor) in enumerate(zip(found.root, found.factor, strict=True)):
+        if root in free:
+            embedding[k, free.index(root)] = factor
+    solutions = null_space(matrix)
+    assert np.linalg.norm(solutions - embedding @ np.linalg.lstsq(embedding, solutions, rcond=None)[0]) < 1e-9
+    left = matrix[found.remaining] @ embedding
+    assert np.linalg.matrix_rank(left, tol=1e-9) == len(free) - solutions.shape[1]
+    # Equations without unknowns are redundant here, as all constants are zero.
+    for number in found.contradictions:
+        assert np.linalg.norm(matrix[number] @ embedding) < 1e-9
+    # Nothing with one or two unknowns is left over.
+    assert all(np.count_nonzero(np.abs(row) > 1e-12) > 2 for row in left)
+
+
+@given(st.integers(2, 8), st.data())
+@settings(deadline=None, max_examples=100)
+def test_derivatives_of_aliases_are_aliases(size, data):
+    """x_k = r_k x_0 by a random tree; then each derivative is the same multiple of that of x_0."""
+    ratio = {0: 1.0}
+    rows: list[dict[int, float]] = []
+    for k in range(1, size):
+        other = data.draw(st.integers(0, k - 1))
+        factor = data.draw(coefficients)
+        rows.append({k: 1.0, other: -factor})
+        ratio[k] = factor * ratio[other]
+    orders = [data.draw(st.integers(0, 2)) for _ in range(size)]
+    made = model(orders, data.draw(st.permutations(rows)))
+    found = find_aliases(made)
+    assert not found.remaining
+    assert not found.contradictions
+    roots = [next(n for n, (v, o) in enumerate(made.nodes) if o == order) for order in range(max(orders) + 1)]
+    for node, (variable, order) in enumerate(made.nodes):
+        first = roots[order]
+        assert found.root[node] == found.root[first]
+        expected = ratio[variable] / ratio[made.nodes[first][0]]
+        assert np.isclose(found.factor[node] / found.factor[first], expected, rtol=1e-12)
+    assert len({found.root[node] for node in range(len(made.nodes))}) == max(orders) + 1
+
+
+def test_a_constant_makes_its_derivatives_zero():
+    found = find_aliases(model([2, 0], [{0: 2.0}, {0: 1.0, 1: -3.0}], [-8.0, 0.0]))  # 2 x0 = 8, x0 = 3 x1
+    assert found.known[found.root[0]] * found.factor[0] == 4.0
+    assert np.isclose(found.known[found.root[1]] * found.factor[1], 4.0 / 3.0)
+    assert [found.known[found.root[node]] for node in (2, 3)] == [0.0, 0.0]
+
+
+def test_a_contradiction_is_found():
+    found = find_aliases(model([0, 0], [{0: 1.0}, {0: 1.0, 1: 1.0}, {1: 1.0}], [-1.0, 0.0, -1.0]))
+    assert len(found.contradictions) == 1
+
+
+def test_terms_that_cancel_but_for_rounding_leave_no_unknown():
+    """0.1 + 0.2 - 0.3 is not zero in floating point: taken as a coefficient, it would make x2 = 0."""
+    found = find_aliases(model([0, 0], [{0: 1.0, 1: -3.0}, {0: 0.1, 1: -0.3}, {0: 0.7, 1: -2.1}]))
+    assert not found.known
+    assert len(found.contradictions) == 2
+
+
+def test_an_equation_between_two_derivatives_is_no_alias_of_one_node():
+    """der(x0) = der(x1) does not make x0 = x1: the integrals differ by a constant."""
+    made = model([1, 1], [{2: 1.0, 3: -1.0}])
+    found = find_aliases(made)
+    assert found.root[0] != found.root[1]
+    assert found.remaining == [0]
