@@ -25,6 +25,13 @@ from components.sensors import RelativeAngleSensor as RelativeAngleSensor
 from components.sensors import RelativeSpeedSensor as RelativeSpeedSensor
 from components.sensors import SpeedSensor as SpeedSensor
 from components.sensors import TorqueSensor as TorqueSensor
+from components.shaft_sources import Accelerate as Accelerate
+from components.shaft_sources import InverseSpeedDependentTorque as InverseSpeedDependentTorque
+from components.shaft_sources import LinearSpeedDependentTorque as LinearSpeedDependentTorque
+from components.shaft_sources import Position as Position
+from components.shaft_sources import QuadraticSpeedDependentTorque as QuadraticSpeedDependentTorque
+from components.shaft_sources import SignTorque as SignTorque
+from components.shaft_sources import Torque2 as Torque2
 from components.signals import CoilForce as CoilForce
 from components.signals import Constant as Constant
 from components.signals import Product as Product
@@ -35,6 +42,12 @@ from components.signals import Step as Step
 from components.signals import Table as Table
 from components.signals import TimeFormula as TimeFormula
 from components.signals import Trapezoid as Trapezoid
+from components.slides import ElastoGap as ElastoGap
+from components.slides import MassWithStopAndFriction as MassWithStopAndFriction
+from components.slides import Rod as Rod
+from components.slides import StribeckFriction as StribeckFriction
+from components.slides import SupportFriction as SupportFriction
+from components.slides import TranslationalBrake as TranslationalBrake
 from components.sources import ConstantForce as ConstantForce
 from components.sources import ConstantSpeed as ConstantSpeed
 from components.sources import ConstantTorque as ConstantTorque
@@ -53,8 +66,29 @@ from components.springs import SpringDamper as SpringDamper
 from components.springs import TranslationalDamper as TranslationalDamper
 from components.springs import TranslationalSpring as TranslationalSpring
 from components.springs import TranslationalSpringDamper as TranslationalSpringDamper
+from components.thermal import FixedTemperature as FixedTemperature
+from components.thermal import HeatPort as HeatPort
+from components.thermal import HeatSource as HeatSource
+from components.thermal import ThermalConductor as ThermalConductor
+from components.thermal import ThermalMass as ThermalMass
+from components.translational_sensors import LinearAccelerationSensor as LinearAccelerationSensor
+from components.translational_sensors import LinearMultiSensor as LinearMultiSensor
+from components.translational_sensors import LinearPowerSensor as LinearPowerSensor
+from components.translational_sensors import RelativePositionSensor as RelativePositionSensor
+from components.translational_sensors import RelativeVelocitySensor as RelativeVelocitySensor
+from components.translational_sensors import VelocitySensor as VelocitySensor
+from components.translational_sources import ConstantVelocity as ConstantVelocity
+from components.translational_sources import Force2 as Force2
+from components.translational_sources import ForceStep as ForceStep
+from components.translational_sources import InverseSpeedDependentForce as InverseSpeedDependentForce
+from components.translational_sources import LinearSpeedDependentForce as LinearSpeedDependentForce
+from components.translational_sources import QuadraticSpeedDependentForce as QuadraticSpeedDependentForce
+from components.translational_sources import SignForce as SignForce
+from components.translational_sources import TranslationalAccelerate as TranslationalAccelerate
+from components.translational_sources import TranslationalPosition as TranslationalPosition
 
 __all__ = [
+    "Accelerate",
     "AngleSensor",
     "BallScrew",
     "BearingFriction",
@@ -67,29 +101,52 @@ __all__ = [
     "ConstantForce",
     "ConstantSpeed",
     "ConstantTorque",
+    "ConstantVelocity",
     "Damper",
     "DryFriction",
     "ElastoBacklash",
     "ElastoBacklash2",
+    "ElastoGap",
     "Fixed",
+    "FixedTemperature",
     "Flange",
     "Force",
+    "Force2",
     "ForceSensor",
+    "ForceStep",
+    "HeatPort",
+    "HeatSource",
     "IdealGear",
     "IdealPlanetary",
     "Inertia",
+    "InverseSpeedDependentForce",
+    "InverseSpeedDependentTorque",
+    "LinearAccelerationSensor",
     "LinearFlange",
+    "LinearMultiSensor",
+    "LinearPowerSensor",
+    "LinearSpeedDependentForce",
+    "LinearSpeedDependentTorque",
     "MachineTable",
     "Mass",
+    "MassWithStopAndFriction",
     "MultiPlateClutch",
     "MultiSensor",
+    "Position",
     "PositionSensor",
     "PowerSensor",
     "Product",
     "Pulse",
+    "QuadraticSpeedDependentForce",
+    "QuadraticSpeedDependentTorque",
     "Ramp",
     "RelativeAngleSensor",
+    "RelativePositionSensor",
     "RelativeSpeedSensor",
+    "RelativeVelocitySensor",
+    "Rod",
+    "SignForce",
+    "SignTorque",
     "Sine",
     "Speed",
     "SpeedDependentLoad",
@@ -97,15 +154,24 @@ __all__ = [
     "Spring",
     "SpringDamper",
     "Step",
+    "StribeckFriction",
+    "SupportFriction",
     "Table",
+    "ThermalConductor",
+    "ThermalMass",
     "TimeFormula",
     "Torque",
+    "Torque2",
     "TorqueSensor",
     "TorqueStep",
+    "TranslationalAccelerate",
+    "TranslationalBrake",
     "TranslationalDamper",
     "TranslationalFixed",
+    "TranslationalPosition",
     "TranslationalSpeed",
     "TranslationalSpring",
     "TranslationalSpringDamper",
     "Trapezoid",
+    "VelocitySensor",
 ]

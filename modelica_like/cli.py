@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any, NoReturn
 
@@ -27,6 +28,14 @@ Debug = Annotated[bool, typer.Option("--debug", help="Show where in the code an 
 Assignments = Annotated[
     list[str] | None, typer.Option("--set", metavar="PATH=VALUE", help='Set a value, e.g. --set clutch.mu="0.3".')
 ]
+
+
+class Start(StrEnum):
+    """What stands for start values that are not given."""
+
+    GIVEN = "given"
+    REST = "rest"
+    STEADY = "steady"
 
 
 @contextmanager
@@ -85,6 +94,7 @@ def check(netlist: Netlist, assignments: Assignments = None, *, debug: Debug = F
 def simulate(
     netlist: Netlist, assignments: Assignments = None, *,
     until: Annotated[str | None, typer.Option(metavar="TIME", help="End time, e.g. 2s; else the netlist's.")] = None,
+    start: Annotated[Start | None, typer.Option(help="Start values: as given, from rest, or the steady state.")] = None,
     csv: Annotated[Path | None, typer.Option(metavar="FILE", help="Write all trajectories as a table.")] = None,
     points: Annotated[int | None, typer.Option(metavar="N", help="Number of equal intervals of the results.")] = None,
     units: Annotated[bool, typer.Option("--units", help="Units in a second header line of the table.")] = False,
@@ -104,7 +114,7 @@ def simulate(
 
         model = build(assembly)
         with Bar(until or model.settings.get("until")) as bar:
-            solution = run(model, until, points=points, progress=bar)
+            solution = run(model, until, start=start.value if start else None, points=points, progress=bar)
         out().print(run_report(solution, energy=energy))
         if csv:
             from modelica_like.report.files import write_csv

@@ -56,6 +56,8 @@ class Wiring:
         for end in ends:
             if type(end) is not type(ends[0]):
                 self.errors.append(_different_kinds(ends[0], end, statement.source))
+                # That they are not connected now is a consequence, not another mistake.
+                self.freed.update(id(one) for one in ends)
                 return
         keys = [self._key(scope, end, statement.source) for end in ends]
         for key in keys[1:]:

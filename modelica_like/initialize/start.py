@@ -145,9 +145,9 @@ class StartProblem:
 
     def _coupled(self, first: StartEntry, second: StartEntry) -> bool:
         """Tell whether two variables depend on a common state."""
-        pattern = self.model.variables.jac_sparsity(0, 1)
-        rows = [set(pattern.T.get_colind()[e.node : e.node + 2]) for e in (first, second)]
-        columns = [set(pattern.T.row()[min(r) : max(r)]) for r in rows]
+        by_variable = self.model.variables.jac_sparsity(0, 1).T
+        starts, states = by_variable.colind(), by_variable.row()
+        columns = [set(states[starts[e.node] : starts[e.node + 1]]) for e in (first, second)]
         return bool(columns[0] & columns[1])
 
     def _missing(self, states: list[int], count: int) -> MissingStart:

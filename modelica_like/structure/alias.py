@@ -60,6 +60,7 @@ class _Elimination:
         self.watchers: dict[int, set[int]] = {}
         self.queue = deque(range(len(model.linear)))
         self.remaining: set[int] = set()
+        self.used: set[int] = set()
         self.contradictions: list[int] = []
         self.inputs = set(model.inputs)
 
@@ -69,7 +70,7 @@ class _Elimination:
             number = self.queue.popleft()
             queued.discard(number)
             for affected in self._consider(number):
-                if affected not in queued:
+                if affected not in queued and affected not in self.used:
                     queued.add(affected)
                     self.queue.append(affected)
         nodes = range(len(self.model.nodes))
@@ -136,10 +137,12 @@ class _Elimination:
         if len(terms) == len(numbers) == 1:
             ((root, coefficient),) = numbers.items()
             if root not in self.integral and root not in self.inputs:
+                self.used.add(number)
                 return self._learn(root, -constant / coefficient if not _is_zero(constant) else 0.0)
         if len(terms) == len(numbers) == 2 and _is_zero(constant):
             (first, a), (second, b) = numbers.items()
             if self._may_merge(first, second):
+                self.used.add(number)
                 return self._merge(first, second, -b / a)
         self.remaining.add(number)
         for root in terms:

@@ -3,30 +3,39 @@
 from __future__ import annotations
 
 from modelica_like.errors import StructureError
-from modelica_like.structure.system import System
+from modelica_like.structure.system import PREFERENCES, System
 
 _MAX_INDEX = 8
+_PREFERRED = PREFERENCES.index("prefer")
 
 
 def prefer_relative_states(system: System) -> None:
-    """Give preferred variables as many derivatives as the kinematic constraint they stand in allows.
+    """Give preferred variables as many derivatives as the linear relations they stand in allow.
 
     A relative angle `phi_rel = phi_b - phi_a` is then differentiated along with the angles of the inertias and can
-    become a state in their
-    place: absolute angles grow without bound, and with them the error that a relative tolerance allows.
+    become a state in their place: absolute angles grow without bound, and with them the error that a relative
+    tolerance allows. Behind a gear the shaft's angle is not differentiated itself, but its relation to the motor's is
+    linear: that is enough.
     """
-    for _, terms in system.linear_rows:
-        if not terms or any(system.levels[level].order for level in terms):
-            continue
-        wishes = [level for level in terms if _wish(system, level) >= 2]
-        for level in wishes:
-            others = [len(system.chains[system.levels[o].chain]) for o in terms if o != level]
-            while others and len(system.chains[system.levels[level].chain]) < min(others):
-                system.add_level(system.levels[level].chain)
-
-
-def _wish(system: System, level: int) -> int:
-    return max(system.levels[n].preference for n in system.chains[system.levels[level].chain])
+    reach = [len(chain) for chain in system.chains]
+    relations = [
+        [system.levels[level].chain for level in levels]
+        for levels in system.linear_rows
+        if len(levels) > 1 and not any(system.levels[level].order for level in levels)
+    ]
+    changed = True
+    while changed:
+        changed = False
+        for chains in relations:
+            shortest = min(chains, key=lambda chain: reach[chain])
+            possible = min(reach[chain] for chain in chains if chain != shortest)
+            if reach[shortest] < possible:
+                reach[shortest] = possible
+                changed = True
+    for chain, length in enumerate(reach):
+        if max(system.levels[level].preference for level in system.chains[chain]) >= _PREFERRED:
+            while len(system.chains[chain]) < length:
+                system.add_level(chain)
 
 
 class Pantelides:

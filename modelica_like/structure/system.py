@@ -43,6 +43,7 @@ class System:
         node_level: for every node (level number, factor), or None if it is known.
         node_values: expression of every node in level symbols and parameters.
         inputs: level numbers of the model's inputs.
+        linear_rows: levels in each linear equation with constant coefficients.
     """
 
     model: FlatModel
@@ -54,7 +55,7 @@ class System:
     node_level: list[tuple[int, float] | None]
     node_values: Any
     inputs: list[int] = field(default_factory=list)
-    linear_rows: list[tuple[int, dict[int, float]]] = field(default_factory=list)
+    linear_rows: list[list[int]] = field(default_factory=list)
 
     def add_level(self, chain: int) -> int:
         """Extend a chain by one derivative."""
@@ -170,7 +171,7 @@ def _collect_residuals(system: System, aliases: Aliases) -> None:
         system.origins.append(model.origin(instance, row))
     for number in aliases.remaining:
         equation = model.linear[number]
-        system.linear_rows.append((len(residuals), _level_terms(system, equation.terms)))
+        system.linear_rows.append(_levels_of(system, equation.terms))
         if equation.row is not None:
             residuals.append(columns[equation.row[0]][equation.row[1]])
         else:
@@ -182,13 +183,7 @@ def _collect_residuals(system: System, aliases: Aliases) -> None:
     system.residual = ca.vertcat(*residuals) if residuals else ca.SX(0, 1)
 
 
-def _level_terms(system: System, terms: tuple[tuple[int, Any], ...]) -> dict[int, float]:
-    """Numeric coefficients by level; empty if one is not a number."""
-    found: dict[int, float] = {}
-    for node, coefficient in terms:
-        placed = system.node_level[node]
-        if not isinstance(coefficient, float):
-            return {}
-        if placed is not None:
-            found[placed[0]] = found.get(placed[0], 0.0) + coefficient * placed[1]
-    return found
+def _levels_of(system: System, terms: tuple[tuple[int, Any], ...]) -> list[int]:
+    """Levels of the unknown nodes in an equation, each once."""
+    placed = (system.node_level[node] for node, _ in terms)
+    return list(dict.fromkeys(pair[0] for pair in placed if pair is not None))

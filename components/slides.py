@@ -1,0 +1,228 @@
+"""Sliding machine parts: rods, contacts, slideways, brakes and stops."""
+
+from __future__ import annotations
+
+from components.friction import DryFriction, Rows
+from components.interfaces import LinearCompliantWithRelativeStates, LinearFlange, SlideInHousing
+from components.thermal import Lossy
+from modelica_like.language import (
+    Component,
+    Equations,
+    Events,
+    Expr,
+    Input,
+    Mode,
+    Parameter,
+    Variable,
+    all_of,
+    der,
+    exp,
+    interpolate,
+    maximum,
+    negate,
+    param,
+    signal_in,
+    var,
+)
+
+
+class Rod(Component):
+    """Rigid rod without mass."""
+
+    flange_a = LinearFlange("left end")
+    flange_b = LinearFlange("right end")
+    L: Parameter = param("m", "length, flange_b.s - flange_a.s", default=0.0)
+
+    def equations(self) -> Equations:
+        yield self.flange_b.s == self.flange_a.s + self.L
+        yield self.flange_a.f + self.flange_b.f == 0
+
+
+class ElastoGap(Lossy, LinearCompliantWithRelativeStates):
+    """Contact of two bodies that may part: spring and damper act while the distance is below s_rel0.
+
+    The spring force is c·s_ref·(penetration/s_ref)^n: n = 1 between plates, 1.5 between spheres (H. Hertz, 1881). The
+    damper force is limited to the spring force, so that the force rises from zero on contact and never pulls; where a
+    fast separation leaves the surface behind, the energy of its deformation is counted as lost. Modelica Standard
+    Library, Translational.ElastoGap.
+    """
+
+    c: Parameter = param("N/m", "stiffness in contact; for n above 1 the secant stiffness at s_ref", min=0)
+    d: Parameter = param("N.s/m", "damping coefficient in contact", default=0.0, min=0)
+    s_rel0: Parameter = param("m", "distance at which the bodies touch", default=0.0)
+    n: Parameter = param("1", "exponent of the spring force; without a value the spring is linear", min=1)
+    s_ref: Parameter = param("m", "penetration at which the force is c·s_ref", default=1.0, min=1e-12)
+    contact = Mode("gap", "touching", description="whether the bodies touch")
+    surfaces = Mode("pressed", "meeting", "leaving", description="spring and damper, damper limited, left behind")
+
+    @property
+    def penetration(self) -> Expr:
+        """How far the bodies are pressed into each other."""
+        return self.s_rel0 - self.s_rel
+
+    @property
+    def spring(self) -> Expr:
+        """Elastic part of the force that presses the bodies together."""
+        force = self.c * self.penetration
+        if self.given("n"):
+            force = self.c * self.s_ref * (maximum(self.penetration, 0) / self.s_ref) ** self.n
+        return self.contact.choose(gap=0, touching=force)
+
+    @property
+    def damper(self) -> Expr:
+        """Viscous part of that force, before it is limited."""
+        return self.contact.choose(gap=0, touching=-self.d * self.v_rel)
+
+    def equations(self) -> Equations:
+        yield from super().equations()
+        both = self.spring + self.damper
+        yield self.f == -self.surfaces.choose(pressed=both, meeting=2 * self.spring, leaving=0)
+
+    def events(self) -> Events:
+        spring, damper = self.spring, self.damper
+        yield self.contact.initially("touching", when=self.s_rel < self.s_rel0)
+        yield self.contact.go("gap", "touching", when=self.s_rel < self.s_rel0)
+        yield self.contact.go("touching", "gap", when=self.s_rel > self.s_rel0)
+        yield self.surfaces.go("pressed", "meeting", when=damper > spring)
+        yield self.surfaces.go("meeting", "pressed", when=damper < spring)
+        yield self.surfaces.go("pressed", "leaving", when=damper < -spring)
+        yield self.surfaces.go("leaving", "pressed", when=damper > -spring)
+
+    def stored_energy(self) -> Expr:
+        linear = self.contact.choose(gap=0, touching=0.5 * self.c * self.penetration**2)
+        if not self.given("n"):
+            return linear
+        relative = maximum(self.penetration, 0) / self.s_ref
+        hertz = self.c * self.s_ref**2 / (self.n + 1) * relative ** (self.n + 1)
+        return self.contact.choose(gap=0, touching=hertz)
+
+    def dissipation(self) -> Expr:
+        return (self.f + self.spring) * self.v_rel
+
+
+class SlideFriction(DryFriction, SlideInHousing, partial=True):
+    """Dry friction between a slide and the housing."""
+
+    v: Variable = var("m/s", "velocity of the slide relative to the housing", state="always")
+
+    @property
+    def slip(self) -> Expr:
+        return self.v
+
+    @property
+    def friction(self) -> Expr:
+        return self.f
+
+
+class SupportFriction(SlideFriction):
+    """Friction of a slideway: a force against the motion that depends on the velocity, with stiction."""
+
+    f_pos: Rows = ((0.0, 1.0),)
+    """Rows of velocity in v_scale and friction force in f_scale."""
+    smooth: bool = False
+    """Interpolate f_pos with a continuous slope."""
+    v_scale: Parameter = param("m/s", "velocity that counts as 1 in f_pos", default=1.0)
+    f_scale: Parameter = param("N", "force that counts as 1 in f_pos", default=1.0)
+
+    def sliding_friction(self, speed: Expr | float) -> Expr:
+        speeds, forces = zip(*self.f_pos, strict=True)
+        return self.f_scale * interpolate(speed / self.v_scale, speeds, forces, smooth=self.smooth)
+
+
+class StribeckFriction(SlideFriction):
+    """Friction of a lubricated slideway after R. Stribeck: f = F_prop·v + F_Coulomb + F_Stribeck·exp(-fexp·v).
+
+    R. Stribeck: Die wesentlichen Eigenschaften der Gleit- und Rollenlager, Z. VDI 46 (1902).
+    """
+
+    F_prop: Parameter = param("N.s/m", "viscous friction", default=0.0, min=0)
+    F_Coulomb: Parameter = param("N", "dry friction at high velocity, without the viscous part", min=0)
+    F_Stribeck: Parameter = param("N", "what friction at rest has in excess", default=0.0, min=0)
+    fexp: Parameter = param("s/m", "inverse of the velocity at which the excess has fallen to 1/e", default=1.0, min=0)
+
+    def sliding_friction(self, speed: Expr | float) -> Expr:
+        return self.F_prop * speed + self.F_Coulomb + self.F_Stribeck * exp(-self.fexp * speed)
+
+
+class TranslationalBrake(SlideFriction):
+    """Friction brake between a slide and the housing: friction force cgeo·mu(v)·fn, fn = fn_max·f_normalized."""
+
+    f_normalized: Input = signal_in("1", "normal force over fn_max; the brake is free at 0", default=1.0)
+    fn_max: Parameter = param("N", "normal force at f_normalized = 1", min=0)
+    cgeo: Parameter = param("1", "number of friction surfaces", default=1.0, min=0)
+    mu_pos: Rows = ((0.0, 0.5),)
+    """Rows of velocity in v_scale and sliding friction coefficient."""
+    smooth: bool = False
+    """Interpolate mu_pos with a continuous slope."""
+    v_scale: Parameter = param("m/s", "velocity that counts as 1 in mu_pos", default=1.0)
+
+    def sliding_friction(self, speed: Expr | float) -> Expr:
+        speeds, values = zip(*self.mu_pos, strict=True)
+        mu = interpolate(speed / self.v_scale, speeds, values, smooth=self.smooth)
+        return self.cgeo * mu * (self.fn_max * self.f_normalized)
+
+
+class MassWithStopAndFriction(DryFriction):
+    """Sliding mass between hard stops, with the friction of R. Stribeck.
+
+    A mass that meets a stop comes to rest there at once, its kinetic energy is lost; the stop holds whatever presses
+    the mass against it. Modelica Standard Library, Translational.MassWithStopAndFriction.
+    """
+
+    flange_a = LinearFlange("left end", free=True)
+    flange_b = LinearFlange("right end", free=True)
+    m: Parameter = param("kg", "mass", min=0)
+    L: Parameter = param("m", "length of the mass", default=0.0, min=0)
+    smin: Parameter = param("m", "position of the left stop, where flange_a meets it", default=-25.0)
+    smax: Parameter = param("m", "position of the right stop, where flange_b meets it", default=25.0)
+    F_prop: Parameter = param("N.s/m", "viscous friction", default=0.0, min=0)
+    F_Coulomb: Parameter = param("N", "dry friction at high velocity, without the viscous part", default=0.0, min=0)
+    F_Stribeck: Parameter = param("N", "what friction at rest has in excess", default=0.0, min=0)
+    fexp: Parameter = param("s/m", "inverse of the velocity at which the excess has fallen to 1/e", default=1.0, min=0)
+    peak: Parameter = param("1", "static friction over sliding friction at standstill", default=1.001, min=1)
+    s: Variable = var("m", "position of the centre of mass", state="always")
+    v: Variable = var("m/s", "velocity", state="always")
+    f: Variable = var("N", "force of the housing against forward motion")
+    stop = Mode("none", "left", "right", description="stop at which the mass rests")
+
+    @property
+    def slip(self) -> Expr:
+        return self.v
+
+    @property
+    def friction(self) -> Expr:
+        return self.f
+
+    def sliding_friction(self, speed: Expr | float) -> Expr:
+        return self.F_prop * speed + self.F_Coulomb + self.F_Stribeck * exp(-self.fexp * speed)
+
+    def idle_friction(self) -> Expr:
+        return self.F_prop * self.v
+
+    def breaks_forward(self) -> Expr:
+        return all_of(super().breaks_forward(), negate(self.stop.is_("right")))
+
+    def breaks_backward(self) -> Expr:
+        return all_of(super().breaks_backward(), negate(self.stop.is_("left")))
+
+    def equations(self) -> Equations:
+        yield from super().equations()
+        a, b = self.flange_a, self.flange_b
+        yield a.s == self.s - 0.5 * self.L
+        yield b.s == self.s + 0.5 * self.L
+        yield der(self.s) == self.v
+        yield self.m * der(self.v) == a.f + b.f - self.f
+
+    def events(self) -> Events:
+        mode, stop = self.mode, self.stop
+        for side, end in (("left", self.smin + 0.5 * self.L), ("right", self.smax - 0.5 * self.L)):
+            beyond = self.s < end if side == "left" else self.s > end
+            moving = ("free", "start_forward", "start_backward", "forward", "backward")
+            yield mode.go(moving, "stuck", when=beyond, reset={self.s: end, self.v: 0})
+            yield stop.go("none", side, when=beyond)
+        yield stop.go("left", "none", when=self.v > 0)
+        yield stop.go("right", "none", when=self.v < 0)
+        yield from super().events()
+
+    def stored_energy(self) -> Expr:
+        return 0.5 * self.m * self.v**2

@@ -1,0 +1,163 @@
+"""Prescribed forces and motions of slides.
+
+A positive force drives the connected part in positive direction.
+"""
+
+from __future__ import annotations
+
+from math import pi
+
+from components.interfaces import LinearFlange, LinearOneFlange
+from components.sources import ForceSource
+from components.speed_laws import inverse_law, linear_law, quadratic_law, sign_law
+from modelica_like.language import (
+    Component,
+    Equations,
+    Events,
+    Expr,
+    Input,
+    Mode,
+    Parameter,
+    Variable,
+    der,
+    param,
+    signal_in,
+    var,
+)
+
+
+class Force2(Component):
+    """Force between two slides, given by a signal: it drives flange_b in positive, flange_a in negative direction."""
+
+    flange_a = LinearFlange("slide end that is pushed back")
+    flange_b = LinearFlange("slide end that is driven")
+    f: Input = signal_in("N", "force on flange_b")
+
+    def equations(self) -> Equations:
+        yield self.flange_a.f == self.f
+        yield self.flange_b.f == -self.f
+
+    def source_power(self) -> Expr:
+        return self.f * (der(self.flange_b.s) - der(self.flange_a.s))
+
+
+class ForceStep(ForceSource):
+    """Force that jumps at a time."""
+
+    step_force: Parameter = param("N", "height of the jump")
+    offset_force: Parameter = param("N", "force before the jump", default=0.0)
+    start_time: Parameter = param("s", "time of the jump", default=0.0)
+    stage = Mode("before", "after", description="before or after the jump")
+
+    def force(self) -> Expr:
+        return self.offset_force + self.stage.choose(before=0, after=self.step_force)
+
+    def events(self) -> Events:
+        yield self.stage.initially("after", when=self.time >= self.start_time)
+        yield self.stage.go("before", "after", at=self.start_time)
+
+
+class SpeedDependentForce(ForceSource, partial=True):
+    """Force that depends on the velocity; a negative f_nominal brakes."""
+
+    f_nominal: Parameter = param("N", "force on the connected part at v_nominal; negative for a load")
+    v_nominal: Parameter = param("m/s", "nominal velocity", min=1e-12)
+    reverses: bool = True
+    """The force changes its direction with the velocity, as friction does."""
+    v: Variable = var("m/s", "velocity of the slide relative to the housing")
+
+    def equations(self) -> Equations:
+        yield from super().equations()
+        yield der(self.s) == self.v
+
+
+class LinearSpeedDependentForce(SpeedDependentForce):
+    """Force proportional to the velocity, e.g. viscous friction."""
+
+    def force(self) -> Expr:
+        return self.f_nominal * linear_law(self.v / self.v_nominal, self.reverses)
+
+
+class QuadraticSpeedDependentForce(SpeedDependentForce):
+    """Force proportional to the square of the velocity, e.g. drag."""
+
+    def force(self) -> Expr:
+        return self.f_nominal * quadratic_law(self.v / self.v_nominal, self.reverses)
+
+
+class InverseSpeedDependentForce(SpeedDependentForce):
+    """Force inversely proportional to the velocity, i.e. of constant power; linear below v0."""
+
+    v0: Parameter = param("m/s", "velocity below which the force falls to zero", min=1e-12)
+
+    def force(self) -> Expr:
+        law = inverse_law(self.v / self.v_nominal, self.v0 / self.v_nominal, self.reverses)
+        return self.f_nominal * law
+
+
+class SignForce(ForceSource):
+    """Constant force with the sign of the velocity, smoothed around standstill."""
+
+    f_nominal: Parameter = param("N", "force on the connected part in forward motion; negative for a load")
+    v0: Parameter = param("m/s", "velocity at which 99 % of it are reached", default=0.1, min=1e-12)
+    v: Variable = var("m/s", "velocity of the slide relative to the housing")
+
+    def equations(self) -> Equations:
+        yield from super().equations()
+        yield der(self.s) == self.v
+
+    def force(self) -> Expr:
+        return self.f_nominal * sign_law(self.v / self.v0)
+
+
+class MotionSource(LinearOneFlange, partial=True):
+    """Motion of a slide relative to the housing, whatever force it takes."""
+
+    v: Variable = var("m/s", "velocity of the slide relative to the housing")
+
+    def equations(self) -> Equations:
+        yield from super().equations()
+        yield der(self.s) == self.v
+
+    def source_power(self) -> Expr:
+        return -self.flange.f * self.v
+
+
+class TranslationalPosition(MotionSource):
+    """Position given by a signal: exactly, or through a Bessel filter of second order.
+
+    The filter makes velocity and acceleration of any signal finite (Modelica Standard Library, Translational.Position).
+    """
+
+    s_ref: Input = signal_in("m", "position")
+    exact: bool = True
+    """Follow the signal exactly: it must then have derivatives."""
+    f_crit: Parameter = param("Hz", "cut-off frequency of the filter", default=50.0, min=1e-12)
+
+    def equations(self) -> Equations:
+        yield from super().equations()
+        if self.exact:
+            yield self.s == self.s_ref
+        else:
+            w_crit = 2 * pi * self.f_crit
+            yield der(self.v) == ((self.s_ref - self.s) * w_crit - 1.3617 * self.v) * w_crit / 0.6180
+
+
+class TranslationalAccelerate(MotionSource):
+    """Acceleration given by a signal."""
+
+    a_ref: Input = signal_in("m/s2", "acceleration")
+
+    def equations(self) -> Equations:
+        yield from super().equations()
+        yield der(self.v) == self.a_ref
+
+
+class ConstantVelocity(MotionSource):
+    """Constant velocity, whatever force it takes."""
+
+    v_fixed: Parameter = param("m/s", "velocity")
+
+    def equations(self) -> Equations:
+        yield from super().equations()
+        yield self.v == self.v_fixed
