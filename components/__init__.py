@@ -1,5 +1,7 @@
 """Machine elements for drive-trains, written in the language of `modelica_like`."""
 
+from components.adaptors import AngleToTorqueAdaptor as AngleToTorqueAdaptor
+from components.adaptors import TorqueToAngleAdaptor as TorqueToAngleAdaptor
 from components.fixed import Fixed as Fixed
 from components.fixed import TranslationalFixed as TranslationalFixed
 from components.friction import BearingFriction as BearingFriction
@@ -15,6 +17,12 @@ from components.interfaces import CompliantWithRelativeStates as CompliantWithRe
 from components.interfaces import Flange as Flange
 from components.interfaces import LinearFlange as LinearFlange
 from components.loads import SpeedDependentLoad as SpeedDependentLoad
+from components.lossy_gears import ConstantEfficiencyGear as ConstantEfficiencyGear
+from components.lossy_gears import LossyGear as LossyGear
+from components.one_way import Freewheel as Freewheel
+from components.one_way import OneWayClutch as OneWayClutch
+from components.one_way import TorqueLimiter as TorqueLimiter
+from components.planetary import Differential as Differential
 from components.planetary import IdealPlanetary as IdealPlanetary
 from components.sensors import AngleSensor as AngleSensor
 from components.sensors import ForceSensor as ForceSensor
@@ -86,10 +94,13 @@ from components.translational_sources import QuadraticSpeedDependentForce as Qua
 from components.translational_sources import SignForce as SignForce
 from components.translational_sources import TranslationalAccelerate as TranslationalAccelerate
 from components.translational_sources import TranslationalPosition as TranslationalPosition
+from components.wheels import EddyCurrentTorque as EddyCurrentTorque
+from components.wheels import IdealRollingWheel as IdealRollingWheel
 
 __all__ = [
     "Accelerate",
     "AngleSensor",
+    "AngleToTorqueAdaptor",
     "BallScrew",
     "BearingFriction",
     "Brake",
@@ -98,12 +109,15 @@ __all__ = [
     "Compliant",
     "CompliantWithRelativeStates",
     "Constant",
+    "ConstantEfficiencyGear",
     "ConstantForce",
     "ConstantSpeed",
     "ConstantTorque",
     "ConstantVelocity",
     "Damper",
+    "Differential",
     "DryFriction",
+    "EddyCurrentTorque",
     "ElastoBacklash",
     "ElastoBacklash2",
     "ElastoGap",
@@ -114,10 +128,12 @@ __all__ = [
     "Force2",
     "ForceSensor",
     "ForceStep",
+    "Freewheel",
     "HeatPort",
     "HeatSource",
     "IdealGear",
     "IdealPlanetary",
+    "IdealRollingWheel",
     "Inertia",
     "InverseSpeedDependentForce",
     "InverseSpeedDependentTorque",
@@ -127,11 +143,13 @@ __all__ = [
     "LinearPowerSensor",
     "LinearSpeedDependentForce",
     "LinearSpeedDependentTorque",
+    "LossyGear",
     "MachineTable",
     "Mass",
     "MassWithStopAndFriction",
     "MultiPlateClutch",
     "MultiSensor",
+    "OneWayClutch",
     "Position",
     "PositionSensor",
     "PowerSensor",
@@ -162,8 +180,10 @@ __all__ = [
     "TimeFormula",
     "Torque",
     "Torque2",
+    "TorqueLimiter",
     "TorqueSensor",
     "TorqueStep",
+    "TorqueToAngleAdaptor",
     "TranslationalAccelerate",
     "TranslationalBrake",
     "TranslationalDamper",

@@ -24,3 +24,22 @@ class IdealPlanetary(Component):
         yield (1 + self.ratio) * carrier.phi == sun.phi + self.ratio * ring.phi
         yield ring.tau == self.ratio * sun.tau
         yield carrier.tau == -(1 + self.ratio) * sun.tau
+
+
+class Differential(Component):
+    """Bevel gear differential: both wheels get half the torque, the cage turns with the mean of their speeds.
+
+    An `IdealPlanetary` with equal torque arms, behind the final drive of the given ratio.
+    """
+
+    flange = Flange("drive shaft")
+    left = Flange("left wheel shaft")
+    right = Flange("right wheel shaft")
+    inlet, outlet = "flange", "left"
+    ratio: Parameter = param("1", "speed of the drive shaft over speed of the cage", default=1.0)
+
+    def equations(self) -> Equations:
+        drive, left, right = self.flange, self.left, self.right
+        yield 2 * drive.phi == self.ratio * (left.phi + right.phi)
+        yield left.tau == right.tau
+        yield 2 * left.tau == -self.ratio * drive.tau

@@ -9,7 +9,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from modelica_like.compiled import CompiledDae as CompiledDae
+    from modelica_like.compile.compiled import CompiledDae as CompiledDae
     from modelica_like.errors import ModelicaLikeError as ModelicaLikeError
     from modelica_like.language import Assembly as Assembly
     from modelica_like.language import Component as Component
@@ -23,7 +23,7 @@ __version__ = "0.1.0"
 
 _HOME = {
     "Assembly": "modelica_like.language",
-    "CompiledDae": "modelica_like.compiled",
+    "CompiledDae": "modelica_like.compile.compiled",
     "Component": "modelica_like.language",
     "ModelicaLikeError": "modelica_like.errors",
     "Options": "modelica_like.solve.options",

@@ -11,7 +11,7 @@ from pathlib import Path
 from rich.console import Console, Group, RenderableType
 from rich.table import Table
 
-from modelica_like.compiled import CompiledDae
+from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import NetlistError
 from modelica_like.netlist import load
 from modelica_like.report.run import closure_line, energy_table, events_table, statistics_line

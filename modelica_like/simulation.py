@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from modelica_like.compile import compile
-from modelica_like.compiled import CompiledDae
+from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import UnitError, ValueOutOfRange
 from modelica_like.flatten import flatten
 from modelica_like.initialize import StartKind, initialize

@@ -8,15 +8,15 @@ HERE = Path(__file__).parent
 EXAMPLES = HERE.parents[1] / "examples"
 
 PICTURES: dict[str, tuple[str, ...]] = {
-    "fan": ("impeller.w", "motor.w", "clutch.tau", "air.tau"),
+    "fan": ("motor.w", "impeller.w", "clutch.tau", "air.tau"),
     "machine_table_direct": ("motor.w", "spindle.w", "clutch.tau", "table.v", "table.s"),
     "machine_table_geared": ("motor.w", "spindle.w", "clutch.tau", "table.v", "table.s"),
-    "machine_tool_startup": ("J*.w", "shaft*.tau", "clutch.tau", "coil.y"),
-    "msl/rotational/First": ("inertia*.w", "torque.tau", "spring.tau"),
-    "msl/rotational/Friction": ("inertia*.w", "clutch.tau", "brake.tau"),
-    "msl/rotational/CoupledClutches": ("J*.w", "clutch*.tau"),
+    "machine_tool_startup": ("J1.w", "J2.w", "J3.w", "J4.w", "shaft1.tau", "shaft2.tau", "clutch.tau"),
+    "msl/rotational/First": ("inertia1.w", "inertia2.w", "inertia3.w", "torque.tau", "spring.tau"),
+    "msl/rotational/Friction": ("inertia3.w", "inertia2.w", "inertia1.w", "clutch.tau", "brake.tau"),
+    "msl/rotational/CoupledClutches": ("J1.w", "J2.w", "J3.w", "J4.w", "clutch1.tau", "clutch2.tau", "clutch3.tau"),
     "msl/rotational/ElasticBearing": ("shaft.w", "load.w", "spring.tau", "housing.phi"),
-    "msl/rotational/Backlash": ("inertia*.phi", "*acklash*.tau"),
+    "msl/rotational/Backlash": ("inertia1.phi", "inertia2.phi", "inertia3.phi", "elastoBacklash.tau", "elastoBacklash2.tau"),
 }
 
 END = {"fan": "4 s"}

@@ -137,7 +137,7 @@ class StartValue:
     strength: Literal["fixed", "default", "guess"]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class FlatModel:
     """Flat equations over nodes; node k < len(variables) is variable k, later nodes are derivatives.
 
@@ -189,6 +189,9 @@ class FlatModel:
         """Return where an equation of an instance comes from."""
         one = self.instances[instance]
         return Origin(one.path, one.template.component, one.template.sources[row])
+
+    def __repr__(self) -> str:
+        return f"<{self}>"
 
     def __str__(self) -> str:
         unknowns = len(self.variables) - len(self.inputs)

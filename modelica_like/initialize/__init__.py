@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from modelica_like.compiled import CompiledDae, Vector
+from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import InitializationError
 from modelica_like.initialize.point import Point as Point
 from modelica_like.initialize.point import call as call

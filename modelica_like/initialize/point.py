@@ -11,8 +11,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from modelica_like.buffers import buffered
-from modelica_like.compiled import CompiledDae, Vector
+from modelica_like.compile.buffers import buffered
+from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import InitializationError, SingularAtStart
 
 _MAX_NEWTON = 50

@@ -8,7 +8,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from modelica_like.compiled import CompiledDae, StartEntry, Vector
+from modelica_like.compile.compiled import CompiledDae, StartEntry, Vector
 from modelica_like.errors import ContradictingStart, InitializationError, MissingStart
 from modelica_like.initialize.matching import Matching
 from modelica_like.initialize.point import Point, call, solve_implicit

@@ -5,7 +5,7 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 
-from modelica_like.compiled import CompiledDae
+from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import InitializationError
 from modelica_like.initialize.point import Point, call
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from modelica_like.compiled import CompiledDae, Vector
+from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.initialize import Point
 from modelica_like.solve.idas import scaled_problem
 from modelica_like.solve.recorder import Segment

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from modelica_like.compiled import CompiledDae, CompiledTransition, Vector
+from modelica_like.compile.compiled import CompiledDae, CompiledTransition, Vector
 from modelica_like.errors import Chattering, StepFailed
 from modelica_like.initialize import Point, call, check_singular, solve_implicit, variable_slopes
 from modelica_like.solve.guards import Guards, candidates, locate

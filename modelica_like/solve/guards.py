@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from modelica_like.buffers import buffered
-from modelica_like.compiled import CompiledDae, Vector
+from modelica_like.compile.buffers import buffered
+from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.initialize import Point, call
 
 _LOCATED = 1e-13

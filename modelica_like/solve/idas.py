@@ -10,8 +10,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from modelica_like.buffers import BufferedFunction, buffered
-from modelica_like.compiled import CompiledDae, Vector
+from modelica_like.compile.buffers import BufferedFunction, buffered
+from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import StepFailed
 from modelica_like.initialize import Point, call
 from modelica_like.solve.options import Options

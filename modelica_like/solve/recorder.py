@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from modelica_like.compiled import Vector
+from modelica_like.compile.compiled import Vector
 from modelica_like.errors import Source
 from modelica_like.initialize import Point
 

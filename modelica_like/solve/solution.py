@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from modelica_like.compiled import CompiledDae, Vector
+from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import MissingExtra, UnknownName, ValueOutOfRange, did_you_mean
 from modelica_like.language.expr import Symbol
 from modelica_like.language.mode import BoundMode

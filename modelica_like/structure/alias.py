@@ -21,7 +21,8 @@ class Aliases:
         known: roots whose value is a number or an expression of parameters.
         derivative: root -> (root, factor) of its derivative: der(root) = factor * root.
         remaining: positions in `FlatModel.linear` of the equations that still say something.
-        contradictions: positions of the equations without any unknown left.
+        contradictions: positions of the equations without any unknown left, each with those that gave its unknowns their
+            values.
     """
 
     root: list[int]
@@ -29,7 +30,7 @@ class Aliases:
     known: dict[int, Any]
     derivative: dict[int, tuple[int, float]]
     remaining: list[int]
-    contradictions: list[int]
+    contradictions: list[tuple[int, ...]]
 
 
 def find_aliases(model: FlatModel) -> Aliases:
@@ -61,7 +62,8 @@ class _Elimination:
         self.queue = deque(range(len(model.linear)))
         self.remaining: set[int] = set()
         self.used: set[int] = set()
-        self.contradictions: list[int] = []
+        self.cause: dict[int, int] = {}
+        self.contradictions: list[tuple[int, ...]] = []
         self.inputs = set(model.inputs)
 
     def run(self) -> Aliases:
@@ -131,13 +133,14 @@ class _Elimination:
         terms, constant = self._reduce(equation)
         self.remaining.discard(number)
         if not terms:
-            self.contradictions.append(number)
+            self.contradictions.append((number, *self._causes(equation)))
             return set()
         numbers = {root: c for root, c in terms.items() if c is not None}
         if len(terms) == len(numbers) == 1:
             ((root, coefficient),) = numbers.items()
             if root not in self.integral and root not in self.inputs:
                 self.used.add(number)
+                self.cause[root] = number
                 return self._learn(root, -constant / coefficient if not _is_zero(constant) else 0.0)
         if len(terms) == len(numbers) == 2 and _is_zero(constant):
             (first, a), (second, b) = numbers.items()
@@ -149,6 +152,11 @@ class _Elimination:
             self.watchers.setdefault(root, set()).add(number)
         return set()
 
+    def _causes(self, equation: LinearEquation) -> list[int]:
+        """Equations that gave the values of all its unknowns."""
+        roots = (self.find(node)[0] for node, _ in equation.terms)
+        return list(dict.fromkeys(self.cause[root] for root in roots if root in self.cause))
+
     def _learn(self, root: int, value: Any) -> set[int]:
         """A class has a constant value, its derivatives are zero."""
         self.known[root] = value
@@ -157,6 +165,7 @@ class _Elimination:
             below, _ = self._derivative(root)
             self.integral.pop(below, None)
             if below not in self.known:
+                self.cause[below] = self.cause[root]
                 affected |= self._learn(below, 0.0)
         return affected
 

@@ -10,6 +10,7 @@ from typing import Any
 
 import casadi as ca
 
+from modelica_like.errors import StructureError
 from modelica_like.structure.isolate import isolate
 
 SMALL = 3
@@ -85,10 +86,20 @@ class BlockSolver:
         _, row_order, column_order, row_starts, column_starts, _, _ = self.jacobian.sparsity().btf()
         count = len(row_starts) - 1
         for number in range(count):
+            if row_starts[number + 1] - row_starts[number] != column_starts[number + 1] - column_starts[number]:
+                raise self._not_square(column_order[column_starts[number] : column_starts[number + 1]])
+        for number in range(count):
             rows = row_order[row_starts[number] : row_starts[number + 1]]
             columns = column_order[column_starts[number] : column_starts[number + 1]]
             self._solve(tuple(rows), tuple(columns))
         return self.solved
+
+    def _not_square(self, columns: list[int]) -> StructureError:
+        names = ", ".join(str(self.unknowns[column]) for column in columns[:6])
+        return StructureError(
+            f"After index reduction the equations do not determine {names or 'anything more, but some are left'}.",
+            advice="Look for rigid parts that form a loop, or for a part that only a derivative of an input could move.",
+        )
 
     def _solve(self, rows: tuple[int, ...], columns: tuple[int, ...]) -> None:
         if len(rows) == 1 and (rows[0], columns[0]) in self.safe:

@@ -88,10 +88,11 @@ def _overdetermined(system: System, origins: list[Origin], chains: list[int]) ->
 
 
 def _contradiction(origins: list[Origin]) -> Overdetermined:
-    parts = _list(list(dict.fromkeys(o.path or o.kind for o in origins)))
+    parts = list(dict.fromkeys(o.path or o.kind for o in origins))
+    fix = "fixes" if len(parts) == 1 else "fix"
     return Overdetermined(
-        f"{parts}: what these equations say is already fixed by others.",
+        f"{_list(parts)} {fix} the same angle, speed or torque more than once.",
         where=_places(origins),
-        why="Two parts fix the same speed, angle or torque, or rigid parts form a loop.",
+        why="Two parts prescribe it, or rigid parts form a loop.",
         advice="Remove one, or put a spring or clutch between.",
     )

@@ -24,7 +24,7 @@ class Notice:
     text: str
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class ReducedDae:
     """Index-1 system: der(x) = ode(x, z, p, d, t), 0 = alg(x, z, p, d, t).
 
@@ -88,6 +88,9 @@ class ReducedDae:
             rates = rates + ca.jtimes(expressions, self.z, z_rates)
         return rates
 
+    def __repr__(self) -> str:
+        return f"<{self}>"
+
     def __str__(self) -> str:
         kinds = [block.kind for block in self.blocks]
         largest = max((len(block.unknowns) for block in self.blocks), default=0)
@@ -120,8 +123,9 @@ def reduce(flat: FlatModel) -> ReducedDae:
     """
     aliases = find_aliases(flat)
     system = build_system(flat, aliases)
+    _check_input_rates(system)
     prefer_relative_states(system)
-    contradictions = [flat.linear[k].origin for k in aliases.contradictions]
+    contradictions = [flat.linear[k].origin for group in aliases.contradictions for k in group]
     check_solvable(system, _incidence(system), contradictions)
     counts = Pantelides(system, _incidence(system)).counts
     states = select_states(system, counts, _top_slopes(system, counts))
@@ -129,6 +133,17 @@ def reduce(flat: FlatModel) -> ReducedDae:
     unknowns = _unknowns(system, states)
     solved = BlockSolver(residual, _column(system, unknowns), _volatile(system)).run()
     return _assemble(system, counts, states, unknowns, origins, solved)
+
+
+def _check_input_rates(system: System) -> None:
+    """Refuse a motion that an input prescribes where its derivative counts: it is not known."""
+    for level in system.inputs:
+        rate = system.derivative(level)
+        if rate is not None:
+            raise StructureError(
+                f"{system.levels[rate].name} is the derivative of the input {system.levels[level].name}, which is not known.",
+                advice="Give the derivative as an input of its own, or filter the input before it prescribes a motion.",
+            )
 
 
 def _column(system: System, levels: list[int]) -> Any:

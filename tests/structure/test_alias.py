@@ -74,7 +74,7 @@ def test_every_solution_of_the_equations_fulfils_the_aliases_and_none_is_lost(sy
     left = matrix[found.remaining] @ embedding
     assert np.linalg.matrix_rank(left, tol=1e-9) == len(free) - solutions.shape[1]
     # Equations without unknowns are redundant here, as all constants are zero.
-    for number in found.contradictions:
+    for number, *_ in found.contradictions:
         assert np.linalg.norm(matrix[number] @ embedding) < 1e-9
     # Nothing with one or two unknowns is left over.
     assert all(np.count_nonzero(np.abs(row) > 1e-12) > 2 for row in left)

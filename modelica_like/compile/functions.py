@@ -2,28 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
-from modelica_like.compiled import CompiledDae, CompiledTransition, Reset, StartEntry, Vector
+from modelica_like.compile.compiled import CompiledDae, CompiledTransition, Reset, StartEntry, Vector
+from modelica_like.compile.energy import energy_terms
+from modelica_like.compile.soon import guards_soon
+from modelica_like.compile.start_system import start_system
 from modelica_like.errors import Source
 from modelica_like.flatten.model import FlatDiscrete, FlatModel, evaluate
 from modelica_like.flatten.template import TransitionForm
 from modelica_like.language import Assembly
-from modelica_like.start_system import start_system
 from modelica_like.structure.reduce import ReducedDae
-
-TIME_RESOLUTION = 1e-10
-"""Time resolution of events relative to max(1 s, |t|).
-
-Guards are judged that much later, so that one that just left zero counts by its direction.
-"""
-
-_JOINS: dict[int, Callable[[Any, Any], Any]] = {ca.OP_FMIN: ca.fmin, ca.OP_FMAX: ca.fmax}
 
 
 def compile(reduced: ReducedDae) -> CompiledDae:
@@ -48,7 +41,7 @@ def compile(reduced: ReducedDae) -> CompiledDae:
         variables=build.function("variables", reduced.values[: len(flat.variables)]),
         guards=build.function("guards", guards),
         guard_rates=build.function("guard_rates", reduced.total_derivative(guards)),
-        guards_soon=build.function("guards_soon", _soon(reduced, guards)),
+        guards_soon=build.function("guards_soon", guards_soon(reduced, guards)),
         moments=build.function("moments", moments),
         resets=build.function("resets", resets),
         reset_nodes=tuple(targets),
@@ -73,33 +66,8 @@ def compile(reduced: ReducedDae) -> CompiledDae:
         places=_places(flat),
         summary=str(reduced),
         settings=dict(getattr(flat.components.get(""), "simulate", {})),
-        _make_energy=lambda: _energy(reduced),
+        _make_energy=lambda: build.function("energy", energy_terms(reduced)),
     )
-
-
-def _soon(reduced: ReducedDae, guards: Any) -> Any:
-    """Follow guards for one time resolution.
-
-    Relations that are joined go each their own way: one that stays at zero never counts as true.
-    """
-    if not guards.numel():
-        return guards
-    relations: list[Any] = []
-    _joined(guards, lambda relation: relations.append(relation) or relation)
-    stacked = ca.vertcat(*relations)
-    ahead = TIME_RESOLUTION * ca.fmax(1.0, ca.fabs(reduced.flat.time))
-    later = iter(ca.vertsplit(stacked + ahead * reduced.total_derivative(stacked)))
-    return _joined(guards, lambda _: next(later))
-
-
-def _joined(guards: Any, relation: Callable[[Any], Any]) -> Any:
-    """Rebuild guards with something else in the place of every relation."""
-
-    def rebuilt(guard: Any) -> Any:
-        join = _JOINS.get(guard.op())
-        return join(rebuilt(guard.dep(0)), rebuilt(guard.dep(1))) if join else relation(guard)
-
-    return ca.vertcat(*(rebuilt(guard) for guard in ca.vertsplit(guards)))
 
 
 def _places(flat: FlatModel) -> dict[str, Source]:
@@ -183,27 +151,3 @@ class _Builder:
                 conditions.append(columns[number][row])
                 modes.append((self.place[prefix + mode], target, source))
         return ca.vertcat(*conditions), tuple(modes)
-
-
-def _energy(reduced: ReducedDae) -> ca.Function:
-    """Evaluate the energy terms of every component."""
-    flat = reduced.flat
-    variable = {one.path: k for k, one in enumerate(flat.variables)}
-    rows: list[Any] = []
-    for instance in flat.instances:
-        template = instance.template
-        prefix = f"{instance.path}." if instance.path else ""
-        slots: list[Any] = []
-        for slot in template.energy_slots:
-            node = variable[prefix + slot.path]
-            value = reduced.values[node] if slot.order == 0 else reduced.rate(node)
-            slots.append(value)
-        v = ca.vertcat(*slots) if slots else ca.SX(0, 1)
-        p = flat.q[list(instance.parameters)] if instance.parameters else ca.SX(0, 1)
-        d = flat.d[list(instance.discretes)] if instance.discretes else ca.SX(0, 1)
-        terms = template.energy(v, p, d, flat.time)
-        powers = terms[3:]
-        inflow = ca.sum1(powers) if powers.numel() else ca.SX(0)
-        rows.append(ca.horzcat(terms[0], terms[1], terms[2], inflow))
-    table = ca.vertcat(*rows)
-    return _Builder(reduced).function("energy", ca.horzcat(table, reduced.total_derivative(table[:, 0])))

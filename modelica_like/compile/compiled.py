@@ -9,7 +9,7 @@ from typing import Any
 
 import casadi as ca
 
-from modelica_like.buffers import Vector as Vector
+from modelica_like.compile.buffers import Vector as Vector
 from modelica_like.errors import LanguageError, Source, UnknownName, did_you_mean
 from modelica_like.flatten.model import FlatDiscrete, FlatParameter, FlatVariable, Origin
 from modelica_like.units import to_si

@@ -1,0 +1,147 @@
+"""Gears with friction in teeth and bearings."""
+
+from __future__ import annotations
+
+from components.interfaces import TwoFlanges
+from components.thermal import Lossy
+from modelica_like.language import (
+    Equations,
+    Events,
+    Expr,
+    Mode,
+    Output,
+    Parameter,
+    Variable,
+    absolute,
+    der,
+    interpolate,
+    maximum,
+    minimum,
+    param,
+    signal_out,
+    var,
+    where,
+)
+
+LossRows = tuple[tuple[float, float, float, float, float], ...]
+
+
+class MeshWithFriction(Lossy, TwoFlanges, partial=True):
+    """Gear whose teeth and bearings rub, and stick where the torques are too small to turn them.
+
+    With the torque x = -flange_b.tau/ratio that the mesh passes on, counted at flange_a, the lost torque is a line in x
+    while flange_a drives, and another one while flange_b drives; in forward rotation the larger one holds, in backward
+    rotation the smaller one. At standstill it is whatever keeps the gear at rest, between these limits (C. Pelchen,
+    C. Schweiger, M. Otter: Modeling and simulating the efficiency of gearboxes, 2nd Modelica Conference 2002; the
+    driving side after C. Bertsch, 2009). The heavier the inertia on the load side, the more the efficiency against the
+    drive matters: where it is negative, the motion is only unique if the inertia of the drive is large enough.
+
+    A subclass gives the efficiencies and the friction of the bearings at a speed.
+    """
+
+    ratio: Parameter = param("1", "transmission ratio, speed of flange_a over speed of flange_b")
+    phi_a: Variable = var("rad", "angle of flange_a relative to the housing")
+    w_a: Variable = var("rad/s", "speed of flange_a relative to the housing", state="always")
+    tau_loss: Variable = var("N.m", "lost torque at flange_a, against forward rotation")
+    mode = Mode("stuck", "start_forward", "start_backward", "forward", "backward", description="friction mode")
+
+    def efficiencies(self, speed: Expr | float) -> tuple[Expr | float, Expr | float]:
+        """Return the mesh efficiency while flange_a drives, and while flange_b drives."""
+        raise NotImplementedError
+
+    def bearing_friction(self, speed: Expr | float) -> tuple[Expr | float, Expr | float]:
+        """Return the torques of the bearings at flange_a, while flange_a and while flange_b drives."""
+        return 0.0, 0.0
+
+    def forward_loss(self, speed: Expr | float) -> Expr:
+        """Return the lost torque in forward rotation."""
+        return maximum(*self._lines(speed, 1.0))
+
+    def backward_loss(self, speed: Expr | float) -> Expr:
+        """Return the lost torque in backward rotation; it is negative."""
+        return minimum(*self._lines(speed, -1.0))
+
+    def _lines(self, speed: Expr | float, direction: float) -> tuple[Expr, Expr]:
+        eta_a, eta_b = self.efficiencies(speed)
+        bearing_a, bearing_b = self.bearing_friction(speed)
+        passed = -self.flange_b.tau / self.ratio
+        driven_by_a = (1 / eta_a - 1) * passed + direction * bearing_a / eta_a
+        return driven_by_a, (eta_b - 1) * passed + direction * eta_b * bearing_b
+
+    def equations(self) -> Equations:
+        yield from super().equations()
+        a, b, loss = self.flange_a, self.flange_b, self.tau_loss
+        yield self.phi_a == a.phi - self.phi_support
+        yield self.phi_a == self.ratio * (b.phi - self.phi_support)
+        yield der(self.phi_a) == self.w_a
+        yield b.tau + self.ratio * (a.tau - loss) == 0
+        yield self.mode.choose(
+            stuck=der(self.w_a),
+            start_forward=loss - self.forward_loss(0),
+            start_backward=loss - self.backward_loss(0),
+            forward=loss - self.forward_loss(maximum(self.w_a, 0)),
+            backward=loss - self.backward_loss(maximum(-self.w_a, 0)),
+        ) == 0  # fmt: skip
+
+    def events(self) -> Events:
+        mode, w = self.mode, self.w_a
+        yield mode.initially("forward", when=w > 0)
+        yield mode.initially("backward", when=w < 0)
+        yield mode.go("stuck", "start_forward", when=self.tau_loss > self.forward_loss(0))
+        yield mode.go("stuck", "start_backward", when=self.tau_loss < self.backward_loss(0))
+        yield mode.go("start_forward", "forward", when=w > 0)
+        yield mode.go("start_backward", "backward", when=w < 0)
+        yield mode.go("start_forward", "stuck", when=der(w) < 0, reset={w: 0})
+        yield mode.go("start_backward", "stuck", when=der(w) > 0, reset={w: 0})
+        yield mode.go("forward", "stuck", when=w < 0, reset={w: 0})
+        yield mode.go("backward", "stuck", when=w > 0, reset={w: 0})
+
+    def dissipation(self) -> Expr:
+        return self.tau_loss * self.w_a
+
+
+class LossyGear(MeshWithFriction):
+    """Gear with the loss table of the Modelica Standard Library, Rotational.LossyGear.
+
+    -flange_b.tau = ratio·(eta_mf·flange_a.tau - tau_bf), where eta_mf is eta_mf1 while flange_a drives and 1/eta_mf2
+    while flange_b drives, tau_bf likewise. Two numbers are enough in a `ConstantEfficiencyGear`.
+    """
+
+    loss_table: LossRows
+    """Rows of speed |w_a| in w_scale, eta_mf1, eta_mf2, and |tau_bf1|, |tau_bf2| in tau_scale."""
+    w_scale: Parameter = param("rad/s", "speed that counts as 1 in loss_table", default=1.0)
+    tau_scale: Parameter = param("N.m", "torque that counts as 1 in loss_table", default=1.0)
+
+    def _column(self, speed: Expr | float, column: int) -> Expr:
+        return interpolate(speed / self.w_scale, [r[0] for r in self.loss_table], [r[column] for r in self.loss_table])
+
+    def efficiencies(self, speed: Expr | float) -> tuple[Expr | float, Expr | float]:
+        return self._column(speed, 1), self._column(speed, 2)
+
+    def bearing_friction(self, speed: Expr | float) -> tuple[Expr | float, Expr | float]:
+        return tuple(self.tau_scale * absolute(self._column(speed, k)) for k in (3, 4))  # type: ignore[return-value]
+
+
+class ConstantEfficiencyGear(MeshWithFriction):
+    """Gear with one efficiency in each direction of power.
+
+    Without a value, the efficiency against the drive is 2 - 1/efficiency: the same friction in the teeth (G. Niemann,
+    H. Winter: Maschinenelemente III, worm gears). Where it is not above zero the gear is self-locking: no torque at
+    flange_b can turn it, only a drive at flange_a.
+    """
+
+    efficiency: Parameter = param("1", "power out at flange_b over power in at flange_a", min=1e-3, max=1)
+    efficiency_back: Parameter = param("1", "power out at flange_a over power in at flange_b; not above 0: none", max=1)
+    self_locking: Output = signal_out("1", "1 for a self-locking gear, otherwise 0")
+
+    @property
+    def backward(self) -> Expr:
+        """Efficiency while flange_b drives."""
+        return self.efficiency_back if self.given("efficiency_back") else 2 - 1 / self.efficiency
+
+    def efficiencies(self, speed: Expr | float) -> tuple[Expr | float, Expr | float]:
+        return self.efficiency, self.backward
+
+    def equations(self) -> Equations:
+        yield from super().equations()
+        yield self.self_locking == where(self.backward > 0, 0, 1)

@@ -1,0 +1,91 @@
+"""Couplings that limit the torque or let a shaft overrun: freewheels, one-way clutches, torque limiters."""
+
+from __future__ import annotations
+
+from components.friction import Clutch, DryFriction
+from components.interfaces import CompliantWithRelativeStates
+from modelica_like.language import (
+    Equations,
+    Events,
+    Expr,
+    Mode,
+    Parameter,
+    Variable,
+    all_of,
+    any_of,
+    der,
+    param,
+    var,
+    where,
+)
+
+
+class Freewheel(CompliantWithRelativeStates):
+    """Ideal freewheel: flange_b may overrun flange_a, but not fall behind.
+
+    Either the shafts turn together and flange_a drives flange_b, or flange_b is faster and there is no torque: of the
+    overrunning speed and the driving torque at most one is not zero, and none is negative.
+    """
+
+    # No torque depends on the angle by which a freewheel has overrun.
+    phi_rel: Variable = var("rad", "relative angle, flange_b.phi - flange_a.phi", state="prefer", default=0)
+    w_rel: Variable = var("rad/s", "overrunning speed", state="always")
+    mode = Mode("overrunning", "locked", description="state of the freewheel")
+
+    def equations(self) -> Equations:
+        yield from super().equations()
+        yield self.mode.choose(overrunning=self.tau, locked=der(self.w_rel)) == 0
+
+    def events(self) -> Events:
+        yield self.mode.initially("locked", when=all_of(self.w_rel <= 0, self.w_rel >= 0))
+        yield self.mode.go("locked", "overrunning", when=self.tau > 0)
+        yield self.mode.go("overrunning", "locked", when=self.w_rel < 0, reset={self.w_rel: 0})
+
+
+class OneWayClutch(Clutch):
+    """Friction clutch and freewheel side by side: flange_b may overrun flange_a, against the friction of the clutch.
+
+    One element, because the torque would not be unique between a freewheel and a clutch that both hold. Modelica
+    Standard Library, Rotational.OneWayClutch.
+    """
+
+    def sliding_friction(self, speed: Expr | float) -> Expr:
+        return where(self.f_normalized > 0, super().sliding_friction(speed), self.tau_drag)
+
+    def equations(self) -> Equations:
+        yield from CompliantWithRelativeStates.equations(self)
+        at_rest = self.sliding_friction(0)
+        moving = self.tau - self.sliding_friction(where(self.w_rel > 0, self.w_rel, 0))
+        yield self.mode.choose(
+            stuck=der(self.w_rel), start_forward=self.tau - at_rest, forward=moving, otherwise=self.tau
+        ) == 0  # fmt: skip
+        if self.heat_port.used:
+            yield self.heat_port.Q_flow == -self.dissipation()
+
+    def events(self) -> Events:
+        mode, w = self.mode, self.w_rel
+        yield mode.initially("forward", when=any_of(w > 0, w < 0))
+        yield mode.initially("stuck", when=w >= 0)
+        yield mode.go("stuck", "start_forward", when=self.breaks_forward())
+        yield mode.go("start_forward", "forward", when=w > 0)
+        yield mode.go("start_forward", "stuck", when=der(w) < 0, reset={w: 0})
+        yield mode.go("forward", "stuck", when=w < 0, reset={w: 0})
+
+
+class TorqueLimiter(DryFriction, CompliantWithRelativeStates):
+    """Slipping coupling that protects a drive: rigid up to tau_max·peak, then it slips at tau_max."""
+
+    tau_max: Parameter = param("N.m", "torque at which it slips", min=0)
+    phi_rel: Variable = var("rad", "relative angle, flange_b.phi - flange_a.phi", state="prefer", default=0)
+    w_rel: Variable = var("rad/s", "slip speed", state="always")
+
+    @property
+    def slip(self) -> Expr:
+        return self.w_rel
+
+    @property
+    def friction(self) -> Expr:
+        return self.tau
+
+    def sliding_friction(self, speed: Expr | float) -> Expr:
+        return self.tau_max

@@ -1,0 +1,87 @@
+"""Functions that work alike on floats, numpy arrays and CasADi expressions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import reduce
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+Number = Any
+"""A float, a numpy array (all arrays of one call fit each other by broadcasting) or a CasADi SX, MX or DM."""
+
+
+def is_symbolic(*values: Number) -> bool:
+    """Tell whether any of the values belongs to CasADi."""
+    return any(isinstance(value, ca.SX | ca.MX | ca.DM) for value in values)
+
+
+def _function(numeric: Callable[..., Any], symbolic: Callable[..., Any], text: str) -> Callable[..., Number]:
+    def function(*values: Number) -> Number:
+        return symbolic(*values) if is_symbolic(*values) else numeric(*values)
+
+    function.__doc__ = text
+    return function
+
+
+sqrt = _function(np.sqrt, ca.sqrt, "Square root.")
+exp = _function(np.exp, ca.exp, "Exponential function.")
+sin = _function(np.sin, ca.sin, "Sine of an angle in rad.")
+cos = _function(np.cos, ca.cos, "Cosine of an angle in rad.")
+acos = _function(np.arccos, ca.acos, "Angle in rad with a given cosine.")
+asin = _function(np.arcsin, ca.asin, "Angle in rad with a given sine.")
+floor = _function(np.floor, ca.floor, "Largest whole number not above a value.")
+sign = _function(np.sign, ca.sign, "Sign: -1, 0 or 1.")
+absolute = _function(np.abs, ca.fabs, "Absolute value.")
+hypot = _function(np.hypot, lambda x, y: ca.sqrt(x * x + y * y), "Resultant of two values at a right angle.")
+where = _function(np.where, ca.if_else, "Choose by a condition: where(condition, then, otherwise).")
+_greater = _function(np.maximum, ca.fmax, "Larger of two values.")
+_smaller = _function(np.minimum, ca.fmin, "Smaller of two values.")
+
+
+def maximum(*values: Number) -> Number:
+    """Return the largest of several values."""
+    return reduce(_greater, values)
+
+
+def minimum(*values: Number) -> Number:
+    """Return the smallest of several values."""
+    return reduce(_smaller, values)
+
+
+def solve(rows: Sequence[Sequence[Number]], right: Sequence[Number]) -> list[Number]:
+    """Solve a small linear system.
+
+    Args:
+        rows: coefficients of each equation.
+        right: right-hand sides.
+
+    Raises:
+        ValueError: the equations have no unique solution.
+    """
+    entries = [*(entry for row in rows for entry in row), *right]
+    if is_symbolic(*entries):
+        matrix = ca.vertcat(*(ca.horzcat(*row) for row in rows))
+        solution = ca.solve(matrix, ca.vertcat(*right))
+        return [solution[k] for k in range(len(rows))]
+    same_shape = np.broadcast_arrays(*(np.asarray(entry, dtype=float) for entry in entries))
+    count = len(rows)
+    matrix = np.stack(same_shape[: count * count], axis=-1).reshape(*same_shape[0].shape, count, count)
+    vector = np.stack(same_shape[count * count :], axis=-1)[..., None]
+    try:
+        solution = np.linalg.solve(matrix, vector)[..., 0]
+    except np.linalg.LinAlgError:
+        raise ValueError("The equations have no unique solution.") from None
+    return [solution[..., k] if same_shape[0].ndim else float(solution[k]) for k in range(count)]
+
+
+def require(condition: Number, message: str) -> None:
+    """Refuse numbers that mean nothing; a symbolic condition cannot be decided, so it passes.
+
+    Raises:
+        ValueError: with the message.
+    """
+    if not is_symbolic(condition) and not np.all(condition):
+        raise ValueError(message)

@@ -1,0 +1,224 @@
+"""Strength of shafts: smallest diameter, stress concentration, equivalent stress, safety against yielding."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from components.sizing.maths import maximum, minimum, require, sqrt, where
+from components.sizing.quantities import Force, Length, Ratio, SmallTorque, Stress, Torque
+from components.sizing.result import Result, line
+from components.sizing.shaft_statics import Load, SectionForces, ShaftStatics, section_forces, shaft_statics
+
+
+@dataclass(frozen=True)
+class NotchCoefficients:
+    """Coefficients of the stress concentration at a shoulder (Steinhilper, Konstruktionselemente, table 3.6)."""
+
+    A: float
+    E: float
+    G: float
+    k: float
+    l: float  # noqa: E741 -- the source's letter
+    m: float
+
+
+SHOULDER_IN_BENDING = NotchCoefficients(A=0.40, E=6.00, G=0.80, k=0.40, l=2.75, m=1.50)
+SHOULDER_IN_TORSION = NotchCoefficients(A=0.40, E=25.00, G=0.20, k=0.45, l=2.25, m=2.00)
+
+
+def stress_concentration(large: Length, small: Length, fillet: Length, coefficients: NotchCoefficients) -> Ratio:
+    """Return the stress-concentration factor of a shoulder with a fillet (Steinhilper; document 002, equation 34).
+
+    1 + 1/sqrt(A/(t/r)^k + E·[(1 + d/2r)/(d/2r)^1.5]^l + G·d/(D·(t/r)^m)) with t = (D - d)/2.
+
+    Args:
+        large: diameter D in m.
+        small: diameter d in m.
+        fillet: radius r in m.
+        coefficients: of the kind of loading.
+
+    Raises:
+        ValueError: there is no shoulder.
+    """
+    require((large > small) & (fillet > 0), "A shoulder needs two diameters that differ, and a fillet radius.")
+    depth, size, c = (large - small) / (2 * fillet), small / (2 * fillet), coefficients
+    total = c.A / depth**c.k + c.E * ((1 + size) / size**1.5) ** c.l + c.G * small / (large * depth**c.m)
+    return 1 + 1 / sqrt(total)
+
+
+def bending_stress(moment: Torque, diameter: Length) -> Stress:
+    """Return the nominal bending stress of a round shaft in Pa: 32·M/(pi·d³) (document 002, equation 32)."""
+    return 32 * moment / (math.pi * diameter**3)
+
+
+def torsional_stress(torque: Torque, diameter: Length) -> Stress:
+    """Return the nominal torsional stress of a round shaft in Pa: 16·T/(pi·d³) (document 002, equation 33)."""
+    return 16 * torque / (math.pi * diameter**3)
+
+
+def von_mises(normal: Stress, shear: Stress) -> Stress:
+    """Return the equivalent stress in Pa: sqrt(sigma² + 3·tau²) (von Mises; document 002, equation 35)."""
+    return sqrt(normal**2 + 3 * shear**2)
+
+
+@dataclass(frozen=True)
+class ShaftDiameter(Result):
+    """Smallest diameter of a shaft in bending."""
+
+    bending: SmallTorque = line("resultant bending moment")
+    allowable_stress: Stress = line("strength over required safety")
+    smallest_diameter: Length = line("smallest diameter that stands the bending moment", at_most="diameter")
+    diameter: Length = line("diameter of the shaft")
+
+
+def shaft_diameter(bending: Torque, strength: Stress, safety: Ratio, diameter: Length) -> ShaftDiameter:
+    """Compare the diameter with the smallest one: d³ = 32·M/(pi·sigma) (document 002, equations 29 to 31).
+
+    Args:
+        bending: resultant bending moment in N.m.
+        strength: fatigue strength in Pa; document 002 takes the yield strength.
+        safety: required safety.
+        diameter: smallest diameter of the shaft in m.
+    """
+    allowable = strength / safety
+    return ShaftDiameter(bending, allowable, (32 * bending / (math.pi * allowable)) ** (1 / 3), diameter)
+
+
+@dataclass(frozen=True)
+class ShaftStress(Result):
+    """Stresses and safety at one section of a shaft."""
+
+    at: Length = line("position")
+    diameter: Length = line("diameter")
+    bending: SmallTorque = line("resultant bending moment")
+    torque: SmallTorque = line("torsional moment")
+    bending_stress: Stress = line("nominal bending stress")
+    torsional_stress: Stress = line("nominal torsional stress")
+    bending_factor: Ratio = line("stress concentration in bending")
+    torsion_factor: Ratio = line("stress concentration in torsion")
+    largest_bending: Stress = line("largest bending stress")
+    largest_torsion: Stress = line("largest torsional stress")
+    equivalent_stress: Stress = line("equivalent stress (von Mises)")
+    safety: Ratio = line("safety against yielding", at_least="required_safety")
+    required_safety: Ratio = line("required safety")
+
+
+def shaft_stress(
+    bending: Torque, torque: Torque, diameter: Length, yield_strength: Stress, bending_factor: Ratio = 1.0,
+    torsion_factor: Ratio = 1.0, axial_force: Force = 0.0, required_safety: Ratio = 1.0, at: Length = 0.0,
+) -> ShaftStress:  # fmt: skip
+    """Work out stresses and safety of a round section (Roloff/Matek; document 002, equations 32 to 36).
+
+    Args:
+        bending: resultant bending moment in N.m.
+        torque: torsional moment in N.m.
+        diameter: in m.
+        yield_strength: in Pa.
+        bending_factor: stress concentration in bending.
+        torsion_factor: stress concentration in torsion.
+        axial_force: in N, without stress concentration.
+        required_safety: smallest safety.
+        at: position in m, for the table.
+    """
+    normal, shear = bending_stress(bending, diameter), torsional_stress(abs(torque), diameter)
+    tension = 4 * abs(axial_force) / (math.pi * diameter**2)
+    equivalent = von_mises(tension + bending_factor * normal, torsion_factor * shear)
+    return ShaftStress(
+        at, diameter, bending, abs(torque), normal, shear, bending_factor, torsion_factor, bending_factor * normal,
+        torsion_factor * shear, equivalent, yield_strength / equivalent, required_safety,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Section:
+    """A cylindrical piece of a shaft.
+
+    Attributes:
+        end: position of its end in m; it begins where the one before ends.
+        diameter: in m.
+        fillet: radius in m of the shoulder at its end.
+    """
+
+    end: Length
+    diameter: Length
+    fillet: Length = 0.0
+
+
+@dataclass(frozen=True)
+class SteppedShaft(Result):
+    """Safety of a stepped shaft at every place that matters."""
+
+    reactions: tuple[Result, ...] = line("bearings")
+    stresses: tuple[ShaftStress, ...] = line("stresses at bearings, loads and shoulders")
+    largest_bending: SmallTorque = line("largest resultant bending moment")
+    largest_stress: Stress = line("largest equivalent stress (von Mises)")
+    safety: Ratio = line("smallest safety against yielding", at_least="required_safety")
+    place: Length = line("where it is")
+    required_safety: Ratio = line("required safety")
+
+
+def stepped_shaft(
+    loads: Sequence[Load], bearings: Sequence[Length], sections: Sequence[Section], yield_strength: Stress,
+    hinges: Sequence[Length] = (), required_safety: Ratio = 1.0,
+) -> SteppedShaft:  # fmt: skip
+    """Check a stepped shaft against yielding, from its loads to the safety.
+
+    Positions and diameters are plain numbers; forces and torques may be arrays or expressions.
+
+    Args:
+        loads: what acts on the shaft.
+        bearings: positions in m.
+        sections: pieces of the shaft from its left end on.
+        yield_strength: in Pa.
+        hinges: positions in m of joints without bending moment.
+        required_safety: smallest safety.
+
+    Raises:
+        ValueError: the shaft is not statically determinate, or something acts beyond its end.
+    """
+    statics = shaft_statics(loads, bearings, hinges)
+    last = max(cut.at for cut in statics.diagram)
+    require(last <= sections[-1].end, f"Something acts at {last:g} m, beyond the last section.")
+    everything = [*loads, *(Load(reaction.at, reaction.y, reaction.z) for reaction in statics.reactions)]
+    stresses = [_at_cut(cut, sections, yield_strength, required_safety) for cut in _worse_sides(statics)]
+    for before, after in zip(sections, sections[1:], strict=False):
+        cuts = section_forces(everything, before.end)
+        stresses += [_at_shoulder(cut, before, after, yield_strength, required_safety) for cut in cuts[1:]]
+    lowest, place = stresses[0].safety, stresses[0].at
+    for stress in stresses[1:]:
+        place = where(stress.safety < lowest, stress.at, place)
+        lowest = minimum(lowest, stress.safety)
+    largest = maximum(*(stress.equivalent_stress for stress in stresses))
+    return SteppedShaft(
+        statics.reactions, tuple(stresses), statics.largest_bending, largest, lowest, place, required_safety
+    )
+
+
+def _worse_sides(statics: ShaftStatics) -> list[SectionForces]:
+    return [cut for cut in statics.diagram if cut.side == "right"] + [
+        cut for cut in statics.diagram if cut.side == "left"
+    ]
+
+
+def _at_cut(
+    cut: SectionForces, sections: Sequence[Section], yield_strength: Stress, required_safety: Ratio
+) -> ShaftStress:
+    piece = next(section for section in sections if cut.at <= section.end)
+    return shaft_stress(
+        cut.bending, cut.torque, piece.diameter, yield_strength, required_safety=required_safety, at=cut.at
+    )
+
+
+def _at_shoulder(
+    cut: SectionForces, before: Section, after: Section, yield_strength: Stress, required_safety: Ratio
+) -> ShaftStress:
+    small, large = sorted((before.diameter, after.diameter))
+    factors = [
+        stress_concentration(large, small, before.fillet, coefficients)
+        for coefficients in (SHOULDER_IN_BENDING, SHOULDER_IN_TORSION)
+    ]
+    return shaft_stress(
+        cut.bending, cut.torque, small, yield_strength, *factors, required_safety=required_safety, at=cut.at
+    )

@@ -1,0 +1,43 @@
+"""Guards a moment later: the direction in which a guard leaves zero."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import casadi as ca
+
+from modelica_like.structure.reduce import ReducedDae
+
+TIME_RESOLUTION = 1e-10
+"""Time resolution of events relative to max(1 s, |t|).
+
+Guards are judged that much later, so that one that just left zero counts by its direction.
+"""
+
+_JOINS: dict[int, Callable[[Any, Any], Any]] = {ca.OP_FMIN: ca.fmin, ca.OP_FMAX: ca.fmax}
+
+
+def guards_soon(reduced: ReducedDae, guards: Any) -> Any:
+    """Follow guards for one time resolution.
+
+    Relations that are joined go each their own way: one that stays at zero never counts as true.
+    """
+    if not guards.numel():
+        return guards
+    relations: list[Any] = []
+    _joined(guards, lambda relation: relations.append(relation) or relation)
+    stacked = ca.vertcat(*relations)
+    ahead = TIME_RESOLUTION * ca.fmax(1.0, ca.fabs(reduced.flat.time))
+    later = iter(ca.vertsplit(stacked + ahead * reduced.total_derivative(stacked)))
+    return _joined(guards, lambda _: next(later))
+
+
+def _joined(guards: Any, relation: Callable[[Any], Any]) -> Any:
+    """Rebuild guards with something else in the place of every relation."""
+
+    def rebuilt(guard: Any) -> Any:
+        join = _JOINS.get(guard.op())
+        return join(rebuilt(guard.dep(0)), rebuilt(guard.dep(1))) if join else relation(guard)
+
+    return ca.vertcat(*(rebuilt(guard) for guard in ca.vertsplit(guards)))

@@ -1,0 +1,462 @@
+"""From flat equations to states: index reduction, state selection, blocks, and what cannot be solved."""
+
+from pathlib import Path
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from components import ConstantSpeed, ConstantTorque, Damper, Fixed, IdealGear, Inertia, Speed, SpringDamper, Table
+from modelica_like import build, load, simulate
+from modelica_like.errors import Overdetermined, SingularAtStart, StructureError, Underdetermined
+from modelica_like.flatten import flatten
+from modelica_like.language import (
+    Assembly,
+    Component,
+    Equations,
+    Input,
+    Parameter,
+    Variable,
+    cos,
+    der,
+    exp,
+    guess,
+    param,
+    series,
+    signal_in,
+    sin,
+    var,
+)
+from modelica_like.structure import reduce
+
+EXAMPLES = Path(__file__).parents[2] / "examples" / "msl" / "rotational"
+
+
+class RigidTrain(Component):
+    """Inertias joined by gears without compliance, driven at the first."""
+
+    n: int = 3
+    ratio: float = 1.1
+
+    def build(self) -> None:
+        self.push = ConstantTorque(tau_constant=10.0)
+        self.inertias = [Inertia(J=1.0 + k % 3) for k in range(self.n)]
+        self.gears = [IdealGear(ratio=self.ratio) for _ in range(self.n - 1)]
+
+    def equations(self) -> Equations:
+        yield from series(self.push, self.inertias[0])
+        for k in range(self.n - 1):
+            yield from series(self.inertias[k], self.gears[k], self.inertias[k + 1])
+
+
+@pytest.mark.parametrize("n", [2, 3, 10, 50, 200])
+def test_a_rigid_train_has_two_states_and_one_torn_unknown(n):
+    reduced = reduce(flatten(RigidTrain(n=n)))
+    assert len(reduced.states) == 2
+    assert reduced.implicit == ()
+    assert reduced.index == 3
+    coupled = [block for block in reduced.blocks if len(block.unknowns) > 1]
+    assert [(len(block.tears), block.kind) for block in coupled] == [(1, "linear")]
+
+
+@pytest.mark.parametrize("n", [2, 10, 200])
+def test_a_rigid_train_accelerates_by_its_reduced_inertia(n):
+    train = RigidTrain(n=n, ratio=1.01)
+    train.set("inertias[1].phi", 0.0)
+    train.set("inertias[1].w", 0.0)
+    run = simulate(train, 1.0, points=2)
+    total = sum((1.0 + k % 3) / 1.01 ** (2 * k) for k in range(n))
+    assert run.final["inertias[1].w"] == pytest.approx(10.0 / total, rel=1e-12)
+    assert run.final[f"inertias[{n}].w"] == pytest.approx(10.0 / total / 1.01 ** (n - 1), rel=1e-11)
+    assert run.final[f"inertias[{n}].flange_a.tau"] == pytest.approx(
+        (1.0 + (n - 1) % 3) * 10.0 / total / 1.01 ** (n - 1), rel=1e-10
+    )
+
+
+def test_rigid_constraints_do_not_drift_in_a_hundred_seconds():
+    train = RigidTrain(n=4, ratio=-1.7)
+    train.set("inertias[1].phi", 0.5)
+    train.set("inertias[1].w", -3.0)
+    run = simulate(train, 100.0, points=200)
+    for k in range(1, 4):
+        for name in ("phi", "w"):
+            before, after = run[f"inertias[{k}].{name}"], run[f"inertias[{k + 1}].{name}"]
+            np.testing.assert_allclose(before, -1.7 * after, rtol=1e-14, atol=1e-10)
+
+
+@pytest.mark.parametrize(("name", "count"), [("First", 4), ("CoupledClutches", 8)])
+def test_state_counts_of_the_standard_library_examples(name, count):
+    reduced = reduce(flatten(load(EXAMPLES / f"{name}.toml")))
+    assert len(reduced.states) == count
+
+
+class Pendulum(Component):
+    """Point mass on a rod, in Cartesian coordinates: the textbook system of index three."""
+
+    m: Parameter = param("kg", "mass", default=2.0)
+    L: Parameter = param("m", "length", default=1.5)
+    g: Parameter = param("m/s2", "gravity", default=9.81)
+    x: Variable = var("m", "x")
+    y: Variable = var("m", "y")
+    vx: Variable = var("m/s", "velocity")
+    vy: Variable = var("m/s", "velocity")
+    T: Variable = var("N/m", "rod force over length")
+
+    def equations(self) -> Equations:
+        yield der(self.x) == self.vx
+        yield der(self.y) == self.vy
+        yield self.m * der(self.vx) == -self.T * self.x
+        yield self.m * der(self.vy) == -self.T * self.y - self.m * self.g
+        yield self.x**2 + self.y**2 == self.L**2
+
+
+def test_the_pendulum_has_index_three_and_two_states():
+    reduced = reduce(flatten(Pendulum()))
+    assert reduced.index == 3
+    assert set(reduced.states) == {"x", "vx"}
+    assert reduced.implicit == ("y",)
+    assert "Index 3: Pendulum couples motions. 1 constraint differentiated; states kept: x, vx." in [
+        notice.text for notice in reduced.notices
+    ]
+
+
+def casadi_pendulum(x: float, vx: float, length: float, gravity: float, mass: float) -> tuple[float, float, float]:
+    """Accelerations and rod force by CasADi's own index reduction, at a consistent point below the pivot."""
+    names = ("x", "y", "vx", "vy")
+    state, rate = ca.MX.sym("x", 4), ca.MX.sym("dx", 4)
+    px, py, qx, qy = ca.vertsplit(state)
+    force = ca.MX.sym("T")
+    equations = ca.vertcat(
+        rate[0] - qx, rate[1] - qy, mass * rate[2] + force * px, mass * rate[3] + force * py + mass * gravity, px**2 + py**2 - length**2,
+    )  # fmt: skip
+    dae = {"x_impl": ca.vertcat(*ca.vertsplit(state)), "dx_impl": ca.vertcat(*ca.vertsplit(rate)), "z": force, "alg": equations}
+    symbols = {name: ca.MX.sym(name) for name in (*names, *(f"d{n}" for n in names))}
+    dae = {
+        "x_impl": ca.vertcat(*(symbols[n] for n in names)), "dx_impl": ca.vertcat(*(symbols[f"d{n}"] for n in names)), "z": force,
+        "alg": ca.substitute([equations], [state, rate], [ca.vertcat(*(symbols[n] for n in names)), ca.vertcat(*(symbols[f"d{n}"] for n in names))])[0],
+    }  # fmt: skip
+    reduced, statistics = ca.dae_reduce_index(dae, {})
+    assert statistics["index"] == 3
+    explicit = ca.dae_map_semi_expl(dae, reduced)[0]
+    solve = ca.Function("g", [explicit["x"], explicit["z"]], [explicit["alg"], ca.jacobian(explicit["alg"], explicit["z"])])
+    y = -np.sqrt(length**2 - x**2)
+    vy = -x * vx / y
+    point = {"x": x, "y": y, "vx": vx, "vy": vy, "dx": vx, "dy": vy}
+    values = [point[s.name()] for s in ca.symvar(explicit["x"])]
+    order = [s.name() for s in ca.symvar(explicit["z"])]
+    z = np.zeros(len(order))
+    residual, jacobian = solve(values, z)
+    z = -np.linalg.solve(jacobian.full(), residual.full()).ravel()  # linear in accelerations and force
+    found = dict(zip(order, z, strict=True))
+    return found["dvx"], found["dvy"], found["T"]
+
+
+@pytest.mark.parametrize(("x", "vx"), [(0.3, 0.0), (-0.9, 1.3), (0.0, -2.0)])
+def test_the_pendulum_accelerates_as_casadi_says(x, vx):
+    model = build(Pendulum())
+    y = -np.sqrt(1.5**2 - x**2)
+    run = simulate(Pendulum(x=x, vx=vx, y=guess(-1.0)), 1e-6, points=1)
+    first = {name: run[name][0] for name in run.names}
+    assert first["y"] == pytest.approx(y, rel=1e-14)
+    expected = casadi_pendulum(x, vx, 1.5, 9.81, 2.0)
+    assert first["T"] == pytest.approx(expected[2], rel=1e-12)
+    position = {name: k for k, name in enumerate(model.states)}
+    ode = np.array(model.ode(0, [{"x": x, "vx": vx}[n] for n in model.states], [y], model.p, [], [])).ravel()
+    assert ode[position["vx"]] == pytest.approx(expected[0], rel=1e-12, abs=1e-12)
+
+
+def test_the_pendulum_does_not_drift_and_has_the_right_period():
+    angle = 0.4
+    run = simulate(Pendulum(x=1.5 * np.sin(angle), vx=0.0, y=guess(-1.0)), 100.0, points=400, rtol=1e-9, atol=1e-11)
+    constraint = run["x"] ** 2 + run["y"] ** 2 - 1.5**2
+    hidden = run["x"] * run["vx"] + run["y"] * run["vy"]
+    assert np.max(np.abs(constraint)) < 1e-10
+    assert np.max(np.abs(hidden)) < 1e-10
+    energy = 0.5 * (run["vx"] ** 2 + run["vy"] ** 2) + 9.81 * run["y"]
+    assert np.ptp(energy) < 1e-5
+    # Exact period by the arithmetic-geometric mean.
+    a, b = 1.0, np.cos(angle / 2)
+    for _ in range(8):
+        a, b = (a + b) / 2, np.sqrt(a * b)
+    period = 2 * np.pi * np.sqrt(1.5 / 9.81) / a
+    assert run.at(10 * period)["x"] == pytest.approx(1.5 * np.sin(angle), abs=1e-6)
+    assert run.at(20.25 * period)["x"] == pytest.approx(0.0, abs=1e-5)
+
+
+def test_states_are_chosen_once_and_the_point_where_they_fail_is_told():
+    """With x as state the rod must not be horizontal; the selection does not change during a run."""
+    with pytest.raises(SingularAtStart, match=r"singular at t = 0 s in block 1 \(y\)") as caught:
+        simulate(Pendulum(x=1.5, vx=0.0, y=guess(0.0)), 1.0)
+    assert 'let other variables be states (state="always")' in caught.value.advice
+
+
+def test_always_and_avoid_steer_the_choice():
+    class Turned(Pendulum):
+        y: Variable = var("m", "y", state="always")
+        vy: Variable = var("m/s", "velocity", state="always")
+
+    class Avoiding(Pendulum):
+        x: Variable = var("m", "x", state="avoid")
+        vx: Variable = var("m/s", "velocity", state="avoid")
+
+    assert set(reduce(flatten(Turned())).states) == {"y", "vy"}
+    assert set(reduce(flatten(Avoiding())).states) == {"y", "vy"}
+    run = simulate(Turned(y=0.0, vy=0.0, x=guess(1.0)), 0.2, points=4, rtol=1e-10, atol=1e-12)
+    # From the horizontal: energy gives the speed, m v² / 2 = -m g y.
+    speed = np.sqrt(run.final["vx"] ** 2 + run.final["vy"] ** 2)
+    assert speed == pytest.approx(np.sqrt(-2 * 9.81 * run.final["y"]), rel=1e-8)
+
+
+def test_relative_angles_become_states():
+    """Absolute angles grow without bound, their small differences would be lost."""
+    drive = Assembly(
+        "drive",
+        parts={"a": Inertia(J=1.0), "spring": SpringDamper(c=100.0, d=1.0), "b": Inertia(J=1.0)},
+        series={"shaft": ["a", "spring", "b"]},
+    )
+    states = reduce(flatten(drive)).states
+    assert {"spring.phi_rel", "spring.w_rel"} <= set(states)
+    assert len(states) == 4
+
+
+def test_a_constraint_on_the_speed_keeps_the_angle():
+    """Prescribed speed: index two; the angle is the integral and stays a state."""
+    drive = Assembly(
+        "drive",
+        parts={"motor": ConstantSpeed(w_fixed=5.0), "rotor": Inertia(J=2.0)},
+        series={"shaft": ["motor", "rotor"]},
+        parameters={},
+    )
+    reduced = reduce(flatten(drive))
+    assert len(reduced.states) == 1
+    drive.set("motor.phi", 0.25)
+    assert simulate(drive, 2.0, points=1).final["rotor.phi"] == pytest.approx(10.25, rel=1e-14)
+    assert simulate(drive, 2.0, points=1).final["rotor.flange_a.tau"] == 0.0
+
+
+def test_a_prescribed_motion_is_differentiated():
+    """Angle given by a formula of time: no states, the torque follows from its second derivative."""
+
+    class Prescribed(Component):
+        flange = Inertia.flange_b
+        rate: Parameter = param("rad/s", "rate", default=3.0)
+
+        def equations(self) -> Equations:
+            yield self.flange.phi == sin(self.rate * self.time)
+
+    drive = Assembly("drive", parts={"crank": Prescribed(), "rotor": Inertia(J=2.0)},
+                     connect={"shaft": ["crank.flange", "rotor.flange_a"]})  # fmt: skip
+    assert reduce(flatten(drive)).states == ()
+    run = simulate(drive, 1.0, points=50)
+    np.testing.assert_allclose(run["rotor.phi"], np.sin(3 * run.time), atol=1e-14)
+    np.testing.assert_allclose(run["rotor.w"], 3 * np.cos(3 * run.time), atol=1e-14)
+    np.testing.assert_allclose(run["rotor.flange_a.tau"], -2 * 9 * np.sin(3 * run.time), atol=1e-13)
+
+
+def test_the_derivative_of_an_input_is_told():
+    class Follower(Component):
+        flange = Inertia.flange_b
+        ref: Input = signal_in("rad", "angle")
+
+        def equations(self) -> Equations:
+            yield self.flange.phi == self.ref
+
+    class Drive(Component):
+        ref: Input = signal_in("rad", "angle")
+        follower, rotor = Follower(), Inertia(J=1.0)
+
+        def equations(self) -> Equations:
+            from modelica_like.language import connect
+
+            yield connect(self.ref, self.follower.ref)
+            yield connect(self.follower.flange, self.rotor.flange_a)
+
+    with pytest.raises(StructureError, match=r"^rotor\.w is the derivative of the input ref, which is not known\."):
+        reduce(flatten(Drive()))
+
+
+# -- systems without a unique solution -------------------------------------------------------------------------------
+
+
+def two(first: Component, second: Component) -> Assembly:
+    parts = {"first": first, "second": second, "rotor": Inertia(J=1.0)}
+    return Assembly("drive", parts=parts, connect={"a": ["first.flange", "rotor.flange_a"], "b": ["second.flange", "rotor.flange_b"]})
+
+
+@pytest.mark.parametrize(
+    ("first", "second"),
+    [
+        (ConstantSpeed(w_fixed=1.0), ConstantSpeed(w_fixed=1.0)),
+        (ConstantSpeed(w_fixed=1.0), Speed(w_ref=2.0)),
+        (ConstantSpeed(w_fixed=1.0), Fixed()),
+        (Fixed(), Fixed()),
+    ],
+)
+def test_two_parts_that_fix_one_motion(first, second):
+    with pytest.raises(Overdetermined) as caught:
+        reduce(flatten(two(first, second)))
+    assert "first" in str(caught.value)
+    assert "second" in str(caught.value)
+    assert caught.value.advice == "Remove one, or put a spring or clutch between."
+
+
+@pytest.mark.parametrize("ratio", [2.0, -0.5])
+def test_parallel_gears_of_one_ratio_are_told(ratio):
+    parts = {"a": Inertia(J=1.0), "b": Inertia(J=1.0), "g": IdealGear(ratio=ratio), "h": IdealGear(ratio=ratio)}
+    drive = Assembly("drive", parts=parts, series={"one": ["a", "g", "b"], "two": ["a", "h", "b"]})
+    with pytest.raises(Overdetermined, match="The motion is constrained twice") as caught:
+        reduce(flatten(drive))
+    assert "gears.py" in str(caught.value)
+
+
+def test_parallel_gears_of_different_ratios_lock():
+    parts = {"a": Inertia(J=1.0), "b": Inertia(J=1.0), "g": IdealGear(ratio=2.0), "h": IdealGear(ratio=3.0), "push": ConstantTorque(tau_constant=6.0)}
+    drive = Assembly("drive", parts=parts, series={"one": ["push", "a", "g", "b"], "two": ["a", "h", "b"]})
+    reduced = reduce(flatten(drive))
+    assert reduced.states == ()
+    run = simulate(drive, 1.0, points=1)
+    # No motion: both torques on a sum to -6, both on b to 0, so tau_g + tau_h = 6 and 2 tau_g + 3 tau_h = 0.
+    assert run.final["g.flange_a.tau"] == pytest.approx(18.0)
+    assert run.final["h.flange_a.tau"] == pytest.approx(-12.0)
+    assert run.final["a.phi"] == 0.0
+
+
+def test_torques_that_meet_without_a_mass_are_told():
+    parts = {"one": ConstantTorque(tau_constant=1.0), "two": ConstantTorque(tau_constant=2.0)}
+    with pytest.raises(Overdetermined):
+        reduce(flatten(Assembly("drive", parts=parts, connect={"w": ["one.flange", "two.flange"]})))
+
+
+def test_unknowns_without_equation_are_told():
+    """A gear with a free side: its torque is zero, but nothing fixes the angle there except the gear itself; two free springs in a row float."""
+
+    class Floating(Component):
+        x: Variable = var("1", "x")
+        y: Variable = var("1", "y")
+        T: Parameter = param("s", "time constant", default=1.0)
+
+        def equations(self) -> Equations:
+            yield self.x == sin(self.time / self.T)
+            yield 2 * self.x == exp(self.time / self.T)
+
+    with pytest.raises((Overdetermined, Underdetermined)) as caught:
+        reduce(flatten(Floating()))
+    assert "Floating" in str(caught.value)
+
+
+def test_a_free_chain_without_reference_is_underdetermined():
+    """Two dampers in a row between nothing: their middle angle appears only in differences."""
+
+    class Loop(Component):
+        x: Variable = var("1", "x")
+        y: Variable = var("1", "y")
+        z: Variable = var("1", "z")
+
+        def equations(self) -> Equations:
+            yield self.x - self.y == cos(self.x - self.y)
+            yield self.z == 1
+            yield self.z * self.z == 1
+
+    with pytest.raises((Overdetermined, Underdetermined)):
+        reduce(flatten(Loop()))
+
+
+# -- blocks ----------------------------------------------------------------------------------------------------------
+
+
+class Coupled(Component):
+    """n nonlinear equations in a ring: x_k + a sin(x_(k+1)) = b_k."""
+
+    n: int = 4
+    a: Parameter = param("1", "coupling", default=0.5)
+
+    def build(self) -> None:
+        self.cells = [Cell(a=0.5, b=0.1 * (k + 1)) for k in range(self.n)]
+
+    def equations(self) -> Equations:
+        from modelica_like.language import connect
+
+        for k in range(self.n):
+            yield connect(self.cells[k - 1].x, self.cells[k].u)
+
+
+class Cell(Component):
+    a: Parameter = param("1", "coupling")
+    b: Parameter = param("1", "constant")
+    u: Input = signal_in("1", "neighbour")
+
+    def equations(self) -> Equations:
+        yield self.x + self.a * sin(self.u) == self.b
+
+    from modelica_like.language import Output, signal_out
+
+    x: Output = signal_out("1", "own")
+
+
+@pytest.mark.parametrize("n", [1, 2, 5, 12])
+def test_a_nonlinear_ring_is_torn_to_one_unknown(n):
+    if n == 1:
+        pytest.skip("a ring of one connects a part with itself")
+    model = build(Coupled(n=n))
+    assert len(model.implicit) == 1
+    run = simulate(Coupled(n=n), 1.0, points=1)
+    x = np.array([run.final[f"cells[{k}].x"] for k in range(1, n + 1)])
+    residual = x + 0.5 * np.sin(np.roll(x, 1)) - 0.1 * np.arange(1, n + 1)
+    assert np.max(np.abs(residual)) < 1e-13
+
+
+def test_small_linear_blocks_are_solved_by_symbols_large_ones_stay_implicit():
+    class Full(Component):
+        n: int = 3
+        T: Parameter = param("s", "time", default=1.0)
+
+        def build(self) -> None:
+            self.rows = [Row(number=k, n=self.n) for k in range(self.n)]
+
+        def equations(self) -> Equations:
+            from modelica_like.language import connect
+
+            for k in range(self.n):
+                for j in range(self.n - 1):
+                    yield connect(self.rows[(k + j + 1) % self.n].y, getattr(self.rows[k], f"u{j}"))
+
+    class Row(Component):
+        number: int = 0
+        n: int = 3
+        c: Parameter = param("1", "coefficient", default=0.25)
+        u0: Input = signal_in("1", "other", default=0.0)
+        u1: Input = signal_in("1", "other", default=0.0)
+        u2: Input = signal_in("1", "other", default=0.0)
+        u3: Input = signal_in("1", "other", default=0.0)
+
+        def equations(self) -> Equations:
+            # The coefficient of the own unknown depends on time: no equation can be solved for it before the run.
+            weight = 2 + sin(self.time / self.second)
+            yield weight * self.y + weight * self.c * (self.u0 + 2 * self.u1 - self.u2 + self.u3) == 1.0 + self.number
+
+        second: Parameter = param("s", "unit", default=1.0)
+        from modelica_like.language import Output, signal_out
+
+        y: Output = signal_out("1", "own")
+
+    for n, implicit in ((2, 0), (3, 0), (5, 5)):
+        model = build(Full(n=n))
+        assert len(model.implicit) <= implicit
+        run = simulate(Full(n=n), 1.0, points=3)
+        matrix = np.eye(n)
+        for k in range(n):
+            for j, c in zip(range(n - 1), (1, 2, -1, 1), strict=False):
+                matrix[k, (k + j + 1) % n] += 0.25 * c
+        for moment in (0, -1):
+            weight = 2 + np.sin(run.time[moment])
+            expected = np.linalg.solve(weight * matrix, 1.0 + np.arange(n))
+            found = [run[f"rows[{k}].y"][moment] for k in range(1, n + 1)]
+            assert found == pytest.approx(expected, rel=1e-12)
+
+
+def test_a_damper_to_ground_and_a_table_are_explicit():
+    parts = {"wave": Table(table=((0, 0), (1, 2))), "rotor": Inertia(J=1.0), "damper": Damper(d=1.0), "ground": Fixed()}
+    drive = Assembly("drive", parts=parts, series={"shaft": ["rotor", "damper", "ground"]})
+    reduced = reduce(flatten(drive))
+    assert all(block.kind == "explicit" for block in reduced.blocks)
+    assert len(reduced.states) == 2
