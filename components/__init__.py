@@ -2,6 +2,23 @@
 
 from components.adaptors import AngleToTorqueAdaptor as AngleToTorqueAdaptor
 from components.adaptors import TorqueToAngleAdaptor as TorqueToAngleAdaptor
+from components.dc_machines import PermanentMagnetDCMachine as PermanentMagnetDCMachine
+from components.dc_machines import SeparatelyExcitedDCMachine as SeparatelyExcitedDCMachine
+from components.dc_machines import SeriesDCMachine as SeriesDCMachine
+from components.dc_machines import ShuntDCMachine as ShuntDCMachine
+from components.electrical import Capacitor as Capacitor
+from components.electrical import ConstantCurrent as ConstantCurrent
+from components.electrical import ConstantVoltage as ConstantVoltage
+from components.electrical import CurrentSensor as CurrentSensor
+from components.electrical import CurrentSink as CurrentSink
+from components.electrical import Ground as Ground
+from components.electrical import Inductor as Inductor
+from components.electrical import Pin as Pin
+from components.electrical import Resistor as Resistor
+from components.electrical import SignalVoltage as SignalVoltage
+from components.electrical import Switch as Switch
+from components.electrical import VariableResistor as VariableResistor
+from components.electrical import VoltageSensor as VoltageSensor
 from components.fixed import Fixed as Fixed
 from components.fixed import TranslationalFixed as TranslationalFixed
 from components.friction import BearingFriction as BearingFriction
@@ -104,16 +121,21 @@ __all__ = [
     "BallScrew",
     "BearingFriction",
     "Brake",
+    "Capacitor",
     "Clutch",
     "CoilForce",
     "Compliant",
     "CompliantWithRelativeStates",
     "Constant",
+    "ConstantCurrent",
     "ConstantEfficiencyGear",
     "ConstantForce",
     "ConstantSpeed",
     "ConstantTorque",
     "ConstantVelocity",
+    "ConstantVoltage",
+    "CurrentSensor",
+    "CurrentSink",
     "Damper",
     "Differential",
     "DryFriction",
@@ -129,11 +151,13 @@ __all__ = [
     "ForceSensor",
     "ForceStep",
     "Freewheel",
+    "Ground",
     "HeatPort",
     "HeatSource",
     "IdealGear",
     "IdealPlanetary",
     "IdealRollingWheel",
+    "Inductor",
     "Inertia",
     "InverseSpeedDependentForce",
     "InverseSpeedDependentTorque",
@@ -150,6 +174,8 @@ __all__ = [
     "MultiPlateClutch",
     "MultiSensor",
     "OneWayClutch",
+    "PermanentMagnetDCMachine",
+    "Pin",
     "Position",
     "PositionSensor",
     "PowerSensor",
@@ -162,9 +188,14 @@ __all__ = [
     "RelativePositionSensor",
     "RelativeSpeedSensor",
     "RelativeVelocitySensor",
+    "Resistor",
     "Rod",
+    "SeparatelyExcitedDCMachine",
+    "SeriesDCMachine",
+    "ShuntDCMachine",
     "SignForce",
     "SignTorque",
+    "SignalVoltage",
     "Sine",
     "Speed",
     "SpeedDependentLoad",
@@ -174,6 +205,7 @@ __all__ = [
     "Step",
     "StribeckFriction",
     "SupportFriction",
+    "Switch",
     "Table",
     "ThermalConductor",
     "ThermalMass",
@@ -193,5 +225,7 @@ __all__ = [
     "TranslationalSpring",
     "TranslationalSpringDamper",
     "Trapezoid",
+    "VariableResistor",
     "VelocitySensor",
+    "VoltageSensor",
 ]

@@ -53,7 +53,7 @@ class AngleToTorqueAdaptor(Component):
 
     def equations(self) -> Equations:
         yield self.flange.phi == self.phi
-        yield self.tau == -self.flange.tau
+        yield self.tau == self.flange.tau
 
     def source_power(self) -> Expr:
         return -self.flange.tau * der(self.flange.phi)

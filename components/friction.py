@@ -12,6 +12,7 @@ from modelica_like.language import (
     Mode,
     Parameter,
     Variable,
+    absolute,
     all_of,
     der,
     interpolate,
@@ -32,7 +33,8 @@ class DryFriction(Lossy, partial=True):
     While they stick, friction is no function of the speed but whatever keeps the relative acceleration at zero; so the
     speed stays a state in every mode (Otter, Elmqvist, Mattsson: Hybrid modeling in Modelica based on the synchronous
     data flow principle, CACSD 1999). A surface that breaks away holds the sliding friction of standstill until it
-    moves. Surfaces that no force presses together are free.
+    moves. Surfaces without static friction are free: nothing holds them, and their friction, if there is any at speed,
+    goes through zero smoothly.
 
     A subclass names its slip speed and its friction variable, and gives the laws of sliding and static friction.
     """
@@ -66,9 +68,10 @@ class DryFriction(Lossy, partial=True):
         """Return the condition on which surfaces that stick begin to slide backward."""
         return self.friction < -self.static_friction()
 
-    def idle_friction(self) -> Expr | float:
-        """Return the friction of free surfaces."""
-        return 0.0
+    def idle_friction(self) -> Expr:
+        """Return the friction of free surfaces: none, where nothing presses them together."""
+        against = maximum(self.sliding_friction(absolute(self.slip)), 0)
+        return where(self.slip < 0, -against, against)
 
     def equations(self) -> Equations:
         yield from super().equations()

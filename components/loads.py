@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from components.friction import DryFriction
 from components.interfaces import OneFlange
-from modelica_like.language import Equations, Expr, Parameter, Variable, der, maximum, param, var, where
+from modelica_like.language import Equations, Expr, Parameter, Variable, der, maximum, param, var
 
 _STANDSTILL = 1e-20
 
@@ -37,9 +37,6 @@ class SpeedDependentLoad(DryFriction, OneFlange):
 
     def static_friction(self) -> Expr:
         return self.peak * self.a
-
-    def idle_friction(self) -> Expr:
-        return where(self.w < 0, -self.sliding_friction(-self.w), self.sliding_friction(self.w))
 
     def equations(self) -> Equations:
         yield from super().equations()

@@ -36,6 +36,9 @@ class MeshWithFriction(Lossy, TwoFlanges, partial=True):
     driving side after C. Bertsch, 2009). The heavier the inertia on the load side, the more the efficiency against the
     drive matters: where it is negative, the motion is only unique if the inertia of the drive is large enough.
 
+    If another friction element holds the same shaft, the torque of each is undetermined while both stick. A tiny `creep`
+    (1e-9) decides: the other one holds as long as it can, then this gear.
+
     A subclass gives the efficiencies and the friction of the bearings at a speed.
     """
 
@@ -43,6 +46,8 @@ class MeshWithFriction(Lossy, TwoFlanges, partial=True):
     phi_a: Variable = var("rad", "angle of flange_a relative to the housing")
     w_a: Variable = var("rad/s", "speed of flange_a relative to the housing", state="always")
     tau_loss: Variable = var("N.m", "lost torque at flange_a, against forward rotation")
+    creep: Parameter = param("1/(kg.m2)", "acceleration of the stuck gear over the torque it holds", min=0)
+    creep_time: Parameter = param("s", "time after which it creeps no faster", default=1e-3, min=0)
     mode = Mode("stuck", "start_forward", "start_backward", "forward", "backward", description="friction mode")
 
     def efficiencies(self, speed: Expr | float) -> tuple[Expr | float, Expr | float]:
@@ -68,6 +73,10 @@ class MeshWithFriction(Lossy, TwoFlanges, partial=True):
         driven_by_a = (1 / eta_a - 1) * passed + direction * bearing_a / eta_a
         return driven_by_a, (eta_b - 1) * passed + direction * eta_b * bearing_b
 
+    def creeping(self) -> Expr | float:
+        """Return the acceleration of the stuck gear."""
+        return self.creep * self.tau_loss - self.w_a / self.creep_time if self.given("creep") else 0.0
+
     def equations(self) -> Equations:
         yield from super().equations()
         a, b, loss = self.flange_a, self.flange_b, self.tau_loss
@@ -76,7 +85,7 @@ class MeshWithFriction(Lossy, TwoFlanges, partial=True):
         yield der(self.phi_a) == self.w_a
         yield b.tau + self.ratio * (a.tau - loss) == 0
         yield self.mode.choose(
-            stuck=der(self.w_a),
+            stuck=der(self.w_a) - self.creeping(),
             start_forward=loss - self.forward_loss(0),
             start_backward=loss - self.backward_loss(0),
             forward=loss - self.forward_loss(maximum(self.w_a, 0)),

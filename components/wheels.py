@@ -21,13 +21,14 @@ class IdealRollingWheel(Component):
 
 
 class EddyCurrentTorque(Lossy, OneFlange):
-    """Eddy current brake: braking torque 2·tau_nominal·x/(1 + x²) with x = w/w_nominal (M. Kloss).
+    """Eddy current brake: braking torque 2·tau_nominal·excitation²·x/(1 + x²) with x = w/w_nominal (M. Kloss).
 
-    The torque is largest at w_nominal; the disc gets hot, its resistance rises, and w_nominal with it. Without a heat
+    The torque is largest at w_nominal, and grows with the square of the excitation current; the disc gets hot, its resistance rises, and w_nominal with it. Without a heat
     port the disc keeps the temperature T. Modelica Standard Library, Rotational.EddyCurrentTorque.
     """
 
-    tau_nominal: Input = signal_in("N.m", "largest braking torque, by the excitation")
+    tau_nominal: Parameter = param("N.m", "largest braking torque at full excitation", min=0)
+    excitation: Input = signal_in("1", "excitation current over its nominal value", default=1.0)
     w_nominal: Parameter = param("rad/s", "speed of the largest torque at T_ref", min=1e-12)
     T_ref: Parameter = param("K", "reference temperature", default=293.15)
     T: Parameter = param("K", "temperature of the disc without a heat port", default=293.15)
@@ -42,7 +43,7 @@ class EddyCurrentTorque(Lossy, OneFlange):
         at_ref = self.alpha / (1 + self.alpha * (self.T_ref - self.T_20))
         x = self.w / (self.w_nominal * (1 + at_ref * (temperature - self.T_ref)))
         yield der(self.phi) == self.w
-        yield self.tau == 2 * self.tau_nominal * x / (1 + x**2)
+        yield self.tau == 2 * self.tau_nominal * self.excitation**2 * x / (1 + x**2)
         yield self.flange.tau == self.tau
 
     def dissipation(self) -> Expr:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 from components.sizing.maths import asin, cos, exp, floor, hypot, maximum, require, sin, sqrt
 from components.sizing.quantities import Angle, Area, Density, Force, Length, Power, Ratio, Speed, Teeth, Velocity
@@ -55,7 +54,6 @@ def belt_velocity(diameter: Length, speed: Speed) -> Velocity:
     return diameter / 2 * speed
 
 
-@dataclass(frozen=True)
 class BeltGeometry(Result):
     """Geometry of an open timing belt."""
 
@@ -103,7 +101,6 @@ def strand_resultant(tight: Force, slack: Force, angle: Angle) -> Force:
     return sqrt(maximum(tight**2 + slack**2 - 2 * tight * slack * cos(angle), 0.0))
 
 
-@dataclass(frozen=True)
 class BeltForces(Result):
     """Forces of a belt and the load of its shafts."""
 

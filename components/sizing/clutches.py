@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 from components.sizing.quantities import (
     Acceleration,
@@ -44,7 +43,6 @@ def friction_work(torque: Torque, speed: Speed, time: Time) -> Energy:
     return torque * speed * time / 2
 
 
-@dataclass(frozen=True)
 class MachineTableClutch(Result):
     """Clutch that brings a machine table to speed."""
 
@@ -92,14 +90,14 @@ def machine_table_clutch(
     acceleration = motor_speed / acceleration_time
     torque = total * acceleration + load_torque / ratio
     return MachineTableClutch(
-        motor_speed=motor_speed, lead=2 * math.pi * table_velocity / fast, table_inertia=table, spindle_inertia=spindle, gear_output_inertia=gear, referred_inertia=total,
+        motor_speed=motor_speed, lead=2 * math.pi * table_velocity / fast, table_inertia=table,
+        spindle_inertia=spindle, gear_output_inertia=gear, referred_inertia=total,
         acceleration=acceleration, acceleration_torque=total * acceleration, ratio=ratio,
         load_torque=load_torque / ratio, clutch_torque=torque,
         friction_work=friction_work(torque, motor_speed, acceleration_time),
     )  # fmt: skip
 
 
-@dataclass(frozen=True)
 class ClutchSelection(Result):
     """Clutch chosen from a catalogue."""
 

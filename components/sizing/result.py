@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Annotated, Any, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, dataclass_transform, get_args, get_origin, get_type_hints
 
 import numpy as np
 
@@ -52,9 +52,12 @@ class Line:
     exceeded: bool
 
 
-@dataclass(frozen=True)
+@dataclass_transform(frozen_default=True, field_specifiers=(line,))
 class Result:
-    """Base of all results of design checks."""
+    """Base of all results of design checks; every subclass is a frozen dataclass."""
+
+    def __init_subclass__(cls) -> None:
+        dataclass(frozen=True)(cls)
 
     def lines(self, limits: Limits | None = None) -> tuple[Line, ...]:
         """Return the lines of the table.
@@ -66,11 +69,11 @@ class Result:
 
     def tables(self) -> dict[str, tuple[Result, ...]]:
         """Return the parts of the result that are rows of a table, by description."""
-        values = {field: getattr(self, field.name) for field in dataclasses.fields(self)}
+        values = {field: getattr(self, field.name) for field in _fields_of(type(self))}
         return {field.metadata["description"]: value for field, value in values.items() if is_rows(value)}
 
     def _fields(self) -> list[dataclasses.Field[Any]]:
-        return [field for field in dataclasses.fields(self) if not is_rows(getattr(self, field.name))]
+        return [field for field in _fields_of(type(self)) if not is_rows(getattr(self, field.name))]
 
     def _line(self, field: dataclasses.Field[Any], limit: tuple[Number | None, Number | None] | None) -> Line:
         value, quantity = getattr(self, field.name), quantity_of(type(self), field.name)
@@ -103,6 +106,10 @@ class Result:
 def is_rows(value: object) -> bool:
     """Tell whether a value is a tuple of results."""
     return isinstance(value, tuple) and bool(value) and all(isinstance(row, Result) for row in value)
+
+
+def _fields_of(kind: Any) -> tuple[dataclasses.Field[Any], ...]:
+    return dataclasses.fields(kind)
 
 
 @lru_cache(maxsize=256)
@@ -139,7 +146,7 @@ def row_values(row: Result) -> tuple[str, ...]:
     return tuple(line.value for line in row.lines())
 
 
-def _required(value: object) -> str:
+def _required(value: Any) -> str:
     if is_symbolic(value):
         return ""
     return "ok" if np.all(value) else "not fulfilled"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from components.sizing.maths import Number, hypot, is_symbolic, maximum, require, solve, where
+from components.sizing.maths import Number, hypot, is_symbolic, maximum, solve, where
 from components.sizing.quantities import Force, Length, SmallTorque, Torque
 from components.sizing.result import Result, line
 
@@ -33,7 +33,6 @@ class Load:
     bend_z: Torque = 0.0
 
 
-@dataclass(frozen=True)
 class BearingReaction(Result):
     """Force of a bearing on the shaft."""
 
@@ -43,7 +42,6 @@ class BearingReaction(Result):
     radial: Force = line("radial load of the bearing")
 
 
-@dataclass(frozen=True)
 class SectionForces(Result):
     """Section forces on one side of a cut."""
 
@@ -57,7 +55,6 @@ class SectionForces(Result):
     torque: SmallTorque = line("torsional moment")
 
 
-@dataclass(frozen=True)
 class ShaftStatics(Result):
     """Bearing reactions and section forces of a shaft."""
 
@@ -176,12 +173,3 @@ def _bending(place: Length, loads: Sequence[Load], force: str, couple: str, righ
 
 def _passed(place: Length, at: Length, right: bool) -> Number:
     return 1.0 * (place >= at if right else place > at)
-
-
-def require_positive(value: Number, what: str) -> None:
-    """Refuse a length that is not above zero.
-
-    Raises:
-        ValueError: with what it is.
-    """
-    require(value > 0, f"The {what} must be above zero.")

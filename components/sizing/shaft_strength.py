@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from components.sizing.maths import maximum, minimum, require, sqrt, where
+import numpy as np
+
+from components.sizing.maths import is_symbolic, maximum, minimum, require, sqrt, where
 from components.sizing.quantities import Force, Length, Ratio, SmallTorque, Stress, Torque
 from components.sizing.result import Result, line
-from components.sizing.shaft_statics import Load, SectionForces, ShaftStatics, section_forces, shaft_statics
+from components.sizing.shaft_statics import Load, SectionForces, section_forces, shaft_statics
+
+_NOTHING = 1e-9
 
 
 @dataclass(frozen=True)
@@ -63,7 +68,6 @@ def von_mises(normal: Stress, shear: Stress) -> Stress:
     return sqrt(normal**2 + 3 * shear**2)
 
 
-@dataclass(frozen=True)
 class ShaftDiameter(Result):
     """Smallest diameter of a shaft in bending."""
 
@@ -86,7 +90,6 @@ def shaft_diameter(bending: Torque, strength: Stress, safety: Ratio, diameter: L
     return ShaftDiameter(bending, allowable, (32 * bending / (math.pi * allowable)) ** (1 / 3), diameter)
 
 
-@dataclass(frozen=True)
 class ShaftStress(Result):
     """Stresses and safety at one section of a shaft."""
 
@@ -125,9 +128,10 @@ def shaft_stress(
     normal, shear = bending_stress(bending, diameter), torsional_stress(abs(torque), diameter)
     tension = 4 * abs(axial_force) / (math.pi * diameter**2)
     equivalent = von_mises(tension + bending_factor * normal, torsion_factor * shear)
+    safety = yield_strength / maximum(equivalent, _NOTHING * yield_strength)
     return ShaftStress(
         at, diameter, bending, abs(torque), normal, shear, bending_factor, torsion_factor, bending_factor * normal,
-        torsion_factor * shear, equivalent, yield_strength / equivalent, required_safety,
+        torsion_factor * shear, equivalent, safety, required_safety,
     )  # fmt: skip
 
 
@@ -146,7 +150,6 @@ class Section:
     fillet: Length = 0.0
 
 
-@dataclass(frozen=True)
 class SteppedShaft(Result):
     """Safety of a stepped shaft at every place that matters."""
 
@@ -182,10 +185,12 @@ def stepped_shaft(
     last = max(cut.at for cut in statics.diagram)
     require(last <= sections[-1].end, f"Something acts at {last:g} m, beyond the last section.")
     everything = [*loads, *(Load(reaction.at, reaction.y, reaction.z) for reaction in statics.reactions)]
-    stresses = [_at_cut(cut, sections, yield_strength, required_safety) for cut in _worse_sides(statics)]
-    for before, after in zip(sections, sections[1:], strict=False):
+    stresses: list[ShaftStress] = []
+    for sides in zip(statics.diagram[::2], statics.diagram[1::2], strict=True):
+        stresses += _worst([_at_cut(cut, sections, yield_strength, required_safety) for cut in sides])
+    for before, after in itertools.pairwise(sections):
         cuts = section_forces(everything, before.end)
-        stresses += [_at_shoulder(cut, before, after, yield_strength, required_safety) for cut in cuts[1:]]
+        stresses += _worst([_at_shoulder(cut, before, after, yield_strength, required_safety) for cut in cuts])
     lowest, place = stresses[0].safety, stresses[0].at
     for stress in stresses[1:]:
         place = where(stress.safety < lowest, stress.at, place)
@@ -196,10 +201,11 @@ def stepped_shaft(
     )
 
 
-def _worse_sides(statics: ShaftStatics) -> list[SectionForces]:
-    return [cut for cut in statics.diagram if cut.side == "right"] + [
-        cut for cut in statics.diagram if cut.side == "left"
-    ]
+def _worst(stresses: list[ShaftStress]) -> list[ShaftStress]:
+    """Of both sides of one cut only the worse one is told, where it can be decided."""
+    if is_symbolic(*(stress.safety for stress in stresses)) or any(np.ndim(stress.safety) for stress in stresses):
+        return stresses
+    return [min(stresses, key=lambda stress: stress.safety)]
 
 
 def _at_cut(

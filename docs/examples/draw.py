@@ -16,13 +16,20 @@ PICTURES: dict[str, tuple[str, ...]] = {
     "msl/rotational/Friction": ("inertia3.w", "inertia2.w", "inertia1.w", "clutch.tau", "brake.tau"),
     "msl/rotational/CoupledClutches": ("J1.w", "J2.w", "J3.w", "J4.w", "clutch1.tau", "clutch2.tau", "clutch3.tau"),
     "msl/rotational/ElasticBearing": ("shaft.w", "load.w", "spring.tau", "housing.phi"),
-    "msl/rotational/Backlash": ("inertia1.phi", "inertia2.phi", "inertia3.phi", "elastoBacklash.tau", "elastoBacklash2.tau"),
+    "msl/rotational/Backlash": (
+        "inertia1.phi",
+        "inertia2.phi",
+        "inertia3.phi",
+        "elastoBacklash.tau",
+        "elastoBacklash2.tau",
+    ),
 }
 
 END = {"fan": "4 s"}
 
 
 def main() -> None:
+    """Run every example and save its picture."""
     for netlist, shown in PICTURES.items():
         run = simulate(EXAMPLES / f"{netlist}.toml", END.get(netlist))
         picture = run.plot(*shown)

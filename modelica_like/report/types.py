@@ -36,6 +36,9 @@ def library_table(types: Mapping[str, type[Component]]) -> Table:
     made = table(f"{len(types)} component types", "type", "module", "what it is")
     for name, kind in sorted(types.items(), key=lambda item: (item[1].__module__, item[0])):
         made.add_row(f"[bold]{name}[/]", kind.__module__.rpartition(".")[2], escape(summary(kind)))
+    # One line per type, so that the list can be searched; `describe` has the whole text.
+    made.columns[-1].no_wrap = True
+    made.columns[-1].overflow = "ellipsis"
     return made
 
 

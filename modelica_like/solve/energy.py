@@ -176,6 +176,13 @@ def _integrator(model: CompiledDae) -> ca.Function:
         problem["x"] = ca.vertcat(problem["x"], ca.SX.sym("companion"))
         problem["ode"] = ca.vertcat(problem["ode"], span * ca.dot(powers, ca.DM(weights)))
         problem["quad"] = span * powers
-        settings = {"reltol": _RTOL, "abstol": _ATOL, "max_num_steps": 1_000_000, "quad_err_con": True}
+        # Where an unknown without derivative begins to change, IDAS would give up its first step for it.
+        settings = {
+            "reltol": _RTOL,
+            "abstol": _ATOL,
+            "max_num_steps": 1_000_000,
+            "quad_err_con": True,
+            "suppress_algebraic": True,
+        }
         model._cache["energy"] = ca.integrator("energy", "idas", problem, 0, 1, settings)
     return model._cache["energy"]

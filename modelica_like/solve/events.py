@@ -17,10 +17,15 @@ from modelica_like.solve.recorder import Event, Recorder
 
 _FIRST_PANEL = 8
 _GROWTH = 4
+_STEPS_PER_CHECK = 6
+"""Guards are looked at about as often as the integrator needs steps: what oscillates between two results is not missed."""
+_STEPS_TO_START = 30
+_MAX_CHECKS = 2**16
 _CHATTER_EVENTS = 50
 _CHATTER_WINDOW = 1e-6
 _SAME_TIME = 1e-12
 _MAX_HALVINGS = 30
+_ON_GRID = 1e-7
 
 Progress = Callable[[float], None]
 
@@ -45,6 +50,7 @@ class EventLoop:
         self.begin = start.t
         self.end = end
         self.step = (end - start.t) / options.points
+        self.checks = 1
         self.progress = progress
         self.integrator = Integrator(model, options)
         self.guards = Guards(model)
@@ -76,7 +82,7 @@ class EventLoop:
         times, x, z = self._panel(stop)
         if self.guards.count and self._stop_at_event(times, x, z):
             return
-        self.record.add(times, x, z)
+        self._keep(times, x, z, stop)
         self.now = Point(float(times[-1]), x[:, -1].copy(), z[:, -1].copy(), first.d)
         if self.guards.count and len(times) >= self.panel:
             self.panel = self.panel * _GROWTH
@@ -84,6 +90,24 @@ class EventLoop:
             due = self._due()
             if due:
                 self._event([*due, *self._rising()])
+
+    def _keep(self, times: Vector, x: Vector, z: Vector, stop: float = np.inf) -> None:
+        """Record the results among the points at which guards were looked at."""
+        position = (times - self.begin) / self.step
+        kept = (np.abs(position - np.rint(position)) < _ON_GRID) | (times == stop)
+        self.record.add(times[kept], x[:, kept], z[:, kept])
+
+    def _refine(self, steps: int, points: int) -> bool:
+        """Adapt the number of looks at the guards per result to the steps of the integrator; True if it was too small."""
+        if not self.guards.count:
+            return False
+        each = max(steps - _STEPS_TO_START, 0) / points
+        if each > _STEPS_PER_CHECK and self.checks < _MAX_CHECKS:
+            self.checks = min(self.checks << int(np.ceil(np.log2(each / _STEPS_PER_CHECK))), _MAX_CHECKS)
+            return True
+        if points >= 4 * _FIRST_PANEL and each < _STEPS_PER_CHECK / 8:
+            self.checks = max(self.checks // 2, 1)
+        return False
 
     def _panel(self, stop: float) -> tuple[Vector, Vector, Vector]:
         """Integrate one panel.
@@ -96,6 +120,7 @@ class EventLoop:
             span, outputs = self._next_panel(stop)
             arrives = self.now.t + span >= stop - _SAME_TIME * max(1.0, abs(stop))
             span = stop - self.now.t if arrives else span
+            before = self.integrator.steps
             try:
                 x, z = self.integrator.run(self.now, span, outputs)
             except StepFailed:
@@ -106,6 +131,8 @@ class EventLoop:
                 self.panel = max(1, outputs // _GROWTH)
                 continue
             times = self.now.t + span * np.arange(1, outputs + 1) / outputs
+            if self._refine(self.integrator.steps - before, outputs):
+                continue
             if outputs > 1:
                 self._snap(times)
             if arrives:
@@ -126,28 +153,30 @@ class EventLoop:
         raise AssertionError
 
     def _next_panel(self, stop: float) -> tuple[float, int]:
-        """Choose length and number of results.
+        """Choose length and number of points.
 
-        Results lie on the regular grid, except where an event ends a segment.
+        They lie on the regular grid of results or in between, except where an event ends a segment.
         """
-        position = (self.now.t - self.begin) / self.step
+        step = self.step / self.checks
+        position = (self.now.t - self.begin) / step
         nearest = round(position)
         if abs(position - nearest) > 1e-9 * max(1.0, position):
-            to_grid = self.begin + (np.floor(position) + 1) * self.step
+            to_grid = self.begin + (np.floor(position) + 1) * step
             return min(to_grid, stop) - self.now.t, 1
-        whole = int(np.floor((stop - self.now.t) / self.step + 1e-9))
+        whole = int(np.floor((stop - self.now.t) / step + 1e-9))
         if whole == 0:
             return stop - self.now.t, 1
         outputs = min(whole, self.panel)
         if self.guards.count:
             outputs = 1 << (outputs.bit_length() - 1)
-        return outputs * self.step, outputs
+        return outputs * step, outputs
 
     def _snap(self, times: Vector) -> None:
         """Put times exactly on the regular grid, so that they do not collect rounding errors."""
-        numbers = np.rint((times - self.begin) / self.step)
-        on_grid = np.abs((times - self.begin) / self.step - numbers) < 1e-7
-        times[on_grid] = self.begin + (self.end - self.begin) * (numbers[on_grid] / self.options.points)
+        position = (times - self.begin) / self.step * self.checks
+        numbers = np.rint(position)
+        on_grid = np.abs(position - numbers) < _ON_GRID
+        times[on_grid] = self.begin + (self.end - self.begin) * (numbers[on_grid] / (self.options.points * self.checks))
 
     def _stop_at_event(self, times: Vector, x: Vector, z: Vector) -> bool:
         """Look for guards that become positive; if one does, go there and handle the event."""
@@ -174,7 +203,7 @@ class EventLoop:
             )
             if located is not None:
                 if k > 0:
-                    self.record.add(all_times[1 : k + 1], all_x[:, 1 : k + 1], all_z[:, 1 : k + 1])
+                    self._keep(all_times[1 : k + 1], all_x[:, 1 : k + 1], all_z[:, 1 : k + 1])
                 self.now = located.point
                 self.record.add(np.array([self.now.t]), self.now.x[:, None], self.now.z[:, None])
                 self._event([*(self.guards.state_events[g] for g in located.guards), *self._due()])

@@ -21,8 +21,7 @@ class Aliases:
         known: roots whose value is a number or an expression of parameters.
         derivative: root -> (root, factor) of its derivative: der(root) = factor * root.
         remaining: positions in `FlatModel.linear` of the equations that still say something.
-        contradictions: positions of the equations without any unknown left, each with those that gave its unknowns their
-            values.
+        contradictions: equations that fix a value more than once; the first has no unknown left, or follows from the others.
     """
 
     root: list[int]
@@ -133,7 +132,7 @@ class _Elimination:
         terms, constant = self._reduce(equation)
         self.remaining.discard(number)
         if not terms:
-            self.contradictions.append((number, *self._causes(equation)))
+            self.contradictions.append(self._causes(number))
             return set()
         numbers = {root: c for root, c in terms.items() if c is not None}
         if len(terms) == len(numbers) == 1:
@@ -152,10 +151,16 @@ class _Elimination:
             self.watchers.setdefault(root, set()).add(number)
         return set()
 
-    def _causes(self, equation: LinearEquation) -> list[int]:
-        """Equations that gave the values of all its unknowns."""
-        roots = (self.find(node)[0] for node, _ in equation.terms)
-        return list(dict.fromkeys(self.cause[root] for root in roots if root in self.cause))
+    def _causes(self, number: int) -> tuple[int, ...]:
+        """Follow the values of the unknowns of an equation back to the equations that gave them."""
+        found = [number]
+        for one in found:
+            for node, _ in self.model.linear[one].terms:
+                cause = self.cause.get(self.find(node)[0])
+                if cause is not None and cause not in found:
+                    found.append(cause)
+        ends = [one for one in found if len(self.model.linear[one].terms) == 1]
+        return tuple(ends if len(ends) > 1 else dict.fromkeys([number, *ends]))
 
     def _learn(self, root: int, value: Any) -> set[int]:
         """A class has a constant value, its derivatives are zero."""

@@ -19,6 +19,7 @@ from components import (
     ConstantSpeed,
     ConstantTorque,
     Damper,
+    Differential,
     ElastoBacklash,
     ElastoBacklash2,
     Fixed,
@@ -95,7 +96,12 @@ def slide(part: Component) -> Assembly:
 
 
 def slide_end(part: Component) -> Assembly:
-    parts = {"wall": TranslationalFixed(), "spring": TranslationalSpringDamper(c=60.0, d=0.2), "m": Mass(m=0.5, s=0.4, v=3.0), "part": part}
+    parts = {
+        "wall": TranslationalFixed(),
+        "spring": TranslationalSpringDamper(c=60.0, d=0.2),
+        "m": Mass(m=0.5, s=0.4, v=3.0),
+        "part": part,
+    }
     return Assembly("drive", parts=parts, series={"shaft": list(parts)})
 
 
@@ -113,39 +119,97 @@ def driven(part: Component, entry: str, wave: Component) -> Assembly:
 
 def prescribed(part: Component, spring: Component, wall: Component, mass: Component, entry: str, unit: str) -> Assembly:
     """The part moves one end of an oscillator."""
-    parts = {"part": part, "spring": spring, "mass": mass, "spring2": type(spring)(c=50.0), "wall": wall, "wave": Sine(amplitude=f"2 {unit}", f=1.5)}
-    return Assembly("drive", parts=parts, series={"s": ["part", "spring", "mass", "spring2", "wall"]}, connect={"c": ("wave.y", f"part.{entry}")})
+    parts = {
+        "part": part,
+        "spring": spring,
+        "mass": mass,
+        "spring2": type(spring)(c=50.0),
+        "wall": wall,
+        "wave": Sine(amplitude=f"2 {unit}", f=1.5),
+    }
+    return Assembly(
+        "drive",
+        parts=parts,
+        series={"s": ["part", "spring", "mass", "spring2", "wall"]},
+        connect={"c": ("wave.y", f"part.{entry}")},
+    )
 
 
 def measured(part: Component) -> Assembly:
     drive = at_end(Damper(d=0.1))
     parts = {**drive.parts, "wall2": Fixed(), "sensor": part}
-    ends = {"a": ("sensor.flange_a", "wall.flange"), "b": ("sensor.flange_b", "J.flange_b")} if "flange_a" in part.connectors else {"a": ("sensor.flange", "J.flange_b")}
+    ends = (
+        {"a": ("sensor.flange_a", "wall.flange"), "b": ("sensor.flange_b", "J.flange_b")}
+        if "flange_a" in part.connectors
+        else {"a": ("sensor.flange", "J.flange_b")}
+    )
     return Assembly("drive", parts=parts, series={"s": ["wall", "spring", "J", "part", "wall2"]}, connect=ends)
 
 
 def planetary() -> Assembly:
     parts = {
-        "part": IdealPlanetary(ratio=2.5), "sun": Inertia(J=0.1, phi=0.0, w=4.0), "ring": Inertia(J=0.6, phi=0.0, w=-1.0), "carrier": Inertia(J=0.3),
-        "oil": Damper(d=0.4), "wall": Fixed(), "torque": ConstantTorque(tau_constant=2.0),
-    }  # fmt: skip
-    connect = {"s": ("part.sun", "sun.flange_a", "torque.flange"), "r": ("part.ring", "ring.flange_a"), "c": ("part.carrier", "carrier.flange_a", "oil.flange_a"),
-               "w": ("oil.flange_b", "wall.flange")}  # fmt: skip
+        "part": IdealPlanetary(ratio=2.5),
+        "sun": Inertia(J=0.1, phi=0.0, w=4.0),
+        "ring": Inertia(J=0.6, phi=0.0, w=-1.0),
+        "carrier": Inertia(J=0.3),
+        "oil": Damper(d=0.4),
+        "wall": Fixed(),
+        "torque": ConstantTorque(tau_constant=2.0),
+    }
+    connect = {
+        "s": ("part.sun", "sun.flange_a", "torque.flange"),
+        "r": ("part.ring", "ring.flange_a"),
+        "c": ("part.carrier", "carrier.flange_a", "oil.flange_a"),
+        "w": ("oil.flange_b", "wall.flange"),
+    }
+    return Assembly("drive", parts=parts, connect=connect)
+
+
+def differential() -> Assembly:
+    parts = {
+        "engine": ConstantTorque(tau_constant=2.0),
+        "part": Differential(ratio=3.0),
+        "left": Inertia(J=0.3, phi=0.0, w=1.0),
+        "right": Inertia(J=0.5, phi=0.0, w=-1.0),
+    }
+    connect = {
+        "d": ("engine.flange", "part.flange"),
+        "l": ("part.left", "left.flange_a"),
+        "r": ("part.right", "right.flange_a"),
+    }
     return Assembly("drive", parts=parts, connect=connect)
 
 
 def screw() -> Assembly:
-    parts = {"motor": ConstantTorque(tau_constant=2.0), "part": BallScrew(lead=0.02), "table": MachineTable(m=20.0, f_friction=30.0, f_load=20.0, s=0.0, v=0.0)}
+    parts = {
+        "motor": ConstantTorque(tau_constant=2.0),
+        "part": BallScrew(lead=0.02),
+        "table": MachineTable(m=20.0, f_friction=30.0, f_load=20.0, s=0.0, v=0.0),
+    }
     return Assembly("drive", parts=parts, series={"s": list(parts)})
 
 
 def product() -> Assembly:
-    parts = {"part": Product(), "a": Sine(amplitude="3 N.m", f=2.0), "b": Step(start_time=0.2), "torque": Torque(), "J": Inertia(J=0.5, phi=0.0, w=1.0)}
+    parts = {
+        "part": Product(),
+        "a": Sine(amplitude="3 N.m", f=2.0),
+        "b": Step(start_time=0.2),
+        "torque": Torque(),
+        "J": Inertia(J=0.5, phi=0.0, w=1.0),
+    }
     connect = {"1": ("a.y", "part.u1"), "2": ("b.y", "part.u2"), "3": ("part.y", "torque.tau")}
     return Assembly("drive", parts=parts, series={"s": ["torque", "J"]}, connect=connect)
 
 
-PLATES = {"mu_min": 0.04, "w_min": 3.0, "curvature": 1e-3, "slope": 1e-3, "mu_static": 0.133, "fn_max": 90.0, "cgeo": 0.5}
+PLATES = {
+    "mu_min": 0.04,
+    "w_min": 3.0,
+    "curvature": 1e-3,
+    "slope": 1e-3,
+    "mu_static": 0.133,
+    "fn_max": 90.0,
+    "cgeo": 0.5,
+}
 MU = ((0.0, 0.5), (2.0, 0.3), (9.0, 0.4))
 
 DRIVES: dict[type[Component], Callable[[], Assembly]] = {
@@ -160,6 +224,7 @@ DRIVES: dict[type[Component], Callable[[], Assembly]] = {
     ConstantSpeed: lambda: through(Spring(c=30.0)),
     ConstantTorque: lambda: at_end(ConstantTorque(tau_constant=-2.0)),
     Damper: lambda: through(Damper(d=2.0)),
+    Differential: differential,
     ElastoBacklash: lambda: through(ElastoBacklash(c=300.0, d=3.0, b=0.2)),
     ElastoBacklash2: lambda: through(ElastoBacklash2(c=300.0, d=3.0, b=0.2)),
     Fixed: lambda: through(Spring(c=30.0)),
@@ -194,21 +259,40 @@ DRIVES: dict[type[Component], Callable[[], Assembly]] = {
     TranslationalDamper: lambda: slide(TranslationalDamper(d=0.7)),
     TranslationalFixed: lambda: slide(TranslationalSpring(c=40.0)),
     TranslationalSpeed: lambda: prescribed(
-        TranslationalSpeed(s=0.0), TranslationalSpring(c=40.0, s_rel=0.0), TranslationalFixed(), Mass(m=0.2, v=0.0), "v_ref", "m/s"
+        TranslationalSpeed(s=0.0),
+        TranslationalSpring(c=40.0, s_rel=0.0),
+        TranslationalFixed(),
+        Mass(m=0.2, v=0.0),
+        "v_ref",
+        "m/s",
     ),
     TranslationalSpring: lambda: slide(TranslationalSpring(c=40.0, s_rel0=0.1)),
     TranslationalSpringDamper: lambda: slide(TranslationalSpringDamper(c=40.0, d=0.5)),
     Trapezoid: lambda: signal(Trapezoid(amplitude="2 N.m", period=0.3, rising=0.05, width=0.1, falling=0.05)),
-}  # fmt: skip
+}
 
 
-MODULES = ("fixed", "friction", "gears", "inertias", "loads", "planetary", "sensors", "signals", "sources", "spindles", "springs")
+MODULES = (
+    "fixed",
+    "friction",
+    "gears",
+    "inertias",
+    "loads",
+    "planetary",
+    "sensors",
+    "signals",
+    "sources",
+    "spindles",
+    "springs",
+)
 
 
 def test_every_component_is_here() -> None:
     exported = [getattr(components, name) for name in components.__all__]
     kinds = [kind for kind in exported if issubclass(kind, Component) and not kind._partial]
-    missing = {kind.__name__ for kind in kinds if kind.__module__.removeprefix("components.") in MODULES} - {kind.__name__ for kind in DRIVES}
+    missing = {kind.__name__ for kind in kinds if kind.__module__.removeprefix("components.") in MODULES} - {
+        kind.__name__ for kind in DRIVES
+    }
     assert not missing, "give these a small drive above"
 
 

@@ -53,13 +53,20 @@ def test_rigid_gear_train_has_two_states(stages: int) -> None:
 
 def test_housing_carries_the_difference_of_the_torques() -> None:
     parts = {
-        "torque": ConstantTorque(tau_constant=5.0), "motor": Inertia(J=0.3), "gear": IdealGear(ratio=3.0),
-        "load": Inertia(J=2.0, phi=0.0, w=0.0), "mount": SpringDamper(c=1e4, d=50.0, phi_rel=0.0), "housing": Inertia(J=1.0, w=0.0), "ground": Fixed(),
-    }  # fmt: skip
+        "torque": ConstantTorque(tau_constant=5.0),
+        "motor": Inertia(J=0.3),
+        "gear": IdealGear(ratio=3.0),
+        "load": Inertia(J=2.0, phi=0.0, w=0.0),
+        "mount": SpringDamper(c=1e4, d=50.0, phi_rel=0.0),
+        "housing": Inertia(J=1.0, w=0.0),
+        "ground": Fixed(),
+    }
     drive = Assembly(
-        "drive", parts=parts, series={"shaft": ["torque", "motor", "gear", "load"], "stand": ["ground", "mount", "housing"]},
+        "drive",
+        parts=parts,
+        series={"shaft": ["torque", "motor", "gear", "load"], "stand": ["ground", "mount", "housing"]},
         connect={"support": ["gear.support", "housing.flange_b"]},
-    )  # fmt: skip
+    )
     run = simulate(drive, "0.5 s", rtol=1e-9)
     np.testing.assert_allclose(run["gear.support.tau"], -run["gear.flange_a.tau"] - run["gear.flange_b.tau"], atol=1e-9)
     housing = run["housing.phi"]
@@ -73,13 +80,23 @@ def test_housing_carries_the_difference_of_the_torques() -> None:
 
 def planetary(ratio: float, held: str, driven: str, taken: str) -> Assembly:
     parts = {
-        "planets": IdealPlanetary(ratio=ratio), "motor": ConstantSpeed(w_fixed=10.0), "brake": Fixed(), "mass": Inertia(J=0.1),
-        "oil": Damper(d=2.0), "wall": Fixed(),
-    }  # fmt: skip
+        "planets": IdealPlanetary(ratio=ratio),
+        "motor": ConstantSpeed(w_fixed=10.0),
+        "brake": Fixed(),
+        "mass": Inertia(J=0.1),
+        "oil": Damper(d=2.0),
+        "wall": Fixed(),
+    }
     return Assembly(
-        "drive", parts=parts, series={"load": ["mass", "oil", "wall"]},
-        connect={"in": ["motor.flange", f"planets.{driven}"], "out": ["mass.flange_a", f"planets.{taken}"], "held": ["brake.flange", f"planets.{held}"]},
-    )  # fmt: skip
+        "drive",
+        parts=parts,
+        series={"load": ["mass", "oil", "wall"]},
+        connect={
+            "in": ["motor.flange", f"planets.{driven}"],
+            "out": ["mass.flange_a", f"planets.{taken}"],
+            "held": ["brake.flange", f"planets.{held}"],
+        },
+    )
 
 
 # (held, driven, taken): speed ratio driven/taken, after R. Willis with the fixed-carrier ratio -r
@@ -106,17 +123,20 @@ def test_planetary_ratios(held: str, driven: str, taken: str, formula: object, r
 
 
 def test_planetary_as_differential_splits_the_torque() -> None:
-    """With equal arms (ratio 1) sun and ring are the two wheels: equal torques, the carrier turns with their mean speed."""
+    """With equal arms sun and ring are the two wheels: equal torques, and the carrier turns with their mean speed."""
     parts = {
         "engine": ConstantTorque(tau_constant=8.0), "differential": IdealPlanetary(ratio=1.0),
         "left": Inertia(J=1.0, phi=0.0, w=0.0), "right": Inertia(J=3.0, phi=0.0, w=0.0),
     }  # fmt: skip
     drive = Assembly(
-        "drive", parts=parts,
+        "drive",
+        parts=parts,
         connect={
-            "in": ["engine.flange", "differential.carrier"], "l": ["differential.sun", "left.flange_a"], "r": ["differential.ring", "right.flange_a"],
+            "in": ["engine.flange", "differential.carrier"],
+            "l": ["differential.sun", "left.flange_a"],
+            "r": ["differential.ring", "right.flange_a"],
         },
-    )  # fmt: skip
+    )
     run = simulate(drive, "1 s", points=10)
     assert run.final["left.w"] == pytest.approx(4.0, rel=1e-9)
     assert run.final["right.w"] == pytest.approx(4.0 / 3.0, rel=1e-9)
@@ -129,9 +149,13 @@ def test_planetary_as_differential_splits_the_torque() -> None:
 @pytest.mark.parametrize("lead", [0.005, 0.015, -0.01])
 def test_ball_screw(lead: float) -> None:
     parts = {
-        "motor": ConstantTorque(tau_constant=2.0), "rotor": Inertia(J=0.001), "screw": BallScrew(lead=lead), "table": Mass(m=200.0, s=0.0, v=0.0),
-        "oil": TranslationalDamper(d=100.0), "bed": TranslationalFixed(),
-    }  # fmt: skip
+        "motor": ConstantTorque(tau_constant=2.0),
+        "rotor": Inertia(J=0.001),
+        "screw": BallScrew(lead=lead),
+        "table": Mass(m=200.0, s=0.0, v=0.0),
+        "oil": TranslationalDamper(d=100.0),
+        "bed": TranslationalFixed(),
+    }
     run = simulate(shaft(**parts), "0.5 s", rtol=1e-9)
     np.testing.assert_allclose(run["table.s"], lead * run["rotor.phi"] / (2 * pi), rtol=1e-12)
     np.testing.assert_allclose(2 * pi * run["screw.flange_r.tau"], -lead * run["screw.flange_t.f"], rtol=1e-12)

@@ -76,8 +76,10 @@ def test_free_oscillation(d: float, rest: float) -> None:
         mass=Inertia(J=J, phi=rest + x0, w=0.0),
     )
     slide = shaft(
-        wall=TranslationalFixed(), spring=sliding.get(d, TranslationalSpringDamper(c=c, d=d, s_rel0=rest)), mass=Mass(m=J, s=rest + x0, v=0.0)
-    )  # fmt: skip
+        wall=TranslationalFixed(),
+        spring=sliding.get(d, TranslationalSpringDamper(c=c, d=d, s_rel0=rest)),
+        mass=Mass(m=J, s=rest + x0, v=0.0),
+    )
     for run, angle, speed, torque in (
         (simulate(drive, "2 s", **TIGHT), "mass.phi", "mass.w", "spring.tau"),
         (simulate(slide, "2 s", **TIGHT), "mass.s", "mass.v", "spring.f"),

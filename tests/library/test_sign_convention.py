@@ -85,7 +85,11 @@ def test_5_ratio_is_left_over_right() -> None:
 
 def test_6_sensors_count_from_left_to_right() -> None:
     result = run(
-        motor=ConstantSpeed(w_fixed=10.0), slip=Damper(d=1.0), tau=TorqueSensor(), power=PowerSensor(), load=Inertia(J=1.0, phi=0.0, w=1.0)
+        motor=ConstantSpeed(w_fixed=10.0),
+        slip=Damper(d=1.0),
+        tau=TorqueSensor(),
+        power=PowerSensor(),
+        load=Inertia(J=1.0, phi=0.0, w=1.0),
     )
     assert result["tau.tau"][0] == pytest.approx(9.0)
     assert result["power.power"][0] == pytest.approx(9.0)
@@ -93,7 +97,12 @@ def test_6_sensors_count_from_left_to_right() -> None:
 
 def test_7_the_housing_carries_the_reaction() -> None:
     parts = {"motor": ConstantTorque(tau_constant=5.0), "mass": Inertia(J=1.0, phi=0.0, w=0.0), "ground": Fixed()}
-    drive = Assembly("drive", parts=parts, series={"shaft": ["motor", "mass"]}, connect={"housing": ["motor.support", "ground.flange"]})
+    drive = Assembly(
+        "drive",
+        parts=parts,
+        series={"shaft": ["motor", "mass"]},
+        connect={"housing": ["motor.support", "ground.flange"]},
+    )
     result = simulate(drive, 0.1, points=2)
     assert result.final["motor.support.tau"] == 5.0
     assert result.final["ground.flange.tau"] == -5.0

@@ -32,7 +32,11 @@ def torque_of(signal: Component, until: float = 2.0, **options: Any) -> Solution
     """Run a drive whose torque is the signal."""
     parts = {"signal": signal, "torque": Torque(), "mass": Inertia(J=1.0, phi=0.0, w=0.0)}
     return simulate(
-        Assembly("drive", parts=parts, series={"shaft": ["torque", "mass"]}, connect={"drive": ["signal.y", "torque.tau"]}), until, **options
+        Assembly(
+            "drive", parts=parts, series={"shaft": ["torque", "mass"]}, connect={"drive": ["signal.y", "torque.tau"]}
+        ),
+        until,
+        **options,
     )
 
 
@@ -51,18 +55,40 @@ def trapezoid(t: float) -> float:
 CASES = [
     (Constant(k="3 N.m"), lambda t: 3.0, []),
     (Step(height="2 N.m", offset="1 N.m", start_time=0.7), lambda t: 3.0 if t >= 0.7 else 1.0, [0.7]),
-    (Ramp(height="4 N.m", duration=0.5, offset="-1 N.m", start_time=0.3), lambda t: -1 + 4 * min(max((t - 0.3) / 0.5, 0), 1), [0.3, 0.8]),
-    (Sine(amplitude="2 N.m", f=3.0, phase="30 deg", offset="1 N.m", start_time=0.4),
-     lambda t: 1 + (2 * np.sin(6 * pi * (t - 0.4) + pi / 6) if t >= 0.4 else 0), [0.4]),
-    (CoilForce(amplitude="5 N.m", T=0.2, start_time=0.3), lambda t: 5 * (1 - np.exp(-(t - 0.3) / 0.2)) ** 2 if t >= 0.3 else 0.0, [0.3]),
-    (Pulse(amplitude="2 N.m", period=0.5, width=0.4, offset="1 N.m", start_time=0.3), pulse, [0.3, 0.5, 0.8, 1.0, 1.3, 1.5, 1.8, 2.0]),
-    (Trapezoid(amplitude="3 N.m", period=0.8, rising=0.1, width=0.2, falling=0.1, offset="-1 N.m", start_time=0.1), trapezoid,
-     [0.1, 0.2, 0.4, 0.5, 0.9, 1.0, 1.2, 1.3, 1.7, 1.8, 2.0]),
+    (
+        Ramp(height="4 N.m", duration=0.5, offset="-1 N.m", start_time=0.3),
+        lambda t: -1 + 4 * min(max((t - 0.3) / 0.5, 0), 1),
+        [0.3, 0.8],
+    ),
+    (
+        Sine(amplitude="2 N.m", f=3.0, phase="30 deg", offset="1 N.m", start_time=0.4),
+        lambda t: 1 + (2 * np.sin(6 * pi * (t - 0.4) + pi / 6) if t >= 0.4 else 0),
+        [0.4],
+    ),
+    (
+        CoilForce(amplitude="5 N.m", T=0.2, start_time=0.3),
+        lambda t: 5 * (1 - np.exp(-(t - 0.3) / 0.2)) ** 2 if t >= 0.3 else 0.0,
+        [0.3],
+    ),
+    (
+        Pulse(amplitude="2 N.m", period=0.5, width=0.4, offset="1 N.m", start_time=0.3),
+        pulse,
+        [0.3, 0.5, 0.8, 1.0, 1.3, 1.5, 1.8, 2.0],
+    ),
+    (
+        Trapezoid(amplitude="3 N.m", period=0.8, rising=0.1, width=0.2, falling=0.1, offset="-1 N.m", start_time=0.1),
+        trapezoid,
+        [0.1, 0.2, 0.4, 0.5, 0.9, 1.0, 1.2, 1.3, 1.7, 1.8, 2.0],
+    ),
     (TimeFormula(formula="2*sin(3*time) + max(time, 1)", scale="1 N.m"), lambda t: 2 * np.sin(3 * t) + max(t, 1), []),
     (TimeFormula(formula="time**2", scale="1 N.m", time_scale="0.1 s"), lambda t: 100 * t**2, []),
-    (Table(table=((0, 0), (0.5, 2), (1.5, -1)), scale="1 N.m"), lambda t: np.interp(t, [0, 0.5, 1.5, 2.0], [0, 2, -1, -2.5]), [0, 0.5, 1.5]),
+    (
+        Table(table=((0, 0), (0.5, 2), (1.5, -1)), scale="1 N.m"),
+        lambda t: np.interp(t, [0, 0.5, 1.5, 2.0], [0, 2, -1, -2.5]),
+        [0, 0.5, 1.5],
+    ),
     (Table(table=((0, 1), (500, 3)), scale="2 N.m", time_scale="1 ms"), lambda t: 2 + 8 * t, [0, 0.5]),
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize(("signal", "formula", "events"), CASES, ids=lambda value: type(value).__name__)
@@ -74,7 +100,10 @@ def test_values_and_moments(signal: Component, formula: Any, events: list[float]
     np.testing.assert_allclose(run["signal.y"][away], expected, atol=1e-12)
 
 
-@pytest.mark.parametrize("factory", [lambda: Step(height="1 N.m", start_time=0.7), lambda: Ramp(height="1 N.m", duration=0.4, start_time=0.3)])
+@pytest.mark.parametrize(
+    "factory",
+    [lambda: Step(height="1 N.m", start_time=0.7), lambda: Ramp(height="1 N.m", duration=0.4, start_time=0.3)],
+)
 def test_both_sides_of_an_event_are_in_the_results(factory: Any) -> None:
     run = torque_of(factory())
     for moment in moments(run):
@@ -83,13 +112,19 @@ def test_both_sides_of_an_event_are_in_the_results(factory: Any) -> None:
 
 def test_a_signal_that_has_started_before() -> None:
     for signal, value in (
-        (Step(height="2 N.m", start_time=-1.0), 2.0), (Ramp(height="2 N.m", duration=1.0, start_time=-0.5), 1.0),
-        (Ramp(height="2 N.m", duration=1.0, start_time=-5.0), 2.0), (Sine(amplitude="2 N.m", f=1.0, start_time=-0.25), 2.0),
-    ):  # fmt: skip
-        assert torque_of(signal, 0.1)["signal.y"][-1 if value == 2.0 and isinstance(signal, Step) else 0] == pytest.approx(value)
+        (Step(height="2 N.m", start_time=-1.0), 2.0),
+        (Ramp(height="2 N.m", duration=1.0, start_time=-0.5), 1.0),
+        (Ramp(height="2 N.m", duration=1.0, start_time=-5.0), 2.0),
+        (Sine(amplitude="2 N.m", f=1.0, start_time=-0.25), 2.0),
+    ):
+        assert torque_of(signal, 0.1)["signal.y"][
+            -1 if value == 2.0 and isinstance(signal, Step) else 0
+        ] == pytest.approx(value)
 
 
-@pytest.mark.parametrize(("periods", "expected"), [(0, []), (1, [0.0, 0.1]), (3, [0.0, 0.1, 0.2, 0.3, 0.4, 0.5]), (-1, None)])
+@pytest.mark.parametrize(
+    ("periods", "expected"), [(0, []), (1, [0.0, 0.1]), (3, [0.0, 0.1, 0.2, 0.3, 0.4, 0.5]), (-1, None)]
+)
 def test_number_of_pulses(periods: int, expected: list[float] | None) -> None:
     run = torque_of(Pulse(amplitude="1 N.m", period=0.2, periods=periods), 1.0)
     if expected is None:
@@ -98,8 +133,12 @@ def test_number_of_pulses(periods: int, expected: list[float] | None) -> None:
 
 
 def test_pulses_of_full_and_no_width() -> None:
-    assert torque_of(Pulse(amplitude="1 N.m", period=0.2, width=1.0), 0.95).final["mass.w"] == pytest.approx(0.95, rel=1e-9)
-    assert torque_of(Pulse(amplitude="1 N.m", period=0.2, width=0.0), 0.95).final["mass.w"] == pytest.approx(0.0, abs=1e-12)
+    assert torque_of(Pulse(amplitude="1 N.m", period=0.2, width=1.0), 0.95).final["mass.w"] == pytest.approx(
+        0.95, rel=1e-9
+    )
+    assert torque_of(Pulse(amplitude="1 N.m", period=0.2, width=0.0), 0.95).final["mass.w"] == pytest.approx(
+        0.0, abs=1e-12
+    )
 
 
 def test_the_impulse_of_pulses_is_exact() -> None:
@@ -160,8 +199,12 @@ def test_formula_is_not_python() -> None:
 
 def test_product_multiplies_units_too() -> None:
     parts = {
-        "torque": Torque(), "mass": Inertia(J=1.0, phi=0.0, w=0.0), "share": Step(height=0.5, start_time=0.5), "full": Constant(k="8 N.m"), "product": Product(),
-    }  # fmt: skip
+        "torque": Torque(),
+        "mass": Inertia(J=1.0, phi=0.0, w=0.0),
+        "share": Step(height=0.5, start_time=0.5),
+        "full": Constant(k="8 N.m"),
+        "product": Product(),
+    }
     drive = Assembly(
         "drive", parts=parts, series={"shaft": ["torque", "mass"]},
         connect={"a": ["share.y", "product.u1"], "b": ["full.y", "product.u2"], "c": ["product.y", "torque.tau"]},
@@ -170,7 +213,10 @@ def test_product_multiplies_units_too() -> None:
 
 
 def test_torque_step_has_its_own_time_event() -> None:
-    parts = {"torque": TorqueStep(step_torque=4.0, offset_torque=1.0, start_time=0.3), "mass": Inertia(J=1.0, phi=0.0, w=0.0)}
+    parts = {
+        "torque": TorqueStep(step_torque=4.0, offset_torque=1.0, start_time=0.3),
+        "mass": Inertia(J=1.0, phi=0.0, w=0.0),
+    }
     run = simulate(Assembly("drive", parts=parts, series={"shaft": list(parts)}), 1.0)
     assert moments(run, "torque") == [0.3]
     assert run.final["mass.w"] == pytest.approx(1.0 + 4.0 * 0.7, rel=1e-9)

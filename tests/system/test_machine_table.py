@@ -1,7 +1,7 @@
 """Document 000: a clutch of constant torque brings a machine table to speed, directly and through a gear.
 
-The closed form: motor speed w and clutch torque M are constant, so the driven side starts with constant acceleration, locks at the
-acceleration time t_A, and the slip energy is M·w·t_A/2, one half of the motor's work.
+The closed form: motor speed w and clutch torque M are constant, so the driven side starts with constant acceleration,
+locks at the acceleration time t_A, and the slip energy is M·w·t_A/2, one half of the motor's work.
 """
 
 from collections.abc import Callable
@@ -55,8 +55,13 @@ J_table = m * (u / w_spindle) ** 2
 w_slow = 1440 * pi / 30
 DIRECT = Table("machine_table_direct", w_spindle, 0.004 + 0.016 + J_table, 86.63, 5443.0, 0.200431)
 GEARED = Table(
-    "machine_table_geared", w_slow, 0.004 + 0.014 + (0.007 + 0.016 + J_table) * (w_spindle / w_slow) ** 2, 414.62, 6252.0, 0.199899
-)  # fmt: skip
+    "machine_table_geared",
+    w_slow,
+    0.004 + 0.014 + (0.007 + 0.016 + J_table) * (w_spindle / w_slow) ** 2,
+    414.62,
+    6252.0,
+    0.199899,
+)
 BOTH = pytest.mark.parametrize("table", [DIRECT, GEARED], ids=["direct", "geared"])
 
 

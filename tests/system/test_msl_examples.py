@@ -1,7 +1,7 @@
 """Examples of the Modelica Standard Library against its own reference results.
 
-The references were computed with Dymola's DASSL at a tolerance of 1e-6, so they carry errors of that order; a run of ours with rtol = 1e-10
-tells, for each signal, which of the two is off.
+The references were computed with Dymola's DASSL at a tolerance of 1e-6, so they carry errors of that order; a run of
+ours with rtol = 1e-10 tells, for each signal, which of the two is off.
 """
 
 import csv
@@ -106,7 +106,7 @@ def test_ten_times_tighter_in_the_median(example: str, name: str) -> None:
 
 @pytest.mark.parametrize(("example", "name"), SIGNALS)
 def test_no_deviation_is_ours(example: str, name: str) -> None:
-    """With three more digits of tolerance the distance to the reference stays: what is left of it is the reference's error."""
+    """With three more digits of tolerance the distance to the reference stays: it is the reference's error."""
     ordinary, precise = run(example), run(example, 1e-10)
     own_error = np.abs(np.interp(precise.time, ordinary.time, ordinary[name]) - precise[name])
     assert np.max(own_error) / np.ptp(precise[name]) <= 5e-4

@@ -1,0 +1,208 @@
+"""Electrical circuits of drives: sources, resistors, inductors, capacitors, switches, sensors."""
+
+from __future__ import annotations
+
+from components.thermal import Lossy
+from modelica_like.language import (
+    Component,
+    Connector,
+    Equations,
+    Events,
+    Expr,
+    Input,
+    Mode,
+    Output,
+    Parameter,
+    Variable,
+    der,
+    flow,
+    param,
+    signal_in,
+    signal_out,
+    var,
+)
+
+
+class Pin(Connector):
+    """Electrical terminal: potential, and the current into the component."""
+
+    v: Variable = var("V", "potential")
+    i: Variable = flow("A", "current, positive into the component")
+
+    def power(self) -> Expr:
+        return self.v * self.i
+
+
+class Ground(Component):
+    """Potential zero; every circuit needs one."""
+
+    p = Pin("grounded terminal")
+
+    def equations(self) -> Equations:
+        yield self.p.v == 0
+
+
+class TwoPins(Component, partial=True):
+    """Element with two terminals; the current flows from p to n through it."""
+
+    p = Pin("positive terminal")
+    n = Pin("negative terminal")
+    inlet, outlet = "p", "n"
+    v: Variable = var("V", "voltage, p.v - n.v")
+    i: Variable = var("A", "current from p to n")
+
+    def equations(self) -> Equations:
+        yield self.v == self.p.v - self.n.v
+        yield self.p.i == self.i
+        yield self.n.i == -self.i
+
+
+class Resistor(Lossy, TwoPins):
+    """Ohmic resistance, which may rise with the temperature of its heat port."""
+
+    R: Parameter = param("Ohm", "resistance at T_ref", min=0)
+    alpha: Parameter = param("1/K", "temperature coefficient", default=0.0)
+    T_ref: Parameter = param("K", "temperature to which R belongs", default=293.15)
+    T: Parameter = param("K", "temperature without a heat port", default=293.15)
+
+    def equations(self) -> Equations:
+        yield from super().equations()
+        temperature = self.heat_port.T if self.heat_port.used else self.T
+        yield self.v == self.R * (1 + self.alpha * (temperature - self.T_ref)) * self.i
+
+    def dissipation(self) -> Expr:
+        return self.v * self.i
+
+
+class VariableResistor(Lossy, TwoPins):
+    """Resistance given by a signal, e.g. a starting resistor."""
+
+    R: Input = signal_in("Ohm", "resistance")
+
+    def equations(self) -> Equations:
+        yield from super().equations()
+        yield self.v == self.R * self.i
+
+    def dissipation(self) -> Expr:
+        return self.v * self.i
+
+
+class Inductor(TwoPins):
+    """Ideal inductance: v = L·der(i)."""
+
+    L: Parameter = param("H", "inductance", min=0)
+
+    def equations(self) -> Equations:
+        yield from super().equations()
+        yield self.L * der(self.i) == self.v
+
+    def stored_energy(self) -> Expr:
+        return 0.5 * self.L * self.i**2
+
+
+class Capacitor(TwoPins):
+    """Ideal capacitance: i = C·der(v)."""
+
+    C: Parameter = param("F", "capacitance", min=0)
+
+    def equations(self) -> Equations:
+        yield from super().equations()
+        yield self.C * der(self.v) == self.i
+
+    def stored_energy(self) -> Expr:
+        return 0.5 * self.C * self.v**2
+
+
+class ElectricalSource(TwoPins, partial=True):
+    """Supply from outside the model."""
+
+    def source_power(self) -> Expr:
+        return -self.v * self.i
+
+
+class ConstantVoltage(ElectricalSource):
+    """Constant voltage between p and n."""
+
+    V: Parameter = param("V", "voltage")
+
+    def equations(self) -> Equations:
+        yield from super().equations()
+        yield self.v == self.V
+
+
+class SignalVoltage(ElectricalSource):
+    """Voltage between p and n given by a signal."""
+
+    v_ref: Input = signal_in("V", "voltage")
+
+    def equations(self) -> Equations:
+        yield from super().equations()
+        yield self.v == self.v_ref
+
+
+class ConstantCurrent(ElectricalSource):
+    """Constant current from p to n."""
+
+    I: Parameter = param("A", "current")  # noqa: E741
+
+    def equations(self) -> Equations:
+        yield from super().equations()
+        yield self.i == self.I
+
+
+class CurrentSink(ElectricalSource):
+    """Current drawn at p and returned at n, given by a signal: an electronic load."""
+
+    i_ref: Input = signal_in("A", "current drawn at p")
+
+    def equations(self) -> Equations:
+        yield from super().equations()
+        yield self.i == self.i_ref
+
+
+class Switch(Lossy, TwoPins):
+    """Switch, closed while its signal is above one half; a small resistance closed, a small conductance open."""
+
+    closed: Input = signal_in("1", "the switch is closed above 0.5")
+    R_closed: Parameter = param("Ohm", "resistance of the closed switch", default=1e-5, min=0)
+    G_open: Parameter = param("S", "conductance of the open switch", default=1e-5, min=0)
+    contacts = Mode("open", "closed", description="state of the switch")
+
+    def equations(self) -> Equations:
+        yield from super().equations()
+        yield self.contacts.choose(open=self.i - self.G_open * self.v, closed=self.v - self.R_closed * self.i) == 0
+
+    def events(self) -> Events:
+        yield self.contacts.initially("closed", when=self.closed > 0.5)
+        yield self.contacts.go("open", "closed", when=self.closed > 0.5)
+        yield self.contacts.go("closed", "open", when=self.closed < 0.5)
+
+    def dissipation(self) -> Expr:
+        return self.v * self.i
+
+
+class VoltageSensor(Component):
+    """Voltage between two terminals."""
+
+    p = Pin("positive terminal")
+    n = Pin("negative terminal")
+    v: Output = signal_out("V", "voltage, p.v - n.v")
+
+    def equations(self) -> Equations:
+        yield self.p.i == 0
+        yield self.n.i == 0
+        yield self.v == self.p.v - self.n.v
+
+
+class CurrentSensor(Component):
+    """Current through a wire, from p to n."""
+
+    p = Pin("positive terminal")
+    n = Pin("negative terminal")
+    inlet, outlet = "p", "n"
+    i: Output = signal_out("A", "current")
+
+    def equations(self) -> Equations:
+        yield self.p.v == self.n.v
+        yield self.p.i + self.n.i == 0
+        yield self.i == self.p.i

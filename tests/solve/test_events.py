@@ -1,0 +1,574 @@
+"""Events against closed forms: located, ordered, iterated, and never missed."""
+
+import math
+import time
+
+import numpy as np
+import pytest
+
+from modelica_like import Solution, build, simulate
+from modelica_like.errors import Chattering, SolveError, StepFailed
+from modelica_like.language import (
+    Component,
+    Discrete,
+    Equations,
+    Events,
+    Mode,
+    Parameter,
+    Variable,
+    all_of,
+    any_of,
+    der,
+    discrete,
+    negate,
+    param,
+    sin,
+    var,
+)
+
+TIGHT = {"rtol": 1e-11, "atol": 1e-13}
+
+
+class Clock(Component, partial=True):
+    """One variable that runs with time, and two modes."""
+
+    x: Variable = var("s", "time")
+    a = Mode("off", "on", "gone")
+    b = Mode("off", "on", "gone")
+    at: Parameter = param("s", "when", default=0.5)
+    rate: Parameter = param("1", "speed of the clock", default=1.0)
+
+    def equations(self) -> Equations:
+        yield der(self.x) == self.rate
+
+
+def story(run: Solution) -> list[tuple[str, str]]:
+    return [(event.mode, event.after) for event in run.events]
+
+
+def times(run: Solution) -> np.ndarray:
+    return np.array([event.time for event in run.events])
+
+
+# -- location --------------------------------------------------------------------------------------------------------
+
+
+class Oscillator(Component):
+    x: Variable = var("1", "position")
+    v: Variable = var("1/s", "velocity")
+    w: Parameter = param("rad/s", "angular frequency", default=20.0)
+    limit: Parameter = param("1", "threshold", default=0.9)
+    side = Mode("below", "above")
+
+    def equations(self) -> Equations:
+        yield der(self.x) == self.v
+        yield der(self.v) == -(self.w**2) * self.x
+
+    def events(self) -> Events:
+        yield self.side.go("below", "above", when=self.x > self.limit)
+        yield self.side.go("above", "below", when=self.x < self.limit)
+
+
+def crossings(end: float) -> np.ndarray:
+    """Times at which sin(20 t) passes 0.9."""
+    first = math.asin(0.9)
+    both = [[first + 2 * math.pi * k, math.pi - first + 2 * math.pi * k] for k in range(int(20 * end))]
+    found = np.sort(np.ravel(both)) / 20.0
+    return found[found <= end]
+
+
+def test_events_on_a_smooth_guard_are_located_to_a_tenth_of_a_nanosecond():
+    run = simulate(Oscillator(x=0.0, v=20.0), 0.6, rtol=1e-13, atol=1e-15)
+    np.testing.assert_allclose(times(run), crossings(0.6), rtol=0, atol=1e-10)
+
+
+@pytest.mark.parametrize("points", [1, 2, 7, 50, 500])
+def test_no_event_is_missed_however_few_results_are_asked_for(points):
+    run = simulate(Oscillator(x=0.0, v=20.0), 5.0, points=points, rtol=1e-9, atol=1e-11)
+    expected = crossings(5.0)
+    assert len(run.events) == len(expected)
+    np.testing.assert_allclose(times(run), expected, rtol=0, atol=2e-7)
+
+
+class Decay(Component):
+    x: Variable = var("1", "amount")
+    T: Parameter = param("s", "time constant", default=1.0)
+    level: Parameter = param("1", "threshold", default=0.5)
+    state = Mode("high", "low")
+
+    def equations(self) -> Equations:
+        yield self.T * der(self.x) == -self.x
+
+    def events(self) -> Events:
+        yield self.state.go("high", "low", when=self.x < self.level)
+
+
+@pytest.mark.parametrize("level", [0.9, 0.5, 0.1, 1e-3, 1e-6])
+def test_a_logarithm_is_located(level):
+    run = simulate(Decay(x=1.0, level=level), 20.0, points=20, rtol=1e-13, atol=1e-17)
+    # The guard is flat where x is small: there its own error counts over its slope.
+    np.testing.assert_allclose(times(run), [-math.log(level)], rtol=0, atol=1e-10)
+
+
+# -- two things at one instant ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("points", [1, 2, 3, 10, 500])
+def test_two_guards_at_the_same_instant(points):
+    class Twin(Clock):
+        def events(self) -> Events:
+            yield self.a.go("off", "on", when=self.x > self.at)
+            yield self.b.go("off", "on", when=3 * self.x > 3 * self.at)
+
+    run = simulate(Twin(x=0.0), 1.0, points=points)
+    assert story(run) == [("a", "on"), ("b", "on")]
+    np.testing.assert_allclose(times(run), 0.5, rtol=0, atol=1e-12)
+
+
+def test_of_two_transitions_of_one_mode_the_first_declared_wins():
+    class Contest(Clock):
+        swap: bool = False
+
+        def events(self) -> Events:
+            first, second = ("gone", "on") if self.swap else ("on", "gone")
+            yield self.a.go("off", first, when=self.x > self.at)
+            yield self.a.go("off", second, when=2 * self.x > 2 * self.at)
+
+    assert story(simulate(Contest(x=0.0), 1.0)) == [("a", "on")]
+    assert story(simulate(Contest(x=0.0, swap=True), 1.0)) == [("a", "gone")]
+
+
+def test_one_event_may_cause_the_next_at_the_same_instant():
+    class Chain(Clock):
+        def events(self) -> Events:
+            yield self.a.go("off", "on", when=self.x > self.at)
+            yield self.b.go("off", "on", when=self.a.is_("on"))
+            yield self.a.go("on", "gone", when=self.b.is_("on"))
+
+    run = simulate(Chain(x=0.0), 1.0)
+    assert story(run) == [("a", "on"), ("b", "on"), ("a", "gone")]
+    assert len(set(times(run))) == 1
+
+
+@pytest.mark.parametrize("at", [0.5, 0.3, 1 / 3, 0.1, 0.7])
+@pytest.mark.parametrize("points", [7, 10])
+def test_a_time_event_and_a_state_event_at_the_same_instant(at, points):
+    class Both(Clock):
+        def events(self) -> Events:
+            yield self.a.go("off", "on", when=self.x > self.at)
+            yield self.b.go("off", "on", at=self.at)
+
+    run = simulate(Both(x=0.0, at=at), 1.0, points=points)
+    assert sorted(story(run)) == [("a", "on"), ("b", "on")]
+    np.testing.assert_allclose(times(run), at, rtol=0, atol=1e-12)
+
+
+# -- guards at zero --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("rate", "fires"), [(1.0, True), (-1.0, False), (0.0, False)])
+def test_a_guard_that_is_zero_at_the_start_counts_by_its_direction(rate, fires):
+    class Zero(Clock):
+        def events(self) -> Events:
+            yield self.a.go("off", "on", when=self.x > self.at)
+
+    run = simulate(Zero(x=0.5, rate=rate), 1.0)
+    assert list(times(run)) == ([0.0] if fires else [])
+
+
+@pytest.mark.parametrize("rate", [1.0, -1.0, 0.0])
+def test_a_relation_with_equality_holds_at_zero(rate):
+    class Zero(Clock):
+        def events(self) -> Events:
+            yield self.a.go("off", "on", when=self.x >= self.at)
+
+    assert list(times(simulate(Zero(x=0.5, rate=rate), 1.0))) == [0.0]
+
+
+@pytest.mark.parametrize("at", [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9])
+def test_a_guard_that_is_zero_at_an_output_point_fires_once(at):
+    class Grid(Clock):
+        def events(self) -> Events:
+            yield self.a.go("*", "on", when=all_of(self.x > self.at, negate(self.a.is_("on"))))
+
+    run = simulate(Grid(x=0.0, at=at), 1.0, points=10)
+    assert story(run) == [("a", "on")]
+    np.testing.assert_allclose(times(run), at, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("back", [True, False])
+def test_a_guard_that_is_zero_right_after_a_reset(back):
+    """x is set to the threshold exactly; it fires if x then rises, and not if it falls."""
+
+    class Reset(Clock):
+        rising: bool = True
+
+        def equations(self) -> Equations:
+            yield der(self.x) == self.a.choose(off=1, on=-1 if self.rising is False else 1, gone=1)
+
+        def events(self) -> Events:
+            yield self.a.go("off", "on", when=self.x > self.at, reset={self.x: 2 * self.at})
+            yield self.b.go("off", "on", when=all_of(self.a.is_("on"), self.x > 2 * self.at))
+
+    run = simulate(Reset(x=0.0, rising=back), 0.8)
+    assert story(run) == ([("a", "on"), ("b", "on")] if back else [("a", "on")])
+
+
+class Parabola(Component):
+    """The guard width² - (t - 1 s)² rises above zero for 2 width."""
+
+    x: Variable = var("s", "time")
+    width: Parameter = param("s", "half the distance of the roots", default=0.005)
+    shift: Parameter = param("s2", "lifts the guard", default=0.0)
+    inside = Mode("no", "yes")
+
+    def equations(self) -> Equations:
+        yield der(self.x) == 1
+
+    def events(self) -> Events:
+        guard = self.width**2 + self.shift - (self.x - self.one) ** 2
+        yield self.inside.go("no", "yes", when=guard > 0)
+        yield self.inside.go("yes", "no", when=guard < 0)
+
+    one: Parameter = param("s", "middle", default=1.0)
+
+
+@pytest.mark.parametrize("points", [1, 3, 10, 500])
+@pytest.mark.parametrize("width", [5e-3, 5e-4, 5e-5])
+def test_two_roots_close_together_are_both_found(width, points):
+    run = simulate(Parabola(x=0.0, width=width), 3.0, points=points, **TIGHT)
+    np.testing.assert_allclose(times(run), [1 - width, 1 + width], rtol=0, atol=1e-10)
+
+
+@pytest.mark.parametrize("points", [1, 3, 7, 10, 500])
+@pytest.mark.parametrize("shift", [0.0, -1e-12, -1e-9, -1e-6])
+def test_a_guard_that_only_touches_zero_does_not_fire(shift, points):
+    assert not simulate(Parabola(x=0.0, width=0.0, shift=shift), 3.0, points=points, **TIGHT).events
+
+
+def test_a_sine_that_touches_zero_at_its_top_does_not_fire():
+    class Wave(Clock):
+        w: Parameter = param("rad/s", "frequency", default=1.0)
+
+        def events(self) -> Events:
+            yield self.a.go("off", "on", when=sin(self.w * self.x) > 1)
+
+    assert not simulate(Wave(x=0.0), 7.0, **TIGHT).events
+
+
+def test_conditions_joined_by_and_or_not():
+    class Joined(Clock):
+        def events(self) -> Events:
+            early, late = self.x > self.at, self.x > 1.5 * self.at
+            yield self.a.go("off", "on", when=all_of(early, late))
+            yield self.b.go("off", "on", when=any_of(early, late))
+            yield self.b.go("on", "gone", when=negate(any_of(negate(early), negate(late))))
+
+    run = simulate(Joined(x=0.0), 1.0)
+    assert story(run) == [("b", "on"), ("a", "on"), ("b", "gone")]
+    np.testing.assert_allclose(times(run), [0.5, 0.75, 0.75], rtol=0, atol=1e-12)
+
+
+# -- time events -----------------------------------------------------------------------------------------------------
+
+
+class Metronome(Component):
+    x: Variable = var("s", "time on")
+    next: Discrete = discrete("s", "next beat", start="first")
+    beats: Discrete = discrete("1", "count")
+    first: Parameter = param("s", "first beat", default=0.0)
+    period: Parameter = param("s", "between beats", default=0.1)
+    hand = Mode("left", "right")
+
+    def equations(self) -> Equations:
+        yield der(self.x) == self.hand.choose(left=0, right=1)
+
+    def events(self) -> Events:
+        after = {self.next: self.next + self.period, self.beats: self.beats + 1}
+        yield self.hand.go("left", "right", at=self.next, reset=after)
+        yield self.hand.go("right", "left", at=self.next, reset=after)
+
+
+@pytest.mark.parametrize("period", [0.1, 1 / 3, 0.07, math.pi / 20])
+def test_time_events_are_hit_exactly(period):
+    run = simulate(Metronome(x=0.0, period=period, first=period), 2.0, points=13)
+    beats = np.cumsum(np.full(int(2.0 / period), period))
+    beats = beats[beats <= 2.0]
+    assert np.array_equal(times(run), beats)  # to the last bit: the times are sums of the period
+    assert run.final["beats"] == len(beats)
+    on = np.sum(np.minimum(np.append(beats, 2.0)[1::2], 2.0) - beats[::2][: len(np.append(beats, 2.0)[1::2])])
+    assert run.final["x"] == pytest.approx(on, abs=1e-12)
+
+
+def test_a_time_event_at_or_before_the_start_fires_at_the_start():
+    for first in (0.0, -1.0):
+        run = simulate(Metronome(x=0.0, period=0.4, first=first), 0.05)
+        assert times(run)[0] == 0.0
+    assert simulate(Metronome(x=0.0, period=0.4, first=-1.0), 0.05).final["beats"] == 3  # -1.0, -0.6, -0.2, all late
+
+
+def test_a_time_event_at_the_end_fires():
+    run = simulate(Metronome(x=0.0, period=5.0, first=1.0), 1.0, points=3)
+    assert list(times(run)) == [1.0]
+
+
+def test_time_events_after_a_start_that_is_not_zero():
+    run = simulate(Metronome(x=0.0, period=0.25, first=100.25), 101.0, t0=100.0, points=4)
+    assert list(times(run)) == [100.25, 100.5, 100.75, 101.0]
+
+
+# -- resets ----------------------------------------------------------------------------------------------------------
+
+
+def test_resets_are_computed_from_the_values_before_the_event():
+    class Swap(Clock):
+        u: Discrete = discrete("1", "one", start=1.0)
+        w: Discrete = discrete("1", "two", start=2.0)
+
+        def events(self) -> Events:
+            yield self.a.go("off", "on", when=self.x > self.at, reset={self.u: self.w, self.w: self.u, self.x: 10 * self.x})
+
+    run = simulate(Swap(x=0.0), 1.0, points=4)
+    assert (run.final["u"], run.final["w"]) == (2.0, 1.0)
+    assert run.final["x"] == pytest.approx(5.5, rel=1e-12)
+
+
+def test_a_variable_that_is_no_state_is_reset_through_the_states():
+    """The momentum m v is reset; v, the state, follows."""
+
+    class Hit(Clock):
+        v: Variable = var("m/s", "velocity", state="always")
+        p: Variable = var("kg.m/s", "momentum", state="avoid")
+        m: Parameter = param("kg", "mass", default=4.0)
+
+        def equations(self) -> Equations:
+            yield from super().equations()
+            yield self.p == self.m * self.v
+            yield self.m * der(self.v) == self.force
+
+        force: Parameter = param("N", "force", default=2.0)
+
+        def events(self) -> Events:
+            yield self.a.go("off", "on", when=self.x > self.at, reset={self.p: -self.p})
+
+    run = simulate(Hit(x=0.0, v=1.0), 1.0, points=2)
+    assert set(run.model.states) == {"x", "v"}
+    # 1 + 0.25 m/s before, -1.25 after, then 0.25 more.
+    assert run.final["v"] == pytest.approx(-1.0, rel=1e-10)
+    assert run.final["p"] == pytest.approx(-4.0, rel=1e-10)
+
+
+# -- many events, and without end ------------------------------------------------------------------------------------
+
+
+class Saw(Component):
+    x: Variable = var("s", "since the last tooth")
+    teeth: Discrete = discrete("1", "count")
+    width: Parameter = param("s", "of a tooth", default=1e-3)
+    tooth = Mode("one")
+
+    def equations(self) -> Equations:
+        yield der(self.x) == 1
+
+    def events(self) -> Events:
+        yield self.tooth.go("one", "one", when=self.x > self.width, reset={self.x: 0, self.teeth: self.teeth + 1})
+
+
+@pytest.mark.parametrize("width", [1e-3, 1e-2])
+def test_a_thousand_events(width):
+    run = simulate(Saw(x=0.0, width=width), 1000.5 * width, points=100)
+    np.testing.assert_allclose(times(run), width * np.arange(1, 1001), rtol=0, atol=1e-10)
+    assert run.final["teeth"] == 1000
+
+
+class Ball(Component):
+    """Bouncing ball: an infinite number of bounces in a finite time (Zeno)."""
+
+    h: Variable = var("m", "height")
+    v: Variable = var("m/s", "velocity")
+    g: Parameter = param("m/s2", "gravity", default=9.81)
+    e: Parameter = param("1", "restitution", default=0.7)
+    air = Mode("flying")
+
+    def equations(self) -> Equations:
+        yield der(self.h) == self.v
+        yield der(self.v) == -self.g
+
+    def events(self) -> Events:
+        yield self.air.go("flying", "flying", when=self.h < 0, reset={self.v: -self.e * self.v})
+
+
+def bounces(e: float, count: int) -> np.ndarray:
+    """Bounce n of a ball dropped from 1 m: T (1 + 2 (e + e² + … + e^(n-1))), T = sqrt(2 h / g)."""
+    powers = np.concatenate([[0.0], np.cumsum(e ** np.arange(1, count))])
+    return math.sqrt(2 / 9.81) * (1 + 2 * powers)
+
+
+def test_a_bouncing_ball_follows_its_closed_form():
+    run = simulate(Ball(h=1.0, v=0.0), 2.4, points=100, **TIGHT)
+    expected = bounces(0.7, 20)
+    expected = expected[expected < 2.4]
+    np.testing.assert_allclose(times(run), expected, rtol=0, atol=1e-9)
+    for before, after in zip(expected, expected[1:], strict=False):
+        middle = run.at(0.5 * (before + after))
+        flight = after - before
+        assert middle["h"] == pytest.approx(9.81 * flight**2 / 8, rel=1e-7)  # the top of its parabola
+        assert middle["v"] == pytest.approx(0.0, abs=1e-7)
+
+
+@pytest.mark.parametrize("e", [0.7, 0.9, 0.5])
+def test_the_zeno_limit_ends_with_a_sentence(e):
+    limit = math.sqrt(2 / 9.81) * (1 + 2 * e / (1 - e))
+    begin = time.perf_counter()
+    with pytest.raises(Chattering) as caught:
+        simulate(Ball(h=1.0, v=0.0, e=e), 1.2 * limit, points=100)
+    assert time.perf_counter() - begin < 20.0
+    assert "air switched" in caught.value.what
+    last = float(caught.value.what.split("…")[1].split(" s")[0])
+    assert last == pytest.approx(limit, rel=1e-4)
+    assert "test_events.py" in str(caught.value)
+
+
+def test_a_ball_at_rest_on_the_floor_ends_with_a_sentence():
+    for e in (0.0, 0.7):
+        with pytest.raises(Chattering):
+            simulate(Ball(h=0.0, v=0.0, e=e), 1.0)
+
+
+def test_a_ball_thrown_from_the_floor_flies():
+    run = simulate(Ball(h=0.0, v=1.0), 0.3, **TIGHT)
+    np.testing.assert_allclose(times(run), [2 / 9.81], rtol=0, atol=1e-10)
+
+
+class Relay(Component):
+    """Each mode drives the other on: sliding mode, which needs a law of its own."""
+
+    x: Variable = var("1", "error")
+    T: Parameter = param("s", "time", default=1.0)
+    state = Mode("up", "down")
+
+    def equations(self) -> Equations:
+        yield self.T * der(self.x) == self.state.choose(up=1, down=-1)
+
+    def events(self) -> Events:
+        yield self.state.go("up", "down", when=self.x > 0)
+        yield self.state.go("down", "up", when=self.x < 0)
+
+
+@pytest.mark.parametrize("x", [-0.5, 0.0])
+def test_two_modes_that_drive_each_other_on_end_with_a_sentence(x):
+    with pytest.raises(Chattering) as caught:
+        simulate(Relay(x=x), 1.0)
+    text = str(caught.value)
+    assert f"state switched 20 times in t = {-x:g}…{-x:g} s (up ⇄ down)." in text
+    assert "self.state.go" in text
+    assert "Modes still switch after 20 rounds at one instant." in text
+
+
+def test_a_relay_with_hysteresis_is_no_chattering():
+    class Hysteresis(Relay):
+        width: Parameter = param("1", "half the hysteresis", default=0.01)
+
+        def events(self) -> Events:
+            yield self.state.go("up", "down", when=self.x > self.width)
+            yield self.state.go("down", "up", when=self.x < -self.width)
+
+    run = simulate(Hysteresis(x=0.0), 1.0)
+    np.testing.assert_allclose(times(run), 0.01 + 0.02 * np.arange(len(run.events)), rtol=0, atol=1e-9)
+    assert len(run.events) == 50
+
+
+# -- no way on -------------------------------------------------------------------------------------------------------
+
+
+def test_a_blow_up_in_finite_time_is_told():
+    class Blow(Component):
+        x: Variable = var("1", "grows")
+        T: Parameter = param("s", "time", default=1.0)
+
+        def equations(self) -> Equations:
+            yield self.T * der(self.x) == self.x**2  # x = 1 / (1 - t)
+
+    with pytest.raises(StepFailed) as caught:
+        simulate(Blow(x=1.0), 2.0)
+    moment = float(caught.value.what.split("t = ")[1].split(" s")[0])
+    assert moment == pytest.approx(1.0, abs=1e-3)
+    assert caught.value.why == "x changes fastest relative to its tolerance."
+
+
+def test_a_blow_up_before_an_event_that_never_comes():
+    class Blow(Clock):
+        y: Variable = var("1", "grows")
+        T: Parameter = param("s", "time", default=1.0)
+
+        def equations(self) -> Equations:
+            yield from super().equations()
+            yield self.T * der(self.y) == self.y**2
+
+        def events(self) -> Events:
+            yield self.a.go("off", "on", when=self.x > 5 * self.at)
+
+    with pytest.raises(SolveError):
+        simulate(Blow(x=0.0, y=1.0), 2.0)
+
+
+def test_a_panel_that_runs_past_an_event_into_nonsense_is_shortened():
+    """The root of a negative number lies behind the event."""
+    from modelica_like.language import sqrt
+
+    class Drain(Component):
+        level: Variable = var("1", "level")
+        T: Parameter = param("s", "time", default=1.0)
+        tank = Mode("full", "empty")
+
+        def equations(self) -> Equations:
+            yield self.T * der(self.level) == self.tank.choose(full=-sqrt(self.level + 1e-4), empty=0)
+
+        def events(self) -> Events:
+            yield self.tank.go("full", "empty", when=self.level < 0, reset={self.level: 0})
+
+    run = simulate(Drain(level=1.0), 5.0, **TIGHT)
+    # sqrt(level + d) = sqrt(1 + d) - t / 2, zero level at sqrt(d).
+    np.testing.assert_allclose(times(run), [2 * (math.sqrt(1.0001) - 0.01)], rtol=0, atol=1e-9)
+    assert run.final["level"] == 0.0
+
+
+def test_a_limit_of_events_is_kept():
+    from modelica_like import Options
+
+    with pytest.raises(Chattering, match="more than 10 events"):
+        simulate(Saw(x=0.0), 1.0, options=Options(max_events=10))
+
+
+def test_a_model_without_states_has_time_events():
+    class Blink(Component):
+        y: Variable = var("1", "light")
+        lamp = Mode("dark", "bright")
+        at: Parameter = param("s", "when", default=0.25)
+
+        def equations(self) -> Equations:
+            yield self.y == self.lamp.choose(dark=0, bright=1)
+
+        def events(self) -> Events:
+            yield self.lamp.go("dark", "bright", at=self.at)
+
+    run = simulate(Blink(), 1.0, points=2)
+    assert list(run.time) == [0.0, 0.25, 0.25, 0.5, 1.0]
+    assert list(run["y"]) == [0, 0, 1, 1, 1]
+
+
+def test_a_guard_on_time_alone_in_a_model_without_states():
+    class Blink(Component):
+        y: Variable = var("1", "light")
+        lamp = Mode("dark", "bright")
+        at: Parameter = param("s", "when", default=1 / 3)
+
+        def equations(self) -> Equations:
+            yield self.y == self.lamp.choose(dark=0, bright=1)
+
+        def events(self) -> Events:
+            yield self.lamp.go("dark", "bright", when=self.time > self.at)
+
+    run = simulate(Blink(), 1.0, points=4)
+    np.testing.assert_allclose(times(run), [1 / 3], rtol=0, atol=1e-10)
+    assert build(Blink()).states == ()
