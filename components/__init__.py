@@ -2,6 +2,14 @@
 
 from components.adaptors import AngleToTorqueAdaptor as AngleToTorqueAdaptor
 from components.adaptors import TorqueToAngleAdaptor as TorqueToAngleAdaptor
+from components.belts import TimingBelt as TimingBelt
+from components.control import PI as PI
+from components.control import PID as PID
+from components.control import ClutchActuator as ClutchActuator
+from components.control import Feedback as Feedback
+from components.control import FirstOrder as FirstOrder
+from components.control import Gain as Gain
+from components.control import Integrator as Integrator
 from components.dc_machines import PermanentMagnetDCMachine as PermanentMagnetDCMachine
 from components.dc_machines import SeparatelyExcitedDCMachine as SeparatelyExcitedDCMachine
 from components.dc_machines import SeriesDCMachine as SeriesDCMachine
@@ -21,11 +29,14 @@ from components.electrical import VariableResistor as VariableResistor
 from components.electrical import VoltageSensor as VoltageSensor
 from components.fixed import Fixed as Fixed
 from components.fixed import TranslationalFixed as TranslationalFixed
+from components.flexible_shafts import FlexibleShaft as FlexibleShaft
+from components.flexible_shafts import StribeckBearing as StribeckBearing
 from components.friction import BearingFriction as BearingFriction
 from components.friction import Brake as Brake
 from components.friction import Clutch as Clutch
 from components.friction import DryFriction as DryFriction
 from components.friction import MultiPlateClutch as MultiPlateClutch
+from components.gearboxes import Gearbox as Gearbox
 from components.gears import IdealGear as IdealGear
 from components.inertias import Inertia as Inertia
 from components.inertias import Mass as Mass
@@ -41,6 +52,9 @@ from components.one_way import OneWayClutch as OneWayClutch
 from components.one_way import TorqueLimiter as TorqueLimiter
 from components.planetary import Differential as Differential
 from components.planetary import IdealPlanetary as IdealPlanetary
+from components.planetary import LossyPlanetarySet as LossyPlanetarySet
+from components.planetary import PlanetarySet as PlanetarySet
+from components.screw_drives import BallScrewDrive as BallScrewDrive
 from components.sensors import AngleSensor as AngleSensor
 from components.sensors import ForceSensor as ForceSensor
 from components.sensors import MultiSensor as MultiSensor
@@ -50,6 +64,8 @@ from components.sensors import RelativeAngleSensor as RelativeAngleSensor
 from components.sensors import RelativeSpeedSensor as RelativeSpeedSensor
 from components.sensors import SpeedSensor as SpeedSensor
 from components.sensors import TorqueSensor as TorqueSensor
+from components.shaft_sensors import AccelerationSensor as AccelerationSensor
+from components.shaft_sensors import RelativeAccelerationSensor as RelativeAccelerationSensor
 from components.shaft_sources import Accelerate as Accelerate
 from components.shaft_sources import InverseSpeedDependentTorque as InverseSpeedDependentTorque
 from components.shaft_sources import LinearSpeedDependentTorque as LinearSpeedDependentTorque
@@ -57,6 +73,7 @@ from components.shaft_sources import Position as Position
 from components.shaft_sources import QuadraticSpeedDependentTorque as QuadraticSpeedDependentTorque
 from components.shaft_sources import SignTorque as SignTorque
 from components.shaft_sources import Torque2 as Torque2
+from components.shift_schedule import ShiftSchedule as ShiftSchedule
 from components.signals import CoilForce as CoilForce
 from components.signals import Constant as Constant
 from components.signals import Product as Product
@@ -111,18 +128,25 @@ from components.translational_sources import QuadraticSpeedDependentForce as Qua
 from components.translational_sources import SignForce as SignForce
 from components.translational_sources import TranslationalAccelerate as TranslationalAccelerate
 from components.translational_sources import TranslationalPosition as TranslationalPosition
+from components.transmissions import Lepelletier as Lepelletier
+from components.transmissions import Ravigneaux as Ravigneaux
 from components.wheels import EddyCurrentTorque as EddyCurrentTorque
 from components.wheels import IdealRollingWheel as IdealRollingWheel
 
 __all__ = [
+    "PI",
+    "PID",
     "Accelerate",
+    "AccelerationSensor",
     "AngleSensor",
     "AngleToTorqueAdaptor",
     "BallScrew",
+    "BallScrewDrive",
     "BearingFriction",
     "Brake",
     "Capacitor",
     "Clutch",
+    "ClutchActuator",
     "CoilForce",
     "Compliant",
     "CompliantWithRelativeStates",
@@ -143,14 +167,19 @@ __all__ = [
     "ElastoBacklash",
     "ElastoBacklash2",
     "ElastoGap",
+    "Feedback",
+    "FirstOrder",
     "Fixed",
     "FixedTemperature",
     "Flange",
+    "FlexibleShaft",
     "Force",
     "Force2",
     "ForceSensor",
     "ForceStep",
     "Freewheel",
+    "Gain",
+    "Gearbox",
     "Ground",
     "HeatPort",
     "HeatSource",
@@ -159,8 +188,10 @@ __all__ = [
     "IdealRollingWheel",
     "Inductor",
     "Inertia",
+    "Integrator",
     "InverseSpeedDependentForce",
     "InverseSpeedDependentTorque",
+    "Lepelletier",
     "LinearAccelerationSensor",
     "LinearFlange",
     "LinearMultiSensor",
@@ -168,6 +199,7 @@ __all__ = [
     "LinearSpeedDependentForce",
     "LinearSpeedDependentTorque",
     "LossyGear",
+    "LossyPlanetarySet",
     "MachineTable",
     "Mass",
     "MassWithStopAndFriction",
@@ -176,6 +208,7 @@ __all__ = [
     "OneWayClutch",
     "PermanentMagnetDCMachine",
     "Pin",
+    "PlanetarySet",
     "Position",
     "PositionSensor",
     "PowerSensor",
@@ -184,6 +217,8 @@ __all__ = [
     "QuadraticSpeedDependentForce",
     "QuadraticSpeedDependentTorque",
     "Ramp",
+    "Ravigneaux",
+    "RelativeAccelerationSensor",
     "RelativeAngleSensor",
     "RelativePositionSensor",
     "RelativeSpeedSensor",
@@ -192,6 +227,7 @@ __all__ = [
     "Rod",
     "SeparatelyExcitedDCMachine",
     "SeriesDCMachine",
+    "ShiftSchedule",
     "ShuntDCMachine",
     "SignForce",
     "SignTorque",
@@ -203,6 +239,7 @@ __all__ = [
     "Spring",
     "SpringDamper",
     "Step",
+    "StribeckBearing",
     "StribeckFriction",
     "SupportFriction",
     "Switch",
@@ -210,6 +247,7 @@ __all__ = [
     "ThermalConductor",
     "ThermalMass",
     "TimeFormula",
+    "TimingBelt",
     "Torque",
     "Torque2",
     "TorqueLimiter",

@@ -28,9 +28,9 @@ class DCMachine(Lossy, Supported, partial=True):
     """Linear DC machine: induced voltage k·flux·w, torque k·flux·i, with the flux relative to its nominal value.
 
     Armature: v = R·ia + v_brush + v_core, v_core = La·der(i) + k·flux·w, where ia - i flows through the conductance of
-    the core losses. A machine that is driven above its no-load speed is a generator: the signs do the rest. The constant
-    k is given, or follows from the nominal operating point. All losses leave through one heat port. Modelica Standard
-    Library, Electrical.Machines.BasicMachines.DCMachines.
+    the core losses. A machine that is driven above its no-load speed is a generator: the signs do the rest. The
+    constant k is given, or follows from the nominal operating point. All losses leave through one heat port. Modelica
+    Standard Library, Electrical.Machines.BasicMachines.DCMachines.
 
     A subclass says where the flux comes from.
     """
@@ -43,7 +43,9 @@ class DCMachine(Lossy, Supported, partial=True):
     I_nominal: Parameter = param("A", "nominal armature current", default=100.0)
     w_nominal: Parameter = param("rad/s", "nominal speed", default=1425 * _RPM, min=1e-12)
     T_nominal: Parameter = param("K", "armature temperature at the nominal operating point", default=293.15)
-    k: Parameter = param("V.s/rad", "induced voltage over speed at nominal flux; replaces the nominal operating point")
+    k: Parameter = param(
+        "V.s/rad", "induced voltage over speed at nominal flux; replaces the nominal operating point", default=None
+    )
     Ra: Parameter = param("Ohm", "armature resistance at T_ref", default=0.05, min=0)
     La: Parameter = param("H", "armature inductance", default=0.0015, min=0)
     Jr: Parameter = param("kg.m2", "moment of inertia of the rotor", default=0.15, min=0)
@@ -54,7 +56,9 @@ class DCMachine(Lossy, Supported, partial=True):
     I_brush: Parameter = param("A", "current at which it is reached", default=1.0, min=1e-12)
     P_friction: Parameter = param("W", "friction loss at w_nominal", default=0.0, min=0)
     p_friction: Parameter = param("1", "exponent of the speed in the friction torque", default=2.0, min=0)
-    P_core: Parameter = param("W", "core loss at nominal induced voltage; without a value there is none", min=1e-12)
+    P_core: Parameter = param(
+        "W", "core loss at nominal induced voltage; without a value there is none", default=None, min=1e-12
+    )
     P_stray: Parameter = param("W", "stray load loss at nominal current and speed", default=0.0, min=0)
     p_stray: Parameter = param("1", "exponent of the speed in the stray load torque", default=1.0, min=0)
     quasi_static: bool = False

@@ -60,6 +60,10 @@ class DryFriction(Lossy, partial=True):
         """Return the largest friction of surfaces that stick."""
         return self.peak * self.sliding_friction(0)
 
+    def pressed(self) -> Expr:
+        """Return the condition on which the surfaces touch."""
+        return self.static_friction() > 0
+
     def breaks_forward(self) -> Expr:
         """Return the condition on which surfaces that stick begin to slide forward."""
         return self.friction > self.static_friction()
@@ -70,7 +74,8 @@ class DryFriction(Lossy, partial=True):
 
     def idle_friction(self) -> Expr:
         """Return the friction of free surfaces: none, where nothing presses them together."""
-        against = maximum(self.sliding_friction(absolute(self.slip)), 0)
+        # At rest it is zero also where an event is just being overrun, so that it never jumps with the direction.
+        against = maximum(self.sliding_friction(absolute(self.slip)), 0) - maximum(self.sliding_friction(0), 0)
         return where(self.slip < 0, -against, against)
 
     def equations(self) -> Equations:
@@ -86,8 +91,7 @@ class DryFriction(Lossy, partial=True):
         ) == 0  # fmt: skip
 
     def events(self) -> Events:
-        mode, slip = self.mode, self.slip
-        pressed = self.static_friction() > 0
+        mode, slip, pressed = self.mode, self.slip, self.pressed()
         yield mode.initially("forward", when=all_of(pressed, slip > 0))
         yield mode.initially("backward", when=all_of(pressed, slip < 0))
         yield mode.initially("stuck", when=pressed)
@@ -117,14 +121,16 @@ class PressedFriction(DryFriction, partial=True):
     """
 
     f_normalized: Input = signal_in("1", "normal force over fn_max; the surfaces are free at 0", default=1.0)
-    fn_max: Parameter = param("N", "normal force at f_normalized = 1", min=0)
+    fn_max: Parameter = param("N", "normal force at f_normalized = 1", default=None, min=0)
     cgeo: Parameter = param("m", "friction radius times number of friction surfaces", default=1.0, min=0)
     mu_pos: Rows = ((0.0, 0.5),)
     """Rows of slip speed in w_scale and sliding friction coefficient."""
     smooth: bool = False
     """Interpolate mu_pos with a continuous slope."""
     w_scale: Parameter = param("rad/s", "slip speed that counts as 1 in mu_pos", default=1.0)
-    capacity: Parameter = param("N.m", "sliding torque at f_normalized = 1; replaces fn_max, cgeo and mu_pos", min=0)
+    capacity: Parameter = param(
+        "N.m", "sliding torque at f_normalized = 1; replaces fn_max, cgeo and mu_pos", default=None, min=0
+    )
     tau_drag: Parameter = param("N.m", "residual drag torque", default=0.0, min=0)
 
     def mu(self, speed: Expr | float) -> Expr | float:

@@ -36,8 +36,8 @@ class MeshWithFriction(Lossy, TwoFlanges, partial=True):
     driving side after C. Bertsch, 2009). The heavier the inertia on the load side, the more the efficiency against the
     drive matters: where it is negative, the motion is only unique if the inertia of the drive is large enough.
 
-    If another friction element holds the same shaft, the torque of each is undetermined while both stick. A tiny `creep`
-    (1e-9) decides: the other one holds as long as it can, then this gear.
+    If another friction element holds the same shaft, the torque of each is undetermined while both stick. A tiny
+    `creep` (1e-9) decides: the other one holds as long as it can, then this gear.
 
     A subclass gives the efficiencies and the friction of the bearings at a speed.
     """
@@ -46,7 +46,7 @@ class MeshWithFriction(Lossy, TwoFlanges, partial=True):
     phi_a: Variable = var("rad", "angle of flange_a relative to the housing")
     w_a: Variable = var("rad/s", "speed of flange_a relative to the housing", state="always")
     tau_loss: Variable = var("N.m", "lost torque at flange_a, against forward rotation")
-    creep: Parameter = param("1/(kg.m2)", "acceleration of the stuck gear over the torque it holds", min=0)
+    creep: Parameter = param("1/(kg.m2)", "acceleration of the stuck gear over its torque", default=None, min=0)
     creep_time: Parameter = param("s", "time after which it creeps no faster", default=1e-3, min=0)
     mode = Mode("stuck", "start_forward", "start_backward", "forward", "backward", description="friction mode")
 
@@ -54,9 +54,9 @@ class MeshWithFriction(Lossy, TwoFlanges, partial=True):
         """Return the mesh efficiency while flange_a drives, and while flange_b drives."""
         raise NotImplementedError
 
-    def bearing_friction(self, speed: Expr | float) -> tuple[Expr | float, Expr | float]:
-        """Return the torques of the bearings at flange_a, while flange_a and while flange_b drives."""
-        return 0.0, 0.0
+    def bearing_losses(self, speed: Expr | float) -> tuple[Expr | float, Expr | float]:
+        """Return the torque lost in bearings at flange_a, while flange_a and while flange_b drives."""
+        raise NotImplementedError
 
     def forward_loss(self, speed: Expr | float) -> Expr:
         """Return the lost torque in forward rotation."""
@@ -68,10 +68,9 @@ class MeshWithFriction(Lossy, TwoFlanges, partial=True):
 
     def _lines(self, speed: Expr | float, direction: float) -> tuple[Expr, Expr]:
         eta_a, eta_b = self.efficiencies(speed)
-        bearing_a, bearing_b = self.bearing_friction(speed)
+        bearing_a, bearing_b = self.bearing_losses(speed)
         passed = -self.flange_b.tau / self.ratio
-        driven_by_a = (1 / eta_a - 1) * passed + direction * bearing_a / eta_a
-        return driven_by_a, (eta_b - 1) * passed + direction * eta_b * bearing_b
+        return (1 / eta_a - 1) * passed + direction * bearing_a, (eta_b - 1) * passed + direction * bearing_b
 
     def creeping(self) -> Expr | float:
         """Return the acceleration of the stuck gear."""
@@ -127,8 +126,11 @@ class LossyGear(MeshWithFriction):
     def efficiencies(self, speed: Expr | float) -> tuple[Expr | float, Expr | float]:
         return self._column(speed, 1), self._column(speed, 2)
 
-    def bearing_friction(self, speed: Expr | float) -> tuple[Expr | float, Expr | float]:
-        return tuple(self.tau_scale * absolute(self._column(speed, k)) for k in (3, 4))  # type: ignore[return-value]
+    def bearing_losses(self, speed: Expr | float) -> tuple[Expr | float, Expr | float]:
+        # The table's torques are counted behind the mesh as seen from the driving side.
+        eta_a, eta_b = self.efficiencies(speed)
+        tau_a, tau_b = (self.tau_scale * absolute(self._column(speed, k)) for k in (3, 4))
+        return tau_a / eta_a, tau_b * eta_b
 
 
 class ConstantEfficiencyGear(MeshWithFriction):
@@ -140,7 +142,10 @@ class ConstantEfficiencyGear(MeshWithFriction):
     """
 
     efficiency: Parameter = param("1", "power out at flange_b over power in at flange_a", min=1e-3, max=1)
-    efficiency_back: Parameter = param("1", "power out at flange_a over power in at flange_b; not above 0: none", max=1)
+    efficiency_back: Parameter = param(
+        "1", "power out at flange_a over power in at flange_b; not above 0: none", default=None, max=1
+    )
+    tau_friction: Parameter = param("N.m", "friction torque of the bearings at flange_a", default=0.0, min=0)
     self_locking: Output = signal_out("1", "1 for a self-locking gear, otherwise 0")
 
     @property
@@ -150,6 +155,9 @@ class ConstantEfficiencyGear(MeshWithFriction):
 
     def efficiencies(self, speed: Expr | float) -> tuple[Expr | float, Expr | float]:
         return self.efficiency, self.backward
+
+    def bearing_losses(self, speed: Expr | float) -> tuple[Expr | float, Expr | float]:
+        return self.tau_friction, self.tau_friction
 
     def equations(self) -> Equations:
         yield from super().equations()

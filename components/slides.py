@@ -15,6 +15,7 @@ from modelica_like.language import (
     Parameter,
     Variable,
     all_of,
+    any_of,
     der,
     exp,
     interpolate,
@@ -50,7 +51,7 @@ class ElastoGap(Lossy, LinearCompliantWithRelativeStates):
     c: Parameter = param("N/m", "stiffness in contact; for n above 1 the secant stiffness at s_ref", min=0)
     d: Parameter = param("N.s/m", "damping coefficient in contact", default=0.0, min=0)
     s_rel0: Parameter = param("m", "distance at which the bodies touch", default=0.0)
-    n: Parameter = param("1", "exponent of the spring force; without a value the spring is linear", min=1)
+    n: Parameter = param("1", "exponent of the spring force; without a value the spring is linear", default=None, min=1)
     s_ref: Parameter = param("m", "penetration at which the force is c·s_ref", default=1.0, min=1e-12)
     contact = Mode("gap", "touching", description="whether the bodies touch")
     surfaces = Mode("pressed", "meeting", "leaving", description="spring and damper, damper limited, left behind")
@@ -199,6 +200,9 @@ class MassWithStopAndFriction(DryFriction):
     def idle_friction(self) -> Expr:
         return self.F_prop * self.v
 
+    def pressed(self) -> Expr:
+        return any_of(super().pressed(), negate(self.stop.is_("none")))
+
     def breaks_forward(self) -> Expr:
         return all_of(super().breaks_forward(), negate(self.stop.is_("right")))
 
@@ -217,6 +221,9 @@ class MassWithStopAndFriction(DryFriction):
         mode, stop = self.mode, self.stop
         for side, end in (("left", self.smin + 0.5 * self.L), ("right", self.smax - 0.5 * self.L)):
             beyond = self.s < end if side == "left" else self.s > end
+            there = all_of(self.s <= end, self.v <= 0) if side == "left" else all_of(self.s >= end, self.v >= 0)
+            yield mode.initially("stuck", when=there)
+            yield stop.initially(side, when=there)
             moving = ("free", "start_forward", "start_backward", "forward", "backward")
             yield mode.go(moving, "stuck", when=beyond, reset={self.s: end, self.v: 0})
             yield stop.go("none", side, when=beyond)

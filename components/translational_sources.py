@@ -156,6 +156,7 @@ class TranslationalAccelerate(MotionSource):
 class ConstantVelocity(MotionSource):
     """Constant velocity, whatever force it takes."""
 
+    s: Variable = var("m", "position of the slide relative to the housing", default=0)
     v_fixed: Parameter = param("m/s", "velocity")
 
     def equations(self) -> Equations:

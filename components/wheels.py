@@ -23,8 +23,9 @@ class IdealRollingWheel(Component):
 class EddyCurrentTorque(Lossy, OneFlange):
     """Eddy current brake: braking torque 2·tau_nominal·excitation²·x/(1 + x²) with x = w/w_nominal (M. Kloss).
 
-    The torque is largest at w_nominal, and grows with the square of the excitation current; the disc gets hot, its resistance rises, and w_nominal with it. Without a heat
-    port the disc keeps the temperature T. Modelica Standard Library, Rotational.EddyCurrentTorque.
+    The torque is largest at w_nominal, and grows with the square of the excitation current; the disc gets hot, its
+    resistance rises, and w_nominal with it. Without a heat port the disc keeps the temperature T. Modelica Standard
+    Library, Rotational.EddyCurrentTorque.
     """
 
     tau_nominal: Parameter = param("N.m", "largest braking torque at full excitation", min=0)

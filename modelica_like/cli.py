@@ -162,6 +162,27 @@ def library(*, debug: Debug = False) -> None:
 
 
 @app.command()
+def size(
+    file: Annotated[
+        str, typer.Argument(metavar="FILE", help="sizing file, or a design check to describe; none: list all checks")
+    ] = "",
+    *, debug: Debug = False,
+) -> None:  # fmt: skip
+    """Run the design checks of a sizing file; exit code 1 if a limit is exceeded."""
+    with told(debug):
+        from modelica_like.sizing.report import checks_report, sizing_report
+        from modelica_like.sizing.run import size as run
+
+        if not file or not Path(file).suffix:
+            out().print(checks_report(file))
+            return
+        sizing = run(file)
+        out().print(sizing_report(sizing))
+        if sizing.exceeded:
+            raise typer.Exit(SOLVE_FAILED)
+
+
+@app.command()
 def demo(
     pictures: Annotated[Path, typer.Option(metavar="FOLDER", help="Where to write the pictures.")] = Path("build/demo"),
     *, debug: Debug = False,

@@ -26,7 +26,7 @@ def centre_distance(belt_length: Length, small: Length, large: Length) -> Length
     """
     mean = belt_length / 4 - math.pi / 8 * (small + large)
     square = mean**2 - (large - small) ** 2 / 8
-    require((mean > 0) & (square >= 0), "The belt is too short for the pulleys.")
+    require("The belt is too short for the pulleys.", mean > 0, square >= 0)
     return mean + sqrt(square)
 
 

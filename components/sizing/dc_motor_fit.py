@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from components.sizing.dc_motors import DcMotor, MotorLines, motor_lines, motor_on_lines
-from components.sizing.maths import Number, absolute, maximum, solve, sqrt
+from components.sizing.maths import Number, absolute, maximum, settled, solve, sqrt
 from components.sizing.quantities import Current, MotorConstant, Ratio, Resistance, Speed, Torque
 from components.sizing.result import Result, line
 
@@ -146,7 +146,7 @@ def _compared(motor: DcMotor, lines: MotorLines, largest_torque: Torque) -> Moto
     own = motor_lines(motor, lines.voltage)
     ends = [(motor_on_lines(lines, torque), motor_on_lines(own, torque)) for torque in (0.0, largest_torque)]
     speed, current = (
-        maximum(*(absolute(getattr(aim, name) - getattr(now, name)) for aim, now in ends))
+        maximum(*(absolute(settled(getattr(aim, name) - getattr(now, name), getattr(aim, name))) for aim, now in ends))
         for name in ("speed", "current")
     )
     return MotorFit(

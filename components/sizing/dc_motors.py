@@ -201,7 +201,7 @@ def series_motor_speed(torque: Torque, voltage: Voltage, mutual: Ratio, resistan
     Raises:
         ValueError: the torque is not above zero.
     """
-    require(torque > 0, "A series machine without load runs away: its torque must be above zero.")
+    require("A series machine without load runs away: its torque must be above zero.", torque > 0)
     return voltage / sqrt(mutual * torque) - resistance / mutual
 
 

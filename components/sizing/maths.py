@@ -9,6 +9,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+_ROUNDING = 1e-12
+_NO_SOLUTION = "The equations have no unique solution."
 Number = Any
 """A float, a numpy array (all arrays of one call fit each other by broadcasting) or a CasADi SX, MX or DM."""
 
@@ -26,6 +28,10 @@ def _function(numeric: Callable[..., Any], symbolic: Callable[..., Any], text: s
     return function
 
 
+def _choose(condition: Any, then: Any, otherwise: Any) -> Any:
+    return np.where(condition, then, otherwise)[()]
+
+
 sqrt = _function(np.sqrt, ca.sqrt, "Square root.")
 exp = _function(np.exp, ca.exp, "Exponential function.")
 sin = _function(np.sin, ca.sin, "Sine of an angle in rad.")
@@ -36,7 +42,7 @@ floor = _function(np.floor, ca.floor, "Largest whole number not above a value.")
 sign = _function(np.sign, ca.sign, "Sign: -1, 0 or 1.")
 absolute = _function(np.abs, ca.fabs, "Absolute value.")
 hypot = _function(np.hypot, lambda x, y: ca.sqrt(x * x + y * y), "Resultant of two values at a right angle.")
-where = _function(np.where, ca.if_else, "Choose by a condition: where(condition, then, otherwise).")
+where = _function(_choose, ca.if_else, "Choose by a condition: where(condition, then, otherwise).")
 _greater = _function(np.maximum, ca.fmax, "Larger of two values.")
 _smaller = _function(np.minimum, ca.fmin, "Smaller of two values.")
 
@@ -70,18 +76,26 @@ def solve(rows: Sequence[Sequence[Number]], right: Sequence[Number]) -> list[Num
     count = len(rows)
     matrix = np.stack(same_shape[: count * count], axis=-1).reshape(*same_shape[0].shape, count, count)
     vector = np.stack(same_shape[count * count :], axis=-1)[..., None]
-    try:
-        solution = np.linalg.solve(matrix, vector)[..., 0]
-    except np.linalg.LinAlgError:
-        raise ValueError("The equations have no unique solution.") from None
+    size = np.max(np.abs(matrix), axis=-1, keepdims=True)
+    require(_NO_SOLUTION, size > 0)
+    require(_NO_SOLUTION, np.linalg.cond(matrix / size) < 1 / _ROUNDING)
+    solution = np.linalg.solve(matrix, vector)[..., 0]
     return [solution[..., k] if same_shape[0].ndim else float(solution[k]) for k in range(count)]
 
 
-def require(condition: Number, message: str) -> None:
+def settled(value: Number, scale: Number) -> Number:
+    """Return a value, or zero for what rounding left of a difference of values of the size of `scale`."""
+    if is_symbolic(value, scale):
+        return value
+    return where(np.abs(value) > _ROUNDING * np.abs(scale), value, 0.0 * np.abs(value))
+
+
+def require(message: str, *conditions: Number) -> None:
     """Refuse numbers that mean nothing; a symbolic condition cannot be decided, so it passes.
 
     Raises:
         ValueError: with the message.
     """
-    if not is_symbolic(condition) and not np.all(condition):
-        raise ValueError(message)
+    for condition in conditions:
+        if not is_symbolic(condition) and not np.all(condition):
+            raise ValueError(message)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from components.sizing.maths import Number, absolute, sign, where
+from components.sizing.maths import Number, absolute, settled, sign, where
 from components.sizing.quantities import Power, Ratio, Speed, Torque
 from components.sizing.result import Result, line
 
@@ -80,7 +80,8 @@ def shaft_speeds(small: Ratio, large: Ratio, first: tuple[str, Speed], second: t
         raise ValueError(f"The speeds of two different shafts are needed, not twice that of the {first[0]}.")
     rows = [(*_willis(member, small, large), speed) for member, speed in (first, second)]
     carrier, ring = _two_by_two(rows[0], rows[1])
-    return ShaftSpeeds(*(a * carrier + b * ring for a, b in (_willis(member, small, large) for member in MEMBERS)))
+    shares = [_willis(member, small, large) for member in MEMBERS]
+    return ShaftSpeeds(*(_sum(a * carrier, b * ring) for a, b in shares))
 
 
 def shaft_torques(small: Ratio, large: Ratio, first: tuple[str, Torque], second: tuple[str, Torque]) -> ShaftTorques:
@@ -99,13 +100,17 @@ def shaft_torques(small: Ratio, large: Ratio, first: tuple[str, Torque], second:
     }  # fmt: skip
     equations = [(*rows[known_shaft(member)], torque) for member, torque in (first, second)]
     a, b = _two_by_two(equations[0], equations[1])
-    return ShaftTorques(*(rows[member][0] * a + rows[member][1] * b for member in MEMBERS))
+    return ShaftTorques(*(_sum(rows[member][0] * a, rows[member][1] * b) for member in MEMBERS))
+
+
+def _sum(first: Number, second: Number) -> Number:
+    return settled(first + second, absolute(first) + absolute(second))
 
 
 def rolling_powers(speeds: ShaftSpeeds, torques: ShaftTorques) -> tuple[Power, Power]:
     """Return the rolling powers T·(w - w_c) in W of the small and the large sun."""
-    small = torques.small_sun * (speeds.small_sun - speeds.carrier)
-    return small, torques.large_sun * (speeds.large_sun - speeds.carrier)
+    small = torques.small_sun * _sum(speeds.small_sun, -speeds.carrier)
+    return small, torques.large_sun * _sum(speeds.large_sun, -speeds.carrier)
 
 
 def lossy_ratios(small: Ratio, large: Ratio, rolling: tuple[Power, Power], mesh: Ratio) -> tuple[Ratio, Ratio]:

@@ -14,6 +14,7 @@ from components.sizing.maths import Number, is_symbolic
 from components.sizing.quantities import Quantity, Ratio
 
 _ROUNDING = 1e-9
+_WIDE = 9
 Limits = Mapping[str, tuple[Number | None, Number | None]]
 """Smallest and largest value, by name of the line; None where there is no such limit."""
 
@@ -99,7 +100,7 @@ class Result:
         text = _aligned([(line.name, line.value, line.unit, line.description, line.verdict) for line in self.lines()])
         parts = [type(self).__name__, text]
         for title, rows in self.tables().items():
-            parts += ["", title, _aligned([row_heading(rows[0]), *map(row_values, rows)])]
+            parts += ["", title, _grid(rows)]
         return "\n".join(parts)
 
 
@@ -136,14 +137,12 @@ def shown(value: Any, quantity: Quantity) -> str:
     return ", ".join(f"{number:.6g}" for number in numbers)
 
 
-def row_heading(row: Result) -> tuple[str, ...]:
-    """Return the heading of a table of such results: names with units."""
-    return tuple(f"{line.name} [{line.unit}]" if line.unit else line.name for line in row.lines())
-
-
-def row_values(row: Result) -> tuple[str, ...]:
-    """Return a result as one row of a table."""
-    return tuple(line.value for line in row.lines())
+def _grid(rows: tuple[Result, ...]) -> str:
+    """Return results of one kind as rows; of many lines each is a row instead."""
+    lines = [row.lines() for row in rows]
+    heading = [f"{line.name} [{line.unit}]" if line.unit else line.name for line in lines[0]]
+    table = [tuple(heading), *(tuple(line.value for line in each) for each in lines)]
+    return _aligned(table if len(heading) <= _WIDE else list(zip(*table, strict=True)))
 
 
 def _required(value: Any) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from components.sizing.maths import Number, hypot, is_symbolic, maximum, solve, where
+from components.sizing.maths import Number, hypot, is_symbolic, maximum, settled, solve, where
 from components.sizing.quantities import Force, Length, SmallTorque, Torque
 from components.sizing.result import Result, line
 
@@ -134,7 +134,7 @@ def shaft_statics(
         largest = maximum(largest, cut.bending)
     return ShaftStatics(
         reactions, diagram, maximum(*(reaction.radial for reaction in reactions)), largest, place,
-        maximum(*(abs(cut.torque) for cut in diagram)), sum(load.torque for load in loads),
+        maximum(*(abs(cut.torque) for cut in diagram)), _sum([load.torque for load in loads]),
     )  # fmt: skip
 
 
@@ -158,17 +158,21 @@ def section_forces(loads: Sequence[Load], place: Length) -> tuple[SectionForces,
 
 def _cut(loads: Sequence[Load], place: Length, right: bool) -> SectionForces:
     y, z = _bending(place, loads, "y", "bend_y", right), _bending(place, loads, "z", "bend_z", right)
-    shear_y, shear_z, torque = (
-        sum(getattr(load, name) * _passed(place, load.at, right) for load in loads) for name in ("y", "z", "torque")
-    )
+    shear_y, shear_z, torque = (_sum([getattr(load, name) * _passed(place, load.at, right) for load in loads])
+                                for name in ("y", "z", "torque"))  # fmt: skip
     return SectionForces(place, "right" if right else "left", shear_y, shear_z, y, z, hypot(y, z), torque)
 
 
 def _bending(place: Length, loads: Sequence[Load], force: str, couple: str, right: bool) -> Number:
-    return sum(
-        getattr(load, force) * maximum(place - load.at, 0.0) + getattr(load, couple) * _passed(place, load.at, right)
-        for load in loads
+    return _sum(
+        [getattr(load, force) * maximum(place - load.at, 0.0) for load in loads]
+        + [getattr(load, couple) * _passed(place, load.at, right) for load in loads]
     )
+
+
+def _sum(terms: Sequence[Number]) -> Number:
+    """Add up what can cancel: nothing, rather than a rounding error, is left where it does."""
+    return settled(sum(terms), sum(abs(term) for term in terms))
 
 
 def _passed(place: Length, at: Length, right: bool) -> Number:

@@ -47,7 +47,7 @@ def stress_concentration(large: Length, small: Length, fillet: Length, coefficie
     Raises:
         ValueError: there is no shoulder.
     """
-    require((large > small) & (fillet > 0), "A shoulder needs two diameters that differ, and a fillet radius.")
+    require("A shoulder needs two diameters that differ, and a fillet radius.", large > small, fillet > 0)
     depth, size, c = (large - small) / (2 * fillet), small / (2 * fillet), coefficients
     total = c.A / depth**c.k + c.E * ((1 + size) / size**1.5) ** c.l + c.G * small / (large * depth**c.m)
     return 1 + 1 / sqrt(total)
@@ -87,7 +87,7 @@ def shaft_diameter(bending: Torque, strength: Stress, safety: Ratio, diameter: L
         diameter: smallest diameter of the shaft in m.
     """
     allowable = strength / safety
-    return ShaftDiameter(bending, allowable, (32 * bending / (math.pi * allowable)) ** (1 / 3), diameter)
+    return ShaftDiameter(bending, allowable, (32 * abs(bending) / (math.pi * allowable)) ** (1 / 3), diameter)
 
 
 class ShaftStress(Result):
@@ -183,7 +183,7 @@ def stepped_shaft(
     """
     statics = shaft_statics(loads, bearings, hinges)
     last = max(cut.at for cut in statics.diagram)
-    require(last <= sections[-1].end, f"Something acts at {last:g} m, beyond the last section.")
+    require(f"Something acts at {last:g} m, beyond the last section.", last <= sections[-1].end)
     everything = [*loads, *(Load(reaction.at, reaction.y, reaction.z) for reaction in statics.reactions)]
     stresses: list[ShaftStress] = []
     for sides in zip(statics.diagram[::2], statics.diagram[1::2], strict=True):

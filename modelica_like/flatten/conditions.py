@@ -25,7 +25,8 @@ def guard_of(condition: Any, source: Source) -> Any:
         return condition.dep(1) - condition.dep(0)
     if operation == ca.OP_LE:
         difference = condition.dep(1) - condition.dep(0)
-        return ca.if_else(difference == 0, _JUST_TRUE, difference)
+        # A sum, so that its rate is that of the difference: a relation that ceases to hold right now does not count.
+        return difference + ca.if_else(difference == 0, _JUST_TRUE, 0)
     if operation == ca.OP_AND:
         return ca.fmin(guard_of(condition.dep(0), source), guard_of(condition.dep(1), source))
     if operation == ca.OP_OR:

@@ -17,14 +17,12 @@ from modelica_like.language.equation import (
     Connection,
     Equation,
     FreeEnd,
-    StartMode,
-    Transition,
-    as_event,
     as_statement,
-    located,
 )
 from modelica_like.language.expr import TIME, Symbol, is_expression, symbols_in
 from modelica_like.language.fields import Parameter, Variable
+from modelica_like.language.places import located
+from modelica_like.language.transition import StartMode, Transition, as_event
 from modelica_like.units import ANY, Unit
 
 
@@ -199,7 +197,7 @@ def _build(component: Component) -> Template:
     names = Names(component)
     names.add([*residuals, *guards, *moments, *(x for pair in resets for x in pair), *(s.when for s in starts)])
     names.add(ca.SX(s.mode.symbol) for s in (*transitions, *starts))
-    energy, energy_terms = Names(component), _energy_terms(component)
+    energy, energy_terms = Names(component), _energy_terms(component, wiring)
     energy.parameters, energy.discretes = names.parameters, names.discretes
     energy.add(energy_terms)
     residual = names.function("residual", residuals)
@@ -256,10 +254,12 @@ def _transition_forms(component: Component, transitions: list[Transition]) -> tu
     return tuple(forms)
 
 
-def _energy_terms(component: Component) -> list[Any]:
-    """Stored energy, loss, source power, then the power into each connector."""
+def _energy_terms(component: Component, wiring: Iterable[Connection | FreeEnd]) -> list[Any]:
+    """Stored energy, loss, source power, then the power into each connector; what passes on to parts is theirs."""
+    passed_on = {id(end) for one in wiring if isinstance(one, Connection) for end in one.ends}
     terms: list[Any] = [component.stored_energy(), component.loss_power(), component.source_power()]
-    terms += [connector.power() if connector.used else 0.0 for connector in component.connectors.values()]
+    own = [c for c in component.connectors.values() if c.used and id(c) not in passed_on]
+    terms += [connector.power() for connector in own]
     return [ca.SX(cast(Any, term)) for term in terms]
 
 

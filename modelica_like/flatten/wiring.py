@@ -10,9 +10,10 @@ from modelica_like.flatten.checks import unit_of_field
 from modelica_like.language.assembly import Assembly
 from modelica_like.language.component import Component
 from modelica_like.language.declared import Connector, Declared
-from modelica_like.language.equation import NOWHERE, Connection, FreeEnd
+from modelica_like.language.equation import Connection, FreeEnd
 from modelica_like.language.expr import Symbol
 from modelica_like.language.fields import Input, Output, Variable
+from modelica_like.language.places import NOWHERE
 from modelica_like.units import Unit, same_dimension
 
 End = tuple[int, bool]

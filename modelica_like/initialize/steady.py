@@ -26,7 +26,7 @@ def solve_steady(model: CompiledDae, point: Point) -> None:
     equations = ca.vertcat(model.ode(*arguments), model.alg(*arguments))
     moving = [k for k, depends in enumerate(ca.which_depends(equations, x, 1, False)) if depends]
     rows = [*moving, *range(len(model.states), len(model.states) + len(model.implicit))]
-    unknowns = ca.vertcat(x[moving], z)
+    unknowns = ca.vertcat(*(x[k] for k in moving), z)
     function = ca.Function("steady", arguments, [equations[rows], ca.jacobian(equations[rows], unknowns)])
     for _ in range(_MAX_NEWTON):
         value, jacobian = function(point.t, point.x, point.z, model.p, model.u, point.d)

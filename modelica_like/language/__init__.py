@@ -5,7 +5,6 @@ from modelica_like.language.assembly import Assembly as Assembly
 from modelica_like.language.component import Component as Component
 from modelica_like.language.declared import Connector as Connector
 from modelica_like.language.equation import Equations as Equations
-from modelica_like.language.equation import Events as Events
 from modelica_like.language.equation import connect as connect
 from modelica_like.language.equation import free as free
 from modelica_like.language.equation import series as series
@@ -44,3 +43,4 @@ from modelica_like.language.functions import tan as tan
 from modelica_like.language.functions import tanh as tanh
 from modelica_like.language.functions import where as where
 from modelica_like.language.mode import Mode as Mode
+from modelica_like.language.transition import Events as Events

@@ -10,9 +10,10 @@ from typing import Any
 from modelica_like.errors import DuplicateName, ModelicaLikeError, Source, raise_together_or_one
 from modelica_like.language.component import Component
 from modelica_like.language.declared import Connector, unknown
-from modelica_like.language.equation import NOWHERE, Connection, Equations, FreeEnd, connect, free, series
+from modelica_like.language.equation import Connection, Equations, FreeEnd, connect, free, series
 from modelica_like.language.expr import Expr, Symbol, symbol_of
 from modelica_like.language.fields import Field, Parameter, Variable, param
+from modelica_like.language.places import NOWHERE
 
 
 class Assembly(Component):

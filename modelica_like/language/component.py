@@ -6,13 +6,15 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar, cast, dataclass_transform
 
 from modelica_like.errors import DuplicateName, LanguageError, ModelicaLikeError
-from modelica_like.language.declared import Connector, Declared, caller, unknown
+from modelica_like.language.declared import Connector, Declared, unknown
 from modelica_like.language.expr import TIME, Expr
 from modelica_like.language.fields import Discrete, Field, Input, Parameter, Value, param, require_identifier
 from modelica_like.language.mode import Mode
+from modelica_like.language.places import caller
 
 if TYPE_CHECKING:
-    from modelica_like.language.equation import Equations, Events
+    from modelica_like.language.equation import Equations
+    from modelica_like.language.transition import Events
 
 
 @dataclass_transform(kw_only_default=True, field_specifiers=(param,))

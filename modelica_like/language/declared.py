@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any, ClassVar, Self
 
-from modelica_like.errors import Source, UnknownName, did_you_mean
+from modelica_like.errors import UnknownName, did_you_mean
 from modelica_like.language.expr import Expr
 from modelica_like.language.fields import Field
-
-_PACKAGE = str(Path(__file__).parent.parent)
 
 
 class Declared:
@@ -89,17 +85,6 @@ class Connector(Declared):
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} {self.label}>"
-
-
-def caller() -> Source:
-    """Return the nearest place on the stack outside this package."""
-    frame = inspect.currentframe()
-    assert frame is not None
-    while frame.f_back is not None and frame.f_code.co_filename.startswith(_PACKAGE):
-        frame = frame.f_back
-    from modelica_like.language.equation import source_of
-
-    return source_of(frame.f_code, frame.f_lasti)
 
 
 def unknown(kind: str, label: str, name: str, known: Iterator[str] | list[str]) -> UnknownName:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, Self, cast, overload
 import casadi as ca
 
 from modelica_like.errors import LanguageError, UnknownName, did_you_mean
-from modelica_like.language.equation import StartMode, Transition
 from modelica_like.language.expr import Expr, Scalar, Symbol, symbol_of
+from modelica_like.language.transition import StartMode, Transition
 
 
 class Mode:

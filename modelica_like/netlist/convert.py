@@ -6,8 +6,9 @@ from typing import Any
 
 from modelica_like.errors import NetlistError
 from modelica_like.language import Assembly, Component, Connector
-from modelica_like.language.equation import Connection, FreeEnd, as_statement, located
+from modelica_like.language.equation import Connection, FreeEnd, as_statement
 from modelica_like.language.fields import Parameter
+from modelica_like.language.places import located
 
 
 def as_assembly(component: Component) -> Assembly:

@@ -13,8 +13,8 @@ from rich.text import Text
 
 from modelica_like.errors import ModelicaLikeError
 from modelica_like.language import Component, Connector, Discrete, Input, Output, Parameter, Variable
-from modelica_like.language.equation import located
 from modelica_like.language.fields import Field
+from modelica_like.language.places import located
 
 
 def table(title: str, *columns: str) -> Table:
@@ -37,8 +37,9 @@ def library_table(types: Mapping[str, type[Component]]) -> Table:
     for name, kind in sorted(types.items(), key=lambda item: (item[1].__module__, item[0])):
         made.add_row(f"[bold]{name}[/]", kind.__module__.rpartition(".")[2], escape(summary(kind)))
     # One line per type, so that the list can be searched; `describe` has the whole text.
-    made.columns[-1].no_wrap = True
-    made.columns[-1].overflow = "ellipsis"
+    for column in made.columns:
+        column.no_wrap = True
+        column.min_width = max(map(len, types), default=0) if column is made.columns[0] else None
     return made
 
 

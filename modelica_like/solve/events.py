@@ -8,9 +8,10 @@ from collections.abc import Callable
 import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, CompiledTransition, Vector
+from modelica_like.compile.soon import TIME_RESOLUTION
 from modelica_like.errors import Chattering, StepFailed
 from modelica_like.initialize import Point, call, check_singular, solve_implicit, variable_slopes
-from modelica_like.solve.guards import Guards, candidates, locate
+from modelica_like.solve.guards import Guards, Located, candidates, locate
 from modelica_like.solve.idas import Integrator
 from modelica_like.solve.options import Options
 from modelica_like.solve.recorder import Event, Recorder
@@ -25,6 +26,7 @@ _CHATTER_EVENTS = 50
 _CHATTER_WINDOW = 1e-6
 _SAME_TIME = 1e-12
 _MAX_HALVINGS = 30
+_MAX_FAILURES = 40
 _ON_GRID = 1e-7
 
 Progress = Callable[[float], None]
@@ -51,6 +53,8 @@ class EventLoop:
         self.end = end
         self.step = (end - start.t) / options.points
         self.checks = 1
+        self._failures = 0
+        self._failed_before = start.t
         self.progress = progress
         self.integrator = Integrator(model, options)
         self.guards = Guards(model)
@@ -84,6 +88,8 @@ class EventLoop:
             return
         self._keep(times, x, z, stop)
         self.now = Point(float(times[-1]), x[:, -1].copy(), z[:, -1].copy(), first.d)
+        if self.now.t >= self._failed_before:
+            self._failures = 0
         if self.guards.count and len(times) >= self.panel:
             self.panel = self.panel * _GROWTH
         if times[-1] == stop:
@@ -122,9 +128,9 @@ class EventLoop:
             span = stop - self.now.t if arrives else span
             before = self.integrator.steps
             try:
-                x, z = self.integrator.run(self.now, span, outputs)
+                x, z = self.integrator.run(self.now, span, outputs, patient=not self.guards.count)
             except StepFailed:
-                if not self.guards.count:
+                if self._gives_up(self.now.t + span):
                     raise
                 if outputs == 1:
                     return self._short_piece(span)
@@ -139,14 +145,20 @@ class EventLoop:
                 times[-1] = stop
             return times, x, z
 
+    def _gives_up(self, end: float) -> bool:
+        """Count failures on the way to one place: behind it is an event, or nothing."""
+        self._failures += 1
+        self._failed_before = max(self._failed_before, end)
+        return not self.guards.count or self._failures > _MAX_FAILURES
+
     def _short_piece(self, span: float) -> tuple[Vector, Vector, Vector]:
         """Integrate a part of the distance to the next result, as long as possible."""
         for halvings in range(1, _MAX_HALVINGS):
             piece = span / 2**halvings
             try:
-                x, z = self.integrator.run(self.now, piece)
+                x, z = self.integrator.run(self.now, piece, patient=False)
             except StepFailed:
-                if halvings + 1 == _MAX_HALVINGS:
+                if self._gives_up(self.now.t + piece) or halvings + 1 == _MAX_HALVINGS:
                     raise
                 continue
             return np.array([self.now.t + piece]), x, z
@@ -201,15 +213,34 @@ class EventLoop:
                 group,
                 base.t,
             )
-            if located is not None:
-                if k > 0:
-                    self._keep(all_times[1 : k + 1], all_x[:, 1 : k + 1], all_z[:, 1 : k + 1])
-                self.now = located.point
-                self.record.add(np.array([self.now.t]), self.now.x[:, None], self.now.z[:, None])
-                self._event([*(self.guards.state_events[g] for g in located.guards), *self._due()])
+            if located is None:
+                found = [one for one in found if one.interval > k]
+                continue
+            soon = self.guards.soon(located.point)
+            wanting = [self.guards.state_events[g] for g in located.guards if soon[g] > 0]
+            if not wanting:
+                # Positive for less than the time resolution: what the last event left is on its way down.
+                late = [one.guard for one in group if not one.inside]
+                if not late:
+                    over = located.guards or [one.guard for one in group]
+                    found = [one for one in found if one.interval > k or one.guard not in over]
+                    continue
+                wanting = self._look_behind(base, located, late, float(all_times[k + 1]))
+            if k > 0:
+                self._keep(all_times[1 : k + 1], all_x[:, 1 : k + 1], all_z[:, 1 : k + 1])
+            self.now = located.point
+            if not wanting:
                 return True
-            found = [one for one in found if one.interval > k]
+            self.record.add(np.array([self.now.t]), self.now.x[:, None], self.now.z[:, None])
+            self._event([*wanting, *self._due()])
+            return True
         return False
+
+    def _look_behind(self, base: Point, located: Located, late: list[int], end: float) -> list[CompiledTransition]:
+        """Go on by the time resolution, from where the search begins anew; what is still positive there wants to fire."""
+        behind = located.point.t + TIME_RESOLUTION * max(1.0, abs(located.point.t))
+        located.point, values, _ = self._trial(base, min(behind, end) - base.t)
+        return [self.guards.state_events[g] for g in late if values[g] > 0]
 
     def _trial(self, base: Point, span: float) -> tuple[Point, Vector, Vector]:
         if span <= 0.0:
@@ -252,6 +283,7 @@ class EventLoop:
     def _event(self, wanting: list[CompiledTransition]) -> None:
         """Handle an event: close the segment, change modes until nothing fires, begin the next segment."""
         self.record.end(self.now.d)
+        self._failures, self._failed_before = 0, self.now.t
         self.now = self.now.copy()
         self._iterate(wanting)
         self.record.begin(self.now)

@@ -67,28 +67,35 @@ class Integrator:
         self.evaluations = 0
         self._tail = np.concatenate([model.p, model.u])
 
-    def _instance(self, outputs: int) -> BufferedFunction:
-        key = "idas", outputs, self.options.rtol, self.options.atol, self.options.max_steps
-        return buffered(self.model._cache, key, lambda: self._make(outputs), results=(0, 1))
+    def _instance(self, outputs: int, steps: int) -> BufferedFunction:
+        key = "idas", outputs, self.options.rtol, self.options.atol, steps
+        return buffered(self.model._cache, key, lambda: self._make(outputs, steps), results=(0, 1))
 
-    def _make(self, outputs: int) -> ca.Function:
+    def _make(self, outputs: int, steps: int) -> ca.Function:
         problem = {name: value for name, value in scaled_problem(self.model).items() if name not in ("inner", "span")}
         grid = [k / outputs for k in range(1, outputs + 1)]
-        return ca.integrator("segment", "idas", problem, 0, grid, self._settings(outputs))
+        return ca.integrator("segment", "idas", problem, 0, grid, self._settings(steps))
 
-    def _settings(self, outputs: int) -> dict[str, Any]:
+    def _settings(self, steps: int) -> dict[str, Any]:
         nominal = self.model.nominals
         return {
             "reltol": self.options.rtol,
             "abstol": self.options.atol * (float(np.min(nominal)) if nominal.size else 1.0),
-            "max_num_steps": self.options.max_steps if outputs == 1 else min(self.options.max_steps, _PANEL_STEPS),
+            "max_num_steps": steps,
             # Left alone, IDAS begins with a step of 1e-10 and takes thirty more to reach its stride, at every event
             # anew.
             "step0": _FIRST_STEP,
         }
 
-    def run(self, start: Point, span: float, outputs: int = 1) -> tuple[Vector, Vector]:
+    def run(self, start: Point, span: float, outputs: int = 1, *, patient: bool = True) -> tuple[Vector, Vector]:
         """Integrate from `start` over `span` seconds.
+
+        Args:
+            start: consistent start.
+            span: length of the interval in s.
+            outputs: number of equidistant results.
+            patient: allow all steps between two results, not only as many as usual: False where a shorter piece can be
+                tried instead.
 
         Returns:
             States and implicit unknowns at `outputs` equidistant times, the last at the end; shapes (nx, outputs),
@@ -101,7 +108,8 @@ class Integrator:
         if not self.model.states:
             return self._algebraic(start, span, outputs)
         p = np.concatenate([[start.t, span], self._tail, start.d])
-        instance = self._instance(outputs)
+        steps = self.options.max_steps if patient else min(self.options.max_steps, _PANEL_STEPS)
+        instance = self._instance(outputs, steps)
         # IDAS tells what went wrong on stderr; it belongs into the error, not onto the screen.
         said = io.StringIO()
         try:
@@ -122,14 +130,16 @@ class Integrator:
         """
         if not self.model.implicit:
             return z
-        outputs = x.shape[1]
+        model, outputs = self.model, x.shape[1]
         times = start.t + span * np.arange(1, outputs + 1) / outputs
+        p, u, d = (np.tile(vector, outputs) for vector in (model.p, model.u, start.d))
+        fast = buffered(model._cache, ("residual", outputs), lambda: _residual_along(model, outputs))
         for _ in range(_POLISHING):
-            arguments = (times[None, :], x, z, self.model.p, self.model.u, start.d)
-            residual = np.array(self.model.alg(*arguments))
-            jacobian = np.array(self.model.alg_jacobian(*arguments).full()).reshape(len(z), outputs, len(z))
+            residual, jacobian = (
+                v.reshape(outputs, len(z), -1) for v in fast(times, x.ravel("F"), z.ravel("F"), p, u, d)
+            )
             try:
-                z = z - np.linalg.solve(jacobian.transpose(1, 0, 2), residual.T[:, :, None])[:, :, 0].T
+                z = z - np.linalg.solve(jacobian.transpose(0, 2, 1), residual)[:, :, 0].T
             except np.linalg.LinAlgError:
                 return z
         return z
@@ -165,3 +175,10 @@ class Integrator:
             why=f"{worst} changes fastest relative to its tolerance.",
             advice="Look for a stiff spring, a vanishing mass or a speed without bound; then try other tolerances.",
         )
+
+
+def _residual_along(model: CompiledDae, count: int) -> ca.Function:
+    """Return residuals of the implicit equations and their Jacobian at `count` times, as one function."""
+    arguments = list(model.arguments.values())
+    both = [model.alg(*arguments), ca.densify(model.alg_jacobian(*arguments))]
+    return ca.Function("residual", arguments, both).map(count)

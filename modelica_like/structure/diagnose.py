@@ -33,7 +33,8 @@ def check_solvable(system: System, incidence: list[list[int]], contradictions: l
     over_rows, over_cols = rows[: coarse_rows[2]], cols[: coarse_cols[1]]
     under_rows, under_cols = rows[coarse_rows[3] :], cols[coarse_cols[2] :]
     if len(over_rows) > len(over_cols):
-        raise _overdetermined(system, [system.origins[r] for r in over_rows], [chains[c] for c in over_cols])
+        over, under = ([_chain_name(system, chains[c]) for c in block] for block in (over_cols, under_cols))
+        raise _overdetermined([system.origins[r] for r in over_rows], over, under)
     if contradictions:
         raise _contradiction(contradictions)
     if len(under_cols) > len(under_rows):
@@ -75,16 +76,17 @@ def _underdetermined(
     )
 
 
-def _overdetermined(system: System, origins: list[Origin], chains: list[int]) -> Overdetermined:
-    names = _list([_chain_name(system, c) for c in chains]) or "none"
+def _overdetermined(origins: list[Origin], over: list[str], under: list[str]) -> Overdetermined:
     parts = list(dict.fromkeys(o.path or o.kind for o in origins))
-    unknowns = f"{len(chains)} unknown{'s' if len(chains) != 1 else ''}"
-    return Overdetermined(
-        f"{len(origins)} equations determine only {unknowns} ({names}): {_list(parts)}.",
-        where=_places(origins),
-        why="Two rigid parts fix the same speed or torque.",
-        advice="Remove one, or put a spring or clutch between.",
-    )
+    unknowns = f"{len(over)} unknown{'s' if len(over) != 1 else ''} ({_list(over) or 'none'})"
+    what = f"{len(origins)} equations determine only {unknowns}: {_list(parts)}."
+    where = _places(origins)
+    if len(parts) > 1 or not under:
+        why, advice = "Two rigid parts fix the same speed or torque.", "Remove one, or put a spring or clutch between."
+    else:
+        why = f"On the other hand {_list(under)} lack{'s' if len(under) == 1 else ''} an equation."
+        advice = f"Look at the equations of {parts[0]}: is another variable meant in one of them?"
+    return Overdetermined(what, where=where, why=why, advice=advice)
 
 
 def _contradiction(origins: list[Origin]) -> Overdetermined:

@@ -348,7 +348,8 @@ def test_friction_that_vanishes_at_standstill(kind: type[Component], sign: int) 
     """Without static friction the mass never sticks: a purely viscous bearing, or plates with mu(0) = 0."""
     viscous = BearingFriction(tau_pos=((0, 0), (1, 2)))
     plates = Brake(fn_max=4.0, mu_pos=((0, 0), (1, 0.5)))
-    run = simulate(shaft(mass=still(sign * 5.0), bearing=viscous if kind is BearingFriction else plates), "1 s", **TIGHT)
+    friction = viscous if kind is BearingFriction else plates
+    run = simulate(shaft(mass=still(sign * 5.0), friction=friction), "1 s", **TIGHT)
     np.testing.assert_allclose(run["mass.w"], sign * 5.0 * np.exp(-2.0 * run.time), rtol=1e-8)
     assert run.events == ()
 

@@ -1,0 +1,38 @@
+"""Gears with losses, elasticity and backlash together."""
+
+from __future__ import annotations
+
+from components.interfaces import Flange
+from components.lossy_gears import LossRows, LossyGear
+from components.springs import ElastoBacklash, SpringDamper
+from modelica_like.language import Component, Equations, Parameter, connect, param, series
+
+
+class Gearbox(Component):
+    """Gear with mesh efficiency and bearing friction, and its elasticity and backlash seen from flange_b.
+
+    Modelica Standard Library, Rotational.Gearbox. The inertia of the input wheel belongs to the shaft at flange_a.
+    """
+
+    flange_a = Flange("input shaft")
+    flange_b = Flange("output shaft")
+    support = Flange("housing", optional=True)
+    loss_table: LossRows = ((0.0, 1.0, 1.0, 0.0, 0.0),)
+    """Rows of speed |w_a| in rad/s, eta_mf1, eta_mf2, and |tau_bf1|, |tau_bf2| in N.m, as in a `LossyGear`."""
+    has_backlash: bool = True
+    """The flanks have backlash."""
+    ratio: Parameter = param("1", "transmission ratio, speed of flange_a over speed of flange_b")
+    c: Parameter = param("N.m/rad", "stiffness of the flanks", min=0)
+    d: Parameter = param("N.m.s/rad", "damping coefficient of the flanks", default=0.0, min=0)
+    b: Parameter = param("rad", "total backlash", default=1e-3, min=1e-10)
+
+    def build(self) -> None:
+        self.gear = LossyGear(ratio="ratio", loss_table=self.loss_table)
+        self.flanks = ElastoBacklash(c="c", d="d", b="b") if self.has_backlash else SpringDamper(c="c", d="d")
+
+    def equations(self) -> Equations:
+        yield connect(self.flange_a, self.gear.flange_a)
+        yield from series(self.gear, self.flanks)
+        yield connect(self.flange_b, self.flanks.flange_b)
+        if self.support.used:
+            yield connect(self.support, self.gear.support)

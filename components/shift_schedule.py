@@ -1,0 +1,101 @@
+"""Shift schedules of automatic gearboxes: pressures of clutches and brakes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import pairwise
+
+from modelica_like.language import (
+    Component,
+    Discrete,
+    Equations,
+    Events,
+    Expr,
+    LanguageError,
+    Mode,
+    Output,
+    Parameter,
+    discrete,
+    param,
+    signal_out,
+    where,
+)
+
+_NEVER = 1e30
+_GEARS = (
+    ("N", "d"), ("1", "ad"), ("2", "ac"), ("3", "ab"), ("4", "ae"), ("5", "be"), ("6", "ce"), ("R", "bd"),
+)  # fmt: skip
+_NUMBERS = {"N": 0.0, "R": -1.0}
+
+
+class ShiftSchedule(Component):
+    """Pressures of five shift elements, gear after gear at fixed times.
+
+    In a shift the pressures of the elements that are closed next rise, and those of the elements that are opened fall,
+    along straight lines during the same time: so the torque is handed over while both slip, without a gap and without
+    two gears being locked at once. Elements that stay closed keep their pressure.
+    """
+
+    shifts: tuple[tuple[float, str, float], ...]
+    """Rows of time, gear, and duration of the shift, both in time_scale; the run begins in the first gear."""
+    pattern: tuple[tuple[str, str], ...] = _GEARS
+    """Gears and the elements closed in them; as it stands, that of a `Lepelletier` gearbox."""
+    time_scale: Parameter = param("s", "what counts as 1 in the times", default=1.0)
+    a: Output = signal_out("1", "pressure of element a")
+    b: Output = signal_out("1", "pressure of element b")
+    c: Output = signal_out("1", "pressure of element c")
+    d: Output = signal_out("1", "pressure of element d")
+    e: Output = signal_out("1", "pressure of element e")
+    gear: Output = signal_out("1", "gear that is engaged or being engaged; 0 neutral, -1 reverse")
+    row: Discrete = discrete("1", "number of shifts that have begun")
+    stage = Mode("holding", "shifting", description="a shift is going on")
+
+    def build(self) -> None:
+        known = dict(self.pattern)
+        for _, gear, _ in self.shifts:
+            if gear not in known:
+                raise LanguageError(
+                    f"The shift schedule asks for the gear '{gear}'; its pattern has {', '.join(known)}.",
+                    advice="Name one of these, or give the pattern another row.",
+                )
+        for (first, gear, duration), (second, following, _) in pairwise(self.shifts[1:]):
+            if first + duration > second:
+                raise LanguageError(
+                    f"The shift to gear {gear} ends at {first + duration:g} s, after that to {following} has begun.",
+                    advice="Let a shift begin when the one before has ended.",
+                )
+
+    def in_row(self, value: Callable[[int], float], ahead: int = 0) -> Expr | float:
+        """Return what belongs to the present row, or to one some rows ahead."""
+        last = len(self.shifts) - 1
+        chosen: Expr | float = value(last)
+        for k in reversed(range(last)):
+            chosen = where(self.row + ahead <= k, value(k), chosen)
+        return chosen
+
+    def closed(self, element: str) -> Callable[[int], float]:
+        """Return the pressure of an element in a row."""
+        elements = dict(self.pattern)
+        return lambda k: float(element in elements[self.shifts[k][1]])
+
+    def equations(self) -> Equations:
+        begin, duration = self.in_row(lambda k: self.shifts[k][0]), self.in_row(lambda k: self.shifts[k][2])
+        done = self.stage.choose(holding=1, shifting=(self.time / self.time_scale - begin) / duration)
+        for element, pressure in (("a", self.a), ("b", self.b), ("c", self.c), ("d", self.d), ("e", self.e)):
+            level = self.closed(element)
+            before = self.in_row(level, ahead=-1)
+            yield pressure == before + (self.in_row(level) - before) * done
+        yield self.gear == self.in_row(lambda k: _gear_number(self.shifts[k][1]))
+
+    def events(self) -> Events:
+        moments = [row[0] for row in self.shifts]
+        following = _NEVER
+        for k in reversed(range(1, len(moments))):
+            following = where(self.row < k, moments[k], following)
+        end = self.in_row(lambda k: self.shifts[k][0] + self.shifts[k][2])
+        yield self.stage.go("holding", "shifting", at=following * self.time_scale, reset={self.row: self.row + 1})
+        yield self.stage.go("shifting", "holding", at=end * self.time_scale)
+
+
+def _gear_number(gear: str) -> float:
+    return _NUMBERS[gear] if gear in _NUMBERS else float(gear)

@@ -1,0 +1,86 @@
+"""Places in source files: where a `yield` stands, where a component was made."""
+
+from __future__ import annotations
+
+import inspect
+import linecache
+from collections.abc import Iterable, Iterator
+from itertools import islice
+from pathlib import Path
+from tokenize import COMMENT, TokenError, generate_tokens
+from types import CodeType, GeneratorType
+from typing import Any, cast
+
+import casadi as ca
+
+from modelica_like.errors import LanguageError, Source
+
+_LANGUAGE = str(Path(__file__).parent)
+_PACKAGE = str(Path(__file__).parent.parent)
+
+NOWHERE = Source("")
+"""No place in a file."""
+
+
+def caller() -> Source:
+    """Return the nearest place on the stack outside this package."""
+    frame = inspect.currentframe()
+    assert frame is not None
+    while frame.f_back is not None and frame.f_code.co_filename.startswith(_PACKAGE):
+        frame = frame.f_back
+    return source_of(frame.f_code, frame.f_lasti)
+
+
+def located(generator: Any, label: str = "equations()") -> Iterator[tuple[Any, Source]]:
+    """Run a generator and pair what it yields with the place of the `yield` in the user's file.
+
+    Args:
+        generator: what `equations()` or `events()` returned.
+        label: name of that method, for messages.
+
+    Raises:
+        LanguageError: it is not iterable.
+    """
+    if not isinstance(generator, Iterable) or isinstance(generator, ca.SX):
+        raise LanguageError(
+            f"{label} returns {type(generator).__name__} instead of yielding equations or events.",
+            advice="Is a `yield` missing?",
+        )
+    items: Iterator[Any] = iter(cast("Iterable[Any]", generator))
+    for item in items:
+        yield item, _place(items)
+
+
+def _place(items: object) -> Source:
+    """Return where a generator stands now: its own line, or that of the generator it delegates to."""
+    frame = None
+    while isinstance(items, GeneratorType) and not items.gi_code.co_filename.startswith(_LANGUAGE):
+        frame = items.gi_frame
+        items = cast(object, items.gi_yieldfrom)
+    return NOWHERE if frame is None else source_of(frame.f_code, frame.f_lasti)
+
+
+def source_of(code: CodeType, instruction: int) -> Source:
+    """Return the source place of a byte-code instruction."""
+    line, end_line, column, end_column = next(islice(code.co_positions(), instruction // 2, None))
+    if line is None:
+        return Source(code.co_filename, code.co_firstlineno)
+    lines = [linecache.getline(code.co_filename, n).rstrip("\n") for n in range(line, (end_line or line) + 1)]
+    if lines and end_column is not None and column is not None:
+        lines[-1] = lines[-1].encode()[:end_column].decode(errors="ignore")
+        lines[0] = lines[0].encode()[column:].decode(errors="ignore")
+    text = lines[0] if len(lines) == 1 else _without_comments(lines)
+    return Source(code.co_filename, line, " ".join(text.split()))
+
+
+def _without_comments(lines: list[str]) -> str:
+    """Join the lines of a statement; a comment would swallow the lines after it."""
+    kept = list(lines)
+    try:
+        for token in generate_tokens(iter([f"{line}\n" for line in lines]).__next__):
+            if token.type == COMMENT:
+                row, column = token.start
+                kept[row - 1] = kept[row - 1][:column]
+    except (TokenError, SyntaxError):
+        pass
+    return " ".join(kept)

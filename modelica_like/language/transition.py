@@ -1,0 +1,113 @@
+"""What `events()` yields: transitions of modes, and choices of the mode at the start."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Protocol
+
+from modelica_like.errors import LanguageError, Source
+from modelica_like.language.expr import TIME, Expr, Symbol, symbols_in
+from modelica_like.language.fields import Discrete, Input, Variable
+from modelica_like.language.places import NOWHERE
+
+
+class NamedModes(Protocol):
+    """The declaration of a mode."""
+
+    def number(self, name: str) -> int:
+        """Return the number of a mode."""
+        ...
+
+
+class ModeOf(Protocol):
+    """The mode of one component."""
+
+    @property
+    def mode(self) -> NamedModes:
+        """Its declaration."""
+        ...
+
+    @property
+    def symbol(self) -> Symbol:
+        """Its symbol."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Transition:
+    """Change of a mode at an event.
+
+    Attributes:
+        mode: the mode that changes.
+        sources: names of the modes it may leave.
+        target: name of the mode it enters.
+        when: condition of a state event, or None.
+        at: time of a time event in s, or None.
+        reset: new values of states and discrete values.
+    """
+
+    mode: ModeOf
+    sources: tuple[str, ...]
+    target: str
+    when: Expr | None
+    at: Expr | None
+    reset: Mapping[Expr, Any]
+    source: Source = NOWHERE
+
+
+@dataclass(frozen=True, eq=False)
+class StartMode:
+    """Choice of a mode at the start."""
+
+    mode: ModeOf
+    target: str
+    when: Expr
+    source: Source = NOWHERE
+
+
+EventStatement = Transition | StartMode
+Events = Iterator[EventStatement]
+"""What `events()` returns."""
+
+
+def as_event(item: Any, source: Source, component: str) -> EventStatement:
+    """Read what `events()` yielded.
+
+    Raises:
+        LanguageError: it is neither a transition nor a choice of the start mode.
+    """
+    if isinstance(item, Transition):
+        _check_transition(item, source, component)
+    if isinstance(item, Transition | StartMode):
+        return replace(item, source=source)
+    raise LanguageError(
+        f"{component}.events() yields {type(item).__name__} instead of a transition.",
+        where=source, advice="Yield `mode.go(…)` or `mode.initially(…)`.",
+    )  # fmt: skip
+
+
+def _check_transition(transition: Transition, source: Source, component: str) -> None:
+    """Check that the time of a time event is known ahead, and that only variables and discrete values are reset."""
+    moving = (
+        []
+        if transition.at is None
+        else [s for s in symbols_in(transition.at) if s is TIME or isinstance(_field(s), Variable)]
+    )
+    if moving:
+        raise LanguageError(
+            f"{component}: the time of an event depends on {moving[0].name}, so it is not known ahead.",
+            where=source, advice="Write it as a state event, `when=…`.",
+        )  # fmt: skip
+    for target in transition.reset:
+        field = _field(target) if isinstance(target, Symbol) and target is not TIME and target.order == 0 else None
+        if not isinstance(field, Variable | Discrete) or isinstance(field, Input):
+            raise LanguageError(
+                f"{component}: a reset gives {target} a value, which is neither a variable nor a discrete value.",
+                where=source,
+                advice="Reset variables of this component, as in reset={self.w: 0}; `go` itself changes the mode.",
+            )
+
+
+def _field(symbol: Symbol) -> Any:
+    return symbol.owner.fields.get(symbol.name)

@@ -1,0 +1,119 @@
+"""The design checks of the installed libraries."""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib.util
+import inspect
+from collections.abc import Callable, Iterator, Mapping
+from functools import lru_cache
+from importlib.metadata import entry_points
+from types import MappingProxyType, ModuleType
+from typing import Any, get_args, get_type_hints
+
+from modelica_like.errors import NetlistError, UnknownName, did_you_mean
+from modelica_like.netlist.registry import GROUP, _imported
+from modelica_like.units import ONE, Unit, parse_unit
+
+Check = Callable[..., Any]
+
+
+@lru_cache(maxsize=1)
+def design_checks() -> Mapping[str, Check]:
+    """Return the design checks of all installed libraries by name, sorted.
+
+    A library `gears` has its checks in the package `gears.sizing`: the functions of `__all__` that return a class with
+    the method `lines`.
+
+    Raises:
+        NetlistError: a library cannot be imported, or two libraries have a check of one name.
+    """
+    checks: dict[str, Check] = {}
+    for entry in sorted(entry_points(group=GROUP), key=lambda entry: entry.name):
+        for name, function in _checks_of(entry.value, entry.name):
+            if checks.setdefault(name, function) is not function:
+                raise NetlistError(f"Two libraries have a design check '{name}': {checks[name].__module__} and "
+                                   f"{function.__module__}.")  # fmt: skip
+    return MappingProxyType(dict(sorted(checks.items())))
+
+
+def _checks_of(library: str, entry: str) -> Iterator[tuple[str, Check]]:
+    package = _imported(library, f"The library '{entry}'")
+    name = f"{library}.sizing"
+    if not hasattr(package, "__path__") or importlib.util.find_spec(name) is None:
+        return
+    module: ModuleType = _imported(name, f"The design checks of the library '{entry}'")
+    for member in getattr(module, "__all__", ()):
+        function = getattr(module, member)
+        if inspect.isfunction(function) and hasattr(_hints(function).get("return"), "lines"):
+            yield member, function
+
+
+def find_check(name: str) -> Check:
+    """Return the design check that a sizing file means by `is`.
+
+    Raises:
+        UnknownName: there is no such check.
+    """
+    known = design_checks()
+    if name not in known:
+        hint = did_you_mean(name, known) or "."
+        raise UnknownName(f"There is no design check '{name}'{hint}", advice="`modelica-like size` lists all checks.")
+    return known[name]
+
+
+@dataclasses.dataclass(frozen=True)
+class Argument:
+    """One argument of a design check.
+
+    Attributes:
+        name: how the file calls it.
+        kind: its annotation: a number with a unit, a text, a dataclass, or a sequence of one of these.
+        required: it has no default.
+        default: its default, if any.
+    """
+
+    name: str
+    kind: Any
+    required: bool
+    default: Any = None
+
+
+def arguments_of(check: Any) -> dict[str, Argument]:
+    """Return the arguments of a check or the fields of a dataclass that is an argument, by name."""
+    hints = _hints(check)
+    if dataclasses.is_dataclass(check):
+        return {
+            field.name: Argument(field.name, hints[field.name], _required(field)) for field in dataclasses.fields(check)
+        }
+    return {
+        name: Argument(name, hints[name], parameter.default is parameter.empty, parameter.default)
+        for name, parameter in inspect.signature(check).parameters.items()
+    }
+
+
+def _required(field: dataclasses.Field[Any]) -> bool:
+    return field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING
+
+
+@lru_cache(maxsize=512)
+def _hints(kind: Any) -> dict[str, Any]:
+    return get_type_hints(kind, include_extras=True)
+
+
+def unit_of_kind(kind: Any) -> Unit | None:
+    """Return the unit of a number's annotation, or None if it is none."""
+    extras = getattr(kind, "__metadata__", ())
+    found = next((extra.unit for extra in extras if hasattr(extra, "unit")), None)
+    return None if found is None else parse_unit(found)
+
+
+def unit_of_line(result: Any, name: str) -> Unit:
+    """Return the unit of a line of a result, that of a plain number if it has none."""
+    return unit_of_kind(_hints(type(result)).get(name)) or ONE
+
+
+def without_none(kind: Any) -> Any:
+    """Return an annotation without `| None`."""
+    kinds = [option for option in get_args(kind) if option is not type(None)]
+    return kinds[0] if type(None) in get_args(kind) else kind

@@ -1,0 +1,94 @@
+"""Formulas of sizing files, with the units of what they refer to."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import casadi as ca
+import numpy as np
+
+from modelica_like.errors import UnitError, ValueOutOfRange
+from modelica_like.language.formula import Formula, parse_formula
+from modelica_like.units import ONE, Unit, coherent, read_quantity, same_dimension
+
+_SAME = ("neg", "abs")
+_ALIKE = ("+", "-", "min", "max")
+
+
+class Value(NamedTuple):
+    """A number, or an array of numbers, in coherent SI with its unit."""
+
+    number: Any
+    unit: Unit
+
+
+Lookup = Callable[[str], Value]
+
+
+def read_value(text: str, lookup: Lookup) -> Value:
+    """Read a quantity or a formula.
+
+    Args:
+        text: `8.5 kg.cm2`, `2*torque` or `belt.shaft_load`.
+        lookup: gives the value of a name.
+
+    Raises:
+        NetlistError: it is neither.
+        UnitError: a sum mixes dimensions.
+        ValueOutOfRange: the value is not finite.
+    """
+    quantity = read_quantity(text)
+    if quantity is not None:
+        number, unit = quantity
+        return _finite(Value(number * unit.factor + unit.offset, unit), text)
+    formula = parse_formula(text)
+    if formula.operation == "name":
+        return lookup(text.strip())
+    unit = _unit(formula, lookup)
+    number = float(formula.evaluate(lambda name: _scalar(lookup(name), name)))
+    return _finite(Value(number, unit), text)
+
+
+def _scalar(value: Value, name: str) -> ca.SX:
+    if np.ndim(value.number):
+        raise UnitError(f"'{name}' has {np.size(value.number)} values; a formula takes single numbers.")
+    return ca.SX(float(value.number))
+
+
+def _finite(value: Value, text: str) -> Value:
+    if not math.isfinite(value.number):
+        raise ValueOutOfRange(f"'{text}' is not a finite number.")
+    return value
+
+
+def _unit(formula: Formula, lookup: Lookup) -> Unit:
+    kind, operands = formula.operation, formula.operands
+    if kind == "number":
+        return ONE
+    if kind == "name":
+        return coherent(lookup(str(formula)).unit)
+    units = [_unit(operand, lookup) for operand in operands]
+    if kind in _ALIKE and not same_dimension(units[0], units[1]):
+        raise UnitError(f"'{formula}' mixes {units[0]} and {units[1]}.")
+    if kind == "*":
+        return units[0] * units[1]
+    if kind == "/":
+        return units[0] / units[1]
+    if kind == "**":
+        return _power(formula, units[0])
+    if kind == "sqrt":
+        return units[0] ** 0.5
+    return units[0] if kind in (*_SAME, *_ALIKE) else ONE
+
+
+def _power(formula: Formula, base: Unit) -> Unit:
+    if same_dimension(base, ONE):
+        return ONE
+    exponent = formula.operands[1]
+    negative = exponent.operation == "neg"
+    exponent = exponent.operands[0] if negative else exponent
+    if exponent.operation != "number":
+        raise UnitError(f"'{formula}': the exponent of something with a unit must be a number.")
+    return base ** (-exponent.operands[0] if negative else exponent.operands[0])

@@ -1,0 +1,151 @@
+"""Tables of a sizing run and of the design checks."""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+from collections.abc import Iterator, Mapping
+from typing import Any, get_args, get_origin
+
+from rich.console import Group, RenderableType
+from rich.markup import escape
+from rich.table import Table
+
+from modelica_like.report.types import table
+from modelica_like.sizing.checks import (
+    Argument,
+    Check,
+    arguments_of,
+    design_checks,
+    find_check,
+    unit_of_kind,
+    without_none,
+)
+from modelica_like.sizing.run import CheckedResult, Sizing
+
+_WIDE = 9
+
+
+def sizing_report(sizing: Sizing) -> RenderableType:
+    """Return all results with verdicts, the comparisons, and one sentence about the whole."""
+    parts: list[RenderableType] = [f"[bold]{escape(sizing.name)}[/]  {escape(sizing.description)}"]
+    for check in sizing.checks:
+        parts += ["", *_check_tables(check)]
+    for heading, names in sizing.compare.items():
+        parts += ["", _comparison(heading, {name: sizing[name] for name in names})]
+    return Group(*parts, "", _whole(sizing))
+
+
+def _check_tables(check: CheckedResult) -> Iterator[RenderableType]:
+    columns = ["line", "value>", "unit"]
+    columns += ["published>", "deviation>"] if check.published else []
+    made = table(escape(f"{check.name}: {check.check}"), *columns, "verdict", "what it is")
+    for line in check.result.lines(check.limits):
+        cells = [f"[bold]{line.name}[/]", escape(line.value), line.unit]
+        cells += _published(check, line.name) if check.published else []
+        style = "red" if line.exceeded else "green" if line.verdict else "dim"
+        made.add_row(*cells, f"[{style}]{escape(line.verdict or '–')}[/]", escape(line.description))
+    yield made
+    if check.note:
+        yield f"[dim]{escape(check.note)}[/]"
+    for title, rows in check.result.tables().items():
+        yield ""
+        yield _rows(title, rows)
+
+
+def _published(check: CheckedResult, line: str) -> list[str]:
+    if line not in check.published:
+        return ["", ""]
+    shown = _as_shown(check.result, line, check.published[line])
+    return [shown, f"{100 * check.deviation(line):+.3f} %"]
+
+
+def _as_shown(result: Any, line: str, value: float) -> str:
+    changed = dataclasses.replace(result, **{line: value})
+    return next(other.value for other in changed.lines() if other.name == line)
+
+
+def _rows(title: str, rows: tuple[Any, ...]) -> Table:
+    """Return results of one kind as rows; many lines stand below each other instead, one column per result."""
+    lines = [row.lines() for row in rows]
+    if len(lines[0]) > _WIDE and len(rows) <= _WIDE:
+        return _side_by_side(title, {each[0].value: each[1:] for each in lines})
+    names = [f"{line.name} [{line.unit}]" if line.unit else line.name for line in lines[0]]
+    made = table(title, *(escape(f"{name}>" if k else name) for k, name in enumerate(names)))
+    for each in lines:
+        made.add_row(*(escape(line.value) for line in each))
+    return made
+
+
+def _comparison(heading: str, results: dict[str, Any]) -> Table:
+    return _side_by_side(heading, {name: result.lines() for name, result in results.items()})
+
+
+def _side_by_side(heading: str, columns: dict[str, tuple[Any, ...]]) -> Table:
+    made = table(escape(heading), "line", *(f"{escape(name)}>" for name in columns), "unit", "what it is")
+    for lines in zip(*columns.values(), strict=True):
+        values = (escape(line.value) for line in lines)
+        made.add_row(f"[bold]{lines[0].name}[/]", *values, lines[0].unit, escape(lines[0].description))
+    return made
+
+
+def _whole(sizing: Sizing) -> str:
+    count = len(sizing.checks)
+    checks = "1 check" if count == 1 else f"{count} checks"
+    if not sizing.exceeded:
+        return f"{checks}, no limit is exceeded."
+    limits = "1 limit is" if sizing.exceeded == 1 else f"{sizing.exceeded} limits are"
+    return f"{checks}, [red]{limits} exceeded[/]."
+
+
+def checks_report(name: str = "") -> RenderableType:
+    """Return the list of all design checks, or the page of one.
+
+    Raises:
+        UnknownName: there is no such check.
+    """
+    return check_page(name, find_check(name)) if name else checks_table(design_checks())
+
+
+def checks_table(checks: Mapping[str, Check]) -> Table:
+    """Return all design checks with their first sentence."""
+    made = table(f"{len(checks)} design checks", "check", "module", "what it does")
+    for name, check in sorted(checks.items(), key=lambda item: (item[1].__module__, item[0])):
+        what = inspect.cleandoc(check.__doc__ or "").partition("\n")[0]
+        made.add_row(f"[bold]{name}[/]", check.__module__.rpartition(".")[2], escape(what))
+    return made
+
+
+def check_page(name: str, check: Check) -> RenderableType:
+    """Return a page about one design check: text and arguments."""
+    text = inspect.cleandoc(check.__doc__ or "").partition("\nArgs:")[0].rstrip()
+    meanings = dict(_meanings(inspect.cleandoc(check.__doc__ or "")))
+    made = table("arguments", "name", "unit", "default", "")
+    for argument in arguments_of(check).values():
+        default = "" if argument.required else str(argument.default)
+        made.add_row(
+            f"[bold]{argument.name}[/]", _kind(argument), escape(default), escape(meanings.get(argument.name, ""))
+        )
+    return Group(f"[bold]{name}[/]", escape(text), "", made)
+
+
+def _meanings(text: str) -> Iterator[tuple[str, str]]:
+    inside = False
+    for line in text.splitlines():
+        if line.startswith("    ") and inside:
+            name, colon, meaning = line.strip().partition(": ")
+            if colon and name.isidentifier():
+                yield name, meaning
+        elif line:
+            inside = line == "Args:"
+
+
+def _kind(argument: Argument) -> str:
+    kind = without_none(argument.kind)
+    unit = unit_of_kind(kind)
+    if unit is not None:
+        return str(unit)
+    if get_origin(kind) is not None:
+        inner = get_args(kind)[0]
+        return f"list of {unit_of_kind(inner) or inner.__name__}"
+    return {str: "text", bool: "true or false", int: "number"}.get(kind, getattr(kind, "__name__", ""))

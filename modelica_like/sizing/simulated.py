@@ -1,0 +1,73 @@
+"""Loads that a sizing file takes from simulations: `{ from = "drive.toml", peak = "clutch.tau" }`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from modelica_like.errors import NetlistError, UnknownName, did_you_mean
+from modelica_like.sizing.formulas import Value
+from modelica_like.sizing.loads import READERS, load_of
+from modelica_like.solve.plot import unit_of
+from modelica_like.solve.solution import Solution
+from modelica_like.units import parse_unit
+
+_KEYS = ("from", "until", "set", *READERS)
+_POWERS = {"stored_energy": "J", "loss_power": "W", "source_power": "W"}
+
+
+class Simulations:
+    """Runs of netlists; every run is made once.
+
+    Args:
+        folder: where the paths of the netlists begin.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.runs: dict[str, Solution] = {}
+
+    def load(self, table: Mapping[str, Any], where: str) -> Value:
+        """Return the load that a table asks for.
+
+        Args:
+            table: `from`, what to read with the variable (`peak = "clutch.tau"`), and maybe `until` and `set`.
+            where: the argument, for messages.
+
+        Raises:
+            ModelicaLikeError: the table, the netlist or the variable is wrong, or the simulation cannot go on.
+        """
+        for key in table:
+            if key not in _KEYS:
+                hint = did_you_mean(key, _KEYS) or "."
+                raise UnknownName(f"A load of a simulation has no '{key}'{hint} It has {', '.join(_KEYS)}.")
+        wanted = [key for key in table if key in READERS]
+        if len(wanted) != 1 or not isinstance(table.get("from"), str) or not isinstance(table[wanted[0]], str):
+            raise NetlistError(
+                f"{where} must be a value, or name a netlist and one variable of it.",
+                advice='Write { from = "drive.toml", peak = "clutch.tau" }.',
+            )
+        run, path = self._run(table), table[wanted[0]]
+        unit = parse_unit(_POWERS.get(path.rpartition(".")[2]) or self._unit(run, path))
+        return Value(load_of(run, path, wanted[0]), unit * parse_unit("s") if wanted[0] == "integral" else unit)
+
+    def _unit(self, run: Solution, path: str) -> str:
+        if path not in run.names:
+            raise UnknownName(f"{run.model.name} has no variable '{path}'{did_you_mean(path, run.names) or '.'}")
+        return unit_of(run, path)
+
+    def _run(self, table: Mapping[str, Any]) -> Solution:
+        values = table.get("set", {})
+        if not isinstance(values, dict):
+            raise NetlistError('`set` of a load must be a table: { "clutch.mu" = 0.3 }.')
+        key = f"{table['from']} {table.get('until')} {sorted(values.items())}"
+        if key not in self.runs:
+            from modelica_like.netlist import load
+            from modelica_like.simulation import simulate
+
+            drive = load(self.folder / table["from"])
+            for path, value in values.items():
+                drive.set(path, value)
+            self.runs[key] = simulate(drive, table.get("until"))
+        return self.runs[key]

@@ -1,0 +1,85 @@
+"""Results print as tables with units and verdicts; the units agree with those of the framework."""
+
+import dataclasses
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from components.sizing import (
+    ClutchSelection,
+    Load,
+    bearing_life,
+    clutch_selection,
+    comparison,
+    flywheel_for_time,
+    quantities,
+    shaft_statics,
+)
+from modelica_like.units import parse_unit
+
+COUNTS = ("", "teeth", "1e6 rev")
+
+
+@pytest.mark.parametrize("name", [name for name in vars(quantities) if hasattr(vars(quantities)[name], "__metadata__")])
+def test_units_of_display(name: str) -> None:
+    quantity = vars(quantities)[name].__metadata__[0]
+    si = parse_unit(quantity.unit)
+    assert si.factor == 1.0
+    if quantity.shown not in COUNTS:
+        shown = parse_unit(quantity.shown)
+        assert shown.dimension == si.dimension
+        assert shown.factor == pytest.approx(quantity.factor, rel=1e-12)
+
+
+def test_table() -> None:
+    selection = clutch_selection(40.0, 100.0, 0.6, 2.0)
+    assert str(selection).splitlines() == [
+        "ClutchSelection",
+        "  required_torque  0.800059  N.m  required torque by the rule 9550·P/n            above the limit 0.6 N.m by "
+        "0.2001 N.m (33.3 %)",
+        "  exact_torque          0.8  N.m  required torque K·P/w without the rounded 9550  above the limit 0.6 N.m by "
+        "0.2 N.m (33.3 %)",
+        "  rated_torque          0.6  N.m  rated torque of the clutch",
+    ]
+
+
+def test_results_are_frozen() -> None:
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        clutch_selection(40.0, 100.0, 0.6).rated_torque = 1.0  # type: ignore[misc]
+
+
+def test_rows_are_a_table_of_their_own() -> None:
+    text = str(shaft_statics([Load(0.3, y=-1000.0)], [0.0, 1.0]))
+    assert "bearings\n  at [mm]  y [N]  z [N]  radial [N]\n        0    700" in text
+    assert "bending [N.mm]" in text
+
+
+def test_limits_from_outside() -> None:
+    life = bearing_life(150.0, 100.0, 2600.0, 1060.0)
+    verdicts = {line.name: line.verdict for line in life.lines({"life": (2e7, None), "static_safety": (None, 5.0)})}
+    assert verdicts["life"] == "ok"
+    assert verdicts["static_safety"] == "above the limit 5 by 2.067 (41.3 %)"
+
+
+def test_the_worst_of_an_array_counts() -> None:
+    made = flywheel_for_time(np.array([0.2, 2.0, 0.3]), 0.6, 139.6, 7850.0, 0.045, width_limit=0.1)
+    line = next(line for line in made.lines() if line.name == "width")
+    assert line.value.count(",") == 2
+    assert line.verdict.startswith("above the limit 100 mm by 70")
+
+
+def test_nan_is_not_ok() -> None:
+    assert ClutchSelection(float("nan"), 0.5, 0.6).lines()[0].exceeded
+
+
+def test_expressions_have_no_verdict() -> None:
+    made = clutch_selection(ca.SX.sym("P"), 100.0, 0.6)
+    assert made.lines()[0].verdict == ""
+    assert "P" in str(made)
+
+
+def test_comparison() -> None:
+    text = comparison(light=clutch_selection(40.0, 100.0, 0.6), heavy=clutch_selection(80.0, 100.0, 0.6))
+    assert text.splitlines()[0].split() == ["light", "heavy"]
+    assert text.splitlines()[2].split()[:4] == ["exact_torque", "0.4", "0.8", "N.m"]
