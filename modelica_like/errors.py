@@ -43,7 +43,8 @@ class ModelicaLikeError(Exception):
     def __init__(self, what: str, *, where: Source | Iterable[Source] = (), why: str = "", advice: str = "") -> None:
         super().__init__(what)
         self.what = what
-        self.where: tuple[Source, ...] = (where,) if isinstance(where, Source) else tuple(where)
+        places = (where,) if isinstance(where, Source) else tuple(where)
+        self.where: tuple[Source, ...] = tuple(place for place in places if place.file)
         self.why = why
         self.advice = advice
 

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from modelica_like.errors import UnknownName, did_you_mean
-from modelica_like.solve.solution import Solution
+
+if TYPE_CHECKING:
+    from modelica_like.solve.solution import Solution
 
 Vector = NDArray[np.float64]
 _Reader = Callable[[Vector, Vector], float]

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from modelica_like.errors import NetlistError, UnknownName, did_you_mean
 from modelica_like.sizing.formulas import Value
 from modelica_like.sizing.loads import READERS, load_of
-from modelica_like.solve.plot import unit_of
-from modelica_like.solve.solution import Solution
 from modelica_like.units import parse_unit
+
+if TYPE_CHECKING:
+    from modelica_like.solve.solution import Solution
 
 _KEYS = ("from", "until", "set", *READERS)
 _POWERS = {"stored_energy": "J", "loss_power": "W", "source_power": "W"}
@@ -55,6 +56,8 @@ class Simulations:
     def _unit(self, run: Solution, path: str) -> str:
         if path not in run.names:
             raise UnknownName(f"{run.model.name} has no variable '{path}'{did_you_mean(path, run.names) or '.'}")
+        from modelica_like.solve.plot import unit_of
+
         return unit_of(run, path)
 
     def _run(self, table: Mapping[str, Any]) -> Solution:

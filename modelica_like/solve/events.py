@@ -349,9 +349,10 @@ class EventLoop:
             counts.setdefault(event.mode, []).append(event)
         mode, events = max(counts.items(), key=lambda item: len(item[1]))
         names = " ⇄ ".join(dict.fromkeys(name for event in events for name in (event.before, event.after)))
-        times = f"{events[0].time:.9g}…{events[-1].time:.9g}"
+        first, last = f"{events[0].time:.9g}", f"{events[-1].time:.9g}"
+        when = f"at t = {last} s" if first == last else f"in t = {first}…{last} s"
         return Chattering(
-            f"{mode} switched {len(events)} times in t = {times} s ({names}).",
+            f"{mode} switched {len(events)} times {when} ({names}).",
             where=list(dict.fromkeys(event.source for event in events))[:3], why=f"{why}.",
             advice="Give the switching a hysteresis (a peak above 1 in friction), or smooth what drives it.",
         )  # fmt: skip
