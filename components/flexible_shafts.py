@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from components.friction import DryFriction
+from components.friction import ShaftFriction
 from components.inertias import Inertia
 from components.interfaces import Flange, ShaftInHousing
 from components.springs import SpringDamper
@@ -37,7 +37,7 @@ class FlexibleShaft(Component):
         yield connect(self.flange_b, masses[-1].flange_b)
 
 
-class StribeckBearing(DryFriction, ShaftInHousing):
+class StribeckBearing(ShaftFriction, ShaftInHousing):
     """Friction of a lubricated plain bearing after R. Stribeck: d·w + tau_Coulomb + tau_Stribeck·exp(-w/w_Stribeck).
 
     R. Stribeck: Die wesentlichen Eigenschaften der Gleit- und Rollenlager, Z. VDI 46 (1902).

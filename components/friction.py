@@ -72,6 +72,10 @@ class DryFriction(Lossy, partial=True):
         """Return the condition on which surfaces that stick begin to slide backward."""
         return self.friction < -self.static_friction()
 
+    def creeping(self) -> Expr | float:
+        """Return the acceleration of surfaces that stick."""
+        return 0.0
+
     def idle_friction(self) -> Expr:
         """Return the friction of free surfaces: none, where nothing presses them together."""
         # At rest it is zero also where an event is just being overrun, so that it never jumps with the direction.
@@ -85,7 +89,7 @@ class DryFriction(Lossy, partial=True):
         forward = self.sliding_friction(maximum(self.slip, 0))
         backward = self.sliding_friction(maximum(-self.slip, 0))
         yield self.mode.choose(
-            free=self.friction - self.idle_friction(), stuck=der(self.slip),
+            free=self.friction - self.idle_friction(), stuck=der(self.slip) - self.creeping(),
             start_forward=self.friction - at_rest, start_backward=self.friction + at_rest,
             forward=self.friction - forward, backward=self.friction + backward,
         ) == 0  # fmt: skip
@@ -112,7 +116,22 @@ class DryFriction(Lossy, partial=True):
         return self.friction * self.slip
 
 
-class PressedFriction(DryFriction, partial=True):
+class ShaftFriction(DryFriction, partial=True):
+    """Dry friction between turning parts.
+
+    What sticks is at rest. That leaves the torque undetermined where another friction element holds the same shaft, and
+    where the motion is prescribed and passes through zero. A tiny `creep` (1e-9) decides: the other element holds as
+    long as it can; a prescribed motion breaks away at once.
+    """
+
+    creep: Parameter = param("1/(kg.m2)", "acceleration while it sticks over its torque", default=None, min=0)
+    creep_time: Parameter = param("s", "time after which it creeps no faster", default=1e-3, min=0)
+
+    def creeping(self) -> Expr | float:
+        return self.creep * self.friction - self.slip / self.creep_time if self.given("creep") else 0.0
+
+
+class PressedFriction(ShaftFriction, partial=True):
     """Friction surfaces pressed together by a normal force.
 
     Friction torque cgeo·mu(slip)·fn with the normal force fn = fn_max·f_normalized. For N surfaces with the radii r_i
@@ -196,7 +215,7 @@ class Brake(PressedFriction, ShaftInHousing):
         return self.tau
 
 
-class BearingFriction(DryFriction, ShaftInHousing):
+class BearingFriction(ShaftFriction, ShaftInHousing):
     """Friction of a bearing: a torque against the rotation that depends on the speed, with stiction."""
 
     w: Variable = var("rad/s", "speed of the shaft relative to the housing", state="always")

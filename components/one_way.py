@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from components.friction import Clutch, DryFriction
+from components.friction import Clutch, ShaftFriction
 from components.interfaces import CompliantWithRelativeStates
 from modelica_like.language import (
     Equations,
@@ -39,7 +39,9 @@ class Freewheel(CompliantWithRelativeStates):
     def events(self) -> Events:
         yield self.mode.initially("locked", when=all_of(self.w_rel <= 0, self.w_rel >= 0))
         yield self.mode.go("locked", "overrunning", when=self.tau > 0)
-        yield self.mode.go("overrunning", "locked", when=self.w_rel < 0, reset={self.w_rel: 0})
+        # Just after the release the speed is zero but for rounding; whether it falls decides.
+        falling = all_of(self.w_rel < 0, der(self.w_rel) < 0)
+        yield self.mode.go("overrunning", "locked", when=falling, reset={self.w_rel: 0})
 
 
 class OneWayClutch(Clutch):
@@ -57,7 +59,8 @@ class OneWayClutch(Clutch):
         at_rest = self.sliding_friction(0)
         moving = self.tau - self.sliding_friction(where(self.w_rel > 0, self.w_rel, 0))
         yield self.mode.choose(
-            stuck=der(self.w_rel), start_forward=self.tau - at_rest, forward=moving, otherwise=self.tau
+            stuck=der(self.w_rel) - self.creeping(), start_forward=self.tau - at_rest,
+            forward=moving, otherwise=self.tau,
         ) == 0  # fmt: skip
         if self.heat_port.used:
             yield self.heat_port.Q_flow == -self.dissipation()
@@ -72,7 +75,7 @@ class OneWayClutch(Clutch):
         yield mode.go("forward", "stuck", when=w < 0, reset={w: 0})
 
 
-class TorqueLimiter(DryFriction, CompliantWithRelativeStates):
+class TorqueLimiter(ShaftFriction, CompliantWithRelativeStates):
     """Slipping coupling that protects a drive: rigid up to tau_max·peak, then it slips at tau_max."""
 
     tau_max: Parameter = param("N.m", "torque at which it slips", min=0)

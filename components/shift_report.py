@@ -47,7 +47,7 @@ def shift_report(
     """Work out what every clutch and brake does in every shift.
 
     A shift lasts until the next one begins. Its friction work is the integral of the loss power over the results of the
-    run by the trapezoidal rule: with 1000 results in the time of a shift it is exact to six digits.
+    run; a dozen results while an element slips make it exact to four digits.
 
     Args:
         run: a run of a gearbox with a `ShiftSchedule`.
@@ -73,7 +73,19 @@ def _element(run: Run, path: str, window: slice, head: tuple[str, float, str]) -
     power = np.where(power > _ROUNDING * np.max(power), power, 0.0)[window]
     if not np.any(power):
         return []
-    torque, steps, slips = run[f"{path}.tau"][window], np.diff(run["time"][window]), power > 0
-    work = float(np.sum(0.5 * (power[1:] + power[:-1]) * steps))
-    slipping = float(np.sum(steps[slips[1:] | slips[:-1]]))
-    return [ElementShift(*head, slipping, float(np.max(np.abs(torque[slips]))), work)]
+    time, torque, slips = run["time"][window], run[f"{path}.tau"][window], power > 0
+    slipping = float(np.sum(np.diff(time)[slips[1:] | slips[:-1]]))
+    return [ElementShift(*head, slipping, float(np.max(np.abs(torque[slips]))), _integral(time, power))]
+
+
+def _integral(time: Any, power: Any) -> float:
+    """Integrate cubics piece by piece; between the pieces there are the two sides of an event."""
+    total = 0.0
+    for piece in np.split(np.arange(len(time)), np.flatnonzero(np.diff(time) == 0) + 1):
+        t, p = time[piece], power[piece]
+        step = np.diff(t)
+        total += float(np.sum(0.5 * step * (p[1:] + p[:-1])))
+        if len(t) > 2:
+            slope = np.gradient(p, t, edge_order=2)
+            total += float(np.sum(step**2 * (slope[:-1] - slope[1:]))) / 12
+    return total

@@ -102,8 +102,14 @@ class ElastoGap(Lossy, LinearCompliantWithRelativeStates):
 
 
 class SlideFriction(DryFriction, SlideInHousing, partial=True):
-    """Dry friction between a slide and the housing."""
+    """Dry friction between a slide and the housing.
 
+    A tiny `creep` (1e-9) decides where the force of what sticks is undetermined: where another friction element holds
+    the same slide, or where its motion is prescribed and passes through zero.
+    """
+
+    creep: Parameter = param("1/kg", "acceleration while it sticks over its force", default=None, min=0)
+    creep_time: Parameter = param("s", "time after which it creeps no faster", default=1e-3, min=0)
     v: Variable = var("m/s", "velocity of the slide relative to the housing", state="always")
 
     @property
@@ -113,6 +119,9 @@ class SlideFriction(DryFriction, SlideInHousing, partial=True):
     @property
     def friction(self) -> Expr:
         return self.f
+
+    def creeping(self) -> Expr | float:
+        return self.creep * self.friction - self.slip / self.creep_time if self.given("creep") else 0.0
 
 
 class SupportFriction(SlideFriction):

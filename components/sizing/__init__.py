@@ -35,6 +35,7 @@ from components.sizing.dc_motors import MotorSummary as MotorSummary
 from components.sizing.dc_motors import dc_motor_point as dc_motor_point
 from components.sizing.dc_motors import drive_for_clutch as drive_for_clutch
 from components.sizing.dc_motors import generator_voltage as generator_voltage
+from components.sizing.dc_motors import measured_lines as measured_lines
 from components.sizing.dc_motors import motor_lines as motor_lines
 from components.sizing.dc_motors import motor_on_lines as motor_on_lines
 from components.sizing.dc_motors import motor_point as motor_point
@@ -157,6 +158,7 @@ __all__ = [
     "lepelletier_gear",
     "line_consistency",
     "machine_table_clutch",
+    "measured_lines",
     "midspan_sag",
     "motor_lines",
     "motor_on_lines",

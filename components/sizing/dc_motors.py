@@ -44,6 +44,22 @@ class DcMotor(Result):
     damping: Damping = line("friction torque over speed")
 
 
+def measured_lines(
+    voltage: Voltage, no_load_speed: Speed, speed_drop: Compliance, no_load_current: Current,
+    current_rise: CurrentSlope,
+) -> MotorLines:  # fmt: skip
+    """Name the straight lines through measured points: w = w0 - s·M, I = I0 + a·M.
+
+    Args:
+        voltage: in V.
+        no_load_speed: w0 in rad/s.
+        speed_drop: s in rad/(N.m.s).
+        no_load_current: I0 in A.
+        current_rise: a in A/(N.m).
+    """
+    return MotorLines(voltage, no_load_speed, speed_drop, no_load_current, current_rise)
+
+
 def motor_lines(motor: DcMotor, voltage: Voltage) -> MotorLines:
     """Return the characteristic curves of a DC motor, which are straight.
 

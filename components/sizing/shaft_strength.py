@@ -191,6 +191,7 @@ def stepped_shaft(
     for before, after in itertools.pairwise(sections):
         cuts = section_forces(everything, before.end)
         stresses += _worst([_at_shoulder(cut, before, after, yield_strength, required_safety) for cut in cuts])
+    stresses.sort(key=lambda stress: stress.at)
     lowest, place = stresses[0].safety, stresses[0].at
     for stress in stresses[1:]:
         place = where(stress.safety < lowest, stress.at, place)

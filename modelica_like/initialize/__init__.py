@@ -68,7 +68,8 @@ def initialize(model: CompiledDae, t0: float = 0.0, start: StartKind = "given") 
 
 def _unsettled(model: CompiledDae, point: Point) -> InitializationError:
     pairs = zip(model.flat_discretes, point.d, _start_modes(model, point), strict=True)
-    names = [one.path for one, old, new in pairs if old != new] or [one.path for one in model.flat_discretes if one.names]
+    changing = [one.path for one, old, new in pairs if old != new]
+    names = changing or [one.path for one in model.flat_discretes if one.names]
     return InitializationError(
         f"The modes at the start do not settle: {', '.join(names)} and the start values change each other in a circle.",
         advice="Give start values of states, which no mode changes.",

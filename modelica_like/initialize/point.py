@@ -87,12 +87,14 @@ def check_singular(model: CompiledDae, point: Point) -> None:
 def _singular(model: CompiledDae, point: Point, blocks: list[tuple[str, ...]], where: Any) -> SingularAtStart:
     names = [name for block in blocks for name in block]
     number = 1 + next((k for k, (known, _) in enumerate(model.singular) if known == blocks[0]), 0)
-    shown = ", ".join(names[:6]) + (", …" if len(names) > 6 else "")
     stuck = [
         one.path.rpartition(".")[0]
         for k, one in enumerate(model.flat_discretes)
         if one.names and one.names[int(point.d[k])] == "stuck"
     ]
+    held = [name for name in names if name.rpartition(".")[0] in stuck]
+    told = held if len(stuck) > 1 and held else names
+    shown = ", ".join(told[:6]) + (", …" if len(told) > 6 else "")
     if len(stuck) > 1:
         why = f"{' and '.join(stuck)} stick: where they hold the same motion, their torque split is undetermined."
         advice = "Make one compliant, or let one start open."

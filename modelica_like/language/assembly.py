@@ -102,7 +102,7 @@ class Assembly(Component):
         raise AttributeError(f"{type(self).__name__} '{self.__dict__.get('_name', '')}' has no '{name}'")
 
     def __setattr__(self, name: str, value: Any) -> None:
-        if name in self.__dict__.get("_own_fields", {}):
+        if name in self.__dict__.get("_own_fields", {}) and not isinstance(value, Component | list):
             self.give(name, value)
         else:
             super().__setattr__(name, value)

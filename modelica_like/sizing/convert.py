@@ -33,10 +33,12 @@ class Converter:
     Attributes:
         lookup: gives the value of a name in a formula.
         simulated: gives the load that a table with `from` asks for.
+        result: gives the result of another check of the file.
     """
 
     lookup: Lookup
     simulated: SimulatedLoad
+    result: Callable[[str], Any]
 
     def arguments(
         self, target: Any, table: Mapping[str, Any], where: str, place: Callable[[str], Source] | None = None
@@ -80,12 +82,22 @@ class Converter:
             inner = get_args(kind)[0]
             return tuple(self._value(inner, item, f"{where}[{k}]") for k, item in enumerate(value))
         if dataclasses.is_dataclass(kind) and isinstance(kind, type):
-            if not isinstance(value, dict):
-                raise NetlistError(f"{where} must be a table: {{ {_example(kind)} }}.")
-            return kind(**self.arguments(kind, value, where))
+            return self._structure(kind, value, where)
         if kind in _TEXTS and type(value) is not _TEXTS[kind]:
             raise NetlistError(f"{where} must be {_article(kind)}, not {value!r}.")
         return value
+
+    def _structure(self, kind: type, value: Any, where: str) -> Any:
+        """Return a dataclass from a table of its fields, or from the name of a check that has it as result."""
+        if isinstance(value, dict):
+            return kind(**self.arguments(kind, value, where))
+        result = self.result(value) if isinstance(value, str) else None
+        if not isinstance(result, kind):
+            raise NetlistError(
+                f"{where} must be a table: {{ {_example(kind)} }}.",
+                advice=f"Or name a check whose result is a {kind.__name__}." if hasattr(kind, "lines") else "",
+            )
+        return result
 
     def quantity(self, unit: Unit, value: Any, where: str) -> Any:
         """Return a number, or an array from a list, in SI."""

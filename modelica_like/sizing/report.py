@@ -69,7 +69,8 @@ def _rows(title: str, rows: tuple[Any, ...]) -> Table:
     """Return results of one kind as rows; many lines stand below each other instead, one column per result."""
     lines = [row.lines() for row in rows]
     if len(lines[0]) > _WIDE and len(rows) <= _WIDE:
-        return _side_by_side(title, {each[0].value: each[1:] for each in lines})
+        corner = f"{lines[0][0].name} [{lines[0][0].unit}]" if lines[0][0].unit else lines[0][0].name
+        return _side_by_side(title, corner, [(each[0].value, each[1:]) for each in lines])
     names = [f"{line.name} [{line.unit}]" if line.unit else line.name for line in lines[0]]
     made = table(title, *(escape(f"{name}>" if k else name) for k, name in enumerate(names)))
     for each in lines:
@@ -78,12 +79,12 @@ def _rows(title: str, rows: tuple[Any, ...]) -> Table:
 
 
 def _comparison(heading: str, results: dict[str, Any]) -> Table:
-    return _side_by_side(heading, {name: result.lines() for name, result in results.items()})
+    return _side_by_side(heading, "line", [(name, result.lines()) for name, result in results.items()])
 
 
-def _side_by_side(heading: str, columns: dict[str, tuple[Any, ...]]) -> Table:
-    made = table(escape(heading), "line", *(f"{escape(name)}>" for name in columns), "unit", "what it is")
-    for lines in zip(*columns.values(), strict=True):
+def _side_by_side(heading: str, corner: str, columns: list[tuple[str, tuple[Any, ...]]]) -> Table:
+    made = table(escape(heading), escape(corner), *(f"{escape(name)}>" for name, _ in columns), "unit", "what it is")
+    for lines in zip(*(each for _, each in columns), strict=True):
         values = (escape(line.value) for line in lines)
         made.add_row(f"[bold]{lines[0].name}[/]", *values, lines[0].unit, escape(lines[0].description))
     return made

@@ -77,7 +77,15 @@ class Sizing:
         return sum(check.exceeded for check in self.checks)
 
     def __getitem__(self, name: str) -> Any:
-        return next(check.result for check in self.checks if check.name == name)
+        """Return the result of a check.
+
+        Raises:
+            UnknownName: there is no such check.
+        """
+        results = {check.name: check.result for check in self.checks}
+        if name not in results:
+            raise UnknownName(f"{self.name} has no check '{name}'{did_you_mean(name, results) or '.'}")
+        return results[name]
 
 
 def size(path: str | Path) -> Sizing:
@@ -115,7 +123,7 @@ class _Run:
         self.done: dict[str, CheckedResult] = {}
         self.parameters: dict[str, Value] = {}
         self.open: list[str] = []
-        self.converter = Converter(self.lookup, Simulations(folder).load)
+        self.converter = Converter(self.lookup, Simulations(folder).load, self.result)
 
     def lookup(self, path: str) -> Value:
         """Return a parameter, or a line of a check (`belt.shaft_load`, `shaft.reactions[0].radial`)."""
@@ -126,6 +134,10 @@ class _Run:
             return _line(self.checked(name).result, rest, path)
         known = [*self.document.parameters, *self.document.checks]
         raise UnknownName(f"There is no parameter or check '{name}'{did_you_mean(name, known) or '.'}")
+
+    def result(self, name: str) -> Any:
+        """Return the result of a check, None if there is no such check."""
+        return self.checked(name).result if name in self.document.checks else None
 
     def _parameter(self, name: str) -> Value:
         if name not in self.parameters:

@@ -19,7 +19,7 @@ from modelica_like.solve.recorder import Event, Recorder
 _FIRST_PANEL = 8
 _GROWTH = 4
 _STEPS_PER_CHECK = 6
-"""Guards are looked at about as often as the integrator needs steps: what oscillates between two results is not missed."""
+"""Guards are looked at about as often as the integrator needs steps: what oscillates between results is not missed."""
 _STEPS_TO_START = 30
 _MAX_CHECKS = 2**16
 _CHATTER_EVENTS = 50
@@ -104,7 +104,7 @@ class EventLoop:
         self.record.add(times[kept], x[:, kept], z[:, kept])
 
     def _refine(self, steps: int, points: int) -> bool:
-        """Adapt the number of looks at the guards per result to the steps of the integrator; True if it was too small."""
+        """Adapt the number of looks at the guards per result to the integrator's steps; True if it was too small."""
         if not self.guards.count:
             return False
         each = max(steps - _STEPS_TO_START, 0) / points
@@ -237,7 +237,7 @@ class EventLoop:
         return False
 
     def _look_behind(self, base: Point, located: Located, late: list[int], end: float) -> list[CompiledTransition]:
-        """Go on by the time resolution, from where the search begins anew; what is still positive there wants to fire."""
+        """Go on by the time resolution; what is still positive there wants to fire, else the search begins anew."""
         behind = located.point.t + TIME_RESOLUTION * max(1.0, abs(located.point.t))
         located.point, values, _ = self._trial(base, min(behind, end) - base.t)
         return [self.guards.state_events[g] for g in late if values[g] > 0]

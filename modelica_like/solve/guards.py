@@ -14,6 +14,8 @@ from modelica_like.initialize import Point, call
 
 _LOCATED = 1e-13
 _MAX_TRIALS = 60
+_NEAR = 0.1
+"""A top between two results is looked at if it is this near zero, relative to the values at both ends."""
 
 
 class Guards:
@@ -47,11 +49,16 @@ class Guards:
         fast = buffered(model._cache, ("guards", count), lambda: model.guards_along(count))
         p, u, modes = (np.tile(vector, count) for vector in (model.p, model.u, d))
         values, rates = (v.reshape(count, -1).T for v in fast(times, x.ravel("F"), z.ravel("F"), p, u, modes))
-        return np.nan_to_num(values, nan=-1.0), np.nan_to_num(rates, nan=0.0, posinf=0.0, neginf=0.0)
+        return _numbers(values), rates if np.isfinite(rates).all() else np.where(np.isfinite(rates), rates, 0.0)
 
     def soon(self, point: Point) -> Vector:
         """Guards as they will be one time resolution later."""
-        return np.nan_to_num(call(self.model, self.model.guards_soon, point), nan=-1.0)
+        return _numbers(call(self.model, self.model.guards_soon, point))
+
+
+def _numbers(guards: Vector) -> Vector:
+    """Let a guard that is not a number be false."""
+    return guards if np.isfinite(guards).all() else np.nan_to_num(guards, nan=-1.0)
 
 
 @dataclass
@@ -72,29 +79,36 @@ def candidates(values: Vector, rates: Vector, active: Any, step: float) -> list[
         active: which guards count.
         step: longest distance of two times in s.
     """
+    rows = np.flatnonzero(active)
+    values, rates = values[rows], rates[rows]
     before, after = values[:, :-1], values[:, 1:]
-    crossing = (before <= 0) & (after > 0) & active[:, None]
-    humps = (before <= 0) & (after <= 0) & (rates[:, :-1] > 0) & (rates[:, 1:] < 0) & active[:, None]
-    if np.any(humps):
-        humps &= _peak(before, after, rates[:, :-1] * step, rates[:, 1:] * step) > -0.1 * (
-            np.abs(before) + np.abs(after)
-        )
-    intervals = np.flatnonzero(np.any(crossing | humps, axis=0))
-    if not intervals.size:
-        return []
+    below = before <= 0
+    crossing = below & (after > 0)
+    humps = below & ~crossing & (rates[:, :-1] > 0) & (rates[:, 1:] < 0)
+    places = np.nonzero(humps)
+    if places[0].size:
+        ends = before[places], after[places]
+        top = _peak(*ends, rates[:, :-1][places] * step, rates[:, 1:][places] * step)
+        humps[places] = top > -_NEAR * (np.abs(ends[0]) + np.abs(ends[1]))
     found: list[Candidate] = []
-    for k in intervals:
-        found += [Candidate(int(g), int(k), False) for g in np.flatnonzero(crossing[:, k])]
-        found += [Candidate(int(g), int(k), True) for g in np.flatnonzero(humps[:, k])]
+    for k in np.flatnonzero(np.any(crossing | humps, axis=0)):
+        found += [Candidate(int(rows[g]), int(k), False) for g in np.flatnonzero(crossing[:, k])]
+        found += [Candidate(int(rows[g]), int(k), True) for g in np.flatnonzero(humps[:, k])]
     return found
 
 
 def _peak(g0: Vector, g1: Vector, r0: Vector, r1: Vector) -> Vector:
-    """Largest value of the cubic through both ends with the given slopes (sampled)."""
-    s = np.linspace(0.05, 0.95, 19).reshape(-1, 1, 1)
-    h = (1 + 2 * s) * (1 - s) ** 2 * g0 + s * (1 - s) ** 2 * r0 + s * s * (3 - 2 * s) * g1 + s * s * (s - 1) * r1
+    """Largest value of the cubics through both ends with the given slopes (sampled)."""
+    h = _CUBIC @ np.array([g0, r0, g1, r1])
     return np.max(h, axis=0)
 
+
+def _hermite(s: Vector) -> Vector:
+    """Values of the four cubic Hermite polynomials at s in (0, 1), shape (len(s), 4)."""
+    return np.array([(1 + 2 * s) * (1 - s) ** 2, s * (1 - s) ** 2, s * s * (3 - 2 * s), s * s * (s - 1)]).T
+
+
+_CUBIC = _hermite(np.linspace(0.05, 0.95, 19))
 
 Trial = Callable[[float], tuple[Point, Vector, Vector]]
 """Integrates from the beginning of the interval by a time and gives the point there with guards and rates."""

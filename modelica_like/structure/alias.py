@@ -21,7 +21,7 @@ class Aliases:
         known: roots whose value is a number or an expression of parameters.
         derivative: root -> (root, factor) of its derivative: der(root) = factor * root.
         remaining: positions in `FlatModel.linear` of the equations that still say something.
-        contradictions: equations that fix a value more than once; the first has no unknown left, or follows from the others.
+        contradictions: groups of equations that fix a value more than once.
     """
 
     root: list[int]

@@ -98,7 +98,7 @@ class BlockSolver:
         names = ", ".join(str(self.unknowns[column]) for column in columns[:6])
         return StructureError(
             f"After index reduction the equations do not determine {names or 'anything more, but some are left'}.",
-            advice="Look for rigid parts that form a loop, or for a part that only a derivative of an input could move.",
+            advice="Look for rigid parts that form a loop, or a part that only the derivative of an input could move.",
         )
 
     def _solve(self, rows: tuple[int, ...], columns: tuple[int, ...]) -> None:

@@ -141,7 +141,8 @@ def _check_input_rates(system: System) -> None:
         rate = system.derivative(level)
         if rate is not None:
             raise StructureError(
-                f"{system.levels[rate].name} is the derivative of the input {system.levels[level].name}, which is not known.",
+                f"{system.levels[rate].name} is the derivative of the input {system.levels[level].name}, "
+                "which is not known.",
                 advice="Give the derivative as an input of its own, or filter the input before it prescribes a motion.",
             )
 

@@ -79,11 +79,11 @@ def check(equation: object) -> None:
         lambda c: c.phi == atan2(c.x, c.x),
         lambda c: c.tau == interpolate(c.phi / c.eps, [0, 1], [2, 3]) * c.P / c.w,
         lambda c: c.w == der(c.phi**2) / c.phi,
-        lambda c: c.P == der(0.5 * c.J * c.w**2),
+        lambda c: der(0.5 * c.J * c.w**2) == c.P,
         lambda c: c.k**c.k == c.k,
         lambda c: c.x == 2 * c.x - c.x / 2,
         lambda c: 0.5 * c.tau == -c.tau,
-        lambda c: c.P == c.tau / c.time,
+        lambda c: c.tau / c.time == c.P,
     ],
 )
 def test_right_equations(equation):
@@ -104,7 +104,10 @@ def test_right_equations(equation):
         (lambda c: c.f == where(c.x > 0, c.f, c.x), "the branches of choose(…) or where(…) differ in unit"),
         (lambda c: c.k == c.k**c.x, "an exponent and a number differ: m and 1."),
         (lambda c: c.x == c.x**c.k, "the base of a variable power and a number differ: m and 1."),
-        (lambda c: c.f == c.mode.choose(a=c.x, b=c.tau), "the branches of choose(…) or where(…) differ in unit; they only stand in `… == 0`."),
+        (
+            lambda c: c.f == c.mode.choose(a=c.x, b=c.tau),
+            "the branches of choose(…) or where(…) differ in unit; they only stand in `… == 0`.",
+        ),
         (lambda c: c.w == der(c.x), "left rad/s, right m/s."),
         (lambda c: c.phi == cos(c.phi) * c.time, "left rad, right s."),
     ],
@@ -133,7 +136,7 @@ def test_all_wrong_equations_of_a_class_are_told_together():
     class Twice(Things):
         def equations(self) -> Equations:
             yield self.tau == self.x
-            yield self.P == self.x
+            yield self.x == self.P
             for name in ("phi", "w", "x", "f"):
                 yield getattr(self, name) == 0
 

@@ -69,7 +69,11 @@ def test_a_tree_of_connects_gives_one_set(tree):
 @given(st.randoms())
 @settings(deadline=None, max_examples=5)
 def test_the_order_of_connecting_does_not_matter(shuffle):
-    pairs = [["left.flange_b", "spring.flange_a"], ["spring.flange_b", "right.flange_a"], ["push.flange", "left.flange_a"]]
+    pairs = [
+        ["left.flange_b", "spring.flange_a"],
+        ["spring.flange_b", "right.flange_a"],
+        ["push.flange", "left.flange_a"],
+    ]
     expected = None
     for _ in range(2):
         wires = {f"w{k}": shuffle.sample(pair, 2) for k, pair in enumerate(shuffle.sample(pairs, 3))}
@@ -78,7 +82,13 @@ def test_the_order_of_connecting_does_not_matter(shuffle):
             "spring": SpringDamper(c=10.0, d=0.5), "push": ConstantTorque(tau_constant=1.5),
         }  # fmt: skip
         order = shuffle.sample(list(parts), 4)
-        run = simulate(Assembly("drive", parts={name: parts[name] for name in order}, connect=wires), 1.0, points=20, rtol=1e-10, atol=1e-12)
+        run = simulate(
+            Assembly("drive", parts={name: parts[name] for name in order}, connect=wires),
+            1.0,
+            points=20,
+            rtol=1e-10,
+            atol=1e-12,
+        )
         values = np.array([run["left.w"], run["right.w"], run["spring.tau"]])
         expected = values if expected is None else expected
         np.testing.assert_allclose(values, expected, atol=1e-8)
@@ -91,7 +101,10 @@ def test_connecting_twice_changes_nothing():
 
 def test_two_sets_stay_two():
     equations = connections(flatten(star([[1, 2], [3, 4]], 3)))
-    assert sorted(e[0][0] for e in equations if "tau" in e[0][0]) == ["rotors[1].flange_b.tau", "rotors[2].flange_b.tau"]
+    assert sorted(e[0][0] for e in equations if "tau" in e[0][0]) == [
+        "rotors[1].flange_b.tau",
+        "rotors[2].flange_b.tau",
+    ]
 
 
 class Box(Component):
@@ -257,7 +270,9 @@ def test_flanges_of_different_kinds_name_what_goes_between():
         def equations(self) -> Equations:
             yield connect(self.lamp.pin, self.rotor.flange_a)
 
-    with pytest.raises(WrongConnection, match=r"a Pin \(V, A\) cannot join a Flange \(rad, N\.m\)\. Join connectors of one kind"):
+    with pytest.raises(
+        WrongConnection, match=r"a Pin \(V, A\) cannot join a Flange \(rad, N\.m\)\. Join connectors of one kind"
+    ):
         flatten(Wrong())
     assert issubclass(LinearFlange, Connector)
 

@@ -100,7 +100,7 @@ def test_text_with_wide_characters_is_cut_at_the_right_column():
             yield from super().equations()
             "Δφ·ω"
             yield self.tau == 0
-            "ü"  # noqa: E702, B018
+            "ü"
 
     assert sources(Wide())[3][2] == "yield self.tau == 0"
 
@@ -118,7 +118,7 @@ def refused(equation: object) -> ModelicaLikeError:
 
 
 def test_a_number_on_the_left_stays_an_equation_or_is_refused():
-    """`0 == x` is turned round by Python, so it works; it types as bool, which is why the language asks for a symbol on the left."""
+    """Python turns `0 == x` round, so it works; it types as bool, so the language asks for a symbol on the left."""
 
     class Turned(Compliant):
         def equations(self) -> Equations:
@@ -213,7 +213,7 @@ def test_a_forgotten_yield_is_told():
 
         def equations(self) -> Equations:
             yield self.x == 1
-            self.y == 2  # noqa: B015
+            self.y == 2
 
     with pytest.raises(ComponentUnbalanced) as caught:
         flatten(Forgotten())

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from components import (
+    BearingFriction,
+    Brake,
     Clutch,
     ConstantForce,
     ConstantTorque,
@@ -15,14 +17,17 @@ from components import (
     Freewheel,
     HeatSource,
     Inertia,
+    LossyGear,
     MassWithStopAndFriction,
     OneWayClutch,
     Sine,
+    Speed,
     Step,
     ThermalConductor,
     ThermalMass,
     Torque,
     TorqueLimiter,
+    TorqueStep,
 )
 from modelica_like import Assembly, Component, Solution, simulate
 
@@ -70,6 +75,21 @@ def test_freewheel_releases_and_catches_when_the_closed_form_says() -> None:
     # From 0.5 s on the engine has der(w) = 16·sin(2·pi·t): it is as fast again at 1 s, never faster before.
     assert run.at(0.9)["engine.w"] == pytest.approx(top - 16 / (2 * pi) * (1 + np.cos(2 * pi * 0.9)), rel=1e-6)
     assert run.at(1.1)["engine.w"] == pytest.approx(run.at(1.1)["load.w"], abs=1e-9) or sin(2 * pi * 1.1) > 0
+    assert run.energy().closure <= 1e-8
+
+
+def test_two_freewheels_in_series() -> None:
+    parts: dict[str, Component] = {
+        "signal": Sine(amplitude="10 N.m", f=1.0), "torque": Torque(), "a": Inertia(J=0.5, phi=0.0, w=0.0),
+        "first": Freewheel(), "b": Inertia(J=1.0, w=0.0), "second": Freewheel(), "c": Inertia(J=1.0, w=0.0),
+        "oil": Damper(d=0.5), "wall": Fixed(),
+    }  # fmt: skip
+    chain = ["torque", "a", "first", "b", "second", "c", "oil", "wall"]
+    drive = Assembly("drive", parts=parts, series={"shaft": chain}, connect={"drive": ["signal.y", "torque.tau"]})
+    run = simulate(drive, "4 s")
+    for wheel in ("first", "second"):
+        assert np.min(run[f"{wheel}.w_rel"]) >= -1e-9
+        assert np.max(run[f"{wheel}.tau"]) <= 1e-6
     assert run.energy().closure <= 1e-8
 
 
@@ -123,6 +143,46 @@ def test_freewheel_stop_and_clutch_in_one_instant() -> None:
     # After the lock-up all three turn together: momentum -1 at 1 s, then -2 N.m on 3 kg.m2.
     assert run.final["third.w"] == pytest.approx((2.0 - 1.0 - 2.0 * 3.0) / 3.0, rel=1e-6)
     assert run.energy().closure <= 1e-8
+
+
+# -- where sticking alone leaves the torque open -----------------------------------------------------------------------
+
+CREEPING: dict[str, Component] = {
+    "bearing": BearingFriction(tau_pos=((0.0, 2.0),), creep=1e-9), "brake": Brake(capacity=2.0, creep=1e-9),
+    "gear": LossyGear(ratio=1.0, loss_table=((0.0, 1.0, 1.0, 2.0, 2.0),), creep=1e-9),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", CREEPING)
+def test_prescribed_motion_passes_through_zero(name: str) -> None:
+    parts: dict[str, Component] = {
+        "signal": Sine(amplitude="10 rad/s", f=1.0, phase=0.3), "motor": Speed(), "friction": CREEPING[name],
+        "mass": Inertia(J=0.1),
+    }  # fmt: skip
+    wires = {"s": ["signal.y", "motor.w_ref"]}
+    drive = Assembly("drive", parts=parts, series={"shaft": ["motor", "friction", "mass"]}, connect=wires)
+    run = simulate(drive, "2 s", rtol=1e-8)
+    torque = run["friction.flange_a.tau"] + run["friction.flange_b.tau"]
+    moving = np.abs(run["mass.w"]) > 1e-3
+    np.testing.assert_allclose(torque[moving], 2.0 * np.sign(run["mass.w"][moving]), atol=1e-9)
+    assert run.energy()["friction"].lost == pytest.approx(2.0 * 10.0 * 4 / pi, rel=1e-5)
+    assert run.energy().closure <= 1e-8
+
+
+def test_two_brakes_on_one_shaft() -> None:
+    """Together they hold 5 N.m; the one that creeps takes what the other cannot."""
+    parts: dict[str, Component] = {
+        "motor": TorqueStep(offset_torque=4.5, step_torque=1.5, start_time=1.0),
+        "shaft": Inertia(J=0.5, phi=0.0, w=3.0),
+        "one": Brake(capacity=2.0), "two": Brake(capacity=3.0, creep=1e-9),
+    }  # fmt: skip
+    run = simulate(Assembly("drive", parts=parts, series={"shaft": list(parts)}), "8 s", rtol=1e-8)
+    assert run.at(0.9)["shaft.w"] == pytest.approx(3.0 - 0.9, rel=1e-6)
+    assert run.final["shaft.w"] == pytest.approx(3.0 - 1.0 + 2.0 * 7.0, rel=1e-6)
+    parts["motor"] = TorqueStep(offset_torque=4.5, step_torque=0.4, start_time=1.0)
+    held = simulate(Assembly("drive", parts=parts, series={"shaft": list(parts)}), "20 s", rtol=1e-8)
+    assert abs(held.final["shaft.w"]) < 1e-10
+    assert held.final["one.tau"] + held.final["two.tau"] == pytest.approx(4.9, rel=1e-6)
 
 
 # -- heat --------------------------------------------------------------------------------------------------------------

@@ -49,6 +49,8 @@ CASES: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
                               large_ratio=-2.24, mesh_efficiency=0.95), given(gear="4")),
     "lepelletier": (given(input_speed=104.7, input_torque=1.0, front_ratio=-1.917, small_ratio=2.74, large_ratio=-2.24,
                          mesh_efficiency=0.95), {}),
+    "measured_lines": (given(voltage=24.0, no_load_speed=496.0, speed_drop=364.0, no_load_current=1.06,
+                             current_rise=20.0), {}),
     "motor_lines": (given(motor=DcMotor(0.05, 0.8, 0.04, 1e-4), voltage=24.0), {}),
     "motor_on_lines": (given(lines=LINES, torque=0.2), {}),
     "motor_point": (given(torque=0.2, speed=418.0, voltage=24.0, current=5.2), {}),

@@ -123,6 +123,10 @@ def test_variant_of_a_simulation(drive: Path) -> None:
     assert size(drive / "shaft.toml")["shaft"].torque == pytest.approx(71.78432 / 2 + 15, rel=1e-6)
 
 
+def trapezoids(values: np.ndarray, times: np.ndarray) -> float:
+    return float(np.sum(np.diff(times) * (values[1:] + values[:-1]) / 2))
+
+
 def test_load_from_a_solution() -> None:
     """In Python: the peak torque of a run loads a shaft, the integral of its loss is the friction work."""
     solution = simulate(ROOT / "examples" / "machine_table_direct.toml")
@@ -135,7 +139,7 @@ def test_load_from_a_solution() -> None:
     assert load_of(solution, "spindle.w", "smallest") == pytest.approx(0.0, abs=1e-9)
     assert load_of(solution, "spindle.w", "largest") == pytest.approx(200 * math.pi, rel=1e-6)
     times, speeds = solution.time, solution["spindle.w"]
-    assert load_of(solution, "spindle.w", "mean") == pytest.approx(np.trapezoid(speeds, times) / 0.4)
-    assert load_of(solution, "spindle.w", "rms") == pytest.approx(math.sqrt(np.trapezoid(speeds**2, times) / 0.4))
+    assert load_of(solution, "spindle.w", "mean") == pytest.approx(trapezoids(speeds, times) / 0.4)
+    assert load_of(solution, "spindle.w", "rms") == pytest.approx(math.sqrt(trapezoids(speeds**2, times) / 0.4))
     with pytest.raises(UnknownName, match="cannot be the 'peek' of a trajectory; did you mean 'peak'"):
         load_of(solution, "clutch.tau", "peek")

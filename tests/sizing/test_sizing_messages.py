@@ -61,6 +61,9 @@ BAD = {
     "no list": (changed('["0 mm", "100 mm"]', '"0 mm"', SHAFT), 3, "checks.shaft.bearings must be a list."),
     "no table": (changed('[{ at = "50 mm", y = "100 N" }]', '["50 mm"]', SHAFT), 4,
                  "checks.shaft.loads[0] must be a table: { at = … }."),
+    "check of another kind": (
+        GOOD + '[checks.fit]\nis = "fit_speed_line"\nlargest_torque = "1 N.m"\nlines = "bearing"\n', 13,
+        "checks.fit.lines must be a table: { voltage = …, no_load_speed = …,"),
     "wrong unit inside": (changed("100 N", "100 mm", SHAFT), 4, "checks.shaft.loads[0].y expects N; '100 mm' is m."),
     "no netlist": (changed('"force"', '{ from = "none.toml", peak = "x.tau" }'), 5, "The netlist"),
     "no variable asked": (changed('"force"', '{ from = "none.toml" }'), 5,

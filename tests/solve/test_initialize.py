@@ -131,7 +131,9 @@ def test_two_start_values_of_one_motion_that_contradict():
         def equations(self) -> Equations:
             yield from series(self.one, self.two)
 
-    with pytest.raises(ContradictingStart, match=r"one\.w = 1 and two\.w = 2 contradict each other: they are the same motion\."):
+    with pytest.raises(
+        ContradictingStart, match=r"one\.w = 1 and two\.w = 2 contradict each other: they are the same motion\."
+    ):
         start(Rigid())
     assert start(Rigid(), two__w=1.0)["two.w"] == 1.0
 
@@ -154,7 +156,10 @@ def test_a_start_value_against_a_constant():
         ({}, "Initialisation (not the model) lacks 2 equations: give a.phi, a.w start values."),
         ({"a__w": 1.0}, "Initialisation (not the model) lacks one equation: give a.phi a start value."),
         ({"b__phi": 1.0}, "Initialisation (not the model) lacks one equation: give a.w a start value."),
-        ({"a__phi": 1.0, "a__w": guess(1.0)}, "Initialisation (not the model) lacks one equation: give a.w a start value."),
+        (
+            {"a__phi": 1.0, "a__w": guess(1.0)},
+            "Initialisation (not the model) lacks one equation: give a.w a start value.",
+        ),
     ],
 )
 def test_missing_start_values(values, message):
@@ -235,7 +240,11 @@ def test_the_steady_state_depends_on_the_mode_the_guess_chooses():
     """Friction 1 N.m + 1 N.m s/rad w against 5 N.m: steady at 4 rad/s when it slides, none when it sticks."""
 
     class Rubbing(Component):
-        push, rotor, bearing = ConstantTorque(tau_constant=5.0), Inertia(J=1.0), BearingFriction(tau_pos=((0, 1), (1, 2)))
+        push, rotor, bearing = (
+            ConstantTorque(tau_constant=5.0),
+            Inertia(J=1.0),
+            BearingFriction(tau_pos=((0, 1), (1, 2))),
+        )
 
         def equations(self) -> Equations:
             yield from series(self.push, self.rotor, self.bearing)
@@ -345,7 +354,7 @@ def test_the_first_condition_that_holds_wins_and_start_is_the_last_resort():
 
 
 def test_modes_and_start_values_that_chase_each_other_are_told():
-    """x follows from y by the mode, and the mode from x: y = 1 gives x = 2 in `a`, which asks for `b`, which gives x = -2."""
+    """x follows from y by the mode, and the mode from x: y = 1 gives x = 2 in `a`, which asks for `b`, where x = -2."""
 
     class Chasing(Component):
         x: Variable = var("1", "state")

@@ -1,10 +1,20 @@
-"""Hybrid drives against independent solvers: SUNDIALS through scikit-sundae, and SciPy's DOP853, each with its own root finding."""
+"""Hybrid drives against independent solvers with root finding of their own: scikit-sundae's IDA, SciPy's DOP853."""
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from components import BearingFriction, Clutch, ConstantSpeed, ElastoBacklash, Fixed, Inertia, Sine, SpringDamper, Torque
+from components import (
+    BearingFriction,
+    Clutch,
+    ConstantSpeed,
+    ElastoBacklash,
+    Fixed,
+    Inertia,
+    Sine,
+    SpringDamper,
+    Torque,
+)
 from modelica_like import simulate
 from modelica_like.language import Component, Equations, connect, series
 
@@ -35,7 +45,15 @@ def stick_slip_by_hand(end: float) -> tuple[np.ndarray, np.ndarray, float]:
             return y[1]
 
         stops.terminal, stops.direction = True, -1  # type: ignore[attr-defined]
-        slide = solve_ivp(lambda s, y: [y[1], 5.0 * (0.5 * s - y[0]) - 1.0], (t, end), [phi, 0.0], "DOP853", events=stops, rtol=1e-13, atol=1e-15)
+        slide = solve_ivp(
+            lambda s, y: [y[1], 5.0 * (0.5 * s - y[0]) - 1.0],
+            (t, end),
+            [phi, 0.0],
+            "DOP853",
+            events=stops,
+            rtol=1e-13,
+            atol=1e-15,
+        )
         phi = slide.y[0, -1]
         if not slide.t_events[0].size:
             return np.array(away), np.array(stick), phi
@@ -47,7 +65,10 @@ def test_stick_slip_against_dop853():
     run = simulate(StickSlip(), 20.0, points=50, **TIGHT)
     away, stick, angle = stick_slip_by_hand(20.0)
     assert len(away) >= 5
-    found = {name: np.array([e.time for e in run.events if e.after == name]) for name in ("start_forward", "forward", "stuck")}
+    found = {
+        name: np.array([e.time for e in run.events if e.after == name])
+        for name in ("start_forward", "forward", "stuck")
+    }
     np.testing.assert_allclose(found["start_forward"], away, rtol=0, atol=1e-8)
     np.testing.assert_allclose(found["stuck"], stick, rtol=0, atol=1e-8)
     np.testing.assert_allclose(found["forward"], away, rtol=0, atol=1e-8)
@@ -83,7 +104,15 @@ def test_backlash_against_dop853():
         return y[0] + 0.05
 
     reference = solve_ivp(
-        rhs, (0.0, 5.0), [0.0, 0.0], "DOP853", events=[upper, lower], rtol=1e-12, atol=1e-14, max_step=5e-3, dense_output=True
+        rhs,
+        (0.0, 5.0),
+        [0.0, 0.0],
+        "DOP853",
+        events=[upper, lower],
+        rtol=1e-12,
+        atol=1e-14,
+        max_step=5e-3,
+        dense_output=True,
     )
     run = simulate(Rattle(), 5.0, points=10, **TIGHT)
     found = np.array([e.time for e in run.events if e.mode == "play.contact"])
@@ -119,7 +148,9 @@ def test_a_lock_up_with_an_elastic_shaft_against_ida():
 
     slip.terminal, slip.direction = [True], [0]  # type: ignore[attr-defined]
     solver = sundae.ida.IDA(residual, rtol=1e-11, atol=1e-13, algebraic_idx=[4], eventsfn=slip, num_events=1)
-    first = solver.solve(np.array([0.0, 3.0]), np.array([40.0, 0.0, 0.0, 0.0, 0.0]), np.array([-20.0, 6.0 / 0.7, 0.0, 0.0, 0.0]))
+    first = solver.solve(
+        np.array([0.0, 3.0]), np.array([40.0, 0.0, 0.0, 0.0, 0.0]), np.array([-20.0, 6.0 / 0.7, 0.0, 0.0, 0.0])
+    )
     moment, (w1, w2, w3, twist, _) = first.t_events[0], first.y_events[0]
     assert w1 == pytest.approx(w2, abs=1e-9)
 

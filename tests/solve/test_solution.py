@@ -1,6 +1,7 @@
 """The result: trajectories by name, grid, instants, tables, pickles; and compile once, run often."""
 
 import pickle
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -8,7 +9,19 @@ import pytest
 from components import Clutch, ConstantTorque, Fixed, IdealGear, Inertia, SpringDamper, TorqueStep
 from modelica_like import Options, Solution, build, simulate
 from modelica_like.errors import LanguageError, UnitError, UnknownName, ValueOutOfRange
-from modelica_like.language import Component, Equations, Input, Parameter, Variable, connect, der, param, series, signal_in, var
+from modelica_like.language import (
+    Component,
+    Equations,
+    Input,
+    Parameter,
+    Variable,
+    connect,
+    der,
+    param,
+    series,
+    signal_in,
+    var,
+)
 
 
 class Drive(Component):
@@ -55,8 +68,19 @@ def test_the_values_are_right(run):
 
 
 def test_every_variable_of_the_unreduced_model_is_there(run):
-    flanges = [f"{part}.flange_{end}.{name}" for part in ("left", "clutch", "right") for end in "ab" for name in ("phi", "tau")]
-    own = ["left.phi", "left.w", "right.phi", "right.w", "clutch.phi_rel", "clutch.tau", "clutch.w_rel", "clutch.f_normalized"]
+    flanges = [
+        f"{part}.flange_{end}.{name}" for part in ("left", "clutch", "right") for end in "ab" for name in ("phi", "tau")
+    ]
+    own = [
+        "left.phi",
+        "left.w",
+        "right.phi",
+        "right.w",
+        "clutch.phi_rel",
+        "clutch.tau",
+        "clutch.w_rel",
+        "clutch.f_normalized",
+    ]
     assert set(run.names) == {*flanges, *own, "clutch.mode"}
     for name in run.names:
         assert run[name].shape == run.time.shape
@@ -99,7 +123,9 @@ def test_events_say_when_what_and_where(run):
 
 def grid(run: Solution) -> list[float]:
     """Expected times: equal intervals, and both sides of every event."""
-    regular = [run.time[0] + (run.time[-1] - run.time[0]) * k / run.options.points for k in range(run.options.points + 1)]
+    regular = [
+        run.time[0] + (run.time[-1] - run.time[0]) * k / run.options.points for k in range(run.options.points + 1)
+    ]
     moments = sorted({event.time for event in run.events})
     on_grid = [t for t in regular if not any(abs(t - m) < 1e-9 for m in moments)]
     return sorted([*on_grid, *moments, *moments])
@@ -218,7 +244,9 @@ def test_statistics_and_representation(run):
     assert counts.steps > 0
     assert counts.evaluations >= counts.steps
     assert counts.seconds > 0
-    assert repr(run).startswith("<Solution of Drive: 21 variables") or "variables, t = 0 … 2 s, 1 mode changes" in repr(run)
+    assert repr(run).startswith("<Solution of Drive: 21 variables") or "variables, t = 0 … 2 s, 1 mode changes" in repr(
+        run
+    )
     assert "CompiledDae Drive: 4 states" in repr(run.model)
 
 
@@ -231,7 +259,11 @@ def test_a_second_run_with_other_values_builds_nothing(monkeypatch):
     first = simulate(model, 2.0, points=8)
     simulate(model, 2.0, points=8, parameters={"grip": 9.0})
     built = len(model._cache)
-    for module in ("modelica_like.simulation.flatten", "modelica_like.simulation.reduce", "modelica_like.simulation.compile"):
+    for module in (
+        "modelica_like.simulation.flatten",
+        "modelica_like.simulation.reduce",
+        "modelica_like.simulation.compile",
+    ):
         monkeypatch.setattr(module, lambda *_: pytest.fail("a stage ran again"))
     import casadi
 
@@ -271,7 +303,7 @@ def test_wrong_parameter_values(values, kind, message):
 
 
 def test_a_parameter_that_is_not_tunable():
-    class Fixed_(Component):
+    class Frozen(Component):
         n: Parameter = param("1", "number", default=2.0, tunable=False)
         x: Variable = var("1", "x")
 
@@ -279,7 +311,7 @@ def test_a_parameter_that_is_not_tunable():
             yield self.x == self.n
 
     with pytest.raises(LanguageError, match=r"^n cannot change after compilation\."):
-        build(Fixed_()).with_parameters({"n": 3.0})
+        build(Frozen()).with_parameters({"n": 3.0})
 
 
 def test_inputs_are_values_of_a_run():
@@ -348,7 +380,7 @@ def test_tighter_tolerances_come_nearer():
         exact = 0.1 * np.exp(-damping * t) * (np.cos(frequency * t) + damping / frequency * np.sin(frequency * t))
         errors.append(np.max(np.abs(found["rotor.phi"] - exact)))
     assert errors[-1] < 1e-8
-    assert all(later < 0.3 * earlier for earlier, later in zip(errors, errors[1:], strict=False))
+    assert all(later < 0.3 * earlier for earlier, later in pairwise(errors))
 
 
 def test_progress_is_told():

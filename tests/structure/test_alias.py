@@ -43,7 +43,9 @@ def systems(draw: st.DrawFn) -> tuple[int, list[dict[int, float]]]:
     size = draw(st.integers(2, 8))
     rows: list[dict[int, float]] = []
     for _ in range(draw(st.integers(1, 10))):
-        chosen = draw(st.lists(st.integers(0, size - 1), min_size=1, max_size=draw(st.sampled_from([1, 2, 2, 2, 3])), unique=True))
+        chosen = draw(
+            st.lists(st.integers(0, size - 1), min_size=1, max_size=draw(st.sampled_from([1, 2, 2, 2, 3])), unique=True)
+        )
         rows.append({k: draw(coefficients) for k in chosen})
     if len(rows) > 1 and draw(st.booleans()):
         first, second = rows[0], rows[1]

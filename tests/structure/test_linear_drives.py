@@ -36,15 +36,13 @@ def poles(reduced: ReducedDae) -> np.ndarray:
     flat = reduced.flat
     a = [ca.jacobian(f, v) for f in (reduced.ode, reduced.alg) for v in (reduced.x, reduced.z)]
     parts = ca.Function("a", [flat.p, reduced.x, reduced.z, flat.time, flat.d], a)
-    fx, fz, gx, gz = (
-        np.array(part.full()) for part in parts([one.value for one in flat.parameters], 0, 0, 0, 0)
-    )
+    fx, fz, gx, gz = (np.array(part.full()) for part in parts([one.value for one in flat.parameters], 0, 0, 0, 0))
     matrix = fx - fz @ np.linalg.solve(gz, gx) if gz.size else fx
     return np.linalg.eigvals(matrix)
 
 
 def assert_same_poles(flat: FlatModel, reduced: ReducedDae) -> None:
-    """det of the flat equations over the product of (s - pole) is one constant: neither a pole nor a state is missing."""
+    """The determinant of the flat equations over the product of (s - pole) is one constant: no pole is missing."""
     found = poles(reduced)
     logs = []
     for s in POINTS:
@@ -137,32 +135,42 @@ def test_geared_inertias_move_as_one():
     drive = joined(
         {"push": ConstantTorque(tau_constant=10.0), "a": Inertia(J=1.0), "b": Inertia(J=2.0), "c": Inertia(J=3.0),
          "g": IdealGear(ratio=2.0), "h": IdealGear(ratio=-0.5)},
-        ("push.flange", "a.flange_a"), ("a.flange_b", "g.flange_a"), ("g.flange_b", "b.flange_a"), ("b.flange_b", "h.flange_a"),
-        ("h.flange_b", "c.flange_a"),
+        ("push.flange", "a.flange_a"), ("a.flange_b", "g.flange_a"), ("g.flange_b", "b.flange_a"),
+        ("b.flange_b", "h.flange_a"), ("h.flange_b", "c.flange_a"),
     )  # fmt: skip
     flat = flatten(drive)
     reduced = reduce(flat)
     assert reduced.states == ("push.phi", "a.w")
     assert reduced.index == 3
-    rates = ca.Function("f", [flat.p, reduced.x, flat.time, flat.d], [reduced.ode])([p.value for p in flat.parameters], [0.3, 5.0], 0, 0)
+    rates = ca.Function("f", [flat.p, reduced.x, flat.time, flat.d], [reduced.ode])(
+        [p.value for p in flat.parameters], [0.3, 5.0], 0, 0
+    )
     assert np.array(rates).ravel() == pytest.approx([5.0, 10.0 / (1.0 + 2.0 / 4.0 + 3.0 / 1.0)], rel=1e-14)
     assert_equations_hold(flat, reduced, 1)
 
 
 def test_a_planetary_set_has_two_degrees_of_freedom():
     drive = joined(
-        {"s": Inertia(J=1.0), "r": Inertia(J=2.0), "c": Inertia(J=3.0), "p": IdealPlanetary(ratio=2.0), "push": ConstantTorque(tau_constant=7.0)},
+        {"s": Inertia(J=1.0), "r": Inertia(J=2.0), "c": Inertia(J=3.0), "p": IdealPlanetary(ratio=2.0),
+         "push": ConstantTorque(tau_constant=7.0)},
         ("s.flange_b", "p.sun"), ("r.flange_b", "p.ring"), ("c.flange_b", "p.carrier"), ("push.flange", "s.flange_a"),
     )  # fmt: skip
     flat = flatten(drive)
     reduced = reduce(flat)
     assert len(reduced.states) == 4
     assert_equations_hold(flat, reduced, 2)
-    # (1 + i) wc = ws + i wr; Lagrange with ws, wr free: M [as, ar] = [tau, 0], M = diag(Js, Jr) + Jc g gᵀ, g = [1, i] / (1 + i).
+    # (1 + i) wc = ws + i wr. Lagrange with ws and wr free: M [as, ar] = [tau, 0] with
+    # M = diag(Js, Jr) + Jc g gᵀ, g = [1, i] / (1 + i).
     g = np.array([1.0, 2.0]) / 3.0
     expected = np.linalg.solve(np.diag([1.0, 2.0]) + 3.0 * np.outer(g, g), [7.0, 0.0])
     names = [flat.node_name(k) for k in range(len(flat.nodes))]
-    values = ca.Function("v", [flat.p, reduced.x, flat.time, flat.d], [reduced.values])([p.value for p in flat.parameters], 0, 0, 0).full().ravel()
+    values = (
+        ca.Function("v", [flat.p, reduced.x, flat.time, flat.d], [reduced.values])(
+            [p.value for p in flat.parameters], 0, 0, 0
+        )
+        .full()
+        .ravel()
+    )
     found = [values[names.index(f"der({n}.w)")] for n in "sr"]
     assert found == pytest.approx(expected, rel=1e-13)
 
