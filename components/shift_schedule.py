@@ -26,6 +26,7 @@ _GEARS = (
     ("N", "d"), ("1", "ad"), ("2", "ac"), ("3", "ab"), ("4", "ae"), ("5", "be"), ("6", "ce"), ("R", "bd"),
 )  # fmt: skip
 _NUMBERS = {"N": 0.0, "R": -1.0}
+_DIGITS = "0123456789"
 
 
 class ShiftSchedule(Component):
@@ -57,6 +58,12 @@ class ShiftSchedule(Component):
                 raise LanguageError(
                     f"The shift schedule asks for the gear '{gear}'; its pattern has {', '.join(known)}.",
                     advice="Name one of these, or give the pattern another row.",
+                )
+        for gear in known:
+            if gear not in _NUMBERS and not (gear and set(gear) <= set(_DIGITS)):
+                raise LanguageError(
+                    f"The pattern of a shift schedule has a gear '{gear}'.",
+                    advice="Call gears by their number, neutral N, reverse R.",
                 )
         for (first, gear, duration), (second, following, _) in pairwise(self.shifts[1:]):
             if first + duration > second:

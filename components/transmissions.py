@@ -7,7 +7,7 @@ from components.friction import Brake, Clutch
 from components.inertias import Inertia
 from components.interfaces import Flange
 from components.planetary import LossyPlanetarySet, PlanetarySet
-from modelica_like.language import Component, Equations, Input, Parameter, connect, param, signal_in
+from modelica_like.language import Component, Equations, Input, LanguageError, Parameter, connect, param, signal_in
 
 
 class WithPlanetarySets(Component, partial=True):
@@ -15,13 +15,21 @@ class WithPlanetarySets(Component, partial=True):
 
     losses: bool = False
     """The meshes lose power."""
-    mesh_efficiency: Parameter = param("1", "efficiency of one mesh; counts with `losses` only", default=1.0, min=1e-3)
+    mesh_efficiency: Parameter = param("1", "efficiency of one mesh, with `losses`", min=1e-3, max=1)
 
     def planetary_set(self, i0: str, meshes: int) -> PlanetarySet:
         """Return a set in which rolling power passes some meshes, one after the other."""
         if self.losses:
             return LossyPlanetarySet(i0=i0, efficiency=f"mesh_efficiency ** {meshes}")
         return PlanetarySet(i0=i0)
+
+    def equations(self) -> Equations:
+        yield from super().equations()
+        if self.given("mesh_efficiency") and not self.losses:
+            raise LanguageError(
+                f"{self.label} has a mesh_efficiency, but no losses.",
+                advice="Say `losses = true`, or take the efficiency out.",
+            )
 
 
 class Ravigneaux(WithPlanetarySets):
@@ -47,6 +55,7 @@ class Ravigneaux(WithPlanetarySets):
         self.long_planet = self.planetary_set("1", meshes=1)
 
     def equations(self) -> Equations:
+        yield from super().equations()
         small, large, planet = self.small, self.large, self.long_planet
         yield connect(self.small_sun, small.sun)
         yield connect(self.large_sun, large.sun)
@@ -90,10 +99,13 @@ class Lepelletier(WithPlanetarySets):
     def build(self) -> None:
         self.front = self.planetary_set("front_ratio", meshes=2)
         self.housing = Fixed()
-        inherited = {name: name for name in ("small_ratio", "large_ratio", "mesh_efficiency")}
-        self.ravigneaux = Ravigneaux(losses=self.losses, **inherited)
+        inherited = {"mesh_efficiency": "mesh_efficiency"} if self.losses else {}
+        self.ravigneaux = Ravigneaux(
+            losses=self.losses, small_ratio="small_ratio", large_ratio="large_ratio", **inherited
+        )
 
     def equations(self) -> Equations:
+        yield from super().equations()
         front, set_ = self.front, self.ravigneaux
         yield connect(self.flange_a, front.ring, self.clutch_e.flange_a)
         yield connect(front.sun, self.housing.flange)

@@ -18,6 +18,9 @@ from modelica_like.errors import InitializationError, ModelicaLikeError, SolveEr
 BAD_INPUT = 2
 SOLVE_FAILED = 1
 
+# What only a defect of this package raises; everything foreseen is a ModelicaLikeError.
+_DEFECTS = (ArithmeticError, AssertionError, AttributeError, LookupError, RuntimeError, TypeError, ValueError)
+
 app = typer.Typer(
     help="Drive-trains written once, acausally: check, simulate and describe netlists.",
     no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False,
@@ -51,13 +54,6 @@ def told(debug: bool) -> Iterator[None]:
         if debug:
             raise
         _fail(f"{error.filename or 'A file'}: {error.strerror or error}.", BAD_INPUT)
-    except (typer.Exit, typer.Abort, typer.BadParameter):
-        raise
-    except Exception as error:
-        if debug:
-            raise
-        what = f"{type(error).__name__}: {error}"
-        _fail(f"This should not happen: {what}\nRun again with --debug, and report what it shows.", SOLVE_FAILED)
 
 
 def exit_code(error: ModelicaLikeError) -> int:
@@ -223,4 +219,12 @@ def _value(text: str) -> Any:
 def main() -> None:
     """Run the command line; classes of modules in the working directory can be used in netlists."""
     sys.path.insert(0, "")
-    app()
+    try:
+        app()
+    except _DEFECTS as error:
+        if "--debug" in sys.argv:
+            raise
+        _fail(
+            f"This should not happen: {type(error).__name__}: {error}\nRun again with --debug, and report what it shows.",
+            SOLVE_FAILED,
+        )

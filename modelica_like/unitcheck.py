@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from fractions import Fraction
 from typing import Any, cast
 
 import casadi as ca
 
-from modelica_like.errors import Source, UnitMismatch
+from modelica_like.errors import LanguageError, Source, UnitMismatch
 from modelica_like.language.expr import Expr
 from modelica_like.units import ANY, ONE, Unit, same_dimension
 
@@ -32,6 +33,17 @@ class _Clash(Exception):
     def __init__(self, left: Unit, right: Unit, what: str) -> None:
         super().__init__(what)
         self.left, self.right, self.what = left, right, what
+
+
+class _NotANumber(Exception):
+    """A number in an expression is nan: nothing can follow from it."""
+
+    def tell(self, label: str, source: Source | None) -> LanguageError:
+        return LanguageError(
+            f"{label}: a number in it is nan.",
+            where=source or (),
+            advice="Functions of `math` do not understand symbols: take sqrt, sin and so on from the language.",
+        )
 
 
 class Dimensions:
@@ -70,13 +82,15 @@ class Dimensions:
         """Return the unit of an expression, or `ANY` if its terms clash (the equation's own check tells that)."""
         try:
             return self.unit(expression)
-        except _Clash:
+        except (_Clash, _NotANumber):
             return ANY
 
     def _of_node(self, node: Any, operands: list[Any], units: list[Unit]) -> Unit:
         if node.is_symbolic():
             return self._unit_of(node)
         if not operands:
+            if math.isnan(float(node)):
+                raise _NotANumber
             return ANY if float(node) == 0.0 else ONE
         operation = node.op()
         if operation == ca.OP_ADD and all(map(_is_choice, operands)):
@@ -139,12 +153,15 @@ def check_equation(left: Expr, right: Expr, dimensions: Dimensions, component: s
 
     Raises:
         UnitMismatch: they differ, or a side is a sum of different things.
+        LanguageError: a number is nan.
     """
     place = f"{component}, {source}" if source.file else component
     try:
         units = dimensions.unit(left), dimensions.unit(right)
     except _Clash as clash:
         raise UnitMismatch(f"{place}: {clash.what} differ: {clash.left} and {clash.right}.") from None
+    except _NotANumber as found:
+        raise found.tell(component, source) from None
     if _MIXED in units and ANY not in units:
         raise UnitMismatch(
             f"{place}: the branches of choose(…) or where(…) differ in unit; they only stand in `… == 0`."
@@ -160,11 +177,14 @@ def check_expression(
 
     Raises:
         UnitMismatch: it has another one.
+        LanguageError: a number is nan.
     """
     where = source or ()
     try:
         unit = dimensions.unit(expression)
     except _Clash as clash:
         raise UnitMismatch(f"{label}: {clash.what} differ: {clash.left} and {clash.right}.", where=where) from None
+    except _NotANumber as found:
+        raise found.tell(label, source) from None
     if not same_dimension(unit, expected):
         raise UnitMismatch(f"{label} expects {expected}; the expression is {unit}.", where=where)

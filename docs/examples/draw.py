@@ -12,6 +12,16 @@ PICTURES: dict[str, tuple[str, ...]] = {
     "machine_table_direct": ("motor.w", "spindle.w", "clutch.tau", "table.v", "table.s"),
     "machine_table_geared": ("motor.w", "spindle.w", "clutch.tau", "table.v", "table.s"),
     "machine_tool_startup": ("J1.w", "J2.w", "J3.w", "J4.w", "shaft1.tau", "shaft2.tau", "clutch.tau"),
+    "ravigneaux": ("small_sun.w", "carrier.w", "machine.w", "clutch_small.tau", "brake_large.tau"),
+    "lepelletier": (
+        "crankshaft.w",
+        "car.w",
+        "box.clutch_a.tau",
+        "box.clutch_b.tau",
+        "box.brake_c.tau",
+        "box.clutch_e.tau",
+        "selector.gear",
+    ),
     "msl/rotational/First": ("inertia1.w", "inertia2.w", "inertia3.w", "torque.tau", "spring.tau"),
     "msl/rotational/Friction": ("inertia3.w", "inertia2.w", "inertia1.w", "clutch.tau", "brake.tau"),
     "msl/rotational/CoupledClutches": ("J1.w", "J2.w", "J3.w", "J4.w", "clutch1.tau", "clutch2.tau", "clutch3.tau"),
@@ -25,7 +35,7 @@ PICTURES: dict[str, tuple[str, ...]] = {
     ),
 }
 
-END = {"fan": "4 s"}
+END = {"fan": "4 s", "ravigneaux": "20 ms"}
 
 
 def main() -> None:

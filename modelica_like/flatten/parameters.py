@@ -8,7 +8,7 @@ from typing import Any
 
 import casadi as ca
 
-from modelica_like.errors import CyclicAssembly, MissingValue
+from modelica_like.errors import CyclicAssembly, MissingValue, ValueOutOfRange
 from modelica_like.flatten.checks import unit_of_field
 from modelica_like.flatten.model import FlatParameter
 from modelica_like.language.component import Component
@@ -84,10 +84,13 @@ class Parameters:
             UnknownName: the formula uses a parameter that does not exist.
             UnitMismatch: the formula has another dimension than it should.
             CyclicAssembly: the formula needs itself.
+            ValueOutOfRange: its numbers give no finite one.
         """
         if value.formula is None:
             return value.number
         expression = ca.SX(value.formula.evaluate(lambda path: self._look_up(scope, path, label)))
+        if expression.is_constant() and not math.isfinite(float(expression)):
+            raise ValueOutOfRange(f"{label} must be a finite number, not {float(expression):g}.")
         check_expression(expression, value.unit, self._dimensions, f"{label} = {value.formula}")
         return expression
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, Vector
-from modelica_like.errors import InitializationError
+from modelica_like.errors import InitializationError, UnknownName, did_you_mean
 from modelica_like.initialize.point import Point as Point
 from modelica_like.initialize.point import call as call
 from modelica_like.initialize.point import check_singular as check_singular
@@ -38,8 +38,14 @@ def initialize(model: CompiledDae, t0: float = 0.0, start: StartKind = "given") 
         MissingStart: start values are missing.
         ContradictingStart: start values contradict each other.
         InitializationError: the solver did not find a solution.
+        UnknownName: there is no such kind of start.
         SingularAtStart: the equations have no unique solution.
     """
+    if start not in get_args(StartKind):
+        raise UnknownName(
+            f"There is no start '{start}'{did_you_mean(start, get_args(StartKind)) or '.'}",
+            advice="A run can start as given, at rest or in the steady state: given, rest, steady.",
+        )
     point = Point(t0, model.guesses.copy(), model.z_guesses.copy(), np.zeros(len(model.flat_discretes)))
     point.d = call(model, model.discrete_starts, point)
     problem = StartProblem(model, point)

@@ -227,6 +227,7 @@ class _StartSystem:
             if step.size == 0 or np.max(np.abs(step) / (1.0 + np.abs(state[columns]))) < 1e-13:
                 break
         if not np.all(np.isfinite(state)) or np.max(np.abs(error) / (1.0 + np.abs(target)), initial=0.0) > _CONSISTENT:
+            solve_implicit(model, point)  # where the implicit equations are singular, that is the reason
             names = ", ".join(model.flat_variables[node].path for node, _ in given[:6])
             raise InitializationError(
                 f"No start was found at which {names} {'have' if len(given) > 1 else 'has'} the value asked for.",

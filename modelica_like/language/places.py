@@ -18,6 +18,9 @@ from modelica_like.errors import LanguageError, Source
 _LANGUAGE = str(Path(__file__).parent)
 _PACKAGE = str(Path(__file__).parent.parent)
 
+_CASADI = str(Path(ca.__file__).parent)
+_END = object()
+
 NOWHERE = Source("")
 """No place in a file."""
 
@@ -47,8 +50,30 @@ def located(generator: Any, label: str = "equations()") -> Iterator[tuple[Any, S
             advice="Is a `yield` missing?",
         )
     items: Iterator[Any] = iter(cast("Iterable[Any]", generator))
-    for item in items:
+    while True:
+        try:
+            item = next(items, _END)
+        except RuntimeError as error:
+            raise _undecided(error, label) or error from None
+        if item is _END:
+            return
         yield item, _place(items)
+
+
+def _undecided(error: RuntimeError, label: str) -> LanguageError | None:
+    """Tell what CasADi says when Python asks a symbolic relation whether it is true."""
+    if "truth value" not in str(error):
+        return None
+    place, frame = NOWHERE, error.__traceback__
+    while frame is not None:
+        if not frame.tb_frame.f_code.co_filename.startswith((_PACKAGE, _CASADI)):
+            place = source_of(frame.tb_frame.f_code, frame.tb_lasti)
+        frame = frame.tb_next
+    return LanguageError(
+        f"{label} asks Python whether a relation of symbols is true; that is known only during a run.",
+        where=place,
+        advice="Write where(condition, a, b), all_of(…), any_of(…); only structural fields decide an `if`.",
+    )
 
 
 def _place(items: object) -> Source:

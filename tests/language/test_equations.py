@@ -1,7 +1,9 @@
 """What `equations()` yields: places in the source, refused statements, the balance of a component."""
 
 import inspect
+import math
 
+import numpy as np
 import pytest
 
 from modelica_like.errors import ComponentUnbalanced, LanguageError, ModelicaLikeError, WiringErrors
@@ -148,6 +150,53 @@ def test_what_is_no_equation_is_refused_with_its_line(equation, message):
     error = refused(equation)
     assert error.what == message
     assert error.advice
+
+
+@pytest.mark.parametrize(
+    "condition",
+    [
+        lambda c: c.tau == (2 if c.tau > 1 else 3),
+        lambda c: c.tau == 0 if c.phi_rel > 0 else c.tau == 1,
+        lambda c: c.tau == c.phi_rel == 0,
+        lambda c: c.tau > 0 and c.tau == 0,
+        lambda c: c.tau == max(c.tau, 0),
+    ],
+)
+def test_python_cannot_decide_about_symbols(condition):
+    class Deciding(Compliant):
+        def equations(self) -> Equations:
+            yield from super().equations()
+            yield condition(self)
+
+    with pytest.raises(
+        LanguageError, match=r"^Deciding\.equations\(\) asks Python whether a relation of symbols"
+    ) as caught:
+        flatten(Deciding())
+    (place,) = caught.value.where
+    assert place.file == __file__
+    assert "c.tau" in place.text or "c.phi_rel" in place.text
+    assert "where(condition, a, b)" in caught.value.advice
+
+
+def test_a_function_of_math_makes_nan_of_a_symbol():
+    class Lost(Compliant):
+        def equations(self) -> Equations:
+            yield from super().equations()
+            yield self.tau == self.tau * math.sqrt(self.phi_rel)
+
+    with pytest.raises(LanguageError, match=r"^Lost: a number in it is nan\.") as caught:
+        flatten(Lost())
+    assert "math.sqrt" in caught.value.where[0].text
+    assert "take sqrt" in caught.value.advice
+
+
+def test_numbers_of_numpy_are_numbers():
+    class Numeric(Compliant):
+        def equations(self) -> Equations:
+            yield from super().equations()
+            yield np.float64(2.0) * self.tau == np.float64(0.0) + self.tau * np.int64(3)
+
+    assert len(sources(Numeric())) == 4
 
 
 def test_connect_takes_connectors_and_signals_only():

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from components import (
+    Clutch,
     ConstantSpeed,
     ConstantTorque,
     Damper,
@@ -156,8 +157,9 @@ def test_loss_leaves_as_heat() -> None:
 def test_ravigneaux_is_two_willis_sets(losses: bool) -> None:
     """Any two speeds determine the others; the torques follow from any two torques (document 001)."""
     small, large = 2.74, -2.24
+    efficiency = {"mesh_efficiency": 1.0} if losses else {}
     parts = {
-        "gears": Ravigneaux(small_ratio=small, large_ratio=large, losses=losses, mesh_efficiency=1.0),
+        "gears": Ravigneaux(small_ratio=small, large_ratio=large, losses=losses, **efficiency),
         "one": ConstantSpeed(w_fixed=30.0), "two": ConstantSpeed(w_fixed=-12.0),
         "ring": Inertia(J=0.1), "oil": Damper(d=0.7), "wall": Fixed(),
         "carrier": Inertia(J=0.2), "grease": Damper(d=0.3), "floor": Fixed(),
@@ -175,6 +177,14 @@ def test_ravigneaux_is_two_willis_sets(losses: bool) -> None:
     assert (h, c) == pytest.approx((-0.7 * w_h, -0.3 * w_c), rel=1e-12)
     assert h == pytest.approx(-(small * si + large * se), rel=1e-12)
     assert si + se + c + h == pytest.approx(0.0, abs=1e-12 * abs(h))
+
+
+def test_efficiency_without_losses_is_refused() -> None:
+    """It would count for nothing, silently."""
+    gears = Ravigneaux(small_ratio=2.0, large_ratio=-2.0, mesh_efficiency=0.99)
+    parts = {"gears": gears, "motor": ConstantSpeed(w_fixed=30.0)}
+    with pytest.raises(LanguageError, match="has a mesh_efficiency, but no losses"):
+        simulate(Assembly("drive", parts=parts, connect={"in": ["motor.flange", "gears.small_sun"]}), "1 s")
 
 
 # -- shift schedules ---------------------------------------------------------------------------------------------------
@@ -212,6 +222,24 @@ def test_wrong_schedules() -> None:
         ShiftSchedule(shifts=((0.0, "7", 0.0),))
     with pytest.raises(LanguageError, match=r"The shift to gear 1 ends at 2\.5 s, after that to 2 has begun"):
         ShiftSchedule(shifts=((0.0, "N", 0.0), (1.0, "1", 1.5), (2.0, "2", 0.5)))
+
+    with pytest.raises(LanguageError, match="has a gear 'low'"):
+        ShiftSchedule(shifts=((0.0, "low", 0.0),), pattern=(("low", "a"),))
+
+
+def test_clutch_pressed_from_zero() -> None:
+    """It slides from the first moment of the ramp on, and does not chatter between open and pressed."""
+    parts = {
+        "one": Inertia(J=1.0, phi=0.0, w=10.0), "clutch": Clutch(capacity=8.0), "two": Inertia(J=1.0, phi=0.0, w=0.0),
+        "selector": ShiftSchedule(shifts=((0, "N", 0), (1, "1", 2))),
+    }  # fmt: skip
+    wires = {"press": ["selector.a", "clutch.f_normalized"]}
+    drive = Assembly("drive", parts=parts, series={"s": ["one", "clutch", "two"]}, connect=wires)
+    run = simulate(drive, "4 s", rtol=1e-10, atol=1e-12)
+    slides, sticks = (event for event in run.events if event.mode == "clutch.mode")
+    assert (slides.time, slides.after, sticks.after) == (1.0, "backward", "stuck")
+    # The torque 4 N.m/s·(t - 1 s) takes 2·4/2·(t - 1 s)² from the slip speed of 10 rad/s.
+    assert sticks.time == pytest.approx(1 + 2.5**0.5, rel=1e-9)
 
 
 def test_speed_unit_of_the_targets() -> None:

@@ -11,12 +11,13 @@ from modelica_like import simulate
 from modelica_like.errors import Chattering
 from modelica_like.language import Assembly, Component, Equations, Events, Mode, Parameter, Variable, der, param, var
 
-END = Fraction(4)
+END = Fraction(401, 97)
+"""No event lies there: their times are multiples of 1/48."""
 
 
 @dataclass(frozen=True)
 class Rule:
-    """In mode `source`, when x passes `level` upwards or downwards: go to `target`, and set x unless `reset` is None."""
+    """In mode `source`, when x passes `level` upwards or downwards: go to `target`, set x unless `reset` is None."""
 
     source: int
     target: int
@@ -38,7 +39,9 @@ class Automaton(Component):
     unit: Parameter = param("s", "unit", default=1.0)
 
     def equations(self) -> Equations:
-        yield der(self.x) == self.mode.choose(**{name: float(rate) for name, rate in zip("abc", self.plan[0], strict=True)})
+        yield der(self.x) == self.mode.choose(
+            **{name: float(rate) for name, rate in zip("abc", self.plan[0], strict=True)}
+        )
 
     def events(self) -> Events:
         for rule in self.plan[1]:
@@ -80,12 +83,13 @@ def by_hand(plan: Plan, x: Fraction) -> list[tuple[Fraction, str]] | None:
 eighths = st.integers(-8, 8).map(lambda k: Fraction(k, 8))
 rules = st.builds(Rule, st.integers(0, 2), st.integers(0, 2), eighths, st.booleans(), st.none() | eighths)
 plans = st.tuples(
-    st.tuples(*[st.sampled_from([-2, -1, 1, 2, 3])] * 3), st.lists(rules, min_size=1, max_size=5, unique=True).map(tuple)
+    st.tuples(*[st.sampled_from([-2, -1, 1, 2, 3])] * 3),
+    st.lists(rules, min_size=1, max_size=5, unique=True).map(tuple),
 )
 
 
 @given(plans, plans, eighths, st.sampled_from([1, 7, 50]))
-@settings(deadline=None, max_examples=400)
+@settings(deadline=None, max_examples=50)
 def test_two_automata_beside_each_other(first, second, x, points):
     expected = {"one": by_hand(first, x), "two": by_hand(second, -x)}
     parts = {"one": Automaton(plan=first, x=float(x)), "two": Automaton(plan=second, x=float(-x))}

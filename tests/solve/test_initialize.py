@@ -22,6 +22,7 @@ from modelica_like.errors import (
     InitializationError,
     MissingStart,
     SingularAtStart,
+    UnknownName,
 )
 from modelica_like.initialize import Point, initialize
 from modelica_like.language import (
@@ -268,6 +269,11 @@ def test_where_there_is_no_steady_state_it_is_told():
 
     with pytest.raises(InitializationError, match=r"^No steady state was found at t = 0 s: rotor\.w keeps changing\."):
         start(Pushed(), "steady")
+
+
+def test_an_unknown_kind_of_start_is_refused():
+    with pytest.raises(UnknownName, match=r"^There is no start 'stedy'; did you mean 'steady'\?"):
+        start(Elastic(), "stedy")
 
 
 # -- nonlinear -------------------------------------------------------------------------------------------------------

@@ -133,7 +133,7 @@ class LockUp(Component):
 
 def test_a_lock_up_with_an_elastic_shaft_against_ida():
     """The slipping phase as a DAE with IDA and a root on the slip speed, the locked phase as an ODE with DOP853."""
-    sundae = pytest.importorskip("sksundae")
+    import sksundae as sundae
 
     def residual(t: float, y: np.ndarray, yp: np.ndarray, res: np.ndarray) -> None:
         w1, w2, w3, twist, tau = y

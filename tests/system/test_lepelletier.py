@@ -12,10 +12,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from components import ConstantSpeed, Lepelletier, LinearSpeedDependentTorque
+from components import ConstantSpeed, ConstantTorque, Inertia, Lepelletier, LinearSpeedDependentTorque
 from components.shift_report import ShiftReport, shift_report
 from components.sizing import lepelletier_gear
 from modelica_like import Assembly, CompiledDae, Solution, build, simulate
+from modelica_like.errors import SingularAtStart
 from modelica_like.netlist import load
 from modelica_like.solve.solution import Values
 
@@ -32,8 +33,9 @@ IN = 1000 * pi / 30
 @cache
 def box(losses: bool) -> CompiledDae:
     """The gearbox behind a motor of constant speed; the load takes 100 N.m at the output in the gear's direction."""
+    efficiency = {"mesh_efficiency": 0.99} if losses else {}
     gears = Lepelletier(
-        front_ratio=FRONT, small_ratio=SMALL, large_ratio=LARGE, losses=losses, mesh_efficiency=0.99,
+        front_ratio=FRONT, small_ratio=SMALL, large_ratio=LARGE, losses=losses, **efficiency,
         J_small_sun=0.005, J_large_sun=0.008, J_carrier=0.02,
     )  # fmt: skip
     for name in ELEMENTS.values():
@@ -136,6 +138,22 @@ def efficiency(gear: str) -> float:
     return run["box.flange_b.tau"] * run["load.w"] / (run["motor.flange.tau"] * IN)
 
 
+def test_two_gears_at_once_hold_the_same_motion() -> None:
+    """At standstill three elements can stick; how they share the torque is undetermined, and the message says so."""
+    gears = Lepelletier(
+        front_ratio=FRONT, small_ratio=SMALL, large_ratio=LARGE, J_small_sun=0.005, J_large_sun=0.008, J_carrier=0.02,
+        pressure_a=1.0, pressure_c=1.0, pressure_d=1.0, pressure_e=1.0,
+    )  # fmt: skip
+    for name in ELEMENTS.values():
+        gears.set(f"{name}.capacity", "2000 N.m")
+    parts = {"motor": ConstantTorque(tau_constant=10.0), "rotor": Inertia(J=0.1), "box": gears, "load": Inertia(J=1.0)}
+    tied = Assembly("tied", parts=parts, series={"drive": list(parts)})
+    with pytest.raises(
+        SingularAtStart, match="stick: where they hold the same motion, their torque split is undetermined"
+    ):
+        simulate(tied, "1 s", start="rest")
+
+
 # -- start-up through all gears ----------------------------------------------------------------------------------------
 
 POINTS = 7000
@@ -163,7 +181,7 @@ def test_every_gear_is_reached(run: Solution) -> None:
         assert at["crankshaft.w"] / (3.5 * at["car.w"]) == pytest.approx(ratio, abs=6e-6)
         closed = {ELEMENTS[letter] for letter in CLOSED[gear]}
         assert {name for name in ELEMENTS.values() if at[f"box.{name}.mode"] == 1.0} == closed
-        assert all(abs(at[SLIP[name]]) < 1e-9 for name in closed)
+        assert all(abs(at[SLIP[name]]) < 1e-8 for name in closed)
 
 
 def test_modes_change_often(run: Solution) -> None:
