@@ -54,6 +54,13 @@ def told(debug: bool) -> Iterator[None]:
         if debug:
             raise
         _fail(f"{error.filename or 'A file'}: {error.strerror or error}.", BAD_INPUT)
+    except (typer.Exit, typer.Abort, typer.BadParameter):
+        raise
+    except _DEFECTS as error:
+        if debug:
+            raise
+        what = f"{type(error).__name__}: {error}"
+        _fail(f"This should not happen: {what}\nRun again with --debug, and report what it shows.", SOLVE_FAILED)
 
 
 def exit_code(error: ModelicaLikeError) -> int:
@@ -219,12 +226,4 @@ def _value(text: str) -> Any:
 def main() -> None:
     """Run the command line; classes of modules in the working directory can be used in netlists."""
     sys.path.insert(0, "")
-    try:
-        app()
-    except _DEFECTS as error:
-        if "--debug" in sys.argv:
-            raise
-        _fail(
-            f"This should not happen: {type(error).__name__}: {error}\nRun again with --debug, and report what it shows.",
-            SOLVE_FAILED,
-        )
+    app()

@@ -165,7 +165,10 @@ def test_switch_on_with_exponential_rise() -> None:
 
 
 def test_switch_on_with_the_actuator() -> None:
-    """The linear rise: lock-up (1 + x)/2·t12 - (x - ln(1 - x)... later, that is 1.0 ms; x = 3·M_f/M_k."""
+    """The generator starts when the clutch carries x = 3·M_f/M_k, so a rise costs t12·(1 + x)/2·(1/(1 - x) - x/(1 - x)).
+
+    That is 9.36 ms, against tau·(1/1 - ln(1 - x)) = 8.37 ms: the lock-up is 1.0 ms later.
+    """
     run = switch_on("linear")
     assert locks(run) == pytest.approx(0.545, abs=5e-4)
     assert locks(run) - locks(switch_on("exponential")) == pytest.approx(1.0e-3, abs=5e-5)
@@ -213,9 +216,13 @@ SWEEP = [
 
 @pytest.mark.parametrize(("rotor", "lock", "almost"), SWEEP)
 def test_other_rotors(rotor: float, lock: float, almost: float) -> None:
+    """TARGETS within 0.3 ms and, for 98 %, 2.5 ms, always early; the motion written out within 1e-4."""
     run = simulate(bench("exponential"), parameters={"rotor": rotor}, points=10_000)
-    assert locks(run) == pytest.approx(lock, abs=1e-4)
-    assert reaches(run, 0.98) == pytest.approx(almost, abs=1.5e-3)
+    reference = expected("exponential", rotor)
+    assert locks(run) == pytest.approx(lock, abs=3e-4)
+    assert reaches(run, 0.98) == pytest.approx(almost, abs=2.5e-3)
+    assert locks(run) == pytest.approx(reference.lock, rel=1e-4)
+    assert reaches(run, 0.98) == pytest.approx(reference.reaches(0.98), rel=1e-4)
 
 
 @pytest.mark.parametrize(("capacity", "disc", "lock"), [(0.5, DISC, 0.700), (0.7, DISC, 0.426), (0.6, 0.0, 0.163)])
