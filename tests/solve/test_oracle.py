@@ -16,7 +16,19 @@ from components import (
     Torque,
 )
 from modelica_like import simulate
-from modelica_like.language import Component, Equations, connect, series
+from modelica_like.language import (
+    Component,
+    Equations,
+    Events,
+    Mode,
+    Parameter,
+    Variable,
+    connect,
+    der,
+    param,
+    series,
+    var,
+)
 
 TIGHT = {"rtol": 1e-11, "atol": 1e-13}
 
@@ -168,3 +180,40 @@ def test_a_lock_up_with_an_elastic_shaft_against_ida():
     assert run.final["left.w"] == pytest.approx(second.y[0, -1], abs=1e-8)
     assert run.final["load.w"] == pytest.approx(second.y[1, -1], abs=1e-8)
     assert run.final["shaft.phi_rel"] == pytest.approx(second.y[2, -1], abs=1e-9)
+
+
+class Rod(Component):
+    """Pendulum in Cartesian coordinates: y and the rod force follow from implicit equations."""
+
+    L: Parameter = param("m", "length", default=1.5)
+    g: Parameter = param("m/s2", "gravity", default=9.81)
+    limit: Parameter = param("1/s2", "force over length and mass", default=8.0)
+    x: Variable = var("m", "x")
+    y: Variable = var("m", "y", guess=-1.0)
+    vx: Variable = var("m/s", "velocity")
+    vy: Variable = var("m/s", "velocity")
+    T: Variable = var("1/s2", "rod force over length and mass")
+    rod = Mode("slack", "tight")
+
+    def equations(self) -> Equations:
+        yield der(self.x) == self.vx
+        yield der(self.y) == self.vy
+        yield der(self.vx) == -self.T * self.x
+        yield der(self.vy) == -self.T * self.y - self.g
+        yield self.x**2 + self.y**2 == self.L**2
+
+    def events(self) -> Events:
+        yield self.rod.go("slack", "tight", when=self.limit < self.T)
+        yield self.rod.go("tight", "slack", when=self.limit > self.T)
+
+
+def test_an_event_on_an_implicit_unknown():
+    """T = g (3 cos(angle) - 2 cos(first angle)) / L, so the cosine at the event is known."""
+    angle = 0.9
+    run = simulate(Rod(x=1.5 * np.sin(angle), vx=0.0), 3.0, points=20, **TIGHT)
+    cosine = (8.0 * 1.5 / 9.81 + 2 * np.cos(angle)) / 3
+    assert len(run.events) >= 4
+    for event in run.events:
+        values = run.at(event.time)
+        assert values["y"] == pytest.approx(-1.5 * cosine, abs=1e-9)
+        assert values["T"] == pytest.approx(8.0, abs=1e-9)
