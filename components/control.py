@@ -147,7 +147,8 @@ class ClutchActuator(Component):
     def equations(self) -> Equations:
         rate = self.coil.choose(off=0, waiting=0, rising=1 / self.t12, on=0, falling=-1 / self.t2)
         yield der(self.level) == rate
-        yield self.y == self.level
+        # At rest exactly 0 and 1: a clutch that is closed by 1e-30 of its force would be another mode.
+        yield self.y == self.coil.choose(off=0, waiting=0, rising=self.level, on=1, falling=self.level)
 
     def events(self) -> Events:
         coil, on, off = self.coil, self.on > 0.5, self.on < 0.5

@@ -290,7 +290,7 @@ def to_si(value: object, unit: Unit, name: str) -> float:
 
 def coherent(unit: Unit) -> Unit:
     """Return the unit with its names replaced by SI ones of the same dimension: `kg.m` for `kg.cm`, `s` for `min`."""
-    if all(find_atom(name).factor == 1.0 for name, _ in unit.atoms):
+    if unit == ANY or all(find_atom(name).factor == 1.0 for name, _ in unit.atoms):
         return unit
     return Unit(_collect((base, power) for name, old in unit.atoms for base, power in _base_powers(name, old)))
 

@@ -12,7 +12,7 @@ import casadi as ca
 from modelica_like.compile.buffers import Vector as Vector
 from modelica_like.errors import LanguageError, Source, UnknownName, did_you_mean
 from modelica_like.flatten.model import FlatDiscrete, FlatParameter, FlatVariable, Origin
-from modelica_like.units import to_si
+from modelica_like.units import coherent, to_si
 
 
 @dataclass(frozen=True)
@@ -194,9 +194,10 @@ class CompiledDae:
                     raise LanguageError(
                         f"{path} cannot change after compilation.", advice="Set it in the model and build that again."
                     )
-                p[self.parameter_position[path]] = one.checked(to_si(value, one.unit, path), value)
+                p[self.parameter_position[path]] = one.checked(to_si(value, coherent(one.unit), path), value)
             elif path in inputs:
-                u[inputs[path]] = to_si(value, self.flat_variables[self.inputs[inputs[path]]].unit, path)
+                unit = self.flat_variables[self.inputs[inputs[path]]].unit
+                u[inputs[path]] = to_si(value, coherent(unit), path)
             elif path in self.derived_position:
                 raise LanguageError(f"{path} follows from other parameters.", advice="Set those.")
             else:

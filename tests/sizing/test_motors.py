@@ -134,6 +134,7 @@ def test_set_d() -> None:
 @pytest.mark.parametrize("viscous", [False, True])
 def test_least_squares_against_another_solver(viscous: bool) -> None:
     from scipy import optimize
+
     torques = np.linspace(0, 0.25, 26)
     aim = motor_on_lines(LINES, torques)
 
