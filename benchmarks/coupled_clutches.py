@@ -1,7 +1,7 @@
 """MSL CoupledClutches in one warm run, against a plain CasADi IDAS integrator over the same time without any event.
 
-Run with `python benchmarks/coupled_clutches.py`. The baseline integrates the model's own equations with the modes frozen
-at their start: what the events and their location cost on top is the ratio.
+Run with `python benchmarks/coupled_clutches.py`. The baseline integrates the model's own equations with the modes
+frozen at their start: what the events and their location cost on top is the ratio.
 """
 
 from __future__ import annotations
