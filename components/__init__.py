@@ -73,9 +73,6 @@ from components.shaft_sources import Position as Position
 from components.shaft_sources import QuadraticSpeedDependentTorque as QuadraticSpeedDependentTorque
 from components.shaft_sources import SignTorque as SignTorque
 from components.shaft_sources import Torque2 as Torque2
-from components.shift_report import ElementShift as ElementShift
-from components.shift_report import Run as Run
-from components.shift_report import ShiftReport as ShiftReport
 from components.shift_schedule import ShiftSchedule as ShiftSchedule
 from components.signals import CoilForce as CoilForce
 from components.signals import Constant as Constant
@@ -170,7 +167,6 @@ __all__ = [
     "ElastoBacklash",
     "ElastoBacklash2",
     "ElastoGap",
-    "ElementShift",
     "Feedback",
     "FirstOrder",
     "Fixed",
@@ -229,10 +225,8 @@ __all__ = [
     "RelativeVelocitySensor",
     "Resistor",
     "Rod",
-    "Run",
     "SeparatelyExcitedDCMachine",
     "SeriesDCMachine",
-    "ShiftReport",
     "ShiftSchedule",
     "ShuntDCMachine",
     "SignForce",

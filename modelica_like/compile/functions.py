@@ -15,7 +15,6 @@ from modelica_like.compile.start_system import start_system
 from modelica_like.errors import Source
 from modelica_like.flatten.model import FlatDiscrete, FlatModel, evaluate
 from modelica_like.flatten.template import TransitionForm
-from modelica_like.language import Assembly
 from modelica_like.structure.reduce import ReducedDae
 
 
@@ -72,10 +71,7 @@ def compile(reduced: ReducedDae) -> CompiledDae:
 
 def _places(flat: FlatModel) -> dict[str, Source]:
     """Where the parts of netlists stand."""
-    owners = {path: (one._owner, one._name) for path, one in flat.components.items()}
-    found = {
-        path: owner.source_of(f"parts.{name}") for path, (owner, name) in owners.items() if isinstance(owner, Assembly)
-    }
+    found = {path: one.place_of() for path, one in flat.components.items()}
     return {path: source for path, source in found.items() if source.file}
 
 

@@ -138,7 +138,8 @@ class _Flattener:
     def _declare_discrete(self, component: Component, name: str, path: str, field: Discrete) -> None:
         value = component.start(name)
         scope = component._owner if name in component._starts else component
-        start = 0.0 if value is None else self.parameters.evaluate(value, scope or component, path)
+        with component.at_its_place(name):
+            start = 0.0 if value is None else self.parameters.evaluate(value, scope or component, path)
         self.discrete_of[id(component), name] = len(self.discretes)
         self.discretes.append(FlatDiscrete(path, field.unit, field.description, start))
 
@@ -219,7 +220,11 @@ class _Flattener:
                 self.linear.append(LinearEquation(((node, 1.0),), -value, Origin(path, "value", _WIRE)))
             else:
                 self.errors.append(
-                    MissingValue(f"{path} is an input without a value.", advice="Connect it or give it a value.")
+                    MissingValue(
+                        f"{path} is an input without a value.",
+                        where=component.place_of(),
+                        advice="Connect it or give it a value.",
+                    )
                 )
 
     def _read_starts(self, component: Component) -> None:
@@ -233,7 +238,8 @@ class _Flattener:
             node = self.variable_of[id(component), name]
             path = self.variables[node].path
             scope = component if given is None else component._owner or component
-            start = self.parameters.evaluate(value, scope, path)
+            with component.at_its_place(name):
+                start = self.parameters.evaluate(value, scope, path)
             strength = "default" if given is None else "fixed" if value.fixed else "guess"
             self.starts.append(StartValue(node, start, strength))
 

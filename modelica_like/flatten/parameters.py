@@ -47,7 +47,8 @@ class Parameters:
         if value.formula is None:
             expression = self._independent(component, name, path, value)
         else:
-            expression = self._dependent(component, name, path, value)
+            with component.at_its_place(name):
+                expression = self._dependent(component, name, path, value)
         self._position[key] = len(self._q)
         self._q.append(expression)
         return self._position[key]
@@ -114,7 +115,9 @@ class Parameters:
         position = self.declare(component, name, label)
         if position is None:
             kind = type(component).__name__
-            raise MissingValue(f"{label} ({kind}) has no value.", advice=f"Give it one: {name} = …")
+            raise MissingValue(
+                f"{label} ({kind}) has no value.", where=component.place_of(), advice=f"Give it one: {name} = …"
+            )
         return position
 
     def q(self, position: int | None) -> Any:

@@ -7,13 +7,11 @@ from dataclasses import dataclass, field
 
 from modelica_like.errors import FreeFlange, ModelicaLikeError, Source, WrongConnection
 from modelica_like.flatten.checks import unit_of_field
-from modelica_like.language.assembly import Assembly
 from modelica_like.language.component import Component
 from modelica_like.language.declared import Connector, Declared
 from modelica_like.language.equation import Connection, FreeEnd
 from modelica_like.language.expr import Symbol
 from modelica_like.language.fields import Input, Output, Variable
-from modelica_like.language.places import NOWHERE
 from modelica_like.units import Unit, same_dimension
 
 End = tuple[int, bool]
@@ -164,12 +162,11 @@ class Wiring:
                 continue
             flows = [n for n, f in connector.fields.items() if isinstance(f, Variable) and f.is_flow]
             carries = "torque" if "tau" in flows else "force" if "f" in flows else "flow"
-            label, owner = component.label, component._owner
-            place = owner.source_of(f"parts.{component._name}") if isinstance(owner, Assembly) else NOWHERE
+            label = component.label
             self.errors.append(
                 FreeFlange(
                     f"{label}.{name} is free, so {label} ({type(component).__name__}) carries no {carries}.",
-                    where=place if place.file else (),
+                    where=component.place_of(),
                     advice=f"Connect it, or say free({label}.{name}).",
                 )
             )

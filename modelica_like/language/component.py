@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar, cast, dataclass_transform
 
-from modelica_like.errors import DuplicateName, LanguageError, ModelicaLikeError
+from modelica_like.errors import DuplicateName, LanguageError, ModelicaLikeError, Source
 from modelica_like.language.declared import Connector, Declared, unknown
 from modelica_like.language.expr import TIME, Expr
 from modelica_like.language.fields import Discrete, Field, Input, Parameter, Value, param, require_identifier
 from modelica_like.language.mode import Mode
-from modelica_like.language.places import caller
+from modelica_like.language.places import NOWHERE, caller
 
 if TYPE_CHECKING:
     from modelica_like.language.equation import Equations
@@ -235,6 +236,29 @@ class Component(Declared):
         """
         owner, _, name = path.rpartition(".")
         self.find(owner).give(name, value)
+
+    def source_of(self, key: str) -> Source:
+        """Return where an entry stands in the netlist that this component was read from; an `Assembly` knows."""
+        return NOWHERE
+
+    def place_of(self, name: str = "") -> Source:
+        """Return where this part of a netlist stands, or one of the netlist's own parameters."""
+        own = self.source_of(f"parameters.{name}")
+        if own.file or not isinstance(self._owner, Component):
+            return own
+        # All elements of an array stand in one line.
+        return self._owner.source_of(f"parts.{self._name.partition('[')[0]}")
+
+    @contextmanager
+    def at_its_place(self, name: str = "") -> Generator[None]:
+        """Give an error that does not know its place that of this part, or of a parameter."""
+        try:
+            yield
+        except ModelicaLikeError as error:
+            place = self.place_of(name)
+            if not error.where and place.file:
+                error.where = (place,)
+            raise
 
     def inlet_connector(self) -> Connector:
         """Return the connector that `series` joins to the part before."""

@@ -101,7 +101,7 @@ class _Task:
             self._each("start", self.document.start, self._start)
             self._each("guess", self.document.guess, lambda path, value: self._start(path, guess(value)))
             self._each("expose", self.document.expose, self.assembly.expose)
-        for section in ("connect", "series", "expose"):
+        for section in ("parameters", "connect", "series", "expose"):
             for name in getattr(self.document, section):
                 self.assembly.place(f"{section}.{name}", self.document.lines.source(section, name))
         for end in self.document.free:

@@ -1,6 +1,5 @@
 """Every way in which a netlist can be wrong, and the sentence that tells it."""
 
-import time
 from pathlib import Path
 
 import pytest
@@ -128,11 +127,9 @@ MESSAGES = {
 def test_message(text: str | bytes, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("bad.toml").write_bytes(text if isinstance(text, bytes) else text.encode())
-    start = time.perf_counter()
     with pytest.raises(ModelicaLikeError) as caught:
         load("bad.toml")
     assert str(caught.value) == message
-    assert time.perf_counter() - start < 1.0
 
 
 def test_a_folder_and_a_missing_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,7 +1,6 @@
 """Lines of keys in TOML texts."""
 
 import contextlib
-import time
 import tomllib
 
 import pytest
@@ -82,11 +81,9 @@ HOSTILE = {
 
 
 @pytest.mark.parametrize("text", HOSTILE.values(), ids=HOSTILE.keys())
-def test_hostile_texts_take_no_time(text: str) -> None:
-    start = time.perf_counter()
+def test_hostile_texts_are_survived(text: str) -> None:
     with contextlib.suppress(NetlistError):
-        locate(text, "f.toml")
-    assert time.perf_counter() - start < 1.0
+        assert locate(text, "f.toml").source("parts", "none").file == "f.toml"
 
 
 @given(st.text(alphabet="[]{}=.,#'\"\\\n \tabc1", max_size=80))
