@@ -65,7 +65,7 @@ def best(action: Callable[[], Any], repeats: int) -> tuple[float, Any]:
 
 
 def measure(n: int) -> str:
-    repeats = 7 if n <= 100 else 3 if n <= 1000 else 1
+    repeats = 7 if n <= 100 else 5 if n <= 1000 else 2
     chain = Chain(n=n)
     build_seconds, model = best(lambda: build(chain), repeats)
     options = {"rtol": RTOL, "atol": ATOL, "points": POINTS}
