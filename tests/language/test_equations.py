@@ -290,7 +290,9 @@ def test_inputs_need_no_equation_and_outputs_do():
         def equations(self) -> Equations:
             yield self.y == 2 * self.u
 
-    flatten(Gain())
+    flat = flatten(Gain())
+    assert [flat.variables[node].path for node in flat.inputs] == ["u"]
+    assert len(flat.linear) + len(flat.general) == 1
 
 
 def test_optional_connectors_count_only_where_they_are_used():

@@ -35,7 +35,8 @@ def test_a_file_gets_no_bar(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_an_end_that_cannot_be_read_is_left_to_the_simulation(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(progress, "_PATIENCE", 0.0)
-    with Bar("2 m") as bar:
-        bar(0.5)
-    with Bar(None) as bar:
-        bar(0.5)
+    file = io.StringIO()
+    for end in ("2 m", None):
+        with Bar(end, Console(file=file, force_terminal=True)) as bar:
+            bar(0.5)
+    assert file.getvalue() == ""
