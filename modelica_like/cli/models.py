@@ -1,0 +1,66 @@
+"""Commands on netlists: check and simulate."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from modelica_like.cli.app import Assignments, Debug, Netlist, app, load_netlist, out, told
+
+
+class Start(StrEnum):
+    """What stands for start values that are not given."""
+
+    GIVEN = "given"
+    REST = "rest"
+    STEADY = "steady"
+
+
+@app.command()
+def check(netlist: Netlist, assignments: Assignments = None, *, debug: Debug = False) -> None:
+    """Check a netlist: equations, unknowns, states, index, blocks, energy terms."""
+    with told(debug):
+        assembly = load_netlist(netlist, assignments)
+        from modelica_like.report.structure import structure_report
+
+        out().print(structure_report(assembly))
+
+
+@app.command()
+def simulate(
+    netlist: Netlist, assignments: Assignments = None, *,
+    until: Annotated[str | None, typer.Option(metavar="TIME", help="End time, e.g. 2s; else the netlist's.")] = None,
+    start: Annotated[Start | None, typer.Option(help="Start values: as given, from rest, or the steady state.")] = None,
+    csv: Annotated[Path | None, typer.Option(metavar="FILE", help="Write all trajectories as a table.")] = None,
+    points: Annotated[int | None, typer.Option(metavar="N", help="Number of equal intervals of the results.")] = None,
+    units: Annotated[bool, typer.Option("--units", help="Units in a second header line of the table.")] = False,
+    plot: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw the results: .png, .svg or .pdf.")] = None,
+    show: Annotated[list[str] | None, typer.Option(metavar="PATTERN", help="What to draw, e.g. '*.w'.")] = None,
+    energy: Annotated[bool, typer.Option(help="Tell the energy balance; it takes another, more precise run.")] = True,
+    debug: Debug = False,
+) -> None:  # fmt: skip
+    """Simulate a netlist: events, energy balance, results as table and picture."""
+    with told(debug):
+        # What is wrong in the file is told before the solver is loaded.
+        assembly = load_netlist(netlist, assignments)
+        from modelica_like.report.progress import Bar
+        from modelica_like.report.run import run_report
+        from modelica_like.simulation import build
+        from modelica_like.simulation import simulate as run
+
+        model = build(assembly)
+        with Bar(until or model.settings.get("until")) as bar:
+            solution = run(model, until, start=start.value if start else None, points=points, progress=bar)
+        out().print(run_report(solution, energy=energy))
+        if csv:
+            from modelica_like.report.files import write_csv
+
+            write_csv(solution, csv, units=units)
+        if plot:
+            from modelica_like.solve.plot import plot as draw
+            from modelica_like.solve.plot import save_plot
+
+            save_plot(draw(solution, show or ()), plot)

@@ -1,0 +1,43 @@
+"""Commands on component types: describe, schema and library."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from modelica_like.cli.app import Debug, app, out, told
+
+
+@app.command()
+def describe(
+    kind: Annotated[str, typer.Argument(metavar="TYPE", help="type as a netlist names it", show_default=False)],
+    *, debug: Debug = False,
+) -> None:  # fmt: skip
+    """Describe a component type: parameters, units, connectors, equations."""
+    with told(debug):
+        from modelica_like.netlist import find_type
+        from modelica_like.report.types import describe as page
+
+        out().print(page(find_type(kind)))
+
+
+@app.command()
+def schema(*, debug: Debug = False) -> None:
+    """Print the JSON schema of netlists with all component types, for editors."""
+    with told(debug):
+        import json
+
+        from modelica_like.netlist import schema as generate
+
+        typer.echo(json.dumps(generate(), indent=2, ensure_ascii=False))
+
+
+@app.command()
+def library(*, debug: Debug = False) -> None:
+    """List all component types of the installed libraries."""
+    with told(debug):
+        from modelica_like.netlist import library_types
+        from modelica_like.report.types import library_table
+
+        out().print(library_table(library_types()))
