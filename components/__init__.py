@@ -1,7 +1,13 @@
 """Machine elements for drive-trains, written in the language of `modelica_like`."""
 
 from components.adaptors import AngleToTorqueAdaptor as AngleToTorqueAdaptor
+from components.adaptors import CurrentToVoltageAdaptor as CurrentToVoltageAdaptor
+from components.adaptors import ForceToPositionAdaptor as ForceToPositionAdaptor
+from components.adaptors import HeatFlowToTemperatureAdaptor as HeatFlowToTemperatureAdaptor
+from components.adaptors import PositionToForceAdaptor as PositionToForceAdaptor
+from components.adaptors import TemperatureToHeatFlowAdaptor as TemperatureToHeatFlowAdaptor
 from components.adaptors import TorqueToAngleAdaptor as TorqueToAngleAdaptor
+from components.adaptors import VoltageToCurrentAdaptor as VoltageToCurrentAdaptor
 from components.belts import TimingBelt as TimingBelt
 from components.control import PI as PI
 from components.control import PID as PID
@@ -62,6 +68,7 @@ from components.sensors import PositionSensor as PositionSensor
 from components.sensors import PowerSensor as PowerSensor
 from components.sensors import RelativeAngleSensor as RelativeAngleSensor
 from components.sensors import RelativeSpeedSensor as RelativeSpeedSensor
+from components.sensors import SpeedLimit as SpeedLimit
 from components.sensors import SpeedSensor as SpeedSensor
 from components.sensors import TorqueSensor as TorqueSensor
 from components.shaft_sensors import AccelerationSensor as AccelerationSensor
@@ -160,6 +167,7 @@ __all__ = [
     "ConstantVoltage",
     "CurrentSensor",
     "CurrentSink",
+    "CurrentToVoltageAdaptor",
     "Damper",
     "Differential",
     "DryFriction",
@@ -177,10 +185,12 @@ __all__ = [
     "Force2",
     "ForceSensor",
     "ForceStep",
+    "ForceToPositionAdaptor",
     "Freewheel",
     "Gain",
     "Gearbox",
     "Ground",
+    "HeatFlowToTemperatureAdaptor",
     "HeatPort",
     "HeatSource",
     "IdealGear",
@@ -211,6 +221,7 @@ __all__ = [
     "PlanetarySet",
     "Position",
     "PositionSensor",
+    "PositionToForceAdaptor",
     "PowerSensor",
     "Product",
     "Pulse",
@@ -235,6 +246,7 @@ __all__ = [
     "Sine",
     "Speed",
     "SpeedDependentLoad",
+    "SpeedLimit",
     "SpeedSensor",
     "Spring",
     "SpringDamper",
@@ -244,6 +256,7 @@ __all__ = [
     "SupportFriction",
     "Switch",
     "Table",
+    "TemperatureToHeatFlowAdaptor",
     "ThermalConductor",
     "ThermalMass",
     "TimeFormula",
@@ -266,4 +279,5 @@ __all__ = [
     "VariableResistor",
     "VelocitySensor",
     "VoltageSensor",
+    "VoltageToCurrentAdaptor",
 ]

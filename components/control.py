@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import log
+
 from modelica_like.language import (
     Component,
     Discrete,
@@ -12,15 +14,17 @@ from modelica_like.language import (
     Mode,
     Output,
     Parameter,
-    Variable,
-    all_of,
     der,
     discrete,
+    exp,
     param,
     signal_in,
     signal_out,
-    var,
 )
+
+_LN_10 = log(10)
+_SETTLED_AFTER = 9
+"""Decades after which an exponential counts as settled."""
 
 
 class Feedback(Component):
@@ -131,31 +135,45 @@ class PID(Component):
 class ClutchActuator(Component):
     """Electromagnetic actuator of a clutch or brake: delay, rise and release of the torque (VDI 2241).
 
-    After switching on nothing happens for the response delay t11, then the torque rises linearly in the time t12; after
-    switching off it falls linearly in the time t2. Its output goes to `f_normalized`.
+    After switching on nothing happens for the response delay t11. Then the torque rises linearly to its full value in
+    the time t12; after switching off it falls linearly to zero in the time t2. As an exponential, like the current of a
+    coil, it has 90 % of its full value after t12, and 10 % after t2, as data sheets state these times: its distance
+    from the final value is divided by ten in each of them. Its output goes to `f_normalized`.
     """
 
     on: Input = signal_in("1", "the coil is switched on above 0.5")
     t11: Parameter = param("s", "response delay", default=0.0, min=0)
-    t12: Parameter = param("s", "rise time from none to full torque", min=1e-12)
-    t2: Parameter = param("s", "release time from full to no torque", min=1e-12)
+    t12: Parameter = param("s", "rise time to full torque; exponential: to 90 %", min=1e-12)
+    t2: Parameter = param("s", "release time from full to no torque; exponential: to 10 %", min=1e-12)
+    exponential: bool = False
+    """The torque rises as 1 - exp(-t/T), T = t12/ln(10), and falls as exp(-t/T), T = t2/ln(10)."""
     y: Output = signal_out("1", "torque over full torque")
-    level: Variable = var("1", "torque over full torque", state="always", default=0)
-    t_rise: Discrete = discrete("s", "time at which the torque begins to rise", start=0.0)
+    since: Discrete = discrete("s", "time at which the present state of the coil began")
+    level: Discrete = discrete("1", "torque over full torque at that time")
     coil = Mode("off", "waiting", "rising", "on", "falling", description="state of the coil")
 
+    def remaining(self, distance: Expr, time: Expr) -> Expr:
+        """Return how far the torque still is from its final value."""
+        decades = (self.time - self.since) / time
+        return distance * exp(-_LN_10 * decades) if self.exponential else distance - decades
+
+    def arrival(self, distance: Expr, time: Expr) -> Expr:
+        """Return when it has its final value."""
+        return self.since + time * (_SETTLED_AFTER if self.exponential else distance)
+
     def equations(self) -> Equations:
-        rate = self.coil.choose(off=0, waiting=0, rising=1 / self.t12, on=0, falling=-1 / self.t2)
-        yield der(self.level) == rate
+        rising = 1 - self.remaining(1 - self.level, self.t12)
+        falling = self.remaining(self.level, self.t2)
         # At rest exactly 0 and 1: a clutch that is closed by 1e-30 of its force would be another mode.
-        yield self.y == self.coil.choose(off=0, waiting=0, rising=self.level, on=1, falling=self.level)
+        yield self.y == self.coil.choose(off=0, waiting=0, rising=rising, on=1, falling=falling)
 
     def events(self) -> Events:
         coil, on, off = self.coil, self.on > 0.5, self.on < 0.5
-        yield coil.go("off", "waiting", when=on, reset={self.t_rise: self.time + self.t11})
-        yield coil.go("waiting", "off", when=all_of(off, self.level <= 0))
-        yield coil.go("waiting", "rising", at=self.t_rise)
-        yield coil.go(("rising", "on"), "falling", when=off)
-        yield coil.go("rising", "on", when=self.level >= 1, reset={self.level: 1})
-        yield coil.go("falling", "rising", when=on)
-        yield coil.go("falling", "off", when=self.level <= 0, reset={self.level: 0})
+        now = {self.since: self.time, self.level: self.y}
+        yield coil.go("off", "waiting", when=on, reset=now)
+        yield coil.go("waiting", "off", when=off)
+        yield coil.go("waiting", "rising", at=self.since + self.t11, reset=now)
+        yield coil.go(("rising", "on"), "falling", when=off, reset=now)
+        yield coil.go("rising", "on", at=self.arrival(1 - self.level, self.t12))
+        yield coil.go("falling", "rising", when=on, reset=now)
+        yield coil.go("falling", "off", at=self.arrival(self.level, self.t2))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from components.interfaces import CompliantWithRelativeStates, ShaftInHousing
 from components.thermal import Lossy
 from modelica_like.language import (
@@ -19,6 +21,7 @@ from modelica_like.language import (
     maximum,
     negate,
     param,
+    prescribed,
     signal_in,
     var,
     where,
@@ -26,21 +29,29 @@ from modelica_like.language import (
 
 Rows = tuple[tuple[float, float], ...]
 
+_NOW = 1e-9
+"""What counts as one instant, in creep_time."""
 
-class DryFriction(Lossy, partial=True):
-    """Two surfaces that stick until the static friction is exceeded, and then slide against the sliding friction.
+
+class Sticking(Lossy, partial=True):
+    """What surfaces do that slide, come to rest on each other and break away again.
 
     While they stick, friction is no function of the speed but whatever keeps the relative acceleration at zero; so the
     speed stays a state in every mode (Otter, Elmqvist, Mattsson: Hybrid modeling in Modelica based on the synchronous
-    data flow principle, CACSD 1999). A surface that breaks away holds the sliding friction of standstill until it
-    moves. Surfaces without static friction are free: nothing holds them, and their friction, if there is any at speed,
-    goes through zero smoothly.
+    data flow principle, CACSD 1999). That leaves it undetermined where another friction element holds the same motion;
+    a tiny `creep` (1e-9) decides: the other one holds as long as it can.
 
-    A subclass names its slip speed and its friction variable, and gives the laws of sliding and static friction.
+    Where the motion is prescribed there is no freedom to stick: friction acts against the motion, and while the motion
+    rests, friction, which could be anything up to the static one, is zero.
+
+    A subclass declares `creep`, `creep_time` and `rest` in its units, and names its slip speed and its friction.
     """
 
-    peak: Parameter = param("1", "static friction over sliding friction at standstill", default=1.0, min=1)
-    mode = Mode("free", "stuck", "start_forward", "start_backward", "forward", "backward", description="friction mode")
+    if TYPE_CHECKING:
+        creep: Parameter
+        creep_time: Parameter
+        rest: Parameter
+    mode = Mode("stuck", "start_forward", "start_backward", "forward", "backward", description="friction mode")
 
     @property
     def slip(self) -> Expr:
@@ -52,6 +63,75 @@ class DryFriction(Lossy, partial=True):
         """Friction torque or force, against forward sliding."""
         raise NotImplementedError
 
+    def holds_forward(self) -> Expr:
+        """Return the friction that surfaces which stick can bear against forward sliding."""
+        raise NotImplementedError
+
+    def holds_backward(self) -> Expr:
+        """Return the friction, a negative one, that they can bear against backward sliding."""
+        return -self.holds_forward()
+
+    def carried(self) -> Expr | float:
+        """Return 1 where a prescribed motion carries the surfaces along, so that they cannot stick; otherwise 0."""
+        return 0.0 if self.given("creep") else prescribed(self.slip)
+
+    def stuck(self) -> Expr:
+        """Return what is zero while the surfaces stick."""
+        creeping = self.creep * self.friction - self.slip / self.creep_time if self.given("creep") else 0.0
+        return where(self.carried() > 0, self.friction, der(self.slip) - creeping)
+
+    def breaks_forward(self) -> Expr:
+        """Return the condition on which surfaces that stick begin to slide forward."""
+        return where(self.carried() > 0, self._soon() - self.rest, self.friction - self.holds_forward()) > 0
+
+    def breaks_backward(self) -> Expr:
+        """Return the condition on which surfaces that stick begin to slide backward."""
+        return where(self.carried() > 0, self._soon() + self.rest, self.friction - self.holds_backward()) < 0
+
+    def _soon(self) -> Expr:
+        return self.slip + self.creep_time * der(self.slip)
+
+    def stops(self, direction: int) -> Expr:
+        """Return the condition on which surfaces that slide in a direction come to rest."""
+        # A prescribed motion may end in standstill without ever passing it; then nothing brakes it any more.
+        still = 0.5 * self.rest - direction * self.creep_time * der(self.slip)
+        return direction * self.slip < self.carried() * _NOW * still
+
+    def events(self) -> Events:
+        mode, slip = self.mode, self.slip
+        yield mode.go("stuck", "start_forward", when=self.breaks_forward())
+        yield mode.go("stuck", "start_backward", when=self.breaks_backward())
+        yield mode.go("start_forward", "forward", when=slip > 0)
+        yield mode.go("start_backward", "backward", when=slip < 0)
+        yield mode.go("start_forward", "stuck", when=der(slip) < 0, reset={slip: 0})
+        yield mode.go("start_backward", "stuck", when=der(slip) > 0, reset={slip: 0})
+        yield mode.go("forward", "stuck", when=self.stops(1), reset={slip: 0})
+        yield mode.go("backward", "stuck", when=self.stops(-1), reset={slip: 0})
+
+    def dissipation(self) -> Expr:
+        return self.friction * self.slip
+
+
+class ShaftSticking(Sticking, partial=True):
+    """Turning surfaces that slide or stick."""
+
+    creep: Parameter = param("1/(kg.m2)", "acceleration while it sticks over its torque", default=None, min=0)
+    creep_time: Parameter = param("s", "time after which it creeps no faster", default=1e-3, min=0)
+    rest: Parameter = param("rad/s", "speed that a prescribed motion must exceed to break away", default=1e-12, min=0)
+
+
+class DryFriction(Sticking, partial=True):
+    """Two surfaces that stick until the static friction is exceeded, and then slide against the sliding friction.
+
+    A surface that breaks away holds the sliding friction of standstill until it moves. Surfaces without static friction
+    are free: nothing holds them, and their friction, if there is any at speed, goes through zero smoothly.
+
+    A subclass gives the laws of sliding and static friction.
+    """
+
+    peak: Parameter = param("1", "static friction over sliding friction at standstill", default=1.0, min=1)
+    mode = Mode("free", "stuck", "start_forward", "start_backward", "forward", "backward", description="friction mode")
+
     def sliding_friction(self, speed: Expr | float) -> Expr:
         """Return the friction while sliding forward at a speed."""
         raise NotImplementedError
@@ -60,21 +140,12 @@ class DryFriction(Lossy, partial=True):
         """Return the largest friction of surfaces that stick."""
         return self.peak * self.sliding_friction(0)
 
+    def holds_forward(self) -> Expr:
+        return self.static_friction()
+
     def pressed(self) -> Expr:
         """Return the condition on which the surfaces touch."""
         return self.static_friction() > 0
-
-    def breaks_forward(self) -> Expr:
-        """Return the condition on which surfaces that stick begin to slide forward."""
-        return self.friction > self.static_friction()
-
-    def breaks_backward(self) -> Expr:
-        """Return the condition on which surfaces that stick begin to slide backward."""
-        return self.friction < -self.static_friction()
-
-    def creeping(self) -> Expr | float:
-        """Return the acceleration of surfaces that stick."""
-        return 0.0
 
     def idle_friction(self) -> Expr:
         """Return the friction of free surfaces: none, where nothing presses them together."""
@@ -89,7 +160,7 @@ class DryFriction(Lossy, partial=True):
         forward = self.sliding_friction(maximum(self.slip, 0))
         backward = self.sliding_friction(maximum(-self.slip, 0))
         yield self.mode.choose(
-            free=self.friction - self.idle_friction(), stuck=der(self.slip) - self.creeping(),
+            free=self.friction - self.idle_friction(), stuck=self.stuck(),
             start_forward=self.friction - at_rest, start_backward=self.friction + at_rest,
             forward=self.friction - forward, backward=self.friction + backward,
         ) == 0  # fmt: skip
@@ -103,32 +174,11 @@ class DryFriction(Lossy, partial=True):
         yield mode.go("free", "forward", when=all_of(pressed, slip > 0))
         yield mode.go("free", "backward", when=all_of(pressed, slip < 0))
         yield mode.go("free", "stuck", when=pressed)
-        yield mode.go("stuck", "start_forward", when=self.breaks_forward())
-        yield mode.go("stuck", "start_backward", when=self.breaks_backward())
-        yield mode.go("start_forward", "forward", when=slip > 0)
-        yield mode.go("start_backward", "backward", when=slip < 0)
-        yield mode.go("start_forward", "stuck", when=der(slip) < 0, reset={slip: 0})
-        yield mode.go("start_backward", "stuck", when=der(slip) > 0, reset={slip: 0})
-        yield mode.go("forward", "stuck", when=slip < 0, reset={slip: 0})
-        yield mode.go("backward", "stuck", when=slip > 0, reset={slip: 0})
-
-    def dissipation(self) -> Expr:
-        return self.friction * self.slip
+        yield from super().events()
 
 
-class ShaftFriction(DryFriction, partial=True):
-    """Dry friction between turning parts.
-
-    What sticks is at rest. That leaves the torque undetermined where another friction element holds the same shaft, and
-    where the motion is prescribed and passes through zero. A tiny `creep` (1e-9) decides: the other element holds as
-    long as it can; a prescribed motion breaks away at once.
-    """
-
-    creep: Parameter = param("1/(kg.m2)", "acceleration while it sticks over its torque", default=None, min=0)
-    creep_time: Parameter = param("s", "time after which it creeps no faster", default=1e-3, min=0)
-
-    def creeping(self) -> Expr | float:
-        return self.creep * self.friction - self.slip / self.creep_time if self.given("creep") else 0.0
+class ShaftFriction(ShaftSticking, DryFriction, partial=True):
+    """Dry friction between turning parts."""
 
 
 class PressedFriction(ShaftFriction, partial=True):

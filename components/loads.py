@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from components.friction import DryFriction
+from components.friction import ShaftFriction
 from components.interfaces import OneFlange
 from modelica_like.language import Equations, Expr, Parameter, Variable, der, maximum, param, var
 
 _STANDSTILL = 1e-20
 
 
-class SpeedDependentLoad(DryFriction, OneFlange):
+class SpeedDependentLoad(ShaftFriction, OneFlange):
     """Torque (a + b·(|w|/w_ref)^p)·sgn(w) against the rotation; the constant part also holds the shaft at standstill.
 
     With p = 2/3 it is a bearing after A. Palmgren, with p = 1 a viscous load, with p = 2 a fan or pump.

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
+from components.friction import ShaftSticking
 from components.interfaces import TwoFlanges
-from components.thermal import Lossy
 from modelica_like.language import (
     Equations,
     Events,
     Expr,
-    Mode,
     Output,
     Parameter,
     Variable,
@@ -26,7 +25,7 @@ from modelica_like.language import (
 LossRows = tuple[tuple[float, float, float, float, float], ...]
 
 
-class MeshWithFriction(Lossy, TwoFlanges, partial=True):
+class MeshWithFriction(ShaftSticking, TwoFlanges, partial=True):
     """Gear whose teeth and bearings rub, and stick where the torques are too small to turn them.
 
     With the torque x = -flange_b.tau/ratio that the mesh passes on, counted at flange_a, the lost torque is a line in x
@@ -36,9 +35,6 @@ class MeshWithFriction(Lossy, TwoFlanges, partial=True):
     driving side after C. Bertsch, 2009). The heavier the inertia on the load side, the more the efficiency against the
     drive matters: where it is negative, the motion is only unique if the inertia of the drive is large enough.
 
-    If another friction element holds the same shaft, the torque of each is undetermined while both stick. A tiny
-    `creep` (1e-9) decides: the other one holds as long as it can, then this gear.
-
     A subclass gives the efficiencies and the friction of the bearings at a speed.
     """
 
@@ -46,9 +42,14 @@ class MeshWithFriction(Lossy, TwoFlanges, partial=True):
     phi_a: Variable = var("rad", "angle of flange_a relative to the housing")
     w_a: Variable = var("rad/s", "speed of flange_a relative to the housing", state="always")
     tau_loss: Variable = var("N.m", "lost torque at flange_a, against forward rotation")
-    creep: Parameter = param("1/(kg.m2)", "acceleration of the stuck gear over its torque", default=None, min=0)
-    creep_time: Parameter = param("s", "time after which it creeps no faster", default=1e-3, min=0)
-    mode = Mode("stuck", "start_forward", "start_backward", "forward", "backward", description="friction mode")
+
+    @property
+    def slip(self) -> Expr:
+        return self.w_a
+
+    @property
+    def friction(self) -> Expr:
+        return self.tau_loss
 
     def efficiencies(self, speed: Expr | float) -> tuple[Expr | float, Expr | float]:
         """Return the mesh efficiency while flange_a drives, and while flange_b drives."""
@@ -72,9 +73,11 @@ class MeshWithFriction(Lossy, TwoFlanges, partial=True):
         passed = -self.flange_b.tau / self.ratio
         return (1 / eta_a - 1) * passed + direction * bearing_a, (eta_b - 1) * passed + direction * bearing_b
 
-    def creeping(self) -> Expr | float:
-        """Return the acceleration of the stuck gear."""
-        return self.creep * self.tau_loss - self.w_a / self.creep_time if self.given("creep") else 0.0
+    def holds_forward(self) -> Expr:
+        return self.forward_loss(0)
+
+    def holds_backward(self) -> Expr:
+        return self.backward_loss(0)
 
     def equations(self) -> Equations:
         yield from super().equations()
@@ -84,7 +87,7 @@ class MeshWithFriction(Lossy, TwoFlanges, partial=True):
         yield der(self.phi_a) == self.w_a
         yield b.tau + self.ratio * (a.tau - loss) == 0
         yield self.mode.choose(
-            stuck=der(self.w_a) - self.creeping(),
+            stuck=self.stuck(),
             start_forward=loss - self.forward_loss(0),
             start_backward=loss - self.backward_loss(0),
             forward=loss - self.forward_loss(maximum(self.w_a, 0)),
@@ -92,20 +95,9 @@ class MeshWithFriction(Lossy, TwoFlanges, partial=True):
         ) == 0  # fmt: skip
 
     def events(self) -> Events:
-        mode, w = self.mode, self.w_a
-        yield mode.initially("forward", when=w > 0)
-        yield mode.initially("backward", when=w < 0)
-        yield mode.go("stuck", "start_forward", when=self.tau_loss > self.forward_loss(0))
-        yield mode.go("stuck", "start_backward", when=self.tau_loss < self.backward_loss(0))
-        yield mode.go("start_forward", "forward", when=w > 0)
-        yield mode.go("start_backward", "backward", when=w < 0)
-        yield mode.go("start_forward", "stuck", when=der(w) < 0, reset={w: 0})
-        yield mode.go("start_backward", "stuck", when=der(w) > 0, reset={w: 0})
-        yield mode.go("forward", "stuck", when=w < 0, reset={w: 0})
-        yield mode.go("backward", "stuck", when=w > 0, reset={w: 0})
-
-    def dissipation(self) -> Expr:
-        return self.tau_loss * self.w_a
+        yield self.mode.initially("forward", when=self.w_a > 0)
+        yield self.mode.initially("backward", when=self.w_a < 0)
+        yield from super().events()
 
 
 class LossyGear(MeshWithFriction):

@@ -1,9 +1,20 @@
-"""Ideal sensors: they measure and load nothing."""
+"""Ideal sensors: they measure, watch and load nothing."""
 
 from __future__ import annotations
 
 from components.interfaces import Flange, LinearFlange
-from modelica_like.language import Component, Equations, Output, der, signal_out
+from modelica_like.language import (
+    Component,
+    Equations,
+    Events,
+    Mode,
+    Output,
+    Parameter,
+    absolute,
+    der,
+    param,
+    signal_out,
+)
 
 
 class AngleSensor(Component):
@@ -26,6 +37,22 @@ class SpeedSensor(Component):
     def equations(self) -> Equations:
         yield self.flange.tau == 0
         yield self.w == der(self.flange.phi)
+
+
+class SpeedLimit(SpeedSensor):
+    """Watches a shaft: when it turns faster than its limit, in either direction, the report of the run says so.
+
+    It stops nothing. What has been exceeded once stays exceeded, like a centrifugal switch that has tripped.
+    """
+
+    w_max: Parameter = param("rad/s", "largest permitted speed", min=0)
+    reason: str = ""
+    """What the report adds, e.g. `a series machine runs away without load`."""
+    limit = Mode("kept", "exceeded", description="speed within its limit, or once above")
+
+    def events(self) -> Events:
+        notice = "exceeds {w_max} rad/s" + (f": {self.reason}" if self.reason else "")
+        yield self.limit.go("kept", "exceeded", when=absolute(self.w) > self.w_max, notice=notice)
 
 
 class RelativeSensor(Component, partial=True):

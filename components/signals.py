@@ -21,8 +21,10 @@ from modelica_like.language import (
     any_of,
     discrete,
     exp,
+    floor,
     interpolate,
     maximum,
+    minimum,
     param,
     parse_formula,
     signal_in,
@@ -99,14 +101,19 @@ class Sine(Started):
 class CoilForce(Started):
     """Force of an electromagnet whose coil is switched on.
 
-    The current rises as 1 - exp(-t/T) with the time constant T of the coil, the force as its square.
+    The current rises as 1 - exp(-t/T) with the time constant T of the coil, the force as its square. A coil that was
+    not without current rises from there, and the force of a polarised magnet is proportional to the current.
     """
 
     amplitude: Parameter = param("*", "final value", default=1.0)
     T: Parameter = param("s", "time constant of the coil current", min=0)
+    start_current: Parameter = param("1", "current at the start over its final value", default=0.0, min=0, max=1)
+    polarised: bool = False
+    """The force is proportional to the current, not to its square."""
 
     def running(self, elapsed: Expr) -> Expr:
-        return self.amplitude * (1 - exp(-elapsed / self.T)) ** 2
+        current = 1 - (1 - self.start_current) * exp(-elapsed / self.T)
+        return self.amplitude * (current if self.polarised else current**2)
 
 
 class TimeFormula(Component):
@@ -172,6 +179,14 @@ class Periodic(Component, partial=True):
         goes_on = any_of(self.periods < 0, self.done < self.periods)
         return self.start_time + self.period * where(goes_on, self.done, _NEVER)
 
+    def completed(self, end: Expr) -> Expr:
+        """Return the number of completed shapes once one ends, that long after its beginning.
+
+        A run may start late: then all shapes before count as completed at once.
+        """
+        passed = floor((self.time - self.start_time - end) / self.period) + 1
+        return maximum(self.done + 1, where(self.periods < 0, passed, minimum(passed, self.periods)))
+
 
 class Pulse(Periodic):
     """Rectangular pulses."""
@@ -185,7 +200,8 @@ class Pulse(Periodic):
     def events(self) -> Events:
         begin = self.begin()
         yield self.stage.go("low", "high", at=begin)
-        yield self.stage.go("high", "low", at=begin + self.width * self.period, reset={self.done: self.done + 1})
+        high = self.width * self.period
+        yield self.stage.go("high", "low", at=begin + high, reset={self.done: self.completed(high)})
 
 
 class Trapezoid(Periodic):
@@ -210,7 +226,8 @@ class Trapezoid(Periodic):
         yield self.stage.go("low", "rising", at=begin)
         yield self.stage.go("rising", "high", at=high)
         yield self.stage.go("high", "falling", at=fall)
-        yield self.stage.go("falling", "low", at=fall + self.falling, reset={self.done: self.done + 1})
+        done = self.completed(self.rising + self.width + self.falling)
+        yield self.stage.go("falling", "low", at=fall + self.falling, reset={self.done: done})
 
 
 class Table(Component):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from components.friction import DryFriction, Rows
+from components.friction import DryFriction, Rows, Sticking
 from components.interfaces import LinearCompliantWithRelativeStates, LinearFlange, SlideInHousing
 from components.thermal import Lossy
 from modelica_like.language import (
@@ -24,6 +24,7 @@ from modelica_like.language import (
     param,
     signal_in,
     var,
+    where,
 )
 
 
@@ -101,15 +102,17 @@ class ElastoGap(Lossy, LinearCompliantWithRelativeStates):
         return (self.f + self.spring) * self.v_rel
 
 
-class SlideFriction(DryFriction, SlideInHousing, partial=True):
-    """Dry friction between a slide and the housing.
-
-    A tiny `creep` (1e-9) decides where the force of what sticks is undetermined: where another friction element holds
-    the same slide, or where its motion is prescribed and passes through zero.
-    """
+class SlideSticking(Sticking, partial=True):
+    """Surfaces of a slide that slide or stick."""
 
     creep: Parameter = param("1/kg", "acceleration while it sticks over its force", default=None, min=0)
     creep_time: Parameter = param("s", "time after which it creeps no faster", default=1e-3, min=0)
+    rest: Parameter = param("m/s", "velocity that a prescribed motion must exceed to break away", default=1e-12, min=0)
+
+
+class SlideFriction(SlideSticking, DryFriction, SlideInHousing, partial=True):
+    """Dry friction between a slide and the housing."""
+
     v: Variable = var("m/s", "velocity of the slide relative to the housing", state="always")
 
     @property
@@ -119,9 +122,6 @@ class SlideFriction(DryFriction, SlideInHousing, partial=True):
     @property
     def friction(self) -> Expr:
         return self.f
-
-    def creeping(self) -> Expr | float:
-        return self.creep * self.friction - self.slip / self.creep_time if self.given("creep") else 0.0
 
 
 class SupportFriction(SlideFriction):
@@ -172,7 +172,7 @@ class TranslationalBrake(SlideFriction):
         return self.cgeo * mu * (self.fn_max * self.f_normalized)
 
 
-class MassWithStopAndFriction(DryFriction):
+class MassWithStopAndFriction(SlideSticking, DryFriction):
     """Sliding mass between hard stops, with the friction of R. Stribeck.
 
     A mass that meets a stop comes to rest there at once, its kinetic energy is lost; the stop holds whatever presses
@@ -211,6 +211,9 @@ class MassWithStopAndFriction(DryFriction):
 
     def pressed(self) -> Expr:
         return any_of(super().pressed(), negate(self.stop.is_("none")))
+
+    def carried(self) -> Expr | float:
+        return where(self.stop.is_("none"), super().carried(), 0)
 
     def breaks_forward(self) -> Expr:
         return all_of(super().breaks_forward(), negate(self.stop.is_("right")))

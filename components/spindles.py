@@ -6,6 +6,7 @@ from math import pi
 
 from components.friction import DryFriction
 from components.interfaces import Flange, LinearFlange
+from components.slides import SlideSticking
 from modelica_like.language import Component, Equations, Expr, Parameter, Variable, der, param, var
 
 
@@ -25,7 +26,7 @@ class BallScrew(Component):
         yield 2 * pi * self.flange_r.tau == -self.lead * self.flange_t.f
 
 
-class MachineTable(DryFriction):
+class MachineTable(SlideSticking, DryFriction):
     """Machine table on a slideway: a mass with a constant process force, and dry friction with stiction."""
 
     flange_a = LinearFlange("drive side", free=True)

@@ -176,6 +176,42 @@ class StepFailed(SolveError):
     """The integrator gave up."""
 
 
+class NoGradient(SolveError):
+    """A derivative does not exist: an event only grazes, two coincide, or the mode sequence changes."""
+
+
+class ExportError(ModelicaLikeError):
+    """A model cannot be written as an FMU, or its C code cannot be compiled."""
+
+
+class FmuRefused(ModelicaLikeError):
+    """An FMU, or a file that should be one, is not fit to be run."""
+
+
+class FmuFailed(SolveError):
+    """An FMU told an error while it ran."""
+
+
+class FmuCrashed(FmuFailed):
+    """An FMU brought down the process in which it ran."""
+
+
+class FmuTimeout(FmuFailed):
+    """An FMU did not come to an end in time."""
+
+
+class CalibrationFailed(SolveError):
+    """A model could not be computed with any parameters that a calibration tried."""
+
+
+class WorkersLost(ModelicaLikeError):
+    """Processes or machines that did the runs of a sweep are gone."""
+
+
+class CheckpointMismatch(ModelicaLikeError):
+    """A checkpoint belongs to another sweep."""
+
+
 class MissingExtra(ModelicaLikeError):
     """An optional package is not installed."""
 

@@ -1,8 +1,19 @@
-"""Draw the pictures of these pages: python docs/examples/draw.py."""
+"""Draw the pictures of these pages: python docs/examples/draw.py [NAME...]."""
 
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import cycle
+from math import pi
 from pathlib import Path
+from typing import Any
 
-from modelica_like import simulate
+import matplotlib as mpl
+import numpy as np
+from matplotlib.figure import Figure
+
+from modelica_like import load, simulate
+from modelica_like.solve.plot import COLOURS, STYLE
 
 HERE = Path(__file__).parent
 EXAMPLES = HERE.parents[1] / "examples"
@@ -23,6 +34,7 @@ PICTURES: dict[str, tuple[str, ...]] = {
         "selector.gear",
     ),
     "dc_bench": ("motor.w", "clutch_pulley.w", "flywheel.w", "motor.ia", "generator.v", "clutch.tau"),
+    "dc_machines/series_runaway": ("machine.w", "machine.ia", "machine.tau_electrical"),
     "msl/rotational/First": ("inertia1.w", "inertia2.w", "inertia3.w", "torque.tau", "spring.tau"),
     "msl/rotational/Friction": ("inertia3.w", "inertia2.w", "inertia1.w", "clutch.tau", "brake.tau"),
     "msl/rotational/CoupledClutches": ("J1.w", "J2.w", "J3.w", "J4.w", "clutch1.tau", "clutch2.tau", "clutch3.tau"),
@@ -39,14 +51,169 @@ PICTURES: dict[str, tuple[str, ...]] = {
 END = {"fan": "4 s", "ravigneaux": "20 ms"}
 
 
-def main() -> None:
-    """Run every example and save its picture."""
+# -- curves that no single run shows -----------------------------------------------------------------------------------
+
+RPM = 30 / pi
+SET_C = {"k": 0.04768, "R": 0.7291, "friction": 0.04457}
+DASHED = {"printed lines": (0, (4, 4)), "separately excited": (0, (4, 4)), "shunt": (0, (1, 3))}
+READINGS: dict[str, dict[str, Any]] = {
+    "S: the netlist": {},
+    "literal": {"force": "5257.7001 N", "coil.start_current": "1 - 1/72.51"},
+    "µ = 0.133": {"clutch.mu_min": 0.133, "clutch.curvature": 0, "clutch.slope": 0},
+    "B: 725 N": {"force": "725 N"},
+    "S, R = 0.13 m": {"radius": "0.13 m"},
+    "B, load with w²": {"force": "725 N", "load_exponent": 2},
+    "A, E: 72.5 N": {"force": "72.5 N"},
+}
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A named curve."""
+
+    name: str
+    x: Any
+    y: Any
+
+
+def panels(title: str, xlabel: str, rows: Mapping[str, Sequence[Curve]]) -> Figure:
+    """Draw curves in rows, one per quantity; those of one name have one colour."""
+    names = list(dict.fromkeys(curve.name for row in rows.values() for curve in row))
+    colours = dict(zip(names, cycle(COLOURS), strict=False))
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(8.0, 0.8 + 2.1 * len(rows)), layout="constrained")
+        told: set[str] = set()
+        for axes, (label, row) in zip(figure.subplots(len(rows), 1, sharex=True), rows.items(), strict=True):
+            for curve in row:
+                style = DASHED.get(curve.name, "-")
+                axes.plot(curve.x, curve.y, linestyle=style, label=curve.name, color=colours[curve.name])
+            axes.set_ylabel(label)
+            if {curve.name for curve in row} != told:
+                axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
+            told = {curve.name for curve in row}
+        axes.set_xlabel(xlabel)
+        figure.suptitle(title, x=0.01, ha="left", fontsize=11, fontweight="bold")
+    return figure
+
+
+def characteristic_rows(curves: Mapping[str, tuple[Any, Any, Any, Any]]) -> dict[str, list[Curve]]:
+    """Return speed, current and efficiency over torque; each curve is (torque in N.m, 1/min, A, efficiency)."""
+    rows: dict[str, list[Curve]] = {"speed n in 1/min": [], "current I in A": [], "efficiency": []}
+    for name, (torque, *values) in curves.items():
+        for row, value in zip(rows.values(), values, strict=True):
+            row.append(Curve(name, torque, value))
+    return rows
+
+
+def characteristic(netlist: str, machine: str, **values: float) -> tuple[Any, Any, Any, Any]:
+    """Run a slowly growing load; only where the machine drives it has it an efficiency."""
+    run = simulate(EXAMPLES / netlist, parameters=values)
+    supplies = [name for name in ("battery", "exciter") if f"{name}.v" in run]
+    power = sum(run[f"{name}.source_power"] for name in supplies)
+    efficiency = np.where(run["shaft.tau"] > 0, run["shaft.power"] / power, np.nan)
+    return run["shaft.tau"], run[f"{machine}.w"] * RPM, -run["battery.i"], efficiency
+
+
+def motor_curves() -> Figure:
+    """The motor of the bench: sets A and C, and the lines that the document prints."""
+    torque = np.linspace(0, 0.25, 100)
+    speed, current = 4736.5 - 3480 * torque, 1.06 + 20 * torque
+    curves = {
+        "set A": characteristic("dc_bench_motor.toml", "motor"),
+        "set C": characteristic("dc_bench_motor.toml", "motor", **SET_C),
+        "printed lines": (torque, speed, current, torque * speed / RPM / (24 * current)),
+    }
+    return panels("dc_bench_motor", "torque M in N·m", characteristic_rows(curves))
+
+
+def machine_curves() -> Figure:
+    """The four types of DC machine, and one with a weaker field."""
+    curves = {
+        "permanent magnet": characteristic("dc_machines/permanent_magnet.toml", "machine"),
+        "separately excited": characteristic("dc_machines/separately_excited.toml", "machine"),
+        "… with half the field": characteristic("dc_machines/separately_excited.toml", "machine", excitation=12.0),
+        "shunt": characteristic("dc_machines/shunt.toml", "machine"),
+        "series": characteristic("dc_machines/series.toml", "machine", first_load=0.4),
+    }
+    return panels("dc_machines", "torque M in N·m", characteristic_rows(curves))
+
+
+def startups() -> Figure:
+    """Both halves of the clutch and the torques, with the two values of damping."""
+    rows: dict[str, list[Curve]] = {}
+    for h1 in (10.0, 1.2):
+        run = simulate(EXAMPLES / "machine_tool_startup.toml", "0.8 s", parameters={"h1": h1}, points=1600)
+        for label, names, sign in (
+            (f"speed in rad/s, h1 = {h1:g}", {"ω2, motor side": "J2.w", "ω3, load side": "J3.w"}, 1),
+            (
+                f"torque in N·m, h1 = {h1:g}",
+                {"shaft 1": "shaft1.tau", "clutch": "clutch.tau"},
+                -1,
+            ),
+        ):
+            rows[label] = [Curve(name, run.time, sign * run[path]) for name, path in names.items()]
+    return panels("machine_tool_startup", "time in s", rows)
+
+
+def readings() -> Figure:
+    """The load side's speed and the clutch's torque, for each reading of the document's formulas."""
+    rows: dict[str, list[Curve]] = {"speed ω3 in rad/s": [], "clutch torque in N·m": []}
+    for name, values in READINGS.items():
+        drive = load(EXAMPLES / "machine_tool_startup.toml")
+        for path, value in values.items():
+            drive.set(path, value)
+        run = simulate(drive, "2 s", points=2000)
+        for row, value in zip(rows.values(), (run["J3.w"], -run["clutch.tau"]), strict=True):
+            row.append(Curve(name, run.time, value))
+    return panels("machine_tool_startup, other readings", "time in s", rows)
+
+
+def release() -> Figure:
+    """The bench's clutch is switched off again after 2 s."""
+    run = simulate(EXAMPLES / "dc_bench.toml", "4.5 s", parameters={"on_time": 2.0})
+    return run.plot("motor.w", "generator.w", "motor.ia", "clutch.tau")
+
+
+def overload() -> Figure:
+    """The bench's generator is loaded until the clutch slips."""
+    drive = {"overload": 4.0, "overload_start": 1.0, "overload_time": 4.0}
+    run = simulate(EXAMPLES / "dc_bench.toml", "4.6 s", parameters=drive)
+    return run.plot("motor.w", "generator.w", "motor.ia", "sink.i", "clutch.tau")
+
+
+def direct_switch_on() -> Figure:
+    """The bench's motor is switched on from rest."""
+    values = {"motor_start": 0.0, "switch_on": 10.0}
+    run = simulate(EXAMPLES / "dc_bench.toml", "0.3 s", parameters=values)
+    return run.plot("motor.w", "motor.ia", "motor.tau_electrical")
+
+
+FIGURES: dict[str, Callable[[], Figure]] = {
+    "dc_bench_motor": motor_curves,
+    "dc_bench_release": release,
+    "dc_bench_overload": overload,
+    "dc_bench_direct": direct_switch_on,
+    "dc_machines": machine_curves,
+    "machine_tool_damping": startups,
+    "machine_tool_readings": readings,
+}
+
+
+def save(figure: Figure, name: str) -> None:
+    """Write a small picture."""
+    figure.savefig(HERE / "pictures" / f"{name}.png", dpi=60, pil_kwargs={"optimize": True})
+
+
+def main(*wanted: str) -> None:
+    """Run every example and save its picture; with names only those pictures."""
     for netlist, shown in PICTURES.items():
-        run = simulate(EXAMPLES / f"{netlist}.toml", END.get(netlist))
-        picture = run.plot(*shown)
-        target = HERE / "pictures" / f"{Path(netlist).name}.png"
-        picture.savefig(target, dpi=60, pil_kwargs={"optimize": True})
+        if not wanted or Path(netlist).name in wanted:
+            run = simulate(EXAMPLES / f"{netlist}.toml", END.get(netlist))
+            save(run.plot(*shown), Path(netlist).name)
+    for name, figure in FIGURES.items():
+        if not wanted or name in wanted:
+            save(figure(), name)
 
 
 if __name__ == "__main__":
-    main()
+    main(*sys.argv[1:])

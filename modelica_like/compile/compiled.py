@@ -36,6 +36,7 @@ class CompiledTransition:
         target: number of the mode it enters.
         timed: whether `index` is a position in the moments rather than in the guards.
         resets: what else changes.
+        notice: what the user is told when it happens.
     """
 
     mode: int
@@ -45,6 +46,7 @@ class CompiledTransition:
     index: int
     resets: tuple[Reset, ...]
     source: Source
+    notice: str = ""
 
 
 @dataclass(frozen=True)
@@ -54,6 +56,15 @@ class StartEntry:
     node: int
     state: tuple[int, float] | None
     strength: str
+
+
+@dataclass(frozen=True)
+class CompiledTerminal:
+    """An open end of the model: the path of its adaptor, its kind, and pairs of a member and the variable behind it."""
+
+    name: str
+    kind: str
+    members: tuple[tuple[str, str], ...]
 
 
 @dataclass(eq=False)
@@ -82,6 +93,10 @@ class CompiledDae:
         p: parameter values.
         components: paths of the components of the energy balance.
         places: where the parts of netlists stand, by path.
+        terminals: open ends with an adaptor.
+        singular: names and origins of the blocks of `determinants`.
+        implicit_blocks: names and origins of the blocks of `alg`.
+        motion_sources: paths of the components that prescribe a motion, whatever torque or force it takes.
     """
 
     name: str
@@ -122,6 +137,9 @@ class CompiledDae:
     components: tuple[str, ...]
     places: dict[str, Source]
     summary: str
+    terminals: tuple[CompiledTerminal, ...] = ()
+    implicit_blocks: tuple[tuple[tuple[str, ...], tuple[Origin, ...]], ...] = ()
+    motion_sources: tuple[str, ...] = ()
     settings: dict[str, Any] = field(default_factory=dict)
     _make_energy: Callable[[], ca.Function] | None = field(default=None, repr=False)
     _cache: dict[Any, Any] = field(default_factory=dict, repr=False)

@@ -8,14 +8,18 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from modelica_like.compile.compiled import CompiledDae, CompiledTransition, Reset, StartEntry, Vector
+from modelica_like.compile.compiled import CompiledDae, CompiledTerminal, CompiledTransition, Reset, StartEntry, Vector
 from modelica_like.compile.energy import energy_terms
 from modelica_like.compile.soon import guards_soon
 from modelica_like.compile.start_system import start_system
 from modelica_like.errors import Source
 from modelica_like.flatten.model import FlatDiscrete, FlatModel, evaluate
 from modelica_like.flatten.template import TransitionForm
+from modelica_like.language.fields import Input
 from modelica_like.structure.reduce import ReducedDae
+
+_SOURCE_POWER = 2
+_EFFORTS = ("N", "N.m")
 
 
 def compile(reduced: ReducedDae) -> CompiledDae:
@@ -63,6 +67,9 @@ def compile(reduced: ReducedDae) -> CompiledDae:
         u=_input_values(flat),
         components=tuple(flat.components),
         places=_places(flat),
+        terminals=_terminals(flat),
+        implicit_blocks=reduced.implicit_blocks,
+        motion_sources=_motion_sources(flat),
         summary=str(reduced),
         settings=dict(getattr(flat.components.get(""), "simulate", {})),
         _make_energy=lambda: build.function("energy", energy_terms(reduced)),
@@ -75,14 +82,40 @@ def _places(flat: FlatModel) -> dict[str, Source]:
     return {path: source for path, source in found.items() if source.file}
 
 
+def _terminals(flat: FlatModel) -> tuple[CompiledTerminal, ...]:
+    """Adaptors that nothing inside drives, with the variables that form their terminals."""
+    inputs = {flat.variables[k].path for k in flat.inputs}
+    found: list[CompiledTerminal] = []
+    for path, one in flat.components.items():
+        if one.terminal is not None and path:
+            members = tuple((name, f"{path}.{name}") for name in one.terminal_members())
+            if all(full in inputs for name, full in members if isinstance(one.fields[name], Input)):
+                found.append(CompiledTerminal(path, one.terminal.kind, members))
+    return tuple(found)
+
+
+def _motion_sources(flat: FlatModel) -> tuple[str, ...]:
+    """Components whose power from outside depends on the torque or force that their connectors happen to carry."""
+    kinds = {one.path: one for one in flat.variables}
+    found: list[str] = []
+    for instance in flat.instances:
+        prefix = f"{instance.path}." if instance.path else ""
+        slots = [kinds[prefix + slot.path] for slot in instance.template.energy_slots]
+        power = instance.template.energy.sparsity_jac(0, 0) if slots else ca.Sparsity(3, 0)
+        rows = zip(*power.get_triplet(), strict=True)
+        if any(row == _SOURCE_POWER and slots[k].kind == "flow" and str(slots[k].unit) in _EFFORTS for row, k in rows):
+            found.append(instance.path)
+    return tuple(found)
+
+
 def _plain(discrete: FlatDiscrete) -> FlatDiscrete:
     """Drop a symbolic start: the function `discrete_starts` has it."""
     return discrete if isinstance(discrete.start, int | float) else replace(discrete, start=0.0)
 
 
 def _input_values(flat: FlatModel) -> Vector:
-    root = flat.components[""]
-    given = [root.value(flat.variables[k].path) for k in flat.inputs]
+    places = [flat.variables[k].path.rpartition(".") for k in flat.inputs]
+    given = [flat.components[path].value(name) for path, _, name in places]
     return np.array([0.0 if value is None or value.number is None else value.number for value in given], float)
 
 
@@ -123,8 +156,9 @@ class _Builder:
         self, prefix: str, form: TransitionForm, index: int, resets: tuple[Reset, ...]
     ) -> CompiledTransition:
         return CompiledTransition(
-            self.place[prefix + form.mode], form.sources, form.target, form.timed, index, resets, form.source
-        )
+            self.place[prefix + form.mode], form.sources, form.target, form.timed, index, resets, form.source,
+            form.notice,
+        )  # fmt: skip
 
     def _reset(self, path: str, value: int, targets: list[int]) -> Reset:
         if path in self.place:

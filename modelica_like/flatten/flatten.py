@@ -23,30 +23,32 @@ from modelica_like.flatten.template import Template, template_of
 from modelica_like.flatten.wiring import Wiring
 from modelica_like.language.component import Component
 from modelica_like.language.declared import Declared
-from modelica_like.language.expr import TIME
+from modelica_like.language.expr import TIME, flagged_motion
 from modelica_like.language.fields import Discrete, Input, Output, Parameter, Variable
 from modelica_like.units import ONE
 
 _WIRE = Source("")
 
 
-def flatten(root: Component) -> FlatModel:
+def flatten(root: Component, *, open_inputs: bool = False) -> FlatModel:
     """Write out all equations of a component tree.
 
     Args:
         root: the model; its own inputs become inputs of the flat model.
+        open_inputs: whether unconnected inputs of adaptors, and of parts that give them no value, do so as well.
 
     Raises:
         WiringErrors, WrongConnection, FreeFlange, MissingValue: everything wrong with the wiring, told together.
         LanguageError, UnitMismatch: a component class is declared wrongly.
         CyclicAssembly: parameters depend on each other in a circle.
     """
-    return _Flattener(root).run()
+    return _Flattener(root, open_inputs).run()
 
 
 class _Flattener:
-    def __init__(self, root: Component) -> None:
+    def __init__(self, root: Component, open_inputs: bool) -> None:
         self.root = root
+        self.open_inputs = open_inputs
         self.wiring = Wiring()
         self.parameters = Parameters(root)
         self.variables: list[FlatVariable] = []
@@ -58,6 +60,7 @@ class _Flattener:
         self.linear: list[LinearEquation] = []
         self.starts: list[StartValue] = []
         self.inputs: list[int] = []
+        self.flags: list[tuple[Any, int]] = []
         self.errors: list[ModelicaLikeError] = []
 
     def run(self) -> FlatModel:
@@ -69,6 +72,7 @@ class _Flattener:
         self._connect()
         for component, _ in templates:
             self._bind_inputs(component)
+            self._relate_inputs(component)
             self._read_starts(component)
             self.wiring.check_free(component)
         self.wiring.check_signal_units()
@@ -84,7 +88,7 @@ class _Flattener:
             derived=self.parameters.derived, formulas=self.parameters.formulas(),
             discretes=self.discretes, d=d, time=ca.SX(TIME), instances=instances, linear=self.linear,
             general=general, starts=self.starts, inputs=self.inputs,
-            components={component.path: component for component, _ in templates},
+            components={component.path: component for component, _ in templates}, flags=tuple(self.flags),
         )  # fmt: skip
 
     def _elaborate(self) -> list[tuple[Component, Template]]:
@@ -164,7 +168,12 @@ class _Flattener:
 
     def _parameter(self, component: Component, path: str) -> int:
         *names, name = path.split(".")
-        return self.parameters.position(component.find(".".join(names)), name)
+        owner = component.find(".".join(names))
+        if motion := flagged_motion(name):
+            flag = ca.SX.sym(f"{owner.path}.{name}")
+            self.flags.append((flag, self.variable_of[id(owner), motion]))
+            return self.parameters.add(flag)
+        return self.parameters.position(owner, name)
 
     def _node(self, variable: int, order: int) -> int:
         node = variable
@@ -213,7 +222,7 @@ class _Flattener:
                 continue
             node = self.variable_of[id(component), name]
             path = self.variables[node].path
-            if component is self.root:
+            if component is self.root or self._is_open(component, name):
                 self.inputs.append(node)
             elif component.value(name) is not None:
                 value = self.parameters.q(self.parameters.declare(component, name, path))
@@ -226,6 +235,19 @@ class _Flattener:
                         advice="Connect it or give it a value.",
                     )
                 )
+
+    def _relate_inputs(self, component: Component) -> None:
+        """Say which open inputs of an adaptor are derivatives of each other."""
+        if component.terminal is None:
+            return
+        for name, rate in component.terminal.rates:
+            nodes = [self.variable_of[id(component), one] for one in (name, rate)]
+            if all(node in self.inputs for node in nodes):
+                terms = ((self._node(nodes[0], 1), 1.0), (nodes[1], -1.0))
+                self.linear.append(LinearEquation(terms, 0.0, Origin(component.path, type(component).__name__, _WIRE)))
+
+    def _is_open(self, component: Component, name: str) -> bool:
+        return self.open_inputs and (component.terminal is not None or component.value(name) is None)
 
     def _read_starts(self, component: Component) -> None:
         for name, field in component.fields.items():

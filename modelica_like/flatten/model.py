@@ -152,6 +152,8 @@ class FlatModel:
         general: (instance, row) of the remaining equations.
         inputs: variables that come from outside.
         components: the tree the model was made from.
+        flags: symbols in q that say whether the motion of a variable is prescribed, with that variable; once the
+            structure is known there are none.
     """
 
     name: str
@@ -172,6 +174,7 @@ class FlatModel:
     starts: list[StartValue]
     inputs: list[int]
     components: dict[str, Component] = field(repr=False)
+    flags: tuple[tuple[Any, int], ...] = ()
 
     def node_name(self, node: int) -> str:
         """Return the name of a node: `motor.phi`, `der(motor.phi)`."""

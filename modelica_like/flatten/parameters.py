@@ -49,9 +49,13 @@ class Parameters:
         else:
             with component.at_its_place(name):
                 expression = self._dependent(component, name, path, value)
-        self._position[key] = len(self._q)
-        self._q.append(expression)
+        self._position[key] = self.add(expression)
         return self._position[key]
+
+    def add(self, expression: Any) -> int:
+        """Append an expression to q; return its position."""
+        self._q.append(expression)
+        return len(self._q) - 1
 
     def _independent(self, component: Component, name: str, path: str, value: Value) -> Any:
         field = component.fields[name]

@@ -19,7 +19,7 @@ from modelica_like.language.equation import (
     FreeEnd,
     as_statement,
 )
-from modelica_like.language.expr import TIME, Symbol, is_expression, symbols_in
+from modelica_like.language.expr import TIME, Symbol, flagged_motion, is_expression, symbols_in
 from modelica_like.language.fields import Parameter, Variable
 from modelica_like.language.places import located
 from modelica_like.language.transition import StartMode, Transition, as_event
@@ -60,6 +60,7 @@ class TransitionForm:
         timed: whether it is a time event.
         index: position in the guards, or in the moments.
         resets: pairs of what is reset (slot path) and the position in the resets.
+        notice: what the user is told when it happens.
     """
 
     mode: str
@@ -69,6 +70,7 @@ class TransitionForm:
     index: int
     resets: tuple[tuple[str, int], ...]
     source: Source
+    notice: str
 
 
 @dataclass(frozen=True)
@@ -122,7 +124,7 @@ class Names:
         kind = symbol.owner.fields.get(symbol.name)
         if isinstance(kind, Variable):
             self.variables.setdefault(Slot(path, symbol.order), symbol)
-        elif isinstance(kind, Parameter):
+        elif isinstance(kind, Parameter) or flagged_motion(symbol.name):
             self.parameters.setdefault(path, symbol)
         else:
             self.discretes.setdefault(path, symbol)
@@ -249,6 +251,7 @@ def _transition_forms(component: Component, transitions: list[Transition]) -> tu
                 index,
                 tuple(resets),
                 t.source,
+                t.notice,
             )
         )
     return tuple(forms)

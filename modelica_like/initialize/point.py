@@ -14,6 +14,7 @@ import numpy as np
 from modelica_like.compile.buffers import buffered
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import InitializationError, SingularAtStart
+from modelica_like.initialize.singular import implicit_singular, singular_block
 
 _MAX_NEWTON = 50
 
@@ -52,7 +53,7 @@ def solve_implicit(model: CompiledDae, point: Point) -> None:
         residual = call(model, model.alg, point)
         jacobian = np.asarray(model.alg_jacobian(point.t, point.x, point.z, model.p, model.u, point.d).full())
         if not np.all(np.isfinite(residual)) or np.linalg.matrix_rank(jacobian) < len(residual):
-            raise _singular(model, point, [tuple(model.implicit)], ())
+            raise implicit_singular(model, point.t, point.d, jacobian)
         step = np.linalg.solve(jacobian, -residual)
         point.z = point.z + step
         change = float(np.max(np.abs(step) / (1.0 + np.abs(point.z))))
@@ -72,41 +73,15 @@ def check_singular(model: CompiledDae, point: Point) -> None:
         SingularAtStart: one has not.
     """
     determinants = call(model, model.determinants, point)
-    for value, (names, origins) in zip(determinants, model.singular, strict=True):
-        if not np.isfinite(value) or abs(value) < 1e-12:
-            raise _singular(model, point, [names], tuple(dict.fromkeys(o.source for o in origins)))
-    rates = call(model, model.ode, point)
-    for name, rate in zip(model.states, rates, strict=True):
-        if not np.isfinite(rate):
-            raise SingularAtStart(
-                f"The derivative of {name} is not finite at t = {point.t:.9g} s.",
-                advice="Look for a mass, inertia or ratio of zero, or a function outside its domain.",
-            )
-
-
-def _singular(model: CompiledDae, point: Point, blocks: list[tuple[str, ...]], where: Any) -> SingularAtStart:
-    names = [name for block in blocks for name in block]
-    number = 1 + next((k for k, (known, _) in enumerate(model.singular) if known == blocks[0]), 0)
-    stuck = [
-        one.path.rpartition(".")[0]
-        for k, one in enumerate(model.flat_discretes)
-        if one.names and one.names[int(point.d[k])] == "stuck"
-    ]
-    held = [name for name in names if name.rpartition(".")[0] in stuck]
-    told = held if len(stuck) > 1 and held else names
-    shown = ", ".join(told[:6]) + (", …" if len(told) > 6 else "")
-    if len(stuck) > 1:
-        why = f"{' and '.join(stuck)} stick: where they hold the same motion, their torque split is undetermined."
-        advice = "Make one compliant, or let one start open."
-    else:
-        why = "Its equations do not determine all of its unknowns there."
-        advice = 'Start elsewhere, or let other variables be states (state="always").'
-    return SingularAtStart(
-        f"The Jacobian is singular at t = {point.t:.9g} s in block {number} ({shown}).",
-        where=where,
-        why=why,
-        advice=advice,
-    )
+    regular = np.isfinite(determinants) & (np.abs(determinants) >= 1e-12)
+    if not regular.all():
+        raise singular_block(model, point.t, point.d, int(np.argmin(regular)))
+    finite = np.isfinite(call(model, model.ode, point))
+    if not finite.all():
+        raise SingularAtStart(
+            f"The derivative of {model.states[int(np.argmin(finite))]} is not finite at t = {point.t:.9g} s.",
+            advice="Look for a mass, inertia or ratio of zero, or a function outside its domain.",
+        )
 
 
 def variable_slopes(model: CompiledDae, point: Point, nodes: list[int]) -> Vector:

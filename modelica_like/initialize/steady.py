@@ -24,7 +24,7 @@ def solve_steady(model: CompiledDae, point: Point) -> None:
     arguments = list(model.arguments.values())
     x, z = model.arguments["x"], model.arguments["z"]
     equations = ca.vertcat(model.ode(*arguments), model.alg(*arguments))
-    moving = [k for k, depends in enumerate(ca.which_depends(equations, x, 1, False)) if depends]
+    moving = moving_states(model)
     rows = [*moving, *range(len(model.states), len(model.states) + len(model.implicit))]
     unknowns = ca.vertcat(*(x[k] for k in moving), z)
     function = ca.Function("steady", arguments, [equations[rows], ca.jacobian(equations[rows], unknowns)])
@@ -44,6 +44,13 @@ def solve_steady(model: CompiledDae, point: Point) -> None:
             f"No steady state was found at t = {point.t:g} s: {name} keeps changing.",
             advice="Check that the drive can be in equilibrium there, or give start values instead.",
         )
+
+
+def moving_states(model: CompiledDae) -> list[int]:
+    """Positions of the states that something depends on; the others, absolute angles, never settle."""
+    arguments = list(model.arguments.values())
+    equations = ca.vertcat(model.ode(*arguments), model.alg(*arguments))
+    return [k for k, depends in enumerate(ca.which_depends(equations, model.arguments["x"], 1, False)) if depends]
 
 
 def check_modes_hold(model: CompiledDae, point: Point) -> None:

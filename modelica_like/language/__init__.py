@@ -31,11 +31,13 @@ from modelica_like.language.functions import atan2 as atan2
 from modelica_like.language.functions import cos as cos
 from modelica_like.language.functions import der as der
 from modelica_like.language.functions import exp as exp
+from modelica_like.language.functions import floor as floor
 from modelica_like.language.functions import interpolate as interpolate
 from modelica_like.language.functions import log as log
 from modelica_like.language.functions import maximum as maximum
 from modelica_like.language.functions import minimum as minimum
 from modelica_like.language.functions import negate as negate
+from modelica_like.language.functions import prescribed as prescribed
 from modelica_like.language.functions import sign as sign
 from modelica_like.language.functions import sin as sin
 from modelica_like.language.functions import sqrt as sqrt
@@ -43,4 +45,5 @@ from modelica_like.language.functions import tan as tan
 from modelica_like.language.functions import tanh as tanh
 from modelica_like.language.functions import where as where
 from modelica_like.language.mode import Mode as Mode
+from modelica_like.language.terminal import Terminal as Terminal
 from modelica_like.language.transition import Events as Events

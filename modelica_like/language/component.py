@@ -6,12 +6,13 @@ from collections.abc import Generator, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar, cast, dataclass_transform
 
-from modelica_like.errors import DuplicateName, LanguageError, ModelicaLikeError, Source
+from modelica_like.errors import DuplicateName, LanguageError, ModelicaLikeError, NetlistError, Source
 from modelica_like.language.declared import Connector, Declared, unknown
 from modelica_like.language.expr import TIME, Expr
-from modelica_like.language.fields import Discrete, Field, Input, Parameter, Value, param, require_identifier
+from modelica_like.language.fields import Discrete, Field, Input, Output, Parameter, Value, param, require_identifier
 from modelica_like.language.mode import Mode
 from modelica_like.language.places import NOWHERE, caller
+from modelica_like.language.terminal import Terminal
 
 if TYPE_CHECKING:
     from modelica_like.language.equation import Equations
@@ -28,6 +29,7 @@ class Component(Declared):
 
     inlet: ClassVar[str] = ""
     outlet: ClassVar[str] = ""
+    terminal: ClassVar[Terminal | None] = None
     _partial: ClassVar[bool] = True
     _class_connectors: ClassVar[dict[str, Connector]] = {}
     _class_parts: ClassVar[dict[str, Component | list[Component]]] = {}
@@ -129,6 +131,7 @@ class Component(Declared):
         elif name in self._class_modes:
             self._class_modes[name].__set__(self, value)
         elif name in self._structural:
+            self.check_structural(name, value)
             self._set_structural(name, value)
             self.build()
         elif name in self._parts and name in self._replaceable and _is_part(value):
@@ -158,6 +161,22 @@ class Component(Declared):
     def set_start_mode(self, name: str, target: str) -> None:
         """Store the mode at the start."""
         self._start_modes[name] = target
+
+    @classmethod
+    def check_structural(cls, name: str, value: Any) -> None:
+        """Check that the value for a structural field has the type of its default.
+
+        Raises:
+            NetlistError: it has another type.
+        """
+        wanted = cast("type[object]", type(cls._structural[name]))
+        if wanted not in (bool, int, float, str) or (
+            isinstance(value, wanted) and isinstance(value, bool) == (wanted is bool)
+        ):
+            return
+        if not (wanted is float and isinstance(value, int) and not isinstance(value, bool)):
+            names = {bool: "true or false", int: "a whole number", float: "a number", str: "a text"}
+            raise NetlistError(f"{cls.__name__}.{name} = {value!r} must be {names[wanted]}.")
 
     def _set_structural(self, name: str, value: Any) -> None:
         if value is _REQUIRED:
@@ -267,6 +286,10 @@ class Component(Declared):
     def outlet_connector(self) -> Connector:
         """Return the connector that `series` joins to the part after."""
         return self._end("outlet", ("flange_b", "flange"))
+
+    def terminal_members(self) -> tuple[str, ...]:
+        """Return the names of the signals that form the terminal of an adaptor."""
+        return tuple(name for name, field in self.fields.items() if isinstance(field, Input | Output))
 
     def _end(self, which: str, usual: tuple[str, ...]) -> Connector:
         names = (getattr(type(self), which),) if getattr(type(self), which) else usual

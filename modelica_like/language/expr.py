@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Any, cast
 from weakref import WeakValueDictionary
 
@@ -86,6 +87,20 @@ def symbol_of(owner: Any, name: str, order: int = 0) -> Symbol:
 def symbols_in(expression: Expr) -> list[Symbol]:
     """Return the symbols that occur in an expression."""
     return [_symbols[leaf_id(leaf)] for leaf in ca.symvar(ca.SX(cast(Any, expression)))]
+
+
+_FLAG = re.compile(r"prescribed\((\w+)\)")
+
+
+def flag_name(name: str) -> str:
+    """Return the name of the symbol that says whether a motion is prescribed."""
+    return f"prescribed({name})"
+
+
+def flagged_motion(name: str) -> str:
+    """Return the name of the motion of such a symbol, or nothing if it is another symbol."""
+    found = _FLAG.fullmatch(name)
+    return found.group(1) if found else ""
 
 
 TIME = Symbol(None, "time")

@@ -9,7 +9,7 @@ from typing import Any, cast
 import casadi as ca
 
 from modelica_like.errors import LanguageError
-from modelica_like.language.expr import TIME, Expr, Scalar, Symbol, symbols_in
+from modelica_like.language.expr import TIME, Expr, Scalar, Symbol, flag_name, symbol_of, symbols_in
 
 
 def _sx(value: Scalar) -> Any:
@@ -25,6 +25,22 @@ def der(expression: Expr) -> Expr:
         rate: Any = 1.0 if symbol is TIME else _rate(symbol)
         total = total + ca.jacobian(_sx(expression), symbol) * rate
     return total
+
+
+def prescribed(motion: Expr) -> Expr:
+    """Return 1 where the model prescribes a motion, whatever torque or force it takes, and 0 where these move it.
+
+    That follows from the structure of the whole model; it never changes during a run.
+
+    Args:
+        motion: a speed of the component, whose derivative stands in the same equation.
+
+    Raises:
+        LanguageError: it is no variable.
+    """
+    if not isinstance(motion, Symbol) or motion is TIME or motion.order:
+        raise LanguageError(f"prescribed({motion}): only a variable can be prescribed.")
+    return symbol_of(motion.owner, flag_name(motion.name))
 
 
 def _rate(symbol: Symbol) -> Expr | float:
@@ -80,6 +96,11 @@ def absolute(x: Scalar) -> Expr:
 def sign(x: Scalar) -> Expr:
     """Sign: -1, 0 or 1."""
     return ca.sign(_sx(x))
+
+
+def floor(x: Scalar) -> Expr:
+    """Return the largest whole number that is not above a value, without an event: for what changes at events."""
+    return ca.floor(_sx(x))
 
 
 def minimum(x: Scalar, y: Scalar) -> Expr:

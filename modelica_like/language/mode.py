@@ -116,9 +116,12 @@ class BoundMode:
 
     def go(
         self, source: str | tuple[str, ...], target: str, *, when: Expr | None = None, at: Scalar | None = None,
-        reset: Mapping[Expr, Scalar] | None = None,
+        reset: Mapping[Expr, Scalar] | None = None, notice: str = "",
     ) -> Transition:  # fmt: skip
         """Declare a transition: a state event (`when`) or a time event (`at`).
+
+        With a `notice`, such as "exceeds {w_max} rad/s", the report of a run says that it happened: the name of the
+        component comes first, and values of its parameters stand for their names.
 
         Raises:
             UnknownName: a mode does not exist.
@@ -130,7 +133,7 @@ class BoundMode:
         if (when is None) == (at is None):
             raise LanguageError(f"{self.mode.label}.go(…, '{target}') needs either `when=` or `at=`.")
         moment = None if at is None else cast(Expr, ca.SX(cast(Any, at)))
-        return Transition(self, sources, target, when, moment, dict(reset or {}))
+        return Transition(self, sources, target, when, moment, dict(reset or {}), notice=notice)
 
     def initially(self, target: str, *, when: Expr) -> StartMode:
         """Declare the mode at the start, if the condition holds there."""

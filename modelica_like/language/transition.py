@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
-from modelica_like.errors import LanguageError, Source
+from modelica_like.errors import LanguageError, Source, did_you_mean
 from modelica_like.language.expr import TIME, Expr, Symbol, symbols_in
-from modelica_like.language.fields import Discrete, Input, Variable
+from modelica_like.language.fields import Discrete, Input, Parameter, Variable
 from modelica_like.language.places import NOWHERE
+
+NAME_IN_NOTICE = re.compile(r"\{(\w+)\}")
+"""A parameter in the notice of a transition."""
 
 
 class NamedModes(Protocol):
@@ -45,6 +49,7 @@ class Transition:
         when: condition of a state event, or None.
         at: time of a time event in s, or None.
         reset: new values of states and discrete values.
+        notice: what the user is told when it happens, without the name of the component.
     """
 
     mode: ModeOf
@@ -54,6 +59,7 @@ class Transition:
     at: Expr | None
     reset: Mapping[Expr, Any]
     source: Source = NOWHERE
+    notice: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +85,7 @@ def as_event(item: Any, source: Source, component: str) -> EventStatement:
     """
     if isinstance(item, Transition):
         _check_transition(item, source, component)
+        _check_notice(item, source, component)
     if isinstance(item, Transition | StartMode):
         return replace(item, source=source)
     raise LanguageError(
@@ -106,6 +113,19 @@ def _check_transition(transition: Transition, source: Source, component: str) ->
                 f"{component}: a reset gives {target} a value, which is neither a variable nor a discrete value.",
                 where=source,
                 advice="Reset variables of this component, as in reset={self.w: 0}; `go` itself changes the mode.",
+            )
+
+
+def _check_notice(transition: Transition, source: Source, component: str) -> None:
+    """Check that the names in a notice are parameters."""
+    fields = transition.mode.symbol.owner.fields
+    parameters = [name for name, field in fields.items() if isinstance(field, Parameter)]
+    for name in NAME_IN_NOTICE.findall(transition.notice):
+        if name not in parameters:
+            raise LanguageError(
+                f"{component}: the notice of an event names {name}, "
+                f"which is no parameter{did_you_mean(name, parameters) or '.'}",
+                where=source,
             )
 
 

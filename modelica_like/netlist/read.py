@@ -172,21 +172,9 @@ def new_component(kind: type[Component], values: dict[str, Any]) -> Component:
     """Make a component; its structural fields must be known at once, because they decide which parts it has."""
     structural = {key: values.pop(key) for key in kind._structural if key in values}
     for key, value in structural.items():
-        _check_structural(kind, key, value)
+        kind.check_structural(key, value)
     try:
         return kind(**structural)
     except (TypeError, ValueError, LookupError, ArithmeticError) as error:
         given = ", ".join(f"{key} = {value!r}" for key, value in structural.items())
         raise NetlistError(f"{kind.__name__} cannot be made with {given}: {error}.") from error
-
-
-def _check_structural(kind: type[Component], key: str, value: Any) -> None:
-    default = kind._structural[key]
-    wanted = type(default)
-    if wanted not in (bool, int, float, str) or (
-        isinstance(value, wanted) and isinstance(value, bool) == (wanted is bool)
-    ):
-        return
-    if not (wanted is float and isinstance(value, int) and not isinstance(value, bool)):
-        names = {bool: "true or false", int: "a whole number", float: "a number", str: "a text"}
-        raise NetlistError(f"{kind.__name__}.{key} = {value!r} must be {names[wanted]}.")

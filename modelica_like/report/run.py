@@ -6,6 +6,7 @@ from rich.console import Group, RenderableType
 from rich.markup import escape
 from rich.table import Table
 
+from modelica_like.language.transition import NAME_IN_NOTICE
 from modelica_like.report.types import table
 from modelica_like.solve.solution import Solution
 
@@ -22,6 +23,7 @@ def run_report(solution: Solution, *, energy: bool = True) -> RenderableType:
     parts: list[RenderableType] = [f"[bold]{escape(solution.model.name)}[/]  {_span(solution)}"]
     if solution.events:
         parts += ["", events_table(solution)]
+    parts += [f"[bold]{escape(notice)}[/]" for notice in notices(solution)]
     if energy:
         parts += ["", energy_table(solution), f"[dim]{closure_line(solution)}[/]"]
     parts += ["", f"[dim]{statistics_line(solution)}[/]"]
@@ -43,6 +45,17 @@ def events_table(solution: Solution) -> Table:
             place = f"{event.source}".partition(" `")[0]
             made.add_row(f"{event.time:.9g}", escape(event.mode), event.before, event.after, escape(place))
     return made
+
+
+def notices(solution: Solution) -> list[str]:
+    """Return what the events of a run have to say: one sentence for each kind of event, with the time of the first."""
+    told: dict[tuple[str, str], str] = {}
+    for event in solution.events:
+        notice, (component, dot, _) = solution.model.transitions[event.transition].notice, event.mode.rpartition(".")
+        if notice and (component, notice) not in told:
+            values = NAME_IN_NOTICE.sub(lambda name, owner=component + dot: f"{solution[owner + name[1]][0]:g}", notice)
+            told[component, notice] = f"At {event.time:.9g} s {component or solution.model.name} {values}."
+    return list(told.values())
 
 
 def energy_table(solution: Solution) -> Table:

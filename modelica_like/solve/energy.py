@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Iterator
+from contextlib import redirect_stderr
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import casadi as ca
 import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, Vector
+from modelica_like.errors import StepFailed
 from modelica_like.initialize import Point
 from modelica_like.solve.idas import scaled_problem
 from modelica_like.solve.recorder import Segment
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _RTOL = 1e-9
 _ATOL = 1e-11
@@ -79,6 +86,23 @@ class EnergyBalance:
         return sum(row.lost for row in self.rows)
 
     @property
+    def delivered(self) -> float:
+        """Energy that loads took away, J."""
+        return -sum(row.source for row in self.rows if row.source < 0)
+
+    @property
+    def efficiency(self) -> float:
+        """Energy that loads took away over that which sources and stores gave; nan where nothing gave any."""
+        given = sum(max(row.source, 0.0) for row in self.rows) + max(-self.stored, 0.0)
+        return self.delivered / given if given else float("nan")
+
+    def sankey(self, title: str = "") -> Figure:
+        """Draw where the energy came from and where it went."""
+        from modelica_like.solve.sankey import sankey
+
+        return sankey(self, title)
+
+    @property
     def closure(self) -> float:
         """Largest residual of a component, and of all connections together, relative to the throughput."""
         residuals = [abs(row.residual) for row in self.rows]
@@ -140,7 +164,11 @@ def _stored(model: CompiledDae, point: Point) -> Vector:
 
 
 def _integrate(model: CompiledDae, segment: Segment) -> tuple[Vector, Point]:
-    """Return the integrals of loss, source power, inflow and rate of all components, and the end."""
+    """Return the integrals of loss, source power, inflow and rate of all components, and the end.
+
+    Raises:
+        StepFailed: IDAS gave up.
+    """
     span = float(segment.times[-1] - segment.times[0])
     start, end = segment.start, segment.point(-1)
     if span <= 0.0:
@@ -148,9 +176,21 @@ def _integrate(model: CompiledDae, segment: Segment) -> tuple[Vector, Point]:
     if not model.states:
         return _trapezoids(model, segment), end
     p = np.concatenate([[start.t, span], model.p, model.u, segment.d])
-    result = _integrator(model)(x0=np.append(start.x, 0.0), z0=start.z, p=p)
+    try:
+        # IDAS also prints what went wrong; the error says it.
+        with redirect_stderr(io.StringIO()):
+            integrator, kept = _integrator(model)
+            result = integrator(x0=np.append(start.x, 0.0), z0=start.z, p=p)
+    except RuntimeError:
+        raise StepFailed(
+            f"The powers cannot be integrated from t = {start.t:g} s to {start.t + span:g} s.",
+            why="Energies ask for more precision than the run itself.",
+            advice="Leave the energy balance out (--no-energy), or look at a shorter time.",
+        ) from None
     end.x, end.z = np.array(result["xf"]).ravel()[:-1], np.array(result["zf"]).ravel()
-    return np.array(result["qf"]).reshape(_POWERS, -1), end
+    powers = np.zeros(_POWERS * len(model.components))
+    powers[kept] = np.array(result["qf"]).ravel()
+    return powers.reshape(_POWERS, -1), end
 
 
 def _trapezoids(model: CompiledDae, segment: Segment) -> Vector:
@@ -161,8 +201,8 @@ def _trapezoids(model: CompiledDae, segment: Segment) -> Vector:
     return np.array([np.trapezoid(terms[:, :, 1 + k], segment.times, axis=1) for k in range(_POWERS)])
 
 
-def _integrator(model: CompiledDae) -> ca.Function:
-    """Return an integrator with the powers as quadratures.
+def _integrator(model: CompiledDae) -> tuple[ca.Function, list[int]]:
+    """Return an integrator with the powers as quadratures, and which they are: those that are not zero anyway.
 
     IDAS chooses its order for the states alone: at constant acceleration it would integrate powers at order one, with
     a hundred thousand steps. So one more state follows all powers, with different weights lest they cancel.
@@ -171,7 +211,9 @@ def _integrator(model: CompiledDae) -> ca.Function:
         problem = dict(scaled_problem(model))
         inner, span = problem.pop("inner"), problem.pop("span")
         terms = model.energy(*inner)
-        powers = ca.vec(terms[:, 1:])
+        every = ca.vertsplit(ca.vec(terms[:, 1:]))
+        kept = [k for k, power in enumerate(every) if not power.is_zero()]
+        powers = ca.vertcat(*(every[k] for k in kept)) if kept else ca.SX(0, 1)
         weights = 1.0 + np.modf(0.618 * np.arange(powers.numel()))[0]
         problem["x"] = ca.vertcat(problem["x"], ca.SX.sym("companion"))
         problem["ode"] = ca.vertcat(problem["ode"], span * ca.dot(powers, ca.DM(weights)))
@@ -183,6 +225,8 @@ def _integrator(model: CompiledDae) -> ca.Function:
             "max_num_steps": 1_000_000,
             "quad_err_con": True,
             "suppress_algebraic": True,
+            # The companion depends on everything: a QR factorisation would fill up.
+            "linear_solver": "csparse",
         }
-        model._cache["energy"] = ca.integrator("energy", "idas", problem, 0, 1, settings)
+        model._cache["energy"] = ca.integrator("energy", "idas", problem, 0, 1, settings), kept
     return model._cache["energy"]

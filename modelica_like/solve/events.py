@@ -61,7 +61,9 @@ class EventLoop:
         self.record = Recorder()
         self.panel = _FIRST_PANEL if self.guards.count else options.points
         self._recent: deque[Event] = deque(maxlen=_CHATTER_EVENTS)
+        self._round = 0
         self._timed = [t for t in model.transitions if t.timed]
+        self._numbers = {id(transition): k for k, transition in enumerate(model.transitions)}
 
     def run(self) -> Recorder:
         """Simulate.
@@ -173,6 +175,10 @@ class EventLoop:
         position = (self.now.t - self.begin) / step
         nearest = round(position)
         if abs(position - nearest) > 1e-9 * max(1.0, position):
+            result = self.begin + (np.floor(position / self.checks) + 1) * self.step
+            looks = 1 << int(np.ceil(np.log2(max((min(result, stop) - self.now.t) / step, 1.0))))
+            if self.guards.count and looks <= self.panel:
+                return min(result, stop) - self.now.t, looks
             to_grid = self.begin + (np.floor(position) + 1) * step
             return min(to_grid, stop) - self.now.t, 1
         whole = int(np.floor((stop - self.now.t) / step + 1e-9))
@@ -292,7 +298,7 @@ class EventLoop:
             raise self._chattering(f"There were more than {self.options.max_events} events")
 
     def _iterate(self, wanting: list[CompiledTransition]) -> None:
-        for _ in range(self.options.iterations):
+        for self._round in range(self.options.iterations):
             if not wanting:
                 return
             self._fire(wanting)
@@ -305,7 +311,7 @@ class EventLoop:
         """Carry out transitions together; of one mode only the one declared first."""
         values = call(self.model, self.model.resets, self.now)
         chosen: dict[int, CompiledTransition] = {}
-        for transition in sorted(wanting, key=self.model.transitions.index):
+        for transition in sorted(wanting, key=self._number):
             if self._is_source(transition):
                 chosen.setdefault(transition.mode, transition)
         targets: list[tuple[int, float]] = []
@@ -332,10 +338,16 @@ class EventLoop:
         change = np.array([value for _, value in targets]) - present
         self.now.x = self.now.x + np.linalg.lstsq(slopes, change, rcond=None)[0]
 
+    def _number(self, transition: CompiledTransition) -> int:
+        return self._numbers[id(transition)]
+
     def _note(self, transition: CompiledTransition) -> None:
         mode = self.model.flat_discretes[transition.mode]
         before = mode.names[int(self.now.d[transition.mode])]
-        event = Event(float(self.now.t), mode.path, before, mode.names[transition.target], transition.source)
+        event = Event(
+            float(self.now.t), mode.path, before, mode.names[transition.target], transition.source,
+            self._number(transition), len(self.record.segments), self._round,
+        )  # fmt: skip
         self.record.events.append(event)
         self._recent.append(event)
         window = _CHATTER_WINDOW * (self.end - self.begin)

@@ -14,6 +14,7 @@ from modelica_like.initialize import Point, call
 
 _LOCATED = 1e-13
 _MAX_TRIALS = 60
+_GUESSING = 12
 _NEAR = 0.1
 """A top between two results is looked at if it is this near zero, relative to the values at both ends."""
 
@@ -30,12 +31,14 @@ class Guards:
         self._sources = np.zeros((self.count, max(largest, 1)), bool)
         for k, transition in enumerate(self.state_events):
             self._sources[k, list(transition.sources)] = True
+        self._rows = np.arange(self.count)
+        self._constants: dict[int, tuple[Vector, Vector]] = {}
 
     def active(self, d: Vector) -> Any:
         """Which guards may fire, by the modes."""
         if not self.count:
             return np.zeros(0, bool)
-        return self._sources[np.arange(self.count), d[self._mode].astype(int)]
+        return self._sources[self._rows, d[self._mode].astype(int)]
 
     def at(self, point: Point) -> tuple[Vector, Vector]:
         """Guards and rates at a point."""
@@ -47,8 +50,11 @@ class Guards:
         """Guards and rates at many times with the same modes; shapes (guards, times)."""
         model, count = self.model, len(times)
         fast = buffered(model._cache, ("guards", count), lambda: model.guards_along(count))
-        p, u, modes = (np.tile(vector, count) for vector in (model.p, model.u, d))
-        values, rates = (v.reshape(count, -1).T for v in fast(times, x.ravel("F"), z.ravel("F"), p, u, modes))
+        if count not in self._constants:
+            self._constants[count] = np.tile(model.p, count), np.tile(model.u, count)
+        modes = d if count == 1 else np.tile(d, count)
+        results = fast(times, x.ravel("F"), z.ravel("F"), *self._constants[count], modes)
+        values, rates = (v.reshape(count, -1).T for v in results)
         return _numbers(values), rates if np.isfinite(rates).all() else np.where(np.isfinite(rates), rates, 0.0)
 
     def soon(self, point: Point) -> Vector:
@@ -213,7 +219,7 @@ def _first_guess(
 
 
 def _cubic(g0: float, g1: float, r0: float, r1: float, inside: bool) -> float:
-    """Earliest rising zero (or, if `inside`, the top) of the cubic Hermite interpolant in (0, 1)."""
+    """Rising zero (or, if `inside`, the first top) of the cubic Hermite interpolant in (0, 1)."""
     a, b, c = 2 * g0 - 2 * g1 + r0 + r1, -3 * g0 + 3 * g1 - 2 * r0 - r1, r0
     if inside:
         tops = [
@@ -222,6 +228,12 @@ def _cubic(g0: float, g1: float, r0: float, r1: float, inside: bool) -> float:
             if abs(s.imag) < 1e-12 and 0 < s.real < 1 and 6 * a * s.real + 2 * b < 0
         ]
         return min(tops, default=0.5)
-    zeros = [s.real for s in np.roots([a, b, c, g0]) if abs(s.imag) < 1e-9 and 1e-12 < s.real < 1]
-    rising = [s for s in zeros if 3 * a * s * s + 2 * b * s + c > 0]
-    return min(rising, default=0.5)
+    if not g0 <= 0 < g1 or (g0 == 0 and c >= 0):
+        return 0.5
+    low, high, s = 0.0, 1.0, 0.5
+    for _ in range(_GUESSING):
+        value, slope = ((a * s + b) * s + c) * s + g0, (3 * a * s + 2 * b) * s + c
+        low, high = (low, s) if value > 0 else (s, high)
+        newton = s - value / slope if slope > 0 else -1.0
+        s = newton if low < newton < high else 0.5 * (low + high)
+    return s

@@ -24,13 +24,13 @@ _QUANTITIES = {
 _USUAL = ("rad/s", "N.m", "m/s", "N")
 _MOST = 6
 _MOST_EVENTS = 40
-_STYLE: Any = {
+STYLE: Any = {
     "font.size": 9, "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True, "grid.color": "#e4e4e4",
     "grid.linewidth": 0.6, "axes.axisbelow": True, "axes.edgecolor": "#666666", "xtick.color": "#444444",
     "ytick.color": "#444444", "lines.linewidth": 1.5, "legend.frameon": False, "legend.fontsize": 8,
 }  # fmt: skip
 # Okabe and Ito's palette: distinct also for colour-blind readers.
-_COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
+COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
 
 
 def plot(solution: Solution, patterns: Sequence[str] = (), *, title: str = "") -> Figure:
@@ -48,7 +48,7 @@ def plot(solution: Solution, patterns: Sequence[str] = (), *, title: str = "") -
     from matplotlib.figure import Figure
 
     groups = _by_unit(solution, chosen(solution, patterns))
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(STYLE):
         figure = Figure(figsize=(8.0, 0.8 + 2.1 * max(len(groups), 1)), layout="constrained", dpi=150)
         panels = figure.subplots(max(len(groups), 1), 1, sharex=True, squeeze=False)[:, 0]
         for axes, (unit, names) in zip(panels, groups.items(), strict=False):
@@ -123,8 +123,8 @@ def _by_unit(solution: Solution, names: Sequence[str]) -> dict[str, list[str]]:
 
 def _draw(axes: Axes, solution: Solution, unit: str, names: Sequence[str]) -> None:
     for k, name in enumerate(names):
-        style = "-" if k < len(_COLOURS) else "--"
-        axes.plot(solution.time, solution[name], style, label=name, color=_COLOURS[k % len(_COLOURS)])
+        style = "-" if k < len(COLOURS) else "--"
+        axes.plot(solution.time, solution[name], style, label=name, color=COLOURS[k % len(COLOURS)])
     quantity = _QUANTITIES.get(unit, "value")
     spelled = unit.replace(".", "\u00b7")
     axes.set_ylabel(quantity if unit == "1" else f"{quantity} in {spelled}")

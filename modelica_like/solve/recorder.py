@@ -21,6 +21,9 @@ class Event:
         before: name of the mode that was left.
         after: name of the mode that was entered.
         source: the transition's place in its component.
+        transition: position in the model's transitions.
+        segment: position of the segment that follows.
+        round: number of the round at its instant; a round sees what the one before has changed.
     """
 
     time: float
@@ -28,6 +31,9 @@ class Event:
     before: str
     after: str
     source: Source
+    transition: int = -1
+    segment: int = 0
+    round: int = 0
 
     def __str__(self) -> str:
         return f"{self.time:.9g} s  {self.mode}: {self.before} → {self.after}"

@@ -10,6 +10,7 @@ import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import MissingExtra, UnknownName, ValueOutOfRange, did_you_mean
+from modelica_like.initialize import Point
 from modelica_like.language.expr import Symbol
 from modelica_like.language.mode import BoundMode
 from modelica_like.solve.energy import EnergyBalance, energy_balance
@@ -169,22 +170,34 @@ class Solution:
             self._cache["energy"] = flat.reshape(len(self.model.components), count, 5).transpose(0, 2, 1)
         return self._cache["energy"]
 
+    def _check_within(self, t: float) -> None:
+        first, last = float(self.time[0]), float(self.time[-1])
+        if not first <= t <= last:
+            raise ValueOutOfRange(f"t = {t:g} s is not within the run, {first:g} s to {last:g} s.")
+
     def at(self, t: float) -> Values:
         """Return all variables at a time, integrated there from the result before (right side of an event).
 
         Raises:
             ValueOutOfRange: the time is not within the run.
         """
-        first, last = float(self.time[0]), float(self.time[-1])
-        if not first <= t <= last:
-            raise ValueOutOfRange(f"t = {t:g} s is not within the run, {first:g} s to {last:g} s.")
+        point = self.point(t)
+        return self._values(point.t, point.x, point.z, point.d)
+
+    def point(self, t: float) -> Point:
+        """Return states, implicit unknowns and modes at a time, integrated there from the result before.
+
+        Raises:
+            ValueOutOfRange: the time is not within the run.
+        """
+        self._check_within(t)
         segment = next(s for s in reversed(self.segments) if s.times[0] <= t)
         k = int(np.searchsorted(segment.times, t, side="right")) - 1
         point = segment.point(k)
         if t > point.t:
             x, z = Integrator(self.model, self.options).run(point, t - point.t)
             point.t, point.x, point.z = t, x[:, 0], z[:, 0]
-        return self._values(point.t, point.x, point.z, point.d)
+        return point
 
     @property
     def final(self) -> Values:

@@ -13,6 +13,7 @@ from modelica_like.structure.alias import find_aliases
 from modelica_like.structure.blocks import Block, BlockSolver, Solved
 from modelica_like.structure.diagnose import check_solvable
 from modelica_like.structure.index import Pantelides, prefer_relative_states
+from modelica_like.structure.prescribed import Flags
 from modelica_like.structure.states import select_states
 from modelica_like.structure.system import System, build_system
 
@@ -40,6 +41,7 @@ class ReducedDae:
         node_states: for every node (position in x, factor) if it is a state up to a factor, else None.
         blocks: blocks of the triangular form, with the names of their unknowns and the origins of their equations.
         determinants: (names, origins, expression) whose zero makes a block singular.
+        implicit_blocks: (names, origins) of the blocks that stay implicit.
         level_values: expression of every level in x, z, inputs, p, d and t.
         explicit: (level, expression) of the explicit unknowns, each in states, z and earlier ones.
         index: structural index of the equations before the reduction.
@@ -64,6 +66,7 @@ class ReducedDae:
     index: int
     differentiated: tuple[Origin, ...]
     system: System = field(repr=False)
+    implicit_blocks: tuple[tuple[tuple[str, ...], tuple[Origin, ...]], ...] = field(repr=False)
     level_values: Any = field(repr=False)
     explicit: tuple[tuple[int, Any], ...] = field(repr=False)
 
@@ -123,6 +126,7 @@ def reduce(flat: FlatModel) -> ReducedDae:
     """
     aliases = find_aliases(flat)
     system = build_system(flat, aliases)
+    flags = Flags(system)
     _check_input_rates(system)
     prefer_relative_states(system)
     contradictions = [flat.linear[k].origin for group in aliases.contradictions for k in group]
@@ -131,6 +135,8 @@ def reduce(flat: FlatModel) -> ReducedDae:
     states = select_states(system, counts, _top_slopes(system, counts))
     residual, origins = _differentiate(system, counts)
     unknowns = _unknowns(system, states)
+    if flags.settle(residual, unknowns):
+        residual, origins = _differentiate(system, counts)
     solved = BlockSolver(residual, _column(system, unknowns), _volatile(system)).run()
     return _assemble(system, counts, states, unknowns, origins, solved)
 
@@ -139,7 +145,7 @@ def _check_input_rates(system: System) -> None:
     """Refuse a motion that an input prescribes where its derivative counts: it is not known."""
     for level in system.inputs:
         rate = system.derivative(level)
-        if rate is not None:
+        if rate is not None and rate not in system.inputs:
             raise StructureError(
                 f"{system.levels[rate].name} is the derivative of the input {system.levels[level].name}, "
                 "which is not known.",
@@ -209,13 +215,14 @@ def _differentiate(system: System, counts: list[int]) -> tuple[Any, list[Origin]
 
 
 def _check_inputs(system: System, equations: Any, rows: list[int]) -> None:
-    if not system.inputs:
+    unknown_rates = [level for level in system.inputs if system.derivative(level) is None]
+    if not unknown_rates:
         return
-    inputs = _column(system, system.inputs)
+    inputs = _column(system, unknown_rates)
     for place, depends in enumerate(ca.which_depends(equations, inputs, 1, True)):
         if depends:
             origin = system.origins[rows[place]]
-            names = ", ".join(system.levels[n].name for n in system.inputs)
+            names = ", ".join(system.levels[n].name for n in unknown_rates)
             raise StructureError(
                 f"{origin.path or origin.kind}: the derivative of an input ({names}) would be needed.",
                 where=origin.source,
@@ -244,6 +251,10 @@ def _assemble(
     z_levels = [unknowns[k] for k in solved.z]
     rates = [level_values[n] for s in states if (n := system.derivative(s)) is not None]
     blocks = solved.blocks
+    told = [
+        (tuple(levels[unknowns[k]].name for k in block.unknowns), tuple(origins[k] for k in block.equations))
+        for block in blocks
+    ]
     return ReducedDae(
         flat=model,
         states=tuple(levels[s].name for s in states),
@@ -260,16 +271,12 @@ def _assemble(
         z_guesses=tuple(levels[n].guess for n in z_levels),
         blocks=tuple(blocks),
         determinants=tuple(
-            (
-                tuple(levels[unknowns[k]].name for k in blocks[number].unknowns),
-                tuple(origins[k] for k in blocks[number].equations),
-                results[1 + len(solved.alg) + k],
-            )
-            for k, (number, _) in enumerate(solved.determinants)
+            (*told[number], results[1 + len(solved.alg) + k]) for k, (number, _) in enumerate(solved.determinants)
         ),
         index=max(counts, default=0) + 1,
         differentiated=tuple(system.origins[k] for k, count in enumerate(counts) if count),
         system=system,
+        implicit_blocks=tuple(pair for pair, block in zip(told, blocks, strict=True) if block.kind == "implicit"),
         level_values=level_values,
         explicit=tuple((unknowns[k], expression) for k, expression in solved.order),
     )

@@ -42,7 +42,7 @@ class System:
         origins: where each residual comes from.
         node_level: for every node (level number, factor), or None if it is known.
         node_values: expression of every node in level symbols and parameters.
-        inputs: level numbers of the model's inputs.
+        inputs: level numbers of the model's inputs, in their order.
         linear_rows: levels in each linear equation with constant coefficients.
     """
 
@@ -81,8 +81,7 @@ def build_system(model: FlatModel, aliases: Aliases) -> System:
     symbols = [ca.SX.sym(level.name) for level in levels]
     node_values = _node_values(model, aliases, node_level, symbols)
     system = System(model, levels, chains, symbols, None, [], node_level, node_values)
-    inputs = {aliases.root[node] for node in model.inputs}
-    system.inputs = sorted(place[root][0] for root in inputs)
+    system.inputs = [place[aliases.root[node]][0] for node in model.inputs]
     _collect_residuals(system, aliases)
     return system
 

@@ -255,3 +255,26 @@ def test_clutch_actuator_that_is_switched_off_again_too_soon() -> None:
     loop = Assembly("loop", parts={"pulse": pulse, "actuator": actuator}, connect={"on": ["pulse.y", "actuator.on"]})
     run = simulate(loop, "0.5 s")
     assert np.all(run["actuator.y"] == 0.0)
+
+
+def test_clutch_actuator_of_a_coil() -> None:
+    """Exponential: 90 % after t12, 10 % after t2; switched off during the rise, it falls from where it is."""
+    pulse = Pulse(start_time=0.1, period=2.0, width=0.085)
+    actuator = ClutchActuator(t11=0.04, t12=0.1, t2=0.05, exponential=True)
+    loop = Assembly("loop", parts={"pulse": pulse, "actuator": actuator}, connect={"on": ["pulse.y", "actuator.on"]})
+    run = simulate(loop, "2.1 s", points=2100)
+    begin, off, gone = 0.14, 0.27, 0.27 + 9 * 0.05
+    assert run.at(begin + 0.1)["actuator.y"] == pytest.approx(0.9, rel=1e-12)
+    reached = 1 - 10 ** (-(off - begin) / 0.1)
+    rise = 1 - 10 ** (-(run.time - begin) / 0.1)
+    fall = reached * 10 ** (-(run.time - off) / 0.05)
+    shape = np.select([run.time < begin, run.time <= off, run.time <= gone], [0, rise, fall], 0)
+    np.testing.assert_allclose(run["actuator.y"], shape, atol=2e-9)
+    again = Pulse(start_time=0.1, period=0.15, width=0.9)
+    retriggered = Assembly(
+        "loop", parts={"pulse": again, "actuator": actuator}, connect={"on": ["pulse.y", "actuator.on"]}
+    )
+    run = simulate(retriggered, "0.3 s")
+    fallen = (1 - 10 ** (-0.95)) * 10 ** (-0.015 / 0.05)
+    assert run.at(0.25)["actuator.y"] == pytest.approx(fallen, rel=1e-9)
+    assert run.at(0.3)["actuator.y"] == pytest.approx(1 - (1 - fallen) * 10 ** (-0.5), rel=1e-9)

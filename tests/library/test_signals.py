@@ -220,3 +220,25 @@ def test_torque_step_has_its_own_time_event() -> None:
     run = simulate(Assembly("drive", parts=parts, series={"shaft": list(parts)}), 1.0)
     assert moments(run, "torque") == [0.3]
     assert run.final["mass.w"] == pytest.approx(1.0 + 4.0 * 0.7, rel=1e-9)
+
+
+@pytest.mark.parametrize("t0", [3.0, 3.03, 250.01])
+@pytest.mark.parametrize("kind", [Pulse, Trapezoid])
+def test_pulses_of_a_run_that_starts_late(kind: type[Component], t0: float) -> None:
+    """Thousands of periods late the signal is where it would have been: the impulse of each full period is the same."""
+    shape = {"width": 0.3} if kind is Pulse else {"rising": 0.01, "width": 0.02, "falling": 0.01}
+    area = 2.0 * 0.03
+    run = torque_of(kind(amplitude="2 N.m", period=0.1, **shape), t0 + 0.5, t0=t0)
+    for periods in (1, 3, 5):
+        assert run.at(t0 + 0.1 * periods)["mass.w"] == pytest.approx(area * periods, rel=1e-9)
+    first = next(t for t in moments(run) if t > t0 + 1e-9)
+    nearest = min(
+        ((first - t0) - (k - t0) % 0.1) % 0.1 for k in ((0.0, 0.03) if kind is Pulse else (0.0, 0.01, 0.03, 0.04))
+    )
+    assert nearest == pytest.approx(0.0, abs=1e-9) or nearest == pytest.approx(0.1, abs=1e-9)
+
+
+def test_pulses_that_are_over_before_a_late_start() -> None:
+    run = torque_of(Pulse(amplitude="2 N.m", period=0.1, periods=25), 50.5, t0=50.0)
+    assert np.all(run["mass.w"] == 0.0)
+    assert run.final["signal.done"] == 25

@@ -15,7 +15,7 @@ PAGES = ROOT / "docs" / "examples"
 OURS = [
     ROOT / "examples" / f"{name}.toml"
     for name in ("fan", "machine_table_direct", "machine_table_geared", "machine_tool_startup", "dc_bench")
-]
+] + [ROOT / "examples" / "dc_bench_motor.toml", *(ROOT / "examples" / "dc_machines").glob("*.toml")]
 
 
 def drawing() -> Any:
@@ -39,9 +39,9 @@ def test_links_of_a_page_lead_somewhere(page: Path) -> None:
 
 
 def test_pictures_are_drawn_and_small() -> None:
-    shown = set(drawing().PICTURES)
+    draw = drawing()
     pictures = {picture.stem: picture for picture in (PAGES / "pictures").glob("*.png")}
-    assert {Path(netlist).name for netlist in shown} == set(pictures)
+    assert {Path(netlist).name for netlist in draw.PICTURES} | set(draw.FIGURES) == set(pictures)
     assert all(picture.stat().st_size < 60_000 for picture in pictures.values())
 
 

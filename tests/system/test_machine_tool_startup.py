@@ -228,6 +228,34 @@ def test_published_samples(w3: float, w2: float, torque: float, run: Callable[[f
     assert -values["clutch.tau"] == pytest.approx(torque, rel=WITHIN)
 
 
+# After the lock-up: smallest torques by the equations above on a fine grid (TARGETS' samples miss the troughs by up to
+# 0.2 %: -187.43), largest and smallest speed of J2, and when it begins to stay within 1 % of its final speed.
+AFTERWARDS = [
+    (10.0, {"T1": -128.100, "T2": -187.771, "M": -172.674}, (35.297, 27.143), 0.471),
+    (1.2, {"T1": -170.315, "T2": -260.066, "M": -238.919}, (35.998, 26.945), 0.754),
+]
+
+
+@pytest.mark.parametrize(("h1", "torques", "speeds", "settled"), AFTERWARDS)
+def test_oscillations_after_the_lock_up(
+    h1: float, torques: dict[str, float], speeds: tuple[float, float], settled: float, run: Callable[[float], Solution]
+) -> None:
+    result = run(h1)
+    locked = result.time > result.events[-1].time
+    for name, expected in torques.items():
+        assert value(result, name)[locked].min() == pytest.approx(expected, rel=1e-4)
+    w2, time = result["J2.w"][locked], result.time[locked]
+    assert (w2.max(), w2.min()) == pytest.approx(speeds, rel=1e-4)
+    assert time[abs(w2 / 32.3528 - 1) > 0.01].max() == pytest.approx(settled, abs=1e-3)
+
+
+def test_lock_up(run: Callable[[float], Solution]) -> None:
+    at = run(10.0).at(run(10.0).events[-1].time)
+    assert at["J2.w"] == pytest.approx(29.582, rel=5e-5)
+    assert at["J3.w"] == pytest.approx(at["J2.w"], rel=1e-9)
+    assert at["coil.y"] * 5256.25 == pytest.approx(4631.9, abs=0.5)
+
+
 @BOTH
 def test_slip_energy(h1: float, run: Callable[[float], Solution], reference: Callable[[float], Trajectory]) -> None:
     balance = run(h1).energy()

@@ -1,0 +1,31 @@
+"""How large signals are: what deviations are measured by."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from modelica_like.solve.plot import unit_of
+from modelica_like.solve.solution import Solution
+
+_NOISE = 1e-6
+
+
+def ranges(solution: Solution, names: Iterable[str], least: float = _NOISE) -> dict[str, float]:
+    """Return the range of each signal, largest minus smallest value.
+
+    The slip of a clutch that sticks is rounding noise and has no range of its own. So what moves less than a share of
+    the largest value among the signals of its unit is taken to have that range.
+
+    Args:
+        solution: the run.
+        names: signals.
+        least: that share.
+    """
+    spans = {name: float(np.ptp(solution[name])) for name in names}
+    largest: dict[str, float] = {}
+    for name in spans:
+        unit = unit_of(solution, name)
+        largest[unit] = max(largest.get(unit, 0.0), float(np.abs(solution[name]).max()))
+    return {name: max(span, least * largest[unit_of(solution, name)]) or 1.0 for name, span in spans.items()}

@@ -1,0 +1,176 @@
+"""Trajectories that come from elsewhere - an FMU, a table - in the shape of a solution."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, cast
+
+import numpy as np
+
+from modelica_like.compile.compiled import Vector
+from modelica_like.errors import MissingValue, Source, UnknownName, did_you_mean
+from modelica_like.solve.energy import EnergyBalance, EnergyRow
+from modelica_like.solve.options import Options
+from modelica_like.solve.recorder import Event
+from modelica_like.solve.solution import ENERGY_TERMS, Solution, Statistics, Values
+
+
+@dataclass(frozen=True)
+class RecordedVariable:
+    """A column.
+
+    Attributes:
+        path: name.
+        unit: as its source spells it.
+        description: what its source says about it.
+        kind: `output`, `local`, `input`, `discrete`.
+        names: of the values of a mode; empty otherwise.
+    """
+
+    path: str
+    unit: str = "1"
+    description: str = ""
+    kind: str = "output"
+    names: Mapping[int, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class RecordedModel:
+    """What is known about a model whose equations are not: its name, columns and parameters."""
+
+    name: str
+    flat_variables: tuple[RecordedVariable, ...]
+    flat_discretes: tuple[RecordedVariable, ...]
+    parameters: Mapping[str, float]
+
+    @property
+    def position(self) -> dict[str, int]:
+        """Row of each continuous variable."""
+        return {variable.path: k for k, variable in enumerate(self.flat_variables)}
+
+    @property
+    def discrete_position(self) -> dict[str, int]:
+        """Row of each mode or discrete value."""
+        return {variable.path: k for k, variable in enumerate(self.flat_discretes)}
+
+    @property
+    def components(self) -> tuple[str, ...]:
+        """Paths that have an energy term."""
+        owners = (path.rpartition(".") for path in self.position)
+        return tuple(dict.fromkeys(owner for owner, _, term in owners if term in ENERGY_TERMS))
+
+
+class RecordedSolution(Solution):
+    """Trajectories of an FMU or of a table.
+
+    Whatever needs no equations works as for any solution: `[...]`, `plot`, `at`, `final`, `events`, `to_pandas`. The
+    energy balance is the integral of the columns `….loss_power`, `….stored_energy` and `….source_power`, where there
+    are such.
+
+    Args:
+        model: names and units.
+        time: shape (n,), in s; a repeated time is an event's left and right value.
+        values: continuous variables, shape (variables, n).
+        discretes: modes and discrete values, shape (discretes, n).
+        seconds: wall time of the run.
+    """
+
+    def __init__(self, model: RecordedModel, time: Vector, values: Vector, discretes: Vector, seconds: float) -> None:
+        self._time, self._values_table, self._discretes = time, values, discretes
+        events = tuple(mode_changes(model.flat_discretes, time, discretes))
+        statistics = Statistics(len(time), 0, 0, len(events), seconds)
+        super().__init__(cast("Any", model), Options(points=max(len(time) - 1, 1)), (), events, statistics)
+
+    @property
+    def recorded(self) -> RecordedModel:
+        """What is known about the model."""
+        return cast("RecordedModel", self.model)
+
+    @property
+    def time(self) -> Vector:
+        """Times of the results in s."""
+        return self._time
+
+    def __getitem__(self, key: str | Any) -> Vector:
+        path, model = self.path(key), self.recorded
+        if path == "time":
+            return self._time
+        if path in model.position:
+            return self._values_table[model.position[path]]
+        if path in model.discrete_position:
+            return self._discretes[model.discrete_position[path]]
+        if path in model.parameters:
+            return np.full(len(self._time), model.parameters[path])
+        known = [*self.names, *model.parameters]
+        raise UnknownName(f"{model.name} has no variable '{path}'{did_you_mean(path, known) or '.'}")
+
+    def __contains__(self, key: object) -> bool:
+        path = self.path(key)
+        model = self.recorded
+        return any(path in known for known in (model.position, model.discrete_position, model.parameters))
+
+    def at(self, t: float) -> Values:
+        """Return all variables at a time, interpolated between the results (right side of an event).
+
+        Raises:
+            ValueOutOfRange: the time is not within the run.
+        """
+        self._check_within(t)
+        k = int(np.searchsorted(self._time, t, side="right")) - 1
+        column = self._values_table[:, k]
+        if t > self._time[k]:
+            share = (t - self._time[k]) / (self._time[k + 1] - self._time[k])
+            column = column + share * (self._values_table[:, k + 1] - column)
+        return Values(self, t, column, self._discretes[:, k])
+
+    @property
+    def final(self) -> Values:
+        """All variables at the end."""
+        return Values(self, float(self._time[-1]), self._values_table[:, -1], self._discretes[:, -1])
+
+    def energy(self) -> EnergyBalance:
+        """Return the energy balance, as far as the columns tell it.
+
+        What flows in through connectors is not known; it is what closes each component's balance. So only the sum of
+        all components is a check.
+
+        Raises:
+            MissingValue: there is no energy term.
+        """
+        if not self.recorded.components:
+            raise MissingValue(
+                f"{self.recorded.name} tells no energies.",
+                why="None of its variables is called ….stored_energy, ….loss_power or ….source_power.",
+            )
+        rows = tuple(self._energy_row(component) for component in self.recorded.components)
+        throughput = max(
+            sum(abs(row.inflow) for row in rows), sum(abs(row.source) for row in rows), sum(abs(r.lost) for r in rows)
+        )
+        return EnergyBalance(rows, throughput)
+
+    def _energy_row(self, component: str) -> EnergyRow:
+        def integral(term: str) -> float:
+            name = f"{component}.{term}"
+            return float(np.trapezoid(self[name], self._time)) if name in self else 0.0
+
+        name = f"{component}.stored_energy"
+        stored = float(self[name][-1] - self[name][0]) if name in self else 0.0
+        lost, source = integral("loss_power"), integral("source_power")
+        return EnergyRow(component, stored + lost - source, source, stored, lost, 0.0, 0.0, 0.0)
+
+    def __repr__(self) -> str:
+        span = f"t = {self._time[0]:g} … {self._time[-1]:g} s"
+        return (
+            f"<Solution of {self.recorded.name}: {len(self.names)} variables, {span}, {len(self.events)} mode changes>"
+        )
+
+
+def mode_changes(discretes: Sequence[RecordedVariable], time: Vector, values: Vector) -> list[Event]:
+    """Return the changes of discrete values between one result and the next, by time."""
+    events: list[Event] = []
+    for variable, row in zip(discretes, values, strict=True):
+        for k in np.flatnonzero(np.diff(row)):
+            before, after = (variable.names.get(int(value), f"{value:g}") for value in row[k : k + 2])
+            events.append(Event(float(time[k + 1]), variable.path, before, after, Source("")))
+    return sorted(events, key=lambda event: event.time)

@@ -1,0 +1,238 @@
+"""The small netlists of examples/components: each runs, keeps its energy, and gives the numbers of its closed forms."""
+
+from collections.abc import Callable
+from functools import lru_cache
+from math import cos, exp, pi, sqrt, tanh
+from pathlib import Path
+
+import pytest
+
+from modelica_like import simulate
+from modelica_like.solve.solution import Solution
+
+ROOT = Path(__file__).parents[2]
+FOLDER = ROOT / "examples" / "components"
+PAGE = ROOT / "docs" / "examples" / "components.md"
+NUMBERS: dict[str, Callable[[Solution], None]] = {}
+
+
+def numbers(check: Callable[[Solution], None]) -> Callable[[Solution], None]:
+    NUMBERS[check.__name__] = check
+    return check
+
+
+@lru_cache
+def run_of(name: str) -> Solution:
+    return simulate(FOLDER / f"{name}.toml", rtol=1e-9)
+
+
+def close(value: float) -> object:
+    return pytest.approx(value, rel=1e-6, abs=1e-9)
+
+
+@numbers
+def belt_slip(run: Solution) -> None:
+    force = 2 * 200 * tanh(0.3 * 170 / 180 * pi / 2)
+    assert run.at(0.3)["belt.f"] == close(force)
+    assert run.at(0.5)["flywheel.w"] - run.at(0.1)["flywheel.w"] == close(0.4 * 0.1 * force / 0.5)
+    assert run.at(0.3)["belt.F_1"] / run.at(0.3)["belt.F_2"] == close(exp(0.3 * 170 / 180 * pi))
+
+
+@numbers
+def screw_lift(run: Solution) -> None:
+    ideal = 2000 * 0.01 / (2 * pi)
+    assert -run.at(0.3)["motor.flange.tau"] == close(ideal / 0.9)
+    assert -run.at(0.9)["motor.flange.tau"] == close(ideal * (2 - 1 / 0.9))
+
+
+@numbers
+def self_locking_worm(run: Solution) -> None:
+    inertia, opposing = 0.01 + 0.2 / 40**2 / 0.4, 20 / 40 / 0.4
+    speed = 0.5 * (2 - opposing) / inertia
+    stopped = 0.5 + speed * inertia / opposing
+    assert run.events[-1].time == close(stopped)
+    assert run.final["rotor.phi"] == close(0.5 * speed * stopped)
+    assert run.final["rotor.w"] == 0
+    assert run.final["worm.self_locking"] == 1
+
+
+@numbers
+def gearbox_efficiency(run: Solution) -> None:
+    assert run.final["output.power"] == close(2000)
+    assert run.final["input.power"] == close(2000 / 0.96)
+
+
+@numbers
+def differential(run: Solution) -> None:
+    assert run.final["car.w"] == close(60 * 4 / 2 / 40 * 0.5)
+    assert run.final["ice.w"] == close(60 * 4 / 2 / 1 * 0.5)
+    assert run.energy()["engine"].source == close(0.5 * 40 * 1.5**2 + 0.5 * 1 * 60**2)
+
+
+@numbers
+def planetary_sets(run: Solution) -> None:
+    assert [run.final[f"output[{k}].w"] for k in (1, 2, 3)] == close([25] * 3)
+    assert [run.final[f"shaft[{k}].tau"] for k in (1, 2, 3)] == close([10, 10, 10 / (1 + 3 * 0.97) * 4])
+
+
+@numbers
+def simultaneous_events(run: Solution) -> None:
+    entered = {"freewheel.mode": "locked", "slide.stop": "right", "clutch.mode": "backward"}
+    at_once = {event.mode: event.after for event in run.events if event.time == close(0.5)}
+    assert entered.items() <= at_once.items()
+    assert -run.at(0.7)["freewheel.tau"] == close(20 + 50)
+    assert run.events[-1].time == close(0.5 + 2 * 10 / 50)
+    assert run.final["slide.s"] == 1
+    assert run.final["slide.v"] == 0
+
+
+@numbers
+def torque_limiter(run: Solution) -> None:
+    assert run.at(0.1)["shaft.tau"] == close(0)
+    assert run.final["shaft.tau"] == close(30)
+    assert run.final["slip.w_rel"] == close(-50)
+    assert run.energy()["limiter"].lost == close(30 * 50 * (0.5 * 0.1 + 0.7))
+
+
+@numbers
+def flexible_shaft(run: Solution) -> None:
+    assert run.final["twist.phi_rel"] == close(-10 / (2 * 2000))
+    middle = 0.5 * (run.final["near.phi"] + run.final["far.phi"])
+    assert middle == pytest.approx(0.5 * 10 / 0.5, rel=1e-4)
+
+
+@numbers
+def stribeck(run: Solution) -> None:
+    left = {event.mode: event.time for event in reversed(run.events) if event.before == "stuck"}
+    assert left == close({"bearing.mode": 0.5, "slideway.mode": 0.3})
+    assert run.final["table.v"] == close((100 - 20) / 50)
+
+
+@numbers
+def linear_brake(run: Solution) -> None:
+    friction = 2 * 0.25 * 100
+    assert run.events[-1].time == close(3 * 10 / friction)
+    assert run.final["slide.s"] == close(0.5 * 10 * 3**2 / friction)
+    assert [run.at(0.2)[f"cut.{name}"] for name in ("v", "f", "power")] == close([2, friction, 2 * friction])
+    assert run.at(0.2)["tacho.v"] == close(2)
+
+
+@numbers
+def shaft_sensors(run: Solution) -> None:
+    read = {"angle.phi": 4, "speed.w": 4, "acceleration.a": 2, "torque.tau": 4}
+    relative = {"relative_angle.phi_rel": 6, "relative_speed.w_rel": 6, "relative_acceleration.a_rel": 3}
+    assert {name: run.final[name] for name in read | relative} == close(read | relative)
+
+
+@numbers
+def slide_sensors(run: Solution) -> None:
+    read = {"position.s": 4, "velocity.v": 4, "acceleration.a": 2, "force.f": 6, "power.power": 24}
+    relative = {"relative_position.s_rel": 6, "relative_velocity.v_rel": 6}
+    assert {name: run.final[name] for name in read | relative} == close(read | relative)
+
+
+@numbers
+def shaft_sources(run: Solution) -> None:
+    assert run.final["winder.w"] == close(sqrt(1 + 2 * 50 * 2 / 0.2))
+    assert run.final["wheel.w"] == close(20 - 3 / 0.5 * 2)
+    assert [run.final[name] for name in ("left.w", "right.w", "spindle.w")] == close([-8, 2, 6])
+    assert run.at(0.25)["crank.flange.tau"] == close(2 * 0.5 * (2 * pi) ** 2)
+
+
+@numbers
+def slide_sources(run: Solution) -> None:
+    assert run.final["boat.v"] == close(5 * exp(-4))
+    assert run.final["train.v"] == close(sqrt(1 + 2 * 20 * 2 / 5))
+    assert [run.final[name] for name in ("sledge.v", "left.v", "right.v", "block.v")] == close([4, -8, 4, 3])
+    assert run.at(0.125)["shaker.flange.f"] == close(0.02 * (4 * pi) ** 2)
+    assert run.final["spring.f"] == close(-50 * 0.1 * 2)
+
+
+@numbers
+def speed_control(run: Solution) -> None:
+    assert run.at(0.5 - 1e-9)["motor.w"] == pytest.approx(200, rel=1e-4)
+    assert run.final["motor.w"] == close(200)
+    assert run.final["motor.ia"] == close(0.5 / 0.08)
+    assert run.final["controller.y"] == close(0.4 * 0.5 / 0.08 + 0.08 * 200)
+
+
+@numbers
+def position_cascade(run: Solution) -> None:
+    assert run.final["axis.phi"] == close(1)
+    assert run.final["speed_loop.integral"] == close(2 / 5)
+    assert run.final["second_axis.phi"] == pytest.approx(1, rel=1e-4)
+    # The integral of the error is what holds the load.
+    assert run.final["total.y"] == pytest.approx(0.5 * 2 / 20, rel=1e-4)
+
+
+@numbers
+def circuits(run: Solution) -> None:
+    settled = 1 - exp(-(10e-3 - 1e-3) / 2e-3)
+    assert run.final["scope.v"] == close(12 * settled)
+    assert run.final["L2.i"] == close(12 / 60 * settled)
+    assert run.final["C3.v"] == close(5e-3 * 10e-3 / 10e-6)
+    assert run.final["meter.i"] == close(12 / 100 * (1 - settled) + 12 / 60 * settled)
+
+
+@numbers
+def clutch_lining(run: Solution) -> None:
+    locked, energy = 0.12 + 0.04 + 0.4 * 150 / 60, run.energy()
+    assert run.events[-1].time == close(locked)
+    assert energy["lining"].stored - energy["air"].source == close(0.5 * 0.4 * 150**2)
+    warm, cold = run.at(5)["lining.T"] - 293.15, run.at(15)["lining.T"] - 293.15
+    assert cold / warm == close(exp(-12 * 10 / 150))
+
+
+@numbers
+def heating(run: Solution) -> None:
+    assert run.final["body.T"] == close(293.15 + 50 / 2 * (1 - exp(-300 * 2 / 400)))
+
+
+@numbers
+def table_on_slideway(run: Solution) -> None:
+    assert run.final["table.v"] == close((700 - 150 - 300) / 200 * 2)
+    assert run.final["scale.s"] == close(0.5 * (700 - 150 - 300) / 200 * 2**2)
+
+
+@numbers
+def cut_boundaries(run: Solution) -> None:
+    assert run.final["mass.s"] == close(0.1 * cos(10))
+    assert run.final["rotor.phi"] == close(0.2 * cos(4))
+    assert run.final["capacitor.v"] == close(10 * exp(-2))
+    assert run.final["body.T"] == close(300 + 100 * exp(-2))
+
+
+@numbers
+def duty_cycle(run: Solution) -> None:
+    areas = [2 * 8 * (0.05 + 0.4 + 0.15), 6 * (0.25 + 1 + 0.25), 4 * (2 - 0.5 * (1 - exp(-4)))]
+    assert [run.final[f"rotor[{k}].w"] for k in (1, 2, 3)] == close([area / 2 for area in areas])
+
+
+@numbers
+def two_speed_gearbox(run: Solution) -> None:
+    # Pressures change by 1500 N.m/s; the old clutch lets go when it can no longer brake what the new one drives.
+    released = 0.2 + (300 + 30) / 3000
+    locked = 0.2 + (330 + sqrt(330**2 - 4 * 1500 * 6.15)) / 3000
+    times = {(event.mode, event.before): event.time for event in run.events}
+    assert times["clutch_a.mode", "stuck"] == close(released)
+    assert times["clutch_b.mode", "backward"] == close(locked)
+    assert run.final["machine.w"] == close(120 / 2)
+
+
+def test_every_netlist_has_numbers_and_a_line_on_the_page() -> None:
+    names = {path.stem for path in FOLDER.glob("*.toml")}
+    assert names == NUMBERS.keys()
+    text = PAGE.read_text(encoding="utf-8")
+    assert [name for name in sorted(names) if f"../../examples/components/{name}.toml" not in text] == []
+
+
+@pytest.mark.parametrize("name", NUMBERS)
+def test_closed_form(name: str) -> None:
+    NUMBERS[name](run_of(name))
+
+
+@pytest.mark.parametrize("name", NUMBERS)
+def test_energy_closes(name: str) -> None:
+    energy = run_of(name).energy()
+    assert energy.throughput > 0
+    assert energy.closure < 1e-8
