@@ -62,7 +62,7 @@ def exit_code(error: ModelicaLikeError) -> int:
 
 def _fail(message: str, code: int) -> NoReturn:
     what, *rest = message.split("\n")
-    console = Console(stderr=True, highlight=False, soft_wrap=True)
+    console = Console(stderr=True, highlight=False, soft_wrap=True, emoji=False)
     console.print(f"[bold red]{escape(what)}[/]")
     for line in rest:
         console.print(escape(line), style="dim" if line.startswith("  ") else None)
@@ -71,7 +71,7 @@ def _fail(message: str, code: int) -> NoReturn:
 
 def out() -> Console:
     """Return the console for results; a pipe gets plain text that is wide enough for tables."""
-    return Console(highlight=False, width=None if sys.stdout.isatty() else 160)
+    return Console(highlight=False, emoji=False, width=None if sys.stdout.isatty() else 160)
 
 
 def load_netlist(netlist: Path, assignments: list[str] | None) -> Any:

@@ -39,6 +39,7 @@ def simulate(
     units: Annotated[bool, typer.Option("--units", help="Units in a second header line of the table.")] = False,
     plot: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw the results: .png, .svg or .pdf.")] = None,
     show: Annotated[list[str] | None, typer.Option(metavar="PATTERN", help="What to draw, e.g. '*.w'.")] = None,
+    sankey: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw where the energy went.")] = None,
     energy: Annotated[bool, typer.Option(help="Tell the energy balance; it takes another, more precise run.")] = True,
     debug: Debug = False,
 ) -> None:  # fmt: skip
@@ -64,3 +65,7 @@ def simulate(
             from modelica_like.solve.plot import save_plot
 
             save_plot(draw(solution, show or ()), plot)
+        if sankey:
+            from modelica_like.solve.plot import save_plot
+
+            save_plot(solution.energy().sankey(model.name), sankey)

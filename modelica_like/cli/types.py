@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -41,3 +42,23 @@ def library(*, debug: Debug = False) -> None:
         from modelica_like.report.types import library_table
 
         out().print(library_table(library_types()))
+
+
+@app.command()
+def docs(
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="FOLDER", help="where the pages go")],
+    types: Annotated[
+        list[str] | None, typer.Argument(metavar="TYPE", help="types as netlists name them", show_default=False)
+    ] = None,
+    *,
+    examples: Annotated[
+        Path | None, typer.Option(metavar="FOLDER", help="netlists that the pages name", show_default=False)
+    ] = None,
+    debug: Debug = False,
+) -> None:
+    """Write pages about component types in Markdown: all types and an index, or the named ones."""
+    with told(debug):
+        from modelica_like.report.component_docs import write_component_pages
+
+        pages = write_component_pages(output, examples, types)
+        out().print(f"{len(pages)} page{'s' if len(pages) > 1 else ''} in {output}")

@@ -16,30 +16,21 @@ _PATIENCE = 0.5
 _INTERVAL = 0.1
 
 
-class Bar:
-    """Shows how far a simulation has come; to be used as its `progress`.
+class _LateBar:
+    """A bar on a terminal that appears when its patience is over."""
 
-    Args:
-        until: end time, a number in s or a quantity; what cannot be read is left to the simulation to tell.
-        console: where to show it, by default stderr; a console that is no terminal gets nothing.
-    """
-
-    def __init__(self, until: float | str | None, console: Console | None = None) -> None:
+    def __init__(self, title: str, console: Console | None) -> None:
+        self._title = title
         self._console = Console(stderr=True) if console is None else console
-        try:
-            self._end = to_si(until, parse_unit("s"), "until")
-        except ModelicaLikeError:
-            self._end = 0.0
         self._next = time.perf_counter() + _PATIENCE
         self._progress: Progress | None = None
 
     def __enter__(self) -> Self:
         return self
 
-    def __call__(self, reached: float) -> None:
-        """Note the time reached, in s."""
+    def _show(self, reached: float, end: float) -> None:
         now = time.perf_counter()
-        if now < self._next or self._end <= 0 or not self._console.is_terminal:
+        if now < self._next or end <= 0 or not self._console.is_terminal:
             return
         self._next = now + _INTERVAL
         if self._progress is None:
@@ -50,7 +41,7 @@ class Bar:
                 TimeRemainingColumn(),
             )
             self._progress = Progress(*columns, console=self._console, transient=True)
-            self._progress.add_task("simulating", total=self._end)
+            self._progress.add_task(self._title, total=end)
             self._progress.start()
         self._progress.update(self._progress.task_ids[0], completed=reached)
 
@@ -59,3 +50,38 @@ class Bar:
     ) -> None:
         if self._progress is not None:
             self._progress.stop()
+
+
+class Bar(_LateBar):
+    """Shows how far a simulation has come; to be used as its `progress`.
+
+    Args:
+        until: end time, a number in s or a quantity; what cannot be read is left to the simulation to tell.
+        console: where to show it, by default stderr; a console that is no terminal gets nothing.
+    """
+
+    def __init__(self, until: float | str | None, console: Console | None = None) -> None:
+        super().__init__("simulating", console)
+        try:
+            self._end = to_si(until, parse_unit("s"), "until")
+        except ModelicaLikeError:
+            self._end = 0.0
+
+    def __call__(self, reached: float) -> None:
+        """Note the time reached, in s."""
+        self._show(reached, self._end)
+
+
+class RunsBar(_LateBar):
+    """Shows how many runs of a sweep are done; to be used as its `progress`.
+
+    Args:
+        console: where to show it, by default stderr; a console that is no terminal gets nothing.
+    """
+
+    def __init__(self, console: Console | None = None) -> None:
+        super().__init__("runs", console)
+
+    def __call__(self, done: int, total: int) -> None:
+        """Note how many are done."""
+        self._show(done, total)

@@ -53,7 +53,7 @@ def describe(kind: type[Component]) -> RenderableType:
         ("parameters", Parameter), ("inputs", Input), ("outputs", Output), ("variables", Variable),
         ("discrete values", Discrete),
     ):  # fmt: skip
-        fields = [field for field in kind._class_fields.values() if _sort(field) is sort]
+        fields = [field for field in kind._class_fields.values() if sort_of(field) is sort]
         if fields:
             sections.append(_fields(title, fields))
     sections += [made for made in (_structure(kind), _connectors(kind), _modes(kind), _parts(kind)) if made.row_count]
@@ -61,7 +61,8 @@ def describe(kind: type[Component]) -> RenderableType:
     return Group(*(Padding(section, (0, 0, 1, 0), expand=False) for section in sections))
 
 
-def _sort(field: Field) -> type[Field]:
+def sort_of(field: Field) -> type[Field]:
+    """Return the sort of a declaration: parameter, input, output, variable or discrete value."""
     return next(sort for sort in (Parameter, Input, Output, Variable, Discrete) if isinstance(field, sort))
 
 
@@ -70,12 +71,13 @@ def _fields(title: str, fields: Iterable[Field]) -> Table:
     for field in fields:
         default = "" if field.default is None else str(field.default)
         made.add_row(
-            f"[bold]{field.name}[/]", field.unit_text, escape(default), _range(field), escape(field.description)
+            f"[bold]{field.name}[/]", field.unit_text, escape(default), value_range(field), escape(field.description)
         )
     return made
 
 
-def _range(field: Field) -> str:
+def value_range(field: Field) -> str:
+    """Return the permitted values, or nothing."""
     low = "" if field.min is None else f"{field.min:g}"
     high = "" if field.max is None else f"{field.max:g}"
     return f"{low} … {high}".strip() if low or high else ""
@@ -97,13 +99,14 @@ def _connectors(kind: type[Component]) -> Table:
             f"[bold]{name}[/]",
             type(connector).__name__,
             escape(fields),
-            _freedom(connector),
+            freedom(connector),
             escape(connector.description),
         )
     return made
 
 
-def _freedom(connector: Connector) -> str:
+def freedom(connector: Connector) -> str:
+    """Tell whether a connector may stay unconnected."""
     return "optional" if connector.optional else "may be free" if connector.may_be_free else ""
 
 

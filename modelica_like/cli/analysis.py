@@ -1,0 +1,45 @@
+"""Commands on small motions: modes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from modelica_like.cli.app import Assignments, Debug, Netlist, app, load_netlist, out, told
+
+
+@app.command()
+def modes(
+    netlist: Netlist, assignments: Assignments = None, *,
+    at: Annotated[
+        str, typer.Option(metavar="WHEN", help="Time, e.g. 0.5s, or start: given, rest, steady.")
+    ] = "given",
+    shapes: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw the shapes of the modes.")] = None,
+    show: Annotated[list[str] | None, typer.Option(metavar="NAME", help="Variables along the shapes.")] = None,
+    bode: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw the frequency response.")] = None,
+    inputs: Annotated[list[str] | None, typer.Option("--input", metavar="NAME", help="Input or parameter.")] = None,
+    outputs: Annotated[list[str] | None, typer.Option("--output", metavar="NAME", help="Variable.")] = None,
+    debug: Debug = False,
+) -> None:  # fmt: skip
+    """Linearise a netlist at a point: eigenvalues, damping, where the energy of each mode is."""
+    with told(debug):
+        assembly = load_netlist(netlist, assignments)
+        from modelica_like.analyse.linearize import linearize
+        from modelica_like.analyse.points import when
+        from modelica_like.report.modes import modes_report
+        from modelica_like.solve.plot import save_plot
+
+        linear = linearize(assembly, when(at), inputs=inputs, outputs=outputs)
+        found = linear.modes()
+        out().print(modes_report(found))
+        if shapes:
+            speeds = [one.path for one in linear.model.flat_variables if _is_speed(one.path, str(one.unit))]
+            save_plot(found.plot(show or speeds), shapes)
+        if bode:
+            save_plot(linear.bode(), bode)
+
+
+def _is_speed(path: str, unit: str) -> bool:
+    return unit == "rad/s" and path.endswith(".w")

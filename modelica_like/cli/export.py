@@ -1,0 +1,59 @@
+"""Commands that write models for other tools: export."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from modelica_like.cli.app import Assignments, Debug, Netlist, app, load_netlist, out, told
+
+
+class Takes(StrEnum):
+    """What open ends take from outside."""
+
+    FLOW = "flow"
+    POTENTIAL = "potential"
+
+
+@app.command()
+def export(
+    netlist: Netlist, assignments: Assignments = None, *,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="FILE", help="The FMU; else named after the netlist.")
+    ] = None,
+    fmi: Annotated[str, typer.Option(metavar="VERSION", help="FMI version: 2.0 or 3.0.")] = "2.0",
+    kind: Annotated[str, typer.Option(metavar="KINDS", help="me, cs, or both: me,cs.")] = "me,cs",
+    platforms: Annotated[
+        str, typer.Option(metavar="NAMES", help="native, all, none, or names such as x86_64-windows, with commas.")
+    ] = "native",
+    outputs: Annotated[
+        list[str] | None, typer.Option("--show", metavar="PATTERN", help="Further outputs, e.g. '*.w'.")
+    ] = None,
+    ends: Annotated[
+        list[str] | None, typer.Option("--open", metavar="PATH", help="A free connector that is open, e.g. J.flange_b.")
+    ] = None,
+    takes: Annotated[Takes, typer.Option(help="What open ends take: flow (torque) or potential (angle).")] = Takes.FLOW,
+    check: Annotated[bool, typer.Option(help="Run the FMU against IDAS before it is handed over.")] = True,
+    debug: Debug = False,
+) -> None:  # fmt: skip
+    """Export a netlist as an FMU: compiled C that needs no Python, checked before it is written."""
+    with told(debug):
+        assembly = load_netlist(netlist, assignments)
+        from rich.console import Console
+
+        from modelica_like.fmi.export import export_fmu
+
+        with Console(stderr=True).status("loading") as status:
+            done = export_fmu(
+                assembly, output or Path(f"{netlist.stem}.fmu"), fmi, _listed(kind), _listed(platforms),
+                outputs=outputs or (), ends=ends or (), takes=takes.value, check=check, report=status.update,
+            )  # fmt: skip
+        out().print(str(done), soft_wrap=True)
+
+
+def _listed(text: str) -> tuple[str, ...]:
+    names = tuple(name.strip() for name in text.split(",") if name.strip())
+    return () if names == ("none",) else names

@@ -1,0 +1,74 @@
+"""Commands on many points of a drive: steady and sweep."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from modelica_like.cli.app import Assignments, Debug, Netlist, app, load_netlist, out, told
+
+
+@app.command()
+def steady(
+    netlist: Netlist, assignments: Assignments = None, *,
+    hold: Annotated[
+        list[str] | None, typer.Option(metavar="NAME=VALUE", help="Hold a variable, e.g. 'motor.w=4000 rpm'.")
+    ] = None,
+    by: Annotated[list[str] | None, typer.Option(metavar="PARAMETER", help="Find it, one for each held one.")] = None,
+    over: Annotated[
+        str | None, typer.Option(metavar="NAME=VALUES", help="A curve, e.g. 'load=0:0.25:26' or 'load=0,0.1,0.2'.")
+    ] = None,
+    show: Annotated[list[str] | None, typer.Option(metavar="NAME", help="Variables of the table and the plot.")] = None,
+    plot: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw the curve.")] = None,
+    debug: Debug = False,
+) -> None:  # fmt: skip
+    """Find operating points of a netlist: powers, losses and efficiency, or a characteristic curve."""
+    with told(debug):
+        assembly = load_netlist(netlist, assignments)
+        from modelica_like.analyse.ranges import read_assignment, read_range
+        from modelica_like.analyse.steady import characteristic
+        from modelica_like.analyse.steady import steady as find
+        from modelica_like.report.steady import curves_report, point_report
+        from modelica_like.solve.plot import save_plot
+
+        if over is None:
+            held = dict(read_assignment(text) for text in hold or ())
+            out().print(point_report(find(assembly, held, by or ()), show or ()))
+            return
+        curves = characteristic(assembly, dict([read_range(over)]), by=(by or [""])[0])
+        out().print(curves_report(curves, show or ()))
+        if plot:
+            save_plot(curves.plot(*(show or ("efficiency",))), plot)
+
+
+@app.command()
+def sweep(
+    netlist: Netlist,
+    over: Annotated[list[str], typer.Option(metavar="NAME=VALUES", help="E.g. 'gear.ratio=2:4:21' or 'mu=0.1,0.3'.")],
+    of: Annotated[list[str], typer.Option(metavar="OUTPUT", help="What to read off each run, e.g. 'max(shaft.tau)'.")],
+    assignments: Assignments = None, *,
+    until: Annotated[str | None, typer.Option(metavar="TIME", help="End time, e.g. 2s; else the netlist's.")] = None,
+    checkpoint: Annotated[Path | None, typer.Option(metavar="FOLDER", help="Keeps what is done.")] = None,
+    processes: Annotated[int | None, typer.Option(metavar="N", help="Of this machine; else one per core.")] = None,
+    scheduler: Annotated[str | None, typer.Option(metavar="ADDRESS", help="Dask, e.g. tcp://host:8786.")] = None,
+    output: Annotated[Path | None, typer.Option("--output", "-o", metavar="FILE", help="Write a table: .csv.")] = None,
+    debug: Debug = False,
+) -> None:  # fmt: skip
+    """Simulate a netlist over a grid of parameter values."""
+    with told(debug):
+        assembly = load_netlist(netlist, assignments)
+        from modelica_like.analyse.ranges import read_range
+        from modelica_like.analyse.sweep import sweep as run
+        from modelica_like.report.progress import RunsBar
+        from modelica_like.report.sweep import sweep_report, write_sweep
+
+        with RunsBar() as bar:
+            found = run(
+                assembly, dict(read_range(text) for text in over), of, until=until, checkpoint=checkpoint,
+                processes=processes, scheduler=scheduler, progress=bar,
+            )  # fmt: skip
+        out().print(sweep_report(found))
+        if output:
+            write_sweep(found, output)

@@ -1,0 +1,82 @@
+"""A compiled model as C sources: its tables, and the run-time that is the same for all models."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+from pathlib import Path
+from typing import Literal
+
+import fmpy
+
+from modelica_like.compile.compiled import CompiledDae
+from modelica_like.fmi.c_text import header, source
+from modelica_like.fmi.interface import Interface
+from modelica_like.fmi.tables import make_tables
+
+Version = Literal["2.0", "3.0"]
+
+RUNTIME = (
+    "tape.c",
+    "linear.c",
+    "point.c",
+    "start.c",
+    "events.c",
+    "rosenbrock.c",
+    "integrate.c",
+    "values.c",
+    "derivatives.c",
+    "instance.c",
+)
+LOG_CATEGORIES = {
+    "logStatusError": "errors: what went wrong, where, and what to do",
+    "logStatusWarning": "doubtful but possible requests",
+    "logEvents": "mode changes with their time",
+    "logIntegrator": "steps of the Co-Simulation integrator with their size and estimated error",
+}
+"""Log categories of every FMU with a description; errors are always reported."""
+
+_FACES = {"2.0": ("fmi2.c",), "3.0": ("fmi3.h", "fmi3.c", "fmi3_unused.c")}
+_HEADERS = {
+    "2.0": ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h"),
+    "3.0": ("fmi3Functions.h", "fmi3FunctionTypes.h", "fmi3PlatformTypes.h"),
+}
+
+
+def source_files(version: Version) -> tuple[str, ...]:
+    """Names of the C files that are compiled together."""
+    return ("model.c", *RUNTIME, *(name for name in _FACES[version] if name.endswith(".c")))
+
+
+def generate(
+    model: CompiledDae, interface: Interface, version: Version = "2.0", *, token: str, tolerance: float = 1e-7
+) -> dict[str, str]:
+    """Write all C sources of an FMU.
+
+    Args:
+        model: the compiled model.
+        interface: its FMI variables.
+        version: FMI version.
+        token: GUID (2.0) or instantiation token (3.0) of the description.
+        tolerance: relative tolerance of Co-Simulation where the importer gives none.
+
+    Returns:
+        File name to text; besides C files the headers that they include.
+
+    Raises:
+        MissingStart, ContradictingStart: the start values do not determine all states.
+        LanguageError: a function has no counterpart in C.
+    """
+    tables = make_tables(model)
+    folder = files("modelica_like.fmi") / "templates"
+    names = (
+        "core.h",
+        *(["fmi3.h"] if version == "3.0" else []),
+        *(name for name in source_files(version) if name != "model.c"),
+    )
+    headers = Path(fmpy.__file__).parent / "c-code"
+    return {
+        "model.h": header(tables, interface.variables, tolerance),
+        "model.c": source(tables, interface.variables, token),
+        **{name: (folder / name).read_text(encoding="utf-8") for name in names},
+        **{name: (headers / name).read_text(encoding="utf-8") for name in _HEADERS[version]},
+    }

@@ -1,0 +1,199 @@
+"""What depends on what: the true sparsity, through implicit equations and through the initialization."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import casadi as ca
+
+from modelica_like.compile.compiled import CompiledDae
+from modelica_like.fmi.interface import FmuVariable, Interface
+from modelica_like.fmi.start_tables import StartTables, start_tables
+
+Known = tuple[str, int]
+"""An argument of the model's functions: its name (t, x, p, u, start) and a position."""
+
+Rows = list[set[Known]]
+
+
+@dataclass(frozen=True)
+class Dependencies:
+    """Dependencies of a model's unknowns on what an importer sets, by value references."""
+
+    model: CompiledDae
+    interface: Interface
+
+    def continuous(self, unknown: FmuVariable) -> list[int]:
+        """Time, states and inputs on which a derivative, output or event indicator depends while the model runs."""
+        found = self._through_implicit(self._own(unknown))
+        return self._references(found, ("t", "x", "u"))
+
+    def initial(self, unknown: FmuVariable) -> list[int]:
+        """Time, parameters, inputs and start values on which an unknown depends in initialization mode."""
+        kind, index = unknown.slot
+        found = self._initial_states[index] if kind == "state" else self._at_start(self._own(unknown))
+        return self._references(found, ("t", "p", "u", "start", "discrete"))
+
+    # -- rows of functions -------------------------------------------------------------------------------------------
+
+    def _own(self, unknown: FmuVariable) -> set[Known]:
+        kind, index = unknown.slot
+        rows = {"der": "ode", "variable": "variables", "guard": "guards"}
+        if kind in rows:
+            return self._rows(rows[kind])[index]
+        if kind == "derived":
+            return self._derived[index]
+        if kind == "discrete":
+            return {("d", index)}
+        names = {"state": "x", "input": "u", "parameter": "p", "time": "t"}
+        return {(names[kind], index)}
+
+    @cached_property
+    def _tables(self) -> dict[str, Rows]:
+        return {}
+
+    def _rows(self, name: str) -> Rows:
+        if name not in self._tables:
+            self._tables[name] = sparsity_rows(getattr(self.model, name))
+        return self._tables[name]
+
+    @cached_property
+    def _derived(self) -> Rows:
+        return sparsity_rows(self.model.derived)
+
+    # -- implicit equations ------------------------------------------------------------------------------------------
+
+    @cached_property
+    def _implicit(self) -> Rows:
+        """What each implicit unknown depends on, by its own block and those before."""
+        rows = self._rows("alg")
+        own = [{k for name, k in row if name == "z"} for row in rows]
+        return solved_rows(own, [{one for one in row if one[0] != "z"} for row in rows], len(rows))
+
+    def _through_implicit(self, row: set[Known]) -> set[Known]:
+        found = {one for one in row if one[0] != "z"}
+        return found.union(*(self._implicit[k] for name, k in row if name == "z"))
+
+    # -- initialization ----------------------------------------------------------------------------------------------
+
+    def _at_start(self, row: Iterable[Known]) -> set[Known]:
+        """Replace states, implicit unknowns and modes by what determines them at the start."""
+        found: set[Known] = set()
+        for name, k in self._through_implicit(set(row)):
+            if name == "x":
+                found |= self._initial_states[k]
+            elif name == "d":
+                found |= self._initial_modes[k]
+            else:
+                found.add((name, k))
+        return found
+
+    @cached_property
+    def _initial_modes(self) -> Rows:
+        """Modes by their start conditions, discrete values by their start."""
+        rows: Rows = [set() for _ in self.model.flat_discretes]
+        starts = self._rows("discrete_starts")
+        for k, one in enumerate(self.model.flat_discretes):
+            rows[k] = {("discrete", k)} if not one.names else {d for d in starts[k] if d[0] in "tpu"}
+        conditions = self._rows("start_conditions")
+        for row, (mode, _, _) in zip(conditions, self.model.start_modes, strict=True):
+            for name, k in self._through_implicit(row):
+                if name != "d":
+                    rows[mode] = rows[mode] | (self._initial_states[k] if name == "x" else {(name, k)})
+        return rows
+
+    def _start_value(self, position: int) -> set[Known]:
+        """A start value: what an importer sets, or the formula behind it."""
+        return {("start", position)} | {one for one in self._rows("start_values")[position] if one[0] in "tpu"}
+
+    @cached_property
+    def _initial_states(self) -> Rows:
+        model, tables = self.model, start_tables(self.model)
+        everything = self._everything
+        if tables.steady is not None:
+            return [everything for _ in model.states]
+        rows: Rows = [set() for _ in model.states]
+        for state, position, _ in reversed(tables.direct):
+            rows[state] = self._start_value(position)
+        solved = self._solved_starts(tables, rows)
+        for place, column in enumerate(tables.columns):
+            if column < len(model.states):
+                rows[column] = solved[place]
+        return rows
+
+    def _solved_starts(self, tables: StartTables, direct: Rows) -> Rows:
+        """What the unknowns of the start system depend on, by its block triangular form."""
+        place = {column: k for k, column in enumerate(tables.columns)}
+        nx = len(self.model.states)
+        ny = self.model.start_system.size1_out(0)
+        offsets = {"x": 0, "y": nx, "z": nx + ny}
+        given = {row: position for position, _, row in tables.rows}
+        every = sparsity_rows(self.model.start_system, output=2) if tables.columns else []
+        own: list[set[int]] = []
+        outer: Rows = []
+        for row in tables.wanted:
+            columns = {offsets[name] + k for name, k in every[row] if name in offsets}
+            own.append({place[column] for column in columns if column in place})
+            known = {one for one in every[row] if one[0] in "tpu"}
+            known = known.union(*(direct[column] for column in columns if column not in place))
+            outer.append(known | (self._start_value(given[row]) if row in given else set()))
+        return solved_rows(own, outer, len(tables.columns))
+
+    @cached_property
+    def _everything(self) -> set[Known]:
+        model = self.model
+        counts = {"t": 1, "p": len(model.p), "u": len(model.u), "start": len(model.starts)}
+        return {(name, k) for name, count in counts.items() for k in range(count)}
+
+    # -- value references --------------------------------------------------------------------------------------------
+
+    @cached_property
+    def _reference(self) -> dict[Known, int]:
+        names = {"time": "t", "state": "x", "parameter": "p", "input": "u"}
+        found = {(names[v.slot[0]], v.slot[1]): v.reference for v in self.interface.variables if v.slot[0] in names}
+        for one in self.interface.variables:
+            if one.start_entry is not None and one.initial == "exact":
+                found["start", one.start_entry] = one.reference
+            if one.slot[0] == "discrete" and one.initial == "exact":
+                found["discrete", one.slot[1]] = one.reference
+        return found
+
+    def _references(self, found: Iterable[Known], names: Sequence[str]) -> list[int]:
+        return sorted(self._reference[one] for one in found if one[0] in names and one in self._reference)
+
+
+def sparsity_rows(function: Any, output: int = 0) -> Rows:
+    """For every row of a function's result the arguments on which it depends."""
+    rows: Rows = [set() for _ in range(function.numel_out(output))]
+    for number, name in enumerate(function.name_in()):
+        for row, column in zip(*function.jac_sparsity(output, number).get_triplet(), strict=True):
+            rows[row].add((name, column))
+    return rows
+
+
+def solved_rows(own: Sequence[set[int]], outer: Rows, unknowns: int) -> Rows:
+    """What each unknown of a square system depends on.
+
+    Args:
+        own: unknowns in each equation.
+        outer: known values in each equation.
+        unknowns: their number.
+    """
+    if not unknowns:
+        return []
+    places = [(row, column) for row, columns in enumerate(own) for column in columns]
+    pattern = ca.Sparsity.triplet(len(own), unknowns, [row for row, _ in places], [column for _, column in places])
+    _, row_order, column_order, row_blocks, column_blocks, *_ = pattern.btf()
+    found: Rows = [set() for _ in range(unknowns)]
+    # The form is lower block triangular: a block needs those before it.
+    for block in range(len(row_blocks) - 1):
+        rows = row_order[row_blocks[block] : row_blocks[block + 1]]
+        columns = set(column_order[column_blocks[block] : column_blocks[block + 1]])
+        total: set[Known] = set().union(*(outer[row] for row in rows))
+        total = total.union(*(found[column] for row in rows for column in own[row] - columns))
+        for column in columns:
+            found[column] = total
+    return found

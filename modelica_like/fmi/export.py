@@ -1,0 +1,252 @@
+"""Export of a drive as an FMU: description, C sources, binaries, terminals and documentation, checked before use."""
+
+from __future__ import annotations
+
+import hashlib
+import tempfile
+import time
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import get_args
+
+from modelica_like.compile import compile
+from modelica_like.compile.compiled import CompiledDae
+from modelica_like.errors import ExportError, UnknownName, did_you_mean
+from modelica_like.flatten import flatten
+from modelica_like.flatten.model import FlatModel
+from modelica_like.fmi.build import PLATFORMS, build, native_platform
+from modelica_like.fmi.check import compare_with_idas, problems
+from modelica_like.fmi.codegen import LOG_CATEGORIES, generate, source_files
+from modelica_like.fmi.description import About, Kind, Version, build_description, identifier, model_description
+from modelica_like.fmi.documentation import Listing, index_page
+from modelica_like.fmi.icons import drive_icon, icon_name, terminal_icon
+from modelica_like.fmi.interface import Interface, interface
+from modelica_like.fmi.package import write_archive
+from modelica_like.fmi.terminals import Takes, terminals_and_icons, with_open_ends
+from modelica_like.simulation import Model, _seconds
+from modelica_like.solve.options import Options
+from modelica_like.structure import reduce
+
+_TOKEN = "{00000000-0000-0000-0000-000000000000}"
+
+Report = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Export:
+    """What was exported.
+
+    Attributes:
+        path: the FMU.
+        version: FMI version.
+        kinds: `me`, `cs` or both.
+        platforms: names of the platforms it has binaries for.
+        size: of the file in bytes.
+        seconds: how long it took.
+    """
+
+    path: Path
+    version: Version
+    kinds: tuple[Kind, ...]
+    platforms: tuple[str, ...]
+    size: int
+    seconds: float
+
+    def __str__(self) -> str:
+        kinds = " and ".join({"me": "Model Exchange", "cs": "Co-Simulation"}[kind] for kind in self.kinds)
+        where = ", ".join(self.platforms) or "sources only"
+        return f"{self.path}: FMI {self.version}, {kinds}, {self.size / 1000:.0f} kB, {where}, {self.seconds:.1f} s"
+
+
+def export_fmu(
+    drive: Model, path: str | Path, version: Version | str = "2.0", kind: Collection[Kind | str] = ("me", "cs"),
+    platforms: Sequence[str] | str = "native", *, outputs: Sequence[str] = (), ends: Sequence[str] = (),
+    takes: Takes = "flow", check: bool = True, report: Report | None = None,
+) -> Export:  # fmt: skip
+    """Export a drive as an FMU: compiled C that needs no Python.
+
+    Connectors that the drive leaves open (a netlist's `expose`) and adaptors that nothing inside drives become inputs
+    and outputs, in FMI 3 also terminals; so do inputs of parts that have no value.
+
+    Args:
+        drive: a component, a netlist file, or a compiled model.
+        path: the FMU to write.
+        version: FMI version, `2.0` or `3.0`.
+        kind: `me` (Model Exchange), `cs` (Co-Simulation) or both.
+        platforms: `native`, `all`, names such as `x86_64-windows`, or none for sources only.
+        outputs: patterns of further variables that are to be outputs, such as `*.w`.
+        ends: free connectors of parts that are to be open, such as `load.flange_b`.
+        takes: what open ends take from outside: the `flow` (torque, force, current, heat flow) or the `potential`.
+        check: whether to run the FMU against IDAS, where it has a binary for this machine.
+        report: called with what is being done.
+
+    Returns:
+        What was exported.
+
+    Raises:
+        ExportError: it cannot be exported or compiled, or does not pass its checks; nothing is written then.
+        UnknownName: there is no such version, kind, platform, connector or variable.
+        MissingExtra: binaries for other platforms need zig.
+        ModelicaLikeError: something is wrong with the model.
+    """
+    begin = time.perf_counter()
+    tell = report or _silent
+    target = _target(path)
+    chosen, kinds, names = _version(version), _kinds(kind), _platforms(platforms)
+    tell("compiling the model")
+    model, description, equations = _compiled(drive, ends, takes)
+    variables = interface(model, outputs)
+    tell("writing C")
+    files, sources = _contents(model, variables, _about(model, chosen, kinds, description), equations)
+    title = identifier(model.name)
+    with tempfile.TemporaryDirectory(prefix="modelica_like_") as folder:
+        for place, name in enumerate(names, 1):
+            tell(f"compiling for {name}" + (f" ({place} of {len(names)})" if len(names) > 1 else ""))
+            library = build(sources, name, Path(folder) / name, title)
+            home = PLATFORMS[name].fmi2 if chosen == "2.0" else name
+            files[f"binaries/{home}/{library.name}"] = library.read_bytes()
+        draft = Path(folder) / "draft.fmu"
+        write_archive(draft, files)
+        tell("checking")
+        _check(draft, model, kinds, names, check)
+        target.write_bytes(draft.read_bytes())
+    return Export(target, chosen, kinds, names, target.stat().st_size, time.perf_counter() - begin)
+
+
+def _silent(_: str) -> None:
+    pass
+
+
+# -- what is asked for -------------------------------------------------------------------------------------------------
+
+
+def _target(path: str | Path) -> Path:
+    target = Path(path)
+    if target.suffix != ".fmu":
+        raise ExportError(f"An FMU is a file with the ending .fmu, not '{target.name}'.")
+    if not target.absolute().parent.is_dir():
+        raise ExportError(f"There is no folder '{target.parent}' for {target.name}.", advice="Make it first.")
+    return target
+
+
+def _version(asked: str) -> Version:
+    for one in get_args(Version):
+        if asked == one:
+            return one
+    raise UnknownName(f"FMI {asked} is not supported.", advice="There are 2.0 and 3.0.")
+
+
+def _kinds(kind: Collection[str]) -> tuple[Kind, ...]:
+    asked = {kind} if isinstance(kind, str) else set(kind)
+    for one in sorted(asked - set(get_args(Kind))):
+        raise UnknownName(
+            f"There is no kind of FMU '{one}'.", advice="There are me (Model Exchange) and cs (Co-Simulation)."
+        )
+    if not asked:
+        raise ExportError("An FMU needs a kind.", advice="Ask for me (Model Exchange), cs (Co-Simulation) or both.")
+    return tuple(one for one in get_args(Kind) if one in asked)
+
+
+def _platforms(platforms: Sequence[str] | str) -> tuple[str, ...]:
+    asked = (platforms,) if isinstance(platforms, str) else tuple(platforms)
+    found: list[str] = []
+    for one in asked:
+        if one not in ("native", "all", *PLATFORMS):
+            known = ["native", "all", *PLATFORMS]
+            raise UnknownName(
+                f"There is no platform '{one}'{did_you_mean(one, known) or '.'}",
+                advice=f"There are {', '.join(known)}.",
+            )
+        found += PLATFORMS if one == "all" else [native_platform() if one == "native" else one]
+    return tuple(dict.fromkeys(found))
+
+
+# -- the model ---------------------------------------------------------------------------------------------------------
+
+
+def _compiled(drive: Model, ends: Sequence[str], takes: Takes) -> tuple[CompiledDae, str, Listing]:
+    """Return the compiled model, its description and its equations."""
+    if isinstance(drive, CompiledDae):
+        if ends:
+            raise ExportError(
+                "A compiled model has no ends that could be opened.", advice="Export its netlist instead."
+            )
+        return drive, "", ()
+    if isinstance(drive, str | Path):
+        from modelica_like.netlist import load
+
+        drive = load(drive)
+    flat = flatten(with_open_ends(drive, ends, takes), open_inputs=True)
+    return compile(reduce(flat)), str(getattr(drive, "description", "") or ""), _equations(flat)
+
+
+def _equations(flat: FlatModel) -> Listing:
+    found: list[tuple[str, str, list[str]]] = []
+    for one in flat.instances:
+        lines = [source.text or str(source) for source in one.template.sources]
+        if lines:
+            found.append((one.path, one.template.component, lines))
+    return found
+
+
+def _about(model: CompiledDae, version: Version, kinds: tuple[Kind, ...], description: str) -> About:
+    settings = model.settings
+    end = _seconds(settings["until"]) if "until" in settings else None
+    points = int(settings.get("points", Options.points))
+    return About(
+        version=version, kinds=frozenset(kinds), token=_TOKEN, description=description, stop_time=end,
+        tolerance=float(settings.get("rtol", Options.rtol)), step_size=None if end is None else end / points,
+        sources=source_files(version), log_categories=LOG_CATEGORIES, tool=_tool(),
+    )  # fmt: skip
+
+
+def _tool() -> str:
+    try:
+        return f"modelica-like {version('modelica-like')}"
+    except PackageNotFoundError:
+        return "modelica-like"
+
+
+# -- the files ---------------------------------------------------------------------------------------------------------
+
+
+def _contents(
+    model: CompiledDae, variables: Interface, about: About, equations: Listing
+) -> tuple[dict[str, bytes], dict[str, str]]:
+    """Return all files but the binaries, and the C sources, under a token that follows from their content."""
+    sources = generate(model, variables, about.version, token=_TOKEN, tolerance=about.tolerance)
+    texts = {"modelDescription.xml": model_description(model, variables, about)}
+    texts |= {f"sources/{name}": text for name, text in sources.items()}
+    texts["documentation/index.html"] = index_page(variables, about.description, about.tool, equations)
+    pictures = {"model.png": drive_icon("png")}
+    if about.version == "3.0":
+        texts["sources/buildDescription.xml"] = build_description(model.name, about.sources)
+        texts["terminalsAndIcons/terminalsAndIcons.xml"] = terminals_and_icons(model.terminals)
+        pictures = {f"terminalsAndIcons/icon.{suffix}": drive_icon(suffix) for suffix in ("png", "svg")}
+        for family in dict.fromkeys(icon_name(one.kind) for one in model.terminals):
+            pictures |= {f"terminalsAndIcons/{family}.{s}": terminal_icon(family, s) for s in ("png", "svg")}
+    token = _token(texts)
+    texts = {name: text.replace(_TOKEN, token) for name, text in texts.items()}
+    files: dict[str, bytes] = {name: text.encode() for name, text in texts.items()} | pictures
+    return files, {name: texts[f"sources/{name}"] for name in sources}
+
+
+def _token(texts: dict[str, str]) -> str:
+    """A GUID that follows from the content: the same model has the same."""
+    total = hashlib.sha256()
+    for name in sorted(texts):
+        total.update(f"{name}\0{texts[name]}\0".encode())
+    digest = total.hexdigest()
+    return f"{{{digest[:8]}-{digest[8:12]}-{digest[12:16]}-{digest[16:20]}-{digest[20:32]}}}"
+
+
+def _check(draft: Path, model: CompiledDae, kinds: tuple[Kind, ...], names: tuple[str, ...], run: bool) -> None:
+    found = problems(draft)
+    if found:
+        raise ExportError(
+            f"The FMU does not pass its checks: {'; '.join(found[:3])}.", why="This is a fault of the export."
+        )
+    if run and native_platform() in names:
+        compare_with_idas(draft, model, kinds[-1])

@@ -1,0 +1,317 @@
+"""The FMI variables of a compiled model: what an importer sees, and where each value lives."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from functools import cached_property
+from typing import Any, Literal
+
+import numpy as np
+
+from modelica_like.compile.compiled import CompiledDae
+from modelica_like.errors import UnknownName, did_you_mean
+from modelica_like.flatten.model import FlatDiscrete, FlatParameter, FlatVariable
+from modelica_like.fmi.start_tables import StartTables, start_tables
+from modelica_like.units import ONE, Unit, coherent, parse_unit
+
+Causality = Literal["independent", "parameter", "calculatedParameter", "input", "output", "local"]
+Variability = Literal["fixed", "tunable", "discrete", "continuous"]
+Initial = Literal["exact", "approx", "calculated"]
+SlotKind = Literal["time", "state", "der", "variable", "parameter", "derived", "input", "discrete", "guard"]
+
+_SECOND = parse_unit("s")
+
+
+@dataclass(frozen=True)
+class FmuVariable:
+    """One variable of the description.
+
+    Attributes:
+        reference: value reference; the position among all variables.
+        initial: None where FMI knows only one choice (inputs, parameters, time).
+        slot: where the value lives, and its position there. Only the name of a state itself has the slot `state`; other
+            names of the same motion are variables.
+        unit: unit of `start`, `min`, `max` and `nominal`; it is coherent, or `1` or `*`.
+        start: start value, where it has one.
+        start_entry: position in the model's `starts` of the start value that an importer replaces when it sets this.
+        derivative_of: value reference of the variable whose time derivative this is.
+        modes: names of a mode's values, from zero.
+    """
+
+    name: str
+    reference: int
+    type: Literal["Float64", "Int32"]
+    causality: Causality
+    variability: Variability
+    initial: Initial | None
+    slot: tuple[SlotKind, int]
+    unit: Unit = ONE
+    description: str = ""
+    start: float | None = None
+    min: float | None = None
+    max: float | None = None
+    nominal: float | None = None
+    start_entry: int | None = None
+    derivative_of: int | None = None
+    modes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Interface:
+    """All FMI variables of a model.
+
+    Attributes:
+        variables: by value reference.
+        states, derivatives: value references in the order of x.
+        outputs: value references of continuous and discrete outputs.
+        indicators: value references of the event indicators, in the order of the guards.
+    """
+
+    name: str
+    variables: tuple[FmuVariable, ...]
+    states: tuple[int, ...]
+    derivatives: tuple[int, ...]
+    outputs: tuple[int, ...]
+    indicators: tuple[int, ...]
+
+    @cached_property
+    def by_name(self) -> dict[str, FmuVariable]:
+        """Variables by their names."""
+        return {one.name: one for one in self.variables}
+
+    def __str__(self) -> str:
+        counts: dict[str, int] = {}
+        for one in self.variables:
+            counts[one.causality] = counts.get(one.causality, 0) + 1
+        parts = ", ".join(f"{count} {causality}" for causality, count in counts.items())
+        return f"Interface {self.name}: {len(self.states)} states; {parts}"
+
+
+def interface(model: CompiledDae, outputs: Sequence[str] = ()) -> Interface:
+    """List the FMI variables of a model, by the names they have in Python.
+
+    Signal outputs of components and modes are outputs, inputs of the model are inputs, everything else is local.
+
+    Args:
+        model: the compiled model.
+        outputs: patterns of further variables that are to be outputs, such as `load.w` or `*.tau`.
+
+    Raises:
+        UnknownName: no variable has a name of such a pattern.
+        MissingStart, ContradictingStart: the start values do not determine all states.
+    """
+    build = _Builder(model, outputs)
+    build.parameters()
+    build.continuous()
+    build.discretes()
+    build.guards()
+    return build.result()
+
+
+class _Builder:
+    def __init__(self, model: CompiledDae, outputs: Sequence[str]) -> None:
+        self.model = model
+        self.found: list[FmuVariable] = []
+        self.states: dict[int, int] = {}
+        self.derivatives: dict[int, int] = {}
+        self.wanted = _matcher(model, outputs)
+        self.starts = _Starts(model)
+        self.depends = _dependence(model)
+        self.add("time", "Float64", "independent", "continuous", None, ("time", 0), unit=_SECOND, description="time")
+
+    def add(self, name: str, kind: Any, causality: Any, variability: Any, initial: Any, slot: Any, **rest: Any) -> int:
+        """Append a variable; return its value reference."""
+        reference = len(self.found)
+        self.found.append(FmuVariable(name, reference, kind, causality, variability, initial, slot, **rest))
+        return reference
+
+    def parameters(self) -> None:
+        """Independent parameters, and those that follow from others."""
+        model = self.model
+        for k, one in enumerate(model.flat_parameters):
+            variability = "tunable" if one.tunable else "fixed"
+            start = float(model.p[k])
+            self.add(one.path, "Float64", "parameter", variability, None, ("parameter", k), start=start, **_about(one))
+        for k, one in enumerate(model.flat_derived):
+            self.add(one.path, "Float64", "calculatedParameter", "tunable", "calculated", ("derived", k), **_about(one))
+
+    def continuous(self) -> None:
+        """Inputs, states with their derivatives, and all other variables."""
+        model = self.model
+        taken = {*model.parameter_position, *model.derived_position}
+        inputs = {variable: k for k, variable in enumerate(model.inputs)}
+        states = {name: k for k, name in enumerate(model.states)}
+        for k, one in enumerate(model.flat_variables):
+            if k in inputs:
+                position = inputs[k]
+                start = float(model.u[position])
+                slot = ("input", position)
+                self.add(one.path, "Float64", "input", "continuous", None, slot, start=start, **_about(one))
+            elif one.path in states:
+                self._state(states[one.path], k, one)
+            elif one.path not in taken:  # the value of an input that a parameter gives is that parameter
+                self._variable(k, one)
+        self._rates()
+
+    def _state(self, position: int, k: int, one: FlatVariable) -> None:
+        start = self.starts.of_variable(k)
+        causality = "output" if self.wanted(one) else "local"
+        slot = ("state", position)
+        self.states[position] = self.add(
+            one.path, "Float64", causality, "continuous", slot=slot, **start, **_about(one)
+        )
+
+    def _variable(self, k: int, one: FlatVariable) -> None:
+        output = self.wanted(one)
+        variability = self.depends[k]
+        start = self.starts.of_variable(k)
+        if output and variability == "tunable":
+            variability = "discrete"  # an output cannot be less
+        if start["initial"] != "calculated":
+            variability = "continuous"
+        causality = "output" if output else "local"
+        self.add(one.path, "Float64", causality, variability, slot=("variable", k), **start, **_about(one))
+
+    def _rates(self) -> None:
+        """Derivatives of all states; states that are themselves derivatives and have no other name come first."""
+        model = self.model
+        unnamed = [k for k in range(len(model.states)) if k not in self.states]
+        units = {
+            name: model.flat_variables[model.position[name]].unit for name in model.states if name in model.position
+        }
+        for k in sorted(unnamed, key=lambda k: model.states[k].count("der(")):
+            base = model.states[k].removeprefix("der(").removesuffix(")")
+            unit = units[model.states[k]] = units[base] / _SECOND
+            below = self.states[model.states.index(base)]
+            self.states[k] = self.add(
+                fmi_name(model.states[k]), "Float64", "local", "continuous", "calculated", ("state", k),
+                unit=coherent(unit), derivative_of=below, nominal=float(model.nominals[k]),
+            )  # fmt: skip
+            self.derivatives[model.states.index(base)] = self.states[k]
+        for k, name in enumerate(model.states):
+            if k not in self.derivatives:
+                self.derivatives[k] = self.add(
+                    fmi_name(f"der({name})"), "Float64", "local", "continuous", "calculated", ("der", k),
+                    unit=coherent(units[name] / _SECOND), derivative_of=self.states[k],
+                )  # fmt: skip
+
+    def discretes(self) -> None:
+        """Modes are outputs, other discrete values are local."""
+        for k, one in enumerate(self.model.flat_discretes):
+            slot, about = ("discrete", k), {"unit": coherent(one.unit), "description": _mode_text(one)}
+            if one.names:
+                bounds = {"min": 0, "max": len(one.names) - 1, "modes": one.names}
+                self.add(one.path, "Int32", "output", "discrete", "calculated", slot, **about, **bounds)
+            else:
+                start = self.starts.discrete(k)
+                self.add(one.path, "Float64", "local", "discrete", "exact", slot, start=start, **about)
+
+    def guards(self) -> None:
+        """One event indicator per state event, named by its mode."""
+        model = self.model
+        self.indicators: dict[int, int] = {}
+        for one in model.transitions:
+            if one.timed or one.index in self.indicators:
+                continue
+            mode = model.flat_discretes[one.mode]
+            leaving = (
+                "any mode" if len(one.sources) == len(mode.names) else " or ".join(mode.names[k] for k in one.sources)
+            )
+            self.indicators[one.index] = self.add(
+                f"event_indicator[{one.index + 1}]", "Float64", "local", "continuous", "calculated",
+                ("guard", one.index), description=f"{mode.path}: {leaving} → {mode.names[one.target]} above zero",
+            )  # fmt: skip
+
+    def result(self) -> Interface:
+        """Return the interface."""
+        count = len(self.model.states)
+        return Interface(
+            self.model.name,
+            tuple(self.found),
+            tuple(self.states[k] for k in range(count)),
+            tuple(self.derivatives[k] for k in range(count)),
+            tuple(one.reference for one in self.found if one.causality == "output"),
+            tuple(self.indicators[k] for k in sorted(self.indicators)),
+        )
+
+
+def fmi_name(name: str) -> str:
+    """Write nested derivatives as FMI's structured names want them: `der(der(a.b))` becomes `der(a.b,2)`."""
+    depth = name.count("der(") if name.startswith("der(") else 0
+    return name if depth < 2 else f"der({name[4 * depth : -depth]},{depth})"
+
+
+def _about(one: FlatVariable | FlatParameter) -> dict[str, Any]:
+    about: dict[str, Any] = {"unit": coherent(one.unit), "description": one.description, "min": one.min, "max": one.max}
+    if isinstance(one, FlatVariable) and one.nominal != 1.0:
+        about["nominal"] = abs(one.nominal)
+    return about
+
+
+def _mode_text(one: FlatDiscrete) -> str:
+    names = ", ".join(f"{k}: {name}" for k, name in enumerate(one.names))
+    return " – ".join(text for text in (one.description, names) if text)
+
+
+def _matcher(model: CompiledDae, patterns: Sequence[str]) -> Callable[[FlatVariable], bool]:
+    paths = [one.path for one in model.flat_variables]
+    for pattern in patterns:
+        if not any(fnmatchcase(path, _literal_brackets(pattern)) for path in paths):
+            raise UnknownName(
+                f"{model.name} has no variable '{pattern}' that could be an output{did_you_mean(pattern, paths) or '.'}"
+            )
+    return lambda one: one.kind == "output" or any(fnmatchcase(one.path, _literal_brackets(p)) for p in patterns)
+
+
+def _literal_brackets(pattern: str) -> str:
+    return re.sub(r"\[", "[[]", pattern)
+
+
+def _dependence(model: CompiledDae) -> list[Variability]:
+    """How each variable changes: with time, at events only, or with parameters only."""
+    function = model.variables
+    names = function.name_in()
+    rows = {name: set(function.jac_sparsity(0, k).row()) for k, name in enumerate(names)}
+    moving = set().union(*(rows[name] for name in names if name not in ("p", "d")))
+    return [
+        "continuous" if k in moving else "discrete" if k in rows["d"] else "tunable"
+        for k in range(len(model.flat_variables))
+    ]  # fmt: skip
+
+
+class _Starts:
+    """Start values that an importer may replace, by state and by variable."""
+
+    def __init__(self, model: CompiledDae) -> None:
+        self.model = model
+        self.tables: StartTables = start_tables(model)
+        arguments = (0.0, model.guesses, model.z_guesses, model.p, model.u)
+        zeros = np.zeros(len(model.flat_discretes))
+        self._discrete = model.discrete_starts(*arguments, zeros).full().ravel()
+        self._values = model.start_values(*arguments, self._discrete).full().ravel()
+        tables = self.tables
+        used = {k for _, k, _ in (*tables.direct, *tables.x_guesses, *tables.z_guesses)} | {
+            k for k, _, _ in tables.rows
+        }
+        if tables.steady is not None:
+            used |= {k for _, k, _ in tables.defaults}
+        self._of_variable: dict[int, int] = {}
+        for k, entry in enumerate(model.starts):
+            if k in used:
+                self._of_variable.setdefault(entry.node, k)
+
+    def of_variable(self, k: int) -> dict[str, Any]:
+        """Start value of a flat variable: the one that was given for this very name."""
+        number = self._of_variable.get(k)
+        if number is None:
+            return {"initial": "calculated"}
+        exact = self.model.starts[number].strength != "guess" and self.tables.steady is None
+        start = float(self._values[number])
+        return {"initial": "exact" if exact else "approx", "start": start, "start_entry": number}
+
+    def discrete(self, k: int) -> float:
+        """Start of a discrete value."""
+        return float(self._discrete[k])

@@ -1,0 +1,82 @@
+"""Foreign code in a process of its own: what it does there, it does not do to us."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import struct
+import subprocess
+import sys
+from collections.abc import Sequence
+from math import isnan, nan
+from pathlib import Path
+
+from modelica_like.errors import FmuCrashed, FmuTimeout
+
+
+def run_child(name: str, script: Path, folder: Path, timeout: float, environment: dict[str, str] | None = None) -> None:
+    """Run a Python script on a folder and wait for its end.
+
+    The script leaves `meta.json` or `error.json` in the folder when it comes to its end, and the time it has reached
+    in `progress`.
+
+    Args:
+        name: what to call the FMU in messages.
+        script: the script.
+        folder: its argument and working directory.
+        timeout: time limit in s.
+        environment: additional environment variables.
+
+    Raises:
+        FmuCrashed: the process ended before the script did.
+        FmuTimeout: the time limit was reached; the process is ended.
+    """
+    (folder / "progress").write_bytes(struct.pack("d", nan))
+    # -P: the script's own folder is no place to import from.
+    command = [sys.executable, "-P", str(script), str(folder)]
+    code = _wait(command, folder, timeout, {**os.environ, **(environment or {})})
+    if code is None:
+        raise FmuTimeout(
+            f"{name} has not come to its end within {timeout:g} s, and was stopped{_reached(folder)}.",
+            advice="Give it more time with `timeout`, or a shorter run.",
+        )
+    if not any((folder / file).exists() for file in ("meta.json", "error.json")):
+        raise FmuCrashed(f"{name} {_death(code)}{_reached(folder)}.", why="It ran in a process of its own.")
+
+
+def _wait(command: Sequence[str], folder: Path, timeout: float, environment: dict[str, str]) -> int | None:
+    """Return the exit code, or None at the time limit. What the FMU prints is not ours."""
+    quiet = subprocess.DEVNULL
+    with subprocess.Popen(
+        command, cwd=folder, stdin=quiet, stdout=quiet, stderr=quiet, env=environment, start_new_session=True
+    ) as process:
+        try:
+            return process.wait(timeout)
+        except subprocess.TimeoutExpired:
+            return None
+        finally:
+            _end(process)
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    """End the process and whatever it has started."""
+    with contextlib.suppress(ProcessLookupError, PermissionError):
+        if os.name == "posix":
+            os.killpg(process.pid, signal.SIGKILL)
+        else:
+            process.kill()
+
+
+def _death(code: int) -> str:
+    if code >= 0:
+        return f"ended its process by itself, with exit code {code},"
+    try:
+        return f"crashed with {signal.Signals(-code).name}"
+    except ValueError:
+        return f"crashed with signal {-code}"
+
+
+def _reached(folder: Path) -> str:
+    (time,) = struct.unpack("d", (folder / "progress").read_bytes()[:8])
+    return " before its first step had ended" if isnan(time) else f" after t = {time:g} s"

@@ -1,0 +1,144 @@
+"""Run any FMU, safely, and look at it as at any other solution."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+import time
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from modelica_like.errors import FmuFailed, FmuRefused, UnknownName, ValueOutOfRange, did_you_mean
+from modelica_like.fmi.process import run_child
+from modelica_like.fmi.unpack import printable, unpack
+from modelica_like.solve.recorded import RecordedModel, RecordedSolution, RecordedVariable
+
+Kind = Literal["me", "cs"]
+Solver = Literal["CVode", "Euler"]
+TIMEOUT = 60.0
+_HEADER = 100_000_000
+_CHILD = Path(__file__).with_name("child.py")
+
+
+def run_fmu(
+    path: str | Path, inputs: Mapping[str, Any] | None = None, parameters: Mapping[str, float] | None = None, *,
+    start: float = 0.0, stop: float | None = None, kind: Kind | None = None, tolerance: float | None = None,
+    step: float | None = None, points: int | None = None, outputs: Sequence[str] | None = None,
+    timeout: float = TIMEOUT, solver: Solver = "CVode",
+) -> RecordedSolution:  # fmt: skip
+    """Run an FMU of FMI 1.0, 2.0 or 3.0 with FMPy, in a process of its own.
+
+    Mode changes of a Co-Simulation are located inside its communication steps, by event mode (FMI 3.0) or by stepping
+    again from a saved state, unless a mode comes and goes within one step; where an FMU can do neither, they are known
+    to a communication step.
+
+    Args:
+        path: the FMU.
+        inputs: a number, or pairs (time in s, value), by name; linear in between.
+        parameters: start values of parameters and variables by name, in the FMU's units.
+        start: start time in s.
+        stop: end time in s; by default that of the FMU.
+        kind: `me` (Model Exchange) or `cs` (Co-Simulation); by default `cs` if the FMU has it.
+        tolerance: relative tolerance.
+        step: communication step, or interval of the results, in s; by default what the FMU suggests.
+        points: number of equal steps instead.
+        outputs: variables to record; by default all that are not parameters.
+        timeout: time limit in s.
+        solver: of Model Exchange.
+
+    Raises:
+        FmuRefused: the file is no FMU, is unsafe to unpack, or has not what was asked for.
+        FmuFailed: the FMU told an error; FmuCrashed: it took its process down; FmuTimeout: it did not end.
+        UnknownName: it has no such variable.
+        OSError: the file cannot be read.
+    """
+    path = Path(path)
+    job = {
+        "start": start, "stop": stop, "kind": kind, "tolerance": tolerance, "step": step, "points": points,
+        "solver": solver,
+        "outputs": list(outputs) if outputs else None, "parameters": _plain(parameters or {}),
+        "inputs": {name: _series(name, value) for name, value in (inputs or {}).items()},
+    }  # fmt: skip
+    _check_times(path.name, start, stop, step, timeout)
+    begin = time.perf_counter()
+    with tempfile.TemporaryDirectory(prefix="modelica_like_", ignore_cleanup_errors=True) as work:
+        folder = Path(work)
+        (folder / "fmu").mkdir()
+        unpack(path, folder / "fmu")
+        (folder / "job.json").write_text(json.dumps(job))
+        run_child(path.name, _CHILD, folder, timeout)
+        _tell_error(path.name, folder)
+        table = np.load(folder / "result.npy", max_header_size=_HEADER)  # names of all columns
+        meta = json.loads((folder / "meta.json").read_text())
+    return _solution(meta, table, job["parameters"], time.perf_counter() - begin)
+
+
+def _plain(values: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: value.item() if isinstance(value, np.generic) else value for name, value in values.items()}
+
+
+def _series(name: str, value: Any) -> Any:
+    if isinstance(value, int | float | np.number):
+        return float(value)
+    pairs = np.asarray(value, dtype=float)
+    if pairs.ndim != 2 or pairs.shape[1] != 2 or not np.all(np.isfinite(pairs)) or np.any(np.diff(pairs[:, 0]) < 0):
+        raise ValueOutOfRange(f"The input '{name}' must be a number, or pairs of rising time and value.")
+    return pairs.tolist()
+
+
+def _check_times(name: str, start: float, stop: float | None, step: float | None, timeout: float) -> None:
+    if stop is not None and stop <= start:
+        raise ValueOutOfRange(f"{name}: the end time {stop:g} s is not after the start time {start:g} s.")
+    if step is not None and step <= 0:
+        raise ValueOutOfRange(f"{name}: the step must be positive, not {step:g} s.")
+    if timeout <= 0:
+        raise ValueOutOfRange(f"{name}: the time limit must be positive, not {timeout:g} s.")
+
+
+def _tell_error(name: str, folder: Path) -> None:
+    """Raise what the child has left to tell."""
+    if not (folder / "error.json").exists():
+        return
+    error = json.loads((folder / "error.json").read_text())
+    kind = error["kind"]
+    if kind == "unknown":
+        hint = did_you_mean(error["name"], error["known"])
+        raise UnknownName(f"{name} has no variable '{error['name']}'{hint or '.'}")
+    if kind == "no input":
+        has = f"It has {', '.join(error['known'])}." if error["known"] else "It has none."
+        raise UnknownName(f"{name}: '{error['name']}' is no input but {_article(error['causality'])}. {has}")
+    if kind == "no kind":
+        raise FmuRefused(f"{name} has no {error['wanted']} part.", advice="Ask for the other kind, or for none.")
+    said = [printable(text) for text in error["messages"]]
+    raise FmuFailed(
+        f"{name} failed: {printable(error['text']).rstrip('.')}.",
+        why="\n".join(f"It said: {text}" for text in said[-3:]),
+    )
+
+
+def _article(word: str) -> str:
+    return f"{'an' if word[0] in 'aeiou' else 'a'} {word}"
+
+
+def _solution(meta: dict[str, Any], table: Any, given: Mapping[str, float], seconds: float) -> RecordedSolution:
+    recorded = [v for v in meta["variables"] if v["name"] in table.dtype.names]
+    columns = [RecordedVariable(v["name"], v["unit"], v["description"], _kind(v), dict(v["items"])) for v in recorded]
+    continuous = tuple(column for column in columns if column.kind != "discrete")
+    discrete = tuple(column for column in columns if column.kind == "discrete")
+    constants = {v["name"]: float(given.get(v["name"], v["start"])) for v in meta["variables"] if _constant(v)}
+    model = RecordedModel(meta["name"], continuous, discrete, constants)
+    values, modes = (np.array([table[c.path] for c in part], dtype=float) for part in (continuous, discrete))
+    count = len(table)
+    return RecordedSolution(model, table["time"].copy(), values.reshape(-1, count), modes.reshape(-1, count), seconds)
+
+
+def _kind(variable: Mapping[str, Any]) -> str:
+    return "discrete" if variable["discrete"] else str(variable["causality"])
+
+
+def _constant(variable: Mapping[str, Any]) -> bool:
+    known = variable["start"] not in (None, "true", "false")
+    return variable["causality"] == "parameter" and known

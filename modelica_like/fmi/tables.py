@@ -1,0 +1,103 @@
+"""Everything about a model that C code needs, as numbers: tapes, sparsity patterns, start values."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+
+from modelica_like.compile.compiled import CompiledDae
+from modelica_like.fmi.sparse import QrPattern, qr_pattern
+from modelica_like.fmi.start_tables import StartTables, start_tables
+from modelica_like.fmi.tape import ARGUMENTS, Slots, Tape, write_tapes
+
+
+@dataclass(frozen=True)
+class Tables:
+    """Everything that model.c holds.
+
+    Attributes:
+        step: pattern of M/(h gamma) - J.
+        to_step: position in it of every nonzero of the Jacobian, and `diagonal` of the diagonal of every state.
+    """
+
+    model: CompiledDae
+    start: StartTables
+    slots: Slots
+    tapes: dict[str, Tape]
+    step: QrPattern
+    to_step: tuple[int, ...]
+    diagonal: tuple[int, ...]
+    start_pattern: QrPattern
+
+    @property
+    def rates_depend_on_time(self) -> bool:
+        """Whether time occurs in the right hand side itself."""
+        return any(0 in operation[1:] for operation in self.tapes["rates"].operations)
+
+
+def make_tables(model: CompiledDae) -> Tables:
+    """Write the functions of a model as tapes and analyse its sparsity.
+
+    Raises:
+        MissingStart, ContradictingStart: the start values do not determine all states.
+        LanguageError: a function has no counterpart in C.
+    """
+    start = start_tables(model)
+    functions, jacobian, start_pattern = _functions(model, start)
+    states = len(model.states)
+    diagonal = ca.Sparsity(jacobian.size1(), jacobian.size2())
+    for k in range(states):
+        diagonal.add_nz(k, k)
+    step = jacobian + diagonal
+    sizes = {name: model.ode.size1_in(name) for name in ARGUMENTS[:-1]} | {"y": model.start_system.size1_out(0)}
+    slots, tapes = write_tapes(functions, sizes)
+    return Tables(
+        model, start, slots, {tape.name: tape for tape in tapes}, qr_pattern(step), _places(jacobian, step),
+        tuple(_places(diagonal, step)), qr_pattern(start_pattern),
+    )  # fmt: skip
+
+
+def _places(inner: Any, outer: Any) -> tuple[int, ...]:
+    """Positions of the nonzeros of one pattern among those of a larger one."""
+    place = {pair: k for k, pair in enumerate(zip(*outer.get_triplet(), strict=True))}
+    return tuple(place[pair] for pair in zip(*inner.get_triplet(), strict=True))
+
+
+def _functions(model: CompiledDae, start: StartTables) -> tuple[dict[str, Any], Any, Any]:
+    """Return all functions by the names of their tapes, and the patterns of the Jacobians of rates and start system."""
+    arguments = model.arguments
+    symbols = list(arguments.values())
+    rates = ca.vertcat(model.ode(*symbols), model.alg(*symbols))
+    jacobian = ca.jacobian(rates, ca.vertcat(arguments["x"], arguments["z"]))
+    alg_jacobian = ca.densify(model.alg_jacobian(*symbols))
+    guards = ca.vertcat(model.guards(*symbols), model.guard_rates(*symbols))
+    written = {"rates": rates, "jacobian": _nonzeros(jacobian), "alg_jacobian": ca.vec(alg_jacobian), "guards": guards}
+    functions: dict[str, Any] = {
+        name: ca.Function(name, symbols, [ca.densify(ca.SX(expression))], list(arguments), [name])
+        for name, expression in written.items()
+    }
+    plain = (
+        "alg",
+        "variables",
+        "guards_soon",
+        "moments",
+        "resets",
+        "start_conditions",
+        "start_values",
+        "discrete_starts",
+        "determinants",
+    )
+    functions |= {name: getattr(model, name) for name in (*plain, "derived")}
+    y = ca.SX.sym("y", model.start_system.size1_out(0))
+    order = [y if name == "y" else arguments[name] for name in model.start_system.name_in()]
+    _, start_jacobian, start_values = model.start_system(*order)
+    chosen = start_jacobian[list(start.wanted), list(start.columns)] if start.columns else ca.SX(0, 0)
+    for name, expression in (("start_system", start_values), ("start_jacobian", _nonzeros(chosen))):
+        functions[name] = ca.Function(name, [*symbols, y], [ca.densify(ca.SX(expression))], [*arguments, "y"], [name])
+    return functions, jacobian.sparsity(), chosen.sparsity()
+
+
+def _nonzeros(matrix: Any) -> Any:
+    return ca.vertcat(*matrix.nonzeros()) if matrix.nnz() else ca.SX(0, 1)

@@ -1,0 +1,157 @@
+"""Functions of the model as tapes: lists of elementary operations that C code runs, differentiates and transposes.
+
+An operation writes one new value, nothing is overwritten, so that derivatives in both directions follow from the same
+list. Compile time and size grow with the number of operations only.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import groupby
+from typing import Any
+
+import casadi as ca
+
+from modelica_like.errors import LanguageError
+
+ARGUMENTS = ("t", "x", "z", "p", "u", "d", "y")
+"""What tapes read: time, states, implicit unknowns, parameters, inputs, modes, and variables of the start system."""
+
+OPERATIONS = (
+    "ADD", "SUB", "MUL", "DIV", "NEG", "EXP", "LOG", "POW", "CONSTPOW", "SQRT", "SQ", "TWICE", "SIN", "COS", "TAN",
+    "ASIN", "ACOS", "ATAN", "LT", "LE", "EQ", "NE", "NOT", "AND", "OR", "FLOOR", "CEIL", "FMOD", "REMAINDER", "FABS",
+    "SIGN", "COPYSIGN", "IF_ELSE_ZERO", "ERF", "FMIN", "FMAX", "INV", "SINH", "COSH", "TANH", "ASINH", "ACOSH",
+    "ATANH", "ATAN2", "HYPOT", "LOG1P", "EXPM1",
+)  # fmt: skip
+"""The operations of `tape.c`, in the order of its enumeration."""
+
+_COPIES = (ca.OP_ASSIGN, ca.OP_LIFT)
+_NAMES = {getattr(ca, f"OP_{name}"): name for name in OPERATIONS}
+
+
+@dataclass(frozen=True)
+class Tape:
+    """A function as operations on slots.
+
+    Slots are [t, x, z, p, u, d, y, constants, results]; operation k writes result k. Equal operations follow each other
+    as far as their operands allow, so that C chooses what to do once per run of them.
+
+    Attributes:
+        name: name of the function.
+        operations: (operation, slot of the left operand, slot of the right operand).
+        outputs: slots of the results of the function.
+    """
+
+    name: str
+    operations: tuple[tuple[str, int, int], ...]
+    outputs: tuple[int, ...]
+
+    @property
+    def runs(self) -> tuple[tuple[str, int], ...]:
+        """Equal operations that follow each other: operation and their number."""
+        return tuple((name, len(list(group))) for name, group in groupby(name for name, _, _ in self.operations))
+
+    def __repr__(self) -> str:
+        return f"<Tape {self.name}: {len(self.operations)} operations, {len(self.outputs)} outputs>"
+
+
+@dataclass(frozen=True)
+class Slots:
+    """Where arguments and constants lie.
+
+    Attributes:
+        sizes: number of values of every argument.
+        constants: all constants of all tapes.
+    """
+
+    sizes: dict[str, int]
+    constants: tuple[float, ...]
+
+    def first(self, argument: str) -> int:
+        """First slot of an argument."""
+        return sum(self.sizes[name] for name in ARGUMENTS[: ARGUMENTS.index(argument)])
+
+    @property
+    def results(self) -> int:
+        """First slot of the results."""
+        return sum(self.sizes.values()) + len(self.constants)
+
+
+def write_tapes(functions: dict[str, Any], sizes: dict[str, int]) -> tuple[Slots, tuple[Tape, ...]]:
+    """Write CasADi functions, each with one dense or sparse result, as tapes.
+
+    Args:
+        functions: functions of scalar expressions (SX) by name; their arguments are among `ARGUMENTS`.
+        sizes: number of values of every argument.
+
+    Raises:
+        LanguageError: a function uses an operation that has no counterpart in C.
+    """
+    constants = {0.0: None} | {value: None for function in functions.values() for value in _constants(function)}
+    slots = Slots(sizes, tuple(constants))
+    base = sum(sizes.values())
+    places = {value: base + k for k, value in enumerate(constants)}
+    return slots, tuple(_tape(name, function, slots, places) for name, function in functions.items())
+
+
+def _constants(function: Any) -> list[float]:
+    count = function.n_instructions()
+    return [function.instruction_constant(k) for k in range(count) if function.instruction_id(k) == ca.OP_CONST]
+
+
+def _tape(name: str, function: Any, slots: Slots, places: dict[float, int]) -> Tape:
+    first = [slots.first(argument) for argument in function.name_in()]
+    held: dict[int, int] = {}
+    operations: list[tuple[str, int, int]] = []
+    outputs = [places[0.0]] * function.nnz_out(0)
+    for k in range(function.n_instructions()):
+        code = function.instruction_id(k)
+        read, written = function.instruction_input(k), function.instruction_output(k)
+        if code == ca.OP_INPUT:
+            held[written[0]] = first[read[0]] + read[1]
+        elif code == ca.OP_CONST:
+            held[written[0]] = places[function.instruction_constant(k)]
+        elif code == ca.OP_OUTPUT:
+            outputs[written[1]] = held[read[0]]
+        elif code in _COPIES:
+            held[written[0]] = held[read[0]]
+        elif code in _NAMES:
+            operands = [held[register] for register in read]
+            operations.append((_NAMES[code], operands[0], operands[-1]))
+            held[written[0]] = slots.results + len(operations) - 1
+        else:
+            raise LanguageError(
+                f"The function {name} of the model uses an operation that FMUs do not have (CasADi number {code}).",
+                advice="Write it with elementary functions.",
+            )
+    return _sorted(Tape(name, tuple(operations), tuple(outputs)), slots.results)
+
+
+def _sorted(tape: Tape, base: int) -> Tape:
+    """Reorder operations to long runs of equal ones: always those of which most are ready."""
+    users: list[list[int]] = [[] for _ in tape.operations]
+    missing: list[int] = []
+    ready: dict[str, list[int]] = {}
+    for k, (name, *operands) in enumerate(tape.operations):
+        sources = {slot - base for slot in operands if slot >= base}
+        for source in sources:
+            users[source].append(k)
+        missing.append(len(sources))
+        if not sources:
+            ready.setdefault(name, []).append(k)
+    order: list[int] = []
+    while any(ready.values()):
+        chosen = ready[max(ready, key=lambda name: len(ready[name]))]
+        for k in chosen:  # grows while it is read: what becomes ready may join
+            order.append(k)
+            for user in users[k]:
+                missing[user] -= 1
+                if not missing[user]:
+                    ready.setdefault(tape.operations[user][0], []).append(user)
+        chosen.clear()
+    place = {base + k: base + position for position, k in enumerate(order)}
+    moved = tuple(
+        (name, place.get(left, left), place.get(right, right))
+        for name, left, right in (tape.operations[k] for k in order)
+    )
+    return Tape(tape.name, moved, tuple(place.get(slot, slot) for slot in tape.outputs))

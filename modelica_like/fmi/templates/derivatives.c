@@ -1,0 +1,226 @@
+/* Derivatives inside a mode, exact: of derivatives, variables and guards by states, inputs, parameters and time, with
+ * the implicit unknowns following. */
+#include <math.h>
+#include <string.h>
+#include "core.h"
+
+/* Slot of what derivatives are taken by. */
+static int known_slot(const Variable *v) {
+    switch (v->kind) {
+        case KIND_TIME: return SLOT_T;
+        case KIND_STATE: return SLOT_X + v->index;
+        case KIND_PARAMETER: return SLOT_P + v->index;
+        case KIND_INPUT: return SLOT_U + v->index;
+        default: return -1;
+    }
+}
+
+static Result check_knowns(Instance *c, const uint32_t *knowns, size_t n) {
+    for (size_t k = 0; k < n; k++) {
+        const Variable *v = known_variable(c, knowns[k], TYPE_FLOAT64);
+        if (v == NULL) return RESULT_ERROR;
+        if (known_slot(v) < 0) return report(c, LOG_ERROR, RESULT_ERROR,
+            "Derivatives by %s are not available: it is neither state, input nor parameter.", v->name);
+    }
+    return RESULT_OK;
+}
+
+static Result check_unknowns(Instance *c, const uint32_t *unknowns, size_t n) {
+    for (size_t k = 0; k < n; k++) {
+        const Variable *v = known_variable(c, unknowns[k], TYPE_FLOAT64);
+        if (v == NULL) return RESULT_ERROR;
+        if (v->kind == KIND_DISCRETE) return report(c, LOG_ERROR, RESULT_ERROR,
+            "%s changes at events only: it has no derivatives.", v->name);
+    }
+    return RESULT_OK;
+}
+
+/* Factorises the Jacobian of the implicit equations at the present point, with the slots of tape_rates filled. */
+static Result factor_implicit(Instance *c, int *order) {
+    State *s = &c->state;
+    if (settle(c) != RESULT_OK) return RESULT_ERROR;
+    evaluate(c, &tape_alg_jacobian, s->t, s->x, s->z, c->work.dense_matrix);
+    if (!lu_factor(N_Z, c->work.dense_matrix, order)) return report(c, LOG_ERROR, RESULT_ERROR,
+        "The implicit equations are singular at t = %.9g s.", s->t);
+    return RESULT_OK;
+}
+
+/* With the dots of the arguments given, fills those of z. */
+static void tangent_of_implicit(Instance *c, const int *order) {
+    Work *w = &c->work;
+    double *dots = w->dots;
+    State *s = &c->state;
+    if (N_Z == 0) return;
+    memset(dots + SLOT_Z, 0, N_Z * sizeof(double));
+    evaluate(c, &tape_alg, s->t, s->x, s->z, w->vector);
+    tape_tangent(&tape_alg, w->slots, dots, w->vector);
+    lu_solve(N_Z, w->dense_matrix, order, w->vector);
+    for (int k = 0; k < N_Z; k++) dots[SLOT_Z + k] = -w->vector[k];
+}
+
+Result directional(Instance *c, const uint32_t *unknowns, size_t n_unknowns, const uint32_t *knowns, size_t n_knowns,
+    const double *seed, double *result) {
+    Work *w = &c->work;
+    State *s = &c->state;
+    int order[AT_LEAST_ONE(N_Z)];
+    if (check_unknowns(c, unknowns, n_unknowns) != RESULT_OK || check_knowns(c, knowns,
+        n_knowns) != RESULT_OK) return RESULT_ERROR;
+    if (factor_implicit(c, order) != RESULT_OK) return RESULT_ERROR;
+    memset(w->dots, 0, SLOT_RESULTS * sizeof(double));
+    for (size_t k = 0; k < n_knowns; k++) w->dots[known_slot(find_variable(knowns[k]))] += seed[k];
+    tangent_of_implicit(c, order);
+    evaluate(c, &tape_rates, s->t, s->x, s->z, w->rhs);
+    tape_tangent(&tape_rates, w->slots, w->dots, w->rhs);
+    c->variables_valid = 0;
+    evaluate(c, &tape_variables, s->t, s->x, s->z, w->variables);
+    tape_tangent(&tape_variables, w->slots, w->dots, w->variables);
+    evaluate(c, &tape_derived, s->t, s->x, s->z, w->guards);
+    tape_tangent(&tape_derived, w->slots, w->dots, w->guards);
+    evaluate(c, &tape_guards, s->t, s->x, s->z, w->guards_before);
+    tape_tangent(&tape_guards, w->slots, w->dots, w->guards_before);
+    for (size_t k = 0; k < n_unknowns; k++) {
+        const Variable *v = find_variable(unknowns[k]);
+        switch (v->kind) {
+            case KIND_DERIVATIVE: result[k] = w->rhs[v->index]; break;
+            case KIND_VARIABLE: result[k] = w->variables[v->index]; break;
+            case KIND_DERIVED: result[k] = w->guards[v->index]; break;
+            case KIND_GUARD: result[k] = guard_active(s, v->index) ? w->guards_before[v->index] : 0; break;
+            default: result[k] = w->dots[known_slot(v)];
+        }
+    }
+    return RESULT_OK;
+}
+
+/* From bars of z to bars of the arguments, through the implicit equations. */
+static void adjoint_of_implicit(Instance *c, const int *order) {
+    Work *w = &c->work;
+    State *s = &c->state;
+    double residual[AT_LEAST_ONE(N_Z)];
+    if (N_Z == 0) return;
+    for (int k = 0; k < N_Z; k++) w->vector[k] = -w->dots[SLOT_Z + k];
+    lu_solve_transposed(N_Z, w->dense_matrix, order, w->vector);
+    memset(w->dots + SLOT_Z, 0, N_Z * sizeof(double));
+    evaluate(c, &tape_alg, s->t, s->x, s->z, residual);
+    tape_adjoint(&tape_alg, w->slots, w->dots, w->vector);
+}
+
+Result adjoint(Instance *c, const uint32_t *unknowns, size_t n_unknowns, const uint32_t *knowns, size_t n_knowns,
+    const double *seed, double *result) {
+    Work *w = &c->work;
+    State *s = &c->state;
+    int order[AT_LEAST_ONE(N_Z)];
+    if (check_unknowns(c, unknowns, n_unknowns) != RESULT_OK || check_knowns(c, knowns,
+        n_knowns) != RESULT_OK) return RESULT_ERROR;
+    if (factor_implicit(c, order) != RESULT_OK) return RESULT_ERROR;
+    memset(w->dots, 0, SLOT_RESULTS * sizeof(double));
+    for (size_t k = 0; k < n_unknowns; k++) {
+        int slot = known_slot(find_variable(unknowns[k]));
+        if (slot >= 0) w->dots[slot] += seed[k];
+    }
+    c->variables_valid = 0;
+    for (int pass = 0; pass < 4; pass++) {
+        const struct { const Tape *tape; Kind kind; double *outputs; } of[] = {
+            {&tape_rates, KIND_DERIVATIVE, w->rhs}, {&tape_variables, KIND_VARIABLE, w->variables},
+            {&tape_derived, KIND_DERIVED, w->guards}, {&tape_guards, KIND_GUARD, w->guards_before},
+        };
+        double *bars = of[pass].outputs;
+        evaluate(c, of[pass].tape, s->t, s->x, s->z, bars);
+        memset(bars, 0, (size_t)of[pass].tape->n_outputs * sizeof(double));
+        for (size_t k = 0; k < n_unknowns; k++) {
+            const Variable *v = find_variable(unknowns[k]);
+            if (v->kind == of[pass].kind && (v->kind != KIND_GUARD || guard_active(s,
+                v->index))) bars[v->index] += seed[k];
+        }
+        tape_adjoint(of[pass].tape, w->slots, w->dots, bars);
+    }
+    adjoint_of_implicit(c, order);
+    for (size_t k = 0; k < n_knowns; k++) result[k] = w->dots[known_slot(find_variable(knowns[k]))];
+    return RESULT_OK;
+}
+
+/* Total derivative of a variable by the states, z following them. */
+void adjoint_of_node(Instance *c, int node, double *by_state) {
+    Work *w = &c->work;
+    State *s = &c->state;
+    int order[AT_LEAST_ONE(N_Z)];
+    evaluate(c, &tape_alg_jacobian, s->t, s->x, s->z, w->dense_matrix);
+    if (!lu_factor(N_Z, w->dense_matrix, order)) {
+        memset(by_state, 0, N_X * sizeof(double));
+        return;
+    }
+    memset(w->dots, 0, SLOT_RESULTS * sizeof(double));
+    c->variables_valid = 0;
+    evaluate(c, &tape_variables, s->t, s->x, s->z, w->variables);
+    memset(w->variables, 0, N_NODES * sizeof(double));
+    w->variables[node] = 1;
+    tape_adjoint(&tape_variables, w->slots, w->dots, w->variables);
+    adjoint_of_implicit(c, order);
+    memcpy(by_state, w->dots + SLOT_X, N_X * sizeof(double));
+}
+
+/* Time derivative of a variable along the solution, with inputs on their straight lines. */
+Result output_rate(Instance *c, uint32_t reference, double *value) {
+    const Variable *v = known_variable(c, reference, TYPE_FLOAT64);
+    Work *w = &c->work;
+    State *s = &c->state;
+    int order[AT_LEAST_ONE(N_Z)];
+    if (v == NULL) return RESULT_ERROR;
+    if (v->kind != KIND_VARIABLE && v->kind != KIND_STATE) return report(c, LOG_ERROR, RESULT_ERROR,
+        "%s has no time derivative: it is not a variable.", v->name);
+    if (factor_implicit(c, order) != RESULT_OK) return RESULT_ERROR;
+    evaluate(c, &tape_rates, s->t, s->x, s->z, w->rhs);
+    if (v->kind == KIND_STATE) {
+        *value = w->rhs[v->index];
+        return RESULT_OK;
+    }
+    memset(w->dots, 0, SLOT_RESULTS * sizeof(double));
+    w->dots[SLOT_T] = 1;
+    memcpy(w->dots + SLOT_X, w->rhs, N_X * sizeof(double));
+    memcpy(w->dots + SLOT_U, s->u_rate, N_U * sizeof(double));
+    tangent_of_implicit(c, order);
+    c->variables_valid = 0;
+    evaluate(c, &tape_variables, s->t, s->x, s->z, w->variables);
+    tape_tangent(&tape_variables, w->slots, w->dots, w->variables);
+    *value = w->variables[v->index];
+    return RESULT_OK;
+}
+
+/* States and inputs on which an unknown depends; returns their number, writes as many as there is room for. */
+size_t dependencies(Instance *c, uint32_t unknown, uint32_t *knowns, size_t capacity, Result *result) {
+    const Variable *v = find_variable(unknown);
+    double *marks = c->work.dots, *outputs;
+    const Tape *tape;
+    size_t count = 0;
+    *result = RESULT_ERROR;
+    if (v == NULL || (v->kind != KIND_DERIVATIVE && v->kind != KIND_VARIABLE && v->kind != KIND_STATE
+        && v->kind != KIND_GUARD)) {
+        report(c, LOG_ERROR, RESULT_ERROR, "The variable with value reference %u is no output.", (unsigned)unknown);
+        return 0;
+    }
+    *result = RESULT_OK;
+    memset(marks, 0, SLOT_RESULTS * sizeof(double));
+    c->variables_valid = 0;
+    if (v->kind == KIND_STATE) marks[SLOT_X + v->index] = 1;
+    else {
+        int implicit = 0;
+        tape = v->kind == KIND_DERIVATIVE ? &tape_rates : v->kind == KIND_GUARD ? &tape_guards : &tape_variables;
+        outputs = v->kind == KIND_DERIVATIVE ? c->work.rhs : v->kind == KIND_GUARD ? c->work.guards_before
+            : c->work.variables;
+        memset(outputs, 0, (size_t)tape->n_outputs * sizeof(double));
+        outputs[v->index] = 1;
+        tape_reaches(tape, marks, outputs);
+        for (int k = 0; k < N_Z; k++) implicit |= marks[SLOT_Z + k] != 0;
+        if (implicit) {
+            for (int k = 0; k < N_Z; k++) c->work.vector[k] = 1;
+            tape_reaches(&tape_alg, marks, c->work.vector);
+        }
+    }
+    for (int k = 0; k < N_VARIABLES; k++) {
+        const Variable *one = &model_variables[k];
+        int slot = one->kind == KIND_STATE || one->kind == KIND_INPUT ? known_slot(one) : -1;
+        if (slot < 0 || marks[slot] == 0) continue;
+        if (count < capacity) knowns[count] = one->reference;
+        count++;
+    }
+    return count;
+}

@@ -1,0 +1,133 @@
+/* Events at one instant: which transitions want to fire, and firing them until nothing does. */
+#include <math.h>
+#include <string.h>
+#include "core.h"
+
+#define ROUNDS 20
+#define SAME_TIME 1e-12
+#define CROWD 200
+#define CROWDED_TIME 1e-9
+
+double number_or_false(double guard) { return isnan(guard) ? -1 : guard; }
+
+static int is_source(const State *s, const Transition *one) {
+    double mode = s->d[one->mode];
+    return mode >= 0 && mode < 64 && (one->sources >> (int)mode & 1);
+}
+
+int guard_active(const State *s, int guard) { return is_source(s, &model_transitions[model_guard_transition[guard]]); }
+
+static double just_after(const State *s) { return s->t + SAME_TIME * fmax(1, fabs(s->t)); }
+
+double next_moment(Instance *c) {
+    State *s = &c->state;
+    double *moments = c->work.guards, next = INFINITY;
+    if (N_MOMENTS == 0) return next;
+    evaluate(c, &tape_moments, s->t, s->x, s->z, moments);
+    for (int k = 0; k < N_TRANSITIONS; k++) {
+        const Transition *one = &model_transitions[k];
+        if (one->timed && is_source(s, one) && moments[one->index] > just_after(s)) next = fmin(next,
+            moments[one->index]);
+    }
+    return next;
+}
+
+/* Adds time events that are due and, unless they were found already, state events that are positive or about to be. */
+int find_wanting(Instance *c, unsigned char *wanting, int guards_too) {
+    State *s = &c->state;
+    double *values = c->work.guards;
+    int any = 0;
+    if (N_MOMENTS > 0) {
+        evaluate(c, &tape_moments, s->t, s->x, s->z, values);
+        for (int k = 0; k < N_TRANSITIONS; k++)
+            if (model_transitions[k].timed && values[model_transitions[k].index] <= just_after(s)) wanting[k] = 1;
+    }
+    if (N_GUARDS > 0 && guards_too) {
+        evaluate(c, &tape_guards_soon, s->t, s->x, s->z, values);
+        for (int k = 0; k < N_GUARDS; k++) if (number_or_false(values[k]) > 0) wanting[model_guard_transition[k]] = 1;
+    }
+    for (int k = 0; k < N_TRANSITIONS; k++) {
+        wanting[k] = wanting[k] && is_source(s, &model_transitions[k]);
+        any |= wanting[k];
+    }
+    return any;
+}
+
+/* Move the states as little as possible, so that variables that follow from them take new values. */
+static void project(Instance *c, const int *targets, const double *values, int count) {
+    State *s = &c->state;
+    double *slopes = c->work.square, *change = c->work.start_residual, *step = c->work.point;
+    evaluate(c, &tape_variables, s->t, s->x, s->z, c->work.variables);
+    for (int k = 0; k < count; k++) change[k] = values[k] - c->work.variables[model_reset_nodes[targets[k]]];
+    for (int k = 0; k < count; k++) adjoint_of_node(c, model_reset_nodes[targets[k]], slopes + (size_t)k * N_X);
+    least_squares(count, N_X, slopes, change, step);
+    for (int k = 0; k < N_X; k++) s->x[k] += step[k];
+}
+
+static void log_transition(Instance *c, const Transition *one) {
+    const char *const *names = model_mode_names[one->mode];
+    int before = (int)c->state.d[one->mode];
+    if (names != NULL && before >= 0 && before < model_mode_counts[one->mode])
+        report(c, LOG_EVENTS, RESULT_OK, "t = %.12g s: %s: %s -> %s", c->state.t, one->name, names[before],
+            names[one->target]);
+}
+
+/* Carry out transitions together; of one mode only the one declared first. */
+static void fire(Instance *c, const unsigned char *wanting) {
+    State *s = &c->state;
+    double values[AT_LEAST_ONE(N_RESETS)], targets_value[AT_LEAST_ONE(N_RESETS)], d[AT_LEAST_ONE(N_D)];
+    int targets[AT_LEAST_ONE(N_RESETS)], count = 0;
+    unsigned char changed[AT_LEAST_ONE(N_D)] = {0};
+    evaluate(c, &tape_resets, s->t, s->x, s->z, values);
+    memcpy(d, s->d, sizeof d);
+    for (int k = 0; k < N_TRANSITIONS; k++) {
+        const Transition *one = &model_transitions[k];
+        if (!wanting[k] || changed[one->mode]) continue;
+        changed[one->mode] = 1;
+        log_transition(c, one);
+        if (*one->notice) report(c, LOG_WARNING, RESULT_OK, "t = %.9g s: %s", s->t, one->notice);
+        s->n_events++;
+        d[one->mode] = one->target;
+        for (int r = one->first_reset; r < one->first_reset + one->n_resets; r++) {
+            const Reset *reset = &model_resets[r];
+            if (reset->kind == RESET_STATE) s->x[reset->index] = values[reset->value] / reset->factor;
+            else if (reset->kind == RESET_DISCRETE) d[reset->index] = values[reset->value];
+            else {
+                targets[count] = reset->target;
+                targets_value[count++] = values[reset->value];
+            }
+        }
+    }
+    memcpy(s->d, d, sizeof d);
+    if (count > 0) project(c, targets, targets_value, count);
+}
+
+static Result crowded(Instance *c) {
+    State *s = &c->state;
+    if (s->t - s->last_event > CROWDED_TIME * fmax(1, fabs(s->t))) {
+        s->last_event = s->t;
+        s->events_since = 0;
+    }
+    if (++s->events_since <= CROWD) return RESULT_OK;
+    return report(c, LOG_ERROR, RESULT_ERROR,
+                  "Events follow each other ever faster at t = %.12g s. Give the switching a hysteresis, or smooth it.", s->t);
+}
+
+/* Fire what wants to fire until nothing does. `wanting` holds the state events that were located, if `located`. */
+Result iterate_events(Instance *c, unsigned char *wanting, int located) {
+    State *s = &c->state;
+    if (find_wanting(c, wanting, !located) && crowded(c) != RESULT_OK) return RESULT_ERROR;
+    for (int round = 0; round < ROUNDS; round++) {
+        int any = 0;
+        for (int k = 0; k < N_TRANSITIONS; k++) any |= wanting[k];
+        if (!any) return RESULT_OK;
+        fire(c, wanting);
+        c->variables_valid = 0;
+        if (solve_implicit(c, s->t, s->x, s->z, 0) != RESULT_OK || check_singular(c) != RESULT_OK) return RESULT_ERROR;
+        memset(wanting, 0, N_TRANSITIONS);
+        find_wanting(c, wanting, 1);
+    }
+    return report(c, LOG_ERROR, RESULT_ERROR,
+        "Modes still switch after %d rounds at t = %.12g s. Give the switching a hysteresis, or smooth what drives it.",
+                  ROUNDS, s->t);
+}

@@ -1,0 +1,375 @@
+/* Co-Simulation: steps that run as far as accuracy allows, events located inside them, results interpolated.
+ *
+ * A step does not end where a communication step ends: the importer's points are read from the dense output. Only where
+ * inputs move does a step end there, so that their jumps fall between steps.
+ */
+#include <math.h>
+#include <string.h>
+#include "core.h"
+
+#define LOOKS 3                     /* looks at the guards per step */
+#define LOCATED 1e-13
+#define MAX_TRIALS 60
+#define MAX_REJECTIONS 60
+#define TIME_RESOLUTION 1e-10       /* as in guards_soon */
+#define NEAR 0.1
+#define SAME_POINT 1e-9            /* rounding of the importer's communication points */
+#define LEAST_LOOKS 500             /* steps per run, where guards could hide between longer ones */
+
+typedef struct {                    /* guards and their rates at a time within a step */
+    double t, *values, *rates;
+} Look;
+
+static void clear_pending(State *s) {
+    s->event_pending = 0;
+    memset(s->wanting, 0, sizeof s->wanting);
+}
+
+void leave_piece(Instance *c) {
+    c->state.piece_valid = 0;
+    clear_pending(&c->state);
+}
+
+static int look_at(Instance *c, double t, double *point, Look *look) {
+    if (solve_implicit(c, t, point, point + N_X, 1) != RESULT_OK) return 0;
+    evaluate(c, &tape_guards, t, point, point + N_X, look->values);
+    look->t = t;
+    look->rates = look->values + N_GUARDS;
+    for (int g = 0; g < N_GUARDS; g++) {
+        look->values[g] = number_or_false(look->values[g]);
+        if (!isfinite(look->rates[g])) look->rates[g] = 0;
+    }
+    return 1;
+}
+
+static double cubic(double s, double g0, double r0, double g1, double r1) {
+    double r = 1 - s;
+    return g0 * (1 + 2 * s) * r * r + r0 * s * r * r + g1 * s * s * (3 - 2 * s) + r1 * s * s * (s - 1);
+}
+
+/* Does the cubic through both ends come near zero from below in between? */
+static int is_hump(double g0, double r0, double g1, double r1) {
+    double top = -INFINITY;
+    if (!(g0 <= 0 && g1 <= 0 && r0 > 0 && r1 < 0)) return 0;
+    for (int k = 1; k < 20; k++) top = fmax(top, cubic(k / 20.0, g0, r0, g1, r1));
+    return top > -NEAR * (fabs(g0) + fabs(g1));
+}
+
+/* First zero of the cubic, or its top. */
+static double cubic_guess(double g0, double r0, double g1, double r1) {
+    double best = -INFINITY, place = 0.5;
+    for (int k = 1; k <= 40; k++) {
+        double value = cubic(k / 40.0, g0, r0, g1, r1);
+        if (value > best) { best = value; place = k / 40.0; }
+        if (value > 0) {
+            double low = (k - 1) / 40.0, high = k / 40.0;
+            for (int n = 0; n < 30; n++) {
+                double middle = 0.5 * (low + high);
+                if (cubic(middle, g0, r0, g1, r1) > 0) high = middle; else low = middle;
+            }
+            return high;
+        }
+    }
+    return place;
+}
+
+/* Kinds of candidates per guard. */
+enum { QUIET, CROSSING, HUMP };
+
+static int find_candidates(const State *s, const Look *before, const Look *after, unsigned char *kinds) {
+    double h = after->t - before->t;
+    int any = 0;
+    for (int g = 0; g < N_GUARDS; g++) {
+        double g0 = before->values[g], g1 = after->values[g];
+        kinds[g] = QUIET;
+        if (!guard_active(s, g) || g0 > 0) continue;
+        if (g1 > 0) kinds[g] = CROSSING;
+        else if (is_hump(g0, before->rates[g] * h, g1, after->rates[g] * h)) kinds[g] = HUMP;
+        any |= kinds[g] != QUIET;
+    }
+    return any;
+}
+
+/* Steps again from the beginning of the piece, to t. */
+static int trial(Instance *c, const Piece *whole, double t, Piece *piece, Look *look) {
+    double ignored;
+    if (t <= whole->begin) {
+        *piece = *whole;
+        piece->end = t;
+        memcpy(piece->last, whole->first, sizeof piece->last);
+    } else {
+        if (!rosenbrock_step(c, whole->begin, whole->first, t - whole->begin, 0, piece, &ignored)) return 0;
+        piece->end = t;
+    }
+    return look_at(c, t, piece->last, look);
+}
+
+static double newton(const Look *look, const unsigned char *kinds) {
+    double step = INFINITY;
+    for (int g = 0; g < N_GUARDS; g++) if (kinds[g] != QUIET && look->rates[g] > 0) step = fmin(step,
+        -look->values[g] / look->rates[g]);
+    return step;
+}
+
+static int any_positive(const Look *look, const unsigned char *kinds) {
+    for (int g = 0; g < N_GUARDS; g++) if (kinds[g] != QUIET && look->values[g] > 0) return 1;
+    return 0;
+}
+
+/* A time at which a guard that rises and falls again is positive. */
+static int positive_top(Instance *c, const Piece *whole, const Look *before, const Look *after, unsigned char *kinds,
+    Piece *piece, Look *look, double *time) {
+    for (int g = 0; g < N_GUARDS; g++) {
+        double low = before->t, high = after->t, h = high - low, t;
+        if (kinds[g] != HUMP) continue;
+        t = low + h * cubic_guess(before->values[g], before->rates[g] * h, after->values[g], after->rates[g] * h);
+        for (int n = 0; n < MAX_TRIALS; n++) {
+            if (!trial(c, whole, t, piece, look)) return 0;
+            if (look->values[g] > 0) { *time = t; return 1; }
+            if (look->rates[g] > 0) low = t; else high = t;
+            if (look->values[g] + fabs(look->rates[g]) * (high - low) < 0 || high - low < 1e-12) break;
+            t = 0.5 * (low + high);
+        }
+        kinds[g] = QUIET;
+    }
+    return 0;
+}
+
+/* Finds the earliest zero of a candidate between two looks; `piece` then ends there, `look` tells the guards there. */
+static int locate(Instance *c, const Piece *whole, const Look *before, const Look *after, unsigned char *kinds,
+    Piece *piece, Look *look) {
+    double low = before->t, high = after->t, h = high - low, t = high, tolerance = LOCATED * fmax(1, fabs(low));
+    if (!any_positive(after, kinds)) {
+        if (!positive_top(c, whole, before, after, kinds, piece, look, &high)) return 0;
+    }
+    for (int g = 0; g < N_GUARDS; g++)
+        if (kinds[g] != QUIET)
+            t = fmin(t, before->t + h * cubic_guess(before->values[g], before->rates[g] * h, after->values[g],
+                after->rates[g] * h));
+    t = fmin(t, high);
+    for (int n = 0; n < MAX_TRIALS; n++) {
+        double step;
+        if (!trial(c, whole, t, piece, look)) return 0;
+        if (any_positive(look, kinds)) high = t; else low = t;
+        step = newton(look, kinds);
+        if (fabs(step) <= tolerance) return 1;
+        if (high - low <= tolerance) break;
+        t = t + step > low && t + step < high ? t + step : 0.5 * (low + high);
+    }
+    return trial(c, whole, high, piece, look);
+}
+
+/* Which of the located guards want to fire. */
+static int mark_wanting(Instance *c, const Piece *piece, const Look *look, const unsigned char *kinds,
+    double tolerance) {
+    State *s = &c->state;
+    double *soon = look->values + 2 * (size_t)N_GUARDS;
+    int any = 0;
+    evaluate(c, &tape_guards_soon, piece->end, piece->last, piece->last + N_X, soon);
+    for (int g = 0; g < N_GUARDS; g++) {
+        int near = look->values[g] > 0 || (look->rates[g] > 0 && -look->values[g] <= 10 * tolerance * look->rates[g]);
+        if (kinds[g] != QUIET && near && number_or_false(soon[g]) > 0) any = s->wanting[model_guard_transition[g]] = 1;
+    }
+    return any;
+}
+
+/* Go on by the time resolution; what crossed and is still positive there wants to fire, else the search begins anew. */
+static int look_behind(Instance *c, const Piece *whole, double end, const unsigned char *kinds, Piece *piece,
+    Look *look) {
+    double behind = fmin(piece->end + TIME_RESOLUTION * fmax(1, fabs(piece->end)), end);
+    if (!trial(c, whole, behind, piece, look)) return 0;
+    for (int g = 0; g < N_GUARDS; g++) if (kinds[g] == CROSSING
+        && look->values[g] > 0) c->state.event_pending = c->state.wanting[model_guard_transition[g]] = 1;
+    return 1;
+}
+
+/* Looks for events in an accepted step; shortens it to the first. Returns 0 if the step must be shorter. */
+static int search_events(Instance *c) {
+    State *s = &c->state;
+    double *memory = c->work.guards_before, *point = c->work.vector + N_Z, t0 = s->piece.begin;
+    Look before = {0, memory, NULL}, after = {0, memory + 3 * (size_t)N_GUARDS, NULL}, found = {0,
+        memory + 6 * (size_t)N_GUARDS, NULL};
+    unsigned char kinds[AT_LEAST_ONE(N_GUARDS)];
+    Piece whole = s->piece, *piece = &s->piece;
+    memcpy(point, whole.first, sizeof(double) * N_UNKNOWNS);
+    if (!look_at(c, t0, point, &before)) return 0;
+    /* What the last event left positive did not want to fire: it is on its way down. */
+    for (int g = 0; g < N_GUARDS; g++) before.values[g] = fmin(before.values[g], 0);
+    for (int k = 1; k <= LOOKS; k++) {
+        double t = k == LOOKS ? whole.end : t0 + (whole.end - t0) * k / LOOKS, *swap;
+        piece_at(&whole, t, point);
+        if (!look_at(c, t, point, &after)) return 0;
+        while (find_candidates(s, &before, &after, kinds)) {
+            double tolerance = LOCATED * fmax(1, fabs(t));
+            int late = 0;
+            if (!locate(c, &whole, &before, &after, kinds, piece, &found)) {
+                if (any_positive(&after, kinds)) return 0;
+                *piece = whole;
+                break;
+            }
+            if (mark_wanting(c, piece, &found, kinds, tolerance)) {
+                s->event_pending = 1;
+                return 1;
+            }
+            /* Positive for less than the time resolution: what the last event left is on its way down. */
+            for (int g = 0; g < N_GUARDS; g++) late |= kinds[g] == CROSSING;
+            if (late) return look_behind(c, &whole, t, kinds, piece, &found);
+            *piece = whole;
+            break;
+        }
+        swap = before.values;
+        before = after;
+        after.values = swap;
+    }
+    return 1;
+}
+
+static double largest_step(const State *s) {
+    double span = s->stop_time - s->start_time;
+    if (!s->stop_time_defined || !(span > 0)) return N_X == 0 ? 1e-3 : INFINITY;
+    return N_GUARDS > 0 || N_X == 0 ? span / LEAST_LOOKS : INFINITY;
+}
+
+/* Takes one step from the present point towards `limit`, shorter where accuracy or an event asks for it. */
+static Result take_step(Instance *c, double limit) {
+    State *s = &c->state;
+    double first[AT_LEAST_ONE(N_UNKNOWNS)], wished = s->step > 0 ? s->step : first_step(c);
+    double least = 1e-15 * fmax(1, fabs(s->t));
+    int rejected = 0;
+    memcpy(first, s->x, N_X * sizeof(double));
+    memcpy(first + N_X, s->z, N_Z * sizeof(double));
+    wished = fmin(wished, largest_step(s));
+    for (int n = 0; n < MAX_REJECTIONS; n++) {
+        double error = 0, factor, h = wished;
+        int cut = s->t + 1.0001 * h >= limit;
+        if (cut) h = limit - s->t;
+        clear_pending(s);
+        if (h < least || !isfinite(h)) break;
+        if (!rosenbrock_step(c, s->t, first, h, 0, &s->piece, &error) || !isfinite(error)) error = 1e30;
+        if (cut) s->piece.end = limit;
+        factor = 0.9 * pow(fmax(error, 1e-10), -0.2);
+        if (error > 1) {
+            rejected++;
+            s->n_rejected++;
+            wished = h * fmax(0.1, factor);
+            continue;
+        }
+        if (solve_implicit(c, s->piece.end, s->piece.last, s->piece.last + N_X, 1) != RESULT_OK || (N_GUARDS > 0
+            && !search_events(c))) {
+            rejected++;
+            s->n_rejected++;
+            wished = 0.25 * h;
+            continue;
+        }
+        s->n_steps++;
+        factor = fmin(factor, rejected ? 1 : 6);
+        s->step = cut ? fmax(wished, h * factor) : h * factor;
+        s->piece_valid = 1;
+        if (c->log_enabled & LOG_INTEGRATOR)
+            report(c, LOG_INTEGRATOR, RESULT_OK, "t = %.12g s: step %.3e s, error %.2e of the tolerance, %d rejected",
+                s->piece.end,
+                   s->piece.end - s->piece.begin, error, rejected);
+        return RESULT_OK;
+    }
+    leave_piece(c);
+    return report(c, LOG_ERROR, RESULT_ERROR,
+        "The integrator gave up at t = %.12g s: the step became too small. Look for a stiff spring, a vanishing "
+                  "mass or a speed without bound.", s->t);
+}
+
+/* Makes a point of the piece the present one. */
+static Result move_to(Instance *c, double t) {
+    State *s = &c->state;
+    double *point = c->work.vector + N_Z;
+    piece_at(&s->piece, t, point);
+    s->t = t;
+    memcpy(s->x, point, N_X * sizeof(double));
+    memcpy(s->z, point + N_X, N_Z * sizeof(double));
+    c->variables_valid = 0;
+    s->z_valid = 0;
+    return settle(c);
+}
+
+/* Inputs, parameters or states moved from outside: go on from the present point. */
+static Result take_changes(Instance *c, int *event) {
+    State *s = &c->state;
+    unsigned char wanting[AT_LEAST_ONE(N_TRANSITIONS)] = {0};
+    *event = 0;
+    if (!s->inputs_changed) return RESULT_OK;
+    s->inputs_changed = 0;
+    leave_piece(c);
+    s->z_valid = 0;
+    c->variables_valid = 0;
+    if (settle(c) != RESULT_OK) return RESULT_ERROR;
+    *event = find_wanting(c, wanting, 1);
+    return RESULT_OK;
+}
+
+/* Fires what was located at the present point, or what wants to fire. */
+Result handle_event(Instance *c) {
+    State *s = &c->state;
+    unsigned char wanting[AT_LEAST_ONE(N_TRANSITIONS)] = {0};
+    int located = s->event_pending;
+    if (located) memcpy(wanting, s->wanting, N_TRANSITIONS);
+    leave_piece(c);
+    s->at_event = 0;
+    s->step = 0;
+    s->z_valid = 0;
+    if (settle(c) != RESULT_OK || iterate_events(c, wanting, located) != RESULT_OK) return RESULT_ERROR;
+    s->z_valid = 1;
+    return RESULT_OK;
+}
+
+static int is_due(Instance *c) {
+    unsigned char wanting[AT_LEAST_ONE(N_TRANSITIONS)] = {0};
+    return N_MOMENTS > 0 && find_wanting(c, wanting, 0);
+}
+
+/* Checks what the importer asks for and says where the step ends. */
+Result check_step(Instance *c, double point, double size, double *target) {
+    State *s = &c->state;
+    double slack = SAME_POINT * fmax(1, fabs(s->t));
+    *target = point + size;
+    if (!isfinite(point) || fabs(point - s->t) > slack)
+        return report(c, LOG_ERROR, RESULT_ERROR,
+            "The communication point is %.12g s, but the instance stands at %.12g s.", point, s->t);
+    if (!(size > 0) || !isfinite(*target)) return report(c, LOG_ERROR, RESULT_ERROR,
+        "The communication step size %g s is not positive.", size);
+    if (!s->stop_time_defined || *target <= s->stop_time) return RESULT_OK;
+    if (*target > s->stop_time + slack)
+        return report(c, LOG_ERROR, RESULT_ERROR, "The step to %.12g s goes beyond the stop time %.12g s.", *target,
+            s->stop_time);
+    *target = s->stop_time;
+    return RESULT_OK;
+}
+
+/* Goes to `target`, or to the first event before it. */
+Arrival integrate_to(Instance *c, double target, int stop_at_events) {
+    State *s = &c->state;
+    int held = s->inputs_changed, event;
+    if (s->at_event && handle_event(c) != RESULT_OK) return FAILED;
+    if (take_changes(c, &event) != RESULT_OK) return FAILED;
+    if (event) {
+        s->at_event = 1;
+        if (stop_at_events) return AT_EVENT;
+        if (handle_event(c) != RESULT_OK) return FAILED;
+    }
+    while (s->t < target) {
+        if (!s->piece_valid) {
+            double limit = s->stop_time_defined && s->stop_time >= target ? s->stop_time : INFINITY;
+            limit = fmin(limit, next_moment(c));
+            if (held) limit = fmin(limit, target);
+            if (take_step(c, limit) != RESULT_OK) return FAILED;
+        }
+        if (s->piece.end > target) return move_to(c, target) == RESULT_OK ? REACHED : FAILED;
+        if (move_to(c, s->piece.end) != RESULT_OK) return FAILED;
+        s->piece_valid = 0;
+        if (s->event_pending || is_due(c)) {
+            s->at_event = 1;
+            if (stop_at_events) return AT_EVENT;
+            if (handle_event(c) != RESULT_OK) return FAILED;
+        }
+        if (c->step_finished != NULL) target = fmin(target, fmax(c->step_finished(c), s->t));
+    }
+    return REACHED;
+}

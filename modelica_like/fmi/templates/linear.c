@@ -1,0 +1,157 @@
+/* Linear algebra: sparse QR with a pattern known ahead, dense LU, dense least squares. */
+#include <float.h>
+#include <math.h>
+#include <string.h>
+#include "core.h"
+
+/* Left-looking Householder QR (T. Davis, Direct Methods for Sparse Linear Systems, ch. 5). Returns 0 if singular. */
+int qr_factor(const QrPattern *a, const double *values, Work *work) {
+    double *x = work->qr_work, largest = 0;
+    memset(x, 0, (size_t)a->size * sizeof(double));
+    for (int column = 0; column < a->size; column++) {
+        int source = a->column_order[column], r = a->r_colind[column];
+        int first = a->v_colind[column], end = a->v_colind[column + 1];
+        double *v = work->qr_v + first, tail = 0, norm;
+        for (int k = a->colind[source]; k < a->colind[source + 1]; k++) x[a->row_place[a->row[k]]] = values[k];
+        for (; a->r_row[r] < column; r++) {
+            int earlier = a->r_row[r];
+            double dot = 0;
+            for (int k = a->v_colind[earlier]; k < a->v_colind[earlier + 1]; k++) dot += work->qr_v[k] * x[a->v_row[k]];
+            dot *= work->qr_beta[earlier];
+            for (int k = a->v_colind[earlier]; k < a->v_colind[earlier + 1]; k++) x[a->v_row[k]] -= dot * work->qr_v[k];
+            work->qr_r[r] = x[earlier];
+            x[earlier] = 0;
+        }
+        for (int k = first; k < end; k++) {
+            work->qr_v[k] = x[a->v_row[k]];
+            x[a->v_row[k]] = 0;
+        }
+        for (int k = 1; k < end - first; k++) tail += v[k] * v[k];
+        norm = sqrt(v[0] * v[0] + tail);
+        if (!isfinite(norm)) return 0;
+        if (tail == 0) {
+            work->qr_r[r] = v[0];
+            work->qr_beta[column] = 0;
+        } else {
+            double head = v[0] > 0 ? v[0] + norm : v[0] - norm;
+            work->qr_r[r] = v[0] > 0 ? -norm : norm;
+            work->qr_beta[column] = 2 / (head * head + tail);
+            v[0] = head;
+        }
+        if (norm > largest) largest = norm;
+        if (norm == 0) return 0;
+    }
+    return 1;
+}
+
+void qr_solve(const QrPattern *a, const Work *work, double *x) {
+    double *y = work->qr_work;
+    for (int k = 0; k < a->size; k++) y[a->row_place[k]] = x[k];
+    for (int column = 0; column < a->size; column++) {
+        double dot = 0;
+        for (int k = a->v_colind[column]; k < a->v_colind[column + 1]; k++) dot += work->qr_v[k] * y[a->v_row[k]];
+        dot *= work->qr_beta[column];
+        for (int k = a->v_colind[column]; k < a->v_colind[column + 1]; k++) y[a->v_row[k]] -= dot * work->qr_v[k];
+    }
+    for (int column = a->size - 1; column >= 0; column--) {
+        int last = a->r_colind[column + 1] - 1;
+        y[column] /= work->qr_r[last];
+        for (int k = a->r_colind[column]; k < last; k++) y[a->r_row[k]] -= work->qr_r[k] * y[column];
+    }
+    for (int k = 0; k < a->size; k++) x[a->column_order[k]] = y[k];
+}
+
+/* LU with partial pivoting of a matrix stored by columns. Returns 0 if it is singular to working precision. */
+int lu_factor(int n, double *m, int *order) {
+    double largest = 0, smallest = DBL_MAX;
+    for (int j = 0; j < n; j++) {
+        int pivot = j;
+        double size;
+        for (int i = j + 1; i < n; i++) if (fabs(m[i + n * j]) > fabs(m[pivot + n * j])) pivot = i;
+        size = fabs(m[pivot + n * j]);
+        if (!isfinite(size) || size == 0) return 0;
+        if (size > largest) largest = size;
+        if (size < smallest) smallest = size;
+        order[j] = pivot;
+        if (pivot != j) for (int k = 0; k < n; k++) {
+            double swap = m[j + n * k];
+            m[j + n * k] = m[pivot + n * k];
+            m[pivot + n * k] = swap;
+        }
+        for (int i = j + 1; i < n; i++) m[i + n * j] /= m[j + n * j];
+        for (int k = j + 1; k < n; k++) for (int i = j + 1; i < n; i++) m[i + n * k] -= m[i + n * j] * m[j + n * k];
+    }
+    return n == 0 || smallest > largest * n * DBL_EPSILON;
+}
+
+void lu_solve(int n, const double *m, const int *order, double *x) {
+    for (int j = 0; j < n; j++) {
+        double swap = x[j];
+        x[j] = x[order[j]];
+        x[order[j]] = swap;
+    }
+    for (int j = 0; j < n; j++) for (int i = j + 1; i < n; i++) x[i] -= m[i + n * j] * x[j];
+    for (int j = n - 1; j >= 0; j--) {
+        x[j] /= m[j + n * j];
+        for (int i = 0; i < j; i++) x[i] -= m[i + n * j] * x[j];
+    }
+}
+
+void lu_solve_transposed(int n, const double *m, const int *order, double *x) {
+    for (int j = 0; j < n; j++) {
+        for (int i = 0; i < j; i++) x[j] -= m[i + n * j] * x[i];
+        x[j] /= m[j + n * j];
+    }
+    for (int j = n - 1; j >= 0; j--) for (int i = j + 1; i < n; i++) x[j] -= m[i + n * j] * x[i];
+    for (int j = n - 1; j >= 0; j--) {
+        double swap = x[j];
+        x[j] = x[order[j]];
+        x[order[j]] = swap;
+    }
+}
+
+/* Shortest x that minimises |A x - b|, by one-sided Jacobi rotations of the rows of A (Hestenes).
+ * `a` holds the rows of A one after the other (and is destroyed), `b` is rotated along. */
+void least_squares(int rows, int columns, double *a, double *b, double *x) {
+    double largest = 0;
+    for (int sweep = 0; sweep < 60; sweep++) {
+        int rotated = 0;
+        for (int i = 0; i < rows; i++) for (int j = i + 1; j < rows; j++) {
+            double *p = a + (size_t)i * columns, *q = a + (size_t)j * columns, pp = 0, qq = 0, pq = 0, angle, t, c, s,
+                swap;
+            for (int k = 0; k < columns; k++) {
+                pp += p[k] * p[k];
+                qq += q[k] * q[k];
+                pq += p[k] * q[k];
+            }
+            if (pq == 0 || fabs(pq) <= DBL_EPSILON * sqrt(pp * qq)) continue;
+            rotated = 1;
+            angle = (qq - pp) / (2 * pq);
+            t = (angle >= 0 ? 1 : -1) / (fabs(angle) + sqrt(1 + angle * angle));
+            c = 1 / sqrt(1 + t * t);
+            s = c * t;
+            for (int k = 0; k < columns; k++) {
+                swap = c * p[k] - s * q[k];
+                q[k] = s * p[k] + c * q[k];
+                p[k] = swap;
+            }
+            swap = c * b[i] - s * b[j];
+            b[j] = s * b[i] + c * b[j];
+            b[i] = swap;
+        }
+        if (!rotated) break;
+    }
+    memset(x, 0, (size_t)columns * sizeof(double));
+    for (int i = 0; i < rows; i++) {
+        double size = 0;
+        for (int k = 0; k < columns; k++) size += a[(size_t)i * columns + k] * a[(size_t)i * columns + k];
+        if (size > largest) largest = size;
+    }
+    for (int i = 0; i < rows; i++) {
+        const double *p = a + (size_t)i * columns;
+        double size = 0;
+        for (int k = 0; k < columns; k++) size += p[k] * p[k];
+        if (size <= largest * 1e-24) continue;    /* singular value below 1e-12 of the largest */
+        for (int k = 0; k < columns; k++) x[k] += p[k] * b[i] / size;
+    }
+}

@@ -1,0 +1,152 @@
+/* One step of RODAS5P: a stiffly accurate, L-stable Rosenbrock method of order 5(4) for index-1 systems with dense output
+ * of order 4 (G. Steinebach, BIT Numerical Mathematics 63:27, 2023). Notation as in Hairer & Wanner II, ch. IV.7, with the
+ * transformation that avoids products with the Jacobian, M = diag(1 for x, 0 for z):
+ *   (M/(h gamma) - J) k_i = f(t + c_i h, y + sum a_ij k_j) + sum (C_ij/h) M k_j + h d_i df/dt.
+ */
+#include <math.h>
+#include <string.h>
+#include "core.h"
+
+#define STAGES 8
+#define GAMMA 0.21193756319429014
+#define N N_UNKNOWNS
+
+static const double A[STAGES][STAGES - 1] = {
+    {0},
+    {3.0},
+    {2.849394379747939, 0.45842242204463923},
+    {-6.954028509809101, 2.489845061869568, -10.358996098473584},
+    {2.8029986275628964, 0.5072464736228206, -0.3988312541770524, -0.04721187230404641},
+    {-7.502846399306121, 2.561846144803919, -11.627539656261098, -0.18268767659942256, 0.030198172008377946},
+    {-7.502846399306121, 2.561846144803919, -11.627539656261098, -0.18268767659942256, 0.030198172008377946, 1},
+    {-7.502846399306121, 2.561846144803919, -11.627539656261098, -0.18268767659942256, 0.030198172008377946, 1, 1},
+};
+static const double C[STAGES][STAGES - 1] = {
+    {0},
+    {-14.155112264123755},
+    {-17.97296035885952, -2.859693295451294},
+    {147.12150275711716, -1.41221402718213, 71.68940251302358},
+    {165.43517024871676, -0.4592823456491126, 42.90938336958603, -5.961986721573306},
+    {24.854864614690072, -3.0009227002832186, 47.4931110020768, 5.5814197821558125, -0.6610691825249471},
+    {30.91273214028599, -3.1208243349937974, 77.79954646070892, 34.28646028294783, -19.097331116725623,
+        -28.087943162872662},
+    {37.80277123390563, -3.2571969029072276, 112.26918849496327, 66.9347231244047, -40.06618937091002,
+        -54.66780262877968, -9.48861652309627},
+};
+static const double C_TIME[STAGES] = {0, 0.6358126895828704, 0.4095798393397535, 0.9769306725060716,
+    0.4288403609558664, 1, 1, 1};
+static const double D_TIME[STAGES] = {0.21193756319429014, -0.42387512638858027, -0.3384627126235924,
+    1.8046452872882734, 2.325825639765069, 0, 0, 0};
+static const double DENSE[3][STAGES] = {
+    {25.948786856663858, -2.5579724845846235, 10.433815404888879, -2.3679251022685204, 0.524948541321073,
+        1.1241088310450404,
+     0.4272876194431874, -0.17202221070155493},
+    {-9.91568850695171, -0.9689944594115154, 3.0438037242978453, -24.495224566215796, 20.176138334709044,
+        15.98066361424651,
+     -6.789040303419874, -6.710236069923372},
+    {11.419903575922262, 2.8879645146136994, 72.92137995996029, 80.12511834622643, -52.072871366152654,
+        -59.78993625266729,
+     -0.15582684282751913, 4.883087185713722},
+};
+
+static void evaluate_jacobian(Instance *c, double t, const double *y) {
+    Work *w = &c->work;
+    evaluate(c, &tape_rates, t, y, y + N_X, w->rhs);
+    tape_run(&tape_jacobian, w->slots, w->jacobian);
+}
+
+/* Partial derivative of the right hand side by time, with inputs on their straight lines. */
+static void evaluate_time_slope(Instance *c, double t, const double *y, double *slope) {
+    Work *w = &c->work;
+    int moving = RATES_DEPEND_ON_TIME;
+    for (int k = 0; k < N_U; k++) moving |= c->state.u_rate[k] != 0;
+    memset(slope, 0, N * sizeof(double));
+    if (!moving) return;
+    evaluate(c, &tape_rates, t, y, y + N_X, w->rhs);
+    memset(w->dots, 0, SLOT_RESULTS * sizeof(double));
+    w->dots[SLOT_T] = 1;
+    for (int k = 0; k < N_U; k++) w->dots[SLOT_U + k] = c->state.u_rate[k];
+    tape_tangent(&tape_rates, w->slots, w->dots, slope);
+}
+
+/* M/(h gamma) - J, factorised. */
+static int factor(Instance *c, double h) {
+    Work *w = &c->work;
+    memset(w->matrix, 0, (size_t)pattern_step.n_nonzeros * sizeof(double));
+    for (int k = 0; k < N_JACOBIAN; k++) w->matrix[jacobian_to_step[k]] = -w->jacobian[k];
+    for (int k = 0; k < N_X; k++) w->matrix[step_diagonal[k]] += 1 / (h * GAMMA);
+    return qr_factor(&pattern_step, w->matrix, w);
+}
+
+static double error_norm(const Instance *c, const double *first, const double *last, const double *error) {
+    double sum = 0, rtol = c->state.tolerance, atol = ABSOLUTE_TO_RELATIVE * rtol;
+    if (N_X == 0) return 0;
+    for (int k = 0; k < N_X; k++) {
+        double weight = rtol * fmax(fabs(first[k]), fabs(last[k])) + atol * model_nominals[k];
+        sum += (error[k] / weight) * (error[k] / weight);
+    }
+    return sqrt(sum / N_X);
+}
+
+/* Steps from `first` at t to t + h. With `keep_jacobian` that of the step before from the same point is used.
+ * Returns 0 if the equations gave values that are not finite, or a singular matrix. */
+int rosenbrock_step(Instance *c, double t, const double *first, double h, int keep_jacobian, Piece *piece,
+    double *error) {
+    Work *w = &c->work;
+    double *slope = w->stages + (size_t)STAGES * AT_LEAST_ONE(N), *y = w->point;
+    piece->begin = t;
+    piece->end = t + h;
+    memcpy(piece->first, first, N * sizeof(double));
+    if (!keep_jacobian) {
+        evaluate_time_slope(c, t, first, slope);
+        evaluate_jacobian(c, t, first);
+    }
+    if (!factor(c, h)) return 0;
+    for (int i = 0; i < STAGES; i++) {
+        double *stage = w->stages + (size_t)i * N;
+        memcpy(y, first, N * sizeof(double));
+        for (int j = 0; j < i; j++)
+            for (int k = 0; k < N; k++) y[k] += A[i][j] * w->stages[j * N + k];
+        evaluate(c, &tape_rates, t + C_TIME[i] * h, y, y + N_X, stage);
+        for (int j = 0; j < i; j++) for (int k = 0; k < N_X; k++) stage[k] += C[i][j] / h * w->stages[j * N + k];
+        for (int k = 0; k < N; k++) {
+            stage[k] += h * D_TIME[i] * slope[k];
+            if (!isfinite(stage[k])) return 0;
+        }
+        qr_solve(&pattern_step, w, stage);
+    }
+    for (int k = 0; k < N; k++) {
+        piece->last[k] = y[k] + w->stages[(STAGES - 1) * N + k];
+        if (!isfinite(piece->last[k])) return 0;
+        for (int row = 0; row < 3; row++) {
+            double sum = 0;
+            for (int i = 0; i < STAGES; i++) sum += DENSE[row][i] * w->stages[i * N + k];
+            piece->dense[row][k] = sum;
+        }
+    }
+    *error = error_norm(c, first, piece->last, w->stages + (STAGES - 1) * N);
+    return 1;
+}
+
+/* Dense output. */
+void piece_at(const Piece *piece, double t, double *point) {
+    double s = (t - piece->begin) / (piece->end - piece->begin), r = 1 - s;
+    if (t >= piece->end) {
+        memcpy(point, piece->last, N * sizeof(double));
+        return;
+    }
+    for (int k = 0; k < N; k++)
+        point[k] = r * piece->first[k] + s * (piece->last[k] + r * (piece->dense[0][k] + s * (piece->dense[1][k] +
+                   s * piece->dense[2][k])));
+}
+
+/* A first step at which states change by a hundredth (Hairer, Norsett & Wanner I, II.4). */
+double first_step(Instance *c) {
+    const State *s = &c->state;
+    double size, speed, *rates = c->work.rhs;
+    evaluate(c, &tape_rates, s->t, s->x, s->z, rates);
+    size = error_norm(c, s->x, s->x, s->x);
+    speed = error_norm(c, s->x, s->x, rates);
+    if (!isfinite(speed) || N_X == 0) return 1e-3;
+    return size < 1e-5 || speed < 1e-5 ? 1e-6 : 0.01 * size / speed;
+}

@@ -1,0 +1,114 @@
+"""Open ends of a drive: adaptors that make them causal, and the FMI 3 terminals they become."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal
+
+from modelica_like.compile.compiled import CompiledTerminal
+from modelica_like.errors import ExportError
+from modelica_like.fmi.icons import icon_name
+from modelica_like.fmi.xml import document, element, root
+from modelica_like.language import Component, Connector, Equations, connect
+from modelica_like.language.declared import unknown
+from modelica_like.language.equation import FreeEnd
+from modelica_like.netlist.registry import library_types
+
+Takes = Literal["flow", "potential"]
+
+_WIDTH = 100.0
+_MARGIN = 10.0
+
+
+def with_open_ends(drive: Component, ends: Sequence[str] = (), takes: Takes = "flow") -> Component:
+    """Return a drive whose open ends have adaptors.
+
+    Open ends are the connectors that the drive itself has (a netlist's `expose`), and free connectors of parts that are
+    named here. The adaptor of `gear.shaft` is the part `gear_shaft`, that of an own connector `shaft` is `shaft_end`.
+
+    Args:
+        drive: the drive; it stays as it is.
+        ends: paths of free connectors.
+        takes: what comes from outside: the `flow` (torque, force, current, heat flow) or the `potential`.
+
+    Raises:
+        UnknownName: there is no such connector.
+        ExportError: no library has an adaptor for one.
+    """
+    paths = tuple(dict.fromkeys([*drive.connectors, *ends]))
+    if not paths:
+        return drive
+    adaptors = {path: _adaptor(_connector(drive, path), takes) for path in paths}
+    twin = drive.copy()
+    twin.__dict__["_name"] = drive._name
+    twin.__class__ = _opened(type(drive))
+    pairs = {
+        path: (path.replace(".", "_") if "." in path else f"{path}_end", end) for path, (_, end) in adaptors.items()
+    }
+    twin.__dict__["_ends"] = pairs
+    for path, (kind, _) in adaptors.items():
+        setattr(twin, pairs[path][0], kind())
+    return twin
+
+
+def _opened(kind: type[Component]) -> type[Component]:
+    """A drive of the same class that also connects its open ends."""
+
+    class Opened(kind):  # type: ignore[misc, valid-type]
+        def equations(self) -> Equations:
+            ends = {id(_connector(self, path)): path for path in self.__dict__["_ends"]}
+            for statement in super().equations():
+                # What was declared to stay free is not free any more.
+                if not (isinstance(statement, FreeEnd) and id(statement.connector) in ends):
+                    yield statement
+            for path, (part, end) in self.__dict__["_ends"].items():
+                yield connect(_connector(self, path), self.parts[part].connectors[end])
+
+    Opened.__name__, Opened.__qualname__ = kind.__name__, kind.__qualname__
+    return Opened
+
+
+def _connector(drive: Component, path: str) -> Connector:
+    owner_path, _, name = path.rpartition(".")
+    owner = drive.find(owner_path)
+    if name not in owner.connectors:
+        raise unknown("connector", owner.label, name, list(owner.connectors))
+    return owner.connectors[name]
+
+
+def _adaptor(connector: Connector, takes: Takes) -> tuple[type[Component], str]:
+    """Find an adaptor for a connector, and its end."""
+    for kind in library_types().values():
+        ends = {name: one for name, one in kind._class_connectors.items() if type(one) is type(connector)}
+        if kind.terminal is not None and kind.terminal.takes == takes and len(ends) == 1:
+            return kind, next(iter(ends))
+    raise ExportError(
+        f"{connector.label} cannot be opened: no library has an adaptor for a {type(connector).__name__} that takes "
+        f"its {takes}.",
+        advice="Write one: a component with that connector, inputs and outputs, and `terminal = Terminal(…)`.",
+    )
+
+
+def terminals_and_icons(terminals: Sequence[CompiledTerminal]) -> str:
+    """Write terminalsAndIcons.xml: the icon of the FMU, and its terminals along the right side."""
+    height = _WIDTH
+    top = root("fmiTerminalsAndIcons", fmiVersion="3.0")
+    picture = element(top, "GraphicalRepresentation")
+    corners = {"x1": 0.0, "y1": 0.0, "x2": _WIDTH, "y2": height}
+    element(picture, "CoordinateSystem", **corners, suggestedScalingFactorTo_mm=0.1)
+    element(picture, "Icon", **corners)
+    if terminals:
+        group = element(top, "Terminals")
+        for place, one in enumerate(terminals, 1):
+            terminal = element(group, "Terminal", name=one.name, matchingRule="plug", terminalKind=one.kind)
+            for member, variable in one.members:
+                element(
+                    terminal, "TerminalMemberVariable", variableName=variable, memberName=member, variableKind="signal"
+                )
+            middle = height * place / (len(terminals) + 1)
+            element(
+                terminal, "TerminalGraphicalRepresentation", defaultConnectionColor="0 0 0",
+                defaultConnectionStrokeSize=1.0, x1=_WIDTH - _MARGIN, y1=middle - _MARGIN / 2, x2=_WIDTH,
+                y2=middle + _MARGIN / 2, iconBaseName=icon_name(one.kind),
+            )  # fmt: skip
+    return document(top)

@@ -1,0 +1,123 @@
+"""FMUs of others: archives are looked through before anything is unpacked."""
+
+from __future__ import annotations
+
+import stat
+import zipfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+
+from modelica_like.errors import FmuRefused
+
+_DESCRIPTION = "modelDescription.xml"
+_ENCRYPTED = 0x1
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What an archive may hold at most.
+
+    Attributes:
+        members: number of files and folders.
+        total: bytes of all files when unpacked.
+        ratio: unpacked over packed size of all files together, where they are larger than `harmless`.
+        harmless: bytes below which the ratio does not matter.
+    """
+
+    members: int = 10_000
+    total: int = 2 * 1024**3
+    ratio: float = 200.0
+    harmless: int = 10 * 1024**2
+
+
+LIMITS = Limits()
+
+
+def unpack(path: Path, target: Path, limits: Limits = LIMITS) -> Path:
+    """Unpack an FMU into a folder, if it is safe to do so.
+
+    Args:
+        path: the FMU.
+        target: an existing, empty folder.
+        limits: what the archive may hold at most.
+
+    Returns:
+        The folder.
+
+    Raises:
+        FmuRefused: the file is no archive, is damaged, holds paths outside, links or a bomb, or is no FMU.
+        OSError: the file cannot be read.
+    """
+    try:
+        with zipfile.ZipFile(path) as archive:
+            _look_through(path.name, archive.infolist(), limits)
+            archive.extractall(target)
+    except (zipfile.BadZipFile, NotImplementedError, EOFError) as error:
+        raise FmuRefused(f"{path.name} is no FMU: it is not a sound zip archive.", why=_sentence(error)) from None
+    if b"<!DOCTYPE" in (target / _DESCRIPTION).read_bytes():
+        raise FmuRefused(
+            f"{path.name} is refused: its {_DESCRIPTION} declares a document type.",
+            why="A model description needs none; it can make a small file enormous, or read other files.",
+        )
+    return target
+
+
+def printable(text: str) -> str:
+    """Return a text without control characters."""
+    return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text)
+
+
+def _sentence(error: Exception) -> str:
+    text = str(error) or "It ends too early."
+    return text if text.endswith(".") else f"{text}."
+
+
+def _look_through(name: str, members: Sequence[zipfile.ZipInfo], limits: Limits) -> None:
+    if len(members) > limits.members:
+        raise FmuRefused(f"{name} is refused: it holds {len(members)} files, more than {limits.members}.")
+    seen: set[str] = set()
+    for member in members:
+        if reason := _objection(member, seen):
+            raise FmuRefused(f"{name} is refused: '{printable(member.orig_filename)}' {reason}.")
+        seen.add(member.filename)
+    _check_size(name, members, limits)
+    if _DESCRIPTION not in seen:
+        raise FmuRefused(f"{name} is no FMU: it has no {_DESCRIPTION}.")
+
+
+def _objection(member: zipfile.ZipInfo, seen: set[str]) -> str:
+    """Return what speaks against a member, or an empty string."""
+    inside, kind = member.orig_filename, stat.S_IFMT(member.external_attr >> 16)
+    if inside.startswith(("/", "\\")) or ":" in inside or "\0" in inside:
+        return "is an absolute path"
+    if ".." in PurePosixPath(inside.replace("\\", "/")).parts:
+        return "leads out of the archive"
+    if "\\" in inside:
+        return "has a backslash where the standard asks for a slash"
+    if kind == stat.S_IFLNK:
+        return "is a link"
+    if kind not in (0, stat.S_IFREG, stat.S_IFDIR):
+        return "is neither a file nor a folder"
+    if member.flag_bits & _ENCRYPTED:
+        return "is encrypted"
+    return "is there twice" if member.filename in seen else ""
+
+
+def _check_size(name: str, members: Sequence[zipfile.ZipInfo], limits: Limits) -> None:
+    unpacked, packed = sum(m.file_size for m in members), sum(m.compress_size for m in members)
+    if unpacked > limits.total:
+        raise FmuRefused(f"{name} is refused: it would unpack to {_size(unpacked)}, more than {_size(limits.total)}.")
+    if unpacked > limits.harmless and unpacked > limits.ratio * packed:
+        raise FmuRefused(
+            f"{name} is refused: {_size(packed)} would unpack to {_size(unpacked)}.",
+            why=f"What shrinks to less than 1/{limits.ratio:g} is more likely an archive bomb than an FMU.",
+        )
+
+
+def _size(count: float) -> str:
+    for unit in ("bytes", "kB", "MB"):
+        if count < 1024:
+            return f"{count:.4g} {unit}"
+        count /= 1024
+    return f"{count:.4g} GB"

@@ -1,0 +1,276 @@
+"""Is an FMU what the standard says, and do other people's importers run it?"""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import fmpy
+import fmpy.validation
+import lxml.etree as etree
+import numpy as np
+
+from modelica_like.errors import FmuFailed, FmuRefused, ModelicaLikeError
+from modelica_like.fmi import importers
+from modelica_like.fmi.process import run_child
+from modelica_like.fmi.run import TIMEOUT, Kind, Solver, run_fmu
+from modelica_like.fmi.unpack import unpack
+from modelica_like.solve.ranges import ranges
+from modelica_like.solve.recorded import RecordedSolution
+from modelica_like.solve.solution import Values
+
+PASSED, FAILED, ABSENT = "passed", "failed", "–"
+_STEPS = 500
+_EULER = "FMPy ME Euler"
+_EULER_STEPS = 2000
+_EULER_STEP = 1e-5
+"""Largest explicit step in s: it must be stable for the stiffest shaft."""
+_EULER_FRACTION = 0.01
+"""Largest part of a run that is done in explicit steps."""
+_SAME = 1e-2
+"""Largest deviation between two ways to run an FMU at its own tolerance, relative to a signal's range."""
+_NEAR = 0.1
+"""The same for explicit steps, which are of first order."""
+_LEAST_RANGE = 1e-2
+"""Of the largest value among the signals of a unit."""
+_OBSERVED = 50
+_SCHEMAS = {
+    "model description": ("modelDescription.xml", "ModelDescription"),
+    "terminals and icons": ("terminalsAndIcons/terminalsAndIcons.xml", "TerminalsAndIcons"),
+    "build description": ("sources/buildDescription.xml", "BuildDescription"),
+}
+
+
+@dataclass(frozen=True)
+class Check:
+    """One check of an FMU.
+
+    Attributes:
+        name: what was checked.
+        verdict: `passed`, `failed`, or `–` where there is nothing to check.
+        sentence: what was found.
+    """
+
+    name: str
+    verdict: str
+    sentence: str
+
+
+@dataclass(frozen=True)
+class Validation:
+    """All checks of an FMU."""
+
+    fmu: str
+    checks: tuple[Check, ...]
+
+    @property
+    def passed(self) -> bool:
+        """Nothing failed."""
+        return all(check.verdict != FAILED for check in self.checks)
+
+    def __getitem__(self, name: str) -> Check:
+        return next(check for check in self.checks if check.name == name)
+
+    def __str__(self) -> str:
+        width = max(len(check.name) for check in self.checks)
+        lines = [f"{check.name:{width}}  {check.verdict:6}  {check.sentence}" for check in self.checks]
+        return "\n".join([self.fmu, *lines])
+
+
+@dataclass(frozen=True)
+class _Subject:
+    """The FMU under examination.
+
+    Attributes:
+        path: the archive.
+        folder: where it is unpacked.
+        description: FMPy's model description.
+        timeout: for each run, in s.
+    """
+
+    path: Path
+    folder: Path
+    description: Any
+    timeout: float
+
+    @property
+    def version(self) -> str:
+        return str(self.description.fmiVersion)
+
+    @property
+    def stop(self) -> float:
+        stop = getattr(self.description.defaultExperiment, "stopTime", None)
+        return float(stop) if stop is not None else 1.0
+
+    @property
+    def euler_stop(self) -> float:
+        """How far the explicit steps go."""
+        return min(_EULER_FRACTION * self.stop, _EULER_STEPS * _EULER_STEP)
+
+    def run(self, kind: Kind, stop: float, step: float, solver: Solver = "CVode") -> RecordedSolution:
+        """Run with FMPy."""
+        step = stop / _EULER_STEPS if solver == "Euler" else step
+        return run_fmu(
+            self.path, stop=stop, kind=kind, solver=solver, step=step, timeout=self.timeout,
+            outputs=self.observed(),
+        )  # fmt: skip
+
+    @property
+    def step(self) -> float:
+        return self.stop / _STEPS
+
+    def observed(self) -> list[str]:
+        """Continuous outputs, or else some local variables."""
+        reals = [v for v in self.description.modelVariables if v.type in ("Real", "Float64") and not v.shape]
+        outputs = [v.name for v in reals if v.causality == "output"]
+        return outputs or [v.name for v in reals if v.causality == "local"][:_OBSERVED]
+
+
+def validate_fmu(path: str | Path, *, timeout: float = TIMEOUT) -> Validation:
+    """Check an FMU against the standard, and run it with several importers.
+
+    The XML against its schemas; FMPy's own checks; FMPy as Model Exchange (CVode and explicit Euler) and Co-Simulation;
+    ecos (FMI 2.0 and 3.0) and libcosim (FMI 2.0) as Co-Simulation, where they are installed. Every run has a process of
+    its own, and what it ends with must agree with the others.
+
+    Args:
+        path: the FMU.
+        timeout: time limit of each run in s.
+
+    Raises:
+        OSError: the file cannot be read.
+    """
+    path = Path(path).resolve()
+    with tempfile.TemporaryDirectory(prefix="modelica_like_") as work:
+        try:
+            unpack(path, Path(work))
+        except FmuRefused as error:
+            return Validation(path.name, (Check("archive", FAILED, error.what),))
+        return Validation(path.name, tuple(_checks(path, Path(work), timeout)))
+
+
+def _checks(path: Path, folder: Path, timeout: float) -> Iterator[Check]:
+    yield Check("archive", PASSED, "It is safe to unpack.")
+    version = _version(folder)
+    schemas = [_schema_check(name, folder / file, version, schema) for name, (file, schema) in _SCHEMAS.items()]
+    yield from schemas
+    problems = _fmpy_problems(folder)
+    yield Check("fmpy validate_fmu", FAILED if problems else PASSED, " ".join(problems) or "It finds nothing.")
+    if schemas[0].verdict == FAILED:
+        return
+    subject = _Subject(path, folder, fmpy.read_model_description(str(folder), validate=False), timeout)
+    runs: dict[str, RecordedSolution] = {}
+    yield _run_check("FMPy ME CVode", subject, "me", "CVode", runs)
+    yield _run_check(_EULER, subject, "me", "Euler", runs)
+    yield _run_check("FMPy CS", subject, "cs", "CVode", runs)
+    yield _importer_check("ecos CS", "ecos", subject, runs.get("FMPy CS"))
+    yield _importer_check("libcosim CS", "libcosim", subject, runs.get("FMPy CS"))
+
+
+def _version(folder: Path) -> str:
+    """Return the first digit of the FMI version, read without trusting the rest."""
+    try:
+        root = etree.parse(folder / "modelDescription.xml").getroot()
+    except etree.XMLSyntaxError:
+        return ""
+    return str(root.get("fmiVersion", ""))[:1]
+
+
+def _schema_check(name: str, file: Path, version: str, schema: str) -> Check:
+    """Check an XML file against FMPy's copy of the standard's schemas."""
+    name = f"schema of {name}"
+    if not file.exists():
+        return Check(name, ABSENT, "It has none.")
+    # Terminals and build descriptions are those of FMI 3.0 in FMUs of FMI 2.0, too.
+    kind = version if schema == "ModelDescription" else "3"
+    try:
+        document = etree.parse(file)
+    except etree.XMLSyntaxError as error:
+        return Check(name, FAILED, f"It is no XML: {error.msg}.")
+    xsd = Path(str(fmpy.__file__)).parent / "schema" / f"fmi{kind}" / f"fmi{'' if kind == '1' else kind}{schema}.xsd"
+    if not xsd.exists():
+        return Check(name, FAILED, "It does not say which version of the standard it follows.")
+    rules = etree.XMLSchema(etree.parse(xsd))
+    if rules.validate(document):
+        return Check(name, PASSED, "It keeps to the schema.")
+    found = "; ".join(f"line {entry.line}: {entry.message}" for entry in list(rules.error_log)[:3])
+    return Check(name, FAILED, found)
+
+
+def _fmpy_problems(folder: Path) -> list[str]:
+    return [str(problem).replace("\n", " ") for problem in fmpy.validation.validate_fmu(str(folder))]
+
+
+def _run_check(name: str, subject: _Subject, kind: Kind, solver: Solver, runs: dict[str, RecordedSolution]) -> Check:
+    """Run with FMPy; what is run must agree with what was run before."""
+    part = subject.description.modelExchange if kind == "me" else subject.description.coSimulation
+    if part is None:
+        return Check(name, ABSENT, f"It has no {'Model Exchange' if kind == 'me' else 'Co-Simulation'}.")
+    before = next(iter(runs.values()), None)
+    stop = subject.euler_stop if solver == "Euler" else subject.stop
+    try:
+        run = subject.run(kind, stop, stop / _STEPS, solver)
+        expected = subject.run("me", stop, stop).final if solver == "Euler" else before and before.final
+    except ModelicaLikeError as error:
+        return Check(name, FAILED, str(error).replace("\n", " "))
+    values = np.array([run[name] for name in run.recorded.position])
+    if not np.all(np.isfinite(values)):
+        return Check(name, FAILED, "There are values that are not finite.")
+    if solver != "Euler":
+        runs[name] = run
+    return _agreement(name, before, expected, {n: run[n][-1] for n in run.recorded.position}, stop)
+
+
+def _importer_check(name: str, importer: str, subject: _Subject, known: RecordedSolution | None) -> Check:
+    """Run with another importer; what it ends with must be what FMPy ends with."""
+    if subject.description.coSimulation is None:
+        return Check(name, ABSENT, "It has no Co-Simulation.")
+    if not importers.installed(importer):
+        return Check(name, ABSENT, 'It is not installed: pip install "modelica-like[importers]".')
+    names = subject.observed()
+    try:
+        values = _run_importer(importer, subject, names)
+    except FmuFailed as error:
+        if importer == "libcosim" and subject.version.startswith("3"):
+            return Check(name, ABSENT, f"{error.what} It does so with every FMU of FMI 3.0: the importer is at fault.")
+        return Check(name, FAILED, error.what)
+    if known is None:
+        return Check(name, PASSED, f"It runs to {subject.stop:g} s; FMPy has no values to compare with.")
+    return _agreement(name, known, known.final, values, subject.stop)
+
+
+def _run_importer(importer: str, subject: _Subject, names: Sequence[str]) -> dict[str, float]:
+    with tempfile.TemporaryDirectory(prefix="modelica_like_", ignore_cleanup_errors=True) as work:
+        folder = Path(work)
+        job = {
+            "importer": importer, "fmu": str(subject.path), "step": subject.step, "steps": _STEPS, "names": list(names),
+        }  # fmt: skip
+        (folder / "job.json").write_text(json.dumps(job))
+        # libcosim unpacks into the temporary folder, and leaves it there when it crashes.
+        run_child(
+            f"{subject.path.name} in {importer}", Path(importers.__file__), folder, subject.timeout, {"TMPDIR": work}
+        )
+        if (folder / "error.json").exists():
+            text = json.loads((folder / "error.json").read_text())["text"]
+            raise FmuFailed(f"{importer} says: {text.strip().rstrip('.')}.")
+        return json.loads((folder / "meta.json").read_text())
+
+
+def _agreement(
+    name: str, known: RecordedSolution | None, expected: Values | None, values: dict[str, float], stop: float
+) -> Check:
+    """Compare values with those of another run at the same time, relative to their ranges in that run."""
+    if known is None or expected is None:
+        return Check(name, PASSED, f"It runs to {stop:g} s.")
+
+    scales = ranges(known, values, _LEAST_RANGE)
+    deviations = {signal: abs(values[signal] - expected[signal]) / scales[signal] for signal in values}
+    worst = max(values, key=deviations.__getitem__, default="")
+    if worst and not deviations[worst] <= (_NEAR if name == _EULER else _SAME):
+        share = f"{deviations[worst]:.1e} of its range"
+        return Check(name, FAILED, f"It runs to {stop:g} s, but {worst} ends {share} away from the other runs.")
+    return Check(name, PASSED, f"It runs to {stop:g} s and ends with the same values.")

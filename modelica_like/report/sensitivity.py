@@ -1,0 +1,32 @@
+"""Sensitivities as ranking tables for the command line."""
+
+from __future__ import annotations
+
+from rich.console import Group, RenderableType
+from rich.markup import escape
+
+from modelica_like.analyse.sensitivity import Sensitivities
+from modelica_like.analyse.sensitivity_report import SHOWN, relative_text, unit_text
+from modelica_like.report.types import table
+
+
+def sensitivity_report(result: Sensitivities) -> RenderableType:
+    """Return one ranking table per output, the most important parameters first."""
+    parts: list[RenderableType] = []
+    for output in result.outputs:
+        title = f"{output.name} = {output.value:.9g} {unit_text(output.unit)}".rstrip()
+        made = table(title, "parameter", "value>", "unit", "derivative>", "relative>")
+        ranking = result.ranking(output.name)
+        for parameter, derivative, relative in ranking[:SHOWN]:
+            unit = escape(unit_text(parameter.unit))
+            made.add_row(
+                escape(parameter.name), f"{parameter.value:.6g}", unit, f"{derivative:.6g}", relative_text(relative)
+            )
+        if len(ranking) > SHOWN:
+            made.add_row(f"… {len(ranking) - SHOWN} more")
+        parts += [made, ""]
+    parts += [
+        f"{escape(name)}: {rows.shape[0]} times, see Sensitivities.series" for name, rows in result.series.items()
+    ]
+    parts.append(f"[dim]derivatives in SI units; relative: percent per percent; {result.method} method[/]")
+    return Group(*parts)

@@ -1,0 +1,86 @@
+"""Trajectories from wherever they are: a netlist is simulated, an FMU is run, a table is read."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+
+from modelica_like.errors import NetlistError
+from modelica_like.fmi.run import run_fmu
+from modelica_like.simulation import build, simulate
+from modelica_like.solve.recorded import RecordedModel, RecordedSolution, RecordedVariable
+from modelica_like.solve.solution import Solution
+
+_POINTS = 500
+
+
+def trajectories(
+    source: str | Path | Solution, until: float | None = None, points: int = _POINTS, tolerance: float | None = None
+) -> Solution:
+    """Return the trajectories of a netlist, an FMU or a CSV file; a solution is returned as it is.
+
+    Args:
+        source: a file that ends in `.toml`, `.fmu` or `.csv`.
+        until: end time in s of a netlist or an FMU; by default its own.
+        points: number of equal intervals of its results.
+        tolerance: relative tolerance of its run.
+
+    Raises:
+        NetlistError: the file is none of these, or the table is not one.
+        ModelicaLikeError: the run fails.
+        OSError: the file cannot be read.
+    """
+    if isinstance(source, Solution):
+        return source
+    path = Path(source)
+    kind = path.suffix.lower()
+    if kind == ".toml":
+        return simulate(build(path), until, points=points, rtol=tolerance)
+    if kind == ".fmu":
+        return run_fmu(path, stop=until, points=points, tolerance=tolerance)
+    if kind == ".csv":
+        return read_csv(path)
+    raise NetlistError(f"'{path.name}' is neither a netlist (.toml) nor an FMU (.fmu) nor a table (.csv).")
+
+
+def read_csv(path: Path) -> RecordedSolution:
+    """Read a table whose first column is `time` in s; a second header line with units may follow the names.
+
+    A repeated time is an event's left and right value.
+
+    Raises:
+        NetlistError: the file is not such a table.
+        OSError: the file cannot be read.
+    """
+    with path.open(newline="", encoding="utf-8-sig") as file:
+        rows = [row for row in csv.reader(file) if row]
+    if len(rows) < 2 or rows[0][0].strip().strip('"') != "time":
+        raise NetlistError(f"{path.name}: a table begins with a line of names, of which the first is `time`.")
+    names = [name.strip() for name in rows[0]]
+    units = None if _is_number(rows[1][0]) else rows[1]
+    first = 1 if units is None else 2
+    values = np.array([_numbers(path.name, k, row, len(names)) for k, row in enumerate(rows[first:], first + 1)])
+    if not len(values) or np.any(np.diff(values[:, 0]) < 0):
+        raise NetlistError(f"{path.name}: the times must rise.")
+    columns = [RecordedVariable(name, unit) for name, unit in zip(names, units or ["1"] * len(names), strict=True)]
+    model = RecordedModel(path.stem, tuple(columns[1:]), (), {})
+    return RecordedSolution(model, values[:, 0], values[:, 1:].T, np.empty((0, len(values))), 0.0)
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _numbers(name: str, line: int, row: list[str], count: int) -> list[float]:
+    if len(row) != count:
+        raise NetlistError(f"{name}:{line}: {len(row)} values under {count} names.")
+    for text in row:
+        if not _is_number(text):
+            raise NetlistError(f"{name}:{line}: '{text}' is not a number.")
+    return [float(text) for text in row]

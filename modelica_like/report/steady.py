@@ -1,0 +1,47 @@
+"""Operating points and curves as tables."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from rich.console import Group, RenderableType
+from rich.markup import escape
+from rich.table import Table
+
+from modelica_like.analyse.steady import Curves, OperatingPoint
+from modelica_like.report.types import table
+
+
+def point_report(point: OperatingPoint, names: Sequence[str] = ()) -> RenderableType:
+    """Return the powers of an operating point, its efficiency, and the values of variables."""
+    model = point.model
+    made = table("powers in W", "component", "from outside>", "lost>")
+    for path, (source, loss) in point.powers.items():
+        if source or loss:
+            made.add_row(escape(path or model.name), f"{source:.6g}", f"{loss:.6g}")
+    parts: list[RenderableType] = [f"[bold]{escape(model.name)}[/]  steady state", "", made]
+    if np.isfinite(point.efficiency):
+        parts.append(f"Efficiency {100 * point.efficiency:.4g} %.")
+    if point.stuck:
+        parts.append(f"Sticking: {escape(', '.join(point.stuck))}.")
+    return Group(*parts, "", _values(point, names or model.states))
+
+
+def _values(point: OperatingPoint, names: Sequence[str]) -> Table:
+    units = {one.path: str(one.unit) for one in (*point.model.flat_variables, *point.model.flat_parameters)}
+    made = table("values", "name", "value>", "unit")
+    for name in names:
+        made.add_row(escape(name), f"{point[name]:.8g}", units.get(name, ""))
+    return made
+
+
+def curves_report(curves: Curves, names: Sequence[str] = ()) -> Table:
+    """Return a characteristic curve, one row per operating point."""
+    columns = [curves.over, *(name for name in names if name != curves.over), "efficiency"]
+    columns = list(dict.fromkeys(columns))
+    titles = [f"{escape(name)} in {curves.unit(name)}>" if curves.unit(name) != "1" else f"{name}>" for name in columns]
+    made = table(curves.points[0].model.name, *titles)
+    for row in zip(*(curves[name] for name in columns), strict=True):
+        made.add_row(*(f"{value:.6g}" for value in row))
+    return made

@@ -1,0 +1,61 @@
+"""What a sweep found: a table of extremes, and a file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from rich.console import Group, RenderableType
+from rich.markup import escape
+
+from modelica_like.errors import NetlistError
+from modelica_like.report.types import table
+
+if TYPE_CHECKING:
+    import xarray
+
+_TOLD = 3
+
+
+def sweep_report(found: xarray.Dataset) -> RenderableType:
+    """Return smallest and largest value of every output with the parameters there, and what failed."""
+    names = [str(name) for name in found.data_vars if name != "failure"]
+    told = found["failure"].to_numpy().ravel()
+    failed = int(np.sum(told != ""))
+    made = table("extremes", "output", "unit", "smallest>", "at", "largest>", "at")
+    for name in names:
+        values = found[name]
+        if not np.any(np.isfinite(values.to_numpy())):
+            made.add_row(escape(name), values.attrs["units"], "none")
+            continue
+        low, high = values.argmin(...), values.argmax(...)
+        made.add_row(
+            escape(name), values.attrs["units"], f"{values.min().item():.6g}", _where(found, low),
+            f"{values.max().item():.6g}", _where(found, high),
+        )  # fmt: skip
+    parts: list[RenderableType] = [f"[bold]{escape(found.attrs['model'])}[/]  {told.size} runs", "", made]
+    if failed:
+        parts.append(f"{failed} runs failed:")
+        parts += [f"  {escape(text.splitlines()[0])}" for text in dict.fromkeys(told[told != ""][:_TOLD])]
+    return Group(*parts)
+
+
+def _where(found: xarray.Dataset, place: Mapping[Any, xarray.DataArray]) -> str:
+    point = found.isel({str(key): value.item() for key, value in place.items()})
+    return escape(", ".join(f"{name} = {point[name].item():.6g}" for name in point.coords))
+
+
+def write_sweep(found: xarray.Dataset, path: Path) -> None:
+    """Write a sweep as a table, one row per run.
+
+    Raises:
+        NetlistError: the ending of the file is not .csv.
+    """
+    if path.suffix != ".csv":
+        raise NetlistError(
+            f"'{path.name}': a sweep can be written as .csv.", advice="For others use the dataset in Python."
+        )
+    path.parent.mkdir(parents=True, exist_ok=True)
+    found.to_dataframe().to_csv(path)

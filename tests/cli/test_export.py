@@ -1,0 +1,46 @@
+"""`modelica-like export`: the file it writes and the line it prints."""
+
+from pathlib import Path
+
+import fmpy
+import pytest
+from typer.testing import CliRunner
+
+from modelica_like.cli import app
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+NETLIST = str(EXAMPLES / "two_mass.toml")
+
+
+def test_an_fmu_named_after_the_netlist(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    result = CliRunner().invoke(app, ["export", NETLIST, "--platforms", "none", "--set", "J1.w=5 rad/s"])
+    assert result.exit_code == 0
+    assert result.stdout.startswith("two_mass.fmu: FMI 2.0, Model Exchange and Co-Simulation, ")
+    assert "sources only" in result.stdout
+    variables = {one.name: one.start for one in fmpy.read_model_description("two_mass.fmu").modelVariables}
+    assert float(variables["J1.w"]) == 5.0
+
+
+def test_version_kind_and_outputs(tmp_path: Path) -> None:
+    path = tmp_path / "x.fmu"
+    options = ["-o", str(path), "--fmi", "3.0", "--kind", "cs", "--platforms", "none", "--show", "J?.w"]
+    assert CliRunner().invoke(app, ["export", NETLIST, *options]).exit_code == 0
+    description = fmpy.read_model_description(str(path))
+    assert description.fmiVersion == "3.0"
+    assert description.modelExchange is None
+    assert {one.variable.name for one in description.outputs} == {"J1.w", "J2.w"}
+
+
+def test_open_end(tmp_path: Path) -> None:
+    path = tmp_path / "x.fmu"
+    options = ["-o", str(path), "--platforms", "none", "--open", "J2.flange_b"]
+    assert CliRunner().invoke(app, ["export", NETLIST, *options]).exit_code == 0
+    inputs = [one.name for one in fmpy.read_model_description(str(path)).modelVariables if one.causality == "input"]
+    assert inputs == ["J2_flange_b.tau"]
+
+
+def test_mistakes_are_told(tmp_path: Path) -> None:
+    result = CliRunner().invoke(app, ["export", NETLIST, "-o", str(tmp_path / "x.fmu"), "--fmi", "1.0"])
+    assert result.exit_code == 2
+    assert result.stderr == "FMI 1.0 is not supported.\nThere are 2.0 and 3.0.\n"

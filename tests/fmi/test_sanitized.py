@@ -1,0 +1,47 @@
+"""Wrong calls and many instances, with the C code under AddressSanitizer and UBSan."""
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from modelica_like import build
+from modelica_like.fmi.codegen import generate, source_files
+from modelica_like.fmi.interface import interface
+
+HERE = Path(__file__).parent
+EXAMPLES = HERE.parents[1] / "examples"
+SANITIZE = ["-g", "-O1", "-std=c99", "-Wall", "-Wextra", "-Werror", "-fsanitize=address,undefined"]
+
+
+def driver(netlist: str, version: str, folder: Path) -> Path:
+    """The C code of a model and a program that misuses it, as one executable."""
+    model = build(EXAMPLES / netlist)
+    for name, text in generate(model, interface(model), version, token="{t}").items():
+        (folder / name).write_text(text)
+    program = HERE / f"misuse{version[0]}.c"
+    compiler = shutil.which("gcc") or shutil.which("clang")
+    assert compiler, "the sanitizers need gcc or clang"
+    command = [compiler, *SANITIZE, "-fno-sanitize-recover=undefined", "-I.", "-o", "driver", str(program)]
+    subprocess.run([*command, *source_files(version), "-lm"], cwd=folder, check=True)
+    return folder / "driver"
+
+
+CASES = [
+    ("msl/rotational/CoupledClutches.toml", "2.0"),
+    ("msl/rotational/CoupledClutches.toml", "3.0"),
+    ("dc_bench.toml", "3.0"),
+]
+
+
+@pytest.mark.parametrize(("netlist", "version"), CASES)
+def test_wrong_calls_are_errors_and_a_thousand_instances_leave_nothing_behind(netlist, version, tmp_path):
+    """Leaks, overflows and undefined behaviour end the program; it counts calls that were answered wrongly itself."""
+    result = subprocess.run([driver(netlist, version, tmp_path), "1000"], capture_output=True, text=True, timeout=300)
+    assert result.returncode == 0, f"{result.stdout}\n{result.stderr}"
+    assert result.stderr == ""
+    if "Clutches" in netlist:
+        lines = dict.fromkeys(result.stdout.splitlines())
+        expected = (HERE / f"messages{version[0]}.txt").read_text(encoding="utf-8")
+        assert "\n".join(lines) + "\n" == expected

@@ -1,0 +1,55 @@
+"""The commands validate and compare: what they print, and their exit codes."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from modelica_like.cli import app
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+Built = Mapping[tuple[str, str], Path]
+
+
+@pytest.fixture
+def run() -> CliRunner:
+    return CliRunner()
+
+
+def test_validate_prints_every_check(run: CliRunner, reference_fmus: Built) -> None:
+    result = run.invoke(app, ["validate", str(reference_fmus["machine_table", "2.0"])])
+    assert result.exit_code == 0
+    assert "libcosim CS                    passed   It runs to 0.4 s and ends with the same values." in result.stdout
+
+
+def test_validate_of_a_broken_file_fails(run: CliRunner, tmp_path: Path) -> None:
+    (tmp_path / "drive.fmu").write_text("nothing")
+    result = run.invoke(app, ["validate", str(tmp_path / "drive.fmu")])
+    assert result.exit_code == 1
+    assert "archive  failed   drive.fmu is no FMU: it is not a sound zip archive." in result.stdout
+
+
+def test_validate_of_no_file(run: CliRunner, tmp_path: Path) -> None:
+    result = run.invoke(app, ["validate", str(tmp_path / "drive.fmu")])
+    assert result.exit_code == 2
+    assert "No such file or directory." in result.stderr
+
+
+def test_compare_prints_deviations_and_draws(run: CliRunner, reference_fmus: Built, tmp_path: Path) -> None:
+    netlist, picture = str(EXAMPLES / "machine_table_direct.toml"), tmp_path / "both.png"
+    fmu = str(reference_fmus["machine_table", "3.0"])
+    result = run.invoke(app, ["compare", netlist, fmu, "--signals", "table.*", "--plot", str(picture)])
+    assert result.exit_code == 0
+    rows = {line.split()[0]: line.split() for line in result.stdout.splitlines() if line}
+    assert rows["table.v"][2] == "m/s"
+    assert float(rows["table.v"][3]) < 1e-6
+    assert rows["clutch.mode"][1:3] == ["stuck", "0.2"]
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_compare_of_strangers_is_told(run: CliRunner, reference_fmus: Built) -> None:
+    fmus = [str(reference_fmus[name, "2.0"]) for name in ("two_mass", "stick_slip")]
+    result = run.invoke(app, ["compare", *fmus])
+    assert result.exit_code == 2
+    assert result.stderr.startswith("two_mass and stick_slip have no signal in common.")

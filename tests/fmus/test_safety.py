@@ -1,0 +1,96 @@
+"""What a foreign FMU does wrong becomes a sentence; nothing of it reaches this process."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from modelica_like.errors import FmuCrashed, FmuFailed, FmuRefused, FmuTimeout, UnknownName, ValueOutOfRange
+from modelica_like.fmi.run import run_fmu
+
+Built = Mapping[tuple[str, str], Path]
+
+CRASH, HANG, LEAVE, FAIL, CRASH_AT_START = 1.0, 2.0, 3.0, 4.0, 5.0
+IN_ITS_OWN = "It ran in a process of its own."
+
+MISDEEDS = {
+    "crash": (CRASH, FmuCrashed, f"hostile_fmi2.fmu crashed with SIGSEGV after t = 0.49 s.\n{IN_ITS_OWN}"),
+    "crash at the start": (
+        CRASH_AT_START,
+        FmuCrashed,
+        f"hostile_fmi2.fmu crashed with SIGSEGV before its first step had ended.\n{IN_ITS_OWN}",
+    ),
+    "leave": (
+        LEAVE,
+        FmuCrashed,
+        f"hostile_fmi2.fmu ended its process by itself, with exit code 0, after t = 0.49 s.\n{IN_ITS_OWN}",
+    ),
+    "hang": (
+        HANG,
+        FmuTimeout,
+        "hostile_fmi2.fmu has not come to its end within 3 s, and was stopped after t = 0.49 s.\n"
+        "Give it more time with `timeout`, or a shorter run.",
+    ),
+    "fail": (FAIL, FmuFailed, "hostile_fmi2.fmu failed: fmi2DoStep failed with status 3 (error)."),
+}
+
+
+@pytest.mark.parametrize("misdeed", MISDEEDS)
+def test_becomes_a_sentence(misdeed: str, hostile: Path) -> None:
+    what, kind, sentence = MISDEEDS[misdeed]
+    with pytest.raises(kind) as told:
+        run_fmu(hostile, parameters={"misdeed": what}, timeout=3.0)
+    assert str(told.value) == sentence
+
+
+def test_noise_goes_nowhere(hostile: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    run = run_fmu(hostile, points=10)
+    np.testing.assert_allclose(run["x"], run.time)
+    assert capfd.readouterr() == ("", "")
+
+
+MISTAKES = {
+    "parameter": (
+        {"parameters": {"shaft.cc": 1.0}},
+        UnknownName,
+        "two_mass_fmi2.fmu has no variable 'shaft.cc'; did you mean 'shaft.c'?",
+    ),
+    "output": ({"outputs": ["J3.w"]}, UnknownName, "two_mass_fmi2.fmu has no variable 'J3.w'; did you mean 'J2.w'?"),
+    "input": (
+        {"inputs": {"J1.J": 1.0}},
+        UnknownName,
+        "two_mass_fmi2.fmu: 'J1.J' is no input but a parameter. It has motor.tau.",
+    ),
+    "table": (
+        {"inputs": {"motor.tau": [(1.0, 0.0), (0.0, 1.0)]}},
+        ValueOutOfRange,
+        "The input 'motor.tau' must be a number, or pairs of rising time and value.",
+    ),
+    "end": (
+        {"stop": -1.0},
+        ValueOutOfRange,
+        "two_mass_fmi2.fmu: the end time -1 s is not after the start time 0 s.",
+    ),
+    "step": ({"step": 0.0}, ValueOutOfRange, "two_mass_fmi2.fmu: the step must be positive, not 0 s."),
+    "timeout": ({"timeout": 0.0}, ValueOutOfRange, "two_mass_fmi2.fmu: the time limit must be positive, not 0 s."),
+}
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_tells_mistakes(mistake: str, reference_fmus: Built) -> None:
+    arguments, kind, sentence = MISTAKES[mistake]
+    with pytest.raises(kind) as told:
+        run_fmu(reference_fmus["two_mass", "2.0"], **arguments)
+    assert str(told.value) == sentence
+
+
+def test_tells_a_missing_kind(reference_fmus: Built) -> None:
+    with pytest.raises(FmuRefused) as told:
+        run_fmu(reference_fmus["dc_bench", "2.0"], kind="me")
+    assert str(told.value) == ("dc_bench_fmi2.fmu has no ModelExchange part.\nAsk for the other kind, or for none.")
+
+
+def test_a_component_without_inputs_says_so(reference_fmus: Built) -> None:
+    with pytest.raises(UnknownName, match=r"'k' is no input but a parameter\. It has none\.$"):
+        run_fmu(reference_fmus["dc_bench", "2.0"], inputs={"k": 1.0})

@@ -1,0 +1,170 @@
+"""How far two trajectories are apart: tables made by hand, and netlists against each other."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from modelica_like import simulate
+from modelica_like.errors import ModelicaLikeError
+from modelica_like.report.compare import Comparison, compare
+from modelica_like.report.files import write_csv
+from modelica_like.report.sources import read_csv, trajectories
+from modelica_like.solve.recorded import RecordedModel, RecordedSolution, RecordedVariable
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+DIRECT = EXAMPLES / "machine_table_direct.toml"
+
+
+def write(path: Path, header: str, *rows: str) -> Path:
+    path.write_text("\n".join([header, *rows, ""]))
+    return path
+
+
+def recorded(name: str, times: list[float], x: list[float], modes: list[float]) -> RecordedSolution:
+    mode = RecordedVariable("clutch.mode", kind="discrete", names={0: "free", 1: "stuck"})
+    model = RecordedModel(name, (RecordedVariable("x", "m"),), (mode,), {})
+    return RecordedSolution(model, *(np.array(part, dtype=float) for part in (times, [x], [modes])), 0.0)
+
+
+def shown(comparison: Comparison) -> str:
+    console = Console(width=100, highlight=False)
+    with console.capture() as capture:
+        console.print(comparison)
+    return "\n".join(line.rstrip() for line in capture.get().splitlines())
+
+
+def test_largest_deviation_and_its_time(tmp_path: Path) -> None:
+    a = write(tmp_path / "a.csv", "time,x,y", "0,0,5", "1,2,5", "2,4,5")
+    b = write(tmp_path / "b.csv", "time,y,x", "0,5,0", "1,5,3", "2,5.5,4.5")
+    comparison = compare(a, b)
+    assert (comparison["x"].largest, comparison["x"].relative, comparison["x"].time) == (1.0, 0.25, 1.0)
+    assert (comparison["y"].largest, comparison["y"].time) == (0.5, 2.0)
+    assert not comparison.interpolated
+
+
+def test_other_times_are_interpolated(tmp_path: Path) -> None:
+    a = write(tmp_path / "a.csv", "time,x", "0,0", "0.5,1", "1,2")
+    b = write(tmp_path / "b.csv", "time,x", "0,0", "0.4,0.8", "0.7,1.4", "1.1,2.4")
+    comparison = compare(a, b)
+    assert comparison.interpolated
+    # At 1 s the second is 1.4 + 3/4·1.0.
+    assert comparison["x"].largest == pytest.approx(0.15)
+    assert comparison["x"].time == 1.0
+    assert "interpolated linearly" in shown(comparison)
+
+
+def test_events_are_paired_and_the_time_between_them_is_left_out() -> None:
+    """The first jumps at 1.0 s, the second at 1.1 s: in between they are 10 apart, and both right."""
+    first = recorded("first", [0, 1, 1, 1.05, 2], [0, 0, 10, 10, 10], [0, 0, 1, 1, 1])
+    second = recorded("second", [0, 1.05, 1.1, 1.1, 2], [0, 0, 0, 10, 11], [0, 0, 0, 1, 1])
+    comparison = compare(first, second)
+    (event,) = comparison.events
+    assert (event.mode, event.after) == ("clutch.mode", "stuck")
+    assert event.difference == pytest.approx(0.1)
+    assert comparison["x"].largest == 1.0
+    assert comparison.largest_event_difference == pytest.approx(0.1)
+
+
+def test_an_event_that_only_one_has() -> None:
+    first = recorded("first", [0, 1, 1, 2], [0, 0, 1, 1], [0, 0, 1, 1])
+    second = recorded("second", [0, 2], [0, 0], [0, 0])
+    comparison = compare(first, second)
+    assert comparison.events[0].difference is None
+    assert comparison.largest_event_difference == np.inf
+    assert "never" in shown(comparison)
+
+
+def test_not_a_number_is_a_deviation() -> None:
+    first = recorded("first", [0, 1, 2], [0, 1, 2], [0, 0, 0])
+    second = recorded("second", [0, 1, 2], [0, np.nan, 2], [0, 0, 0])
+    assert compare(first, second)["x"].largest == np.inf
+
+
+def test_a_netlist_and_its_own_table(tmp_path: Path) -> None:
+    """What was written reads back the same, events included."""
+    run = simulate(DIRECT)
+    write_csv(run, tmp_path / "run.csv", units=True)
+    table = read_csv(tmp_path / "run.csv")
+    np.testing.assert_array_equal(table["table.v"], run["table.v"])
+    comparison = compare(DIRECT, tmp_path / "run.csv")
+    assert comparison.largest == 0.0
+    assert len(comparison.deviations) == len(run.model.position)
+
+
+def test_signals_are_chosen_by_patterns(tmp_path: Path) -> None:
+    run = simulate(DIRECT, points=10)
+    comparison = compare(run, run, signals=["table.?", "hub.w"])
+    assert {row.signal for row in comparison.deviations} == {"table.s", "table.v", "hub.w"}
+
+
+def test_report_and_picture() -> None:
+    first = recorded("first", [0, 1, 1, 2], [0, 0, 1, 1], [0, 0, 1, 1])
+    second = recorded("second", [0, 1.5, 1.5, 2], [0, 0, 2, 2], [0, 0, 1, 1])
+    comparison = compare(first, second)
+    assert shown(comparison) == (
+        "first and second\n"
+        "signal  largest deviation     of the range  at time in s\n"
+        "x               1.000e+00  m       1.0e+00             2\n"
+        "\n"
+        "events\n"
+        "mode         to     first at s  second at s  difference in s\n"
+        "clutch.mode  stuck           1          1.5          5.0e-01"
+    )
+    above, below = comparison.plot().axes
+    assert above.get_ylabel() == "x in m"
+    assert [line.get_label() for line in above.get_lines()] == ["first", "second"]
+    assert max(below.get_lines()[0].get_ydata()) == 1.0
+
+
+MESSAGES = {
+    "no signal in common": (
+        ("time,x", "0,0", "1,1"),
+        ("time,y", "0,0", "1,1"),
+        (),
+        "a and b have no signal in common.\nSignals are compared by their names, such as clutch.tau.",
+    ),
+    "no time in common": (
+        ("time,x", "0,0", "1,1"),
+        ("time,x", "2,0", "3,1"),
+        (),
+        "a and b have no time in common.",
+    ),
+    "unknown signal": (
+        ("time,speed", "0,0", "1,1"),
+        ("time,speed", "0,0", "1,1"),
+        ("sped",),
+        "They have no common signal 'sped'; did you mean 'speed'?",
+    ),
+    "no header": (
+        ("0,0", "1,1"),
+        ("time,x", "0,0"),
+        (),
+        "a.csv: a table begins with a line of names, of which the first is `time`.",
+    ),
+    "times that fall": (("time,x", "1,0", "0,1"), ("time,x", "0,0"), (), "a.csv: the times must rise."),
+    "a word": (("time,x", "0,0", "1,fast"), ("time,x", "0,0"), (), "a.csv:3: 'fast' is not a number."),
+    "a value too many": (("time,x", "0,0", "1,1,1"), ("time,x", "0,0"), (), "a.csv:3: 3 values under 2 names."),
+}
+
+
+@pytest.mark.parametrize("case", MESSAGES)
+def test_messages(case: str, tmp_path: Path) -> None:
+    a, b, signals, sentence = MESSAGES[case]
+    with pytest.raises(ModelicaLikeError) as told:
+        compare(write(tmp_path / "a.csv", *a), write(tmp_path / "b.csv", *b), signals=signals)
+    assert str(told.value) == sentence
+
+
+def test_picture_of_nothing() -> None:
+    run = recorded("first", [0, 1], [0, 1], [0, 0])
+    with pytest.raises(ModelicaLikeError) as told:
+        compare(run, run).plot("y")
+    assert str(told.value) == "Neither has a signal 'y'."
+
+
+def test_other_files() -> None:
+    with pytest.raises(ModelicaLikeError) as told:
+        trajectories("drive.txt")
+    assert str(told.value) == "'drive.txt' is neither a netlist (.toml) nor an FMU (.fmu) nor a table (.csv)."
