@@ -9,11 +9,17 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from modelica_like.analyse.function import simulation_function as simulation_function
+    from modelica_like.analyse.sensitivity import sensitivities as sensitivities
     from modelica_like.compile.compiled import CompiledDae as CompiledDae
     from modelica_like.errors import ModelicaLikeError as ModelicaLikeError
+    from modelica_like.fmi.export import export_fmu as export_fmu
+    from modelica_like.fmi.run import run_fmu as run_fmu
+    from modelica_like.fmi.validate import validate_fmu as validate_fmu
     from modelica_like.language import Assembly as Assembly
     from modelica_like.language import Component as Component
     from modelica_like.netlist import load as load
+    from modelica_like.report.compare import compare as compare
     from modelica_like.simulation import build as build
     from modelica_like.simulation import simulate as simulate
     from modelica_like.solve.options import Options as Options
@@ -29,8 +35,14 @@ _HOME = {
     "Options": "modelica_like.solve.options",
     "Solution": "modelica_like.solve.solution",
     "build": "modelica_like.simulation",
+    "compare": "modelica_like.report.compare",
+    "export_fmu": "modelica_like.fmi.export",
     "load": "modelica_like.netlist",
+    "run_fmu": "modelica_like.fmi.run",
+    "sensitivities": "modelica_like.analyse.sensitivity",
     "simulate": "modelica_like.simulation",
+    "simulation_function": "modelica_like.analyse.function",
+    "validate_fmu": "modelica_like.fmi.validate",
 }
 
 __all__ = [
@@ -41,8 +53,14 @@ __all__ = [
     "Options",
     "Solution",
     "build",
+    "compare",
+    "export_fmu",
     "load",
+    "run_fmu",
+    "sensitivities",
     "simulate",
+    "simulation_function",
+    "validate_fmu",
 ]
 
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 import time
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -24,8 +25,13 @@ _SECOND = parse_unit("s")
 Model = Component | CompiledDae | str | Path
 
 
-def build(drive: Model) -> CompiledDae:
+def build(drive: Model, free: Iterable[str] = ()) -> CompiledDae:
     """Compile a component tree or a netlist file; a compiled model is returned as it is.
+
+    Args:
+        drive: the model.
+        free: parameters that shall be independent: what follows from others by a formula keeps the formula's value,
+            but can be varied on its own. Not possible in a compiled model.
 
     Raises:
         ModelicaLikeError: something is wrong with the model; the message says what, where and what to do.
@@ -36,6 +42,14 @@ def build(drive: Model) -> CompiledDae:
         from modelica_like.netlist import load
 
         drive = load(drive)
+    model = compile(reduce(flatten(drive)))
+    bound = [name for name in free if name in model.derived_position]
+    if not bound:
+        return model
+    values = model.derived(model.p).full().ravel()
+    drive = copy.deepcopy(drive)
+    for name in bound:
+        drive.set(name, float(values[model.derived_position[name]]))
     return compile(reduce(flatten(drive)))
 
 

@@ -15,9 +15,11 @@ import pytest
 import modelica_like.errors as errors
 from components import (
     Clutch,
+    ClutchActuator,
     ConstantSpeed,
     ConstantTorque,
     Fixed,
+    Freewheel,
     IdealGear,
     IdealPlanetary,
     Inertia,
@@ -26,7 +28,7 @@ from components import (
     SpringDamper,
     TorqueSensor,
 )
-from modelica_like import build, simulate
+from modelica_like import build, load, simulate, simulation_function
 from modelica_like.errors import ModelicaLikeError
 from modelica_like.flatten import flatten
 from modelica_like.initialize import initialize
@@ -47,6 +49,7 @@ from modelica_like.language import (
     var,
 )
 from modelica_like.language.formula import parse_formula
+from modelica_like.report.run import notices
 from modelica_like.structure import reduce
 
 HERE = Path(__file__)
@@ -104,6 +107,19 @@ class Typo(Component):
         yield self.x + self.x**5 == 2  # typo two
 
 
+class Turning(Component):
+    x: Variable = var("1", "height")
+    T: Parameter = param("s", "time", default=1.0)
+    turn: Parameter = param("1", "height at which it turns", default=0.5)
+    mode = Mode("rising", "falling")
+
+    def equations(self) -> Equations:
+        yield self.T * der(self.x) == self.mode.choose(rising=1, falling=-1)
+
+    def events(self) -> Events:
+        yield self.mode.go("rising", "falling", when=self.x > self.turn)
+
+
 class Relay(Component):
     x: Variable = var("1", "error")
     T: Parameter = param("s", "time", default=1.0)
@@ -115,6 +131,21 @@ class Relay(Component):
     def events(self) -> Events:
         yield self.state.go("up", "down", when=self.x > 0)  # relay up
         yield self.state.go("down", "up", when=self.x < 0)  # relay down
+
+
+class Alarm(Component):
+    x: Variable = var("1", "rises", default=0.0)
+    x_max: Parameter = param("1", "limit", default=1.5)
+    T: Parameter = param("s", "time", default=1.0)
+    bell: str = "x_max"
+    alarm = Mode("quiet", "ringing")
+
+    def equations(self) -> Equations:
+        yield self.T * der(self.x) == 1
+
+    def events(self) -> Events:
+        notice = f"exceeds {{{self.bell}}}"
+        yield self.alarm.go("quiet", "ringing", when=self.x > self.x_max, notice=notice)  # alarm
 
 
 class Blow(Component):
@@ -206,6 +237,19 @@ def in_parallel() -> Assembly:
     return Assembly("drive", parts=parts, series={"a": ["rotor", "one", "load"], "b": ["rotor", "two", "load"]})
 
 
+def overrun() -> Assembly:
+    """A freewheel between a shaft that a source holds still and the housing."""
+    parts: dict[str, Component] = {"engine": ConstantSpeed(w_fixed=0.0), "wheel": Freewheel(), "wall": Fixed()}
+    return Assembly("drive", parts=parts, series={"shaft": list(parts)})
+
+
+def century():
+    """A run so long that the rates of the powers exceed what the integrator can begin with."""
+    shunt = load(HERE.parents[2] / "examples" / "dc_machines" / "shunt.toml")
+    shunt.set("load.duration", "1e8 s")
+    return simulate(shunt, "1e8 s")
+
+
 CASES: dict[str, tuple[type[ModelicaLikeError], Callable[[], object], str]] = {}
 
 
@@ -224,7 +268,7 @@ def expand(text: str) -> str:
             1 + next(k for k, line in enumerate(lines) if line.strip().endswith(end) or (name and line.strip() == end))
         )
 
-    return re.sub(r"\{([a-z ]+|[a-z]+\.py:[^{}]+)\}", number, text)
+    return re.sub(r"\{([a-z ]+|[a-z_]+\.py:[^{}]+)\}", number, text)
 
 
 # -- wiring ----------------------------------------------------------------------------------------------------------
@@ -480,6 +524,32 @@ The Jacobian is singular at t = 0 s in block 1 (one.tau, two.tau).
 one and two stick: where they hold the same motion, their torque split is undetermined.
 Make one compliant, or let one start open.""",
 )
+case(
+    errors.SingularAtStart,
+    "a freewheel holds what a source prescribes",
+    lambda: initialize(build(overrun())),
+    """\
+The Jacobian is singular at t = 0 s in block 1 (wheel.tau).
+  in one_way.py:{one_way.py:yield self.mode.choose(overrunning=self.tau, locked=der(self.w_rel)) == 0} \
+`yield self.mode.choose(overrunning=self.tau, locked=der(self.w_rel)) == 0`
+wheel holds a motion that is prescribed by engine: no torque can stop it.
+Let a torque drive it instead, or put a spring or clutch between.""",
+)
+
+case(
+    errors.NetlistError,
+    "a structural field has another type",
+    lambda: ClutchActuator(t12=0.1, t2=0.1).set("exponential", "yes"),
+    "ClutchActuator.exponential = 'yes' must be true or false.",
+)
+case(
+    errors.LanguageError,
+    "a notice names what is no parameter",
+    lambda: flatten(Alarm(bell="xmax")),
+    """\
+Alarm: the notice of an event names xmax, which is no parameter; did you mean 'x_max'?
+  in test_messages.py:{alarm} `yield self.alarm.go("quiet", "ringing", when=self.x > self.x_max, notice=notice)`""",
+)
 
 # -- run -------------------------------------------------------------------------------------------------------------
 
@@ -504,6 +574,24 @@ x changes fastest relative to its tolerance.
 Look for a stiff spring, a vanishing mass or a speed without bound; then try other tolerances.""",
 )
 case(
+    errors.StepFailed,
+    "energies cannot be integrated",
+    lambda: century().energy(),
+    """\
+The powers cannot be integrated from t = 0 s to 1e+08 s.
+Energies ask for more precision than the run itself.
+Leave the energy balance out (--no-energy), or look at a shorter time.""",
+)
+case(
+    errors.NoGradient,
+    "another mode sequence than that of a simulation function",
+    lambda: simulation_function(Turning(x=0.0), ["turn"], ["x"], until=1.0).at([2.0]),
+    """\
+Turning has another mode sequence at these parameter values: as mode change 1, 'mode: rising → falling' is missing.
+A function with a fixed mode sequence has derivatives only as long as the sequence stays.
+Bound the parameters, begin elsewhere, or allow it with any_sequence=True.""",
+)
+case(
     errors.MissingExtra,
     "an optional package is not installed",
     lambda: without("pandas"),
@@ -517,11 +605,19 @@ def test_a_high_index_is_a_notice():
     ]
 
 
+def test_what_an_event_has_to_say():
+    run = simulate(Alarm(), 2.0)
+    assert notices(run) == ["At 1.5 s Alarm exceeds 1.5."]
+
+
 def test_every_error_has_a_snapshot():
-    kinds = {kind for kind, _, _ in CASES.values()}
+    """Here, or in a neighbouring file, which names the error in a test and not only where it imports it."""
     bases = {errors.ModelicaLikeError, errors.SolveError}  # never raised themselves
     every = {kind for kind in vars(errors).values() if isinstance(kind, type) and issubclass(kind, ModelicaLikeError)}
-    assert every - kinds - bases == set()
+    elsewhere = "".join(file.read_text() for file in HERE.parent.glob("test_*.py") if file != HERE)
+    told = {kind for kind, _, _ in CASES.values()}
+    told |= {kind for kind in every if re.search(rf"(\(|raises\(|\(errors\.)\s*{kind.__name__}\b", elsewhere)}
+    assert every - told - bases == set()
 
 
 @pytest.mark.parametrize("name", CASES)

@@ -1,0 +1,239 @@
+"""Calibration: parameters from measurements, by least squares with exact gradients."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from modelica_like.analyse.measurements import Measurement, Numbers, OperatingPoints, Trajectories
+from modelica_like.compile.compiled import CompiledDae
+from modelica_like.errors import (
+    CalibrationFailed,
+    InitializationError,
+    MissingExtra,
+    SolveError,
+    UnknownName,
+    ValueOutOfRange,
+)
+from modelica_like.simulation import Model, build
+from modelica_like.units import coherent, to_si
+
+__all__ = ["Calibration", "Numbers", "OperatingPoints", "Trajectories", "calibrate"]
+
+Matrix = np.ndarray[Any, np.dtype[np.float64]]
+_RANK = 1e-8
+"""Relative size of a singular value below which a combination of parameters does not show in the data."""
+_CONFIDENCE = 0.95
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """Parameters that fit measurements best.
+
+    Attributes:
+        model: the compiled model with the parameters found.
+        names: paths of the parameters.
+        values: their values in SI units, shape (parameters,).
+        units: their coherent SI units.
+        residuals: deviations of the model, each divided by the uncertainty of its measurement, shape (numbers,).
+        labels: what each residual belongs to.
+        covariance: of the values, shape (parameters, parameters), scaled to the scatter of the residuals (where there
+            are no more numbers than parameters, by the stated uncertainties); nan for what the data do not determine.
+        rank: number of combinations of parameters that the data determine.
+        undetermined: combinations that they do not, as weights of relative changes, by parameter.
+        at_bounds: parameters that stopped at a bound.
+        starts: sum of squares reached from each start.
+    """
+
+    model: CompiledDae = field(repr=False)
+    names: tuple[str, ...]
+    values: Matrix
+    units: tuple[str, ...]
+    residuals: Matrix = field(repr=False)
+    labels: tuple[str, ...] = field(repr=False)
+    covariance: Matrix = field(repr=False)
+    rank: int
+    undetermined: tuple[dict[str, float], ...]
+    at_bounds: tuple[str, ...]
+    starts: tuple[float, ...] = field(repr=False)
+
+    def __getitem__(self, name: str) -> float:
+        if name not in self.names:
+            raise UnknownName(f"'{name}' was not calibrated: {', '.join(self.names)}.")
+        return float(self.values[self.names.index(name)])
+
+    @property
+    def identifiable(self) -> bool:
+        """Whether the data determine all parameters."""
+        return self.rank == len(self.names)
+
+    @property
+    def cost(self) -> float:
+        """Half the sum of squares of the residuals."""
+        return 0.5 * float(self.residuals @ self.residuals)
+
+    @property
+    def confidence(self) -> Matrix:
+        """Half widths of the 95 % intervals of the values (Student's t), shape (parameters,)."""
+        from scipy.stats import t
+
+        freedom = max(len(self.residuals) - self.rank, 1)
+        return np.sqrt(np.diag(self.covariance)) * float(t.ppf(0.5 + _CONFIDENCE / 2, freedom))
+
+    @property
+    def correlation(self) -> Matrix:
+        """Correlations of the values, shape (parameters, parameters)."""
+        size = np.sqrt(np.diag(self.covariance))
+        return self.covariance / np.outer(size, size)
+
+    def __str__(self) -> str:
+        width = max(map(len, self.names))
+        lines = [f"Calibration of {self.model.name}: {len(self.residuals)} numbers, {len(self.names)} parameters"]
+        for name, value, unit, half in zip(self.names, self.values, self.units, self.confidence, strict=True):
+            spread = f"± {half:.2g}" if np.isfinite(half) else "not determined"
+            note = "  (at its bound)" if name in self.at_bounds else ""
+            lines.append(f"  {name:{width}}  {value:.6g} {spread} {unit}{note}".rstrip())
+        for combination in self.undetermined:
+            parts = ", ".join(f"{name} {100 * weight:+.0f} %" for name, weight in combination.items())
+            lines.append(f"  The data do not tell this change: {parts}.")
+        worst = int(np.argmax(np.abs(self.residuals)))
+        lines.append(f"  largest residual {self.residuals[worst]:+.3g} of its uncertainty: {self.labels[worst]}")
+        return "\n".join(lines)
+
+
+def calibrate(
+    drive: Model, data: Sequence[Measurement] | Measurement, parameters: Mapping[str, tuple[Any, Any]], *,
+    guess: Mapping[str, Any] | None = None, starts: int = 1, seed: int = 0,
+) -> Calibration:  # fmt: skip
+    """Find the parameters with which a drive fits measurements best, in the sense of weighted least squares.
+
+    Residuals are deviations over the uncertainties that the data state; gradients are exact.
+
+    Args:
+        drive: a component, a netlist file or a compiled model.
+        data: measurements: `OperatingPoints`, `Trajectories`, `Numbers`.
+        parameters: path of each parameter with its lower and upper bound.
+        guess: where to begin; by default the values of the model, moved into the bounds.
+        starts: number of starts: after the first, from a Latin hypercube between the bounds. The best result counts.
+        seed: of those.
+
+    Raises:
+        UnknownName: a name is not known.
+        ValueOutOfRange: there are no data, or bounds are not in order.
+        CalibrationFailed: the model could not be computed from any start.
+        MissingExtra: scipy is not installed.
+    """
+    model = build(drive, free=parameters)
+    measured = [data] if isinstance(data, Measurement) else list(data)
+    if not measured or not parameters:
+        raise ValueOutOfRange("A calibration needs data and at least one parameter.")
+    problem = _Problem(model, measured, parameters)
+    begins = problem.starts(guess or {}, starts, seed)
+    found: list[Any] = []
+    failures: list[InitializationError | SolveError] = []
+    for begin in begins:
+        try:
+            found.append(problem.solve(begin))
+        except (InitializationError, SolveError) as error:
+            failures.append(error)
+    if not found:
+        raise CalibrationFailed(
+            f"{model.name} could not be calibrated: {failures[-1].what}", where=failures[-1].where,
+            advice="Give a guess with which the model can be computed, or narrower bounds.",
+        )  # fmt: skip
+    best = min(found, key=lambda one: one.cost)
+    return problem.result(best, tuple(2 * one.cost for one in found))
+
+
+class _Problem:
+    """Residuals and their Jacobian in values scaled by the bounds."""
+
+    def __init__(
+        self, model: CompiledDae, data: Sequence[Measurement], parameters: Mapping[str, tuple[Any, Any]]
+    ) -> None:
+        self.model, self.data, self.names = model, data, tuple(parameters)
+        units = {one.path: coherent(one.unit) for one in model.flat_parameters}
+        for name in self.names:
+            # Tells what is wrong with a name.
+            model.with_parameters({name: parameters[name][0]})
+        self.units = tuple(str(units[name]) for name in self.names)
+        bounds = np.array([[to_si(v, units[name], name) for v in parameters[name]] for name in self.names])
+        self.low, self.high = bounds.T
+        for name, low, high in zip(self.names, self.low, self.high, strict=True):
+            if not low < high:
+                raise ValueOutOfRange(f"{name}: the lower bound {low:g} is not below the upper bound {high:g}.")
+        self.span = self.high - self.low
+        self._at: tuple[bytes, Matrix, Matrix] | None = None
+
+    def starts(self, guess: Mapping[str, Any], count: int, seed: int) -> list[Matrix]:
+        """Return starts in [0, 1]."""
+        model = self.model.with_parameters(dict(guess))
+        first = np.array([model.p[model.parameter_position[name]] for name in self.names])
+        begins = [np.clip((first - self.low) / self.span, 0.0, 1.0)]
+        if count > 1:
+            from modelica_like.analyse.plan import LatinHypercube
+
+            begins += list(LatinHypercube(count - 1, seed).unit_cube(len(self.names)))
+        return begins
+
+    def solve(self, begin: Matrix) -> Any:
+        """Run the least-squares solver from one start."""
+        try:
+            from scipy.optimize import least_squares
+        except ImportError:
+            raise MissingExtra(
+                "scipy is not installed.", advice='Install it with: pip install "modelica-like[analyse]"'
+            ) from None
+        slopes: Any = lambda q: self.evaluate(q)[1]  # noqa: E731 - scipy's stubs know names only
+        return least_squares(
+            lambda q: self.evaluate(q)[0], begin, slopes, bounds=(0.0, 1.0), x_scale="jac",
+            ftol=1e-14, xtol=1e-12, gtol=1e-12,
+        )  # fmt: skip
+
+    def evaluate(self, q: Matrix) -> tuple[Matrix, Matrix]:
+        """Return residuals and Jacobian; both are asked for at the same point."""
+        key = q.tobytes()
+        if self._at is None or self._at[0] != key:
+            model = self.at(q)
+            parts = [one.residuals(model, self.names) for one in self.data]
+            residuals = np.concatenate([r for r, _ in parts])
+            slopes = np.concatenate([j for _, j in parts]) * self.span
+            self._at = key, residuals, slopes
+        return self._at[1], self._at[2]
+
+    def at(self, q: Matrix) -> CompiledDae:
+        values = self.low + self.span * q
+        return self.model.with_parameters(dict(zip(self.names, map(float, values), strict=True)))
+
+    def result(self, found: Any, costs: tuple[float, ...]) -> Calibration:
+        """Work out covariance and rank at the solution."""
+        residuals, slopes = self.evaluate(found.x)
+        values = self.low + self.span * found.x
+        sizes = np.where(values == 0.0, self.span, np.abs(values))
+        relative = slopes / self.span * sizes
+        _, singular, right = np.linalg.svd(relative, full_matrices=True)
+        padded = np.concatenate([singular, np.zeros(len(self.names) - len(singular))])
+        known = padded > _RANK * padded.max(initial=1e-300)
+        covariance = self._covariance(right, padded, known, residuals, sizes)
+        lost = tuple(
+            {name: float(w) for name, w in zip(self.names, row, strict=True) if abs(w) > 1e-3} for row in right[~known]
+        )
+        edges = tuple(name for name, q in zip(self.names, found.x, strict=True) if q <= 1e-9 or q >= 1 - 1e-9)
+        labels = tuple(label for one in self.data for label in one.labels())
+        return Calibration(
+            self.at(found.x), self.names, values, self.units, residuals, labels, covariance, int(known.sum()), lost,
+            edges, costs,
+        )  # fmt: skip
+
+    def _covariance(self, right: Matrix, singular: Matrix, known: Any, residuals: Matrix, sizes: Matrix) -> Matrix:
+        rank = int(known.sum())
+        freedom = len(residuals) - rank
+        # As many numbers as parameters: there is no scatter to judge by but the stated uncertainties.
+        scatter = float(residuals @ residuals) / freedom if freedom > 0 else 1.0
+        covariance = (right[known].T / singular[known] ** 2) @ right[known] * scatter
+        touched = np.any(np.abs(right[~known]) > 1e-3, axis=0)
+        covariance[touched, :] = covariance[:, touched] = np.nan
+        return covariance * np.outer(sizes, sizes)

@@ -1,0 +1,94 @@
+"""A file in which a sweep keeps what is done, so that it goes on where it was stopped."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from modelica_like.analyse.plan import Plan
+from modelica_like.analyse.workers import Chunk, Done, Job
+from modelica_like.errors import CheckpointMismatch, MissingExtra
+
+
+class Checkpoint:
+    """Results of a sweep as arrays of a Zarr folder, one chunk of the arrays for each chunk of runs.
+
+    A chunk counts as done only once everything else of it is written, so a sweep that is stopped while it writes does
+    that chunk again.
+
+    Args:
+        path: the folder; made if it does not exist.
+        job: what the runs have in common.
+        plan: the points.
+        size: runs in a chunk.
+
+    Raises:
+        CheckpointMismatch: the folder belongs to another sweep.
+        MissingExtra: zarr is not installed.
+    """
+
+    def __init__(self, path: str | Path, job: Job, plan: Plan, size: int) -> None:
+        zarr = _zarr()
+        self.path = Path(path)
+        key = _fingerprint(job, plan, size)
+        if (self.path / "zarr.json").exists():
+            self._group = zarr.open_group(self.path, mode="r+")
+            if self._group.attrs.get("sweep") != key:
+                raise CheckpointMismatch(
+                    f"{self.path.name} holds another sweep: the model, its values, the points or the outputs differ.",
+                    advice="Give another file, or remove this one to begin anew.",
+                )
+        elif self.path.exists() and (not self.path.is_dir() or any(self.path.iterdir())):
+            raise CheckpointMismatch(f"{self.path.name} exists and is not the checkpoint of a sweep.")
+        else:
+            self._group = zarr.open_group(self.path, mode="w")
+            count, width = len(plan), len(job.outputs)
+            self._group.create_array(
+                "values", shape=(count, width), chunks=(size, width), dtype="f8", fill_value=np.nan
+            )
+            chunks = -(-count // size)
+            self._group.create_array("done", shape=(chunks,), chunks=(1,), dtype="bool", fill_value=False)
+            self._group.attrs["sweep"] = key
+        self._size = size
+
+    def left(self, chunks: list[Chunk]) -> list[Chunk]:
+        """Return the chunks that are not done."""
+        done = self._group["done"][:]
+        return [chunk for chunk in chunks if not done[chunk[0] // self._size]]
+
+    def keep(self, done: Done) -> None:
+        """Write the results of a chunk."""
+        first, values, failures = done
+        self._group["values"][first : first + len(values)] = np.array(values)
+        number = first // self._size
+        told = {str(first + k): text for k, text in enumerate(failures) if text}
+        (self.path / f"failures-{number}.json").write_text(json.dumps(told), encoding="utf-8")
+        self._group["done"][number] = True
+
+    def results(self) -> tuple[Any, dict[int, str]]:
+        """Return values, shape (runs, outputs), and the failures by run."""
+        failures: dict[int, str] = {}
+        for file in sorted(self.path.glob("failures-*.json")):
+            failures.update({int(k): text for k, text in json.loads(file.read_text(encoding="utf-8")).items()})
+        return self._group["values"][:], failures
+
+
+def _fingerprint(job: Job, plan: Plan, size: int) -> str:
+    text = json.dumps([job.names, job.outputs, sorted(map(str, job.settings.items())), size])
+    return hashlib.sha256(
+        job.identity.encode() + text.encode() + np.ascontiguousarray(plan.points).tobytes()
+    ).hexdigest()
+
+
+def _zarr() -> Any:
+    try:
+        import zarr
+    except ImportError:
+        raise MissingExtra(
+            "zarr is not installed.", advice='Install it with: pip install "modelica-like[analyse]"'
+        ) from None
+    return zarr

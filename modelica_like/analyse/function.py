@@ -1,0 +1,239 @@
+"""A whole simulation as a differentiable CasADi function, for a user's own optimisation problem."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from modelica_like.analyse.sensitivity import Sensitivities, sensitivities
+from modelica_like.compile.buffers import Vector
+from modelica_like.errors import LanguageError, ModelicaLikeError, NoGradient
+from modelica_like.initialize import StartKind
+from modelica_like.simulation import Model, build, simulate
+from modelica_like.solve.options import Options
+from modelica_like.solve.recorder import Event
+from modelica_like.solve.solution import Solution
+
+_TOGETHER = 1e-9
+
+
+class SimulationFunction(ca.Callback):
+    """y = f(p): simulates with all events; its Jacobian is that of the replay, exact through the events.
+
+    Second derivatives are central differences of the exact Jacobian. The object must live as long as what is built
+    from it. CasADi tells an error of the simulation in its own words; `refusal` has it as it was.
+
+    Attributes:
+        inputs: paths of the parameters p.
+        outputs: names of the outputs y, as in `sensitivities`.
+        start_values: values of the parameters in the model, a starting point.
+        runs: number of simulations so far.
+        refusal: why the last evaluation failed, if it did.
+    """
+
+    def __init__(
+        self, drive: Model, inputs: Sequence[str], outputs: Sequence[str], run: Mapping[str, Any], *,
+        precision: float, any_sequence: bool, nan_where_refused: bool,
+    ) -> None:  # fmt: skip
+        super().__init__()
+        self.inputs = tuple(inputs)
+        self.outputs = tuple(outputs)
+        self.runs = 0
+        self.refusal: ModelicaLikeError | None = None
+        self._model = build(drive)
+        self._run = dict(run)
+        self._precision = precision
+        self._nan_where_refused = nan_where_refused
+        self._last: tuple[bytes, Sensitivities] | None = None
+        self._sequence: list[tuple[str, str, str]] | None = None
+        solution = simulate(self._model, **self._run)
+        first = self._differentiate(solution)
+        self.start_values = np.array([one.value for one in first.parameters])
+        self._sequence = None if any_sequence else mode_sequence(solution.events)
+        self._jacobian = _Jacobian(self)
+        self.construct("simulation", {})
+
+    def _differentiate(self, solution: Solution) -> Sensitivities:
+        return sensitivities(
+            solution, self.outputs, self.inputs, start=self._run.get("start"), precision=self._precision
+        )
+
+    def at(self, p: Vector | Sequence[float]) -> Sensitivities:
+        """Simulate at parameter values and return outputs with derivatives; kept until the next values.
+
+        Raises:
+            NoGradient: the mode sequence is not the one of the start values, or a derivative does not exist.
+            ModelicaLikeError: the simulation fails.
+        """
+        values = np.asarray(p, float).ravel()
+        key = values.tobytes()
+        if self._last is None or self._last[0] != key:
+            given = {**(self._run.get("parameters") or {}), **dict(zip(self.inputs, map(float, values), strict=True))}
+            self.runs += 1
+            solution = simulate(self._model, **{**self._run, "parameters": given})
+            self._check_sequence(solution)
+            self._last = key, self._differentiate(solution)
+        return self._last[1]
+
+    def _check_sequence(self, solution: Solution) -> None:
+        if self._sequence is None:
+            return
+        sequence = mode_sequence(solution.events)
+        if sequence != self._sequence:
+            raise _changed(self._sequence, sequence, solution)
+
+    def get_n_in(self) -> int:
+        """Return the number of arguments."""
+        return 1
+
+    def get_n_out(self) -> int:
+        """Return the number of results."""
+        return 1
+
+    def get_name_in(self, i: int) -> str:
+        """Return the name of an argument."""
+        return "p"
+
+    def get_name_out(self, i: int) -> str:
+        """Return the name of a result."""
+        return "y"
+
+    def get_sparsity_in(self, i: int) -> Any:
+        """Return the shape of an argument."""
+        return ca.Sparsity.dense(len(self.inputs))
+
+    def get_sparsity_out(self, i: int) -> Any:
+        """Return the shape of a result."""
+        return ca.Sparsity.dense(len(self.outputs))
+
+    def attempt(self, p: Any) -> Sensitivities | None:
+        """Simulate for CasADi; what goes wrong is kept in `refusal`, and raised unless nan is wanted."""
+        self.refusal = None
+        try:
+            return self.at(np.array(p))
+        except ModelicaLikeError as error:
+            self.refusal = error
+            if self._nan_where_refused:
+                return None
+            raise
+
+    def eval(self, arg: Any) -> list[Any]:
+        """Simulate."""
+        made = self.attempt(arg[0])
+        return [ca.DM([np.nan] * len(self.outputs) if made is None else [one.value for one in made.outputs])]
+
+    def has_jacobian(self) -> bool:
+        """Tell CasADi that the derivatives are known."""
+        return True
+
+    def get_jacobian(self, name: str, inames: Any, onames: Any, opts: Any) -> Any:
+        """Return the function of the derivatives."""
+        return self._jacobian
+
+
+class _Jacobian(ca.Callback):
+    """dy/dp of a simulation."""
+
+    def __init__(self, simulation: SimulationFunction) -> None:
+        super().__init__()
+        self._simulation = simulation
+        self._size = len(simulation.outputs), len(simulation.inputs)
+        self.construct("jacobian", {"enable_fd": True, "fd_method": "central"})
+
+    def get_n_in(self) -> int:
+        return 2
+
+    def get_n_out(self) -> int:
+        return 1
+
+    def get_name_in(self, i: int) -> str:
+        return ("p", "out_y")[i]
+
+    def get_name_out(self, i: int) -> str:
+        return "jac_y_p"
+
+    def get_sparsity_in(self, i: int) -> Any:
+        return ca.Sparsity.dense(self._size[1]) if i == 0 else ca.Sparsity(self._size[0], 1)
+
+    def get_sparsity_out(self, i: int) -> Any:
+        return ca.Sparsity.dense(*self._size)
+
+    def eval(self, arg: Any) -> list[Any]:
+        made = self._simulation.attempt(arg[0])
+        return [ca.DM(np.full(self._size, np.nan) if made is None else made.derivatives)]
+
+
+def simulation_function(
+    drive: Model, inputs: Sequence[str], outputs: Sequence[str], *, until: float | str | None = None,
+    parameters: Mapping[str, Any] | None = None, start: StartKind | None = None, options: Options | None = None,
+    precision: float = 1e-8, any_sequence: bool = False, nan_where_refused: bool = False,
+) -> SimulationFunction:  # fmt: skip
+    """Return a simulation as a CasADi function of parameters.
+
+    Args:
+        drive: a component, a netlist file, or a compiled model.
+        inputs: parameters and inputs of the model, in SI units.
+        outputs: as in `sensitivities`, without series.
+        until: end time, as in `simulate`.
+        parameters: other values of parameters, as in `simulate`.
+        start: kind of start, as in `simulate`.
+        options: as in `simulate`.
+        precision: as in `sensitivities`.
+        any_sequence: go on where the mode sequence is another one than at the start values. Outputs are then still
+            differentiable almost everywhere, but not at the change.
+        nan_where_refused: where the simulation fails or its mode sequence is another one, return nan instead of
+            raising: an optimiser then tries a shorter step. `refusal` tells why.
+
+    Raises:
+        NoGradient: at the start values a derivative does not exist.
+        LanguageError: a series is no output of a function.
+        ModelicaLikeError: the model or a name is wrong, or the simulation is not possible.
+    """
+    series = [name for name in outputs if name.replace(" ", "").startswith("series(")]
+    if series:
+        raise LanguageError(
+            f"{series[0]} is a trajectory; the outputs of a simulation function are numbers.",
+            advice="Ask for single times: at(table.s, 0.3 s).",
+        )
+    run = {"until": until, "parameters": parameters, "start": start, "options": options}
+    return SimulationFunction(
+        drive, inputs, outputs, run, precision=precision, any_sequence=any_sequence, nan_where_refused=nan_where_refused
+    )
+
+
+def mode_sequence(events: Sequence[Event]) -> list[tuple[str, str, str]]:
+    """Return mode, name before and name after of all mode changes; those at one instant in alphabetical order."""
+    ordered: list[tuple[str, str, str]] = []
+    group: list[Event] = []
+    for event in events:
+        if group and event.time - group[0].time > _TOGETHER * max(1.0, abs(event.time)):
+            ordered += _by_mode(group)
+            group = []
+        group.append(event)
+    return ordered + _by_mode(group)
+
+
+def _by_mode(events: list[Event]) -> list[tuple[str, str, str]]:
+    return [(e.mode, e.before, e.after) for e in sorted(events, key=lambda event: event.mode)]
+
+
+def _changed(expected: list[tuple[str, str, str]], found: list[tuple[str, str, str]], solution: Solution) -> NoGradient:
+    differing = (k for k, (a, b) in enumerate(zip(expected, found, strict=False)) if a != b)
+    same = next(differing, min(len(expected), len(found)))
+    now, before = (_told(sequence[same : same + 1]) for sequence in (found, expected))
+    what = f"{now} happens besides" if now else f"{before} is missing"
+    if now and before:
+        what = f"{now} happens instead of {before}"
+    return NoGradient(
+        f"{solution.model.name} has another mode sequence at these parameter values: "
+        f"as mode change {same + 1}, {what}.",
+        why="A function with a fixed mode sequence has derivatives only as long as the sequence stays.",
+        advice="Bound the parameters, begin elsewhere, or allow it with any_sequence=True.",
+    )
+
+
+def _told(changes: list[tuple[str, str, str]]) -> str:
+    return "".join(f"'{mode}: {before} → {after}'" for mode, before, after in changes)

@@ -1,0 +1,159 @@
+"""Motions that modes hold: the plates of a clutch that stick move as one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from modelica_like.compile.compiled import CompiledDae, Vector
+from modelica_like.initialize import Point, call, variable_slopes
+
+Matrix = np.ndarray[Any, np.dtype[np.float64]]
+_ZERO = 1e-9
+"""Relative size below which a speed or a slope counts as zero."""
+
+
+@dataclass(frozen=True)
+class Motions:
+    """The motions that are left where modes hold some.
+
+    Attributes:
+        keep: positions of the states that can move on their own.
+        shape: deviations of all states by those that are kept, shape (states, kept).
+    """
+
+    keep: list[int]
+    shape: Matrix
+
+    def without(self, lines: Matrix) -> Motions:
+        """Hold linear combinations of the kept states at zero deviation, shape (combinations, kept)."""
+        pivots: list[int] = []
+        lines = lines.copy()
+        for row in range(len(lines)):
+            pivot = int(np.argmax(np.abs(lines[row])))
+            lines[row] /= lines[row, pivot]
+            for other in range(len(lines)):
+                if other != row:
+                    lines[other] -= lines[other, pivot] * lines[row]
+            pivots.append(pivot)
+        free = [n for n in range(len(self.keep)) if n not in pivots]
+        follow = np.zeros((len(self.keep), len(free)))
+        follow[free, range(len(free))] = 1.0
+        follow[pivots] = -lines[:, free]
+        return Motions([self.keep[n] for n in free], self.shape @ follow)
+
+
+def free_motions(model: CompiledDae, point: Point, a: Matrix) -> Motions:
+    """Return the motions that the present modes leave free.
+
+    A mode holds what stands still in it whatever states, inputs, parameters and time are, but would move in another
+    mode of the same component: the slip speed of a clutch that is stuck, and with the speed the slip angle.
+
+    Args:
+        model: the compiled model.
+        point: where it is linearised.
+        a: slopes of the rates by the states there, shape (states, states).
+    """
+    count = len(model.states)
+    motions = Motions(list(range(count)), np.eye(count))
+    speeds = _independent(list(_held_speeds(model, point)))
+    if not len(speeds):
+        return motions
+    motions = motions.without(speeds)
+    angles = _held_angles(model, point, a, motions)
+    return motions.without(angles) if len(angles) else motions
+
+
+def _held_speeds(model: CompiledDae, point: Point) -> Iterator[Vector]:
+    """Slopes (by the states) of variables that are zero and stay so because of a mode of their component."""
+    values = call(model, model.variables, point)
+    for mode, one in enumerate(model.flat_discretes):
+        owner = one.path.rpartition(".")[0]
+        own = [
+            k
+            for k, variable in enumerate(model.flat_variables)
+            if one.names and variable.path.rpartition(".")[0] == owner and abs(values[k]) <= _ZERO * variable.nominal
+        ]
+        for slope in variable_slopes(model, point, own) if own else ():
+            if np.any(slope) and _is_held(model, point, slope / np.linalg.norm(slope), mode):
+                yield slope / np.linalg.norm(slope)
+
+
+def _is_held(model: CompiledDae, point: Point, combination: Vector, mode: int) -> bool:
+    """Whether the rate of a combination of states depends on nothing now, but on something in another mode."""
+    others: list[float] = []
+    for number in range(len(model.flat_discretes[mode].names)):
+        other = replace(point, d=point.d.copy())
+        other.d[mode] = number
+        others.append(float(np.abs(_rate_slopes(model, other, combination)).max()))
+    present = float(np.abs(_rate_slopes(model, point, combination)).max())
+    return present <= _ZERO * max((one for one in others if np.isfinite(one)), default=0.0)
+
+
+def _held_angles(model: CompiledDae, point: Point, a: Matrix, motions: Motions) -> Matrix:
+    """Combinations of the kept states whose rates depended only on speeds that are held, shape (combinations, kept)."""
+    gone = [k for k in range(len(model.states)) if k not in set(motions.keep)]
+    rows = [n for n, k in enumerate(motions.keep) if np.any(a[k, gone])]
+    count = len(model.states)
+    units = np.eye(count)[[motions.keep[n] for n in rows]]
+    full = np.array([_rate_slopes(model, point, one) for one in units]).reshape(len(rows), -1)
+    scale = np.abs(full).max(axis=1, keepdims=True, initial=1e-300)
+    by_states = (full[:, :count] / model.nominals) @ motions.shape * model.nominals[motions.keep]
+    left = np.hstack([by_states, full[:, count:]]) / scale
+    still = _null(left.T)
+    # Of what stands still now, that which does so only because the speeds are held.
+    moved = (full / scale).T @ still
+    _, sizes, right = np.linalg.svd(moved, full_matrices=False) if still.size else (None, np.zeros(0), np.zeros((0, 0)))
+    held = still @ right[sizes > _ZERO].T if still.size else np.zeros((len(rows), 0))
+    lines = np.zeros((held.shape[1], len(motions.keep)))
+    lines[:, rows] = (held / scale).T
+    return lines
+
+
+def _null(matrix: Matrix) -> Matrix:
+    """Orthonormal basis of what a matrix maps to zero, as columns."""
+    if not matrix.size:
+        return np.eye(matrix.shape[1])
+    _, sizes, right = np.linalg.svd(matrix)
+    rank = int(np.sum(sizes > _ZERO * sizes.max(initial=1e-300)))
+    return right[rank:].T
+
+
+def _independent(slopes: list[Vector]) -> Matrix:
+    """Drop combinations that follow from those before."""
+    kept: list[Vector] = []
+    for slope in slopes:
+        if np.linalg.matrix_rank(np.array([*kept, slope]), tol=_ZERO) > len(kept):
+            kept.append(slope)
+    return np.array(kept)
+
+
+def _rate_slopes(model: CompiledDae, point: Point, combination: Vector) -> Vector:
+    """Slopes of the rate of a combination of states by [x, u, p, t], times the sizes of those."""
+    if "rate_slopes" not in model._cache:
+        model._cache["rate_slopes"] = _reverse(model)
+    arguments = point.t, point.x, point.z, model.p, model.u, point.d
+    follow = np.zeros(len(model.implicit))
+    if model.implicit:
+        by_z = np.asarray(model._cache["rate_slopes"](*arguments, combination, follow)[0]).ravel()
+        follow = -np.linalg.solve(np.asarray(model.alg_jacobian(*arguments).full()).T, by_z)
+    _, *parts = (np.asarray(one).ravel() for one in model._cache["rate_slopes"](*arguments, combination, follow))
+    sizes = model.nominals, _sizes(model.u), _sizes(model.p), max(1.0, abs(point.t))
+    return np.concatenate([part * size for part, size in zip(parts, sizes, strict=True)])
+
+
+def _reverse(model: CompiledDae) -> ca.Function:
+    symbols = model.arguments
+    arguments = list(symbols.values())
+    rates, residuals = ca.SX.sym("rates", len(model.states)), ca.SX.sym("residuals", len(model.implicit))
+    weighted = ca.dot(rates, model.ode(*arguments)) + ca.dot(residuals, model.alg(*arguments))
+    slopes = [ca.densify(ca.gradient(weighted, symbols[name])) for name in ("z", "x", "u", "p", "t")]
+    return ca.Function("rate_slopes", [*arguments, rates, residuals], slopes)
+
+
+def _sizes(values: Vector) -> Vector:
+    return np.where(values == 0.0, 1.0, np.abs(values))

@@ -1,0 +1,133 @@
+"""Global sensitivity: which parameters an output depends on over their whole ranges."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+
+from modelica_like.analyse.plan import Samples
+from modelica_like.analyse.sweep import sweep
+from modelica_like.errors import MissingExtra, UnknownName, ValueOutOfRange
+from modelica_like.simulation import Model
+
+Kind = Literal["sobol", "morris"]
+_LEVELS = 4
+_CONSTANT = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Importance:
+    """How much each parameter matters for each output.
+
+    Attributes:
+        method: `sobol` or `morris`.
+        parameters: paths.
+        outputs: names.
+        measures: by name, shape (outputs, parameters): Sobol's first-order (`S1`) and total (`ST`) indices, shares of
+            the variance; Morris's mean absolute (`mu_star`) and scatter (`sigma`) of elementary effects, in the unit
+            of the output for the whole range of the parameter. Each with its 95 % half width (`S1_conf`, ...).
+        runs: number of simulations.
+    """
+
+    method: Kind
+    parameters: tuple[str, ...]
+    outputs: tuple[str, ...]
+    measures: dict[str, Any] = field(repr=False)
+    runs: int
+
+    def __getitem__(self, key: tuple[str, str, str]) -> float:
+        """Return a measure: `importance["S1", "table.s", "gear.ratio"]`."""
+        measure, output, parameter = key
+        for name, known in ((measure, self.measures), (output, self.outputs), (parameter, self.parameters)):
+            if name not in known:
+                raise UnknownName(f"There is no '{name}' in this result: {', '.join(known)}.")
+        return float(self.measures[measure][self.outputs.index(output), self.parameters.index(parameter)])
+
+    def __str__(self) -> str:
+        first = next(iter(self.measures))
+        lines = [f"{self.method.capitalize()} analysis of {self.runs} runs"]
+        names = [name for name in self.measures if not name.endswith("_conf")]
+        for row, output in enumerate(self.outputs):
+            lines.append(f"  {output}")
+            for column in np.argsort(-np.abs(self.measures[names[-1] if self.method == "sobol" else first][row])):
+                shown = ", ".join(f"{name} {self.measures[name][row, column]:.4g}" for name in names)
+                lines.append(f"    {self.parameters[column]}: {shown}")
+        return "\n".join(lines)
+
+
+def importance(
+    drive: Model, ranges: Mapping[str, tuple[Any, Any]], outputs: Sequence[str], *, method: Kind = "sobol",
+    samples: int = 256, seed: int = 0, **settings: Any,
+) -> Importance:  # fmt: skip
+    """Find which parameters matter, by the variance they cause (Sobol) or by elementary effects (Morris).
+
+    Args:
+        drive: a component, a netlist file or a compiled model.
+        ranges: path of each parameter with its lower and upper bound; equally likely in between.
+        outputs: as in `sweep`.
+        method: `sobol` (A. Saltelli et al., 2010) takes samples·(parameters + 2) runs, `morris` (M. D. Morris, 1991)
+            samples·(parameters + 1).
+        samples: a power of two for Sobol.
+        seed: of the random numbers.
+        settings: further arguments of `sweep`: processes, scheduler, checkpoint, until, ...
+
+    Raises:
+        UnknownName: a name is not known.
+        ValueOutOfRange: runs failed or gave no number, so that the measures mean nothing.
+        MissingExtra: SALib is not installed.
+    """
+    sample, analyse = _salib(method)
+    problem = {"num_vars": len(ranges), "names": list(ranges), "bounds": [[0.0, 1.0]] * len(ranges)}
+    if method == "sobol":
+        cube = sample.sample(problem, samples, calc_second_order=False, seed=seed)
+    else:
+        cube = sample.sample(problem, samples, num_levels=_LEVELS, seed=seed)
+    results = sweep(drive, ranges, outputs, sampling=Samples(cube), **settings)
+    columns = [results[name].to_numpy() for name in outputs]
+    for name, column in zip(outputs, columns, strict=True):
+        _check_complete(name, column, [str(text) for text in results["failure"].to_numpy()])
+    measures: dict[str, list[Any]] = {}
+    for column in columns:
+        for key, values in _measures(method, analyse, problem, cube, column, seed).items():
+            measures.setdefault(key, []).append(values)
+    return Importance(method, tuple(ranges), tuple(outputs), {k: np.array(v) for k, v in measures.items()}, len(cube))
+
+
+def _measures(method: Kind, analyse: Any, problem: dict[str, Any], cube: Any, column: Any, seed: int) -> dict[str, Any]:
+    wanted = ("S1", "ST", "S1_conf", "ST_conf") if method == "sobol" else ("mu_star", "sigma", "mu_star_conf")
+    if np.ptp(column) <= _CONSTANT * np.abs(column).max():
+        # Nothing depends on anything: what there is to share is rounding.
+        return {key: np.zeros(problem["num_vars"]) for key in wanted}
+    if method == "sobol":
+        found = analyse.analyze(problem, column, calc_second_order=False, seed=seed)
+    else:
+        found = analyse.analyze(problem, cube, column, num_levels=_LEVELS, seed=seed)
+    return {key: np.asarray(found[key], float) for key in wanted}
+
+
+def _check_complete(name: str, column: Any, failures: Sequence[str]) -> None:
+    bad = int(np.sum(~np.isfinite(column)))
+    if bad:
+        why = next((text.splitlines()[0] for text in failures if text), "it does not happen there")
+        raise ValueOutOfRange(
+            f"{name} has no value in {bad} of {len(column)} runs: {why}",
+            advice="Narrow the ranges until all runs succeed.",
+        )
+
+
+def _salib(method: str) -> tuple[Any, Any]:
+    try:
+        from SALib.analyze import morris as analyse_morris
+        from SALib.analyze import sobol as analyse_sobol
+        from SALib.sample import morris as sample_morris
+        from SALib.sample import sobol as sample_sobol
+    except ImportError:
+        raise MissingExtra(
+            "SALib is not installed.", advice='Install it with: pip install "modelica-like[analyse]"'
+        ) from None
+    if method not in ("sobol", "morris"):
+        raise UnknownName(f"There is no method '{method}'. There are sobol and morris.")
+    return (sample_sobol, analyse_sobol) if method == "sobol" else (sample_morris, analyse_morris)

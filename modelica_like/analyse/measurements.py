@@ -1,0 +1,211 @@
+"""Measurements for a calibration: operating points, trajectories, single numbers."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from modelica_like.analyse.sensitivity import sensitivities
+from modelica_like.analyse.sensitivity_outputs import read_output
+from modelica_like.analyse.steady import OperatingPoint, steady, steady_slopes
+from modelica_like.compile.compiled import CompiledDae
+from modelica_like.errors import NetlistError, UnknownName, ValueOutOfRange, did_you_mean
+from modelica_like.units import Unit, coherent, parse_unit, to_si
+
+Matrix = np.ndarray[Any, np.dtype[np.float64]]
+
+
+class Measurement(ABC):
+    """What a model is compared with."""
+
+    @abstractmethod
+    def residuals(self, model: CompiledDae, names: Sequence[str]) -> tuple[Matrix, Matrix]:
+        """Return deviations over uncertainties, and their derivatives by parameters in SI units.
+
+        Args:
+            model: the model with the values to judge.
+            names: parameters.
+
+        Returns:
+            Shapes (numbers,) and (numbers, parameters).
+        """
+
+    @abstractmethod
+    def labels(self) -> list[str]:
+        """Return what each number is."""
+
+
+@dataclass(frozen=True)
+class Numbers(Measurement):
+    """Numbers read off one run, such as a lock-up time.
+
+    Attributes:
+        values: by output, as `sensitivities` names it: numbers in SI units or quantities.
+        uncertainty: by output, in the same units; by default a hundredth of the value.
+        until: end of the run; by default that of the netlist.
+        parameters: values of this run.
+    """
+
+    values: Mapping[str, Any]
+    uncertainty: Mapping[str, Any] = field(default_factory=dict)
+    until: float | str | None = None
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+
+    def residuals(self, model: CompiledDae, names: Sequence[str]) -> tuple[Matrix, Matrix]:
+        """Run the model with its sensitivities."""
+        outputs = [read_output(model, name) for name in self.values]
+        wanted = np.array([to_si(v, o.unit, o.name) for v, o in zip(self.values.values(), outputs, strict=True)])
+        sizes = np.array(
+            [_uncertainty(self.uncertainty, o.name, o.unit, w) for o, w in zip(outputs, wanted, strict=True)]
+        )
+        found = sensitivities(model, list(self.values), names, until=self.until, parameters=self.parameters)
+        now = np.array([one.value for one in found.outputs])
+        return (now - wanted) / sizes, found.derivatives / sizes[:, None]
+
+    def labels(self) -> list[str]:
+        """Return the names of the outputs."""
+        return list(self.values)
+
+
+@dataclass(frozen=True)
+class OperatingPoints(Measurement):
+    """Steady states: a table whose rows set some parameters and measure some variables.
+
+    Attributes:
+        table: columns by name, or a CSV file, a pandas DataFrame or an xarray Dataset with such columns; a name may
+            carry its unit in brackets: `motor.w [rpm]`.
+        given: columns that are set: paths of parameters or inputs. All others are measured variables.
+        uncertainty: by variable, numbers in SI units or quantities; by default a hundredth of the largest value.
+    """
+
+    table: Any
+    given: Sequence[str]
+    uncertainty: Mapping[str, Any] = field(default_factory=dict)
+
+    def residuals(self, model: CompiledDae, names: Sequence[str]) -> tuple[Matrix, Matrix]:
+        """Find the steady state of every row; each begins from the one before."""
+        columns = _in_si(model, read_table(self.table))
+        measured = [name for name in columns if name not in self.given]
+        sizes = np.array([_column_uncertainty(model, self.uncertainty, name, columns[name]) for name in measured])
+        near: OperatingPoint | None = None
+        deviations: list[Matrix] = []
+        slopes: list[Matrix] = []
+        for row in range(len(next(iter(columns.values())))):
+            near = steady(model, parameters={name: columns[name][row] for name in self.given}, near=near)
+            wanted = np.array([columns[name][row] for name in measured])
+            deviations.append((np.array([near[name] for name in measured]) - wanted) / sizes)
+            slopes.append(steady_slopes(near.model, near.point, measured, names) / sizes[:, None])
+        return np.concatenate(deviations), np.concatenate(slopes)
+
+    def labels(self) -> list[str]:
+        """Return variable and row of every number."""
+        columns = read_table(self.table)
+        measured = [name for name, (_, _) in columns.items() if name not in self.given]
+        rows = len(next(iter(columns.values()))[0])
+        return [f"{name} in row {row + 1}" for row in range(rows) for name in measured]
+
+
+@dataclass(frozen=True)
+class Trajectories(Measurement):
+    """Measured curves over time.
+
+    Attributes:
+        table: a column `time` and columns of variables, as in `OperatingPoints`.
+        uncertainty: by variable; by default a hundredth of the largest value.
+        parameters: values of this run.
+    """
+
+    table: Any
+    uncertainty: Mapping[str, Any] = field(default_factory=dict)
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+
+    def residuals(self, model: CompiledDae, names: Sequence[str]) -> tuple[Matrix, Matrix]:
+        """Run the model with the sensitivities of every number."""
+        columns = _in_si(model, read_table(self.table))
+        if "time" not in columns:
+            raise UnknownName("Measured trajectories need a column 'time'.")
+        times = columns.pop("time")
+        sizes = [_column_uncertainty(model, self.uncertainty, name, columns[name]) for name in columns]
+        wanted = [f"at({name}, {float(t)!r})" for name in columns for t in times]
+        end = float(times.max())
+        found = sensitivities(model, wanted, names, until=end, parameters=self.parameters, method="forward")
+        scale = np.repeat(sizes, len(times))
+        now = np.array([one.value for one in found.outputs])
+        return (now - np.concatenate(list(columns.values()))) / scale, found.derivatives / scale[:, None]
+
+    def labels(self) -> list[str]:
+        """Return variable and time of every number."""
+        columns = read_table(self.table)
+        times, unit = columns.pop("time")
+        return [f"{name} at {t:g} {unit or 's'}" for name in columns for t in times]
+
+
+Columns = dict[str, tuple[Any, str]]
+"""Columns by name: numbers and their unit (empty: SI)."""
+
+
+def read_table(table: Any) -> Columns:
+    """Read columns with units from a mapping, a CSV file, a DataFrame or a Dataset.
+
+    Raises:
+        NetlistError: a file is not a table of numbers.
+        ValueOutOfRange: columns differ in length, or there are none.
+    """
+    if isinstance(table, str | Path):
+        table = _csv(Path(table))
+    pairs = [(str(name), table[name]) for name in (getattr(table, "variables", None) or table)]
+    columns: Columns = {}
+    for title, values in pairs:
+        name, _, unit = title.partition("[")
+        own = getattr(values, "attrs", {}).get("units", "")
+        columns[name.strip()] = np.asarray(values, float).ravel(), unit.rstrip("] ") or own
+    lengths = {len(values) for values, _ in columns.values()}
+    if len(lengths) != 1 or 0 in lengths:
+        raise ValueOutOfRange("Measured columns must have the same length, and at least one row.")
+    return columns
+
+
+def _csv(path: Path) -> Mapping[str, Any]:
+    lines = [line for line in path.read_text(encoding="utf-8").splitlines() if line.strip() and line[0] != "#"]
+    titles = [title.strip().strip('"') for title in lines[0].split(",")] if lines else []
+    try:
+        rows = np.array([[float(cell) for cell in line.split(",")] for line in lines[1:]])
+    except ValueError as error:
+        raise NetlistError(f"{path.name} is not a table of numbers: {error}.") from None
+    if rows.ndim != 2 or rows.shape[1] != len(titles):
+        raise NetlistError(f"{path.name}: rows have not as many columns as the title line.")
+    return dict(zip(titles, rows.T, strict=True))
+
+
+def _in_si(model: CompiledDae, columns: Columns) -> dict[str, Matrix]:
+    values: dict[str, Matrix] = {}
+    for name, (numbers, unit) in columns.items():
+        own = parse_unit("s") if name == "time" else _unit(model, name)
+        values[name] = np.array([to_si(f"{n!r} {unit}" if unit else float(n), own, name) for n in map(float, numbers)])
+    return values
+
+
+def _unit(model: CompiledDae, name: str) -> Unit:
+    known = {one.path: one.unit for one in (*model.flat_variables, *model.flat_parameters)}
+    if name not in known:
+        raise UnknownName(f"{model.name} has no variable or parameter '{name}'{did_you_mean(name, known) or '.'}")
+    return coherent(known[name])
+
+
+def _column_uncertainty(model: CompiledDae, stated: Mapping[str, Any], name: str, values: Iterable[float]) -> float:
+    return _uncertainty(stated, name, _unit(model, name), float(np.max(np.abs(np.asarray(values)))))
+
+
+def _uncertainty(stated: Mapping[str, Any], name: str, unit: Unit, value: float) -> float:
+    size = to_si(stated[name], unit, name) if name in stated else 0.01 * abs(value)
+    if not size > 0:
+        raise ValueOutOfRange(
+            f"{name}: the uncertainty of a measurement must be positive, not {size:g}.",
+            advice=f'State it, e.g. uncertainty={{"{name}": …}}.',
+        )
+    return size

@@ -1,0 +1,43 @@
+"""Values of a parameter as a command line gives them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from modelica_like.errors import ValueOutOfRange
+
+
+def read_assignment(text: str) -> tuple[str, str]:
+    """Read `motor.w=4000 rpm`.
+
+    Raises:
+        ValueOutOfRange: there is no equals sign.
+    """
+    name, equals, value = text.partition("=")
+    if not equals or not name.strip() or not value.strip():
+        raise ValueOutOfRange(f"'{text}' is not NAME=VALUE.", advice="Write for example 'motor.w=4000 rpm'.")
+    return name.strip(), value.strip()
+
+
+def read_range(text: str) -> tuple[str, list[Any]]:
+    """Read `load=0:0.25:26 N.m` (first, last, count) or `load=0,0.1,0.2 N.m`; the unit counts for all.
+
+    Raises:
+        ValueOutOfRange: it is neither.
+    """
+    name, values = read_assignment(text)
+    numbers, _, unit = values.partition(" ")
+    try:
+        if numbers.count(":") == 2:
+            first, last, count = numbers.split(":")
+            given = np.linspace(float(first), float(last), int(count)).tolist()
+        else:
+            given = [float(one) for one in numbers.split(",")]
+    except ValueError:
+        raise ValueOutOfRange(
+            f"'{text}': '{values}' is neither FIRST:LAST:COUNT nor a list of numbers.",
+            advice="Write for example 'load=0:0.25:26 N.m' or 'load=0,0.1,0.2 N.m'.",
+        ) from None
+    return name, [f"{one!r} {unit}" if unit.strip() else one for one in given]

@@ -1,0 +1,59 @@
+"""Numbers read off a run: final values, peaks, energies, times of mode changes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from modelica_like.analyse.sensitivity_outputs import Output
+from modelica_like.errors import UnknownName
+from modelica_like.solve.solution import Solution
+
+
+def read(solution: Solution, output: Output) -> float:
+    """Read one number off a run; peaks and integrals are those of its results.
+
+    Raises:
+        UnknownName: a mode change does not happen.
+    """
+    owner, _, last = output.path.rpartition(".")
+    match output.kind:
+        case "end":
+            return solution.final[output.path]
+        case "at":
+            return solution.at(output.moment)[output.path]
+        case "max":
+            return float(np.max(solution[output.path]))
+        case "min":
+            return float(np.min(solution[output.path]))
+        case "time":
+            return _time(solution, output)
+        case _ if last in ("loss_energy", "source_energy"):
+            rows = [row for row in solution.energy() if owner in ("", row.component)]
+            return sum(row.lost if last == "loss_energy" else row.source for row in rows)
+        case _:
+            return float(np.trapezoid(solution[output.path], solution.time))
+
+
+def _time(solution: Solution, output: Output) -> float:
+    before, after, number = output.change
+    found = [
+        event.time
+        for event in solution.events
+        if event.mode == output.path and before in ("", event.before) and after in ("", event.after)
+    ]
+    if len(found) < number:
+        raise UnknownName(f"'{output.name}' does not happen in this run.")
+    return found[number - 1]
+
+
+def read_all(solution: Solution, outputs: Sequence[Output]) -> list[float]:
+    """Read several numbers; what does not happen is nan."""
+    values: list[float] = []
+    for output in outputs:
+        try:
+            values.append(read(solution, output))
+        except UnknownName:
+            values.append(float("nan"))
+    return values

@@ -1,0 +1,280 @@
+"""Events of a replay as linear maps: where the event goes, and what it changes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from modelica_like.analyse.replay_slopes import _NONE, Sizes, slopes
+from modelica_like.compile.buffers import Vector
+from modelica_like.compile.compiled import CompiledDae, CompiledTransition
+from modelica_like.errors import NoGradient
+from modelica_like.initialize import Point, call, solve_implicit
+from modelica_like.solve.recorder import Event
+
+_GRAZING = 1e-6
+_SAME = 1e-9
+_SMOOTH = 1e-9
+
+
+@dataclass(frozen=True)
+class Trigger:
+    """When an event happens: its time is t_k + shift, and depends on x and theta before it.
+
+    Attributes:
+        shift: numerical difference to the recorded time; rounding of the location.
+        x: derivative of the time by the states before the event, shape (nx,).
+        theta: derivative by (p, u, d) before the event.
+    """
+
+    shift: float
+    x: Vector
+    theta: Vector
+
+
+@dataclass(frozen=True)
+class Jump:
+    """An instant at which modes change, carried back and forth to the recorded time.
+
+    Attributes:
+        before: point before.
+        after: point after, at the same time.
+        events: the mode changes.
+        trigger: when it happens; None at the start of the run, and where nothing depends on the time of the event.
+        x: derivatives of the states after by (x, theta) before, shape (nx, nx + ntheta).
+        d: derivatives of the discrete values after, shape (nd, nx + ntheta).
+        reason: why there is no trigger.
+        gain: what the integrands lose at the event: quadratures grow by it times the shift of the event, shape (nq,).
+        disputed: positions in theta by which nothing after the event has a derivative, with the reason.
+    """
+
+    before: Point
+    after: Point
+    events: tuple[Event, ...]
+    trigger: Trigger | None
+    x: Vector
+    d: Vector
+    reason: NoGradient | None = None
+    gain: Vector = field(default_factory=lambda: np.zeros(0))
+    disputed: tuple[tuple[int, ...], NoGradient] | None = None
+
+    @property
+    def late(self) -> Vector:
+        """What the quadratures gain because the event is not exactly at its recorded time."""
+        return self.gain * (0.0 if self.trigger is None else self.trigger.shift)
+
+    def time(self) -> Trigger:
+        """Return when it happens.
+
+        Raises:
+            NoGradient: its time has no derivative.
+        """
+        if self.trigger is None:
+            assert self.reason is not None
+            raise self.reason
+        return self.trigger
+
+
+def make_jump(
+    model: CompiledDae, before: Point, events: tuple[Event, ...], begin: Point, integrands: Any, *, first: bool
+) -> Jump:
+    """Differentiate an event.
+
+    Args:
+        model: the compiled model.
+        before: the point before the event, at its recorded time.
+        events: the mode changes there, in the order in which they happened.
+        begin: beginning of the segment before: what a guard changes since then decides whether it is grazing.
+        integrands: gives the integrands of the quadratures at a point.
+        first: the event is at the start of the run, and stays there.
+
+    Raises:
+        NoGradient: the states after the event have no derivative.
+    """
+    size = Sizes.of(model)
+    columns = size.x + size.theta
+    work = _Work(model, before.copy(), np.eye(size.x, columns), np.eye(size.d, columns, size.x + size.fixed))
+    rate_before = slopes(model, before, "ode").value
+    when = When(None) if first else event_time(model, before, events, begin)
+    trigger = when.trigger
+    time = np.zeros(columns) if trigger is None else np.concatenate([trigger.x, trigger.theta])
+    if trigger is not None:
+        work.x += np.outer(rate_before, time)
+        work.point.x = before.x + rate_before * trigger.shift
+        work.time = time
+    for number in sorted({event.round for event in events}):
+        work.fire([event.transition for event in events if event.round == number])
+    rate_after = slopes(model, work.point, "ode").value
+    gain = integrands(before) - integrands(work.point)
+    disputed = None
+    if when.reason is not None and (
+        np.any(np.abs(gain) > _SMOOTH) or _matters(model, before, rate_before, work.point, rate_after)
+    ):
+        if trigger is None:
+            raise when.reason
+        disputed = when.disputed, when.reason
+    if trigger is not None:
+        work.x -= np.outer(rate_after, time)
+        work.point.x = work.point.x - rate_after * trigger.shift
+        solve_implicit(model, work.point)
+    return Jump(before, work.point, events, trigger, work.x, work.d, when.reason, gain, disputed)
+
+
+def _matters(model: CompiledDae, before: Point, f_before: Vector, after: Point, f_after: Vector) -> bool:
+    """Tell whether states or rates jump: only then does it matter when the event happens."""
+    rates = np.abs(f_before - f_after) > _SMOOTH * (model.nominals + np.abs(f_before) + np.abs(f_after))
+    states = np.abs(before.x - after.x) > _SMOOTH * (model.nominals + np.abs(before.x))
+    return bool(np.any(rates | states))
+
+
+@dataclass(frozen=True)
+class When:
+    """What decides when an event happens, and by which entries of theta that is not certain."""
+
+    trigger: Trigger | None
+    reason: NoGradient | None = None
+    disputed: tuple[int, ...] = ()
+
+
+def event_time(model: CompiledDae, before: Point, events: tuple[Event, ...], begin: Point) -> When:
+    """Find out what decides when the event happens: what fires in the first round."""
+    found: list[tuple[Event, Trigger]] = []
+    for event in events:
+        if event.round:
+            continue
+        one = model.transitions[event.transition]
+        trigger = _moment(model, before, one) if one.timed else _crossing(model, before, one, begin)
+        if trigger is None:
+            return When(None, _grazing(event))
+        found.append((event, trigger))
+    first, trigger = found[0]
+    theta = np.concatenate([model.p, model.u, before.d])
+    for other, second in found[1:]:
+        weights = np.maximum(np.abs(before.x), model.nominals), np.maximum(np.abs(theta), 1.0)
+        apart = [
+            np.flatnonzero(np.abs(a - b) * weight > _SAME * max(before.t - begin.t, abs(before.t)))
+            for a, b, weight in zip((trigger.x, trigger.theta), (second.x, second.theta), weights, strict=True)
+        ]
+        if apart[0].size:
+            return When(None, _coincidence(first, other))
+        if apart[1].size:
+            return When(trigger, _coincidence(first, other), tuple(map(int, apart[1])))
+    return When(trigger)
+
+
+def _moment(model: CompiledDae, before: Point, transition: CompiledTransition) -> Trigger:
+    k = transition.index
+    part = slopes(model, before, f"moment {k}", lambda: model.moments(*model.arguments.values())[k])
+    return Trigger(float(part.value[0]) - before.t, part.x[0], part.theta[0])
+
+
+def _crossing(model: CompiledDae, before: Point, transition: CompiledTransition, begin: Point) -> Trigger | None:
+    """Event time of a guard: it moves by minus its change over its rate; None if it only grazes zero."""
+    k = transition.index
+    part = slopes(model, before, f"guard {k}", lambda: model.guards(*model.arguments.values())[k])
+    rate = float(part.t[0] + part.x[0] @ slopes(model, before, "ode").value)
+    change = abs(float(call(model, model.guards, begin)[k])) + float(
+        np.abs(part.x[0]) @ (np.abs(before.x) + model.nominals)
+    )
+    if not rate * (before.t - begin.t) > _GRAZING * change:
+        return None
+    return Trigger(-float(part.value[0]) / rate, -part.x[0] / rate, -part.theta[0] / rate)
+
+
+def _grazing(event: Event) -> NoGradient:
+    return NoGradient(
+        f"No gradient at t = {event.time:.9g} s: {event.mode} changes from {event.before} to {event.after} "
+        "where its condition only grazes zero.",
+        where=event.source,
+        why="A small change of a parameter moves the event by much, or lets it vanish.",
+        advice="Move the parameters away from this limit.",
+    )
+
+
+def _coincidence(one: Event, other: Event) -> NoGradient:
+    return NoGradient(
+        f"No gradient at t = {one.time:.9g} s: '{one.mode}: {one.before} → {one.after}' and "
+        f"'{other.mode}: {other.before} → {other.after}' happen at the same instant but for different reasons.",
+        where=[one.source, other.source],
+        why="A small change of a parameter decides which comes first, so the derivatives of both sides differ.",
+        advice="Move the parameters apart.",
+    )
+
+
+@dataclass
+class _Work:
+    """States and discrete values in the course of an event, with their derivatives by (x, theta) before it."""
+
+    model: CompiledDae
+    point: Point
+    x: Vector
+    d: Vector
+    time: Vector | None = None
+
+    def _total(self, name: str, expression: Any, constants: Vector = _NONE) -> tuple[Vector, Vector]:
+        """Value of a function and its derivatives by (x, theta) before the event."""
+        part = slopes(self.model, self.point, name, expression, constants)
+        fixed = self.x.shape[1] - self.x.shape[0] - self.d.shape[0]
+        total = part.x @ self.x + part.theta[:, fixed:] @ self.d
+        nx = self.x.shape[0]
+        total[:, nx : nx + fixed] += part.theta[:, :fixed]
+        if self.time is not None:
+            total += np.outer(part.t, self.time)
+        return part.value, total
+
+    def fire(self, numbers: list[int]) -> None:
+        """Carry out transitions together."""
+        model = self.model
+        transitions = [model.transitions[k] for k in numbers]
+        x, d, dx, dd = self.point.x.copy(), self.point.d.copy(), self.x.copy(), self.d.copy()
+        projected: list[tuple[int, int]] = []
+        for transition in transitions:
+            d[transition.mode] = transition.target
+            for reset in transition.resets:
+                value, slope = self._reset(reset.value)
+                if reset.kind == "state":
+                    x[reset.index], dx[reset.index] = value / reset.factor, slope / reset.factor
+                elif reset.kind == "discrete":
+                    d[reset.index], dd[reset.index] = value, slope
+                else:
+                    projected.append((reset.target, reset.value))
+        values = [self._reset(number) for _, number in projected]
+        self.point = replace(self.point, x=x, d=d)
+        self.x, self.d = dx, dd
+        if projected:
+            self._project([node for node, _ in projected], values)
+        solve_implicit(model, self.point)
+
+    def _reset(self, number: int) -> tuple[float, Vector]:
+        make = lambda: self.model.resets(*self.model.arguments.values())[number]  # noqa: E731
+        value, slope = self._total(f"reset {number}", make)
+        return float(value[0]), slope[0]
+
+    def _project(self, targets: list[int], values: list[tuple[float, Vector]]) -> None:
+        """Move the states as little as possible until variables have their new values; see solve.events."""
+        model = self.model
+        nodes = [model.reset_nodes[k] for k in targets]
+        solve_implicit(model, self.point)
+        name = f"nodes {nodes}"
+        present, slope = self._total(name, lambda: model.variables(*model.arguments.values())[nodes])
+        back = np.linalg.pinv(slopes(model, self.point, name).x)
+        missing = np.array([value for value, _ in values]) - present
+        change, turn = self._total(f"projection {nodes}", lambda r: _projection(model, nodes, r), missing)
+        self.point = replace(self.point, x=self.point.x + change)
+        self.x = self.x + turn + back @ (np.array([one for _, one in values]) - slope)
+
+
+def _projection(model: CompiledDae, nodes: list[int], missing: Any) -> Any:
+    """Smallest change of the states that changes variables by `missing`."""
+    given = model.arguments
+    x, z = given["x"], given["z"]
+    variables, alg = model.variables(*given.values())[nodes], model.alg(*given.values())
+    slope = ca.jacobian(variables, x)
+    if z.numel():
+        follow = ca.solve(ca.densify(ca.jacobian(alg, z)), ca.densify(ca.jacobian(alg, x)))
+        slope = slope - ca.mtimes(ca.jacobian(variables, z), follow)
+    slope = ca.densify(slope)
+    return ca.mtimes(slope.T, ca.solve(ca.mtimes(slope, slope.T), missing))

@@ -1,0 +1,81 @@
+"""Places inside a smooth segment at which equations change their slope: breakpoints of tables, |x|, min, max, where.
+
+States pass them smoothly, their sensitivities do not: a step must end there.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from modelica_like.compile.buffers import Vector, buffered
+from modelica_like.compile.compiled import CompiledDae
+from modelica_like.initialize import Point
+
+_DIFFERENCES = (ca.OP_LT, ca.OP_LE, ca.OP_FMIN, ca.OP_FMAX)
+_ZEROS = (ca.OP_FABS, ca.OP_SIGN)
+_NOISE = 1e-12
+_AT_IT = 1e-9
+
+
+class Kinks:
+    """Functions of the state whose zeros are kinks of a model's equations."""
+
+    def __init__(self, model: CompiledDae) -> None:
+        self.model = model
+        if "kinks" not in model._cache:
+            model._cache["kinks"] = _switches(model)
+        self.count = int(model._cache["kinks"].size1_out(0))
+        self.largest = np.full(self.count, _NOISE)
+
+    def at(self, point: Point) -> Vector:
+        """Values at a point."""
+        model = self.model
+        if not self.count:
+            return np.zeros(0)
+        fast = buffered(model._cache, "kinks along", lambda: model._cache["kinks"])
+        values = fast(point.t, point.x, point.z, model.p, model.u, point.d)[0]
+        self.largest = np.maximum(self.largest, np.abs(values))
+        return values
+
+    def passed(self, before: Vector, after: Vector) -> Any:
+        """Which kinks lie between two points; one at which a step begins does not."""
+        away = np.abs(before) > _AT_IT * self.largest
+        return away & (before * after < 0.0) & (np.abs(after) > _NOISE * self.largest)
+
+
+def _switches(model: CompiledDae) -> ca.Function:
+    """Arguments of the operations that have a kink, as far as they move during a segment."""
+    given = list(model.arguments.values())
+    equations = ca.Function("equations", given, [model.ode(*given), model.alg(*given)])
+    found: dict[str, Any] = {}
+    if any(equations.instruction_id(k) in (*_DIFFERENCES, *_ZEROS) for k in range(equations.n_instructions())):
+        moving = ca.vertcat(*(model.arguments[name] for name in "txz"))
+        for one in _arguments(equations, given):
+            if ca.depends_on(one, moving):
+                found.setdefault(str(one), one)
+    return ca.Function("kinks", given, [ca.densify(ca.SX(ca.vertcat(*found.values())))])
+
+
+def _arguments(function: ca.Function, given: list[Any]) -> list[Any]:
+    """Evaluate a function by its instructions; collect what its kinked operations look at."""
+    work: dict[int, Any] = {}
+    found: list[Any] = []
+    for k in range(function.n_instructions()):
+        operation, inputs = function.instruction_id(k), function.instruction_input(k)
+        if operation == ca.OP_OUTPUT:
+            continue
+        if operation == ca.OP_INPUT:
+            value = given[inputs[0]].nz[inputs[1]]
+        elif operation == ca.OP_CONST:
+            value = ca.SX(function.instruction_constant(k))
+        elif len(inputs) == 1:
+            value = ca.SX.unary(operation, work[inputs[0]])
+            found += [work[inputs[0]]] if operation in _ZEROS else []
+        else:
+            value = ca.SX.binary(operation, work[inputs[0]], work[inputs[1]])
+            found += [work[inputs[0]] - work[inputs[1]]] if operation in _DIFFERENCES else []
+        work[function.instruction_output(k)[0]] = value
+    return found

@@ -1,0 +1,249 @@
+"""Exact sensitivities of a run, through its events."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from modelica_like.analyse.replay import Replay, Tolerances, replay
+from modelica_like.analyse.replay_slopes import Sizes
+from modelica_like.analyse.replay_sweeps import adjoint, forward
+from modelica_like.analyse.sensitivity_outputs import Output, quadratures, read_off, read_output, value_at
+from modelica_like.compile.buffers import Vector
+from modelica_like.compile.compiled import CompiledDae
+from modelica_like.errors import LanguageError, UnknownName, did_you_mean
+from modelica_like.initialize import StartKind
+from modelica_like.simulation import Model, simulate
+from modelica_like.solve.options import Options
+from modelica_like.solve.solution import Solution
+from modelica_like.units import Unit, coherent
+
+if TYPE_CHECKING:
+    import pandas
+    from matplotlib.figure import Figure
+
+Method = Literal["auto", "forward", "adjoint"]
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A number with its name and unit, in SI."""
+
+    name: str
+    value: float
+    unit: Unit
+
+
+@dataclass(frozen=True, eq=False)
+class Sensitivities:
+    """Derivatives of outputs by parameters, in SI units.
+
+    Attributes:
+        model: name of the model.
+        outputs: what was differentiated, with its values.
+        parameters: by what, with their values.
+        derivatives: shape (outputs, parameters).
+        method: `forward` or `adjoint`.
+        time: times of the series in s, both sides of events included; empty without series.
+        series: of each series its derivatives over time, shape (times, parameters).
+    """
+
+    model: str
+    outputs: tuple[Quantity, ...]
+    parameters: tuple[Quantity, ...]
+    derivatives: Vector
+    method: str
+    time: Vector = field(default_factory=lambda: np.zeros(0))
+    series: Mapping[str, Vector] = field(default_factory=dict)
+
+    def __getitem__(self, key: tuple[str, str]) -> float:
+        """Derivative of an output by a parameter.
+
+        Raises:
+            UnknownName: it was not asked for.
+        """
+        output, parameter = key
+        return float(self.derivatives[self._row(output), self._column(parameter)])
+
+    def _row(self, output: str) -> int:
+        return _position([one.name for one in self.outputs], output, "output")
+
+    def _column(self, parameter: str) -> int:
+        return _position([one.name for one in self.parameters], parameter, "parameter")
+
+    @property
+    def normalised(self) -> Vector:
+        """Relative change of each output per relative change of each parameter; nan where the output is zero."""
+        values = np.array([one.value for one in self.outputs])[:, None]
+        weights = np.array([one.value for one in self.parameters])[None, :]
+        return np.divide(
+            self.derivatives * weights, values, out=np.full(self.derivatives.shape, np.nan), where=values != 0
+        )
+
+    def ranking(self, output: str) -> tuple[tuple[Quantity, float, float], ...]:
+        """Parameters with derivative and normalised derivative of an output, the most important first."""
+        row = self._row(output)
+        weights = np.array([one.value for one in self.parameters])
+        order = np.argsort(-np.abs(self.derivatives[row] * weights), kind="stable")
+        return tuple(
+            (self.parameters[k], float(self.derivatives[row, k]), float(self.normalised[row, k])) for k in order
+        )
+
+    def tornado(self, output: str, *, change: float = 0.1, most: int = 12) -> Figure:
+        """Draw what a relative change of each parameter makes of an output, to first order.
+
+        Args:
+            output: which.
+            change: relative change of the parameters.
+            most: largest number of parameters.
+        """
+        from modelica_like.analyse.sensitivity_report import tornado
+
+        return tornado(self, output, change=change, most=most)
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """Return a table with outputs as rows and parameters as columns.
+
+        Raises:
+            MissingExtra: pandas is not installed.
+        """
+        try:
+            import pandas
+        except ImportError:
+            from modelica_like.solve.solution import _missing
+
+            raise _missing("pandas") from None
+        rows, columns = ([one.name for one in side] for side in (self.outputs, self.parameters))
+        return pandas.DataFrame(self.derivatives, index=rows, columns=columns)
+
+    def __str__(self) -> str:
+        from modelica_like.analyse.sensitivity_report import text
+
+        return text(self)
+
+
+def _position(names: list[str], name: str, what: str) -> int:
+    if name not in names:
+        raise UnknownName(f"There is no {what} '{name}' in these sensitivities{did_you_mean(name, names) or '.'}")
+    return names.index(name)
+
+
+def sensitivities(
+    drive: Model | Solution, of: Sequence[str], to: Sequence[str] = (), *, until: float | str | None = None,
+    parameters: Mapping[str, Any] | None = None, method: Method = "auto", start: StartKind | None = None,
+    options: Options | None = None, precision: float = 1e-8,
+) -> Sensitivities:  # fmt: skip
+    """Differentiate what a run gives, by parameters and inputs; exact through mode changes and resets.
+
+    Args:
+        drive: a component, a netlist file, a compiled model, or a run.
+        of: final values (`table.s`), `max(shaft.tau)`, `min(…)`, `at(table.s, 0.3 s)`, `integral(…)`, `series(…)`; of
+            components `clutch.loss_energy`, `source_energy`, `lock_time`, `unlock_time`; times of mode changes
+            `time(clutch.mode: forward -> stuck)`, the second one with `, 2`.
+        to: parameters and inputs; by default all that can change.
+        until: end time, as in `simulate`.
+        parameters: other values of parameters, as in `simulate`.
+        method: `forward` (cost grows with the parameters), `adjoint` (with the outputs), or what is cheaper.
+        start: kind of start, as in `simulate`; of a run, the kind it had.
+        options: as in `simulate`.
+        precision: relative tolerance of the steps of the replay.
+
+    Raises:
+        NoGradient: a derivative does not exist; the message says at which event.
+        UnknownName: an output or a parameter does not exist.
+        LanguageError: a parameter follows from others.
+        ModelicaLikeError: the simulation is not possible.
+    """
+    if isinstance(drive, Solution):
+        solution = drive
+    else:
+        solution = simulate(drive, until, parameters=parameters, start=start, options=options)
+    model = solution.model
+    outputs = [read_output(model, name) for name in of]
+    chosen = _chosen(model, to)
+    column, name = quadratures(model, outputs)
+    stops = solution.time if any(one.kind == "series" for one in outputs) else ()
+    tolerances = Tolerances(precision, 1e-2 * precision)
+    chain = replay(solution, column, name, start=start, stops=stops, tolerances=tolerances)
+    _check_disputed(chain, chosen)
+    return _differentiate(solution, chain, outputs, chosen, method)
+
+
+def _chosen(model: CompiledDae, names: Sequence[str]) -> list[tuple[int, Quantity]]:
+    """Positions in (p, u) of parameters and inputs."""
+    values = np.concatenate([model.p, model.u])
+    inputs = {model.flat_variables[k].path: len(model.p) + n for n, k in enumerate(model.inputs)}
+    known = {**model.parameter_position, **inputs}
+    tunable = [one.path for one in model.flat_parameters if one.tunable]
+    units = [one.unit for one in model.flat_parameters] + [model.flat_variables[k].unit for k in model.inputs]
+    found: list[tuple[int, Quantity]] = []
+    for name in names or [*tunable, *inputs]:
+        if name in model.derived_position:
+            name = _origin(model, name)
+        if name not in known:
+            everything = [*known, *model.derived_position]
+            raise UnknownName(f"{model.name} has no parameter '{name}'{did_you_mean(name, everything) or '.'}")
+        k = known[name]
+        found.append((k, Quantity(name, float(values[k]), coherent(units[k]))))
+    return found
+
+
+def _origin(model: CompiledDae, name: str) -> str:
+    """The independent parameter that a derived one is equal to.
+
+    Raises:
+        LanguageError: it follows from others by a formula.
+    """
+    import casadi as ca
+
+    formula = model.derived(model.arguments["p"])[model.derived_position[name]]
+    places = [k for k in range(len(model.p)) if ca.depends_on(formula, model.arguments["p"][k])]
+    if len(places) == 1 and ca.is_equal(formula, model.arguments["p"][places[0]]):
+        return model.flat_parameters[places[0]].path
+    names = ", ".join(model.flat_parameters[k].path for k in places)
+    raise LanguageError(
+        f"{name} follows from other parameters ({names}).",
+        advice=f"Ask for these, or give {name} a value of its own.",
+    )
+
+
+def _check_disputed(chain: Replay, chosen: list[tuple[int, Quantity]]) -> None:
+    fixed = Sizes.of(chain.model).fixed
+    for _, jump in chain.jumps:
+        if (jump.disputed is not None and {k for k, _ in chosen} & set(jump.disputed[0])) or (
+            jump.disputed is not None and any(k >= fixed for k in jump.disputed[0])
+        ):
+            raise jump.disputed[1]
+
+
+def _differentiate(
+    solution: Solution, chain: Replay, outputs: list[Output], chosen: list[tuple[int, Quantity]], method: Method
+) -> Sensitivities:
+    size = Sizes.of(chain.model)
+    plain = [one for one in outputs if one.kind != "series"]
+    series = [one for one in outputs if one.kind == "series"]
+    readings = read_off(solution, chain, plain)
+    nodes = range(len(chain.nodes)) if series else range(0)
+    over_time = [value_at(chain, one.path, k) for one in series for k in nodes]
+    total = [*readings, *over_time]
+    positions = [k for k, _ in chosen]
+    # A column costs about the same in both directions.
+    way = method if method != "auto" else "adjoint" if len(total) < len(chosen) else "forward"
+    if way == "adjoint":
+        derivatives = adjoint(chain, total)[:, positions]
+    else:
+        derivatives = forward(chain, total, np.eye(size.fixed)[:, positions])
+    count = len(plain)
+    rows = derivatives[count:].reshape(len(series), len(nodes), len(chosen))
+    return Sensitivities(
+        chain.model.name,
+        tuple(Quantity(one.name, reading.value, one.unit) for one, reading in zip(plain, readings, strict=True)),
+        tuple(quantity for _, quantity in chosen),
+        derivatives[:count],
+        way,
+        np.array([chain.nodes[k].t for k in nodes]),
+        {one.name: table for one, table in zip(series, rows, strict=True)},
+    )

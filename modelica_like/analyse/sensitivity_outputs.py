@@ -1,0 +1,219 @@
+"""What sensitivities are asked of: names such as `table.s`, `max(shaft.tau)`, `clutch.lock_time`, read off a replay."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from modelica_like.analyse.replay import Replay, Step
+from modelica_like.analyse.replay_slopes import slopes
+from modelica_like.analyse.replay_sweeps import Reading
+from modelica_like.analyse.sensitivity_peaks import peak
+from modelica_like.compile.compiled import CompiledDae
+from modelica_like.errors import UnknownName, ValueOutOfRange, did_you_mean
+from modelica_like.solve.recorder import Event
+from modelica_like.solve.solution import Solution
+from modelica_like.units import Unit, coherent, parse_unit, to_si
+
+_CALL = re.compile(r"\s*(max|min|integral|at|series|time)\s*\((.*)\)\s*$")
+_CHANGE = re.compile(
+    r"\s*(?P<mode>[^:\s]+)\s*(?::\s*(?P<before>\w+)\s*)?(?:→|->)\s*(?P<after>\w+)\s*(?:,\s*(?P<number>\d+))?\s*$"
+)
+_ENERGY = {"loss_energy": 1, "source_energy": 2}
+_POWERS = {"stored_energy": 0, "loss_power": 1, "source_power": 2}
+_HELD = ("stuck", "locked")
+_SECOND, _JOULE, _WATT = parse_unit("s"), parse_unit("J"), parse_unit("W")
+
+
+@dataclass(frozen=True)
+class Output:
+    """One thing to differentiate.
+
+    Attributes:
+        name: as it was asked for.
+        unit: its unit.
+        kind: `end`, `at`, `max`, `min`, `integral`, `series` or `time`.
+        path: the variable, or the mode.
+        moment: time of `at` in s.
+        change: which mode change: names before (may be empty) and after, and its number among those.
+    """
+
+    name: str
+    unit: Unit
+    kind: str
+    path: str
+    moment: float = 0.0
+    change: tuple[str, str, int] = ("", "", 1)
+
+
+def read_output(model: CompiledDae, name: str) -> Output:
+    """Read the name of an output.
+
+    Raises:
+        UnknownName: it names nothing of the model.
+    """
+    called = _CALL.match(name)
+    if called is None:
+        return _plain(model, name.strip())
+    kind, inside = called.group(1), called.group(2).strip()
+    if kind == "time":
+        return _mode_change(model, name, inside)
+    path, _, moment = inside.partition(",") if kind == "at" else (inside, "", "")
+    unit = expression_of(model, path.strip())[1]
+    if kind == "integral":
+        unit = _JOULE if str(unit) == "W" else unit * _SECOND
+    return Output(name, unit, kind, path.strip(), to_si(moment.strip(), _SECOND, name) if kind == "at" else 0.0)
+
+
+def _plain(model: CompiledDae, name: str) -> Output:
+    owner, _, last = name.rpartition(".")
+    if name in model.position:
+        return Output(name, expression_of(model, name)[1], "end", name)
+    if last in _ENERGY and owner in model.components:
+        return Output(name, _JOULE, "integral", name)
+    if last in ("lock_time", "unlock_time"):
+        found = _holding_mode(model, owner)
+        if found is not None:
+            mode, held = found
+            return Output(name, _SECOND, "time", mode, change=("", held, 1) if last == "lock_time" else (held, "", 1))
+    return Output(name, expression_of(model, name)[1], "end", name)
+
+
+def _holding_mode(model: CompiledDae, owner: str) -> tuple[str, str] | None:
+    """The mode of a component in which it holds, and the name of that."""
+    for one in model.flat_discretes:
+        held = next((name for name in _HELD if name in one.names), None)
+        if held and one.path.rpartition(".")[0] == owner:
+            return one.path, held
+    return None
+
+
+def _mode_change(model: CompiledDae, name: str, inside: str) -> Output:
+    parts = _CHANGE.match(inside)
+    modes = {one.path: one.names for one in model.flat_discretes if one.names}
+    if parts is None:
+        raise UnknownName(
+            f"'{name}' does not say which mode change.",
+            advice="Write time(clutch.mode: forward -> stuck), and a number if it happens again: "
+            "time(clutch.mode -> stuck, 2).",
+        )
+    mode = parts["mode"]
+    if mode not in modes:
+        raise UnknownName(f"{model.name} has no mode '{mode}'{did_you_mean(mode, modes) or '.'}")
+    for one in (parts["before"], parts["after"]):
+        if one is not None and one not in modes[mode]:
+            raise UnknownName(
+                f"{mode} has no mode '{one}'{did_you_mean(one, modes[mode]) or '.'} It has {', '.join(modes[mode])}."
+            )
+    return Output(
+        name, _SECOND, "time", mode, change=(parts["before"] or "", parts["after"], int(parts["number"] or 1))
+    )
+
+
+def expression_of(model: CompiledDae, path: str) -> tuple[Callable[[], Any], Unit]:
+    """Return what makes the SX of a variable or of an energy term in the model's arguments, and its unit.
+
+    Raises:
+        UnknownName: there is no such variable.
+    """
+    arguments = model.arguments.values()
+    if path in model.position:
+        k = model.position[path]
+        return lambda: model.variables(*arguments)[k], coherent(model.flat_variables[k].unit)
+    owner, _, last = path.rpartition(".")
+    columns = _POWERS | _ENERGY
+    if last in columns and owner in model.components:
+        # The model itself stands for all its components together.
+        rows = [model.components.index(owner)] if owner else list(range(len(model.components)))
+        unit = _JOULE if last in (*_ENERGY, "stored_energy") else _WATT
+        return lambda: ca.sum1(model.energy(*arguments)[rows, columns[last]]), unit
+    known = [*model.position, *(f"{one}.{last}" for one in model.components if last in columns)]
+    raise UnknownName(
+        f"{model.name} has no variable '{path}'{did_you_mean(path, known) or '.'}",
+        advice="Besides variables there are max(…), min(…), integral(…), at(…, time), series(…), "
+        "time(mode: before -> after), and of components loss_energy, source_energy, lock_time, unlock_time.",
+    )
+
+
+def quadratures(model: CompiledDae, outputs: Sequence[Output]) -> tuple[Any, str]:
+    """Return all integrands of outputs as one SX column, and a name for them."""
+    paths = [one.path for one in outputs if one.kind == "integral"]
+    column = ca.vertcat(*(expression_of(model, path)[0]() for path in paths)) if paths else ca.SX(0, 1)
+    return column, ";".join(paths)
+
+
+def read_off(solution: Solution, replay: Replay, outputs: Sequence[Output]) -> list[Reading]:
+    """Return the readings of outputs other than series, one each.
+
+    Raises:
+        UnknownName: a mode change does not happen.
+        NoGradient: it has no derivative.
+    """
+    integrals = [one for one in outputs if one.kind == "integral"]
+    return [
+        _integral(replay, integrals.index(one), len(integrals)) if one.kind == "integral"
+        else _event_time(solution, replay, one) if one.kind == "time"
+        else _peak(replay, one) if one.kind in ("max", "min")
+        else _at(replay, one) if one.kind == "at"
+        else value_at(replay, one.path, len(replay.nodes) - 1)
+        for one in outputs
+    ]  # fmt: skip
+
+
+def value_at(replay: Replay, path: str, node: int, probe: Step | None = None, jump: int | None = None) -> Reading:
+    """Read a variable at a node, after a probe from there, or at a jump that carries it along."""
+    model = replay.model
+    point = replay.nodes[node] if probe is None else probe.after
+    part = slopes(model, point, f"value of {path}", expression_of(model, path)[0])
+    rate = 0.0
+    if jump is not None:
+        rate = float(part.t[0] + part.x[0] @ slopes(model, point, "ode").value)
+    return Reading(float(part.value[0]), node, part.x[0], part.theta[0], probe, jump, rate)
+
+
+def _integral(replay: Replay, number: int, count: int) -> Reading:
+    return Reading(float(replay.quadratures[number]), quadratures=np.eye(count)[number])
+
+
+def _event_time(solution: Solution, replay: Replay, output: Output) -> Reading:
+    before, after, number = output.change
+    found: list[tuple[int, Event]] = []
+    for k, jump in replay.jumps:
+        for event in jump.events:
+            if event.mode == output.path and before in ("", event.before) and after in ("", event.after):
+                found.append((k, event))
+    if len(found) < number:
+        raise _no_such_event(solution, output)
+    k, _ = found[number - 1]
+    jump = replay.moves[k]
+    assert not isinstance(jump, Step)
+    return Reading(jump.before.t + jump.time().shift, jump=k, rate=1.0)
+
+
+def _no_such_event(solution: Solution, output: Output) -> UnknownName:
+    changes = [f"{e.before} → {e.after} at {e.time:.6g} s" for e in solution.events if e.mode == output.path]
+    told = f"{output.path} changes: {', '.join(changes[:6])}{', …' if len(changes) > 6 else ''}." if changes else (
+        f"{output.path} does not change in this run."
+    )  # fmt: skip
+    return UnknownName(f"'{output.name}' does not happen after the start of the run.", why=told)
+
+
+def _at(replay: Replay, output: Output) -> Reading:
+    first, last = replay.nodes[0].t, replay.nodes[-1].t
+    if not first <= output.moment <= last:
+        raise ValueOutOfRange(f"{output.name}: the run goes from {first:g} s to {last:g} s.")
+    node = max(k for k, point in enumerate(replay.nodes) if point.t <= output.moment)
+    if replay.nodes[node].t == output.moment:
+        return value_at(replay, output.path, node)
+    return value_at(replay, output.path, node, replay.probe(node, output.moment))
+
+
+def _peak(replay: Replay, output: Output) -> Reading:
+    make = expression_of(replay.model, output.path)[0]
+    found = peak(replay, f"value of {output.path}", make, 1.0 if output.kind == "max" else -1.0)
+    return value_at(replay, output.path, found.node, found.probe, found.jump)

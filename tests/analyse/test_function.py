@@ -1,0 +1,121 @@
+"""A simulation as a CasADi function: derivatives, second derivatives, the check of the mode sequence, two designs."""
+
+import runpy
+from math import pi
+from pathlib import Path
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from modelica_like import load, simulation_function
+from modelica_like.errors import LanguageError, NoGradient
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+INPUTS = ("clutch_torque", "load_torque")
+w, J = 6000 * pi / 30, 0.02 + 500 * (0.015 / (2 * pi)) ** 2
+M, L = J * w / 0.2 + 15, 15.0
+
+
+def table(**options: Any) -> Any:
+    drive = load(EXAMPLES / "machine_table_direct.toml")
+    drive.set("clutch_torque", f"{M!r} N.m")
+    return simulation_function(drive, INPUTS, ["clutch.lock_time", "clutch.loss_energy"], **options)
+
+
+def test_values_and_jacobian_are_those_of_the_paper() -> None:
+    function = table()
+    p = ca.MX.sym("p", 2)
+    jacobian = ca.Function("jacobian", [p], [ca.jacobian(function(p), p)])
+    assert function.start_values == pytest.approx([M, L])
+    assert np.array(function([90.0, 14.0])).ravel() == pytest.approx([J * w / 76, 90 * J * w**2 / 76 / 2], rel=1e-9)
+    expected = [[-J * w / 76**2, J * w / 76**2], [-J * w**2 * 14 / 76**2 / 2, 90 * J * w**2 / 76**2 / 2]]
+    assert np.array(jacobian([90.0, 14.0])) == pytest.approx(np.array(expected), rel=1e-8)
+
+
+def test_value_and_jacobian_share_one_simulation() -> None:
+    function = table()
+    p = ca.MX.sym("p", 2)
+    both = ca.Function("both", [p], [function(p), ca.jacobian(function(p), p)])
+    before = function.runs
+    both([91.0, 13.0])
+    assert function.runs == before + 1
+
+
+def test_adjoint_and_forward_products() -> None:
+    function = table()
+    p, direction = ca.MX.sym("p", 2), ca.MX.sym("direction", 2)
+    forward = ca.Function("forward", [p, direction], [ca.jtimes(function(p), p, direction)])
+    adjoint = ca.Function("adjoint", [p, direction], [ca.jtimes(function(p), p, direction, True)])
+    jacobian = np.array(ca.Function("jacobian", [p], [ca.jacobian(function(p), p)])([90.0, 14.0]))
+    assert np.array(forward([90.0, 14.0], [1.0, 2.0])).ravel() == pytest.approx(jacobian @ [1, 2], rel=1e-12)
+    assert np.array(adjoint([90.0, 14.0], [1.0, 2.0])).ravel() == pytest.approx(jacobian.T @ [1, 2], rel=1e-12)
+
+
+def test_second_derivatives_of_the_friction_work() -> None:
+    function = table()
+    p = ca.MX.sym("p", 2)
+    hessian = ca.Function("hessian", [p], [ca.hessian(function(p)[1], p)[0]])
+    # W = M J w²/(2 (M - L))
+    cross = -J * w**2 / 2 * (M + L) / (M - L) ** 3
+    expected = [[J * w**2 * L / (M - L) ** 3, cross], [cross, J * w**2 * M / (M - L) ** 3]]
+    assert np.array(hessian([M, L])) == pytest.approx(np.array(expected), rel=1e-4)
+
+
+def test_another_mode_sequence_is_refused(capfd: pytest.CaptureFixture[str]) -> None:
+    function = table()
+    with pytest.raises(NoGradient, match=r"'clutch\.mode: backward → stuck' is missing"):
+        function.at([16.0, 15.0])
+    with pytest.raises(RuntimeError, match="has another mode sequence"):
+        function([16.0, 15.0])
+    capfd.readouterr()
+    assert isinstance(function.refusal, NoGradient)
+
+
+def test_an_optimiser_gets_nan_if_it_wants() -> None:
+    function = table(nan_where_refused=True)
+    assert np.all(np.isnan(np.array(function([16.0, 15.0]))))
+    assert isinstance(function.refusal, NoGradient)
+    assert np.all(np.isfinite(np.array(function([80.0, 15.0]))))
+    assert function.refusal is None
+
+
+def test_any_sequence_goes_on() -> None:
+    drive = load(EXAMPLES / "machine_table_direct.toml")
+    drive.set("clutch_torque", f"{M!r} N.m")
+    function = simulation_function(drive, INPUTS, ["table.v"], any_sequence=True)
+    # the clutch still slips at the end: v = lead/(2 pi) (M - L)/J t
+    assert float(function([16.0, 15.0])) == pytest.approx(0.015 / (2 * pi) / J * 0.4, rel=1e-9)
+
+
+def test_a_series_is_no_output() -> None:
+    with pytest.raises(LanguageError, match="is a trajectory"):
+        simulation_function(EXAMPLES / "machine_table_direct.toml", ["load_torque"], ["series(table.s)"])
+
+
+def test_engagement_profile_with_ipopt() -> None:
+    design = runpy.run_path(str(EXAMPLES / "design" / "engagement_profile.py"))["design"]
+    first, best = design(600.0)
+    assert best.work <= 600.0 * (1 + 1e-6)
+    assert best.lock_time <= 0.4 * (1 + 1e-6)
+    assert best.peak < 0.6 * first.peak
+    # A force that never falls is best constant: its peak is the friction torque at standstill, with which it locks.
+    assert max(best.heights) - min(best.heights) < 1e-4
+
+
+def test_gear_and_flywheel_with_ipopt() -> None:
+    example = runpy.run_path(str(EXAMPLES / "design" / "gear_and_flywheel.py"))
+    first, best = example["design"](20.0, 0.8)
+    assert first.stored < 20.0
+    # Energy at the largest speed of the clutch: J w²/2 with the pulley of 3e-5 kg.m2.
+    assert best.disc == pytest.approx(2 * 20.0 / (50 * pi) ** 2 - 3e-5, rel=1e-5)
+    assert best.speed == pytest.approx(50 * pi, rel=1e-6)
+    assert best.lock_time <= 0.8
+    # No neighbour that keeps the limits needs less.
+    function = simulation_function(
+        load(example["NETLIST"]), example["INPUTS"], example["OUTPUTS"], until="1 s", any_sequence=True
+    )
+    for ratio, disc in ((0.97, 1.0), (1.03, 1.0), (1.0, 0.97), (1.0, 1.03), (1.03, 1.05)):
+        supply, stored, lock_time, _, speed = np.array(function([ratio * best.ratio, disc * best.disc])).ravel()
+        assert supply > best.supply or stored < 20.0 or lock_time > 0.8 or speed > 50 * pi

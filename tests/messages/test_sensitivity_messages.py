@@ -1,0 +1,176 @@
+# ruff: noqa: E501 messages stand here as they are told
+"""What is said where a gradient does not exist, or is not asked for rightly."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from modelica_like import load, sensitivities, simulate, simulation_function
+from modelica_like.analyse.replay import replay
+from modelica_like.errors import LanguageError, ModelicaLikeError, NoGradient, StepFailed, UnknownName, ValueOutOfRange
+from modelica_like.language import Component, Equations, Events, Mode, Parameter, Variable, der, param, sin, var
+
+HERE = Path(__file__)
+DIRECT = HERE.parents[2] / "examples" / "machine_table_direct.toml"
+
+
+class Touch(Component):
+    """A wave whose crest reaches a level by a hair."""
+
+    T: Parameter = param("s", "time", default=1.0)
+    level: Parameter = param("1", "level", default=1 - 1e-14)
+    x: Variable = var("1", "wave")
+    y: Variable = var("1", "what turns round")
+    mode = Mode("below", "above")
+
+    def equations(self) -> Equations:
+        yield self.x == sin(self.time / self.T)
+        yield self.T * der(self.y) == self.mode.choose(below=1, above=-1)
+
+    def events(self) -> Events:
+        yield self.mode.go("below", "above", when=self.x > self.level)  # touch
+
+
+class Race(Component):
+    """Two levels that are reached at once."""
+
+    T: Parameter = param("s", "time", default=1.0)
+    one: Parameter = param("1", "level", default=0.5)
+    two: Parameter = param("1", "level", default=0.5)
+    x: Variable = var("1", "what rises")
+    y: Variable = var("1", "what turns round")
+    first = Mode("below", "above")
+    second = Mode("below", "above")
+
+    def equations(self) -> Equations:
+        yield self.T * der(self.x) == 1
+        yield self.T * der(self.y) == self.first.choose(below=1, above=-1) * self.second.choose(below=1, above=3)
+
+    def events(self) -> Events:
+        yield self.first.go("below", "above", when=self.x > self.one)  # one
+        yield self.second.go("below", "above", when=self.x > self.two)  # two
+
+
+class Timeless(Component):
+    """A variable that follows from the time."""
+
+    T: Parameter = param("s", "time", default=1.0)
+    x: Variable = var("1", "quantity")
+
+    def equations(self) -> Equations:
+        yield self.x == self.time / self.T
+
+
+class Explosion(Component):
+    """A quantity that is infinite after 1 s."""
+
+    T: Parameter = param("s", "time", default=1.0)
+    x: Variable = var("1", "quantity")
+
+    def equations(self) -> Equations:
+        yield self.T * der(self.x) == self.x**2
+
+
+def past_the_end() -> Any:
+    run = simulate(Explosion(x=1.0), 0.9)
+    only = run.segments[0]
+    longer = replace(only, times=np.append(only.times, 1.5))
+    return replay(replace(run, segments=(longer,)))
+
+
+def strong() -> Any:
+    drive = load(DIRECT)
+    drive.set("clutch_torque", "87 N.m")
+    return drive
+
+
+def table(*of: str, to: tuple[str, ...] = ("load_torque",), **options: Any) -> Any:
+    return sensitivities(DIRECT, of, to, **options)
+
+
+CASES: dict[str, tuple[type[ModelicaLikeError], Callable[[], Any], str]] = {
+    "an event that grazes": (
+        NoGradient,
+        lambda: sensitivities(Touch(y=0.0), ["y"], ["T"], until="3 s"),
+        """\
+No gradient at t = 1.57079619 s: mode changes from below to above where its condition only grazes zero.
+  in test_sensitivity_messages.py:{touch} `yield self.mode.go("below", "above", when=self.x > self.level)`
+A small change of a parameter moves the event by much, or lets it vanish.
+Move the parameters away from this limit.""",
+    ),
+    "two events at once": (
+        NoGradient,
+        lambda: sensitivities(Race(x=0.0, y=0.0), ["y"], ["one"], until="1 s"),
+        """\
+No gradient at t = 0.5 s: 'first: below → above' and 'second: below → above' happen at the same instant but for different reasons.
+  in test_sensitivity_messages.py:{one} `yield self.first.go("below", "above", when=self.x > self.one)`
+  in test_sensitivity_messages.py:{two} `yield self.second.go("below", "above", when=self.x > self.two)`
+A small change of a parameter decides which comes first, so the derivatives of both sides differ.
+Move the parameters apart.""",
+    ),
+    "another mode sequence": (
+        NoGradient,
+        lambda: simulation_function(strong(), ["load_torque"], ["table.s"]).at([86.0]),
+        """\
+machine_table_direct has another mode sequence at these parameter values: as mode change 1, 'clutch.mode: backward → stuck' is missing.
+A function with a fixed mode sequence has derivatives only as long as the sequence stays.
+Bound the parameters, begin elsewhere, or allow it with any_sequence=True.""",
+    ),
+    "a step of the replay": (StepFailed, past_the_end, """\
+The replay of the run did not get on at t = 1 s: its steps do not converge.
+Look for a function without a slope there, or for a mode that should have changed."""),
+    "a model without states": (LanguageError, lambda: sensitivities(Timeless(), ["x"], ["T"], until="1 s"), """\
+Timeless has no states: nothing develops over time, so there is no run to differentiate.
+Compare runs with other parameter values instead."""),
+    "an output that does not exist": (UnknownName, lambda: table("table.x"), """\
+machine_table_direct has no variable 'table.x'; did you mean 'table.v'?
+Besides variables there are max(…), min(…), integral(…), at(…, time), series(…), time(mode: before -> after), and of components loss_energy, source_energy, lock_time, unlock_time."""),
+    "a mode that does not exist": (UnknownName, lambda: table("time(clutch.node -> stuck)"), """\
+machine_table_direct has no mode 'clutch.node'; did you mean 'clutch.mode'?"""),
+    "a mode change that does not exist": (UnknownName, lambda: table("time(clutch.mode -> stack)"), """\
+clutch.mode has no mode 'stack'; did you mean 'stuck'? It has free, stuck, start_forward, start_backward, forward, backward."""),
+    "a mode change that is not written as one": (UnknownName, lambda: table("time(clutch.mode)"), """\
+'time(clutch.mode)' does not say which mode change.
+Write time(clutch.mode: forward -> stuck), and a number if it happens again: time(clutch.mode -> stuck, 2)."""),
+    "a mode change that does not happen": (UnknownName, lambda: table("time(clutch.mode -> stuck, 2)"), """\
+'time(clutch.mode -> stuck, 2)' does not happen after the start of the run.
+clutch.mode changes: backward → stuck at 0.2 s."""),
+    "a time outside the run": (ValueOutOfRange, lambda: table("at(table.s, 7 s)"), """\
+at(table.s, 7 s): the run goes from 0 s to 0.4 s."""),
+    "a parameter that does not exist": (UnknownName, lambda: table("table.s", to=("load_torqe",)), """\
+machine_table_direct has no parameter 'load_torqe'; did you mean 'load_torque'?"""),
+    "a parameter that follows from others": (LanguageError, lambda: table("table.s", to=("clutch.capacity",)), """\
+clutch.capacity follows from other parameters (motor_speed, acceleration_time, load_torque, lead, table_mass, hub_inertia, spindle_inertia).
+Ask for these, or give clutch.capacity a value of its own."""),
+    "an output that was not asked for": (UnknownName, lambda: table("table.s")["table.v", "load_torque"], """\
+There is no output 'table.v' in these sensitivities; did you mean 'table.s'?"""),
+    "a precision out of range": (ValueOutOfRange, lambda: table("table.s", precision=1e-20), """\
+The precision of a replay, 1e-20, is out of range: it must be between 1e-13 and 0.001."""),
+    "a series as output of a function": (
+        LanguageError, lambda: simulation_function(DIRECT, ["lead"], ["series(table.s)"]), """\
+series(table.s) is a trajectory; the outputs of a simulation function are numbers.
+Ask for single times: at(table.s, 0.3 s)."""),
+}  # fmt: skip
+
+
+def expand(text: str) -> str:
+    """Write lines of this file as {marker}, the line that ends in `# marker`."""
+    lines = HERE.read_text().splitlines()
+    for marker in ("touch", "one", "two"):
+        text = text.replace(
+            f"{{{marker}}}", str(1 + next(k for k, line in enumerate(lines) if line.endswith(f"# {marker}")))
+        )
+    return text
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_message(name: str) -> None:
+    kind, make, text = CASES[name]
+    with pytest.raises(ModelicaLikeError) as caught:
+        make()
+    assert type(caught.value) is kind
+    assert str(caught.value) == expand(text)
