@@ -1,5 +1,6 @@
 # make demo   the machine-table and machine-tool start-ups, computed against published values
 # make test   everything that continuous integration runs
+# make fmus   the reference FMUs, from their C sources, to build/fmus
 # make benchmark   times as ratios to hand-written baselines of the same run
 
 PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11; do \
@@ -7,7 +8,7 @@ PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11; 
 BIN := .venv/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
 
-.PHONY: demo test lint types layers pytest benchmark format clean
+.PHONY: demo test lint types layers pytest benchmark fmus format clean
 
 demo: .venv/installed
 	$(BIN)/modelica-like demo
@@ -32,6 +33,9 @@ benchmark: .venv/installed-dev
 	$(BIN)/python benchmarks/bad_input.py
 	$(BIN)/python benchmarks/coupled_clutches.py
 	$(BIN)/python benchmarks/chain.py 10 100 1000 5000
+
+fmus: .venv/installed
+	$(BIN)/python fmus/build.py
 
 format: .venv/installed-dev
 	$(BIN)/ruff check --fix
