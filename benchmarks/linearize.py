@@ -11,7 +11,7 @@ import time
 from chain import Chain, best, hand_written
 
 from modelica_like import build
-from modelica_like.analyse.linearize import linearize
+from modelica_like.analyse.linear.linearize import linearize
 
 
 def measure(n: int) -> str:

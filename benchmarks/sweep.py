@@ -14,7 +14,7 @@ import casadi as ca
 import numpy as np
 
 from modelica_like import build
-from modelica_like.analyse.sweep import sweep
+from modelica_like.analyse.sweeps.sweep import sweep
 
 NETLIST = Path(__file__).parents[1] / "examples" / "machine_table_geared.toml"
 OUTPUTS = ["table.s", "clutch.lock_time"]

@@ -9,8 +9,15 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from modelica_like.analyse.function import simulation_function as simulation_function
-    from modelica_like.analyse.sensitivity import sensitivities as sensitivities
+    from modelica_like.analyse.calibration.calibrate import calibrate as calibrate
+    from modelica_like.analyse.linear.campbell import campbell as campbell
+    from modelica_like.analyse.linear.linearize import linearize as linearize
+    from modelica_like.analyse.sensitivity.derivatives import sensitivities as sensitivities
+    from modelica_like.analyse.sensitivity.function import simulation_function as simulation_function
+    from modelica_like.analyse.steady import characteristic as characteristic
+    from modelica_like.analyse.steady import steady as steady
+    from modelica_like.analyse.sweeps.importance import importance as importance
+    from modelica_like.analyse.sweeps.sweep import sweep as sweep
     from modelica_like.compile.compiled import CompiledDae as CompiledDae
     from modelica_like.errors import ModelicaLikeError as ModelicaLikeError
     from modelica_like.fmi.export import export_fmu as export_fmu
@@ -35,13 +42,20 @@ _HOME = {
     "Options": "modelica_like.solve.options",
     "Solution": "modelica_like.solve.solution",
     "build": "modelica_like.simulation",
+    "calibrate": "modelica_like.analyse.calibration.calibrate",
+    "campbell": "modelica_like.analyse.linear.campbell",
+    "characteristic": "modelica_like.analyse.steady",
     "compare": "modelica_like.report.compare",
     "export_fmu": "modelica_like.fmi.export",
+    "importance": "modelica_like.analyse.sweeps.importance",
+    "linearize": "modelica_like.analyse.linear.linearize",
     "load": "modelica_like.netlist",
     "run_fmu": "modelica_like.fmi.run",
-    "sensitivities": "modelica_like.analyse.sensitivity",
+    "sensitivities": "modelica_like.analyse.sensitivity.derivatives",
     "simulate": "modelica_like.simulation",
-    "simulation_function": "modelica_like.analyse.function",
+    "simulation_function": "modelica_like.analyse.sensitivity.function",
+    "steady": "modelica_like.analyse.steady",
+    "sweep": "modelica_like.analyse.sweeps.sweep",
     "validate_fmu": "modelica_like.fmi.validate",
 }
 
@@ -53,13 +67,20 @@ __all__ = [
     "Options",
     "Solution",
     "build",
+    "calibrate",
+    "campbell",
+    "characteristic",
     "compare",
     "export_fmu",
+    "importance",
+    "linearize",
     "load",
     "run_fmu",
     "sensitivities",
     "simulate",
     "simulation_function",
+    "steady",
+    "sweep",
     "validate_fmu",
 ]
 

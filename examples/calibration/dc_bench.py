@@ -1,6 +1,6 @@
 """Document 002: the constants of the bench's motor, identified from what was measured on it.
 
-Two lines were fitted to the measurements of 6.1: speed n = 4736.5/min - 3.48/min/mN.m·M, current I = 0.02 A/mN.m·M + 1.06 A.
+Two lines were fitted to the measurements of 6.1: n = 4736.5/min - 3.48/min/mN.m·M and I = 0.02 A/mN.m·M + 1.06 A.
 Each of them alone fits a permanent-magnet machine exactly, but not the same one: its torque constant and its voltage
 constant would differ by 7 %, which would create energy. The rotor's inertia follows from the 0.7 s that the generator
 takes to its final voltage.
@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from modelica_like import build
-from modelica_like.analyse.calibrate import Calibration, Numbers, OperatingPoints, calibrate
+from modelica_like.analyse.calibration.calibrate import Calibration, Numbers, OperatingPoints, calibrate
 
 HERE = Path(__file__).parent
 MOTOR, BENCH = HERE.parent / "dc_bench_motor.toml", HERE.parent / "dc_bench.toml"

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from modelica_like.analyse.linearize import slopes_at
+from modelica_like.analyse.linear.linearize import slopes_at
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import InitializationError, UnknownName, ValueOutOfRange, did_you_mean
 from modelica_like.initialize import Point, call, initialize
@@ -264,7 +264,7 @@ class Curves:
             paths: what to draw.
             over: the horizontal axis; by default what was varied.
         """
-        from modelica_like.analyse.frequency_plots import draw_curves
+        from modelica_like.analyse.linear.pictures import draw_curves
 
         return draw_curves(self, paths, over or self.over)
 

@@ -9,8 +9,8 @@ from scipy.optimize import least_squares
 
 from components import ConstantTorque, Damper, Fixed, Inertia
 from modelica_like import build
-from modelica_like.analyse.calibrate import Numbers, OperatingPoints, Trajectories, calibrate
-from modelica_like.analyse.measurements import read_table
+from modelica_like.analyse.calibration.calibrate import Numbers, OperatingPoints, Trajectories, calibrate
+from modelica_like.analyse.calibration.measurements import read_table
 from modelica_like.errors import CalibrationFailed, NetlistError, UnknownName, ValueOutOfRange
 from modelica_like.language import Component, Equations, connect, series
 

@@ -19,8 +19,8 @@ from components import (
     SpringDamper,
 )
 from modelica_like import build, simulate
-from modelica_like.analyse.campbell import campbell
-from modelica_like.analyse.linearize import linearize
+from modelica_like.analyse.linear.campbell import campbell
+from modelica_like.analyse.linear.linearize import linearize
 from modelica_like.initialize import variable_slopes
 from modelica_like.language import Component, Equations, connect, series
 

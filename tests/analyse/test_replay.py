@@ -7,9 +7,9 @@ import pytest
 
 from components import Fixed, Inertia, SpringDamper
 from modelica_like import build, simulate
-from modelica_like.analyse.replay import Step, Tolerances, replay
-from modelica_like.analyse.replay_kinks import Kinks
-from modelica_like.analyse.replay_steps import radau
+from modelica_like.analyse.replay.chain import Step, Tolerances, replay
+from modelica_like.analyse.replay.kinks import Kinks
+from modelica_like.analyse.replay.steps import radau
 from modelica_like.language import Component, Equations, series
 
 EXAMPLES = Path(__file__).parents[2] / "examples"

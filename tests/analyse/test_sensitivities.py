@@ -9,7 +9,7 @@ import pytest
 
 from components import Fixed, Inertia, SpringDamper
 from modelica_like import Assembly, CompiledDae, Component, Options, build, load, sensitivities, simulate
-from modelica_like.analyse.sensitivity import Sensitivities
+from modelica_like.analyse.sensitivity.derivatives import Sensitivities
 from modelica_like.language import Equations, Events, Mode, Parameter, Variable, der, param, series, var, where
 
 EXAMPLES = Path(__file__).parents[2] / "examples"

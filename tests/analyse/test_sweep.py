@@ -12,9 +12,9 @@ import pytest
 
 from components import ConstantTorque, Inertia
 from modelica_like import build
-from modelica_like.analyse.importance import importance
-from modelica_like.analyse.plan import LatinHypercube, Sobol
-from modelica_like.analyse.sweep import sweep
+from modelica_like.analyse.sweeps.importance import importance
+from modelica_like.analyse.sweeps.plan import LatinHypercube, Sobol
+from modelica_like.analyse.sweeps.sweep import sweep
 from modelica_like.errors import CheckpointMismatch, UnknownName, ValueOutOfRange
 from modelica_like.language import Component, Equations, series
 

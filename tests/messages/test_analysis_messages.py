@@ -11,17 +11,17 @@ import pytest
 
 from components import ConstantTorque, Inertia
 from modelica_like import build
-from modelica_like.analyse.calibrate import Numbers, OperatingPoints, Trajectories, calibrate
-from modelica_like.analyse.campbell import campbell
-from modelica_like.analyse.importance import importance
-from modelica_like.analyse.linearize import linearize
-from modelica_like.analyse.measurements import read_table
-from modelica_like.analyse.plan import LatinHypercube
-from modelica_like.analyse.points import when
-from modelica_like.analyse.ranges import read_assignment, read_range
+from modelica_like.analyse.calibration.calibrate import Numbers, OperatingPoints, Trajectories, calibrate
+from modelica_like.analyse.linear.campbell import campbell
+from modelica_like.analyse.sweeps.importance import importance
+from modelica_like.analyse.linear.linearize import linearize
+from modelica_like.analyse.calibration.measurements import read_table
+from modelica_like.analyse.sweeps.plan import LatinHypercube
+from modelica_like.analyse.linear.points import when
+from modelica_like.analyse.sweeps.ranges import read_assignment, read_range
 from modelica_like.analyse.steady import characteristic, steady
-from modelica_like.analyse.sweep import sweep
-from modelica_like.analyse.workers import Job, in_processes
+from modelica_like.analyse.sweeps.sweep import sweep
+from modelica_like.analyse.sweeps.workers import Job, in_processes
 from modelica_like.errors import (
     CalibrationFailed,
     CheckpointMismatch,
@@ -206,7 +206,7 @@ def test_a_table_that_is_none(tmp_path):
 
 
 def test_workers_that_die_again_and_again(monkeypatch):
-    monkeypatch.setattr("modelica_like.analyse.workers.run_chunk", dies)
+    monkeypatch.setattr("modelica_like.analyse.sweeps.workers.run_chunk", dies)
     job = Job.of(model(), ["mass.J"], ["mass.w"], {"until": 1.0})
     with pytest.raises(WorkersLost) as caught:
         list(in_processes(job, [(0, [[1.0], [2.0]])], 1))

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from modelica_like import load, sensitivities, simulate, simulation_function
-from modelica_like.analyse.replay import replay
+from modelica_like.analyse.replay.chain import replay
 from modelica_like.errors import LanguageError, ModelicaLikeError, NoGradient, StepFailed, UnknownName, ValueOutOfRange
 from modelica_like.language import Component, Equations, Events, Mode, Parameter, Variable, der, param, sin, var
 

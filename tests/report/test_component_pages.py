@@ -29,9 +29,10 @@ from modelica_like.language import (
     where,
 )
 from modelica_like.netlist import library_types
-from modelica_like.report import latex_names
-from modelica_like.report.component_docs import component_pages, examples_by_type
-from modelica_like.report.statements import Statements, statements, variants
+from modelica_like.report.component_pages import latex_names
+from modelica_like.report.component_pages.library import component_pages, examples_by_type
+from modelica_like.report.component_pages.statements import Statements, statements
+from modelica_like.report.component_pages.variants import variants
 
 ROOT = Path(__file__).parents[2]
 FOLDER = ROOT / "docs" / "components"

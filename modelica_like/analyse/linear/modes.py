@@ -16,7 +16,7 @@ from modelica_like.initialize import variable_slopes
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from modelica_like.analyse.linearize import LinearModel
+    from modelica_like.analyse.linear.linearize import LinearModel
 
 _STILL = 1e-9
 """Eigenvalues below this share of the largest are zero: motions that nothing brings back."""
@@ -113,7 +113,7 @@ class Modes(Sequence[Mode]):
 
     def plot(self, names: Sequence[str], count: int = 4) -> Figure:
         """Draw the deviations of variables of one unit, such as speeds along the drive, in the first `count` modes."""
-        from modelica_like.analyse.frequency_plots import draw_shapes
+        from modelica_like.analyse.linear.pictures import draw_shapes
 
         return draw_shapes(self, names, count)
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from modelica_like.analyse.linearize import LinearModel, linearize
-from modelica_like.analyse.points import At
+from modelica_like.analyse.linear.linearize import LinearModel, linearize
+from modelica_like.analyse.linear.points import At
 from modelica_like.errors import ValueOutOfRange
 from modelica_like.initialize import call
 from modelica_like.simulation import Model, build
@@ -82,7 +82,7 @@ class Campbell:
 
     def plot(self) -> Figure:
         """Draw frequencies over speed with the lines of the orders and their crossings."""
-        from modelica_like.analyse.frequency_plots import draw_campbell
+        from modelica_like.analyse.linear.pictures import draw_campbell
 
         return draw_campbell(self)
 

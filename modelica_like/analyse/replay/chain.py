@@ -15,11 +15,11 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from modelica_like.analyse.replay_jumps import Jump, event_time, make_jump
-from modelica_like.analyse.replay_kinks import Kinks
-from modelica_like.analyse.replay_slopes import Sizes
-from modelica_like.analyse.replay_start import StartSlopes
-from modelica_like.analyse.replay_steps import StepFunctions
+from modelica_like.analyse.replay.jumps import Jump, event_time, make_jump
+from modelica_like.analyse.replay.kinks import Kinks
+from modelica_like.analyse.replay.slopes import Sizes
+from modelica_like.analyse.replay.start import StartSlopes
+from modelica_like.analyse.replay.steps import StepFunctions
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import LanguageError, StepFailed, ValueOutOfRange

@@ -8,8 +8,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from modelica_like.analyse.plan import Samples
-from modelica_like.analyse.sweep import sweep
+from modelica_like.analyse.sweeps.plan import Samples
+from modelica_like.analyse.sweeps.sweep import sweep
 from modelica_like.errors import MissingExtra, UnknownName, ValueOutOfRange
 from modelica_like.simulation import Model
 

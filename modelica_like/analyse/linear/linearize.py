@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import casadi as ca
 import numpy as np
 
-from modelica_like.analyse.held import free_motions
-from modelica_like.analyse.points import At, Drive, point_of
+from modelica_like.analyse.linear.held import free_motions
+from modelica_like.analyse.linear.points import At, Drive, point_of
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import MissingExtra, UnknownName, did_you_mean
 from modelica_like.initialize import Point
@@ -18,7 +18,7 @@ from modelica_like.initialize import Point
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from modelica_like.analyse.modes import Modes
+    from modelica_like.analyse.linear.modes import Modes
 
 Matrix = np.ndarray[Any, np.dtype[np.float64]]
 _SHOWN = 12
@@ -67,7 +67,7 @@ class LinearModel:
 
     def modes(self) -> Modes:
         """Return eigenvalues, damping, shapes, participation, and where the energy of each mode is."""
-        from modelica_like.analyse.modes import find_modes
+        from modelica_like.analyse.linear.modes import find_modes
 
         return find_modes(self)
 
@@ -88,7 +88,7 @@ class LinearModel:
         Args:
             frequencies: in Hz; by default around the frequencies of the modes.
         """
-        from modelica_like.analyse.frequency_plots import draw_bode
+        from modelica_like.analyse.linear.pictures import draw_bode
 
         return draw_bode(self, frequencies)
 

@@ -8,7 +8,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from modelica_like.analyse.replay_slopes import _NONE, Sizes, slopes
+from modelica_like.analyse.replay.slopes import _NONE, Sizes, slopes
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae, CompiledTransition
 from modelica_like.errors import NoGradient

@@ -10,10 +10,10 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from modelica_like.analyse.replay import Replay, Step
-from modelica_like.analyse.replay_slopes import slopes
-from modelica_like.analyse.replay_sweeps import Reading
-from modelica_like.analyse.sensitivity_peaks import peak
+from modelica_like.analyse.replay.chain import Replay, Step
+from modelica_like.analyse.replay.slopes import slopes
+from modelica_like.analyse.replay.sweeps import Reading
+from modelica_like.analyse.sensitivity.peaks import peak
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import UnknownName, ValueOutOfRange, did_you_mean
 from modelica_like.solve.recorder import Event

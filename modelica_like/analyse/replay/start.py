@@ -8,7 +8,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from modelica_like.analyse.replay_slopes import Sizes
+from modelica_like.analyse.replay.slopes import Sizes
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.initialize import Point, StartKind

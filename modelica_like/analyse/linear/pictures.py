@@ -13,9 +13,9 @@ from matplotlib.ticker import MultipleLocator
 from modelica_like.solve.plot import COLOURS, STYLE
 
 if TYPE_CHECKING:
-    from modelica_like.analyse.campbell import Campbell
-    from modelica_like.analyse.linearize import LinearModel
-    from modelica_like.analyse.modes import Modes
+    from modelica_like.analyse.linear.campbell import Campbell
+    from modelica_like.analyse.linear.linearize import LinearModel
+    from modelica_like.analyse.linear.modes import Modes
     from modelica_like.analyse.steady import Curves
 
 _POINTS = 600

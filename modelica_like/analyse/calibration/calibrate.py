@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from modelica_like.analyse.measurements import Measurement, Numbers, OperatingPoints, Trajectories
+from modelica_like.analyse.calibration.measurements import Measurement, Numbers, OperatingPoints, Trajectories
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import (
     CalibrationFailed,
@@ -174,7 +174,7 @@ class _Problem:
         first = np.array([model.p[model.parameter_position[name]] for name in self.names])
         begins = [np.clip((first - self.low) / self.span, 0.0, 1.0)]
         if count > 1:
-            from modelica_like.analyse.plan import LatinHypercube
+            from modelica_like.analyse.sweeps.plan import LatinHypercube
 
             begins += list(LatinHypercube(count - 1, seed).unit_cube(len(self.names)))
         return begins

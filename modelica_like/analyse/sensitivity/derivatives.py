@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from modelica_like.analyse.replay import Replay, Tolerances, replay
-from modelica_like.analyse.replay_slopes import Sizes
-from modelica_like.analyse.replay_sweeps import adjoint, forward
-from modelica_like.analyse.sensitivity_outputs import Output, quadratures, read_off, read_output, value_at
+from modelica_like.analyse.replay.chain import Replay, Tolerances, replay
+from modelica_like.analyse.replay.slopes import Sizes
+from modelica_like.analyse.replay.sweeps import adjoint, forward
+from modelica_like.analyse.sensitivity.outputs import Output, quadratures, read_off, read_output, value_at
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import LanguageError, UnknownName, did_you_mean
@@ -100,7 +100,7 @@ class Sensitivities:
             change: relative change of the parameters.
             most: largest number of parameters.
         """
-        from modelica_like.analyse.sensitivity_report import tornado
+        from modelica_like.analyse.sensitivity.report import tornado
 
         return tornado(self, output, change=change, most=most)
 
@@ -120,7 +120,7 @@ class Sensitivities:
         return pandas.DataFrame(self.derivatives, index=rows, columns=columns)
 
     def __str__(self) -> str:
-        from modelica_like.analyse.sensitivity_report import text
+        from modelica_like.analyse.sensitivity.report import text
 
         return text(self)
 

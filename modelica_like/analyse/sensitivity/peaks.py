@@ -9,9 +9,9 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from modelica_like.analyse.replay import Replay, Step
-from modelica_like.analyse.replay_jumps import Jump
-from modelica_like.analyse.replay_slopes import slopes
+from modelica_like.analyse.replay.chain import Replay, Step
+from modelica_like.analyse.replay.jumps import Jump
+from modelica_like.analyse.replay.slopes import slopes
 from modelica_like.compile.buffers import Vector, buffered
 from modelica_like.initialize import Point
 

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from modelica_like.analyse.checkpoint import Checkpoint
-from modelica_like.analyse.plan import Plan, Sampling, make_plan
-from modelica_like.analyse.sensitivity_outputs import read_output
-from modelica_like.analyse.workers import Chunk, Done, Job, cores, in_processes, in_this_process, on_cluster
+from modelica_like.analyse.sensitivity.outputs import read_output
+from modelica_like.analyse.sweeps.checkpoint import Checkpoint
+from modelica_like.analyse.sweeps.plan import Plan, Sampling, make_plan
+from modelica_like.analyse.sweeps.workers import Chunk, Done, Job, cores, in_processes, in_this_process, on_cluster
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import MissingExtra, ValueOutOfRange
 from modelica_like.simulation import Model, build

@@ -8,7 +8,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from modelica_like.analyse.sensitivity import Sensitivities, sensitivities
+from modelica_like.analyse.sensitivity.derivatives import Sensitivities, sensitivities
 from modelica_like.compile.buffers import Vector
 from modelica_like.errors import LanguageError, ModelicaLikeError, NoGradient
 from modelica_like.initialize import StartKind

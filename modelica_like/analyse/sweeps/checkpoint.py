@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from modelica_like.analyse.plan import Plan
-from modelica_like.analyse.workers import Chunk, Done, Job
+from modelica_like.analyse.sweeps.plan import Plan
+from modelica_like.analyse.sweeps.workers import Chunk, Done, Job
 from modelica_like.errors import CheckpointMismatch, MissingExtra
 
 

@@ -12,8 +12,8 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
 
-from modelica_like.analyse.readings import read_all
-from modelica_like.analyse.sensitivity_outputs import read_output
+from modelica_like.analyse.sensitivity.outputs import read_output
+from modelica_like.analyse.sweeps.readings import read_all
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import MissingExtra, ModelicaLikeError, WorkersLost
 from modelica_like.simulation import simulate

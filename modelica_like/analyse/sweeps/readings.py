@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from modelica_like.analyse.sensitivity_outputs import Output
+from modelica_like.analyse.sensitivity.outputs import Output
 from modelica_like.errors import UnknownName
 from modelica_like.solve.solution import Solution
 

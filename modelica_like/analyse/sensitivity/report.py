@@ -11,7 +11,7 @@ from modelica_like.solve.plot import COLOURS, STYLE
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from modelica_like.analyse.sensitivity import Sensitivities
+    from modelica_like.analyse.sensitivity.derivatives import Sensitivities
 
 SHOWN = 20
 """Largest number of parameters in a table."""

@@ -1,0 +1,1 @@
+"""Small motions about a point: linear models, modes, frequency response."""

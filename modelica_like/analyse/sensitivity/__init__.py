@@ -1,0 +1,1 @@
+"""Exact derivatives of runs, and runs as differentiable functions."""

@@ -1,0 +1,1 @@
+"""Many runs of one model: grids and samples, workers, checkpoints, global sensitivity."""
