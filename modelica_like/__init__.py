@@ -12,10 +12,10 @@ if TYPE_CHECKING:
     from modelica_like.analyse.calibration.calibrate import calibrate as calibrate
     from modelica_like.analyse.linear.campbell import campbell as campbell
     from modelica_like.analyse.linear.linearize import linearize as linearize
+    from modelica_like.analyse.operating.curves import characteristic as characteristic
+    from modelica_like.analyse.operating.steady import steady as steady
     from modelica_like.analyse.sensitivity.derivatives import sensitivities as sensitivities
     from modelica_like.analyse.sensitivity.function import simulation_function as simulation_function
-    from modelica_like.analyse.steady import characteristic as characteristic
-    from modelica_like.analyse.steady import steady as steady
     from modelica_like.analyse.sweeps.importance import importance as importance
     from modelica_like.analyse.sweeps.sweep import sweep as sweep
     from modelica_like.compile.compiled import CompiledDae as CompiledDae
@@ -44,7 +44,7 @@ _HOME = {
     "build": "modelica_like.simulation",
     "calibrate": "modelica_like.analyse.calibration.calibrate",
     "campbell": "modelica_like.analyse.linear.campbell",
-    "characteristic": "modelica_like.analyse.steady",
+    "characteristic": "modelica_like.analyse.operating.curves",
     "compare": "modelica_like.report.compare",
     "export_fmu": "modelica_like.fmi.export",
     "importance": "modelica_like.analyse.sweeps.importance",
@@ -54,7 +54,7 @@ _HOME = {
     "sensitivities": "modelica_like.analyse.sensitivity.derivatives",
     "simulate": "modelica_like.simulation",
     "simulation_function": "modelica_like.analyse.sensitivity.function",
-    "steady": "modelica_like.analyse.steady",
+    "steady": "modelica_like.analyse.operating.steady",
     "sweep": "modelica_like.analyse.sweeps.sweep",
     "validate_fmu": "modelica_like.fmi.validate",
 }

@@ -13,7 +13,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from modelica_like import load, simulate
-from modelica_like.solve.plot import COLOURS, STYLE
+from modelica_like.solve.style import COLOURS, STYLE
 
 HERE = Path(__file__).parent
 EXAMPLES = HERE.parents[1] / "examples"

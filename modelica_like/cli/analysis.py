@@ -26,8 +26,8 @@ def modes(
     """Linearise a netlist at a point: eigenvalues, damping, where the energy of each mode is."""
     with told(debug):
         assembly = load_netlist(netlist, assignments)
-        from modelica_like.analyse.linearize import linearize
-        from modelica_like.analyse.points import when
+        from modelica_like.analyse.linear.linearize import linearize
+        from modelica_like.analyse.linear.points import when
         from modelica_like.report.modes import modes_report
         from modelica_like.solve.plot import save_plot
 

@@ -25,7 +25,7 @@ def sensitivity(
     """Differentiate a run exactly, through its events: ranking tables, tornado plot."""
     with told(debug):
         assembly = load_netlist(netlist, assignments)
-        from modelica_like.analyse.sensitivity import sensitivities
+        from modelica_like.analyse.sensitivity.derivatives import sensitivities
         from modelica_like.report.sensitivity import sensitivity_report
         from modelica_like.solve.plot import save_plot
 

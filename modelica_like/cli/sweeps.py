@@ -27,9 +27,9 @@ def steady(
     """Find operating points of a netlist: powers, losses and efficiency, or a characteristic curve."""
     with told(debug):
         assembly = load_netlist(netlist, assignments)
-        from modelica_like.analyse.ranges import read_assignment, read_range
-        from modelica_like.analyse.steady import characteristic
-        from modelica_like.analyse.steady import steady as find
+        from modelica_like.analyse.operating.curves import characteristic
+        from modelica_like.analyse.operating.steady import steady as find
+        from modelica_like.analyse.sweeps.ranges import read_assignment, read_range
         from modelica_like.report.steady import curves_report, point_report
         from modelica_like.solve.plot import save_plot
 
@@ -59,8 +59,8 @@ def sweep(
     """Simulate a netlist over a grid of parameter values."""
     with told(debug):
         assembly = load_netlist(netlist, assignments)
-        from modelica_like.analyse.ranges import read_range
-        from modelica_like.analyse.sweep import sweep as run
+        from modelica_like.analyse.sweeps.ranges import read_range
+        from modelica_like.analyse.sweeps.sweep import sweep as run
         from modelica_like.report.progress import RunsBar
         from modelica_like.report.sweep import sweep_report, write_sweep
 

@@ -58,7 +58,7 @@ def docs(
 ) -> None:
     """Write pages about component types in Markdown: all types and an index, or the named ones."""
     with told(debug):
-        from modelica_like.report.component_docs import write_component_pages
+        from modelica_like.report.component_pages.library import write_component_pages
 
         pages = write_component_pages(output, examples, types)
         out().print(f"{len(pages)} page{'s' if len(pages) > 1 else ''} in {output}")

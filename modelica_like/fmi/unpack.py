@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import stat
 import zipfile
+import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
@@ -53,7 +54,7 @@ def unpack(path: Path, target: Path, limits: Limits = LIMITS) -> Path:
         with zipfile.ZipFile(path) as archive:
             _look_through(path.name, archive.infolist(), limits)
             archive.extractall(target)
-    except (zipfile.BadZipFile, NotImplementedError, EOFError) as error:
+    except (zipfile.BadZipFile, zlib.error, NotImplementedError, EOFError) as error:
         raise FmuRefused(f"{path.name} is no FMU: it is not a sound zip archive.", why=_sentence(error)) from None
     if b"<!DOCTYPE" in (target / _DESCRIPTION).read_bytes():
         raise FmuRefused(

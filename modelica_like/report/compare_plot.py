@@ -7,8 +7,8 @@ from fnmatch import fnmatchcase
 from typing import TYPE_CHECKING
 
 from modelica_like.errors import UnknownName
-from modelica_like.solve.plot import COLOURS, STYLE
 from modelica_like.solve.ranges import ranges
+from modelica_like.solve.style import COLOURS, STYLE
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

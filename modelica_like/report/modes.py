@@ -5,7 +5,7 @@ from __future__ import annotations
 from rich.console import Group, RenderableType
 from rich.markup import escape
 
-from modelica_like.analyse.modes import Mode, Modes
+from modelica_like.analyse.linear.modes import Mode, Modes
 from modelica_like.report.types import table
 
 _LEAST = 0.005

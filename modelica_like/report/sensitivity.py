@@ -5,8 +5,8 @@ from __future__ import annotations
 from rich.console import Group, RenderableType
 from rich.markup import escape
 
-from modelica_like.analyse.sensitivity import Sensitivities
-from modelica_like.analyse.sensitivity_report import SHOWN, relative_text, unit_text
+from modelica_like.analyse.sensitivity.derivatives import Sensitivities
+from modelica_like.analyse.sensitivity.report import SHOWN, relative_text, unit_text
 from modelica_like.report.types import table
 
 

@@ -9,7 +9,8 @@ from rich.console import Group, RenderableType
 from rich.markup import escape
 from rich.table import Table
 
-from modelica_like.analyse.steady import Curves, OperatingPoint
+from modelica_like.analyse.operating.curves import Curves
+from modelica_like.analyse.operating.steady import OperatingPoint
 from modelica_like.report.types import table
 
 

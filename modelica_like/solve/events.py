@@ -298,7 +298,8 @@ class EventLoop:
             raise self._chattering(f"There were more than {self.options.max_events} events")
 
     def _iterate(self, wanting: list[CompiledTransition]) -> None:
-        for self._round in range(self.options.iterations):
+        for number in range(self.options.iterations):
+            self._round = number
             if not wanting:
                 return
             self._fire(wanting)

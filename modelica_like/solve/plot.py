@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from modelica_like.errors import NetlistError, UnknownName, did_you_mean
 from modelica_like.solve.recorder import Event
 from modelica_like.solve.solution import Solution
+from modelica_like.solve.style import COLOURS, STYLE, headline, panels, with_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -24,13 +25,6 @@ _QUANTITIES = {
 _USUAL = ("rad/s", "N.m", "m/s", "N")
 _MOST = 6
 _MOST_EVENTS = 40
-STYLE: Any = {
-    "font.size": 9, "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True, "grid.color": "#e4e4e4",
-    "grid.linewidth": 0.6, "axes.axisbelow": True, "axes.edgecolor": "#666666", "xtick.color": "#444444",
-    "ytick.color": "#444444", "lines.linewidth": 1.5, "legend.frameon": False, "legend.fontsize": 8,
-}  # fmt: skip
-# Okabe and Ito's palette: distinct also for colour-blind readers.
-COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
 
 
 def plot(solution: Solution, patterns: Sequence[str] = (), *, title: str = "") -> Figure:
@@ -45,18 +39,16 @@ def plot(solution: Solution, patterns: Sequence[str] = (), *, title: str = "") -
         UnknownName: nothing fits a pattern.
     """
     import matplotlib as mpl
-    from matplotlib.figure import Figure
 
     groups = _by_unit(solution, chosen(solution, patterns))
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(8.0, 0.8 + 2.1 * max(len(groups), 1)), layout="constrained", dpi=150)
-        panels = figure.subplots(max(len(groups), 1), 1, sharex=True, squeeze=False)[:, 0]
-        for axes, (unit, names) in zip(panels, groups.items(), strict=False):
+        figure, rows = panels(max(len(groups), 1), 0.8 + 2.1 * max(len(groups), 1))
+        for axes, (unit, names) in zip(rows, groups.items(), strict=False):
             _draw(axes, solution, unit, names)
-        _mark_events(list(panels), solution.events)
-        panels[-1].set_xlabel("time in s")
-        panels[-1].set_xlim(solution.time[0], solution.time[-1])
-        figure.suptitle(title or solution.model.name, x=0.01, ha="left", fontsize=11, fontweight="bold")
+        _mark_events(rows, solution.events)
+        rows[-1].set_xlabel("time in s")
+        rows[-1].set_xlim(solution.time[0], solution.time[-1])
+        headline(figure, title or solution.model.name)
     return figure
 
 
@@ -125,9 +117,7 @@ def _draw(axes: Axes, solution: Solution, unit: str, names: Sequence[str]) -> No
     for k, name in enumerate(names):
         style = "-" if k < len(COLOURS) else "--"
         axes.plot(solution.time, solution[name], style, label=name, color=COLOURS[k % len(COLOURS)])
-    quantity = _QUANTITIES.get(unit, "value")
-    spelled = unit.replace(".", "\u00b7")
-    axes.set_ylabel(quantity if unit == "1" else f"{quantity} in {spelled}")
+    axes.set_ylabel(with_unit(_QUANTITIES.get(unit, "value"), unit))
     axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from modelica_like.solve.energy import EnergyBalance
-from modelica_like.solve.plot import STYLE
+from modelica_like.solve.style import STYLE, headline
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -61,7 +61,7 @@ def sankey(balance: EnergyBalance, title: str = "") -> Figure:
         _box(axes, _MIDDLE, 0.0, -1.0, "#444444")
         axes.set(xlim=(-0.45, 1.45), ylim=(-1.0 - _GAP * rows, 0.06 + _GAP * rows))
         heading = title or "energy"
-        figure.suptitle(f"{heading}: {total:.4g} J", x=0.01, ha="left", fontsize=11, fontweight="bold")
+        headline(figure, f"{heading}: {total:.4g} J")
     return figure
 
 

@@ -16,6 +16,7 @@ from modelica_like.language.mode import BoundMode
 from modelica_like.solve.energy import EnergyBalance, energy_balance
 from modelica_like.solve.idas import Integrator
 from modelica_like.solve.options import Options
+from modelica_like.solve.rates import differentiated, rate_along
 from modelica_like.solve.recorder import Event, Segment
 
 if TYPE_CHECKING:
@@ -48,8 +49,11 @@ class Statistics:
 class Values(Mapping[str, float]):
     """All variables at one instant, by path."""
 
-    def __init__(self, solution: Solution, time: float, column: Vector, discrete: Vector) -> None:
+    def __init__(
+        self, solution: Solution, time: float, column: Vector, discrete: Vector, point: Point | None = None
+    ) -> None:
         self.time = time
+        self._point = point
         self._solution = solution
         self._column = column
         self._discrete = discrete
@@ -61,6 +65,9 @@ class Values(Mapping[str, float]):
             return float(self._column[model.position[path]])
         if path in model.discrete_position:
             return float(self._discrete[model.discrete_position[path]])
+        if self._point is not None and (name := differentiated(path)):
+            now = self._point
+            return float(rate_along(model, name, np.array([now.t]), *(v[:, None] for v in (now.x, now.z, now.d)))[0])
         return float(self._solution[path][0])
 
     def __iter__(self) -> Iterator[str]:
@@ -115,8 +122,8 @@ class Solution:
         """Return a trajectory, shape (len(time),).
 
         Args:
-            key: path of a variable, mode, discrete value, parameter, or of an energy term (`clutch.loss_power`), or a
-                component's attribute.
+            key: path of a variable, mode, discrete value, parameter, or of an energy term (`clutch.loss_power`), the
+                time derivative of a variable (`der(load.w)`), or a component's attribute.
 
         Raises:
             UnknownName: there is no such variable.
@@ -134,6 +141,8 @@ class Solution:
             return np.full(len(self.time), model.p[model.parameter_position[path]])
         if path in model.derived_position:
             return np.full(len(self.time), float(model.derived(model.p)[model.derived_position[path]]))
+        if name := differentiated(path):
+            return rate_along(model, name, *self._states())
         owner, _, term = path.rpartition(".")
         if term in ENERGY_TERMS and owner in model.components:
             return self._energy_terms()[model.components.index(owner), ENERGY_TERMS.index(term)]
@@ -144,18 +153,23 @@ class Solution:
         path = self.path(key)  # type: ignore[arg-type]
         model = self.model
         known = (model.position, model.discrete_position, model.parameter_position, model.derived_position)
-        return any(path in one for one in known)
+        return any(path in one for one in known) or differentiated(path) in model.position
 
     @property
     def names(self) -> tuple[str, ...]:
         """Paths of all variables, modes and discrete values."""
         return (*self.model.position, *self.model.discrete_position)
 
-    def _arguments(self) -> tuple[Any, ...]:
+    def _states(self) -> tuple[Vector, Vector, Vector, Vector]:
+        """Times, states, implicit unknowns and discrete values of all results."""
         x = np.concatenate([s.x for s in self.segments], axis=1)
         z = np.concatenate([s.z for s in self.segments], axis=1)
         d = np.concatenate([np.repeat(s.d[:, None], len(s.times), axis=1) for s in self.segments], axis=1)
-        return self.time[None, :], x, z, self.model.p, self.model.u, d
+        return self.time, x, z, d
+
+    def _arguments(self) -> tuple[Any, ...]:
+        times, x, z, d = self._states()
+        return times[None, :], x, z, self.model.p, self.model.u, d
 
     def _variables(self) -> Vector:
         if "variables" not in self._cache:
@@ -207,7 +221,7 @@ class Solution:
 
     def _values(self, t: float, x: Vector, z: Vector, d: Vector) -> Values:
         column = np.array(self.model.variables(t, x, z, self.model.p, self.model.u, d)).ravel()
-        return Values(self, t, column, d)
+        return Values(self, t, column, d, Point(t, np.ravel(x), np.ravel(z), d))
 
     def energy(self) -> EnergyBalance:
         """Return the energy balance of every component over the run."""

@@ -7,7 +7,8 @@ import pytest
 
 from components import ConstantTorque, Inertia
 from modelica_like import build
-from modelica_like.analyse.steady import characteristic, steady
+from modelica_like.analyse.operating.curves import characteristic
+from modelica_like.analyse.operating.steady import steady
 from modelica_like.errors import InitializationError, UnknownName, ValueOutOfRange
 from modelica_like.language import Component, Equations, series
 

@@ -12,14 +12,15 @@ import pytest
 from components import ConstantTorque, Inertia
 from modelica_like import build
 from modelica_like.analyse.calibration.calibrate import Numbers, OperatingPoints, Trajectories, calibrate
-from modelica_like.analyse.linear.campbell import campbell
-from modelica_like.analyse.sweeps.importance import importance
-from modelica_like.analyse.linear.linearize import linearize
 from modelica_like.analyse.calibration.measurements import read_table
-from modelica_like.analyse.sweeps.plan import LatinHypercube
+from modelica_like.analyse.linear.campbell import campbell
+from modelica_like.analyse.linear.linearize import linearize
 from modelica_like.analyse.linear.points import when
+from modelica_like.analyse.operating.curves import characteristic
+from modelica_like.analyse.operating.steady import steady
+from modelica_like.analyse.sweeps.importance import importance
+from modelica_like.analyse.sweeps.plan import LatinHypercube
 from modelica_like.analyse.sweeps.ranges import read_assignment, read_range
-from modelica_like.analyse.steady import characteristic, steady
 from modelica_like.analyse.sweeps.sweep import sweep
 from modelica_like.analyse.sweeps.workers import Job, in_processes
 from modelica_like.errors import (

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from modelica_like.analyse.operating.steady import OperatingPoint, steady, steady_slopes
 from modelica_like.analyse.sensitivity.derivatives import sensitivities
 from modelica_like.analyse.sensitivity.outputs import read_output
-from modelica_like.analyse.steady import OperatingPoint, steady, steady_slopes
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import NetlistError, UnknownName, ValueOutOfRange, did_you_mean
 from modelica_like.units import Unit, coherent, parse_unit, to_si

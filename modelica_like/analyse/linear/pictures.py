@@ -1,4 +1,4 @@
-"""Pictures of small motions and operating points: Bode plot, mode shapes, Campbell diagram, curves."""
+"""Pictures of small motions: Bode plot, mode shapes, Campbell diagram."""
 
 from __future__ import annotations
 
@@ -10,13 +10,12 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 
-from modelica_like.solve.plot import COLOURS, STYLE
+from modelica_like.solve.style import COLOURS, STYLE, headline, panels
 
 if TYPE_CHECKING:
     from modelica_like.analyse.linear.campbell import Campbell
     from modelica_like.analyse.linear.linearize import LinearModel
     from modelica_like.analyse.linear.modes import Modes
-    from modelica_like.analyse.steady import Curves
 
 _POINTS = 600
 _DECADES = 1.0
@@ -33,7 +32,7 @@ def draw_bode(linear: LinearModel, frequencies: Any = None) -> Figure:
     f = _around(linear) if frequencies is None else np.asarray(frequencies, float)
     gains = linear.response(f)
     with mpl.rc_context(STYLE):
-        figure, (size, phase) = _panels(2, 4.6)
+        figure, (size, phase) = panels(2, 4.6)
         curves = [(o, i) for o, i in np.ndindex(gains.shape[:2]) if np.any(gains[o, i])]
         for k, (o, i) in enumerate(curves):
             label, colour = f"{linear.outputs[o]} by {linear.inputs[i]}", COLOURS[k % len(COLOURS)]
@@ -47,9 +46,7 @@ def draw_bode(linear: LinearModel, frequencies: Any = None) -> Figure:
         size.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
         phase.set(ylabel="phase in °", xlabel="frequency in Hz")
         phase.yaxis.set_major_locator(MultipleLocator(90))
-        figure.suptitle(
-            f"{linear.model.name} at t = {linear.time:g} s", x=0.01, ha="left", fontsize=11, fontweight="bold"
-        )
+        headline(figure, f"{linear.model.name} at t = {linear.time:g} s")
     return figure
 
 
@@ -63,19 +60,19 @@ def draw_shapes(modes: Modes, names: Sequence[str], count: int = 4) -> Figure:
     """
     chosen = [k for k, mode in enumerate(modes) if mode.oscillates][:count]
     with mpl.rc_context(STYLE):
-        figure, panels = _panels(max(len(chosen), 1), 0.8 + 1.4 * max(len(chosen), 1))
+        figure, rows = panels(max(len(chosen), 1), 0.8 + 1.4 * max(len(chosen), 1))
         for row, k in enumerate(chosen):
             shape = modes.shape(k, names)
             top = shape[np.argmax(np.abs(shape))]
             values = np.real(shape / top) if top else np.real(shape)
-            axes, mode = panels[row], modes[k]
+            axes, mode = rows[row], modes[k]
             axes.axhline(0.0, color="#666666", linewidth=0.8)
             axes.plot(range(len(names)), values, "o-", color=COLOURS[row % len(COLOURS)])
             axes.set(ylim=(-1.2, 1.2), ylabel="relative")
             text = f"{mode.frequency:.4g} Hz, damping {mode.damping:.3g}"
             axes.set_title(text, loc="left", fontsize=9)
-        panels[-1].set_xticks(range(len(names)), names)
-        _headline(figure, f"Modes of {modes.linear.model.name}")
+        rows[-1].set_xticks(range(len(names)), names)
+        headline(figure, f"Modes of {modes.linear.model.name}")
     return figure
 
 
@@ -83,7 +80,7 @@ def draw_campbell(diagram: Campbell) -> Figure:
     """Draw frequencies over speed with the lines of the orders and their crossings."""
     rpm = diagram.speeds * 30 / np.pi
     with mpl.rc_context(STYLE):
-        figure, (axes,) = _panels(1, 4.2)
+        figure, (axes,) = panels(1, 4.2)
         for mode, curve in enumerate(diagram.frequencies):
             axes.plot(rpm, curve, color=COLOURS[mode % len(COLOURS)], label=f"mode {mode + 1}")
         top = 1.1 * float(np.nanmax(diagram.frequencies, initial=1.0))
@@ -97,25 +94,8 @@ def draw_campbell(diagram: Campbell) -> Figure:
             axes.plot(one.speed * 30 / np.pi, one.frequency, "o", color="#000000", markersize=4)
         axes.set(xlabel=f"{diagram.speed} in rpm", ylabel="frequency in Hz", ylim=(0, top), xlim=(rpm[0], rpm[-1]))
         axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
-        _headline(figure, f"Campbell diagram of {diagram.name}")
+        headline(figure, f"Campbell diagram of {diagram.name}")
     return figure
-
-
-def draw_curves(curves: Curves, paths: Sequence[str], over: str) -> Figure:
-    """Draw columns of operating points over one of them, one panel each."""
-    with mpl.rc_context(STYLE):
-        figure, panels = _panels(max(len(paths), 1), 0.8 + 1.9 * max(len(paths), 1))
-        for k, (axes, path) in enumerate(zip(panels, paths, strict=False)):
-            axes.plot(curves[over], curves[path], color=COLOURS[k % len(COLOURS)])
-            axes.set_ylabel(_with_unit(path, curves.unit(path)))
-        panels[-1].set_xlabel(_with_unit(over, curves.unit(over)))
-        _headline(figure, curves.points[0].model.name)
-    return figure
-
-
-def _with_unit(name: str, unit: str) -> str:
-    spelled = unit.replace(".", "\u00b7")
-    return name if unit == "1" else f"{name} in {spelled}"
 
 
 def _around(linear: LinearModel) -> Any:
@@ -123,12 +103,3 @@ def _around(linear: LinearModel) -> Any:
     found = found[found > 1e-9 * found.max(initial=1.0)]
     low, high = (found.min(), found.max()) if len(found) else (0.1, 10.0)
     return np.logspace(np.log10(low) - _DECADES, np.log10(high) + _DECADES, _POINTS)
-
-
-def _panels(count: int, height: float) -> tuple[Figure, list[Any]]:
-    figure = Figure(figsize=(8.0, height), layout="constrained", dpi=150)
-    return figure, list(figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0])
-
-
-def _headline(figure: Figure, text: str) -> None:
-    figure.suptitle(text, x=0.01, ha="left", fontsize=11, fontweight="bold")

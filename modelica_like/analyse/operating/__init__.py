@@ -1,0 +1,1 @@
+"""Steady states of drives, and curves of them."""

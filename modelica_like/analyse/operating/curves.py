@@ -1,0 +1,99 @@
+"""Characteristic curves: operating points over a parameter, or over what a parameter holds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from modelica_like.analyse.operating.steady import OperatingPoint, steady
+from modelica_like.errors import InitializationError, ValueOutOfRange
+from modelica_like.simulation import Model, build
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True, eq=False)
+class Curves:
+    """Operating points along a curve.
+
+    Attributes:
+        over: path of what was varied.
+        points: one per value.
+    """
+
+    over: str
+    points: tuple[OperatingPoint, ...] = field(repr=False)
+
+    def __getitem__(self, path: str) -> Any:
+        """Return a column, shape (points,); `efficiency` and `loss` are those of the drive, in 1 and W."""
+        if path == "efficiency":
+            return np.array([one.efficiency for one in self.points])
+        if path == "loss":
+            return np.array([sum(one.losses.values()) for one in self.points])
+        return np.array([one[path] for one in self.points])
+
+    def plot(self, *paths: str, over: str = "") -> Figure:
+        """Draw columns, one panel each.
+
+        Args:
+            paths: what to draw.
+            over: the horizontal axis; by default what was varied.
+        """
+        from modelica_like.analyse.operating.pictures import draw_curves
+
+        return draw_curves(self, paths, over or self.over)
+
+    def unit(self, path: str) -> str:
+        """Return the coherent SI unit of a column."""
+        if path in ("efficiency", "loss"):
+            return "1" if path == "efficiency" else "W"
+        model = self.points[0].model
+        known = (*model.flat_variables, *model.flat_parameters, *model.flat_derived, *model.flat_discretes)
+        return next(str(one.unit) for one in known if one.path == path)
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    def __str__(self) -> str:
+        values = self[self.over]
+        name = self.points[0].model.name
+        return f"Curves of {name}: {len(self)} operating points, {self.over} = {values[0]:.6g} … {values[-1]:.6g}"
+
+
+def characteristic(drive: Model, over: Mapping[str, Iterable[Any]], *, by: str = "") -> Curves:
+    """Follow the steady states of a drive over a parameter, or over a variable that a parameter holds.
+
+    n(M), I(M) and eta(M) of a motor: `characteristic(motor, {"load.tau_constant": torques})`.
+
+    Args:
+        drive: a component, a netlist file or a compiled model.
+        over: path of one parameter, input or variable, and the values it takes; each begins from the one before.
+        by: if it is a variable: the parameter that holds it there.
+
+    Raises:
+        ValueOutOfRange: `over` is not one name with at least one value.
+        UnknownName: a name is not known.
+        InitializationError: there is no steady state for a value; the message names it.
+    """
+    if len(over) != 1:
+        raise ValueOutOfRange(f"A characteristic curve goes over one quantity, not {len(over)}.")
+    (path, values) = next(iter(over.items()))
+    model = build(drive, free=[path, by])
+    points: list[OperatingPoint] = []
+    for value in values:
+        near = points[-1] if points else None
+        try:
+            if by:
+                points.append(steady(model, {path: value}, by, near=near))
+            else:
+                points.append(steady(model, parameters={path: value}, near=near))
+        except InitializationError as error:
+            error.what = f"At {path} = {value}: {error.what}"
+            raise
+    if not points:
+        raise ValueOutOfRange(f"There is no value of {path} to go over.")
+    return Curves(path, tuple(points))
