@@ -20,6 +20,7 @@ def steady(
     over: Annotated[
         str | None, typer.Option(metavar="NAME=VALUES", help="A curve, e.g. 'load=0:0.25:26' or 'load=0,0.1,0.2'.")
     ] = None,
+    after: Annotated[str | None, typer.Option(metavar="TIME", help="Begin from the end of a run, e.g. 2s.")] = None,
     show: Annotated[list[str] | None, typer.Option(metavar="NAME", help="Variables of the table and the plot.")] = None,
     plot: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw the curve.")] = None,
     debug: Debug = False,
@@ -31,13 +32,15 @@ def steady(
         from modelica_like.analyse.operating.steady import steady as find
         from modelica_like.analyse.sweeps.ranges import read_assignment, read_range
         from modelica_like.report.steady import curves_report, point_report
+        from modelica_like.simulation import simulate
         from modelica_like.solve.plot import save_plot
 
+        near = simulate(assembly, after) if after else None
         if over is None:
             held = dict(read_assignment(text) for text in hold or ())
-            out().print(point_report(find(assembly, held, by or ()), show or ()))
+            out().print(point_report(find(assembly, held, by or (), near=near), show or ()))
             return
-        curves = characteristic(assembly, dict([read_range(over)]), by=(by or [""])[0])
+        curves = characteristic(assembly, dict([read_range(over)]), by=(by or [""])[0], near=near)
         out().print(curves_report(curves, show or ()))
         if plot:
             save_plot(curves.plot(*(show or ("efficiency",))), plot)

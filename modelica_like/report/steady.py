@@ -13,13 +13,18 @@ from modelica_like.analyse.operating.curves import Curves
 from modelica_like.analyse.operating.steady import OperatingPoint
 from modelica_like.report.types import table
 
+_SMALL = 1e-9
+"""Share of the largest power below which one is rounding."""
+
 
 def point_report(point: OperatingPoint, names: Sequence[str] = ()) -> RenderableType:
     """Return the powers of an operating point, its efficiency, and the values of variables."""
     model = point.model
     made = table("powers in W", "component", "from outside>", "lost>")
-    for path, (source, loss) in point.powers.items():
-        if source or loss:
+    powers = point.powers
+    largest = max((abs(one) for pair in powers.values() for one in pair), default=0.0)
+    for path, (source, loss) in powers.items():
+        if max(abs(source), abs(loss)) > _SMALL * largest:
             made.add_row(escape(path or model.name), f"{source:.6g}", f"{loss:.6g}")
     parts: list[RenderableType] = [f"[bold]{escape(model.name)}[/]  steady state", "", made]
     if np.isfinite(point.efficiency):

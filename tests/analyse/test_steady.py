@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from components import ConstantTorque, Inertia
-from modelica_like import build
+from modelica_like import build, simulate
 from modelica_like.analyse.operating.curves import characteristic
 from modelica_like.analyse.operating.steady import steady
 from modelica_like.errors import InitializationError, UnknownName, ValueOutOfRange
@@ -75,6 +75,22 @@ def test_wrong_calls(motor):
         steady(motor, {"motor.w": 400.0}, by="last_load")
     with pytest.raises(ValueOutOfRange, match="over one quantity, not 2"):
         characteristic(motor, {"first_load": [0.1], "supply": [24.0]})
+
+
+def test_a_gearbox_begins_from_a_run_that_has_closed_its_clutches():
+    """Document 001, first gear: ratio (1 + 1/1.917)·2.74, efficiency 0.96368 with 0.99 in every mesh."""
+    gears = EXAMPLES / "lepelletier_gears.toml"
+    point = steady(gears, near=simulate(gears, "2 s"))
+    assert point["motor.w"] / point["load.w"] == pytest.approx((1 + 1 / 1.917) * 2.74, rel=1e-9)
+    assert point.efficiency == pytest.approx(0.96368, abs=5e-6)
+    assert point.stuck == ("box.clutch_a", "box.brake_d")
+
+
+def test_a_gear_that_locks_itself_is_told():
+    """A worm of efficiency 0.4 is not turned by its load."""
+    point = steady(EXAMPLES / "components" / "self_locking_worm.toml")
+    assert point.stuck == ("worm",)
+    assert point["worm.w_a"] == 0.0
 
 
 class Accelerated(Component):

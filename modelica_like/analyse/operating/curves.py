@@ -11,6 +11,7 @@ import numpy as np
 from modelica_like.analyse.operating.steady import OperatingPoint, steady
 from modelica_like.errors import InitializationError, ValueOutOfRange
 from modelica_like.simulation import Model, build
+from modelica_like.solve.solution import Solution
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -64,7 +65,9 @@ class Curves:
         return f"Curves of {name}: {len(self)} operating points, {self.over} = {values[0]:.6g} … {values[-1]:.6g}"
 
 
-def characteristic(drive: Model, over: Mapping[str, Iterable[Any]], *, by: str = "") -> Curves:
+def characteristic(
+    drive: Model, over: Mapping[str, Iterable[Any]], *, by: str = "", near: OperatingPoint | Solution | None = None,
+) -> Curves:  # fmt: skip
     """Follow the steady states of a drive over a parameter, or over a variable that a parameter holds.
 
     n(M), I(M) and eta(M) of a motor: `characteristic(motor, {"load.tau_constant": torques})`.
@@ -73,6 +76,7 @@ def characteristic(drive: Model, over: Mapping[str, Iterable[Any]], *, by: str =
         drive: a component, a netlist file or a compiled model.
         over: path of one parameter, input or variable, and the values it takes; each begins from the one before.
         by: if it is a variable: the parameter that holds it there.
+        near: where to begin, as in `steady`.
 
     Raises:
         ValueOutOfRange: `over` is not one name with at least one value.
@@ -85,7 +89,7 @@ def characteristic(drive: Model, over: Mapping[str, Iterable[Any]], *, by: str =
     model = build(drive, free=[path, by])
     points: list[OperatingPoint] = []
     for value in values:
-        near = points[-1] if points else None
+        near = points[-1] if points else near
         try:
             if by:
                 points.append(steady(model, {path: value}, by, near=near))

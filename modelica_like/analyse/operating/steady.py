@@ -14,6 +14,7 @@ from modelica_like.errors import InitializationError, UnknownName, ValueOutOfRan
 from modelica_like.initialize import Point, call, initialize
 from modelica_like.initialize.steady import check_modes_hold, moving_states, solve_steady
 from modelica_like.simulation import Model, build
+from modelica_like.solve.solution import Solution
 from modelica_like.units import to_si
 
 if TYPE_CHECKING:
@@ -93,7 +94,7 @@ class OperatingPoint(Mapping[str, float]):
 
 def steady(
     drive: Model, hold: Mapping[str, Any] | None = None, by: Sequence[str] | str = (), *,
-    parameters: Mapping[str, Any] | None = None, near: OperatingPoint | None = None,
+    parameters: Mapping[str, Any] | None = None, near: OperatingPoint | Solution | None = None,
 ) -> OperatingPoint:  # fmt: skip
     """Find a steady state of a drive: all derivatives zero, except of states that nothing depends on.
 
@@ -105,7 +106,8 @@ def steady(
         hold: values of variables, numbers in SI units or quantities.
         by: the parameters or inputs to find, as many as are held.
         parameters: other values of parameters and inputs.
-        near: an operating point to begin from; otherwise the guesses of the model.
+        near: what to begin from: another operating point, or the end of a run with its modes (clutches that have
+            locked); otherwise the guesses of the model.
 
     Raises:
         ValueOutOfRange: not as many parameters as held variables.
@@ -117,9 +119,10 @@ def steady(
         model = model.with_parameters(dict(parameters))
     free = [by] if isinstance(by, str) else list(by)
     targets = _targets(model, hold or {}, free)
-    if near is not None and free:
+    if isinstance(near, OperatingPoint) and free:
         model = model.with_parameters({name: near[name] for name in free})
-    point = _settle(model, near.point if near is not None else None)
+    begin = near.point(float(near.time[-1])) if isinstance(near, Solution) else near.point if near else None
+    point = _settle(model, begin)
     if free:
         model, point = _hold(model, point, targets, free)
     return _operating_point(model, point)
