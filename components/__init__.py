@@ -9,6 +9,8 @@ from components.adaptors import TemperatureToHeatFlowAdaptor as TemperatureToHea
 from components.adaptors import TorqueToAngleAdaptor as TorqueToAngleAdaptor
 from components.adaptors import VoltageToCurrentAdaptor as VoltageToCurrentAdaptor
 from components.belts import TimingBelt as TimingBelt
+from components.bristle_friction import LuGreFriction as LuGreFriction
+from components.choppers import HBridge as HBridge
 from components.control import PI as PI
 from components.control import PID as PID
 from components.control import ClutchActuator as ClutchActuator
@@ -16,10 +18,15 @@ from components.control import Feedback as Feedback
 from components.control import FirstOrder as FirstOrder
 from components.control import Gain as Gain
 from components.control import Integrator as Integrator
+from components.control import Limiter as Limiter
+from components.control import P as P
+from components.control import Sum as Sum
 from components.dc_machines import PermanentMagnetDCMachine as PermanentMagnetDCMachine
 from components.dc_machines import SeparatelyExcitedDCMachine as SeparatelyExcitedDCMachine
 from components.dc_machines import SeriesDCMachine as SeriesDCMachine
 from components.dc_machines import ShuntDCMachine as ShuntDCMachine
+from components.eddy_current_brakes import EddyCurrentForce as EddyCurrentForce
+from components.eddy_current_brakes import EddyCurrentTorque as EddyCurrentTorque
 from components.electrical import Capacitor as Capacitor
 from components.electrical import ConstantCurrent as ConstantCurrent
 from components.electrical import ConstantVoltage as ConstantVoltage
@@ -53,6 +60,12 @@ from components.interfaces import LinearFlange as LinearFlange
 from components.loads import SpeedDependentLoad as SpeedDependentLoad
 from components.lossy_gears import ConstantEfficiencyGear as ConstantEfficiencyGear
 from components.lossy_gears import LossyGear as LossyGear
+from components.motions import InitializeFlange as InitializeFlange
+from components.motions import Move as Move
+from components.motions import RelativeStates as RelativeStates
+from components.motions import TranslationalInitializeFlange as TranslationalInitializeFlange
+from components.motions import TranslationalMove as TranslationalMove
+from components.motions import TranslationalRelativeStates as TranslationalRelativeStates
 from components.one_way import Freewheel as Freewheel
 from components.one_way import OneWayClutch as OneWayClutch
 from components.one_way import TorqueLimiter as TorqueLimiter
@@ -60,6 +73,7 @@ from components.planetary import Differential as Differential
 from components.planetary import IdealPlanetary as IdealPlanetary
 from components.planetary import LossyPlanetarySet as LossyPlanetarySet
 from components.planetary import PlanetarySet as PlanetarySet
+from components.point_to_point import KinematicPTP2 as KinematicPTP2
 from components.screw_drives import BallScrewDrive as BallScrewDrive
 from components.sensors import AngleSensor as AngleSensor
 from components.sensors import ForceSensor as ForceSensor
@@ -115,11 +129,16 @@ from components.springs import SpringDamper as SpringDamper
 from components.springs import TranslationalDamper as TranslationalDamper
 from components.springs import TranslationalSpring as TranslationalSpring
 from components.springs import TranslationalSpringDamper as TranslationalSpringDamper
+from components.stepped_signals import BooleanPulse as BooleanPulse
+from components.stepped_signals import BooleanStep as BooleanStep
+from components.stepped_signals import BooleanTable as BooleanTable
+from components.stepped_signals import StepTable as StepTable
 from components.thermal import FixedTemperature as FixedTemperature
 from components.thermal import HeatPort as HeatPort
 from components.thermal import HeatSource as HeatSource
 from components.thermal import ThermalConductor as ThermalConductor
 from components.thermal import ThermalMass as ThermalMass
+from components.torque_converters import TorqueConverter as TorqueConverter
 from components.translational_sensors import LinearAccelerationSensor as LinearAccelerationSensor
 from components.translational_sensors import LinearMultiSensor as LinearMultiSensor
 from components.translational_sensors import LinearPowerSensor as LinearPowerSensor
@@ -137,7 +156,18 @@ from components.translational_sources import TranslationalAccelerate as Translat
 from components.translational_sources import TranslationalPosition as TranslationalPosition
 from components.transmissions import Lepelletier as Lepelletier
 from components.transmissions import Ravigneaux as Ravigneaux
-from components.wheels import EddyCurrentTorque as EddyCurrentTorque
+from components.universal_joints import UniversalJoint as UniversalJoint
+from components.vehicles import RollingResistance as RollingResistance
+from components.vehicles import Vehicle as Vehicle
+from components.waves import CombiTable as CombiTable
+from components.waves import Cosine as Cosine
+from components.waves import Exponentials as Exponentials
+from components.waves import ExpSine as ExpSine
+from components.waves import LogFrequencySweep as LogFrequencySweep
+from components.waves import SawTooth as SawTooth
+from components.waves import Sinc as Sinc
+from components.waves import VariableSine as VariableSine
+from components.wheels import IdealGearR2T as IdealGearR2T
 from components.wheels import IdealRollingWheel as IdealRollingWheel
 
 __all__ = [
@@ -150,11 +180,15 @@ __all__ = [
     "BallScrew",
     "BallScrewDrive",
     "BearingFriction",
+    "BooleanPulse",
+    "BooleanStep",
+    "BooleanTable",
     "Brake",
     "Capacitor",
     "Clutch",
     "ClutchActuator",
     "CoilForce",
+    "CombiTable",
     "Compliant",
     "CompliantWithRelativeStates",
     "Constant",
@@ -165,16 +199,20 @@ __all__ = [
     "ConstantTorque",
     "ConstantVelocity",
     "ConstantVoltage",
+    "Cosine",
     "CurrentSensor",
     "CurrentSink",
     "CurrentToVoltageAdaptor",
     "Damper",
     "Differential",
     "DryFriction",
+    "EddyCurrentForce",
     "EddyCurrentTorque",
     "ElastoBacklash",
     "ElastoBacklash2",
     "ElastoGap",
+    "ExpSine",
+    "Exponentials",
     "Feedback",
     "FirstOrder",
     "Fixed",
@@ -190,32 +228,41 @@ __all__ = [
     "Gain",
     "Gearbox",
     "Ground",
+    "HBridge",
     "HeatFlowToTemperatureAdaptor",
     "HeatPort",
     "HeatSource",
     "IdealGear",
+    "IdealGearR2T",
     "IdealPlanetary",
     "IdealRollingWheel",
     "Inductor",
     "Inertia",
+    "InitializeFlange",
     "Integrator",
     "InverseSpeedDependentForce",
     "InverseSpeedDependentTorque",
+    "KinematicPTP2",
     "Lepelletier",
+    "Limiter",
     "LinearAccelerationSensor",
     "LinearFlange",
     "LinearMultiSensor",
     "LinearPowerSensor",
     "LinearSpeedDependentForce",
     "LinearSpeedDependentTorque",
+    "LogFrequencySweep",
     "LossyGear",
     "LossyPlanetarySet",
+    "LuGreFriction",
     "MachineTable",
     "Mass",
     "MassWithStopAndFriction",
+    "Move",
     "MultiPlateClutch",
     "MultiSensor",
     "OneWayClutch",
+    "P",
     "PermanentMagnetDCMachine",
     "Pin",
     "PlanetarySet",
@@ -233,9 +280,12 @@ __all__ = [
     "RelativeAngleSensor",
     "RelativePositionSensor",
     "RelativeSpeedSensor",
+    "RelativeStates",
     "RelativeVelocitySensor",
     "Resistor",
     "Rod",
+    "RollingResistance",
+    "SawTooth",
     "SeparatelyExcitedDCMachine",
     "SeriesDCMachine",
     "ShiftSchedule",
@@ -243,6 +293,7 @@ __all__ = [
     "SignForce",
     "SignTorque",
     "SignalVoltage",
+    "Sinc",
     "Sine",
     "Speed",
     "SpeedDependentLoad",
@@ -251,8 +302,10 @@ __all__ = [
     "Spring",
     "SpringDamper",
     "Step",
+    "StepTable",
     "StribeckBearing",
     "StribeckFriction",
+    "Sum",
     "SupportFriction",
     "Switch",
     "Table",
@@ -263,6 +316,7 @@ __all__ = [
     "TimingBelt",
     "Torque",
     "Torque2",
+    "TorqueConverter",
     "TorqueLimiter",
     "TorqueSensor",
     "TorqueStep",
@@ -271,12 +325,18 @@ __all__ = [
     "TranslationalBrake",
     "TranslationalDamper",
     "TranslationalFixed",
+    "TranslationalInitializeFlange",
+    "TranslationalMove",
     "TranslationalPosition",
+    "TranslationalRelativeStates",
     "TranslationalSpeed",
     "TranslationalSpring",
     "TranslationalSpringDamper",
     "Trapezoid",
+    "UniversalJoint",
     "VariableResistor",
+    "VariableSine",
+    "Vehicle",
     "VelocitySensor",
     "VoltageSensor",
     "VoltageToCurrentAdaptor",

@@ -27,6 +27,16 @@ _SETTLED_AFTER = 9
 """Decades after which an exponential counts as settled."""
 
 
+def at_limits(limit: Mode, free: Expr, low: Expr, high: Expr) -> Events:
+    """Yield the events of a signal, free of limits, that meets and leaves its limits."""
+    yield limit.initially("high", when=free > high)
+    yield limit.initially("low", when=free < low)
+    yield limit.go("free", "high", when=free > high)
+    yield limit.go("free", "low", when=free < low)
+    yield limit.go("high", "free", when=free < high)
+    yield limit.go("low", "free", when=free > low)
+
+
 class Feedback(Component):
     """Difference of set value and measured value."""
 
@@ -47,6 +57,62 @@ class Gain(Component):
 
     def equations(self) -> Equations:
         yield self.y == self.k * self.u
+
+
+class Sum(Component):
+    """Sum of two signals."""
+
+    u1: Input = signal_in("*", "first signal")
+    u2: Input = signal_in("*", "second signal")
+    y: Output = signal_out("*", "u1 + u2")
+
+    def equations(self) -> Equations:
+        yield self.y == self.u1 + self.u2
+
+
+class Limiter(Component):
+    """Signal that keeps between ±y_max; with y_min given, between y_min and y_max. It has a kink at an event."""
+
+    u: Input = signal_in("*", "signal")
+    y_max: Parameter = param("*", "upper limit")
+    y_min: Parameter = param("*", "lower limit; without a value -y_max", default=None)
+    y: Output = signal_out("*", "limited signal")
+    limit = Mode("free", "high", "low", description="limit of the signal")
+
+    @property
+    def lowest(self) -> Expr:
+        """Lower limit."""
+        return self.y_min if self.given("y_min") else -self.y_max
+
+    def equations(self) -> Equations:
+        yield self.y == self.limit.choose(free=self.u, high=self.y_max, low=self.lowest)
+
+    def events(self) -> Events:
+        yield from at_limits(self.limit, self.u, self.lowest, self.y_max)
+
+
+class P(Component):
+    """Proportional controller y = k·(u_s - u_m), limited to ±y_max where that is given; it needs no anti-windup."""
+
+    u_s: Input = signal_in("*", "set value")
+    u_m: Input = signal_in("*", "measured value")
+    k: Parameter = param("*", "gain, output over error")
+    y_max: Parameter = param("*", "limit of the output")
+    y: Output = signal_out("*", "output")
+    limit = Mode("free", "high", "low", description="limit of the output")
+
+    def free_output(self) -> Expr:
+        """Return the output without limit."""
+        return self.k * (self.u_s - self.u_m)
+
+    def equations(self) -> Equations:
+        free = self.free_output()
+        limited = self.given("y_max")
+        yield self.y == (self.limit.choose(free=free, high=self.y_max, low=-self.y_max) if limited else free)
+
+    def events(self) -> Events:
+        if self.given("y_max"):
+            yield from at_limits(self.limit, self.free_output(), -self.y_max, self.y_max)
 
 
 class FirstOrder(Component):
@@ -71,7 +137,7 @@ class Integrator(Component):
 
 
 class PI(Component):
-    """Proportional-integral controller y = k·(e + 1/Ti·∫e dt), e = u_s - u_m.
+    """Proportional-integral controller y = k·(e + 1/Ti·∫e dt) + u_ff, e = u_s - u_m.
 
     With y_max given, the output is limited to ±y_max, and the integral keeps its value while the output is at a limit
     that the error would push further (anti-windup by clamping).
@@ -79,6 +145,7 @@ class PI(Component):
 
     u_s: Input = signal_in("*", "set value")
     u_m: Input = signal_in("*", "measured value")
+    u_ff: Input = signal_in("*", "feed-forward, in units of the output", default=0.0)
     k: Parameter = param("*", "gain, output over error")
     Ti: Parameter = param("s", "reset time", min=1e-12)
     y_max: Parameter = param("*", "limit of the output")
@@ -89,7 +156,7 @@ class PI(Component):
 
     def free_output(self) -> Expr:
         """Return the output without limit."""
-        return self.k * (self.e + self.integral)
+        return self.k * (self.e + self.integral) + self.u_ff
 
     def equations(self) -> Equations:
         yield self.e == self.u_s - self.u_m
@@ -102,13 +169,7 @@ class PI(Component):
 
     def events(self) -> Events:
         if self.given("y_max"):
-            limit, free = self.limit, self.free_output()
-            yield limit.initially("high", when=free > self.y_max)
-            yield limit.initially("low", when=free < -self.y_max)
-            yield limit.go("free", "high", when=free > self.y_max)
-            yield limit.go("free", "low", when=free < -self.y_max)
-            yield limit.go("high", "free", when=free < self.y_max)
-            yield limit.go("low", "free", when=free > -self.y_max)
+            yield from at_limits(self.limit, self.free_output(), -self.y_max, self.y_max)
 
 
 class PID(Component):

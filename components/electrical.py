@@ -151,13 +151,30 @@ class ConstantCurrent(ElectricalSource):
 
 
 class CurrentSink(ElectricalSource):
-    """Current drawn at p and returned at n, given by a signal: an electronic load."""
+    """Electronic load: draws at p, and returns at n, the current of a signal, but drives none itself.
+
+    It cannot have less than its smallest resistance: where the voltage does not suffice for the current, e.g. because a
+    generator comes to rest, that resistance is what is left of it; at a reversed voltage it draws nothing. Where an
+    inductance is in series, whose current cannot jump, it needs a capacitor in parallel, as such loads have one.
+    """
 
     i_ref: Input = signal_in("A", "current drawn at p")
+    R_min: Parameter = param("Ohm", "smallest resistance", default=1e-3, min=1e-12)
+    load = Mode("sinking", "empty", "reversed", description="whether the voltage suffices for the current")
 
     def equations(self) -> Equations:
         yield from super().equations()
-        yield self.i == self.i_ref
+        sinking, empty = self.i - self.i_ref, self.v - self.R_min * self.i
+        yield self.load.choose(sinking=sinking, empty=empty, reversed=self.i) == 0
+
+    def events(self) -> Events:
+        load, fails = self.load, self.v < self.R_min * self.i_ref
+        yield load.initially("reversed", when=self.v < 0)
+        yield load.initially("empty", when=fails)
+        yield load.go("sinking", "empty", when=fails)
+        yield load.go("empty", "sinking", when=self.i > self.i_ref)
+        yield load.go("empty", "reversed", when=self.v < 0)
+        yield load.go("reversed", "empty", when=self.v > 0)
 
 
 class Switch(Lossy, TwoPins):

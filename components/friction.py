@@ -71,22 +71,22 @@ class Sticking(Lossy, partial=True):
         """Return the friction, a negative one, that they can bear against backward sliding."""
         return -self.holds_forward()
 
-    def carried(self) -> Expr | float:
-        """Return 1 where a prescribed motion carries the surfaces along, so that they cannot stick; otherwise 0."""
-        return 0.0 if self.given("creep") else prescribed(self.slip)
+    def carried(self) -> Expr | bool:
+        """Return the condition on which a prescribed motion carries the surfaces along, so that they cannot stick."""
+        return False if self.given("creep") else prescribed(self.slip) > 0
 
-    def stuck(self) -> Expr:
+    def sticking(self) -> Expr:
         """Return what is zero while the surfaces stick."""
         creeping = self.creep * self.friction - self.slip / self.creep_time if self.given("creep") else 0.0
-        return where(self.carried() > 0, self.friction, der(self.slip) - creeping)
+        return where(self.carried(), self.friction, der(self.slip) - creeping)
 
     def breaks_forward(self) -> Expr:
         """Return the condition on which surfaces that stick begin to slide forward."""
-        return where(self.carried() > 0, self._soon() - self.rest, self.friction - self.holds_forward()) > 0
+        return where(self.carried(), self._soon() - self.rest, self.friction - self.holds_forward()) > 0
 
     def breaks_backward(self) -> Expr:
         """Return the condition on which surfaces that stick begin to slide backward."""
-        return where(self.carried() > 0, self._soon() + self.rest, self.friction - self.holds_backward()) < 0
+        return where(self.carried(), self._soon() + self.rest, self.friction - self.holds_backward()) < 0
 
     def _soon(self) -> Expr:
         return self.slip + self.creep_time * der(self.slip)
@@ -95,7 +95,7 @@ class Sticking(Lossy, partial=True):
         """Return the condition on which surfaces that slide in a direction come to rest."""
         # A prescribed motion may end in standstill without ever passing it; then nothing brakes it any more.
         still = 0.5 * self.rest - direction * self.creep_time * der(self.slip)
-        return direction * self.slip < self.carried() * _NOW * still
+        return direction * self.slip < where(self.carried(), _NOW * still, 0)
 
     def events(self) -> Events:
         mode, slip = self.mode, self.slip
@@ -160,7 +160,7 @@ class DryFriction(Sticking, partial=True):
         forward = self.sliding_friction(maximum(self.slip, 0))
         backward = self.sliding_friction(maximum(-self.slip, 0))
         yield self.mode.choose(
-            free=self.friction - self.idle_friction(), stuck=self.stuck(),
+            free=self.friction - self.idle_friction(), stuck=self.sticking(),
             start_forward=self.friction - at_rest, start_backward=self.friction + at_rest,
             forward=self.friction - forward, backward=self.friction + backward,
         ) == 0  # fmt: skip

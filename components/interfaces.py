@@ -91,6 +91,11 @@ class Supported(Component, partial=True):
         """Angle of the housing."""
         return self.support.phi if self.support.used else 0.0
 
+    @property
+    def w_support(self) -> Expr | float:
+        """Speed of the housing."""
+        return der(self.support.phi) if self.support.used else 0.0
+
     def support_torque(self, shaft_torque: Expr) -> Equations:
         """Yield the balance of the housing: it carries what the shafts bring in."""
         if self.support.used:

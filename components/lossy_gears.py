@@ -87,7 +87,7 @@ class MeshWithFriction(ShaftSticking, TwoFlanges, partial=True):
         yield der(self.phi_a) == self.w_a
         yield b.tau + self.ratio * (a.tau - loss) == 0
         yield self.mode.choose(
-            stuck=self.stuck(),
+            stuck=self.sticking(),
             start_forward=loss - self.forward_loss(0),
             start_backward=loss - self.backward_loss(0),
             forward=loss - self.forward_loss(maximum(self.w_a, 0)),

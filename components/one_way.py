@@ -54,16 +54,16 @@ class OneWayClutch(Clutch):
     def sliding_friction(self, speed: Expr | float) -> Expr:
         return where(self.f_normalized > 0, super().sliding_friction(speed), self.tau_drag)
 
-    def carried(self) -> Expr | float:
-        # It holds against falling behind whatever prescribes that.
-        return 0.0
+    def carried(self) -> Expr | bool:
+        # It holds against falling behind, whatever prescribes that.
+        return False
 
     def equations(self) -> Equations:
         yield from CompliantWithRelativeStates.equations(self)
         at_rest = self.sliding_friction(0)
         moving = self.tau - self.sliding_friction(where(self.w_rel > 0, self.w_rel, 0))
         yield self.mode.choose(
-            stuck=self.stuck(), start_forward=self.tau - at_rest,
+            stuck=self.sticking(), start_forward=self.tau - at_rest,
             forward=moving, otherwise=self.tau,
         ) == 0  # fmt: skip
         if self.heat_port.used:

@@ -230,7 +230,29 @@ class Trapezoid(Periodic):
         yield self.stage.go("falling", "low", at=fall + self.falling, reset={self.done: done})
 
 
-class Table(Component):
+class Rowwise(Component, partial=True):
+    """Signal from a table over time, with a time event at every row."""
+
+    time_scale: Parameter = param("s", "what counts as 1 in the times", default=1.0)
+    y: Output = signal_out("*", "signal")
+    row: Discrete = discrete("1", "number of the last row that was passed", start=-1.0)
+    kinks = Mode("ahead", description="rows still ahead")
+
+    def moments(self) -> tuple[float, ...]:
+        """Return the times of the rows."""
+        raise NotImplementedError
+
+    def events(self) -> Events:
+        now, following, passed = self.time / self.time_scale, _NEVER, -1.0
+        for k, moment in reversed(list(enumerate(self.moments()))):
+            following = where(self.row < k, moment, following)
+            passed = passed + where(now < moment, 0, 1)
+        # A run may start late: then all rows before count as passed at once.
+        ahead = {self.row: maximum(self.row + 1, passed)}
+        yield self.kinks.go("ahead", "ahead", at=following * self.time_scale, reset=ahead)
+
+
+class Table(Rowwise):
     """Signal that interpolates in a table of time and value; beyond its ends the last slope goes on."""
 
     table: tuple[tuple[float, float], ...]
@@ -238,21 +260,14 @@ class Table(Component):
     smooth: bool = False
     """Interpolate with a continuous slope instead of straight lines."""
     scale: Parameter = param("*", "what counts as 1 in the values", default=1.0)
-    time_scale: Parameter = param("s", "what counts as 1 in the times", default=1.0)
-    y: Output = signal_out("*", "signal")
-    row: Discrete = discrete("1", "number of the last row that was passed", start=-1.0)
-    kinks = Mode("ahead", description="rows still ahead")
+
+    def moments(self) -> tuple[float, ...]:
+        return () if self.smooth else tuple(moment for moment, _ in self.table)
 
     def equations(self) -> Equations:
         times, values = zip(*self.table, strict=True)
         yield self.y == self.scale * interpolate(self.time / self.time_scale, times, values, smooth=self.smooth)
 
     def events(self) -> Events:
-        now, following, passed = self.time / self.time_scale, _NEVER, -1.0
-        for k, (moment, _) in reversed(list(enumerate(self.table))):
-            following = where(self.row < k, moment, following)
-            passed = passed + where(now < moment, 0, 1)
         if not self.smooth:
-            # A run may start late: then all rows before count as passed at once.
-            ahead = {self.row: maximum(self.row + 1, passed)}
-            yield self.kinks.go("ahead", "ahead", at=following * self.time_scale, reset=ahead)
+            yield from super().events()

@@ -212,7 +212,7 @@ class MassWithStopAndFriction(SlideSticking, DryFriction):
     def pressed(self) -> Expr:
         return any_of(super().pressed(), negate(self.stop.is_("none")))
 
-    def carried(self) -> Expr | float:
+    def carried(self) -> Expr | bool:
         return where(self.stop.is_("none"), super().carried(), 0)
 
     def breaks_forward(self) -> Expr:

@@ -16,6 +16,7 @@ from modelica_like.language.declared import unknown
 from modelica_like.language.expr import leaf_id
 from modelica_like.language.fields import Input, Parameter, Value
 from modelica_like.unitcheck import Dimensions, check_expression
+from modelica_like.units import ONE, Unit, read_quantity
 
 
 class Parameters:
@@ -34,7 +35,8 @@ class Parameters:
         self._position: dict[tuple[int, str], int] = {}
         self._open: list[str] = []
         self._by_leaf: dict[int, int] = {}
-        self._dimensions = Dimensions(lambda leaf: self.flat[self._by_leaf[leaf_id(leaf)]].unit)
+        self._quantities: dict[int, tuple[Any, float, Unit]] = {}
+        self._dimensions = Dimensions(self._unit_of_leaf)
 
     def declare(self, component: Component, name: str, path: str) -> int | None:
         """Give a parameter its place in q; None if it has no value."""
@@ -93,11 +95,28 @@ class Parameters:
         """
         if value.formula is None:
             return value.number
-        expression = ca.SX(value.formula.evaluate(lambda path: self._look_up(scope, path, label)))
-        if expression.is_constant() and not math.isfinite(float(expression)):
-            raise ValueOutOfRange(f"{label} must be a finite number, not {float(expression):g}.")
+        expression = ca.SX(value.formula.evaluate(lambda path: self._look_up(scope, path, label), self._quantity))
+        result = self._with_numbers(expression)
+        if result.is_constant() and not math.isfinite(float(result)):
+            raise ValueOutOfRange(f"{label} must be a finite number, not {float(result):g}.")
         check_expression(expression, value.unit, self._dimensions, f"{label} = {value.formula}")
-        return expression
+        return result
+
+    def _quantity(self, text: str) -> Any:
+        """Return a symbol for a number with a unit, so that the unit is checked with the formula."""
+        number, unit = read_quantity(text) or (math.nan, ONE)
+        symbol = ca.SX.sym(text)
+        self._quantities[leaf_id(symbol)] = symbol, number * unit.factor + unit.offset, unit
+        return symbol
+
+    def _with_numbers(self, expression: Any) -> Any:
+        found = [self._quantities[key] for leaf in ca.symvar(expression) if (key := leaf_id(leaf)) in self._quantities]
+        symbols, numbers = ca.vertcat(*(one[0] for one in found)), ca.DM([one[1] for one in found])
+        return ca.substitute(expression, symbols, ca.SX(numbers)) if found else expression
+
+    def _unit_of_leaf(self, leaf: Any) -> Unit:
+        key = leaf_id(leaf)
+        return self._quantities[key][2] if key in self._quantities else self.flat[self._by_leaf[key]].unit
 
     def _look_up(self, scope: Component, path: str, label: str) -> Any:
         owner_path, _, name = path.rpartition(".")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, Self, overload
 
@@ -9,6 +10,9 @@ from modelica_like.errors import LanguageError, UnitError, ValueOutOfRange
 from modelica_like.language.expr import Expr, symbol_of
 from modelica_like.language.formula import Arithmetic, Formula, as_formula, parse_formula
 from modelica_like.units import ANY, Unit, parse_unit, read_quantity, to_si
+
+_CALCULATES = re.compile(r"\s[-+*/]\s")
+"""What follows a number is no unit, but goes on as a formula."""
 
 StatePreference = Literal["always", "prefer", "default", "avoid"]
 
@@ -100,6 +104,8 @@ class Field:
         try:
             return read_quantity(text)
         except UnitError as error:
+            if _CALCULATES.search(text):
+                return None
             raise UnitError(f"{self.label} = '{text}': {error.what}", advice=error.advice) from None
 
     def _checked(self, number: float, given: Any) -> float:

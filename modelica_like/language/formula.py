@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import math
 import operator
+import re
 import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -12,7 +13,8 @@ from typing import Any, cast
 
 import casadi as ca
 
-from modelica_like.errors import NetlistError, did_you_mean
+from modelica_like.errors import NetlistError, UnitError, did_you_mean
+from modelica_like.units import parse_unit
 
 _MAX_LENGTH = 2000
 _MAX_DEPTH = 150
@@ -29,6 +31,10 @@ _OPERATIONS: dict[str, _Operation] = {
 }  # fmt: skip
 _FUNCTIONS = ("sqrt", "abs", "sin", "cos", "tan", "exp", "log", "tanh", "min", "max")
 _CONSTANTS = {"pi": math.pi}
+_QUANTITY = re.compile(
+    r"(?<![\w.])((?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?[ \t]+)((?:[^\W\d_]|[%°])[^\s+*,()-]*(?:\([\w.]+\)[\w.]*)?)"
+)
+_PLACEHOLDER = "_quantity_{}_"
 _PRECEDENCE = {"+": 1, "-": 1, "*": 2, "/": 2, "neg": 3, "**": 4}
 
 
@@ -75,8 +81,9 @@ class Formula(Arithmetic):
     """Expression tree over named parameters.
 
     Attributes:
-        operation: `number`, `name`, an operator, or a function name.
-        operands: one float, one dotted path (or the parameter's declaration), or the operand formulas.
+        operation: `number`, `quantity`, `name`, an operator, or a function name.
+        operands: one float, one text with a unit, one dotted path (or the parameter's declaration), or the operand
+            formulas.
     """
 
     operation: str
@@ -90,14 +97,26 @@ class Formula(Arithmetic):
             if isinstance(operand, Formula):
                 yield from operand.names()
 
-    def evaluate(self, lookup: Callable[[str], Any]) -> Any:
-        """Compute the value; `lookup` gives the value (a number or an expression) of a path."""
+    def evaluate(self, lookup: Callable[[str], Any], quantity: Callable[[str], Any] | None = None) -> Any:
+        """Compute the value.
+
+        Args:
+            lookup: gives the value (a number or an expression) of a path.
+            quantity: gives the value of a number with a unit.
+
+        Raises:
+            NetlistError: there is a unit where only numbers count.
+        """
         if self.operation == "number":
             # In CasADi's arithmetic 1/0 and (-1)**0.5 are values that a check finds, in Python's they are exceptions.
             return ca.SX(self.operands[0])
+        if self.operation == "quantity":
+            if quantity is None:
+                raise NetlistError(f"'{self.operands[0]}' has a unit, but this formula takes plain numbers only.")
+            return quantity(self.operands[0])
         if self.operation == "name":
             return lookup(self._name())
-        return _OPERATIONS[self.operation](*(operand.evaluate(lookup) for operand in self.operands))
+        return _OPERATIONS[self.operation](*(operand.evaluate(lookup, quantity) for operand in self.operands))
 
     def _name(self) -> str:
         # In a class body a parameter is used before the class, and so its name, exists: it is asked for late.
@@ -112,6 +131,8 @@ class Formula(Arithmetic):
             return repr(self.operands[0])
         if self.operation == "name":
             return self._name()
+        if self.operation == "quantity":
+            return self.operands[0] if outer <= 3 else f"({self.operands[0]})"
         if self.operation in _FUNCTIONS:
             return f"{self.operation}({', '.join(str(operand) for operand in self.operands)})"
         own = _PRECEDENCE[self.operation]
@@ -136,7 +157,9 @@ def as_formula(value: Any) -> Formula:
 
 
 def parse_formula(text: str) -> Formula:
-    """Read a formula from text; only arithmetic, names, `pi` and a few functions are understood.
+    """Read a formula from text; arithmetic, names, quantities, `pi` and a few functions are understood.
+
+    A quantity in it is a number, a blank and a unit: `2*J + 1182.6 kg.mm2`.
 
     Raises:
         NetlistError: the text is not such a formula.
@@ -146,12 +169,31 @@ def parse_formula(text: str) -> Formula:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            tree = ast.parse(text.strip(), mode="eval")
+            replaced, quantities = _without_quantities(text.strip())
+            tree = ast.parse(replaced, mode="eval")
     except (SyntaxError, ValueError, MemoryError, RecursionError):
         raise _not_a_formula(text) from None
     if _depth(tree) > _MAX_DEPTH:
         raise _not_a_formula(text, "it is nested too deeply")
-    return _convert(tree.body, text)
+    return _convert(tree.body, text, quantities)
+
+
+def _without_quantities(text: str) -> tuple[str, dict[str, str]]:
+    """Put names in the place of numbers with a unit; also return what each stands for."""
+    quantities: dict[str, str] = {}
+
+    def name(match: re.Match[str]) -> str:
+        try:
+            known = match.group(2) not in _CONSTANTS and parse_unit(match.group(2)).factor
+        except UnitError:
+            known = False
+        if not known:
+            return match.group()
+        placeholder = _PLACEHOLDER.format(len(quantities))
+        quantities[placeholder] = match.group()
+        return placeholder
+
+    return _QUANTITY.sub(name, text), quantities
 
 
 def _depth(tree: ast.AST) -> int:
@@ -170,20 +212,22 @@ def _not_a_formula(text: str, why: str = "") -> NetlistError:
     )
 
 
-def _convert(node: ast.expr, text: str) -> Formula:
+def _convert(node: ast.expr, text: str, quantities: dict[str, str]) -> Formula:
     if isinstance(node, ast.Constant) and isinstance(node.value, int | float) and not isinstance(node.value, bool):
         return Formula("number", (_finite(node.value, text),))
     if isinstance(node, ast.BinOp) and type(node.op) in _BINARY:
-        return Formula(_BINARY[type(node.op)], (_convert(node.left, text), _convert(node.right, text)))
+        return Formula(_BINARY[type(node.op)], (_convert(node.left, text, quantities), _convert(node.right, text, quantities)))
     if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
-        return Formula("neg", (_convert(node.operand, text),))
+        return Formula("neg", (_convert(node.operand, text, quantities),))
     if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.UAdd):
-        return _convert(node.operand, text)
+        return _convert(node.operand, text, quantities)
     if isinstance(node, ast.Name | ast.Attribute | ast.Subscript):
         path = _path(node, text)
+        if path in quantities:
+            return Formula("quantity", (quantities[path],))
         return Formula("number", (_CONSTANTS[path],)) if path in _CONSTANTS else Formula("name", (path,))
     if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and not node.keywords:
-        return _call(node, node.func.id, text)
+        return _call(node, node.func.id, text, quantities)
     raise _not_a_formula(text)
 
 
@@ -197,13 +241,13 @@ def _finite(value: float, text: str) -> float:
     return number
 
 
-def _call(node: ast.Call, name: str, text: str) -> Formula:
+def _call(node: ast.Call, name: str, text: str, quantities: dict[str, str]) -> Formula:
     if name not in _FUNCTIONS:
         raise _not_a_formula(text, f"there is no function '{name}'{did_you_mean(name, _FUNCTIONS).rstrip('?')}")
     wanted = 2 if name in ("min", "max") else 1
     if len(node.args) != wanted:
         raise _not_a_formula(text, f"{name} takes {wanted} argument{'s' if wanted > 1 else ''}")
-    return Formula(name, tuple(_convert(argument, text) for argument in node.args))
+    return Formula(name, tuple(_convert(argument, text, quantities) for argument in node.args))
 
 
 def _path(node: ast.expr, text: str) -> str:

@@ -113,7 +113,7 @@ def maximum(x: Scalar, y: Scalar) -> Expr:
     return ca.fmax(_sx(x), _sx(y))
 
 
-def where(condition: Expr, then: Scalar, otherwise: Scalar) -> Expr:
+def where(condition: Expr | bool, then: Scalar, otherwise: Scalar) -> Expr:
     """Choose by a condition, without an event; the branch not taken may be undefined."""
     return ca.if_else(condition, _sx(then), _sx(otherwise))
 

@@ -47,8 +47,13 @@ def read_value(text: str, lookup: Lookup) -> Value:
     if formula.operation == "name":
         return lookup(text.strip())
     unit = _unit(formula, lookup)
-    number = float(formula.evaluate(lambda name: _scalar(lookup(name), name)))
+    number = float(formula.evaluate(lambda name: _scalar(lookup(name), name), lambda part: ca.SX(_quantity(part).number)))
     return _finite(Value(number, unit), text)
+
+
+def _quantity(text: str) -> Value:
+    number, unit = read_quantity(text) or (math.nan, ONE)
+    return Value(number * unit.factor + unit.offset, unit)
 
 
 def _scalar(value: Value, name: str) -> ca.SX:
@@ -67,6 +72,8 @@ def _unit(formula: Formula, lookup: Lookup) -> Unit:
     kind, operands = formula.operation, formula.operands
     if kind == "number":
         return ONE
+    if kind == "quantity":
+        return coherent(_quantity(str(formula)).unit)
     if kind == "name":
         return coherent(lookup(str(formula)).unit)
     units = [_unit(operand, lookup) for operand in operands]

@@ -13,6 +13,8 @@ from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.initialize import Point, call
 
 _LOCATED = 1e-13
+_NOISE = 1e-30
+"""A decaying signal ends by swinging around zero with such values; that is no event."""
 _MAX_TRIALS = 60
 _GUESSING = 12
 _NEAR = 0.1
@@ -63,8 +65,9 @@ class Guards:
 
 
 def _numbers(guards: Vector) -> Vector:
-    """Let a guard that is not a number be false."""
-    return guards if np.isfinite(guards).all() else np.nan_to_num(guards, nan=-1.0)
+    """Let a guard that is not a number be false, and what is nothing but rounding zero."""
+    guards = guards if np.isfinite(guards).all() else np.nan_to_num(guards, nan=-1.0)
+    return np.where(np.abs(guards) < _NOISE, 0.0, guards)
 
 
 @dataclass

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from modelica_like.errors import NetlistError, UnitError, ValueOutOfRange
+from modelica_like.errors import NetlistError, UnitError, UnitMismatch, ValueOutOfRange
 from modelica_like.flatten import flatten
 from modelica_like.language import Component, Equations, Parameter, Variable, param, var
 from modelica_like.language.formula import Formula, as_formula, parse_formula
@@ -213,3 +213,45 @@ def test_only_numbers_formulas_and_declarations_stand_in_formulas():
     for value in (True, "J", None, [1]):
         with pytest.raises(NetlistError, match="cannot stand in a formula"):
             as_formula(value)
+
+
+class Pulley(Component):
+    """Two moments of inertia, one from the other."""
+
+    own: Parameter = param("kg.m2", "of the pulley", default=0.5)
+    total: Parameter = param("kg.m2", "of all", default=1.0)
+    turns: Variable = var("1", "turns")
+
+    def equations(self) -> Equations:
+        yield self.turns * self.total == self.own
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("own + 1182.6 kg.mm2", 0.5 + 1182.6e-6), ("1182.6 kg.mm2 + own", 0.5 + 1182.6e-6),
+        ("2*(own - 3e-1 kg.cm2)", 2 * (0.5 - 0.3e-4)), ("-5 kg.cm2 + own", 0.5 - 5e-4), ("3 kg.m2 / 2", 1.5),
+        ("max(own, 2 g.m2)", 0.5), ("20 % * own", 0.1), ("(4 g.m)**2 / 2 kg", 8e-6), ("own", 0.5), ("7 kg.cm2", 7e-4),
+    ],
+)  # fmt: skip
+def test_quantities_in_formulas(text, value):
+    model = flatten(Pulley(total=text))
+    found = {one.path: one.value for one in (*model.parameters, *model.derived)}
+    assert found["total"] == pytest.approx(value, rel=1e-14)
+
+
+@pytest.mark.parametrize("text", ["own + 2 N.m", "2 N.m + own", "2 N.m * own", "own + 2"])
+def test_quantities_in_formulas_have_dimensions(text):
+    with pytest.raises(UnitMismatch):
+        flatten(Pulley(total=text))
+
+
+@pytest.mark.parametrize("text", ["a + 2 kg.m2", "2 kg.m2 + a", "a**(3 rpm)", "-(1e-3 kg/m3)*a", "min(2 N, 3.5 kN)"])
+def test_a_formula_with_quantities_prints_as_itself(text):
+    assert parse_formula(str(parse_formula(text))) == parse_formula(text)
+
+
+@pytest.mark.parametrize("text", ["a + 2 kgm2", "2 pi", "2 kg.m2 a"])
+def test_what_only_looks_like_a_quantity_is_refused(text):
+    with pytest.raises(NetlistError, match="neither a quantity nor a formula"):
+        parse_formula(text)

@@ -2,10 +2,14 @@
 
 from collections.abc import Callable
 from functools import lru_cache
-from math import cos, exp, pi, sqrt, tanh
+from math import atan, cos, exp, log, pi, sin, sqrt, tan, tanh
 from pathlib import Path
 
+import numpy as np
 import pytest
+from scipy.integrate import quad
+from scipy.linalg import expm
+from scipy.special import sici
 
 from modelica_like import simulate
 from modelica_like.solve.solution import Solution
@@ -26,7 +30,7 @@ def run_of(name: str) -> Solution:
     return simulate(FOLDER / f"{name}.toml", rtol=1e-9)
 
 
-def close(value: float) -> object:
+def close(value: object) -> object:
     return pytest.approx(value, rel=1e-6, abs=1e-9)
 
 
@@ -217,6 +221,117 @@ def two_speed_gearbox(run: Solution) -> None:
     assert times["clutch_a.mode", "stuck"] == close(released)
     assert times["clutch_b.mode", "backward"] == close(locked)
     assert run.final["machine.w"] == close(120 / 2)
+
+
+@numbers
+def proportional_control(run: Solution) -> None:
+    assert run.at(0.1)["rotor.w"] == close((10 - 2) / 0.05 * 0.1)
+    assert run.final["rotor.w"] == close(30)
+
+
+@numbers
+def vehicle(run: Solution) -> None:
+    weight, drag, mass = 0.012 * 1200 * 9.80665, 0.5 * 0.3 * 2.2 * 1.2, 1200
+    left = atan(20 * sqrt(drag / weight)) - 10 * sqrt(weight * drag) / mass
+    assert run.final["car.v"] == close(sqrt(weight / drag) * tan(left))
+    against = 9.80665 / sqrt(1 + 0.05**2) * (1200 * (0.05 + 0.01) + 600 * (0.05 + 0.02))
+    climbing = 1 + 10 * (600 / 0.3 - against) / (1800 + 18 / 0.3**2)
+    assert [run.final["tractor.v"], run.final["trailer.v"]] == close([climbing, climbing])
+    assert run.final["trolley.v"] == close(3 - 10 * 0.02 * 490 / 50)
+
+
+@numbers
+def h_bridge(run: Solution) -> None:
+    settled, on, off, half = 24 / 2, exp(-0.0075 / 0.025), exp(-0.0025 / 0.025), exp(-0.005 / 0.025)
+    assert run.at(0.4975)["L_1.i"] == close(settled * (1 - 2 * on + on * off) / (1 - on * off))
+    assert run.at(0.495)["L_2.i"] == close(settled * (1 - half) / (1 - half**2))
+    assert run.final["L_3.i"] == close(12 / (2 + 0.4))
+    assert run.at(0.05)["capacitor.v"] == close(10 - 0.1 * 0.05 / 1e-3)
+    assert [run.final["capacitor.v"], run.final["load.i"]] == pytest.approx([0, 0], abs=1e-7)
+
+
+@numbers
+def cascade_control(run: Solution) -> None:
+    """All loops are linear as long as no limit is met: the step response is a matrix exponential."""
+    Ra, La, k_phi, J, T, target, load = 0.05, 1.5e-3, 0.6366, 0.3, 0.5e-3, 4e-3, 20.0
+    k_speed, k_current = J / (4 * T) / k_phi, La / (2 * T)
+    # each row: weights of angle, speed, current, voltage, both integrals, and of target and load
+    speed_error = np.array([-1 / (32 * T), -1, 0, 0, 0, 0, 1 / (32 * T), 0])
+    current_error = k_speed * (speed_error + np.eye(8)[4]) - np.eye(8)[2]
+    voltage = k_current * (current_error + np.eye(8)[5])
+    rows = [
+        np.eye(8)[1], (k_phi * np.eye(8)[2] - np.eye(8)[7]) / J,
+        (np.eye(8)[3] - Ra * np.eye(8)[2] - k_phi * np.eye(8)[1]) / La, (voltage - np.eye(8)[3]) / T,
+        speed_error / (8 * T), current_error * Ra / La, np.zeros(8), np.zeros(8),
+    ]  # fmt: skip
+    start = target * np.eye(8)[6]
+    names = ("machine.phi", "machine.w", "motor.ia", "bridge.v", "speed_loop.integral", "current_loop.integral")
+    for t in (0.002, 0.01, 0.05):
+        assert [run.at(t)[name] for name in names] == pytest.approx(
+            list((expm(np.array(rows) * t) @ start)[:6]), rel=1e-5
+        )
+    loaded = expm(np.array(rows) * 0.5) @ start + load * np.eye(8)[7]
+    after = expm(np.array(rows) * 0.02) @ loaded
+    assert [run.at(0.52)[name] for name in names] == pytest.approx(list(after[:6]), rel=1e-5, abs=1e-9)
+    assert [run.final["machine.phi"], run.final["motor.ia"]] == close([target, load / k_phi])
+
+
+@numbers
+def move(run: Solution) -> None:
+    arrived = {event.mode: event.time for event in run.events if event.after == "arrived"}
+    assert arrived == close({"turn.stage": 2 / 2 + 2 / 5, "way.stage": 0.1 + 2 * sqrt(0.2 / 5)})
+    assert [run.final[name] for name in ("disc.phi", "disc.w", "table.s")] == close([3, 0, -0.2])
+    assert -run.at(0.2)["crank.flange.tau"] == pytest.approx(2 * 5, rel=1e-5)
+    assert run.final["rotor.phi"] == close(0.3 * cos(4) + 0.5 * sin(4))
+    assert run.final["mass.s"] == pytest.approx(0.01 * cos(20), rel=1e-5)
+    assert [run.final["twist.phi_rel"], run.final["gap.s_rel"]] == close([0.1 * cos(6)] * 2)
+
+
+@numbers
+def rack_drive(run: Solution) -> None:
+    def motion(x: float) -> float:
+        """Time from rest to the speed x·v_nominal: 15·x' = (30 - 100·x/(1 + x²))/2·5."""
+        return quad(lambda u: 3 * 2 / (30 - 100 * u / (1 + u**2)), 0, x)[0]
+
+    assert motion(run.at(0.5)["slide.v"] / 3) == close(0.5)
+    assert [run.final["carriage.v"], run.final["sledge.v"]] == close([2 / 0.1 / 2 * 2, -2 / 0.1 / 4 * 2])
+
+
+@numbers
+def universal_joint(run: Solution) -> None:
+    start, quarter = run.at(0), run.at(pi / 20)
+    assert [start["shaft.w"], quarter["shaft.w"]] == close([10 / cos(pi / 6), 10 * cos(pi / 6)])
+    assert run["machine.w"] == close(10)
+    assert [quarter[f"first.flange_{end}.tau"] for end in "ab"] == close([5, -5 / cos(pi / 6)])
+
+
+@numbers
+def torque_converter(run: Solution) -> None:
+    assert [run.final[f"converter.flange_{end}.tau"] for end in "ab"] == close([2e-3 * 200**2, -2 * 2e-3 * 200**2])
+    assert run.at(1)["flywheel.w"] == close(100 * (1 - exp(-2e-3 * 100 / 0.5)))
+
+
+@numbers
+def bristle_friction(run: Solution) -> None:
+    assert run.final["bearing.tau"] == close(1 + 0.5 * exp(-1) + 2 * 0.02)
+    # Loaded slowly, the bristles follow dz/dphi = 1 - z/z_sliding.
+    assert [run.final["seal.z"], run.final["rotor.phi"]] == pytest.approx([0.8e-4, -1e-4 * log(1 - 0.8)], rel=1e-4)
+
+
+@numbers
+def waves(run: Solution) -> None:
+    growth, heated = log(8) / 2, 1 - exp(-2.5)
+    torques = [
+        2 * sin(1.2 * pi) / (0.6 * pi),
+        quad(lambda t: 2 * exp(-1.5 * t) * sin(4 * pi * t), 0, 1.5)[0],
+        2 * float(sici(8 * pi)[0]) / (4 * pi),
+        2 * (1 - 0.4 * heated + 0.3 * heated * (1 - exp(-0.75 / 0.3))),
+        2 * (4 * 0.2 + 0.2 * 0.25),
+        quad(lambda t: 2 * sin(pi * (exp(growth * t) - 1) / growth), 0, 2)[0],
+        1 * 0.5 + 3 * 0.75 - 2 * 0.75,
+    ]
+    assert [2 * run.final[f"rotor[{k}].w"] for k in range(1, 8)] == close(torques)
+    assert [2 * run.final[f"wheel[{k}].w"] for k in range(1, 6)] == close([0.5, 4 * 0.1, 0.25 + 1.25, 2, 1 + 2])
 
 
 def test_every_netlist_has_numbers_and_a_line_on_the_page() -> None:

@@ -14,20 +14,24 @@ from components import (
     Damper,
     Fixed,
     FixedTemperature,
+    ForceStep,
     Freewheel,
     HeatSource,
     Inertia,
     LossyGear,
+    MachineTable,
     MassWithStopAndFriction,
     OneWayClutch,
     Sine,
     Speed,
+    SpeedDependentLoad,
     Step,
     ThermalConductor,
     ThermalMass,
     Torque,
     TorqueLimiter,
     TorqueStep,
+    TranslationalBrake,
 )
 from modelica_like import Assembly, Component, Solution, simulate
 
@@ -183,6 +187,36 @@ def test_two_brakes_on_one_shaft() -> None:
     held = simulate(Assembly("drive", parts=parts, series={"shaft": list(parts)}), "20 s", rtol=1e-8)
     assert abs(held.final["shaft.w"]) < 1e-10
     assert held.final["one.tau"] + held.final["two.tau"] == pytest.approx(4.9, rel=1e-6)
+
+
+SLIDES: dict[str, Component] = {
+    "table": MachineTable(m=2.0, f_friction=3.0, s=0.0, v=2.0, creep=1e-9),
+    "mass": MassWithStopAndFriction(m=2.0, F_Coulomb=3.0, s=0.0, v=2.0, creep=1e-9),
+}
+
+
+@pytest.mark.parametrize("name", SLIDES)
+def test_a_slide_and_its_brake(name: str) -> None:
+    """5 N stop 2 kg from 2 m/s within 0.8 s; then both hold 4 N."""
+    parts: dict[str, Component] = {
+        "push": ForceStep(step_force=4.0, start_time=1.0), "slide": SLIDES[name],
+        "brake": TranslationalBrake(fn_max=4.0),
+    }  # fmt: skip
+    run = simulate(Assembly("drive", parts=parts, series={"slide": list(parts)}), "10 s", rtol=1e-8)
+    assert run.at(0.5)["slide.v"] == pytest.approx(2.0 - 2.5 * 0.5, rel=1e-7)
+    assert abs(run.final["slide.v"]) < 1e-10
+    assert run.final["slide.f"] + run.final["brake.f"] == pytest.approx(4.0, rel=1e-6)
+
+
+def test_a_load_and_a_brake() -> None:
+    """5 N.m stop 0.5 kg.m2 from 5 rad/s within 0.5 s."""
+    parts: dict[str, Component] = {
+        "shaft": Inertia(J=0.5, phi=0.0, w=5.0), "brake": Brake(capacity=2.0),
+        "load": SpeedDependentLoad(a=3.0, creep=1e-9),
+    }  # fmt: skip
+    run = simulate(Assembly("drive", parts=parts, series={"shaft": list(parts)}), "1 s", rtol=1e-8)
+    assert run.at(0.25)["shaft.w"] == pytest.approx(2.5, rel=1e-7)
+    assert abs(run.final["shaft.w"]) < 1e-12
 
 
 # -- heat --------------------------------------------------------------------------------------------------------------

@@ -26,6 +26,8 @@ from components import (
     Mass,
     Speed,
     SpringDamper,
+    TimeFormula,
+    Torque,
     TorqueSensor,
 )
 from modelica_like import Solution, build, simulate, simulation_function
@@ -235,6 +237,14 @@ def in_parallel() -> Assembly:
         "load": Inertia(J=1.0),
     }
     return Assembly("drive", parts=parts, series={"a": ["rotor", "one", "load"], "b": ["rotor", "two", "load"]})
+
+
+def drive_by(signal: Component) -> Assembly:
+    """A torque that follows a signal."""
+    parts: dict[str, Component] = {"signal": signal, "torque": Torque(), "rotor": Inertia(J=1.0)}
+    return Assembly(
+        "drive", parts=parts, series={"shaft": ["torque", "rotor"]}, connect={"drive": ["signal.y", "torque.tau"]}
+    )
 
 
 def overrun() -> Assembly:
@@ -541,6 +551,12 @@ case(
     "a structural field has another type",
     lambda: ClutchActuator(t12=0.1, t2=0.1).set("exponential", "yes"),
     "ClutchActuator.exponential = 'yes' must be true or false.",
+)
+case(
+    errors.NetlistError,
+    "a unit in a formula of time",
+    lambda: flatten(drive_by(TimeFormula(formula="72.5 N.m * time"))),
+    "'72.5 N.m' has a unit, but this formula takes plain numbers only.",
 )
 case(
     errors.LanguageError,

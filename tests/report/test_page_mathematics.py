@@ -13,6 +13,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
+from modelica_like.errors import LanguageError
 from modelica_like.language import Component
 from modelica_like.language.equation import Equation, as_statement
 from modelica_like.language.expr import Symbol, symbols_in
@@ -21,9 +22,9 @@ from modelica_like.language.transition import as_event
 from modelica_like.netlist import library_types
 from modelica_like.report.component_pages import latex_names
 from modelica_like.report.component_pages.library import examples_by_type
-from modelica_like.report.component_pages.named_calls import ROWS, any_table
+from modelica_like.report.component_pages.named_calls import any_table
 from modelica_like.report.component_pages.page import structure_of
-from modelica_like.report.component_pages.statements import statements
+from modelica_like.report.component_pages.statements import Statements, statements
 
 # -- a reader of LaTeX -------------------------------------------------------------------------------------------------
 
@@ -34,10 +35,12 @@ RELATIONS: dict[str, Callable[[Any, Any], bool]] = {
 }  # fmt: skip
 FUNCTIONS: dict[str, Callable[..., Any]] = {
     r"\sin": np.sin, r"\cos": np.cos, r"\tan": np.tan, r"\exp": np.exp, r"\ln": np.log, r"\tanh": np.tanh,
-    r"\text{sgn}": np.sign, r"\text{atan2}": np.arctan2, r"\max": max, r"\min": min,
+    r"\text{sgn}": np.sign, r"\text{atan2}": np.arctan2, r"\max": max, r"\min": min, r"\text{floor}": np.floor,
 }  # fmt: skip
-NAMED = re.compile(r"[a-zA-Z]|\\text.*|\\(varphi|omega|dot|ddot|rate|pi|infty|frac|tfrac|sqrt|left|begin|max|min|"
-                   r"alpha|beta|gamma|delta|eta|mu|psi|rho|tau|sin|cos|tan|exp|ln|tanh)")  # fmt: skip
+NAMED = re.compile(
+    r"[a-zA-Z]|\\text.*|\\(varphi|omega|dot|ddot|rate|pi|infty|frac|tfrac|sqrt|left|begin|max|min|sin|cos|tan|exp|ln|tanh|"
+    + "|".join(latex_names.GREEK) + ")"
+)  # fmt: skip
 """What a factor can begin with."""
 
 
@@ -220,15 +223,16 @@ def path_of(symbol: Symbol, root: Component) -> str:
 class Numbers:
     """A component whose symbols all have a number, and its pages' formulas with the same numbers."""
 
-    def __init__(self, kind: type[Component], structure: Mapping[str, Any], active: int) -> None:
+    def __init__(self, kind: type[Component], structure: Mapping[str, Any], active: int, option: str = "") -> None:
         self.random = random.Random(f"{kind.__name__} {active}")
         self.tables = {
-            name: tuple(
-                (x, *(self.random.uniform(0.2, 0.9) for _ in row[1:])) for x, row in zip(ROWS, rows, strict=True)
-            )
+            name: tuple((x, *(self.random.uniform(0.2, 0.9) for _ in values)) for x, *values in rows)
             for name, rows in any_table(kind).items()
         }
-        self.component = kind(**{**self.tables, **structure})
+        self.component = component = kind(**{**self.tables, **structure})
+        component.__dict__["given"] = lambda name: name == option or Component.given(component, name)
+        if option in component.connectors:
+            component.connectors[option]._used = True
         self.active = {name: active % len(mode.names) for name, mode in kind._class_modes.items()}
         self.known: dict[str, float] = {}
 
@@ -266,13 +270,34 @@ class Numbers:
             for column in range(1, len(first)):
                 slope = (second[column] - first[column]) / (second[0] - first[0])
                 number = f"_{{{column + 1}}}" if len(first) > 2 else ""
-                found[latex + number] = lambda x, y=first[column], s=slope: y + s * (x - ROWS[0])
-            self.known |= {f"{latex}_{{{k + 1}}}": ROWS[k] for k in (0, 1)}
+                found[latex + number] = lambda x, a=first[0], y=first[column], s=slope: y + s * (x - a)
+            if len(first) == 2:
+                self.known |= {f"{latex}_{{1}}": first[0], f"{latex}_{{2}}": second[0]}
         return found
 
 
 def same(ours: Any, theirs: Any) -> bool:
     return ours == pytest.approx(theirs, rel=2e-5, abs=1e-9, nan_ok=True)
+
+
+def compare(page: Statements, numbers: Numbers) -> None:
+    component, name = numbers.component, type(numbers.component).__name__
+    said = [as_statement(one, source, name) for one, source in located(component.equations())]
+    residuals = [numbers.of(ca.SX(one.left) - ca.SX(one.right)) for one in said if isinstance(one, Equation)]
+    energies = {term: numbers.of(getattr(component, term)()) for term in page.energy}
+    events = [as_event(one, source, name) for one, source in located(component.events())]
+    moments = [numbers.of(one.when if getattr(one, "at", None) is None else one.at) for one in events]
+    resets = [numbers.of(value) for one in events for value in getattr(one, "reset", {}).values()]
+    formulas = numbers.formulas(page.definitions)
+    for term, residual in zip(page.equations, residuals, strict=True):
+        written = formulas.worth(term.left) - formulas.worth(term.right)
+        assert same(abs(written), abs(residual)), (term, numbers.active)
+    for term, energy in energies.items():
+        assert same(formulas.worth(page.energy[term].right), energy), page.energy[term]
+    for event, moment in zip(page.events, moments, strict=True):
+        assert same(formulas.worth(event.when.removeprefix("t = ")), moment), event
+    for latex, value in zip((reset for event in page.events for reset in event.resets), resets, strict=True):
+        assert same(formulas.worth(latex.partition(" := ")[2]), value), latex
 
 
 @pytest.mark.parametrize("name", sorted(library_types()))
@@ -282,21 +307,11 @@ def test_formulas_are_worth_what_the_class_says(name: str) -> None:
     structure = structure_of(kind, examples()[name])
     page = statements(kind, structure)
     for active in range(max((len(mode.names) for mode in kind._class_modes.values()), default=1)):
-        numbers = Numbers(kind, structure, active)
-        component = numbers.component
-        said = [as_statement(one, source, name) for one, source in located(component.equations())]
-        residuals = [numbers.of(ca.SX(one.left) - ca.SX(one.right)) for one in said if isinstance(one, Equation)]
-        energies = {term: numbers.of(getattr(component, term)()) for term in page.energy}
-        events = [as_event(one, source, name) for one, source in located(component.events())]
-        moments = [numbers.of(one.when if getattr(one, "at", None) is None else one.at) for one in events]
-        resets = [numbers.of(value) for one in events for value in getattr(one, "reset", {}).values()]
-        formulas = numbers.formulas(page.definitions)
-        for term, residual in zip(page.equations, residuals, strict=True):
-            written = formulas.worth(term.left) - formulas.worth(term.right)
-            assert same(abs(written), abs(residual)), (term, numbers.active)
-        for term, energy in energies.items():
-            assert same(formulas.worth(page.energy[term].right), energy), page.energy[term]
-        for event, moment in zip(page.events, moments, strict=True):
-            assert same(formulas.worth(event.when.removeprefix("t = ")), moment), event
-        for latex, value in zip((r for event in page.events for r in event.resets), resets, strict=True):
-            assert same(formulas.worth(latex.partition(" := ")[2]), value), latex
+        compare(page, Numbers(kind, structure, active))
+    for option in (*page.asked, *(one for one, end in kind._class_connectors.items() if end.optional)):
+        try:
+            other = statements(kind, structure, given=frozenset({option}), used=frozenset({option}) - set(page.asked))
+        except LanguageError:
+            assert option == "mesh_efficiency"  # an efficiency needs losses
+            continue
+        compare(other, Numbers(kind, structure, 1, option))

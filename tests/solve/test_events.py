@@ -571,3 +571,25 @@ def test_a_guard_on_time_alone_in_a_model_without_states():
     run = simulate(Blink(), 1.0, points=4)
     np.testing.assert_allclose(times(run), [1 / 3], rtol=0, atol=1e-10)
     assert build(Blink()).states == ()
+
+
+def test_a_decaying_signal_is_no_event_any_more() -> None:
+    """A clutch whose force decays exponentially: exp(-t/T) is 1e-30 long before the end, and then only rounding."""
+
+    class Decaying(Component):
+        """x' = -x/T, and a mode that asks for its sign."""
+
+        x: Variable = var("1", "what decays")
+        T: Parameter = param("s", "time constant", default=0.02)
+        sign = Mode("positive", "negative")
+
+        def equations(self) -> Equations:
+            yield self.T * der(self.x) == -self.x
+
+        def events(self) -> Events:
+            yield self.sign.go("positive", "negative", when=self.x < 0)
+            yield self.sign.go("negative", "positive", when=self.x > 0)
+
+    run = simulate(Decaying(x=1.0), 20.0)
+    assert run.events == ()
+    assert run.statistics.integrations < 50

@@ -389,3 +389,37 @@ def test_progress_is_told():
     assert seen == sorted(seen)
     assert seen[-1] == 2.0
     assert connect is not None
+
+
+def test_time_derivatives_by_name() -> None:
+    """Of states, of what follows from them, and of what implicit equations determine, on both sides of an event."""
+    run = simulate(Drive(), 2.0, rtol=1e-9)
+    slides = run.time < 1.0
+    np.testing.assert_allclose(run["der(left.w)"][slides], -5.0, rtol=1e-9)
+    np.testing.assert_allclose(run["der(right.flange_a.phi)"], run["right.w"], rtol=1e-9, atol=1e-9)
+    assert run["der(left.w)"][-1] == pytest.approx(0.0, abs=1e-12)
+    assert run.at(0.5)["der(right.w)"] == pytest.approx(5.0, rel=1e-9)
+    assert run.final["der(clutch.w_rel)"] == pytest.approx(0.0, abs=1e-12)
+    drive = Drive()
+    again = simulate(drive, 2.0)
+    assert np.array_equal(again[der(drive.left.w)], again["der(left.w)"])
+    assert "der(left.w)" in run
+    assert "der(left.v)" not in run
+    with pytest.raises(UnknownName, match="did you mean 'left.w'"):
+        run["der(left.v)"]
+
+
+def test_time_derivative_of_an_implicit_unknown() -> None:
+    """y + y³ = t: der(y) = 1/(1 + 3·y²)."""
+
+    class Cubic(Component):
+        y: Variable = var("1", "root")
+
+        def equations(self) -> Equations:
+            yield self.y + self.y**3 == self.time / self.second
+
+        second: Parameter = param("s", "time that counts as 1", default=1.0)
+
+    run = simulate(Cubic(), 2.0)
+    np.testing.assert_allclose(run["der(y)"], 1 / (1 + 3 * run["y"] ** 2), rtol=1e-10)
+    assert run.at(1.234)["der(y)"] == pytest.approx(1 / (1 + 3 * run.at(1.234)["y"] ** 2), rel=1e-10)

@@ -12,7 +12,8 @@ from modelica_like.errors import NetlistError
 from modelica_like.language import Component
 from modelica_like.netlist.document import parse, read_text
 from modelica_like.netlist.registry import find_type, library_types
-from modelica_like.report.component_page import Example, page, place
+from modelica_like.report.component_pages.markdown import module_title, place
+from modelica_like.report.component_pages.page import Example, page
 from modelica_like.report.types import summary
 
 INDEX = "README.md"
@@ -94,16 +95,14 @@ def _index(types: Mapping[str, type[Component]]) -> str:
         "# Components",
         f"{len(types)} component types, by machine element. These pages are generated from the declarations: "
         "`modelica-like docs -o docs/components --examples examples` writes them, so do not edit them by hand.",
-        " · ".join(f"[{_title(module)}](#{_title(module).replace(' ', '-')})" for module in sorted(modules)),
+        " · ".join(
+            f"[{module_title(module)}](#{module_title(module).replace(' ', '-')})" for module in sorted(modules)
+        ),
     ]
     for module, members in sorted(modules.items()):
         text = cleandoc(import_module(module).__doc__ or "").partition("\n\n")[0]
-        sections += [f"## {_title(module)}", text, _rows(types, members)]
+        sections += [f"## {module_title(module)}", text, _rows(types, members)]
     return "\n\n".join(sections) + "\n"
-
-
-def _title(module: str) -> str:
-    return module.rpartition(".")[2].replace("_", " ")
 
 
 def _rows(types: Mapping[str, type[Component]], members: Sequence[str]) -> str:

@@ -9,7 +9,7 @@ import re
 from fractions import Fraction
 from math import isclose, pi
 
-GREEK = ("alpha", "beta", "gamma", "delta", "eta", "mu", "psi", "rho", "tau")
+GREEK = ("alpha", "beta", "gamma", "delta", "eta", "mu", "psi", "rho", "sigma", "tau", "zeta")
 _LETTERS = {"phi": r"\varphi", "w": r"\omega", **{name: f"\\{name}" for name in GREEK}}
 _INDEXED = re.compile(r"([A-Zivwt])([a-z]|\d+)")
 _LONGEST_SYMBOL = 2

@@ -16,10 +16,9 @@ from modelica_like.language.equation import Connection, Equation, as_statement
 from modelica_like.language.expr import Symbol, symbols_in
 from modelica_like.language.places import located
 from modelica_like.language.transition import Transition, as_event
-from modelica_like.report import latex_names as names
-from modelica_like.report.mathematics import CONDITIONS, Writer
-from modelica_like.report.named_calls import (
-    ROWS,
+from modelica_like.report.component_pages import latex_names as names
+from modelica_like.report.component_pages.mathematics import CONDITIONS, Writer
+from modelica_like.report.component_pages.named_calls import (
     Call,
     Calls,
     Definition,
@@ -133,6 +132,11 @@ class _Page:
         self.calls = calls
         self.referenced: dict[tuple[str, int], None] = {}
         self.parameters: set[str] = set()
+        self.abscissae = {
+            row[0]: f"{names.name(name)}_{{{number}}}"
+            for name, rows in any_table(type(component)).items()
+            for number, row in enumerate(rows, 1)
+        }
         self.writer = Writer(self._symbol, _mode_names, self._special)
 
     def statements(self) -> Statements:
@@ -173,8 +177,8 @@ class _Page:
         return names.function(call.name, [self.writer.latex(argument) for argument in call.arguments], call.number)
 
     def _special(self, e: Any, writer: Writer) -> str:
-        if e.is_constant() and float(e) in ROWS:
-            return rf"{names.name(next(iter(any_table(type(self.component)))))}_{{{ROWS.index(float(e)) + 1}}}"
+        if e.is_constant():
+            return self.abscissae.get(float(e), "")
         found = looked_up(e)
         if found is None:
             return ""
@@ -262,58 +266,3 @@ def _parts(component: Component) -> list[Part]:
 
 def _values(part: Component) -> str:
     return ", ".join(f"{name} = {value.given}" for name, value in part._values.items())
-
-
-def variants(kind: type[Component], structure: Mapping[str, Any], base: Statements) -> dict[str, Statements]:
-    """Return what a type says with one optional thing more, by what that is, as far as it differs.
-
-    Args:
-        kind: the type.
-        structure: values of structural fields.
-        base: what it says without.
-    """
-    found: dict[str, Statements] = {}
-    for name, connector in kind._class_connectors.items():
-        if connector.optional:
-            _add(found, f"`{name}` connected", base, kind, structure, used=frozenset({name}))
-    for name in base.asked:
-        _add(found, value_for(name), base, kind, structure, given=frozenset({name}))
-    for name, default in kind._structural.items():
-        if isinstance(default, bool):
-            value = "false" if default else "true"
-            _add(found, f"`{name} = {value}`", base, kind, {**structure, name: not default})
-    return found
-
-
-def value_for(name: str) -> str:
-    """Return how a variant is called in which an optional parameter has a value."""
-    return f"a value for `{name}`"
-
-
-def _add(
-    found: dict[str, Statements], what: str, base: Statements, kind: type[Component], structure: Mapping[str, Any],
-    **options: Any,
-) -> None:  # fmt: skip
-    try:
-        other = statements(kind, structure, **options)
-    except LanguageError:  # the class itself says that this alone means nothing
-        return
-    different = _difference(other, base)
-    if any((different.equations, different.definitions, different.events, different.energy, different.parts)):
-        found[what] = different
-
-
-def _difference(other: Statements, base: Statements) -> Statements:
-    """Return what one has and another has not."""
-    energy = {name: term for name, term in other.energy.items() if base.energy.get(name) != term}
-    energy |= {name: Term(term.left, "0") for name, term in base.energy.items() if name not in other.energy}
-    return Statements(
-        tuple(one for one in other.equations if one not in base.equations),
-        tuple(one for one in other.definitions if one not in base.definitions),
-        tuple(one for one in other.events if one not in base.events),
-        energy,
-        tuple(one for one in other.connections if one not in base.connections),
-        tuple(one for one in other.parts if one not in base.parts),
-        (),
-        other.parameters,
-    )

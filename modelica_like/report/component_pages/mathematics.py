@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import casadi as ca
 
 from modelica_like.language.expr import Symbol, symbols_in
-from modelica_like.report import latex_names as names
+from modelica_like.report.component_pages import latex_names as names
 
 CASES, OR, AND, RELATION, SUM, PRODUCT, POWER, ATOM = range(8)
 """How tightly an expression binds."""
@@ -197,11 +197,11 @@ class Writer:
         below = [self._power(base, -exponent) for base, exponent in factors if exponent < 0]
         sign, number = ("-", -number) if number < 0 else ("", number)
         half = isclose(number, 0.5) and not below
+        if below and number < 1 and isclose(1 / number, round(1 / number)):
+            below.insert(0, self._number(round(1 / number)))
+            number = 1.0
         if half:
             number = 1.0
-        elif below and isclose(1 / number, round(1 / number)):
-            below = [*([self._number(round(1 / number))] if number < 1 else []), *below]
-            number = max(number, 1.0) if number < 1 else number
         if number != 1 or not above:
             above.insert(0, self._number(number))
         if below:
@@ -209,8 +209,10 @@ class Writer:
             beside = [one for one in above if r"\begin{cases}" in one.latex]
             above = [one for one in above if one not in beside] or [Written("1", ATOM)]
             latex = _joined([Written(rf"\frac{{{_joined(above)}}}{{{_joined(below)}}}", PRODUCT), *beside])
+        elif half or sign:
+            latex = (r"\tfrac{1}{2} " if half else "") + r" \cdot ".join(one.inside(PRODUCT) for one in above)
         else:
-            latex = (r"\tfrac{1}{2} " if half else "") + _joined(above)
+            latex = _joined(above)
         lone = not sign and not half and not below and len(above) == 1
         return Written(sign + latex, above[0].binds if lone else SUM if sign else PRODUCT)
 

@@ -18,7 +18,11 @@ from modelica_like.language import Component
 from modelica_like.language.expr import Symbol, symbols_in
 
 ROWS = (0.6180339887498949, 1.4142135623730951)
-"""Abscissae of the two rows that stand for any table: numbers that no equation uses."""
+"""Abscissae of the two rows that stand for a type's first table, plus one for each further table: nobody uses them."""
+
+
+_PAIR = 2
+"""Columns of a table with one column of values."""
 
 
 @dataclass(eq=False)
@@ -61,11 +65,13 @@ class Row:
         table: name of the structural field.
         column: number of the column, counted from one; 0 if the table has only one column of values.
         number: number of the row.
+        begin: abscissa of the first row.
     """
 
     table: str
     column: int
     number: int
+    begin: float
     fields: Mapping[str, Any] = field(default_factory=dict[str, Any])
 
     def is_constant(self, name: str) -> bool:
@@ -197,15 +203,17 @@ def _given(calls: Calls) -> Callable[[Component, str], bool]:
 def any_table(kind: type[Component]) -> dict[str, Any]:
     """Return two rows for each structural field that is a table of numbers: its values are symbols."""
     hints = get_type_hints(kind)
-    tables: dict[str, Any] = {}
-    for name in kind._structural:
-        columns = _columns(hints[name])
-        if columns:
-            tables[name] = tuple(
-                (ROWS[k], *(Symbol(Row(name, c if columns > 2 else 0, k), name) for c in range(1, columns)))
-                for k in (0, 1)
-            )
-    return tables
+    widths = {name: _columns(hints[name]) for name in kind._structural}
+    return {
+        name: tuple((x + shift, *_cells(name, width, number, ROWS[0] + shift)) for number, x in enumerate(ROWS))
+        for shift, (name, width) in enumerate((name, width) for name, width in widths.items() if width)
+    }
+
+
+def _cells(table: str, width: int, number: int, begin: float) -> list[Symbol]:
+    """Return symbols for the values in a row."""
+    columns = range(1, width) if width > _PAIR else (0,)
+    return [Symbol(Row(table, column, number, begin), table) for column in columns]
 
 
 def _columns(hint: Any) -> int:
@@ -219,20 +227,20 @@ def looked_up(e: Any) -> tuple[Row, Any] | None:
     """Recognise the value of a table: the table's column, and the argument it is looked up for."""
     if e.is_symbolic():
         row = symbols_in(e)[0].owner
-        return (row, ca.SX(ROWS[0])) if isinstance(row, Row) else None
+        return (row, ca.SX(row.begin)) if isinstance(row, Row) else None
     if e.op() != ca.OP_ADD or not e.dep(0).is_symbolic() or e.dep(1).op() != ca.OP_MUL:
         return None
     row, distance = symbols_in(e.dep(0))[0].owner, e.dep(1).dep(0)
-    return (row, _shifted(distance)) if isinstance(row, Row) else None
+    return (row, _shifted(distance, row.begin)) if isinstance(row, Row) else None
 
 
-def _shifted(distance: Any) -> Any:
+def _shifted(distance: Any, begin: float) -> Any:
     """Return the argument of a table from its distance to the first row."""
     if distance.is_constant():
-        return ca.SX(round(float(distance) + ROWS[0], 12))
+        return ca.SX(round(float(distance) + begin, 12))
     if distance.op() == ca.OP_SUB and distance.dep(1).is_constant():
         return distance.dep(0)
     if distance.op() == ca.OP_NEG and distance.dep(0).op() == ca.OP_ADD:
         inner = distance.dep(0)
         return -(inner.dep(1) if inner.dep(0).is_constant() else inner.dep(0))
-    return distance + ROWS[0]
+    return distance + begin

@@ -1,0 +1,93 @@
+"""Vehicles in one dimension, and what resists them."""
+
+from __future__ import annotations
+
+from components.interfaces import Flange, LinearFlange, LinearOneFlange
+from components.speed_laws import sign_law
+from components.thermal import Lossy
+from modelica_like.language import (
+    Component,
+    Equations,
+    Expr,
+    Input,
+    Parameter,
+    Variable,
+    absolute,
+    der,
+    param,
+    signal_in,
+    sqrt,
+    var,
+)
+
+
+class RollingResistance(Lossy, LinearOneFlange):
+    """Resistance of rolling wheels, Cr·weight·cos(slope), against the motion; it does not hold at standstill.
+
+    The inclination is the tangent of the slope. Modelica Standard Library, Translational.RollingResistance.
+    """
+
+    weight: Parameter = param("N", "weight on the wheels", min=0)
+    Cr: Input = signal_in("1", "rolling resistance coefficient", default=0.015)
+    inclination: Input = signal_in("1", "rise of the road over its run", default=0.0)
+    v0: Parameter = param("m/s", "velocity at which 99 % of it are reached", default=0.1, min=1e-12)
+    v: Variable = var("m/s", "velocity of the wheels")
+    f: Variable = var("N", "force against forward motion")
+
+    def equations(self) -> Equations:
+        yield from super().equations()
+        yield der(self.s) == self.v
+        yield self.f == self.Cr * self.weight / sqrt(1 + self.inclination**2) * sign_law(self.v / self.v0)
+        yield self.flange.f == self.f
+
+    def dissipation(self) -> Expr:
+        return self.f * self.v
+
+
+class Vehicle(Component):
+    """Vehicle with drag, rolling resistance and slope, driven by a wheel, and coupled to others at flange_t.
+
+    Against the motion act the drag Cd·A·rho·u·|u|/2, with the velocity u relative to the wind, the weight on the slope,
+    m·g·sin(slope), and the rolling resistance Cr·m·g·cos(slope), which does not hold at standstill. Modelica Standard
+    Library, Translational.Vehicle.
+    """
+
+    flange_r = Flange("drive shaft", free=True)
+    flange_t = LinearFlange("coupling to other vehicles", free=True)
+    inlet, outlet = "flange_r", "flange_t"
+    m: Parameter = param("kg", "mass", min=0)
+    J: Parameter = param("kg.m2", "moment of inertia of wheels and drive", default=0.0, min=0)
+    R: Parameter = param("m", "wheel radius", min=1e-12)
+    A: Parameter = param("m2", "front area", default=1.0, min=0)
+    Cd: Parameter = param("1", "drag coefficient", default=0.5, min=0)
+    rho: Parameter = param("kg/m3", "density of the air", default=1.2, min=0)
+    g: Parameter = param("m/s2", "gravity", default=9.80665)
+    v0: Parameter = param("m/s", "velocity with 99 % of the rolling resistance", default=1e-3, min=1e-12)
+    Cr: Input = signal_in("1", "rolling resistance coefficient", default=0.015)
+    inclination: Input = signal_in("1", "rise of the road over its run", default=0.0)
+    v_wind: Input = signal_in("m/s", "velocity of the wind, positive from behind", default=0.0)
+    s: Variable = var("m", "position")
+    v: Variable = var("m/s", "velocity")
+    f_drag: Variable = var("N", "drag of the air against forward motion")
+    f_roll: Variable = var("N", "rolling resistance against forward motion")
+    f_slope: Variable = var("N", "part of the weight against forward motion")
+
+    def equations(self) -> Equations:
+        wind, slant = self.v - self.v_wind, sqrt(1 + self.inclination**2)
+        yield self.flange_t.s == self.s
+        yield self.R * self.flange_r.phi == self.s
+        yield der(self.s) == self.v
+        yield self.f_drag == 0.5 * self.Cd * self.A * self.rho * wind * absolute(wind)
+        yield self.f_roll == self.Cr * self.m * self.g / slant * sign_law(self.v / self.v0)
+        yield self.f_slope == self.m * self.g * self.inclination / slant
+        drive = self.flange_r.tau / self.R + self.flange_t.f
+        yield (self.m + self.J / self.R**2) * der(self.v) == drive - self.f_drag - self.f_roll - self.f_slope
+
+    def stored_energy(self) -> Expr:
+        return 0.5 * (self.m + self.J / self.R**2) * self.v**2
+
+    def loss_power(self) -> Expr:
+        return self.f_drag * (self.v - self.v_wind) + self.f_roll * self.v
+
+    def source_power(self) -> Expr:
+        return -self.f_drag * self.v_wind - self.f_slope * self.v

@@ -1,0 +1,1 @@
+"""Pages about component types in Markdown, made from their declarations."""

@@ -1,0 +1,59 @@
+"""Markdown: tables, cells and links."""
+
+from __future__ import annotations
+
+import inspect
+import os
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from modelica_like.language import Component
+from modelica_like.netlist.registry import library_types
+
+
+def source_link(kind: type, file: Path) -> str:
+    """Return a link to the line where a class begins, relative to a page."""
+    source = Path(inspect.getsourcefile(kind) or "")
+    line = inspect.getsourcelines(kind)[1]
+    return f"[{source.name}:{line}]({relative(source, file.resolve())}#L{line})"
+
+
+def module_title(module: str) -> str:
+    """Return what a module is about, by its name."""
+    return module.rpartition(".")[2].replace("_", " ")
+
+
+def markdown(words: str) -> str:
+    """Return a text so that nothing in it is a command."""
+    return words.replace("<", "&lt;").replace("*", r"\*")
+
+
+def cell(words: str) -> str:
+    """Return a text for a cell of a table."""
+    return markdown(words).replace("|", r"\|").replace("\n", " ")
+
+
+def table(title: str, head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Return a table under a heading, without the columns that are empty; nothing if there are no rows."""
+    rows = list(rows)
+    if not rows:
+        return ""
+    kept = [k for k in range(len(head)) if any(row[k] for row in rows)]
+    lines = [[head[k] for k in kept], ["---"] * len(kept), *([row[k] for k in kept] for row in rows)]
+    return (f"## {title}\n\n" if title else "") + "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def page_link(kind: type[Component]) -> str:
+    """Return a link from one page to another."""
+    known = library_types().get(kind.__name__) is kind
+    return f"[{kind.__name__}](../{place(kind).as_posix()})" if known else kind.__name__
+
+
+def place(kind: type[Component]) -> Path:
+    """Return the file of a page, from the folder of all pages: `friction/Clutch.md`."""
+    return Path(kind.__module__.rpartition(".")[2]) / f"{kind.__name__}.md"
+
+
+def relative(target: Path, page: Path) -> str:
+    """Return the path of a file as a link of a page."""
+    return Path(os.path.relpath(target, page.parent)).as_posix()
