@@ -5,6 +5,7 @@ from __future__ import annotations
 from math import log
 
 from modelica_like.language import (
+    BoundMode,
     Component,
     Discrete,
     Equations,
@@ -27,7 +28,7 @@ _SETTLED_AFTER = 9
 """Decades after which an exponential counts as settled."""
 
 
-def at_limits(limit: Mode, free: Expr, low: Expr, high: Expr) -> Events:
+def at_limits(limit: BoundMode, free: Expr, low: Expr, high: Expr) -> Events:
     """Yield the events of a signal, free of limits, that meets and leaves its limits."""
     yield limit.initially("high", when=free > high)
     yield limit.initially("low", when=free < low)
@@ -97,7 +98,7 @@ class P(Component):
     u_s: Input = signal_in("*", "set value")
     u_m: Input = signal_in("*", "measured value")
     k: Parameter = param("*", "gain, output over error")
-    y_max: Parameter = param("*", "limit of the output")
+    y_max: Parameter = param("*", "limit of the output; without a value it has none", default=None)
     y: Output = signal_out("*", "output")
     limit = Mode("free", "high", "low", description="limit of the output")
 
@@ -139,8 +140,9 @@ class Integrator(Component):
 class PI(Component):
     """Proportional-integral controller y = k·(e + 1/Ti·∫e dt) + u_ff, e = u_s - u_m.
 
-    With y_max given, the output is limited to ±y_max, and the integral keeps its value while the output is at a limit
-    that the error would push further (anti-windup by clamping).
+    With y_max given, the output is limited to ±y_max. What exceeds the limit is fed back to the integral with the time
+    constant Ni·Ti, so that it does not wind up (anti-windup by back-calculation, as in the Modelica Standard Library,
+    Blocks.Continuous.LimPID).
     """
 
     u_s: Input = signal_in("*", "set value")
@@ -148,7 +150,8 @@ class PI(Component):
     u_ff: Input = signal_in("*", "feed-forward, in units of the output", default=0.0)
     k: Parameter = param("*", "gain, output over error")
     Ti: Parameter = param("s", "reset time", min=1e-12)
-    y_max: Parameter = param("*", "limit of the output")
+    y_max: Parameter = param("*", "limit of the output; without a value it has none", default=None)
+    Ni: Parameter = param("1", "time constant of the anti-windup over Ti", default=0.9, min=1e-12)
     y: Output = signal_out("*", "output")
     e: Output = signal_out("*", "error")
     integral: Output = signal_out("*", "integral of the error over Ti")
@@ -161,7 +164,8 @@ class PI(Component):
     def equations(self) -> Equations:
         yield self.e == self.u_s - self.u_m
         if self.given("y_max"):
-            yield self.Ti * der(self.integral) == self.limit.choose(free=self.e, high=0, low=0)
+            excess = self.free_output() - self.y
+            yield self.Ti * der(self.integral) == self.e - excess / (self.k * self.Ni)
             yield self.y == self.limit.choose(free=self.free_output(), high=self.y_max, low=-self.y_max)
         else:
             yield self.Ti * der(self.integral) == self.e

@@ -38,7 +38,7 @@ class Mass(Component):
     flange_a = LinearFlange("left end", free=True)
     flange_b = LinearFlange("right end", free=True)
     m: Parameter = param("kg", "mass", min=0)
-    L: Parameter = param("m", "distance from left to right end; without a value both ends are at s")
+    L: Parameter = param("m", "distance from left to right end; without a value both ends are at s", default=None)
     s: Variable = var("m", "position")
     v: Variable = var("m/s", "velocity")
 

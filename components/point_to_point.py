@@ -12,6 +12,7 @@ from modelica_like.language import (
     Parameter,
     absolute,
     der,
+    maximum,
     minimum,
     param,
     sign,
@@ -50,7 +51,8 @@ class KinematicPTP2(Component):
     @property
     def duration(self) -> Expr:
         """Duration of the motion."""
-        return self.rise + absolute(self.way) / (self.qdd_max * self.rise)
+        way = absolute(self.way)
+        return self.rise + maximum(sqrt(way / self.qdd_max), way / self.qd_max)
 
     def equations(self) -> Equations:
         gone = self.time - self.start_time

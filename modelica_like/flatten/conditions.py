@@ -8,7 +8,7 @@ import casadi as ca
 
 from modelica_like.errors import LanguageError, Source
 
-_JUST_TRUE = 1e-300
+JUST_TRUE = 1e-300
 """Guard of a relation that includes equality, where both sides are equal."""
 
 
@@ -26,7 +26,7 @@ def guard_of(condition: Any, source: Source) -> Any:
     if operation == ca.OP_LE:
         difference = condition.dep(1) - condition.dep(0)
         # A sum, so that its rate is that of the difference: a relation that ceases to hold right now does not count.
-        return difference + ca.if_else(difference == 0, _JUST_TRUE, 0)
+        return difference + ca.if_else(difference == 0, JUST_TRUE, 0)
     if operation == ca.OP_AND:
         return ca.fmin(guard_of(condition.dep(0), source), guard_of(condition.dep(1), source))
     if operation == ca.OP_OR:

@@ -216,7 +216,9 @@ def _convert(node: ast.expr, text: str, quantities: dict[str, str]) -> Formula:
     if isinstance(node, ast.Constant) and isinstance(node.value, int | float) and not isinstance(node.value, bool):
         return Formula("number", (_finite(node.value, text),))
     if isinstance(node, ast.BinOp) and type(node.op) in _BINARY:
-        return Formula(_BINARY[type(node.op)], (_convert(node.left, text, quantities), _convert(node.right, text, quantities)))
+        return Formula(
+            _BINARY[type(node.op)], (_convert(node.left, text, quantities), _convert(node.right, text, quantities))
+        )
     if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
         return Formula("neg", (_convert(node.operand, text, quantities),))
     if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.UAdd):

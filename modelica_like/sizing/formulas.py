@@ -47,7 +47,9 @@ def read_value(text: str, lookup: Lookup) -> Value:
     if formula.operation == "name":
         return lookup(text.strip())
     unit = _unit(formula, lookup)
-    number = float(formula.evaluate(lambda name: _scalar(lookup(name), name), lambda part: ca.SX(_quantity(part).number)))
+    number = float(
+        formula.evaluate(lambda name: _scalar(lookup(name), name), lambda part: ca.SX(_quantity(part).number))
+    )
     return _finite(Value(number, unit), text)
 
 

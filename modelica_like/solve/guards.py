@@ -10,6 +10,7 @@ import numpy as np
 
 from modelica_like.compile.buffers import buffered
 from modelica_like.compile.compiled import CompiledDae, Vector
+from modelica_like.flatten.conditions import JUST_TRUE
 from modelica_like.initialize import Point, call
 
 _LOCATED = 1e-13
@@ -67,7 +68,8 @@ class Guards:
 def _numbers(guards: Vector) -> Vector:
     """Let a guard that is not a number be false, and what is nothing but rounding zero."""
     guards = guards if np.isfinite(guards).all() else np.nan_to_num(guards, nan=-1.0)
-    return np.where(np.abs(guards) < _NOISE, 0.0, guards)
+    sizes = np.abs(guards)
+    return np.where((sizes < _NOISE) & (sizes > JUST_TRUE), 0.0, guards)
 
 
 @dataclass
@@ -93,7 +95,7 @@ def candidates(values: Vector, rates: Vector, active: Any, step: float) -> list[
     before, after = values[:, :-1], values[:, 1:]
     below = before <= 0
     crossing = below & (after > 0)
-    humps = below & ~crossing & (rates[:, :-1] > 0) & (rates[:, 1:] < 0)
+    humps = below & ~crossing & (rates[:, :-1] * step > _NOISE) & (rates[:, 1:] * step < -_NOISE)
     places = np.nonzero(humps)
     if places[0].size:
         ends = before[places], after[places]
@@ -205,7 +207,9 @@ def _event(point: Point, values: Vector, rates: Vector, watched: Any, tolerance:
 
 
 def _newton(values: Vector, rates: Vector, watched: Any) -> float | None:
-    """Newton step to the earliest zero of the rising guards."""
+    """Newton step to the earliest zero of the rising guards; None where one has risen before, and falls again."""
+    if np.any((values[watched] > 0) & (rates[watched] <= 0)):
+        return None
     steps = [float(-values[g] / rates[g]) for g in watched if rates[g] > 0]
     return min(steps) if steps else None
 

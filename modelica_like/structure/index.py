@@ -15,13 +15,14 @@ def prefer_relative_states(system: System) -> None:
     A relative angle `phi_rel = phi_b - phi_a` is then differentiated along with the angles of the inertias and can
     become a state in their place: absolute angles grow without bound, and with them the error that a relative
     tolerance allows. Behind a gear the shaft's angle is not differentiated itself, but its relation to the motor's is
-    linear: that is enough.
+    linear: that is enough. A relation to an input gives none: the state would need the input's derivatives.
     """
+    known = set(system.inputs)
     reach = [len(chain) for chain in system.chains]
     relations = [
         [system.levels[level].chain for level in levels]
         for levels in system.linear_rows
-        if len(levels) > 1 and not any(system.levels[level].order for level in levels)
+        if len(levels) > 1 and not any(system.levels[level].order or level in known for level in levels)
     ]
     changed = True
     while changed:

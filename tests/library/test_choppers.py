@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from components import (
+    PI,
     Capacitor,
     ConstantTorque,
     ConstantVoltage,
@@ -153,6 +154,21 @@ def test_proportional_controller_with_limit() -> None:
     run = simulate(Assembly("d", parts=parts, series={"s": ["torque", "J", "speed"]}, connect=connect), 1.0, **TIGHT)
     assert run.events[0].time == pytest.approx(7 / 12, rel=1e-9)
     assert run.final["J.w"] == pytest.approx(10 - 3 * exp(-4 * (1 - 7 / 12)), rel=1e-8)
+
+
+@pytest.mark.parametrize("error", [5.0, -5.0])
+def test_integral_at_a_limit(error: float) -> None:
+    """Back-calculation: the integral nears sign(e)·y_max/k - e·(1 - Ni) with the time constant Ni·Ti."""
+    parts: dict[str, Component] = {
+        "part": PI(k="2 N.m", Ti=0.4, y_max="4 N.m", Ni=0.5, u_s=error, u_m=0.0, integral=0.0), "torque": Torque(),
+        "J": Inertia(J=0.5, phi=0.0, w=0.0),
+    }  # fmt: skip
+    drive = Assembly("d", parts=parts, series={"s": ["torque", "J"]}, connect={"y": ["part.y", "torque.tau"]})
+    run = simulate(drive, 1.0, **TIGHT)
+    limit = np.copysign(4.0, error)
+    final = limit / 2 - error * (1 - 0.5)
+    np.testing.assert_allclose(run["part.integral"], final * (1 - np.exp(-run.time / (0.5 * 0.4))), atol=1e-8)
+    np.testing.assert_allclose(run["part.y"], limit, atol=1e-9)
 
 
 def test_cascade_at_its_limits() -> None:

@@ -405,7 +405,7 @@ def test_time_derivatives_by_name() -> None:
     assert np.array_equal(again[der(drive.left.w)], again["der(left.w)"])
     assert "der(left.w)" in run
     assert "der(left.v)" not in run
-    with pytest.raises(UnknownName, match="did you mean 'left.w'"):
+    with pytest.raises(UnknownName, match=r"did you mean 'left\.w'"):
         run["der(left.v)"]
 
 

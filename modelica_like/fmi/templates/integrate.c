@@ -230,11 +230,14 @@ static double largest_step(const State *s) {
     return N_GUARDS > 0 || N_X == 0 ? span / LEAST_LOOKS : INFINITY;
 }
 
+/* Below this, two times are the same. */
+static double least_step(const State *s) { return 1e-15 * fmax(1, fabs(s->t)); }
+
 /* Takes one step from the present point towards `limit`, shorter where accuracy or an event asks for it. */
 static Result take_step(Instance *c, double limit) {
     State *s = &c->state;
     double first[AT_LEAST_ONE(N_UNKNOWNS)], wished = s->step > 0 ? s->step : first_step(c);
-    double least = 1e-15 * fmax(1, fabs(s->t));
+    double least = least_step(s);
     int rejected = 0;
     memcpy(first, s->x, N_X * sizeof(double));
     memcpy(first + N_X, s->z, N_Z * sizeof(double));
@@ -355,6 +358,11 @@ Arrival integrate_to(Instance *c, double target, int stop_at_events) {
         if (handle_event(c) != RESULT_OK) return FAILED;
     }
     while (s->t < target) {
+        if (!s->piece_valid && target - s->t < least_step(s)) {
+            /* An event was located a rounding error before the target. */
+            s->t = target;
+            break;
+        }
         if (!s->piece_valid) {
             double limit = s->stop_time_defined && s->stop_time >= target ? s->stop_time : INFINITY;
             limit = fmin(limit, next_moment(c));
