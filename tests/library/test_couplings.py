@@ -96,8 +96,8 @@ def test_torque_converter_starts_a_vehicle() -> None:
 
     def rates(t: float, w: Any) -> list[float]:
         x = w[1] / w[0]
-        torque = np.interp(x, *zip(*CAPACITY, strict=True)) * w[0] ** 2
-        return [(60 - torque) / 0.2, (np.interp(x, *zip(*RATIO, strict=True)) * torque - 0.1 * w[1]) / 3.0]
+        torque = np.interp(x, [0, 0.8, 1], [2e-3, 1.5e-3, 0]) * w[0] ** 2
+        return [(60 - torque) / 0.2, (np.interp(x, [0, 0.85], [2, 1]) * torque - 0.1 * w[1]) / 3.0]
 
     run = shaft(
         4.0, engine=ConstantTorque(tau_constant=60.0), J1=Inertia(J=0.2, phi=0.0, w=80.0),

@@ -1,82 +1,109 @@
-"""Waves, transients and stepped signals: their values at all times, besides the areas under them."""
+"""Waves, transients and stepped signals: their values, and time events exactly where they jump or have a kink."""
 
 from collections.abc import Callable
-from functools import cache
-from pathlib import Path
+from math import cos, exp, log, pi, sin
 from typing import Any
 
 import numpy as np
 import pytest
 
-from components import BooleanPulse, BooleanTable, Exponentials, Gain, Inertia, LogFrequencySweep, SawTooth, Torque
+from components import (
+    BooleanPulse,
+    BooleanStep,
+    BooleanTable,
+    CombiTable,
+    Constant,
+    Cosine,
+    Exponentials,
+    ExpSine,
+    Inertia,
+    LogFrequencySweep,
+    SawTooth,
+    Sinc,
+    StepTable,
+    Torque,
+    VariableSine,
+)
 from modelica_like import Assembly, Component, Solution, simulate
 
-WAVES = Path(__file__).parents[2] / "examples" / "components" / "waves.toml"
-GROWTH = np.log(8) / 2
-Curve = Callable[[Any], Any]
+
+def run_of(signal: Component, until: float = 2.0, **more: Any) -> Solution:
+    """Run the signal beside a rotor."""
+    parts = {"signal": signal, "torque": Torque(tau=1.0), "J": Inertia(J=1.0, phi=0.0, w=0.0), **more.pop("parts", {})}
+    return simulate(Assembly("d", parts=parts, series={"s": ["torque", "J"]}, **more), until, rtol=1e-9)
 
 
-def heating(t: Any) -> Any:
-    rise = 1 - np.exp(-np.clip(t - 0.25, 0, 1) / 0.4)
-    return 2 * rise * np.exp(-np.clip(t - 1.25, 0, None) / 0.3)
+def rise(t: float) -> float:
+    up = 1 - exp(-min(max(t - 0.3, 0), 0.5) / 0.2)
+    return 1 + 2 * up * exp(-max(t - 0.8, 0) / 0.4)
 
 
-CURVES: dict[str, Curve] = {
-    "cosine.y": lambda t: 2 * np.cos(0.6 * np.pi * t),
-    "hit.y": lambda t: np.where(t > 0.5, 2 * np.exp(-1.5 * (t - 0.5)) * np.sin(4 * np.pi * (t - 0.5)), 0),
-    "sinc.y": lambda t: 2 * np.sinc(4 * t),
-    "heating.y": heating,
-    "saw.y": lambda t: np.where(t > 0.2, 2 * (((t - 0.2) / 0.4) % 1), 0),
-    "octaves.y": lambda t: 0.5 * 8 ** (t / 2),
-    "sweep.y": lambda t: 2 * np.sin(np.pi * (np.exp(GROWTH * t) - 1) / GROWTH),
-    "steps.y": lambda t: np.select([t < 0.5, t < 1.25], [1, 3], -2),
-    "switch.y": lambda t: t > 1.5,
-    "pulses.y": lambda t: (t > 0.1) & ((t - 0.1) % 0.5 < 0.1),
-    "gates.y": lambda t: np.select([t < 0.25, t < 0.5, t < 1.75], [1, 0, 1], 0),
-    "both.columns[1].y": lambda t: 2 * np.interp(t, [0, 1, 2], [0, 1, 0]),
-    "both.columns[2].y": lambda t: np.interp(t, [0, 1, 2], [1, 1, 3]),
-}
-TIMES = np.arange(0.013, 2, 0.037)
+CASES: list[tuple[Component, Callable[[float], float], list[float]]] = [
+    (
+        Cosine(amplitude="2 N.m", f=3.0, phase="30 deg", offset="1 N.m", start_time=0.4),
+        lambda t: 1 + (2 * cos(6 * pi * (t - 0.4) + pi / 6) if t >= 0.4 else 0),
+        [0.4],
+    ),
+    (
+        ExpSine(amplitude="2 N.m", f=3.0, damping=1.5, start_time=0.4),
+        lambda t: 2 * exp(-1.5 * (t - 0.4)) * sin(6 * pi * (t - 0.4)) if t >= 0.4 else 0,
+        [0.4],
+    ),
+    (Sinc(amplitude="2 N.m", f=2.0), lambda t: 2 * float(np.sinc(4 * t)), []),
+    (
+        Exponentials(height="2 N.m", offset="1 N.m", rise_time=0.5, T_rise=0.2, T_fall=0.4, start_time=0.3),
+        rise,
+        [0.3, 0.8],
+    ),
+    (
+        SawTooth(amplitude="2 N.m", period=0.5, periods=2, offset="1 N.m", start_time=0.3),
+        lambda t: 1 + 4 * ((t - 0.3) % 0.5) * (0.3 <= t < 1.3),
+        [0.3, 0.8, 0.8, 1.3],
+    ),
+    (
+        LogFrequencySweep(f_min=1.0, f_max=8.0, duration=1.2, start_time=0.3),
+        lambda t: exp(log(8) * min(max(t - 0.3, 0) / 1.2, 1)),
+        [0.3, 1.5],
+    ),
+    (
+        StepTable(table=((0.2, 1), (0.7, 3), (1.1, -2)), scale="1 N.m"),
+        lambda t: 1 if t < 0.7 else 3 if t < 1.1 else -2,
+        [0.2, 0.7, 1.1],
+    ),
+    (BooleanStep(start_time=0.7), lambda t: t >= 0.7, [0.7]),
+    (BooleanStep(start_time=0.7, start_value=True), lambda t: t < 0.7, [0.7]),
+    (
+        BooleanTable(times=(0.2, 0.7, 1.1), start_value=True),
+        lambda t: t < 0.2 or 0.7 <= t < 1.1,
+        [0.2, 0.7, 1.1],
+    ),
+    (
+        BooleanPulse(period=0.8, width=0.25, start_time=0.3),
+        lambda t: t >= 0.3 and (t - 0.3) % 0.8 < 0.2,
+        [0.3, 0.5, 1.1, 1.3, 1.9],
+    ),
+]  # fmt: skip
 
 
-@cache
-def waves() -> Solution:
-    return simulate(WAVES, rtol=1e-9, atol=1e-11)
+@pytest.mark.parametrize(("signal", "law", "kinks"), CASES, ids=lambda case: type(case).__name__)
+def test_values_and_events(signal: Component, law: Callable[[float], float], kinks: list[float]) -> None:
+    run = run_of(signal)
+    assert [event.time for event in run.events] == pytest.approx(kinks, abs=1e-12)
+    away = [k for k, t in enumerate(run.time) if all(abs(t - kink) > 1e-9 for kink in kinks)]
+    np.testing.assert_allclose(run["signal.y"][away], [law(run.time[k]) for k in away], atol=1e-9)
 
 
-@pytest.mark.parametrize("path", CURVES)
-def test_values(path: str) -> None:
-    """At times between the jumps, which are all at multiples of 0.05 s."""
-    values = [waves().at(float(t))[path] for t in TIMES]
-    np.testing.assert_allclose(values, CURVES[path](TIMES), atol=1e-6)
+def test_table_of_several_signals() -> None:
+    run = run_of(CombiTable(table=((0, 0, 1), (1, 2, 1), (2, 0, 3))))
+    np.testing.assert_allclose(run["signal.columns[1].y"], np.interp(run.time, (0, 1, 2), (0, 2, 0)), atol=1e-12)
+    np.testing.assert_allclose(run["signal.columns[2].y"], np.interp(run.time, (0, 1, 2), (1, 1, 3)), atol=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("signal", "value"),
-    [
-        (SawTooth(amplitude=2.0, period=0.4, start_time=-1.0), 2 * 0.75),
-        (Exponentials(rise_time=1.0, T_rise=0.4, T_fall=0.3, start_time=-3.0), (1 - np.exp(-2.5)) * np.exp(-2.1 / 0.3)),
-        (BooleanPulse(period=0.5, width=0.4, start_time=-1.0), 1.0),
-        (BooleanTable(times=(-2.0, -1.0, -0.5)), 1.0),
-    ],
-    ids=lambda item: type(item).__name__ if isinstance(item, Component) else "",
-)
-def test_signals_that_began_before_the_run(signal: Component, value: float) -> None:
-    parts = {"signal": signal, "unit": Gain(k="1 N.m"), "torque": Torque(), "J": Inertia(J=1.0, phi=0.0, w=0.0)}
-    connect = {"u": ["signal.y", "unit.u"], "y": ["unit.y", "torque.tau"]}
-    run = simulate(Assembly("d", parts=parts, series={"s": ["torque", "J"]}, connect=connect), 0.15)
-    assert run.at(0.1)["signal.y"] == pytest.approx(value, abs=1e-9)
-    assert run.energy().closure <= 1e-8
-
-
-def test_sweep_keeps_its_last_frequency() -> None:
-    sweep = LogFrequencySweep(f_min=1.0, f_max=4.0, duration=0.2)
-    unit = Gain(k="1 N.m.s")
-    parts = {"sweep": sweep, "unit": unit, "torque": Torque(), "J": Inertia(J=1.0, phi=0.0, w=0.0)}
-    connect = {"u": ["sweep.y", "unit.u"], "y": ["unit.y", "torque.tau"]}
-    run = simulate(
-        Assembly("d", parts=parts, series={"s": ["torque", "J"]}, connect=connect), 0.5, rtol=1e-9, atol=1e-11
-    )
-    assert run.at(0.1)["sweep.y"] == pytest.approx(2.0, rel=1e-12)
-    assert run.final["sweep.y"] == pytest.approx(4.0, rel=1e-12)
-    assert run.final["J.w"] == pytest.approx(0.2 * 3 / np.log(4) + 0.3 * 4, rel=1e-8)
+def test_sine_of_a_sweep() -> None:
+    """Its angle is the integral of the frequency: (f_max - f_min)·T/ln(f_max/f_min) turns."""
+    sweep = LogFrequencySweep(f_min=1.0, f_max=8.0, duration=2.0)
+    parts = {"sine": VariableSine(offset="1 N.m"), "a": Constant(k="3 N.m")}
+    connect = {"f": ["signal.y", "sine.f"], "a": ["a.y", "sine.amplitude"]}
+    run = run_of(sweep, parts=parts, connect=connect)
+    angle = 2 * pi * 2 / log(8) * (np.exp(log(8) * run.time / 2) - 1)
+    np.testing.assert_allclose(run["sine.y"], 1 + 3 * np.sin(angle), atol=1e-5)
