@@ -46,6 +46,12 @@ PICTURES: dict[str, tuple[str, ...]] = {
         "elastoBacklash.tau",
         "elastoBacklash2.tau",
     ),
+    "msl/rotational/OneWayClutch": ("inertiaIn.w", "inertiaOut.w", "oneWayClutch.tau"),
+    "msl/rotational/LossyGearDemo2": ("Inertia1.w", "Inertia2.w", "bearingFriction.tau", "gear.tau_loss"),
+    "msl/translational/ElastoGap": ("mass1.s", "mass2.s", "elastoGap1.f", "elastoGap2.f"),
+    "msl/translational/PreLoad": ("spool.s", "innerContactA.f", "innerContactB.f", "force.f"),
+    "msl/dcmachines/DCPM_Start": ("dcpm.ia", "dcpm.w", "dcpm.tau_electrical"),
+    "msl/dcmachines/DCSE_Start": ("dcse.ia", "dcse.w", "dcse.tau_electrical"),
 }
 
 END = {"fan": "4 s", "ravigneaux": "20 ms"}

@@ -43,8 +43,9 @@ def test_wrong_calls_are_errors_and_a_thousand_instances_leave_nothing_behind(ne
     assert result.returncode == 0, f"{result.stdout}\n{result.stderr}"
     assert result.stderr == ""
     if "Clutches" in netlist:
-        # Which number a variable has depends on how many the library's components declare.
-        said = re.sub(r"value reference \d+ is not of type Real", "value reference 111 is not of type Real", result.stdout)
-        lines = dict.fromkeys(said.splitlines())
+        # References and sizes depend on how many variables the library's components declare.
+        said = re.sub(r"value reference \d{1,4}\b", "value reference N", result.stdout)
+        said = re.sub(r"\d+ bytes, not \d+", "N bytes, not N", said)
+        lines = list(dict.fromkeys(said.splitlines()))
         expected = (HERE / f"messages{version[0]}.txt").read_text(encoding="utf-8")
-        assert "\n".join(lines) + "\n" == expected
+        assert lines == expected.splitlines()

@@ -1,7 +1,8 @@
-"""The energy balance of every example closes to 1e-8 of its throughput."""
+"""The energy balance of every example closes to 1e-8 of its throughput, component by component."""
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from modelica_like import load, simulate
@@ -15,4 +16,9 @@ NETLISTS = sorted(path for path in ROOT.rglob("*.toml") if not {"sizing", "cosim
 def test_energy_closes(path: Path) -> None:
     drive = load(path)
     run = simulate(drive, None if "until" in drive.simulate else 2.0)
-    assert run.energy().closure <= 1e-8
+    balance = run.energy()
+    assert balance.closure <= 1e-8
+    for row in balance:
+        assert abs(row.residual) <= 1e-8 * balance.throughput, row
+        losses = run[f"{row.component}.loss_power"]
+        assert np.min(losses) >= -1e-8 * max(1.0, np.max(losses)), row.component
