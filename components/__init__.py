@@ -40,6 +40,7 @@ from components.electrical import SignalVoltage as SignalVoltage
 from components.electrical import Switch as Switch
 from components.electrical import VariableResistor as VariableResistor
 from components.electrical import VoltageSensor as VoltageSensor
+from components.fixed import Disc as Disc
 from components.fixed import Fixed as Fixed
 from components.fixed import TranslationalFixed as TranslationalFixed
 from components.flexible_shafts import FlexibleShaft as FlexibleShaft
@@ -136,12 +137,14 @@ from components.stepped_signals import StepTable as StepTable
 from components.thermal import FixedTemperature as FixedTemperature
 from components.thermal import HeatPort as HeatPort
 from components.thermal import HeatSource as HeatSource
+from components.thermal import TemperatureSensor as TemperatureSensor
 from components.thermal import ThermalConductor as ThermalConductor
 from components.thermal import ThermalMass as ThermalMass
 from components.torque_converters import TorqueConverter as TorqueConverter
 from components.translational_sensors import LinearAccelerationSensor as LinearAccelerationSensor
 from components.translational_sensors import LinearMultiSensor as LinearMultiSensor
 from components.translational_sensors import LinearPowerSensor as LinearPowerSensor
+from components.translational_sensors import RelativeLinearAccelerationSensor as RelativeLinearAccelerationSensor
 from components.translational_sensors import RelativePositionSensor as RelativePositionSensor
 from components.translational_sensors import RelativeVelocitySensor as RelativeVelocitySensor
 from components.translational_sensors import VelocitySensor as VelocitySensor
@@ -205,6 +208,7 @@ __all__ = [
     "CurrentToVoltageAdaptor",
     "Damper",
     "Differential",
+    "Disc",
     "DryFriction",
     "EddyCurrentForce",
     "EddyCurrentTorque",
@@ -278,6 +282,7 @@ __all__ = [
     "Ravigneaux",
     "RelativeAccelerationSensor",
     "RelativeAngleSensor",
+    "RelativeLinearAccelerationSensor",
     "RelativePositionSensor",
     "RelativeSpeedSensor",
     "RelativeStates",
@@ -309,6 +314,7 @@ __all__ = [
     "SupportFriction",
     "Switch",
     "Table",
+    "TemperatureSensor",
     "TemperatureToHeatFlowAdaptor",
     "ThermalConductor",
     "ThermalMass",

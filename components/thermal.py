@@ -2,7 +2,20 @@
 
 from __future__ import annotations
 
-from modelica_like.language import Component, Connector, Equations, Expr, Parameter, Variable, der, flow, param, var
+from modelica_like.language import (
+    Component,
+    Connector,
+    Equations,
+    Expr,
+    Output,
+    Parameter,
+    Variable,
+    der,
+    flow,
+    param,
+    signal_out,
+    var,
+)
 
 _ROOM = 293.15
 
@@ -96,3 +109,14 @@ class ThermalConductor(Component):
         a, b = self.port_a, self.port_b
         yield a.Q_flow == self.G * (a.T - b.T)
         yield a.Q_flow + b.Q_flow == 0
+
+
+class TemperatureSensor(Component):
+    """Temperature of a body, e.g. for a control that protects a motor's winding."""
+
+    port = HeatPort("measured surface")
+    T: Output = signal_out("K", "temperature")
+
+    def equations(self) -> Equations:
+        yield self.port.Q_flow == 0
+        yield self.T == self.port.T

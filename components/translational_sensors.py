@@ -68,6 +68,18 @@ class RelativeVelocitySensor(RelativeSlideSensor):
         yield self.v_rel == der(self.flange_b.s) - der(self.flange_a.s)
 
 
+class RelativeLinearAccelerationSensor(RelativeSlideSensor):
+    """Acceleration of one slide end relative to another."""
+
+    v_rel: Variable = var("m/s", "relative velocity")
+    a_rel: Output = signal_out("m/s2", "relative acceleration")
+
+    def equations(self) -> Equations:
+        yield from super().equations()
+        yield self.v_rel == der(self.flange_b.s) - der(self.flange_a.s)
+        yield self.a_rel == der(self.v_rel)
+
+
 class CutSlideSensor(Component, partial=True):
     """Sensor in a cut through a slide."""
 

@@ -123,7 +123,7 @@ def linear_brake(run: Solution) -> None:
 
 @numbers
 def shaft_sensors(run: Solution) -> None:
-    read = {"angle.phi": 4, "speed.w": 4, "acceleration.a": 2, "torque.tau": 4}
+    read = {"angle.phi": 4, "speed.w": 4, "acceleration.a": 2, "torque.tau": 4, "turned.phi": 4 + pi / 2}
     relative = {"relative_angle.phi_rel": 6, "relative_speed.w_rel": 6, "relative_acceleration.a_rel": 3}
     assert {name: run.final[name] for name in read | relative} == close(read | relative)
 
@@ -131,7 +131,7 @@ def shaft_sensors(run: Solution) -> None:
 @numbers
 def slide_sensors(run: Solution) -> None:
     read = {"position.s": 4, "velocity.v": 4, "acceleration.a": 2, "force.f": 6, "power.power": 24}
-    relative = {"relative_position.s_rel": 6, "relative_velocity.v_rel": 6}
+    relative = {"relative_position.s_rel": 6, "relative_velocity.v_rel": 6, "relative_acceleration.a_rel": 3}
     assert {name: run.final[name] for name in read | relative} == close(read | relative)
 
 
@@ -189,7 +189,8 @@ def clutch_lining(run: Solution) -> None:
 
 @numbers
 def heating(run: Solution) -> None:
-    assert run.final["body.T"] == close(293.15 + 50 / 2 * (1 - exp(-300 * 2 / 400)))
+    warm = 293.15 + 50 / 2 * (1 - exp(-300 * 2 / 400))
+    assert [run.final["body.T"], run.final["thermometer.T"]] == close([warm, warm])
 
 
 @numbers
