@@ -13,7 +13,7 @@ from modelica_like.language.declared import Connector, unknown
 from modelica_like.language.equation import Connection, Equations, FreeEnd, connect, free, series
 from modelica_like.language.expr import Expr, Symbol, symbol_of
 from modelica_like.language.fields import Field, Parameter, Variable, param
-from modelica_like.language.places import NOWHERE
+from modelica_like.language.places import NOWHERE, caller
 
 
 class Assembly(Component):
@@ -28,6 +28,7 @@ class Assembly(Component):
     _chains: dict[str, tuple[str, ...]]
     _free: tuple[str, ...]
     _places: dict[str, Source]
+    _made: Source
 
     def __init__(
         self, name: str = "", *, parts: Mapping[str, Component | list[Component]] | None = None,
@@ -36,7 +37,7 @@ class Assembly(Component):
     ) -> None:  # fmt: skip
         self.__dict__.update(_own_fields={}, _own_connectors=(), _wires={}, _chains={}, _free=(), _places={})
         super().__init__()
-        self.__dict__.update(_name=name, description=description, simulate={}, origin="")
+        self.__dict__.update(_name=name, description=description, simulate={}, origin="", _made=caller())
         for key, value in (parameters or {}).items():
             self.add_parameter(key, value)
         for key, part in (parts or {}).items():
@@ -68,7 +69,9 @@ class Assembly(Component):
         self._places[key] = source
 
     def source_of(self, key: str) -> Source:
-        """Return where in the netlist a wire, series or part stands."""
+        """Return where in the netlist a wire, series or part stands; of a drive built in Python, where a part is."""
+        if not self._places and key.startswith("parts."):
+            return replace(self._made, text=key)
         return self._places.get(key, NOWHERE)
 
     @property
@@ -115,12 +118,20 @@ class Assembly(Component):
             try:
                 statements = make()
             except ModelicaLikeError as error:
-                error.where = error.where or ((source,) if source is not NOWHERE else ())
+                error.where = error.where or (self._told(key),)
                 errors.append(error)
             else:
                 yield from (replace(statement, source=source) for statement in statements)
         if errors:
             raise raise_together_or_one(errors)
+
+    def _told(self, key: str) -> Source:
+        """Return where to look for an entry: its line in a netlist, or the call that made the assembly."""
+        if self._places:
+            return self.source_of(key)
+        kind, _, name = key.partition(".")
+        given = {"connect": self._wires, "series": self._chains}.get(kind, {}).get(name)
+        return replace(self._made, text=key if given is None else f"{key} = {list(given)}")
 
     def _wiring(self) -> Iterator[tuple[str, Callable[[], list[Any]]]]:
         """Yield every entry of the netlist with what makes its statements."""

@@ -195,7 +195,8 @@ def drive(**wires: str) -> Assembly:
     }  # fmt: skip
     ends = {key: text.split() for key, text in wires.items()}
     used = {end.split(".")[0] for group in ends.values() for end in group}
-    return Assembly("drive", parts={name: part for name, part in parts.items() if name in used}, connect=ends)
+    chosen = {name: part for name, part in parts.items() if name in used}
+    return Assembly("drive", parts=chosen, connect=ends)  # wired
 
 
 def with_wire(wire: Callable[[Wires], object]) -> Component:
@@ -289,6 +290,7 @@ case(
     lambda: flatten(drive(a="rotor.flange_a planet.sun", b="planet.carrier load.flange_a")),
     """\
 planet.ring is free, so planet (IdealPlanetary) carries no torque.
+  in test_messages.py:{wired} `parts.planet`
 Connect it, or say free(planet.ring).""",
 )
 case(
@@ -336,7 +338,9 @@ case(
     errors.UnknownName,
     "an unknown flange",
     lambda: flatten(drive(a="planet.sum rotor.flange_a")),
-    "planet (IdealPlanetary) has no connector 'sum'; did you mean 'sun'? It has sun, carrier, ring.",
+    """\
+planet (IdealPlanetary) has no connector 'sum'; did you mean 'sun'? It has sun, carrier, ring.
+  in test_messages.py:{wired} `connect.a = ['planet.sum', 'rotor.flange_a']`""",
 )
 case(
     errors.UnknownName,
@@ -357,16 +361,22 @@ drive: 'm' is already the name of something else.
 case(
     errors.MissingValue,
     "a parameter without a value",
-    lambda: flatten(Assembly("drive", parts={"rotor": Inertia()})),
-    "rotor.J (Inertia) has no value.\nGive it one: J = …",
+    lambda: flatten(Assembly("drive", parts={"rotor": Inertia()})),  # no value
+    """\
+rotor.J (Inertia) has no value.
+  in test_messages.py:{no value} `parts.rotor`
+Give it one: J = …""",
 )
 case(
     errors.MissingValue,
     "an input without a value",
     lambda: flatten(
-        Assembly("drive", parts={"motor": Speed(), "rotor": Inertia(J=1.0)}, series={"s": ["motor", "rotor"]})
+        Assembly("drive", parts={"motor": Speed(), "rotor": Inertia(J=1.0)}, series={"s": ["motor"]})  # no signal
     ),
-    "motor.w_ref is an input without a value.\nConnect it or give it a value.",
+    """\
+motor.w_ref is an input without a value.
+  in test_messages.py:{no signal} `parts.motor`
+Connect it or give it a value.""",
 )
 
 # -- language --------------------------------------------------------------------------------------------------------
