@@ -370,9 +370,7 @@ Give it one: J = …""",
 case(
     errors.MissingValue,
     "an input without a value",
-    lambda: flatten(
-        Assembly("drive", parts={"motor": Speed(), "rotor": Inertia(J=1.0)}, series={"s": ["motor"]})  # no signal
-    ),
+    lambda: flatten(Assembly(parts={"motor": Speed(), "j": Inertia(J=1.0)}, series={"s": ["motor", "j"]})),  # no signal
     """\
 motor.w_ref is an input without a value.
   in test_messages.py:{no signal} `parts.motor`
