@@ -79,7 +79,7 @@ def simulate(
     if parameters:
         model = model.with_parameters(dict(parameters))
     settings = model.settings
-    end = _seconds(until if until is not None else settings.get("until"))
+    end = seconds(until if until is not None else settings.get("until"))
     chosen = _options(options or Options(), settings, rtol=rtol, atol=atol, points=points)
     if end <= t0:
         raise ValueOutOfRange(f"The end time {end:g} s is not after the start time {t0:g} s.")
@@ -87,13 +87,14 @@ def simulate(
     first = initialize(model, t0, start or settings.get("start", "given"))
     loop = EventLoop(model, chosen, first, end, progress)
     record = loop.run()
-    seconds = time.perf_counter() - begin
+    elapsed = time.perf_counter() - begin
     counts = loop.integrator
-    statistics = Statistics(counts.steps, counts.evaluations, counts.calls, len(record.events), seconds)
+    statistics = Statistics(counts.steps, counts.evaluations, counts.calls, len(record.events), elapsed)
     return Solution(model, chosen, tuple(record.segments), tuple(record.events), statistics)
 
 
-def _seconds(until: float | str | None) -> float:
+def seconds(until: float | str | None) -> float:
+    """Return an end time or a step, a number in s or a quantity, in s."""
     if until is None:
         raise ValueOutOfRange(
             "There is no end time.",

@@ -14,7 +14,7 @@ from fmpy.model_description import ValidationError
 
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import ExportError
-from modelica_like.simulation import _seconds, simulate
+from modelica_like.simulation import seconds, simulate
 
 _PART = 0.1
 _POINTS = 50
@@ -85,7 +85,7 @@ def compare_with_idas(path: Path, model: CompiledDae, kind: Literal["me", "cs"])
     """
     from modelica_like.fmi.run import run_fmu
 
-    end = _PART * _seconds(model.settings.get("until", "1 s"))
+    end = _PART * seconds(model.settings.get("until", "1 s"))
     nominals = {n: abs(size) for n, size in zip(model.states, model.nominals, strict=True) if n in model.position}
     if not nominals:
         return 0.0

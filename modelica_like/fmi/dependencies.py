@@ -37,6 +37,10 @@ class Dependencies:
         found = self._initial_states[index] if kind == "state" else self._at_start(self._own(unknown))
         return self._references(found, ("t", "p", "u", "start", "discrete"))
 
+    def inputs_of(self, position: int) -> set[int]:
+        """Numbers of the inputs that a variable follows at once."""
+        return {k for name, k in self._through_implicit(self._rows("variables")[position]) if name == "u"}
+
     # -- rows of functions -------------------------------------------------------------------------------------------
 
     def _own(self, unknown: FmuVariable) -> set[Known]:

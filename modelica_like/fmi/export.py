@@ -25,7 +25,7 @@ from modelica_like.fmi.icons import drive_icon, icon_name, terminal_icon
 from modelica_like.fmi.interface import Interface, interface
 from modelica_like.fmi.package import write_archive
 from modelica_like.fmi.terminals import Takes, terminals_and_icons, with_open_ends
-from modelica_like.simulation import Model, _seconds
+from modelica_like.simulation import Model, seconds
 from modelica_like.solve.options import Options
 from modelica_like.structure import reduce
 
@@ -193,7 +193,7 @@ def _equations(flat: FlatModel) -> Listing:
 
 def _about(model: CompiledDae, version: Version, kinds: tuple[Kind, ...], description: str) -> About:
     settings = model.settings
-    end = _seconds(settings["until"]) if "until" in settings else None
+    end = seconds(settings["until"]) if "until" in settings else None
     points = int(settings.get("points", Options.points))
     return About(
         version=version, kinds=frozenset(kinds), token=_TOKEN, description=description, stop_time=end,

@@ -38,7 +38,7 @@ def with_open_ends(drive: Component, ends: Sequence[str] = (), takes: Takes = "f
     paths = tuple(dict.fromkeys([*drive.connectors, *ends]))
     if not paths:
         return drive
-    adaptors = {path: _adaptor(_connector(drive, path), takes) for path in paths}
+    adaptors = {path: adaptor_for(connector_at(drive, path), takes) for path in paths}
     twin = drive.copy()
     twin.__dict__["_name"] = drive._name
     twin.__class__ = _opened(type(drive))
@@ -56,19 +56,24 @@ def _opened(kind: type[Component]) -> type[Component]:
 
     class Opened(kind):  # type: ignore[misc, valid-type]
         def equations(self) -> Equations:
-            ends = {id(_connector(self, path)): path for path in self.__dict__["_ends"]}
+            ends = {id(connector_at(self, path)): path for path in self.__dict__["_ends"]}
             for statement in super().equations():
                 # What was declared to stay free is not free any more.
                 if not (isinstance(statement, FreeEnd) and id(statement.connector) in ends):
                     yield statement
             for path, (part, end) in self.__dict__["_ends"].items():
-                yield connect(_connector(self, path), self.parts[part].connectors[end])
+                yield connect(connector_at(self, path), self.parts[part].connectors[end])
 
     Opened.__name__, Opened.__qualname__ = kind.__name__, kind.__qualname__
     return Opened
 
 
-def _connector(drive: Component, path: str) -> Connector:
+def connector_at(drive: Component, path: str) -> Connector:
+    """Return the connector at a path.
+
+    Raises:
+        UnknownName: there is none.
+    """
     owner_path, _, name = path.rpartition(".")
     owner = drive.find(owner_path)
     if name not in owner.connectors:
@@ -76,8 +81,12 @@ def _connector(drive: Component, path: str) -> Connector:
     return owner.connectors[name]
 
 
-def _adaptor(connector: Connector, takes: Takes) -> tuple[type[Component], str]:
-    """Find an adaptor for a connector, and its end."""
+def adaptor_for(connector: Connector, takes: Takes) -> tuple[type[Component], str]:
+    """Return the type of the adaptor for a connector, and the name of its end.
+
+    Raises:
+        ExportError: no library has one.
+    """
     for kind in library_types().values():
         ends = {name: one for name, one in kind._class_connectors.items() if type(one) is type(connector)}
         if kind.terminal is not None and kind.terminal.takes == takes and len(ends) == 1:

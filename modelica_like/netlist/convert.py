@@ -24,7 +24,7 @@ def as_assembly(component: Component) -> Assembly:
     own = [name for name, field in root.fields.items() if not isinstance(field, Parameter)]
     if own or root.modes:
         raise _not_only_wires(component, ", ".join([*own, *root.modes]))
-    parameters = {name: _value(root, name) for name in root.fields}
+    parameters = {name: value_text(root, name) for name in root.fields}
     parts: dict[str, Any] = dict(root._parts)
     wires: list[list[str]] = []
     free: list[str] = []
@@ -67,7 +67,12 @@ def _path(end: Any) -> str:
     return end.path if isinstance(end, Connector) else ".".join(filter(None, (end.owner.path, end.name)))
 
 
-def _value(component: Component, name: str) -> Any:
+def value_text(component: Component, name: str) -> Any:
+    """Return the value of a parameter as a netlist declares it.
+
+    Raises:
+        NetlistError: it has none.
+    """
     value = component.value(name)
     if value is None:
         raise NetlistError(f"{component.label}.{name} has no value, so a netlist cannot declare it.")
