@@ -18,6 +18,8 @@ from modelica_like.solve.recorder import Event, Recorder
 
 _FIRST_PANEL = 8
 _GROWTH = 4
+_NEVER = 1e-12
+"""Rates, relative to the value and per second, below which a guard does not rise."""
 _STEPS_PER_CHECK = 6
 """Guards are looked at about as often as the integrator needs steps: what oscillates between results is not missed."""
 _STEPS_TO_START = 30
@@ -55,6 +57,8 @@ class EventLoop:
         self.checks = 1
         self._failures = 0
         self._failed_before = start.t
+        self._in_sight = np.inf
+        self._ahead = np.inf
         self.progress = progress
         self.integrator = Integrator(model, options)
         self.guards = Guards(model)
@@ -92,8 +96,9 @@ class EventLoop:
         self.now = Point(float(times[-1]), x[:, -1].copy(), z[:, -1].copy(), first.d)
         if self.now.t >= self._failed_before:
             self._failures = 0
-        if self.guards.count and len(times) >= self.panel:
-            self.panel = self.panel * _GROWTH
+        longer = self.panel * _GROWTH
+        if self.guards.count and len(times) >= self.panel and longer * self.step / self.checks < self._ahead:
+            self.panel = longer
         if times[-1] == stop:
             due = self._due()
             if due:
@@ -104,6 +109,21 @@ class EventLoop:
         position = (times - self.begin) / self.step
         kept = (np.abs(position - np.rint(position)) < _ON_GRID) | (times == stop)
         self.record.add(times[kept], x[:, kept], z[:, kept])
+
+    def _shorten(self, steps: int, times: Vector, x: Vector, z: Vector) -> bool:
+        """Let the next panel end at the first event in sight, if this one was laborious; True if that is much sooner.
+
+        Behind an event the old mode's equations mean nothing, so what they cost tells nothing about looks at guards.
+        """
+        outputs = len(times)
+        if not self.guards.count or outputs < _FIRST_PANEL or steps <= _STEPS_PER_CHECK * outputs:
+            return False
+        values, _ = self.guards.along(times, x, z, self.now.d)
+        risen = np.flatnonzero((values[self.guards.active(self.now.d)] > 0).any(axis=0))
+        if not len(risen) or 2 * (risen[0] + 1) > outputs:
+            return False
+        self._in_sight = float(times[risen[0]])
+        return True
 
     def _refine(self, steps: int, points: int) -> bool:
         """Adapt the number of looks at the guards per result to the integrator's steps; True if it was too small."""
@@ -125,9 +145,10 @@ class EventLoop:
         shorter one ends before.
         """
         while True:
-            span, outputs = self._next_panel(stop)
-            arrives = self.now.t + span >= stop - _SAME_TIME * max(1.0, abs(stop))
-            span = stop - self.now.t if arrives else span
+            goal = min(stop, self._in_sight) if self._in_sight > self._just_after() else stop
+            span, outputs = self._next_panel(goal)
+            arrives = self.now.t + span >= goal - _SAME_TIME * max(1.0, abs(goal))
+            span = goal - self.now.t if arrives else span
             before = self.integrator.steps
             try:
                 x, z = self.integrator.run(self.now, span, outputs, patient=not self.guards.count)
@@ -139,12 +160,13 @@ class EventLoop:
                 self.panel = max(1, outputs // _GROWTH)
                 continue
             times = self.now.t + span * np.arange(1, outputs + 1) / outputs
-            if self._refine(self.integrator.steps - before, outputs):
+            steps = self.integrator.steps - before
+            if self._shorten(steps, times, x, z) or self._refine(steps, outputs):
                 continue
             if outputs > 1:
                 self._snap(times)
             if arrives:
-                times[-1] = stop
+                times[-1] = goal
             return times, x, z
 
     def _gives_up(self, end: float) -> bool:
@@ -240,6 +262,7 @@ class EventLoop:
             self.record.add(np.array([self.now.t]), self.now.x[:, None], self.now.z[:, None])
             self._event([*wanting, *self._due()])
             return True
+        self._ahead = _foreseen(values[active, -1], rates[active, -1])
         return False
 
     def _look_behind(self, base: Point, located: Located, late: list[int], end: float) -> list[CompiledTransition]:
@@ -289,7 +312,7 @@ class EventLoop:
     def _event(self, wanting: list[CompiledTransition]) -> None:
         """Handle an event: close the segment, change modes until nothing fires, begin the next segment."""
         self.record.end(self.now.d)
-        self._failures, self._failed_before = 0, self.now.t
+        self._failures, self._failed_before, self._in_sight = 0, self.now.t, np.inf
         self.now = self.now.copy()
         self._iterate(wanting)
         self.record.begin(self.now)
@@ -369,3 +392,9 @@ class EventLoop:
             where=list(dict.fromkeys(event.source for event in events))[:3], why=f"{why}.",
             advice="Give the switching a hysteresis (a peak above 1 in friction), or smooth what drives it.",
         )  # fmt: skip
+
+
+def _foreseen(values: Vector, rates: Vector) -> float:
+    """Time until the first guard rises, as far as straight lines tell."""
+    rising = (values < 0) & (rates > -_NEVER * values)
+    return float(np.min(-values[rising] / rates[rising], initial=np.inf))
