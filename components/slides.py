@@ -239,8 +239,9 @@ class MassWithStopAndFriction(SlideSticking, DryFriction):
             moving = ("free", "start_forward", "start_backward", "forward", "backward")
             yield mode.go(moving, "stuck", when=beyond, reset={self.s: end, self.v: 0})
             yield stop.go("none", side, when=beyond)
-        yield stop.go("left", "none", when=self.v > 0)
-        yield stop.go("right", "none", when=self.v < 0)
+        # While it is held, its velocity is nothing but rounding.
+        yield stop.go("left", "none", when=all_of(negate(mode.is_("stuck")), self.v > 0))
+        yield stop.go("right", "none", when=all_of(negate(mode.is_("stuck")), self.v < 0))
         yield from super().events()
 
     def stored_energy(self) -> Expr:
