@@ -4,6 +4,7 @@
 #include "core.h"
 
 #define ROUNDS 20
+#define BALANCED 1e-3
 #define SAME_TIME 1e-12
 #define CROWD 200
 #define CROWDED_TIME 1e-9
@@ -51,6 +52,19 @@ int find_wanting(Instance *c, unsigned char *wanting, int guards_too) {
         any |= wanting[k];
     }
     return any;
+}
+
+/* After a switch, drop state events whose guard is as good as zero at the end of the time resolution: an importer that
+   stops there has them balanced on that edge, and would see them switch back and forth. They come a little later. */
+static void drop_balanced(Instance *c, unsigned char *wanting) {
+    State *s = &c->state;
+    double *soon = c->work.guards, *now = c->work.guards_before;
+    if (N_GUARDS == 0) return;
+    evaluate(c, &tape_guards_soon, s->t, s->x, s->z, soon);
+    evaluate(c, &tape_guards, s->t, s->x, s->z, now);
+    for (int k = 0; k < N_GUARDS; k++)
+        if (number_or_false(now[k]) < 0 && number_or_false(soon[k]) <= BALANCED * fabs(now[k]))
+            wanting[model_guard_transition[k]] = 0;
 }
 
 /* Move the states as little as possible, so that variables that follow from them take new values. */
@@ -126,6 +140,7 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
         if (solve_implicit(c, s->t, s->x, s->z, 0) != RESULT_OK || check_singular(c) != RESULT_OK) return RESULT_ERROR;
         memset(wanting, 0, N_TRANSITIONS);
         find_wanting(c, wanting, 1);
+        drop_balanced(c, wanting);
     }
     return report(c, LOG_ERROR, RESULT_ERROR,
         "Modes still switch after %d rounds at t = %.12g s. Give the switching a hysteresis, or smooth what drives it.",
