@@ -12,8 +12,9 @@ _MAX_DEPTH = 20
 _MAX_TEXT = 120
 Path = tuple[str, ...]
 
-_STRING = r"""(?P<string>\"{3}(?:[^"\\]|\\.|"(?!""))*+(?:\"{3,5}|\Z) | '{3}(?:[^']|'(?!''))*+(?:'{3,5}|\Z)
-        |"(?:[^"\\\n]|\\.)*+"? | '[^'\n]*+'?)"""
+# No possessive quantifier (`*+`) of a group: those of Python before 3.11.5 do not match as they should.
+_STRING = r"""(?P<string>\"{3}(?:[^"\\]++|\\.|"(?!""))*(?:\"{3,5}|\Z) | '{3}(?:[^']++|'(?!''))*(?:'{3,5}|\Z)
+        |"(?:[^"\\\n]++|\\.)*"? | '[^'\n]*+'?)"""
 _COMMON = rf"""(?P<comment>\#[^\n]*+) | {_STRING} | (?P<open>[\[{{]) | (?P<close>[\]}}]) | (?P<newline>\n)"""
 _KEY = re.compile(
     rf"""{_COMMON} | (?P<equals>=) | (?P<dot>\.) | (?P<space>[ \t\r]++) | (?P<word>[^"'\#\[\]{{}}\n=.\s]++)
