@@ -73,10 +73,22 @@ def generate(
         *(["fmi3.h"] if version == "3.0" else []),
         *(name for name in source_files(version) if name != "model.c"),
     )
-    headers = Path(fmpy.__file__).parent / "c-code"
     return {
         "model.h": header(tables, interface.variables, tolerance),
         "model.c": source(tables, interface.variables, token),
         **{name: (folder / name).read_text(encoding="utf-8") for name in names},
-        **{name: (headers / name).read_text(encoding="utf-8") for name in _HEADERS[version]},
+        **{name: _header(name) for name in _HEADERS[version]},
     }
+
+
+def licenses(version: Version) -> str:
+    """Return the licences of the sources in an FMU: that of the generated code, and that of the standard's headers."""
+    own = (files("modelica_like.fmi") / "templates" / "license.txt").read_text(encoding="utf-8")
+    text = _header(_HEADERS[version][0])
+    comment = text[text.index("Copyright") : text.index("*/")]
+    lines = [line.strip().strip("-") for line in comment.splitlines()]
+    return f"The C code of the model:\n\n{own}\nThe headers fmi*.h:\n\n" + "\n".join(lines).strip() + "\n"
+
+
+def _header(name: str) -> str:
+    return (Path(fmpy.__file__).parent / "c-code" / name).read_text(encoding="utf-8")

@@ -18,7 +18,7 @@ from modelica_like.flatten import flatten
 from modelica_like.flatten.model import FlatModel
 from modelica_like.fmi.build import PLATFORMS, build, native_platform
 from modelica_like.fmi.check import compare_with_idas, problems
-from modelica_like.fmi.codegen import LOG_CATEGORIES, generate, source_files
+from modelica_like.fmi.codegen import LOG_CATEGORIES, generate, licenses, source_files
 from modelica_like.fmi.description import About, Kind, Version, build_description, identifier, model_description
 from modelica_like.fmi.documentation import Listing, index_page
 from modelica_like.fmi.icons import drive_icon, icon_name, terminal_icon
@@ -220,6 +220,7 @@ def _contents(
     texts = {"modelDescription.xml": model_description(model, variables, about)}
     texts |= {f"sources/{name}": text for name, text in sources.items()}
     texts["documentation/index.html"] = index_page(variables, about.description, about.tool, equations)
+    texts["documentation/licenses/license.txt"] = licenses(about.version)
     pictures = {"model.png": drive_icon("png")}
     if about.version == "3.0":
         texts["sources/buildDescription.xml"] = build_description(model.name, about.sources)

@@ -155,6 +155,15 @@ def test_token_is_the_same_in_description_and_code(exported: Callable[[str], Exp
     assert token.encode() in member(path, "sources/model.c")
 
 
+@pytest.mark.parametrize("version", ["2.0", "3.0"])
+def test_licences_of_the_sources_are_in_the_fmu(exported: Callable[[str], Export], version: str) -> None:
+    text = member(exported(version).path, "documentation/licenses/license.txt").decode()
+    assert (EXAMPLES.parent / "LICENSE").read_text(encoding="utf-8") in text
+    assert 'Modelica Association Project "FMI"' in text
+    assert "Redistributions in binary form must reproduce" in text
+    assert "*" not in text
+
+
 def test_page_lists_variables_and_equations(exported: Callable[[str], Export]) -> None:
     page = member(exported("3.0").path, "documentation/index.html").decode()
     assert all(
