@@ -11,6 +11,16 @@
 #include <stdint.h>
 #include "model.h"
 
+/* Compiled on a new Linux, the FMU is to run on an old one: these functions have got new versions since glibc 2.17. */
+#if defined(__GLIBC__) && defined(__x86_64__)
+#define OLD(f) __asm__(".symver " #f "," #f "@GLIBC_2.2.5")
+#elif defined(__GLIBC__) && defined(__aarch64__)
+#define OLD(f) __asm__(".symver " #f "," #f "@GLIBC_2.17")
+#endif
+#ifdef OLD
+OLD(exp); OLD(log); OLD(pow); OLD(hypot); OLD(fmod);
+#endif
+
 #define AT_LEAST_ONE(n) ((n) > 0 ? (n) : 1)
 #define N_UNKNOWNS (N_X + N_Z)
 #define SLOT_T 0
