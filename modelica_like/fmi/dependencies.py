@@ -11,6 +11,7 @@ import casadi as ca
 
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.fmi.interface import FmuVariable, Interface
+from modelica_like.fmi.reach import Reach
 from modelica_like.fmi.start_tables import StartTables, start_tables
 
 Known = tuple[str, int]
@@ -171,11 +172,8 @@ class Dependencies:
 
 def sparsity_rows(function: Any, output: int = 0) -> Rows:
     """For every row of a function's result the arguments on which it depends."""
-    rows: Rows = [set() for _ in range(function.numel_out(output))]
-    for number, name in enumerate(function.name_in()):
-        for row, column in zip(*function.jac_sparsity(output, number).get_triplet(), strict=True):
-            rows[row].add((name, column))
-    return rows
+    reach = Reach(function, output)
+    return [set(reach.elements(row)) for row in range(len(reach.rows))]
 
 
 def solved_rows(own: Sequence[set[int]], outer: Rows, unknowns: int) -> Rows:

@@ -14,6 +14,7 @@ import numpy as np
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import UnknownName, did_you_mean
 from modelica_like.flatten.model import FlatDiscrete, FlatParameter, FlatVariable
+from modelica_like.fmi.reach import Reach
 from modelica_like.fmi.start_tables import StartTables, start_tables
 from modelica_like.units import ONE, Unit, coherent, parse_unit
 
@@ -43,7 +44,7 @@ class FmuVariable:
 
     name: str
     reference: int
-    type: Literal["Float64", "Int32"]
+    type: Literal["Float64", "Enumeration"]
     causality: Causality
     variability: Variability
     initial: Initial | None
@@ -204,7 +205,7 @@ class _Builder:
             slot, about = ("discrete", k), {"unit": coherent(one.unit), "description": _mode_text(one)}
             if one.names:
                 bounds = {"min": 0, "max": len(one.names) - 1, "modes": one.names}
-                self.add(one.path, "Int32", "output", "discrete", "calculated", slot, **about, **bounds)
+                self.add(one.path, "Enumeration", "output", "discrete", "calculated", slot, **about, **bounds)
             else:
                 start = self.starts.discrete(k)
                 self.add(one.path, "Float64", "local", "discrete", "exact", slot, start=start, **about)
@@ -272,14 +273,13 @@ def _literal_brackets(pattern: str) -> str:
 
 def _dependence(model: CompiledDae) -> list[Variability]:
     """How each variable changes: with time, at events only, or with parameters only."""
-    function = model.variables
-    names = function.name_in()
-    rows = {name: set(function.jac_sparsity(0, k).row()) for k, name in enumerate(names)}
-    moving = set().union(*(rows[name] for name in names if name not in ("p", "d")))
+    reach = Reach(model.variables)
+    moving = reach.mask(*(name for name in model.variables.name_in() if name not in ("p", "d")))
+    switching = reach.mask("d")
     return [
-        "continuous" if k in moving else "discrete" if k in rows["d"] else "tunable"
-        for k in range(len(model.flat_variables))
-    ]  # fmt: skip
+        "continuous" if row & moving else "discrete" if row & switching else "tunable"
+        for row in reach.rows[: len(model.flat_variables)]
+    ]
 
 
 class _Starts:

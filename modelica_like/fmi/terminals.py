@@ -9,7 +9,7 @@ from modelica_like.compile.compiled import CompiledTerminal
 from modelica_like.errors import ExportError
 from modelica_like.fmi.icons import icon_name
 from modelica_like.fmi.xml import document, element, root
-from modelica_like.language import Component, Connector, Equations, connect
+from modelica_like.language import Assembly, Component, Connector, Equations, connect
 from modelica_like.language.declared import unknown
 from modelica_like.language.equation import FreeEnd
 from modelica_like.netlist.registry import library_types
@@ -24,7 +24,8 @@ def with_open_ends(drive: Component, ends: Sequence[str] = (), takes: Takes = "f
     """Return a drive whose open ends have adaptors.
 
     Open ends are the connectors that the drive itself has (a netlist's `expose`), and free connectors of parts that are
-    named here. The adaptor of `gear.shaft` is the part `gear_shaft`, that of an own connector `shaft` is `shaft_end`.
+    named here. The adaptor of `gear.shaft` is the part `gear_shaft`, that of an own connector `shaft` is `shaft_end`. A
+    single component becomes a drive that has no other part, and all its connectors are open.
 
     Args:
         drive: the drive; it stays as it is.
@@ -35,6 +36,10 @@ def with_open_ends(drive: Component, ends: Sequence[str] = (), takes: Takes = "f
         UnknownName: there is no such connector.
         ExportError: no library has an adaptor for one.
     """
+    if drive.connectors and not drive.parts:
+        name = type(drive).__name__.lower()
+        alone = Assembly(type(drive).__name__, parts={name: drive})
+        return with_open_ends(alone, [f"{name}.{end}" for end in drive.connectors], takes)
     paths = tuple(dict.fromkeys([*drive.connectors, *ends]))
     if not paths:
         return drive

@@ -155,6 +155,12 @@ def test_token_is_the_same_in_description_and_code(exported: Callable[[str], Exp
     assert token.encode() in member(path, "sources/model.c")
 
 
+def test_a_single_component(tmp_path: Path) -> None:
+    export_fmu(Inertia(J=2.0, phi=0.0, w=1.0), tmp_path / "inertia.fmu", "2.0")
+    run = run_fmu(tmp_path / "inertia.fmu", stop=0.5, inputs={"inertia_flange_a.tau": 3.0, "inertia_flange_b.tau": 1.0})
+    assert run.final["inertia.w"] == pytest.approx(1.0 + 4.0 / 2.0 * 0.5, rel=1e-9)
+
+
 @pytest.mark.parametrize("version", ["2.0", "3.0"])
 def test_licences_of_the_sources_are_in_the_fmu(exported: Callable[[str], Export], version: str) -> None:
     text = member(exported(version).path, "documentation/licenses/license.txt").decode()

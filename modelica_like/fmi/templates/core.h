@@ -11,10 +11,11 @@
 #include <stdint.h>
 #include "model.h"
 
-/* Compiled on a new Linux, the FMU is to run on an old one: these functions have got new versions since glibc 2.17. */
-#if defined(__GLIBC__) && defined(__x86_64__)
+/* Compiled on a new Linux, the FMU is to run on an old one: these functions have got new versions since glibc 2.17.
+   Versions can only be told to a linker that is given libm. */
+#if defined(OLD_GLIBC) && defined(__GLIBC__) && defined(__x86_64__)
 #define OLD(f) __asm__(".symver " #f "," #f "@GLIBC_2.2.5")
-#elif defined(__GLIBC__) && defined(__aarch64__)
+#elif defined(OLD_GLIBC) && defined(__GLIBC__) && defined(__aarch64__)
 #define OLD(f) __asm__(".symver " #f "," #f "@GLIBC_2.17")
 #endif
 #ifdef OLD
@@ -66,7 +67,7 @@ typedef struct {                     /* pattern of a square matrix and of its QR
 
 typedef enum { KIND_TIME, KIND_STATE, KIND_DERIVATIVE, KIND_VARIABLE, KIND_PARAMETER, KIND_DERIVED, KIND_INPUT,
     KIND_DISCRETE, KIND_GUARD } Kind;
-typedef enum { TYPE_FLOAT64, TYPE_INT32 } ValueType;
+typedef enum { TYPE_FLOAT64, TYPE_ENUMERATION } ValueType;
 
 typedef struct {
     uint32_t reference;
@@ -220,9 +221,9 @@ Result check_step(Instance *c, double point, double size, double *target);
 const Variable *find_variable(uint32_t reference);
 const Variable *known_variable(Instance *c, uint32_t reference, ValueType type);
 Result get_float(Instance *c, uint32_t reference, double *value);
-Result get_int(Instance *c, uint32_t reference, int32_t *value);
+Result get_mode(Instance *c, uint32_t reference, int *value);
 Result set_float(Instance *c, uint32_t reference, double value);
-Result set_int(Instance *c, uint32_t reference, int32_t value);
+Result set_mode(Instance *c, uint32_t reference, int64_t value);
 Result set_input_rate(Instance *c, uint32_t reference, double rate);
 Result set_time(Instance *c, double time);
 Result set_states(Instance *c, const double *x);

@@ -127,7 +127,7 @@ fmi2Status fmi2GetInteger(fmi2Component component, const fmi2ValueReference vr[]
     ENTER(fmi2GetInteger, READABLE);
     NEED(vr, nvr);
     NEED(value, nvr);
-    for (size_t k = 0; k < nvr; k++) if (get_int(c, vr[k], &value[k]) != RESULT_OK) return fmi2Error;
+    for (size_t k = 0; k < nvr; k++) if (get_mode(c, vr[k], &value[k]) != RESULT_OK) return fmi2Error;
     return fmi2OK;
 }
 
@@ -161,7 +161,7 @@ fmi2Status fmi2SetInteger(fmi2Component component, const fmi2ValueReference vr[]
     ENTER(fmi2SetInteger, SETTABLE);
     NEED(vr, nvr);
     NEED(value, nvr);
-    for (size_t k = 0; k < nvr; k++) if (set_int(c, vr[k], value[k]) != RESULT_OK) return fmi2Error;
+    for (size_t k = 0; k < nvr; k++) if (set_mode(c, vr[k], value[k]) != RESULT_OK) return fmi2Error;
     return fmi2OK;
 }
 

@@ -141,13 +141,17 @@ fmi3Status fmi3GetFloat64(fmi3Instance instance, const fmi3ValueReference valueR
     return fmi3OK;
 }
 
-fmi3Status fmi3GetInt32(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
-    fmi3Int32 values[], size_t nValues) {
-    ENTER(fmi3GetInt32, READABLE);
+fmi3Status fmi3GetInt64(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
+    fmi3Int64 values[], size_t nValues) {
+    ENTER(fmi3GetInt64, READABLE);
     NEED_SIZE(nValues, nValueReferences, "values");
     NEED(valueReferences, nValues);
     NEED(values, nValues);
-    for (size_t k = 0; k < nValues; k++) if (get_int(c, valueReferences[k], &values[k]) != RESULT_OK) return fmi3Error;
+    for (size_t k = 0; k < nValues; k++) {
+        int mode;
+        if (get_mode(c, valueReferences[k], &mode) != RESULT_OK) return fmi3Error;
+        values[k] = mode;
+    }
     return fmi3OK;
 }
 
@@ -161,13 +165,13 @@ fmi3Status fmi3SetFloat64(fmi3Instance instance, const fmi3ValueReference valueR
     return fmi3OK;
 }
 
-fmi3Status fmi3SetInt32(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
-    const fmi3Int32 values[], size_t nValues) {
-    ENTER(fmi3SetInt32, SETTABLE);
+fmi3Status fmi3SetInt64(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
+    const fmi3Int64 values[], size_t nValues) {
+    ENTER(fmi3SetInt64, SETTABLE);
     NEED_SIZE(nValues, nValueReferences, "values");
     NEED(valueReferences, nValues);
     NEED(values, nValues);
-    for (size_t k = 0; k < nValues; k++) if (set_int(c, valueReferences[k], values[k]) != RESULT_OK) return fmi3Error;
+    for (size_t k = 0; k < nValues; k++) if (set_mode(c, valueReferences[k], values[k]) != RESULT_OK) return fmi3Error;
     return fmi3OK;
 }
 

@@ -18,7 +18,7 @@ const Variable *known_variable(Instance *c, uint32_t reference, ValueType type) 
     if (v != NULL && v->type == type) return v;
     report(c, LOG_ERROR, RESULT_ERROR, v == NULL ? "There is no variable with value reference %u."
         : "The variable with value reference %u is not of type %s.",
-           (unsigned)reference, type == TYPE_FLOAT64 ? "Real (Float64)" : "Integer (Int32)");
+           (unsigned)reference, type == TYPE_FLOAT64 ? "Real (Float64)" : "Enumeration (Integer, Int64)");
     return NULL;
 }
 
@@ -96,10 +96,10 @@ void get_indicators(Instance *c, double *indicators) {
     for (int k = 0; k < N_GUARDS; k++) indicators[k] = guard_active(s, k) ? number_or_false(values[k]) : -1;
 }
 
-Result get_int(Instance *c, uint32_t reference, int32_t *value) {
-    const Variable *v = known_variable(c, reference, TYPE_INT32);
+Result get_mode(Instance *c, uint32_t reference, int *value) {
+    const Variable *v = known_variable(c, reference, TYPE_ENUMERATION);
     if (v == NULL || make_ready(c, v) != RESULT_OK) return RESULT_ERROR;
-    *value = (int32_t)c->state.d[v->index];
+    *value = (int)c->state.d[v->index];
     return RESULT_OK;
 }
 
@@ -176,14 +176,14 @@ Result set_input_rate(Instance *c, uint32_t reference, double rate) {
     return RESULT_OK;
 }
 
-Result set_int(Instance *c, uint32_t reference, int32_t value) {
-    const Variable *v = known_variable(c, reference, TYPE_INT32);
+Result set_mode(Instance *c, uint32_t reference, int64_t value) {
+    const Variable *v = known_variable(c, reference, TYPE_ENUMERATION);
     if (v == NULL) return RESULT_ERROR;
     if (v->kind != KIND_DISCRETE) return refuse(c, v, "it is calculated.");
     if (value < 0 || value >= model_mode_counts[v->index])
-        return report(c, LOG_ERROR, RESULT_ERROR, "%s has no mode %d: they are 0 to %d.", v->name, (int)value,
+        return report(c, LOG_ERROR, RESULT_ERROR, "%s has no mode %lld: they are 0 to %d.", v->name, (long long)value,
             model_mode_counts[v->index] - 1);
-    return set_start(c, v, value);
+    return set_start(c, v, (double)value);
 }
 
 Result set_time(Instance *c, double time) {
