@@ -218,5 +218,7 @@ class MissingExtra(ModelicaLikeError):
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
     """Return `; did you mean 'sun'?` for the known name nearest to `name`, or an empty string."""
-    near = difflib.get_close_matches(name, list(known), n=1, cutoff=0.55)
+    names = list(known)
+    near = difflib.get_close_matches(name, names, n=1, cutoff=0.58)
+    near = near or [one for one in names if one in name.split("_")]
     return f"; did you mean '{near[0]}'?" if near else ""

@@ -63,7 +63,7 @@ def _reason(model: CompiledDae, holding: list[str], held: list[str], *, alone: b
     if len(holding) > 1:
         return (
             f"{_and(holding)} stick: where they hold the same motion, their {kind} split is undetermined.",
-            "Make one compliant, or let one start open.",
+            "Give one of them a small creep, put a spring between them, or let one start open.",
         )
     if holding and alone:
         by = f" by {_and(model.motion_sources)}" if 0 < len(model.motion_sources) <= 3 else ""

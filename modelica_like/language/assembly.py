@@ -7,7 +7,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from modelica_like.errors import DuplicateName, ModelicaLikeError, Source, raise_together_or_one
+from modelica_like.errors import DuplicateName, ModelicaLikeError, Source, WrongConnection, raise_together_or_one
 from modelica_like.language.component import Component
 from modelica_like.language.declared import Connector, unknown
 from modelica_like.language.equation import Connection, Equations, FreeEnd, connect, free, series
@@ -157,8 +157,18 @@ class Assembly(Component):
         components: list[Component] = []
         for name in names:
             part = self._parts.get(name)
-            components += part if isinstance(part, list) else [self.find(name)]
+            components += part if isinstance(part, list) else [self._link(name)]
         return list(series(*components))
+
+    def _link(self, path: str) -> Component:
+        """Find a part of a series."""
+        owner, _, name = path.rpartition(".")
+        if owner and name in self.find(owner).connectors:
+            raise WrongConnection(
+                f"{path} is a connector, and a series joins parts.",
+                advice=f"Write {owner} in the series, or join {path} in a connection of its own.",
+            )
+        return self.find(path)
 
     def _connector(self, path: str) -> Connector:
         end = self._resolve(path)

@@ -296,7 +296,7 @@ def test_two_brakes_on_one_shaft_cannot_both_stick() -> None:
         message = str(caught.value)
         assert when in message
         assert "brake1 and brake2 stick" in message
-        assert "Make one compliant, or let one start open." in message
+        assert "Give one of them a small creep, put a spring between them, or let one start open." in message
 
 
 def test_friction_under_prescribed_motion() -> None:

@@ -343,6 +343,15 @@ planet (IdealPlanetary) has no connector 'sum'; did you mean 'sun'? It has sun, 
   in test_messages.py:{wired} `connect.a = ['planet.sum', 'rotor.flange_a']`""",
 )
 case(
+    errors.WrongConnection,
+    "a connector in a series",
+    lambda: flatten(Assembly(parts={"j": Inertia(J=1.0)}, series={"s": ["j.flange_a", "j"]})),  # connector in series
+    """\
+j.flange_a is a connector, and a series joins parts.
+  in test_messages.py:{connector in series} `series.s = ['j.flange_a', 'j']`
+Write j in the series, or join j.flange_a in a connection of its own.""",
+)
+case(
     errors.UnknownName,
     "an unknown parameter",
     lambda: Inertia(j=1.0),  # unknown parameter
@@ -540,7 +549,7 @@ The Jacobian is singular at t = 0 s in block 1 (one.tau, two.tau).
   in inertias.py:{inertias.py:yield self.J * der(self.w) == a.tau + b.tau} `yield self.J * der(self.w) == a.tau + b.tau`
   in test_messages.py:{twist} `yield self.phi_rel == self.flange_b.phi - self.flange_a.phi`
 one and two stick: where they hold the same motion, their torque split is undetermined.
-Make one compliant, or let one start open.""",
+Give one of them a small creep, put a spring between them, or let one start open.""",
 )
 case(
     errors.SingularAtStart,
