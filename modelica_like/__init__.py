@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from modelica_like.analyse.sweeps.importance import importance as importance
     from modelica_like.analyse.sweeps.sweep import sweep as sweep
     from modelica_like.compile.compiled import CompiledDae as CompiledDae
+    from modelica_like.cosimulation.run import cosim as cosim
+    from modelica_like.cosimulation.split import split as split
     from modelica_like.errors import ModelicaLikeError as ModelicaLikeError
     from modelica_like.fmi.export import export_fmu as export_fmu
     from modelica_like.fmi.run import run_fmu as run_fmu
@@ -46,6 +48,7 @@ _HOME = {
     "campbell": "modelica_like.analyse.linear.campbell",
     "characteristic": "modelica_like.analyse.operating.curves",
     "compare": "modelica_like.report.compare",
+    "cosim": "modelica_like.cosimulation.run",
     "export_fmu": "modelica_like.fmi.export",
     "importance": "modelica_like.analyse.sweeps.importance",
     "linearize": "modelica_like.analyse.linear.linearize",
@@ -54,6 +57,7 @@ _HOME = {
     "sensitivities": "modelica_like.analyse.sensitivity.derivatives",
     "simulate": "modelica_like.simulation",
     "simulation_function": "modelica_like.analyse.sensitivity.function",
+    "split": "modelica_like.cosimulation.split",
     "steady": "modelica_like.analyse.operating.steady",
     "sweep": "modelica_like.analyse.sweeps.sweep",
     "validate_fmu": "modelica_like.fmi.validate",
@@ -71,6 +75,7 @@ __all__ = [
     "campbell",
     "characteristic",
     "compare",
+    "cosim",
     "export_fmu",
     "importance",
     "linearize",
@@ -79,6 +84,7 @@ __all__ = [
     "sensitivities",
     "simulate",
     "simulation_function",
+    "split",
     "steady",
     "sweep",
     "validate_fmu",

@@ -11,8 +11,19 @@ from pathlib import Path, PurePosixPath
 
 from modelica_like.errors import FmuRefused
 
-_DESCRIPTION = "modelDescription.xml"
 _ENCRYPTED = 0x1
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of archive: what it is called, and the description it must have."""
+
+    name: str
+    description: str
+
+
+FMU = Kind("FMU", "modelDescription.xml")
+SSP = Kind("SSP", "SystemStructure.ssd")
 
 
 @dataclass(frozen=True)
@@ -35,33 +46,45 @@ class Limits:
 LIMITS = Limits()
 
 
-def unpack(path: Path, target: Path, limits: Limits = LIMITS) -> Path:
-    """Unpack an FMU into a folder, if it is safe to do so.
+def unpack(path: Path, target: Path, limits: Limits = LIMITS, kind: Kind = FMU) -> Path:
+    """Unpack an FMU, or another archive, into a folder, if it is safe to do so.
 
     Args:
-        path: the FMU.
+        path: the archive.
         target: an existing, empty folder.
         limits: what the archive may hold at most.
+        kind: what it should be.
 
     Returns:
         The folder.
 
     Raises:
-        FmuRefused: the file is no archive, is damaged, holds paths outside, links or a bomb, or is no FMU.
+        FmuRefused: the file is no archive, is damaged, holds paths outside, links or a bomb, or is not of its kind.
         OSError: the file cannot be read.
     """
     try:
         with zipfile.ZipFile(path) as archive:
-            _look_through(path.name, archive.infolist(), limits)
+            _look_through(path.name, archive.infolist(), limits, kind)
             archive.extractall(target)
     except (zipfile.BadZipFile, zlib.error, NotImplementedError, EOFError) as error:
-        raise FmuRefused(f"{path.name} is no FMU: it is not a sound zip archive.", why=_sentence(error)) from None
-    if b"<!DOCTYPE" in (target / _DESCRIPTION).read_bytes():
         raise FmuRefused(
-            f"{path.name} is refused: its {_DESCRIPTION} declares a document type.",
+            f"{path.name} is no {kind.name}: it is not a sound zip archive.", why=_sentence(error)
+        ) from None
+    refuse_document_type(path.name, target / kind.description)
+    return target
+
+
+def refuse_document_type(name: str, file: Path) -> None:
+    """Refuse a description of an archive that declares a document type.
+
+    Raises:
+        FmuRefused: it does.
+    """
+    if b"<!DOCTYPE" in file.read_bytes():
+        raise FmuRefused(
+            f"{name} is refused: its {file.name} declares a document type.",
             why="A model description needs none; it can make a small file enormous, or read other files.",
         )
-    return target
 
 
 def printable(text: str) -> str:
@@ -74,7 +97,7 @@ def _sentence(error: Exception) -> str:
     return text if text.endswith(".") else f"{text}."
 
 
-def _look_through(name: str, members: Sequence[zipfile.ZipInfo], limits: Limits) -> None:
+def _look_through(name: str, members: Sequence[zipfile.ZipInfo], limits: Limits, kind: Kind) -> None:
     if len(members) > limits.members:
         raise FmuRefused(f"{name} is refused: it holds {len(members)} files, more than {limits.members}.")
     seen: set[str] = set()
@@ -82,9 +105,9 @@ def _look_through(name: str, members: Sequence[zipfile.ZipInfo], limits: Limits)
         if reason := _objection(member, seen):
             raise FmuRefused(f"{name} is refused: '{printable(member.orig_filename)}' {reason}.")
         seen.add(member.filename)
-    _check_size(name, members, limits)
-    if _DESCRIPTION not in seen:
-        raise FmuRefused(f"{name} is no FMU: it has no {_DESCRIPTION}.")
+    _check_size(name, members, limits, kind)
+    if kind.description not in seen:
+        raise FmuRefused(f"{name} is no {kind.name}: it has no {kind.description}.")
 
 
 def _objection(member: zipfile.ZipInfo, seen: set[str]) -> str:
@@ -105,14 +128,14 @@ def _objection(member: zipfile.ZipInfo, seen: set[str]) -> str:
     return "is there twice" if member.filename in seen else ""
 
 
-def _check_size(name: str, members: Sequence[zipfile.ZipInfo], limits: Limits) -> None:
+def _check_size(name: str, members: Sequence[zipfile.ZipInfo], limits: Limits, kind: Kind) -> None:
     unpacked, packed = sum(m.file_size for m in members), sum(m.compress_size for m in members)
     if unpacked > limits.total:
         raise FmuRefused(f"{name} is refused: it would unpack to {_size(unpacked)}, more than {_size(limits.total)}.")
     if unpacked > limits.harmless and unpacked > limits.ratio * packed:
         raise FmuRefused(
             f"{name} is refused: {_size(packed)} would unpack to {_size(unpacked)}.",
-            why=f"What shrinks to less than 1/{limits.ratio:g} is more likely an archive bomb than an FMU.",
+            why=f"What shrinks to less than 1/{limits.ratio:g} is more likely an archive bomb than an {kind.name}.",
         )
 
 

@@ -21,6 +21,8 @@ from modelica_like.netlist.document import Document, parse, read_text
 from modelica_like.netlist.registry import find_type
 
 _MAX_PARTS = 200_000
+FMU_PART = "FMU"
+"""What a part `is` that comes as an FMU."""
 
 
 def load(path: str | Path) -> Assembly:
@@ -45,6 +47,11 @@ def loads(text: str, file: str = "netlist.toml") -> Assembly:
         file: what to call it in messages; netlists used as parts are looked for beside it.
     """
     return _Loader().build(parse(text, file), (Path(file).resolve(),))
+
+
+def assemble(document: Document, file: Path) -> Assembly:
+    """Make the assembly of a netlist that has been read already; see `load`."""
+    return _Loader().build(document, (file.resolve(),))
 
 
 class _Loader:
@@ -138,6 +145,8 @@ class _Task:
     def _part(self, name: str, table: Mapping[str, Any]) -> Component:
         values = {key: value for key, value in table.items() if key not in ("is", "count")}
         kind = table["is"]
+        if kind == FMU_PART:
+            raise _among_equations(name)
         if kind.endswith(".toml"):
             part: Component = self.loader.load(Path(self.document.lines.file).parent / kind, self.chain).copy()
         else:
@@ -166,6 +175,14 @@ class _Task:
                 f"{path} is a parameter, not a variable.", advice="Give its value where the part is declared."
             )
         owner.give(name, value)
+
+
+def _among_equations(name: str) -> NetlistError:
+    return NetlistError(
+        f"{name} is an FMU, which cannot stand among equations.",
+        why="An FMU computes its outputs in steps of its own, and its equations are not known.",
+        advice="Run the netlist as a co-simulation: cosim(…) or `modelica-like cosim`.",
+    )
 
 
 def new_component(kind: type[Component], values: dict[str, Any]) -> Component:

@@ -213,5 +213,6 @@ def test_workers_that_die_again_and_again(monkeypatch):
         list(in_processes(job, [(0, [[1.0], [2.0]])], 1))
     assert str(caught.value) == (
         "2 runs of the sweep were not done: worker processes of this machine died 3 times.\n"
-        "What was done is in the checkpoint, if there is one: start the sweep again with it."
+        "What was done is in the checkpoint, if there is one: start the sweep again with it. If they died at their "
+        'start: a script that sweeps keeps its own work behind if __name__ == "__main__":, or says processes=1.'
     )

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from modelica_like import load, sensitivities, simulate, simulation_function
+from modelica_like import build, load, sensitivities, simulate, simulation_function
 from modelica_like.analyse.replay.chain import replay
 from modelica_like.errors import LanguageError, ModelicaLikeError, NoGradient, StepFailed, UnknownName, ValueOutOfRange
 from modelica_like.language import Component, Equations, Events, Mode, Parameter, Variable, der, param, sin, var
@@ -55,6 +55,16 @@ class Race(Component):
         yield self.second.go("below", "above", when=self.x > self.two)  # two
 
 
+class Counted(Component):
+    """A quantity with a rate that is fixed when the model is compiled."""
+
+    n: Parameter = param("1/s", "rate", default=2.0, tunable=False)
+    x: Variable = var("1", "quantity")
+
+    def equations(self) -> Equations:
+        yield der(self.x) == self.n
+
+
 class Timeless(Component):
     """A variable that follows from the time."""
 
@@ -86,6 +96,12 @@ def strong() -> Any:
     drive = load(DIRECT)
     drive.set("clutch_torque", "87 N.m")
     return drive
+
+
+def of_numbers() -> Any:
+    drive = load(DIRECT.with_name("machine_table_geared.toml"))
+    drive.set("ratio", "pi/13")
+    return build(drive)
 
 
 def table(*of: str, to: tuple[str, ...] = ("load_torque",), **options: Any) -> Any:
@@ -143,9 +159,23 @@ clutch.mode changes: backward → stuck at 0.2 s."""),
 at(table.s, 7 s): the run goes from 0 s to 0.4 s."""),
     "a parameter that does not exist": (UnknownName, lambda: table("table.s", to=("load_torqe",)), """\
 machine_table_direct has no parameter 'load_torqe'; did you mean 'load_torque'?"""),
-    "a parameter that follows from others": (LanguageError, lambda: table("table.s", to=("clutch.capacity",)), """\
+    "a parameter that follows from others": (
+        LanguageError, lambda: sensitivities(build(DIRECT), ["table.s"], ["clutch.capacity"]), """\
 clutch.capacity follows from other parameters (motor_speed, acceleration_time, load_torque, lead, table_mass, hub_inertia, spindle_inertia).
-Ask for these, or give clutch.capacity a value of its own."""),
+Ask for these, or hand over the drive as it was before it was compiled or run: clutch.capacity then moves on its own."""),
+    "a parameter that is a formula of numbers": (LanguageError, lambda: sensitivities(of_numbers(), ["table.s"], ["ratio"]), """\
+ratio is given by a formula of numbers.
+Hand over the drive as it was before it was compiled or run: ratio then moves on its own."""),
+    "a parameter that is fixed": (LanguageError, lambda: sensitivities(Counted(x=0.0), ["x"], ["n"], until=1.0), """\
+n cannot change after compilation, so nothing can be differentiated by it.
+Compare runs of models that were built with other values."""),
+    "no output": (ValueOutOfRange, lambda: table(), """\
+There is no output to differentiate: give at least one name."""),
+    "a function without inputs": (ValueOutOfRange, lambda: simulation_function(DIRECT, [], ["table.s"]), """\
+There is no parameter as input: give at least one name."""),
+    "a method that does not exist": (UnknownName, lambda: table("table.s", method="adjiont"), """\
+There is no method 'adjiont'; did you mean 'adjoint'?
+Derivatives are found by forward or adjoint, or by what is cheaper: auto."""),
     "an output that was not asked for": (UnknownName, lambda: table("table.s")["table.v", "load_torque"], """\
 There is no output 'table.v' in these sensitivities; did you mean 'table.s'?"""),
     "a precision out of range": (ValueOutOfRange, lambda: table("table.s", precision=1e-20), """\

@@ -9,7 +9,9 @@ import pytest
 from modelica_like.netlist import dumps, load, loads, schema
 
 EXAMPLES = sorted(
-    path for path in (Path(__file__).parents[2] / "examples").rglob("*.toml") if "sizing" not in path.parts
+    path
+    for path in (Path(__file__).parents[2] / "examples").rglob("*.toml")
+    if not {"sizing", "cosim"} & set(path.parts)
 )
 
 

@@ -1,0 +1,120 @@
+"""Commands for co-simulation: split and cosim."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from modelica_like.cli.app import Assignments, Debug, Netlist, app, load_netlist, out, told
+
+
+class MasterName(StrEnum):
+    """In which order the FMUs step."""
+
+    JACOBI = "jacobi"
+    GAUSS_SEIDEL = "gauss-seidel"
+
+
+class InputsName(StrEnum):
+    """How inputs move between communication points."""
+
+    LINEAR = "linear"
+    HOLD = "hold"
+
+
+@app.command()
+def split(
+    netlist: Netlist, assignments: Assignments = None, *,
+    at: Annotated[
+        list[str],
+        typer.Option("--at", metavar="PLACE", help="A part (the cut is behind it), an end such as shaft.flange_a, or "
+                     "an entry of [connect]; several are possible.", show_default=False),
+    ],
+    output: Annotated[
+        Path, typer.Option("-o", "--output", metavar="FOLDER", help="Where to write: a folder, or an SSP (….ssp).")
+    ],
+    names: Annotated[
+        list[str] | None, typer.Option("--name", metavar="NAME", help="Name of an FMU, in the order of the netlist.")
+    ] = None,
+    fmi: Annotated[str, typer.Option(metavar="VERSION", help="FMI version: 2.0 or 3.0.")] = "2.0",
+    ssp: Annotated[str, typer.Option(metavar="VERSION", help="SSP version of an SSP: 1.0 or 2.0.")] = "1.0",
+    check: Annotated[bool, typer.Option(help="Run every FMU against IDAS before it is handed over.")] = True,
+    debug: Debug = False,
+) -> None:  # fmt: skip
+    """Cut a drive at shafts into FMUs, with the system file that `cosim` runs."""
+    with told(debug):
+        assembly = load_netlist(netlist, assignments)
+        from rich.console import Console
+
+        from modelica_like.cosimulation.split import split as run
+        from modelica_like.cosimulation.ssp import split_to_ssp
+
+        with Console(stderr=True).status("loading") as status:
+            if output.suffix.lower() == ".ssp":
+                done = split_to_ssp(
+                    assembly, at, output, ssp, names=names or (), version=fmi, check=check, report=status.update
+                )
+            else:
+                done = run(assembly, at, output, names=names or (), version=fmi, check=check, report=status.update)
+        out().print(str(done), soft_wrap=True)
+
+
+@app.command()
+def cosim(
+    system: Annotated[
+        Path, typer.Argument(metavar="SYSTEM", help="system or netlist with FMUs (TOML), or SSP", show_default=False)
+    ],
+    assignments: Annotated[
+        list[str] | None, typer.Option("--set", metavar="FMU.PATH=VALUE", help="Set a value in an FMU, in its units.")
+    ] = None, *,
+    until: Annotated[str | None, typer.Option(metavar="TIME", help="End time, e.g. 2s; else the system's.")] = None,
+    step: Annotated[str | None, typer.Option(metavar="TIME", help="Communication step, e.g. 0.1ms.")] = None,
+    tolerance: Annotated[
+        float | None, typer.Option(metavar="RTOL", help="Relative tolerance of the coupling: the step varies.")
+    ] = None,
+    master: Annotated[MasterName | None, typer.Option(help="All at once, or one after the other.")] = None,
+    inputs: Annotated[InputsName | None, typer.Option(help="Inputs on straight lines, or held.")] = None,
+    csv: Annotated[Path | None, typer.Option(metavar="FILE", help="Write all trajectories as a table.")] = None,
+    units: Annotated[bool, typer.Option("--units", help="Units in a second header line of the table.")] = False,
+    plot: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw the results: .png, .svg or .pdf.")] = None,
+    show: Annotated[list[str] | None, typer.Option(metavar="PATTERN", help="What to draw, e.g. '*.w'.")] = None,
+    timeout: Annotated[float, typer.Option(metavar="SECONDS", help="Time limit.")] = 600.0,
+    debug: Debug = False,
+) -> None:  # fmt: skip
+    """Run a system of FMUs together: mode changes, energies at the couplings, results as table and picture."""
+    with told(debug):
+        from modelica_like.cosimulation.run import cosim as run
+        from modelica_like.cosimulation.run import opened
+        from modelica_like.report.cosimulation import cosimulation_report
+        from modelica_like.report.progress import Bar
+
+        with opened(system) as known, Bar(until or known.settings.until) as bar:
+            solution = run(
+                known, until, step=step, master=master, inputs=inputs, tolerance=tolerance,
+                parameters=_numbers(assignments or ()), timeout=timeout, progress=bar,
+            )  # fmt: skip
+        out().print(cosimulation_report(solution))
+        if csv:
+            from modelica_like.report.files import write_csv
+
+            write_csv(solution, csv, units=units)
+        if plot:
+            from modelica_like.solve.plot import plot as draw
+            from modelica_like.solve.plot import save_plot
+
+            save_plot(draw(solution, show or ()), plot)
+
+
+def _numbers(assignments: list[str] | tuple[str, ...]) -> dict[str, float]:
+    """Read values for FMUs, which take plain numbers."""
+    values: dict[str, float] = {}
+    for assignment in assignments:
+        path, _, text = assignment.partition("=")
+        try:
+            values[path.strip()] = float(text)
+        except ValueError:
+            raise typer.BadParameter(f"'{assignment}' is not FMU.PATH=NUMBER.", param_hint="--set") from None
+    return values

@@ -1,0 +1,242 @@
+"""Runs a system of FMUs in a process of its own: python -m modelica_like.cosimulation.child FOLDER.
+
+The folder holds `job.json` and the unpacked FMUs in `0`, `1`, … What came out is left there: `result.npy` and
+`meta.json`, or `error.json`; `progress` holds the time reached, `calling` the number of the FMU that was called last.
+"""
+
+from __future__ import annotations
+
+import json
+import mmap
+import struct
+import sys
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from modelica_like.cosimulation.master import Balance, Counts, Master, Signal
+from modelica_like.cosimulation.slaves import REAL, Refused, Slave
+
+
+class Board:
+    """Tells outside how far the run is, and which FMU it is in."""
+
+    def __init__(self, folder: Path) -> None:
+        self._time, self._unit = (self._shared(folder / name) for name in ("progress", "calling"))
+        self.unit = 0
+
+    @staticmethod
+    def _shared(path: Path) -> mmap.mmap:
+        with path.open("r+b") as file:
+            return mmap.mmap(file.fileno(), 8)
+
+    def reach(self, time: float) -> None:
+        """Tell the time reached."""
+        self._time[:8] = struct.pack("d", time)
+
+    def call(self, unit: int) -> None:
+        """Tell which FMU is called now."""
+        self.unit = unit
+        self._unit[:8] = struct.pack("q", unit)
+
+
+class Recorder:
+    """Keeps rows of all variables and of the energies at the bonds.
+
+    Args:
+        slaves: whose variables.
+        outputs: names of each.
+        balances: energies.
+        interval: shortest time between two rows, in s.
+    """
+
+    def __init__(
+        self, slaves: list[Slave], outputs: list[list[str]], balances: list[Balance], interval: float, board: Board
+    ) -> None:
+        self._readers = [slave.reader(names) for slave, names in zip(slaves, outputs, strict=True)]
+        self._balances, self._interval, self._board = balances, interval, board
+        self.rows: list[list[float]] = []
+
+    def look(self, time: float) -> list[float]:
+        """Read a row."""
+        if self.rows and time - self.rows[-1][0] < self._interval * (1 - 1e-6):
+            return [time]
+        row = [time]
+        for read in self._readers:
+            row += read()
+        for balance in self._balances:
+            row += [balance.power, balance.residual]
+        return row
+
+    def keep(self, row: list[float]) -> None:
+        """Keep a row, unless it is nearer to the one before than the interval."""
+        self._board.reach(row[0])
+        if len(row) > 1:
+            self.rows.append(row)
+
+    def close(self, time: float) -> None:
+        """Keep the end, however near it is to the row before."""
+        if self.rows[-1][0] != time:
+            self._interval = 0.0
+            self.keep(self.look(time))
+
+
+def open_slaves(folder: Path, job: dict[str, Any], board: Board) -> list[Slave]:
+    """Instantiate all FMUs, and check the names."""
+    slaves: list[Slave] = []
+    for k, unit in enumerate(job["units"]):
+        slaves.append(Slave(unit["name"], folder / str(k), lambda k=k: board.call(k)))
+        for name in unit["parameters"]:
+            check_name(slaves[-1], name, "parameters")
+    for link in job["links"]:
+        (n, name), *targets = link["ends"]
+        check_name(slaves[n], name, "outputs")
+        for n, name in targets:
+            check_name(slaves[n], name, "inputs")
+            if (causality := slaves[n].all[name].causality) != "input":
+                known = [v for v, about in slaves[n].all.items() if about.causality == "input"]
+                raise Refused(kind="no input", unit=slaves[n].name, name=name, causality=causality, known=known)
+    if job["tolerance"] is not None and (unable := [slave.name for slave in slaves if not slave.can_save]):
+        raise Refused(kind="no rollback", unit=unable[0])
+    return slaves
+
+
+def check_name(slave: Slave, name: str, wanted: str) -> None:
+    """Refuse a name that an FMU does not have."""
+    if name not in slave.all:
+        known = [n for n, v in slave.all.items() if wanted != "inputs" or v.causality == "input"]
+        raise Refused(kind="unknown", unit=slave.name, name=name, known=known)
+
+
+def choose(slaves: list[Slave], patterns: list[str] | None, *, own_names: bool) -> list[list[str]]:
+    """Return the names of the variables to record, of each FMU."""
+    names = [{name: name if own_names else f"{slave.name}.{name}" for name in slave.variables} for slave in slaves]
+    if patterns is None:
+        return [list(own) for own in names]
+    full = [name for own in names for name in own.values()]
+    for pattern in patterns:
+        if not any(fits(name, pattern) for name in full):
+            raise Refused(kind="no output", name=pattern, known=full)
+    return [[name for name, one in own.items() if any(fits(one, p) for p in patterns)] for own in names]
+
+
+def fits(name: str, pattern: str) -> bool:
+    """Tell whether a name is meant."""
+    return name == pattern or fnmatchcase(name, pattern)
+
+
+def connect(slaves: list[Slave], job: dict[str, Any]) -> Master:
+    """Make the master."""
+    signals: list[Signal] = []
+    for link in job["links"]:
+        (n, name), *targets = link["ends"]
+        nominal = getattr(slaves[n].all[name], "nominal", None)
+        signals.append(Signal((n, name), [(m, other) for m, other in targets], float(nominal or 1.0)))
+    balances = [Balance(bond["flow"], bond["rate"]) for bond in job["bonds"]]
+    return Master(slaves, signals, balances, job["master"] == "gauss-seidel", job["inputs"] == "linear")
+
+
+def start(slaves: list[Slave], master: Master, job: dict[str, Any]) -> None:
+    """Initialize all FMUs together."""
+    for slave, unit in zip(slaves, job["units"], strict=True):
+        for name, value in unit["parameters"].items():
+            slave.set(name, value)
+    for slave in slaves:
+        slave.enter_initialization(job["start"], job["until"], job["fmu_tolerance"])
+    master.begin(job["start"])
+    for slave in slaves:
+        slave.exit_initialization()
+    master.begin(job["start"])
+
+
+def run(folder: Path) -> None:
+    """Run the job of a folder."""
+    job = json.loads((folder / "job.json").read_text())
+    board = Board(folder)
+    slaves: list[Slave] = []
+    sys.excepthook = reporter(folder, job, board, slaves)
+    slaves += open_slaves(folder, job, board)
+    outputs = choose(slaves, job["outputs"], own_names=job["own_names"])
+    master = connect(slaves, job)
+    start(slaves, master, job)
+    recorder = Recorder(slaves, outputs, master.balances, job["interval"], board)
+    recorder.keep(recorder.look(job["start"]))
+    span = job["start"], job["until"], job["step"]
+    if job["tolerance"] is None:
+        master.run_fixed(*span, recorder)
+    else:
+        master.run_variable(*span, job["tolerance"], recorder)
+    recorder.close(job["until"])
+    meta = result(slaves, outputs, master) | {"open": open_inputs(slaves, job)}
+    for slave in slaves:
+        slave.close()
+    np.save(folder / "result.npy", np.array(recorder.rows))
+    (folder / "meta.json").write_text(json.dumps(meta))
+
+
+def result(slaves: list[Slave], outputs: list[list[str]], master: Master) -> dict[str, Any]:
+    """Return what is to be known about the columns and the run."""
+    counts: Counts = master.counts
+    return {
+        "units": [
+            {"columns": [about(slave.all[name]) for name in names], "constants": constants(slave)}
+            for slave, names in zip(slaves, outputs, strict=True)
+        ],
+        "balances": [vars(balance) for balance in master.balances],
+        "counts": vars(counts),
+    }
+
+
+def open_inputs(slaves: list[Slave], job: dict[str, Any]) -> list[dict[str, Any]]:
+    """Return the inputs to which nothing is connected, and no value was given."""
+    driven = {(n, name) for link in job["links"] for n, name in link["ends"][1:]}
+    found: list[dict[str, Any]] = []
+    for n, (slave, unit) in enumerate(zip(slaves, job["units"], strict=True)):
+        inputs = [name for name, variable in slave.all.items() if variable.causality == "input"]
+        names = [name for name in inputs if (n, name) not in driven and name not in unit["parameters"]]
+        values = slave.reader(names)()
+        found += [
+            about(slave.all[name]) | {"fmu": slave.name, "value": value}
+            for name, value in zip(names, values, strict=True)
+        ]
+    return found
+
+
+def about(variable: Any) -> dict[str, Any]:
+    """Return what is to be known about a column."""
+    items = getattr(variable.declaredType, "items", None) or ()
+    return {
+        "name": variable.name,
+        "unit": variable.unit or getattr(variable.declaredType, "unit", None) or "1",
+        "description": variable.description or "",
+        "causality": variable.causality or "local",
+        "discrete": variable.type not in REAL,
+        "items": [(int(item.value), item.name) for item in items],
+    }
+
+
+def constants(slave: Slave) -> dict[str, float]:
+    """Return the values of the parameters."""
+    names = [name for name, v in slave.all.items() if v.causality == "parameter"]
+    return dict(zip(names, slave.reader(names)(), strict=True))
+
+
+def reporter(folder: Path, job: dict[str, Any], board: Board, slaves: list[Slave]) -> Any:
+    """Return an exception hook that leaves the error in the folder."""
+
+    def report(kind: type[BaseException], error: BaseException, trace: Any) -> None:
+        if isinstance(error, Refused):
+            detail = error.detail
+        else:
+            messages = slaves[board.unit].messages if board.unit < len(slaves) else []
+            unit = job["units"][board.unit]["name"]
+            detail = {"kind": "failed", "unit": unit, "text": str(error) or kind.__name__, "messages": messages}
+        (folder / "error.json").write_text(json.dumps(detail))
+
+    return report
+
+
+if __name__ == "__main__":
+    run(Path(sys.argv[1]))

@@ -1,0 +1,273 @@
+"""Where a netlist is cut: connections are taken apart, and the parts fall into groups."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from modelica_like.errors import NetlistError, Source, UnknownName, did_you_mean
+from modelica_like.language import Assembly, Connector
+from modelica_like.language.equation import Connection
+from modelica_like.language.expr import Symbol
+
+
+@dataclass(frozen=True)
+class Wire:
+    """Ends that are joined, with a name and where they were joined.
+
+    Attributes:
+        ends: paths of connectors or signals.
+        signal: it carries a value in one direction.
+    """
+
+    name: str
+    ends: tuple[str, ...]
+    signal: bool
+    source: Source
+
+
+@dataclass(frozen=True)
+class Cut:
+    """A wire taken apart.
+
+    Attributes:
+        name: as it was asked for, fit to be a name.
+        near: ends on the one side: the end that was named.
+        far: all other ends.
+        signal: it carries a value in one direction, from `near` to `far`.
+    """
+
+    name: str
+    near: tuple[str, ...]
+    far: tuple[str, ...]
+    signal: bool
+    source: Source
+
+
+@dataclass(frozen=True)
+class CutNetlist:
+    """A netlist in groups of parts.
+
+    Attributes:
+        groups: names of the parts of each group, in the order of the netlist.
+        wires: those inside the groups.
+        cuts: those between the groups.
+    """
+
+    groups: tuple[tuple[str, ...], ...]
+    wires: tuple[Wire, ...]
+    cuts: tuple[Cut, ...]
+
+    def group_of(self, path: str) -> int:
+        """Return the number of the group in which an end lies."""
+        return next(k for k, group in enumerate(self.groups) if part_of(path) in group)
+
+
+def part_of(path: str) -> str:
+    """Return the name of the part (or of the array of parts) to which a path belongs."""
+    return path.partition(".")[0].partition("[")[0]
+
+
+def cut_netlist(assembly: Assembly, at: Sequence[str]) -> CutNetlist:
+    """Cut a netlist.
+
+    Args:
+        assembly: the netlist.
+        at: names of parts (the cut is behind them), of their ends (`shaft.flange_a`), or of entries of `[connect]`.
+
+    Raises:
+        UnknownName: there is no such shaft.
+        NetlistError: the place cannot be cut, or the netlist does not fall apart there.
+    """
+    if not at:
+        raise NetlistError(f"{assembly.label}: there is nothing to cut.", advice="Name a shaft, e.g. --at shaft.")
+    wires = _joined(_wires(assembly))
+    cuts: dict[tuple[str, ...], Cut] = {}
+    for name in at:
+        cut, wire = _find(assembly, wires, name)
+        cuts.setdefault(wire.ends, cut)
+    kept: list[Wire] = []
+    for wire in wires:
+        if wire.ends not in cuts:
+            kept.append(wire)
+        elif len(cuts[wire.ends].far) > 1 and not wire.signal:
+            kept.append(Wire(wire.name, cuts[wire.ends].far, wire.signal, wire.source))
+    groups = _groups(assembly, kept)
+    found = CutNetlist(groups, tuple(kept), tuple(cuts.values()))
+    for cut in found.cuts:
+        _check_apart(assembly, found, cut)
+    return found
+
+
+def _wires(assembly: Assembly) -> list[Wire]:
+    """Return all connections of the netlist itself, those of series named after their parts."""
+    names = {ends: name for name, ends in assembly.wires.items()}
+    found: list[Wire] = []
+    for statement in assembly.equations():
+        if not isinstance(statement, Connection):
+            continue
+        ends = tuple(_path(end) for end in statement.ends)
+        if any("." not in end for end in ends):  # the netlist's own outer connector
+            continue
+        named = names.get(ends, "_".join(part.replace(".", "_") for part in map(_owner, ends)))
+        found.append(Wire(named, ends, not isinstance(statement.ends[0], Connector), statement.source))
+    return found
+
+
+def _path(end: Connector | Symbol) -> str:
+    return end.path if isinstance(end, Connector) else ".".join(filter(None, (end.owner.path, end.name)))
+
+
+def _owner(path: str) -> str:
+    return path.rpartition(".")[0].replace("[", "_").replace("]", "")
+
+
+def _joined(wires: Iterable[Wire]) -> list[Wire]:
+    """Join wires that share an end."""
+    joined: list[Wire] = []
+    for wire in wires:
+        touching = [one for one in joined if set(one.ends) & set(wire.ends)]
+        if touching:
+            first = touching[0]
+            ends = tuple(dict.fromkeys(end for one in (*touching, wire) for end in one.ends))
+            joined = [one for one in joined if one not in touching]
+            wire = Wire(first.name, ends, first.signal, first.source)
+        joined.append(wire)
+    return joined
+
+
+# -- what is meant by a name -------------------------------------------------------------------------------------------
+
+
+def _find(assembly: Assembly, wires: Sequence[Wire], name: str) -> tuple[Cut, Wire]:
+    near = _near_end(assembly, wires, name)
+    wire = next((one for one in wires if near in one.ends), None)
+    if wire is None:
+        raise NetlistError(f"{near} is connected to nothing, so there is nothing to cut.")
+    if wire.signal:  # a value goes from an output to inputs
+        source, *others = sorted(wire.ends, key=lambda end: not _is_output(assembly, end))
+        near, far = source, tuple(others)
+        _check_can_open(assembly, far)
+    else:
+        far = tuple(end for end in wire.ends if end != near)
+    return Cut(_as_name(name), (near,), far, wire.signal, wire.source), wire
+
+
+def _near_end(assembly: Assembly, wires: Sequence[Wire], name: str) -> str:
+    """Return the end that a name means."""
+    if name in assembly.wires:
+        ends = assembly.wires[name]
+        first, *others = ends
+        if len(others) > 1 and any(wire.ends == ends and not wire.signal for wire in wires):
+            raise NetlistError(
+                f"{name} joins {len(ends)} ends: {', '.join(ends)}.", where=assembly.source_of(f"connect.{name}"),
+                advice="Name the end that is to be cut off.",
+            )  # fmt: skip
+        return first
+    connected = [end for wire in wires for end in wire.ends]
+    if name in connected:
+        return name
+    part = assembly.parts.get(name)
+    if part is None:
+        raise _nowhere(assembly, name, connected)
+    ends = [f"{name}.{end}" for end in part.connectors if f"{name}.{end}" in connected]
+    if len(part.connectors) < 2 and len(ends) == 1:
+        return ends[0]
+    try:
+        behind = f"{name}.{part.outlet_connector().path.rpartition('.')[2]}"
+        before = f"{name}.{part.inlet_connector().path.rpartition('.')[2]}"
+    except UnknownName:
+        listing = ", ".join(ends) or "none that is connected"
+        raise NetlistError(f"It is not clear where {name} is to be cut.", advice=f"Name an end: {listing}.") from None
+    return behind if behind in connected else before
+
+
+def _nowhere(assembly: Assembly, name: str, connected: Sequence[str]) -> Exception:
+    if name in assembly.chains:
+        chain = ", ".join(assembly.chains[name])
+        return NetlistError(
+            f"{name} is a whole series: {chain}.", where=assembly.source_of(f"series.{name}"),
+            advice="Name the part behind which it is to be cut.",
+        )  # fmt: skip
+    if part_of(name) in assembly._parts and name.count(".") > 1:
+        return NetlistError(
+            f"{name} lies inside of {part_of(name)}; only connections of the netlist itself can be cut.",
+            advice=f"Split {part_of(name)}'s own netlist, or cut at one of its ends.",
+        )
+    known = [*assembly.parts, *assembly.wires, *connected]
+    return UnknownName(
+        f"{assembly.label} has no shaft '{name}'{did_you_mean(name, known) or '.'}",
+        advice="Name a part (it is cut behind it), one of its ends (shaft.flange_a), or an entry of [connect].",
+    )
+
+
+def _check_can_open(assembly: Assembly, ends: Sequence[str]) -> None:
+    """Refuse inputs that have a value where nothing is connected: they would not become inputs of an FMU."""
+    for end in ends:
+        owner, _, name = end.rpartition(".")
+        if assembly.find(owner).value(name) is not None:
+            raise NetlistError(
+                f"{end} has a default value, so it does not become an input of an FMU.",
+                advice="Cut at a shaft, or at a signal whose inputs have no default.",
+            )
+
+
+def _is_output(assembly: Assembly, path: str) -> bool:
+    owner, _, name = path.rpartition(".")
+    return type(assembly.find(owner).fields[name]).__name__ == "Output"
+
+
+def _as_name(text: str) -> str:
+    return text.replace(".", "_").replace("[", "_").replace("]", "")
+
+
+# -- groups ------------------------------------------------------------------------------------------------------------
+
+
+def _groups(assembly: Assembly, wires: Iterable[Wire]) -> tuple[tuple[str, ...], ...]:
+    group = {name: name for name in assembly._parts}
+
+    def root(name: str) -> str:
+        while group[name] != name:
+            name = group[name]
+        return name
+
+    for wire in wires:
+        first, *others = (part_of(end) for end in wire.ends)
+        for other in others:
+            group[root(other)] = root(first)
+    members: dict[str, list[str]] = {}
+    for name in assembly._parts:
+        members.setdefault(root(name), []).append(name)
+    return tuple(tuple(names) for names in members.values())
+
+
+def _check_apart(assembly: Assembly, found: CutNetlist, cut: Cut) -> None:
+    inside = [end for end in cut.far if found.group_of(end) == found.group_of(cut.near[0])]
+    if not inside or (cut.signal and len(inside) < len(cut.far)):
+        return
+    near, far = part_of(cut.near[0]), part_of(inside[0])
+    if near == far:
+        raise NetlistError(f"{cut.near[0]} lies inside of the array {near}, which cannot be cut.", where=cut.source)
+    raise NetlistError(
+        f"{assembly.label} does not fall apart between {cut.near[0]} and {inside[0]}.", where=cut.source,
+        why=f"{near} and {far} are also joined by {' – '.join(_way(found.wires, near, far))}.",
+        advice="Cut there, too: --at can be given several times.",
+    )  # fmt: skip
+
+
+def _way(wires: Sequence[Wire], start: str, end: str) -> list[str]:
+    """Return the parts along the shortest way from one to the other."""
+    came: dict[str, str] = {start: ""}
+    queue = [start]
+    for part in queue:
+        for wire in wires:
+            parts = [part_of(one) for one in wire.ends]
+            for other in parts if part in parts else ():
+                if other not in came:
+                    came[other] = part
+                    queue.append(other)
+    way = [end]
+    while came[way[-1]]:
+        way.append(came[way[-1]])
+    return way[::-1]

@@ -1,0 +1,114 @@
+"""What an FMU says about itself, without running it: variables, units, kinds."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import fmpy
+
+from modelica_like.errors import FmuRefused
+from modelica_like.fmi.unpack import printable, unpack
+
+BASE_UNITS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
+
+
+@dataclass(frozen=True)
+class UnitDefinition:
+    """A unit as the FMI and SSP standards define it: the value in SI units is factor · value + offset.
+
+    Attributes:
+        exponents: of the SI base units, without those that are zero.
+    """
+
+    name: str
+    exponents: tuple[tuple[str, int], ...] = ()
+    factor: float = 1.0
+    offset: float = 0.0
+
+    def same_scale(self, other: UnitDefinition) -> bool:
+        """Tell whether one number means the same in both."""
+        return (self.factor, self.offset) == (other.factor, other.offset)
+
+    def convert(self, value: float, to: UnitDefinition) -> float:
+        """Return a value in another unit."""
+        if self.same_scale(to):
+            return value
+        return (self.factor * value + self.offset - to.offset) / to.factor
+
+
+@dataclass(frozen=True)
+class FmuVariable:
+    """A scalar variable of an FMU.
+
+    Attributes:
+        kind: `Real`, `Integer`, `Boolean`, `Float64`, `Enumeration`, …, as the standard calls it.
+        causality: `input`, `output`, `parameter`, `local`, …
+        unit: its name, or an empty text.
+    """
+
+    name: str
+    kind: str
+    causality: str
+    unit: str = ""
+
+
+@dataclass(frozen=True)
+class DescribedFmu:
+    """An FMU's description.
+
+    Attributes:
+        version: of FMI.
+        cosimulation: it has a Co-Simulation part.
+        variables: by name.
+        units: their definitions, by name.
+    """
+
+    version: str
+    cosimulation: bool
+    variables: Mapping[str, FmuVariable]
+    units: Mapping[str, UnitDefinition]
+
+    def unit_of(self, name: str) -> UnitDefinition | None:
+        """Return the unit of a variable, if the FMU defines one."""
+        return self.units.get(self.variables[name].unit) if name in self.variables else None
+
+    def of(self, causality: str) -> list[str]:
+        """Return the names of the variables of a causality."""
+        return [name for name, variable in self.variables.items() if variable.causality == causality]
+
+
+def described(path: Path) -> DescribedFmu:
+    """Read the description of an FMU; nothing of it is run.
+
+    Raises:
+        FmuRefused: the file is no FMU, is unsafe to unpack, or its description cannot be read.
+        OSError: the file cannot be read.
+    """
+    with tempfile.TemporaryDirectory(prefix="modelica_like_") as work:
+        unpack(path, Path(work))
+        try:
+            read: Any = fmpy.read_model_description(work, validate=False)
+        except Exception as error:  # FMPy has no errors of its own
+            reason = printable(str(error)).rstrip(".")
+            raise FmuRefused(f"The description of {path.name} cannot be read: {reason}.") from error
+    scalars = [one for one in read.modelVariables if not one.shape]
+    variables = {one.name: FmuVariable(one.name, one.type, one.causality or "local", _unit(one)) for one in scalars}
+    units = {one.name: _definition(one) for one in read.unitDefinitions or ()}
+    return DescribedFmu(read.fmiVersion, read.coSimulation is not None, variables, units)
+
+
+def _unit(variable: Any) -> str:
+    return variable.unit or getattr(variable.declaredType, "unit", None) or ""
+
+
+def _definition(unit: Any) -> UnitDefinition:
+    base = unit.baseUnit
+    if base is None:
+        return UnitDefinition(unit.name)
+    exponents = tuple((name, int(getattr(base, name))) for name in BASE_UNITS if getattr(base, name))
+    factor = 1.0 if base.factor is None else float(base.factor)
+    return UnitDefinition(unit.name, exponents, factor, float(base.offset or 0.0))

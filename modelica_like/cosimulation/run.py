@@ -1,0 +1,180 @@
+"""Run a system of FMUs, in a process of its own, and look at it as at any other solution."""
+
+from __future__ import annotations
+
+import json
+import os
+import struct
+import tempfile
+import threading
+import time as clock
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, get_args
+
+import numpy as np
+
+from modelica_like.cosimulation.failures import tell_error, tell_loss
+from modelica_like.cosimulation.files import load_system
+from modelica_like.cosimulation.solution import CosimSolution, Coupling, cosim_solution
+from modelica_like.cosimulation.system import Inputs, Master, Settings, System, check_system, one_of
+from modelica_like.errors import FmuCrashed, FmuTimeout, UnknownName, ValueOutOfRange, did_you_mean
+from modelica_like.fmi.process import run_child
+from modelica_like.fmi.unpack import unpack
+from modelica_like.simulation import seconds
+from modelica_like.solve.events import Progress
+
+__all__ = ["CosimSolution", "Coupling", "cosim"]
+
+TIMEOUT = 600.0
+_FIXED_PART = 1e-3
+_FIRST_PART = 1e-6
+_INNER_PART = 0.1
+_WATCH = 0.1
+_CHILD = Path(__file__).with_name("child.py")
+_PACKAGES = Path(__file__).parents[2]
+
+
+def cosim(
+    system: System | str | Path, until: float | str | None = None, *, step: float | str | None = None,
+    master: Master | str | None = None, inputs: Inputs | str | None = None, tolerance: float | None = None,
+    parameters: Mapping[str, float] | None = None, fmu_tolerance: float | None = None,
+    outputs: Sequence[str] | None = None, interval: float = 0.0, timeout: float = TIMEOUT,
+    progress: Progress | None = None,
+) -> CosimSolution:  # fmt: skip
+    """Run a system of FMUs, all together in one process that is not this one.
+
+    Mode changes are known to a communication step.
+
+    Args:
+        system: a system, its TOML file, an SSP, or a netlist with FMUs as parts.
+        until: end time, a number in s or a quantity; by default what the system says.
+        step: communication step, a number in s or a quantity; by default what the system says, or a thousandth of
+            the run.
+        master: `jacobi` or `gauss-seidel`.
+        inputs: `linear` (FMUs are told the slopes of their inputs, where they can take them) or `hold`.
+        tolerance: relative tolerance of the signals between FMUs; with it the step varies.
+        parameters: start values and parameters, by the FMU's name and the variable's: `motor.J1.J`.
+        fmu_tolerance: relative tolerance inside the FMUs; by default their own, or a tenth of `tolerance`.
+        outputs: names or patterns (`load.*`) of variables to record; by default all that are not parameters.
+        interval: shortest time between two results, in s.
+        timeout: time limit in s.
+        progress: called with the time reached.
+
+    Raises:
+        NetlistError, UnknownName, ValueOutOfRange: the system or a value is wrong.
+        FmuRefused: an FMU cannot be run this way.
+        FmuFailed: an FMU told an error; FmuCrashed: it took the process down; FmuTimeout: the run did not end.
+        OSError: a file cannot be read.
+    """
+    if not isinstance(system, System):
+        with opened(Path(system)) as known:
+            return cosim(
+                known, until, step=step, master=master, inputs=inputs, tolerance=tolerance, parameters=parameters,
+                fmu_tolerance=fmu_tolerance, outputs=outputs, interval=interval, timeout=timeout, progress=progress,
+            )  # fmt: skip
+    check_system(system)
+    system = _with_parameters(system, parameters or {})
+    if until is None and system.settings.until is None:
+        raise ValueOutOfRange(
+            f"{system.name}: there is no end time.",
+            advice="Give `until`, or put it under [simulate] in the system's file.",
+        )
+    settings = _settings(system.settings, until, step, master, inputs, tolerance)
+    if timeout <= 0:
+        raise ValueOutOfRange(f"{system.name}: the time limit must be positive, not {timeout:g} s.")
+    begin = clock.perf_counter()
+    with tempfile.TemporaryDirectory(prefix="modelica_like_", ignore_cleanup_errors=True) as work:
+        folder = Path(work)
+        for k, unit in enumerate(system.units):
+            (folder / str(k)).mkdir()
+            unpack(unit.file, folder / str(k))
+        inner = fmu_tolerance if fmu_tolerance is not None else _inner(settings.tolerance)
+        job = _job(system, settings) | {"fmu_tolerance": inner, "interval": interval, "outputs": outputs}
+        (folder / "job.json").write_text(json.dumps(job))
+        _run(system, folder, timeout, progress)
+        table = np.load(folder / "result.npy")
+        meta = json.loads((folder / "meta.json").read_text())
+    return cosim_solution(system, meta, table, clock.perf_counter() - begin)
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[System]:
+    """Open a system, and keep what had to be unpacked for it as long as it is needed; see `load_system`."""
+    with tempfile.TemporaryDirectory(prefix="modelica_like_", ignore_cleanup_errors=True) as work:
+        yield load_system(path, Path(work))
+
+
+def _with_parameters(system: System, given: Mapping[str, float]) -> System:
+    units = {unit.name: unit for unit in system.units}
+    for name, value in given.items():
+        unit, _, variable = name.partition(".")
+        if unit not in units:
+            raise UnknownName(f"{system.name} has no FMU '{unit}'{did_you_mean(unit, units) or '.'}")
+        units[unit] = replace(units[unit], parameters={**units[unit].parameters, variable: float(value)})
+    return replace(system, units=tuple(units.values()))
+
+
+def _settings(
+    base: Settings, until: float | str | None, step: float | str | None, master: str | None, inputs: str | None,
+    tolerance: float | None,
+) -> Settings:  # fmt: skip
+    end = seconds(until if until is not None else base.until)
+    chosen = tolerance if tolerance is not None else base.tolerance
+    part = _FIXED_PART if chosen is None else _FIRST_PART
+    size = seconds(step, "step") if step is not None else base.step or end * part
+    for what, value in (("end time", end), ("step", size)):
+        if not 0 < value < np.inf:
+            raise ValueOutOfRange(f"The {what} must be positive, not {value:g} s.")
+    if chosen is not None and not 1e-12 <= chosen <= 0.1:
+        raise ValueOutOfRange(f"tolerance = {chosen:g} must be a number from 1e-12 to 0.1.")
+    chosen_master = one_of("master", master or base.master, get_args(Master))
+    way = one_of("way to give inputs", inputs or base.inputs, get_args(Inputs))
+    return Settings(end, min(size, end), chosen_master, way, chosen)
+
+
+def _inner(tolerance: float | None) -> float | None:
+    """Return the tolerance of the FMUs, whose errors must not look like those of the coupling."""
+    return None if tolerance is None else _INNER_PART * tolerance
+
+
+def _job(system: System, settings: Settings) -> dict[str, Any]:
+    number = {unit.name: k for k, unit in enumerate(system.units)}
+    links = {link.name: k for k, link in enumerate(system.links)}
+    return {
+        "units": [{"name": u.name, "parameters": dict(u.parameters)} for u in system.units],
+        "links": [
+            {"ends": [[number[p.unit], p.variable] for p in (link.source, *link.targets)]} for link in system.links
+        ],
+        "bonds": [{"flow": links[bond.flow], "rate": links[bond.rate]} for bond in system.bonds],
+        "own_names": system.own_names, "start": 0.0, **vars(settings),
+    }  # fmt: skip
+
+
+def _run(system: System, folder: Path, timeout: float, progress: Progress | None) -> None:
+    for name in ("progress", "calling"):
+        (folder / name).write_bytes(struct.pack("q", 0))
+    paths = [str(_PACKAGES), os.environ.get("PYTHONPATH", "")]
+    environment = {"PYTHONPATH": os.pathsep.join(filter(None, paths))}
+    done = threading.Event()
+    watcher = threading.Thread(target=_watch, args=(folder, done, progress), daemon=True)
+    watcher.start()
+    try:
+        run_child(system.name, _CHILD, folder, timeout, environment)
+    except (FmuCrashed, FmuTimeout) as error:
+        (calling,) = struct.unpack("q", (folder / "calling").read_bytes()[:8])
+        raise tell_loss(system, calling, error) from None
+    finally:
+        done.set()
+        watcher.join()
+    tell_error(system, folder)
+
+
+def _watch(folder: Path, done: threading.Event, progress: Progress | None) -> None:
+    """Tell the time reached, now and then."""
+    while progress is not None and not done.wait(_WATCH):
+        (time,) = struct.unpack("d", (folder / "progress").read_bytes()[:8])
+        if not np.isnan(time):
+            progress(time)

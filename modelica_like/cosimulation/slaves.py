@@ -1,0 +1,150 @@
+"""FMUs as a master sees them: FMPy's Co-Simulation slaves of FMI 2.0 and 3.0 with one face."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import fmpy
+from fmpy.simulation import instantiate_fmu
+
+REAL = ("Real", "Float64", "Float32")
+_STORED = {
+    "Real": "Real", "Integer": "Integer", "Enumeration": "Integer", "Boolean": "Boolean", "Float64": "Float64",
+    "Float32": "Float32", "Int8": "Int8", "UInt8": "UInt8", "Int16": "Int16", "UInt16": "UInt16", "Int32": "Int32",
+    "UInt32": "UInt32", "Int64": "Int64", "UInt64": "UInt64",
+}  # fmt: skip
+_MESSAGES = 20
+
+
+class Refused(Exception):
+    """A system cannot be run as asked; `detail` says why, for the process that asked."""
+
+    def __init__(self, **detail: Any) -> None:
+        super().__init__(str(detail))
+        self.detail = detail
+
+
+class Slave:
+    """One FMU.
+
+    Args:
+        name: its name in the system.
+        folder: the unpacked FMU.
+        notice: called before the FMU itself is.
+
+    Attributes:
+        variables: FMPy's descriptions of the scalar variables by name, without parameters.
+        slopes: it takes the slopes of its inputs.
+        can_save: its state can be saved and restored, and its steps may vary.
+    """
+
+    def __init__(self, name: str, folder: Path, notice: Callable[[], None] = lambda: None) -> None:
+        self.name, self.notice = name, notice
+        self.messages: list[str] = []
+        self.description: Any = fmpy.read_model_description(str(folder), validate=False)
+        about = self.description.coSimulation
+        if self.description.fmiVersion == "1.0" or about is None:
+            raise Refused(kind="no co-simulation", unit=name, version=self.description.fmiVersion)
+        second = self.description.fmiVersion == "2.0"
+        known = (v for v in self.description.modelVariables if v.type in (*_STORED, "Boolean") and not v.shape)
+        self.all = {v.name: v for v in known if v.causality != "independent"}
+        self.variables = {n: v for n, v in self.all.items() if "arameter" not in (v.causality or "")}
+        self.slopes = second and bool(about.canInterpolateInputs)
+        self.can_save = bool(about.canGetAndSetFMUstate and about.canHandleVariableCommunicationStepSize)
+        notice()
+        self._fmu: Any = instantiate_fmu(
+            str(folder), self.description, "CoSimulation", logger=self._log, event_mode_used=False
+        )
+        self._save, self._load, self._free = (
+            (self._fmu.getFMUstate, self._fmu.setFMUstate, self._fmu.freeFMUstate)
+            if second
+            else (self._fmu.getFMUState, self._fmu.setFMUState, self._fmu.freeFMUState)
+        )
+
+    def _log(self, *arguments: Any) -> None:
+        text = arguments[-1]
+        self.messages.append(text.decode(errors="replace") if isinstance(text, bytes) else str(text))
+        del self.messages[:-_MESSAGES]
+
+    def enter_initialization(self, start: float, stop: float, tolerance: float | None) -> None:
+        """Enter the initialization mode."""
+        self.notice()
+        if self.description.fmiVersion == "2.0":
+            self._fmu.setupExperiment(tolerance=tolerance, startTime=start, stopTime=stop)
+            self._fmu.enterInitializationMode()
+        else:
+            self._fmu.enterInitializationMode(tolerance=tolerance, startTime=start, stopTime=stop)
+
+    def exit_initialization(self) -> None:
+        """Leave the initialization mode."""
+        self.notice()
+        self._fmu.exitInitializationMode()
+
+    def _stored(self, name: str) -> str:
+        kind = _STORED[self.all[name].type]
+        # Only enumerations are left to be called so in FMI 3.0, which reads them as 64 bits.
+        return "Int64" if kind == "Integer" and self.description.fmiVersion != "2.0" else kind
+
+    def set(self, name: str, value: float) -> None:
+        """Set a variable."""
+        self.notice()
+        kind = self._stored(name)
+        given: Any = float(value) if kind in REAL else bool(value) if kind == "Boolean" else round(value)
+        getattr(self._fmu, f"set{kind}")([self.all[name].valueReference], [given])
+
+    def reader(self, names: Sequence[str]) -> Callable[[], list[float]]:
+        """Return a function that reads variables, with one call of the FMU for each type."""
+        groups: dict[str, list[int]] = {}
+        for place, name in enumerate(names):
+            groups.setdefault(self._stored(name), []).append(place)
+        calls = [
+            (getattr(self._fmu, f"get{kind}"), [self.all[names[k]].valueReference for k in places], places)
+            for kind, places in groups.items()
+        ]
+
+        def read() -> list[float]:
+            self.notice()
+            values = [0.0] * len(names)
+            for get, references, places in calls:
+                for place, value in zip(places, get(references), strict=True):
+                    values[place] = float(value)
+            return values
+
+        return read
+
+    def give_slopes(self, names: Sequence[str], slopes: Sequence[float]) -> None:
+        """Tell how inputs move during the next step."""
+        self.notice()
+        references = [self.all[name].valueReference for name in names]
+        self._fmu.setRealInputDerivatives(references, [1] * len(names), list(slopes))
+
+    def step(self, time: float, size: float) -> None:
+        """Step to time + size."""
+        self.notice()
+        done = self._fmu.doStep(currentCommunicationPoint=time, communicationStepSize=size,
+                                noSetFMUStatePriorToCurrentPoint=not self.can_save)  # fmt: skip
+        if isinstance(done, tuple) and done[1]:
+            raise Refused(kind="ends", unit=self.name, time=time)
+
+    def save(self) -> Any:
+        """Save the state."""
+        self.notice()
+        return self._save()
+
+    def load(self, state: Any) -> None:
+        """Go back to a saved state."""
+        self.notice()
+        self._load(state)
+
+    def free(self, state: Any) -> None:
+        """Give a saved state back."""
+        self.notice()
+        self._free(state)
+
+    def close(self) -> None:
+        """Terminate the FMU."""
+        self.notice()
+        self._fmu.terminate()
+        self._fmu.freeInstance()

@@ -1,0 +1,174 @@
+"""Cut a drive at a shaft into FMUs that are simulated together."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import get_args
+
+from modelica_like.cosimulation.causality import Takes, ends_of, open_ends, orient
+from modelica_like.cosimulation.cut import Cut, CutNetlist, cut_netlist
+from modelica_like.cosimulation.files import write_system
+from modelica_like.cosimulation.parts import Maker
+from modelica_like.cosimulation.system import POWERS, Bond, Link, Master, Port, Settings, System, Unit, one_of
+from modelica_like.errors import DuplicateName, NetlistError
+from modelica_like.fmi.export import export_fmu
+from modelica_like.initialize import initialize
+from modelica_like.language import Assembly, Component
+from modelica_like.netlist import load, save
+from modelica_like.netlist.convert import as_assembly
+from modelica_like.simulation import build, seconds
+
+Report = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Split:
+    """A drive in parts.
+
+    Attributes:
+        system: the FMUs and their connections.
+        path: its TOML file.
+        ends: what each end of a cut takes from the other side: `flow` (torque) or `potential` (angle and speed).
+    """
+
+    system: System
+    path: Path
+    ends: Mapping[str, Takes]
+
+    def __str__(self) -> str:
+        words = {"flow": "takes the load, and tells how it moves", "potential": "is moved, and tells its load"}
+        lines = [f"{self.path}: {', '.join(unit.file.name for unit in self.system.units)}"]
+        return "\n".join([*lines, *(f"  {path} {words[takes]}" for path, takes in self.ends.items())])
+
+
+def split(
+    drive: Component | str | Path, at: Sequence[str] | str, folder: str | Path, *, names: Sequence[str] = (),
+    version: str = "2.0", step: float | str | None = None, master: str | None = None, check: bool = True,
+    report: Report | None = None,
+) -> Split:  # fmt: skip
+    """Cut a drive at shafts into FMUs, and write the system that `cosim` runs.
+
+    The start values are those of the whole drive: a state keeps the start value that it was given, others are given the
+    number that the drive starts with.
+
+    Args:
+        drive: a netlist file, or a component that has only parts and wires.
+        at: names of parts (the cut is behind them), of their ends (`shaft.flange_a`), or of entries of `[connect]`; a
+            signal can be cut, too.
+        folder: where to write; it is made if it does not exist.
+        names: of the FMUs, in the order of the netlist; by default that of the first part of each.
+        version: FMI version; inputs can move on straight lines in 2.0 only.
+        step: communication step to write into the system, in s.
+        master: `jacobi` or `gauss-seidel`, to write into the system.
+        check: whether to run each FMU against IDAS.
+        report: called with what is being done.
+
+    Raises:
+        UnknownName: there is no such shaft.
+        NetlistError: the drive cannot be cut there.
+        ExportError: a part cannot be exported.
+        ModelicaLikeError: something is wrong with the drive.
+    """
+    tell = report or _silent
+    tell("compiling the drive")
+    assembly = _assembly(drive)
+    found = cut_netlist(assembly, [at] if isinstance(at, str) else at)
+    titles = _titles(found, names)
+    settings = _settings(assembly.__dict__["simulate"].get("until"), step, master)
+    maker = Maker(assembly, found)
+    tell("looking for the causality")
+    chosen = orient(found, maker.bare)
+    values = _start_values(assembly)
+    target = Path(folder)
+    target.mkdir(parents=True, exist_ok=True)
+    units: list[Unit] = []
+    for k, title in enumerate(titles):
+        tell(f"exporting {title}")
+        ends = open_ends(found, k, chosen)
+        part = maker.started(k, ends, values)
+        part.__dict__["_name"] = title
+        save(part, target / f"{title}.toml")
+        export_fmu(part, target / f"{title}.fmu", version, {"cs"}, check=check)
+        units.append(Unit(title, target / f"{title}.fmu", maker.not_passed_on(ends)))
+    links, bonds = _couplings(maker, chosen, titles)
+    system = System(assembly._name, tuple(units), links, bonds, settings, own_names=True)
+    path = target / "system.toml"
+    write_system(system, path)
+    return Split(system, path, {end.path: end.takes for cut, takes in chosen.items() for end in ends_of(cut, takes)})
+
+
+def _settings(until: float | str | None, step: float | str | None, master: str | None) -> Settings:
+    settings = Settings() if master is None else Settings(master=one_of("master", master, get_args(Master)))
+    given = {"until": until, "step": step}
+    return replace(settings, **{name: seconds(value, name) for name, value in given.items() if value is not None})
+
+
+def _silent(_: str) -> None:
+    pass
+
+
+def _assembly(drive: Component | str | Path) -> Assembly:
+    if isinstance(drive, str | Path):
+        return load(drive)
+    return drive if isinstance(drive, Assembly) else as_assembly(drive)
+
+
+def _titles(found: CutNetlist, names: Sequence[str]) -> list[str]:
+    if not names:
+        return [group[0] for group in found.groups]
+    if len(names) != len(found.groups):
+        groups = "; ".join(_some(group) for group in found.groups)
+        raise NetlistError(
+            f"There are {len(found.groups)} FMUs, but {len(names)} name{'s' if len(names) > 1 else ''}.",
+            why=f"They are: {groups}.",
+        )
+    for name in names:
+        if not name.isidentifier():
+            raise NetlistError(f"'{name}' is no name of an FMU: letters, digits and _.")
+    if len(set(names)) < len(names):
+        raise DuplicateName(f"Two FMUs cannot have one name: {', '.join(names)}.")
+    return list(names)
+
+
+def _some(group: Sequence[str]) -> str:
+    return ", ".join(group) if len(group) < 4 else f"{group[0]}, {group[1]} … {group[-1]}"
+
+
+def _start_values(assembly: Assembly) -> dict[str, float]:
+    """Return all variables of the whole drive at its start, in SI units."""
+    whole = build(assembly)
+    point = initialize(whole, 0.0, whole.settings.get("start", "given"))
+    column = whole.variables(point.t, point.x, point.z, whole.p, whole.u, point.d).full().ravel()
+    return {one.path: float(value) for one, value in zip(whole.flat_variables, column, strict=True)}
+
+
+def _couplings(
+    maker: Maker, chosen: Mapping[Cut, Takes], titles: Sequence[str]
+) -> tuple[tuple[Link, ...], tuple[Bond, ...]]:
+    """Return the connections between the FMUs, and the bonds they make."""
+    links: list[Link] = []
+    bonds: list[Bond] = []
+    for cut in maker.found.cuts:
+        if cut.signal:
+            links.append(_signal(maker.found, cut, titles))
+            continue
+        near, far = ends_of(cut, chosen[cut])
+        moved, moving = (near, far) if near.takes == "potential" else (far, near)
+        flow, *motions = maker.members(moved)
+        for name in (flow, *motions):
+            giver, taker = (moved, moving) if name == flow else (moving, moved)
+            ends = [Port(titles[maker.found.group_of(end.path)], f"{end.adaptor}.{name}") for end in (giver, taker)]
+            links.append(Link(f"{cut.name}_{name}", ends[0], (ends[1],)))
+        rate = next((rate for name, rate in POWERS if name == flow and rate in motions), None)
+        if rate is not None:
+            bonds.append(Bond(cut.name, f"{cut.name}_{flow}", f"{cut.name}_{rate}"))
+    return tuple(links), tuple(bonds)
+
+
+def _signal(found: CutNetlist, cut: Cut, titles: Sequence[str]) -> Link:
+    source, home = cut.near[0], found.group_of(cut.near[0])
+    ends = (source, *(end for end in cut.far if found.group_of(end) != home))
+    ports = [Port(titles[found.group_of(end)], end) for end in ends]
+    return Link(cut.name, ports[0], tuple(ports[1:]))

@@ -1,0 +1,117 @@
+"""System structure packages (SSP): systems of FMUs that other tools open."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, get_args
+
+from modelica_like.cosimulation.described import DescribedFmu, described
+from modelica_like.cosimulation.split import Split, split
+from modelica_like.cosimulation.ssp_document import Version, ssd
+from modelica_like.cosimulation.ssp_reader import read_structure
+from modelica_like.cosimulation.system import System, check_system
+from modelica_like.errors import NetlistError, UnknownName, did_you_mean
+from modelica_like.fmi.package import write_archive
+from modelica_like.fmi.unpack import SSP, unpack
+from modelica_like.language import Component
+
+
+def write_ssp(system: System, path: str | Path, version: Version | str = "1.0") -> Path:
+    """Write a system and its FMUs as an SSP.
+
+    The same system gives the same bytes. What the standard has no words for (master, step, tolerance, bonds) is kept
+    in an annotation, which other tools leave alone.
+
+    Args:
+        system: the system.
+        path: the file to write, `….ssp`; it is replaced.
+        version: of the SSP standard, `1.0` or `2.0`, which knows the types of FMI 3.0.
+
+    Returns:
+        The file.
+
+    Raises:
+        UnknownName: there is no such version, or an FMU has not a variable of the system.
+        NetlistError: the file has another ending, its folder does not exist, or the system is not sound.
+        FmuRefused: a file is no FMU.
+        OSError: a file cannot be read or written.
+    """
+    target, chosen = _target(path), _version(version)
+    check_system(system)
+    fmus = {unit.name: described(unit.file) for unit in system.units}
+    _check_variables(system, fmus)
+    homes: dict[Path, str] = {}
+    for unit in system.units:
+        homes.setdefault(unit.file.resolve(), f"resources/{unit.name}.fmu")
+    sources = {unit.name: homes[unit.file.resolve()] for unit in system.units}
+    files = {home: file.read_bytes() for file, home in homes.items()}
+    write_archive(target, files | {SSP.description: ssd(system, fmus, sources, chosen)})
+    return target
+
+
+def split_to_ssp(
+    drive: Component | str | Path, at: Sequence[str] | str, path: str | Path, ssp_version: Version | str = "1.0",
+    **options: Any,
+) -> Split:  # fmt: skip
+    """Cut a drive at shafts, and write the parts as an SSP.
+
+    Args:
+        drive: a netlist file, or a component that has only parts and wires.
+        at: where to cut; see `split`.
+        path: the file to write, `….ssp`.
+        ssp_version: of the SSP standard.
+        options: of `split`.
+
+    Raises:
+        ModelicaLikeError: see `split` and `write_ssp`.
+    """
+    target, chosen = _target(path), _version(ssp_version)
+    with tempfile.TemporaryDirectory(prefix="modelica_like_") as folder:
+        done = split(drive, at, folder, **options)
+        return replace(done, path=write_ssp(done.system, target, chosen))
+
+
+def _target(path: str | Path) -> Path:
+    target = Path(path)
+    if target.suffix.lower() != ".ssp":
+        raise NetlistError(f"An SSP is a file with the ending .ssp, not '{target.name}'.")
+    if not target.absolute().parent.is_dir():
+        raise NetlistError(f"There is no folder '{target.parent}' for {target.name}.", advice="Make it first.")
+    return target
+
+
+def _version(asked: str) -> Version:
+    for one in get_args(Version):
+        if asked == one:
+            return one
+    raise UnknownName(f"SSP {asked} is not supported.", advice="There are 1.0 and 2.0.")
+
+
+def _check_variables(system: System, fmus: dict[str, DescribedFmu]) -> None:
+    ports = [(port.unit, port.variable) for link in system.links for port in (link.source, *link.targets)]
+    ports += [(unit.name, name) for unit in system.units for name in unit.parameters]
+    files = {unit.name: unit.file.name for unit in system.units}
+    for unit, name in ports:
+        known = fmus[unit].variables
+        if name not in known:
+            raise UnknownName(f"{unit} ({files[unit]}) has no variable '{name}'{did_you_mean(name, known) or '.'}")
+
+
+def load_ssp(path: Path, work: Path) -> System:
+    """Read an SSP: the system of its SystemStructure.ssd, flat.
+
+    Systems inside of the system are taken apart; the names of their FMUs are joined with `_`.
+
+    Args:
+        path: the file.
+        work: an empty folder into which it is unpacked; the FMUs of the system lie there.
+
+    Raises:
+        FmuRefused: the file is no SSP, or is unsafe to unpack.
+        NetlistError, UnknownName: it says something that cannot be run, or contradicts itself.
+        OSError: the file cannot be read.
+    """
+    return read_structure(path.name, unpack(path, work, kind=SSP))

@@ -1,0 +1,171 @@
+"""Systems of FMUs: what is coupled with what."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+from modelica_like.errors import ModelicaLikeError, NetlistError, UnknownName, did_you_mean, raise_together_or_one
+
+Master = Literal["jacobi", "gauss-seidel"]
+Inputs = Literal["hold", "linear"]
+
+POWERS = (("tau", "w"), ("f", "v"), ("i", "v"))
+"""Last names of a flow and of the rate or potential that make a power together."""
+
+
+@dataclass(frozen=True)
+class Port:
+    """A variable of an FMU in a system."""
+
+    unit: str
+    variable: str
+
+    def __str__(self) -> str:
+        return f"{self.unit}.{self.variable}"
+
+
+@dataclass(frozen=True)
+class Unit:
+    """An FMU in a system.
+
+    Attributes:
+        name: by which connections and results call it.
+        file: the FMU.
+        parameters: start values by name, in the FMU's units.
+    """
+
+    name: str
+    file: Path
+    parameters: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Link:
+    """An output and the inputs that take its value at every communication point."""
+
+    name: str
+    source: Port
+    targets: tuple[Port, ...]
+
+    def __str__(self) -> str:
+        return f"{self.source} → {', '.join(map(str, self.targets))}"
+
+
+@dataclass(frozen=True)
+class Bond:
+    """A shaft, slide or wire between two FMUs, through which power flows.
+
+    Attributes:
+        flow: link of the torque, force or current into the second FMU.
+        rate: link of the speed, velocity or potential back to the first.
+    """
+
+    name: str
+    flow: str
+    rate: str
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How a system is run.
+
+    Attributes:
+        until: end time in s.
+        step: communication step in s; the first one where `tolerance` is given.
+        master: `jacobi` (all FMUs step at once, on what was known before) or `gauss-seidel` (one after the other, each
+            on what those before have told).
+        inputs: `linear` (inputs move on straight lines where an FMU can take that) or `hold`.
+        tolerance: relative tolerance of the coupling: the step varies.
+    """
+
+    until: float | None = None
+    step: float | None = None
+    master: Master = "jacobi"
+    inputs: Inputs = "linear"
+    tolerance: float | None = None
+
+
+@dataclass(frozen=True)
+class System:
+    """FMUs and their connections.
+
+    Attributes:
+        units: in the order in which a Gauss-Seidel master steps them.
+        own_names: results keep the names that variables have in their FMUs, without the FMU's name before it.
+    """
+
+    name: str
+    units: tuple[Unit, ...]
+    links: tuple[Link, ...]
+    bonds: tuple[Bond, ...] = ()
+    settings: Settings = field(default_factory=Settings)
+    own_names: bool = False
+
+    def __str__(self) -> str:
+        lines = [f"System {self.name}: {', '.join(unit.name for unit in self.units)}"]
+        return "\n".join([*lines, *(f"  {link}" for link in self.links)])
+
+
+def one_of(what: str, name: str, known: Sequence[str]) -> Any:
+    """Return a name, if it is one of those known.
+
+    Raises:
+        UnknownName: it is not.
+    """
+    if name in known:
+        return name
+    hint = did_you_mean(name, known) or "."
+    raise UnknownName(f"There is no {what} '{name}'{hint}", advice=f"There are {' and '.join(known)}.")
+
+
+def check_system(system: System) -> None:
+    """Check that names are known, and that no input is driven twice.
+
+    Raises:
+        NetlistError, UnknownName: what is wrong; several errors come together.
+    """
+    errors: list[ModelicaLikeError] = []
+    if not system.units:
+        errors.append(NetlistError(f"{system.name} has no FMU.", advice="Declare them in [fmus]."))
+    known = [unit.name for unit in system.units]
+    ports = [port for link in system.links for port in (link.source, *link.targets)]
+    for port in ports:
+        if port.unit not in known:
+            errors.append(UnknownName(f"{system.name} has no FMU '{port.unit}'{did_you_mean(port.unit, known) or '.'}"))
+    driven: dict[Port, str] = {}
+    for link in system.links:
+        for target in link.targets:
+            if target in driven:
+                both = f"{driven[target]} and {link.name}"
+                errors.append(NetlistError(f"{system.name}: {target} is driven twice, by {both}."))
+            driven[target] = link.name
+    names = [link.name for link in system.links]
+    for bond in system.bonds:
+        for name in {bond.flow, bond.rate} - set(names):
+            hint = did_you_mean(name, names) or "."
+            errors.append(UnknownName(f"{system.name}: bond {bond.name} names no connection '{name}'{hint}"))
+    if errors:
+        raise raise_together_or_one(errors)
+
+
+def find_bonds(links: Iterable[Link]) -> tuple[Bond, ...]:
+    """Return the bonds that follow from names: `a.x.tau` to `b.y.tau`, and `b.y.w` back to `a.x.w`."""
+    by_ends = {(link.source, target): link for link in links for target in link.targets}
+    bonds: list[Bond] = []
+    for (source, target), link in by_ends.items():
+        for flow, rate in POWERS:
+            stem, _, last = source.variable.rpartition(".")
+            other, _, its_last = target.variable.rpartition(".")
+            if last != flow or its_last != flow:
+                continue
+            back = by_ends.get((Port(target.unit, _joined(other, rate)), Port(source.unit, _joined(stem, rate))))
+            if back is not None:
+                bonds.append(Bond(stem.replace(".", "_") or link.name, link.name, back.name))
+    return tuple(bonds)
+
+
+def _joined(stem: str, last: str) -> str:
+    return f"{stem}.{last}" if stem else last

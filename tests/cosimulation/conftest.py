@@ -1,0 +1,16 @@
+"""A two-mass oscillator, cut behind its shaft once for all tests."""
+
+from pathlib import Path
+
+import pytest
+
+from modelica_like.cosimulation.split import Split, split
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+
+@pytest.fixture(scope="session")
+def oscillator(tmp_path_factory: pytest.TempPathFactory) -> Split:
+    """examples/two_mass.toml: `motor` has the torque, J1 and the shaft, `wheel` has J2."""
+    folder = tmp_path_factory.mktemp("oscillator")
+    return split(EXAMPLES / "two_mass.toml", "shaft", folder, names=("motor", "wheel"), check=False)

@@ -1,0 +1,136 @@
+"""The two-mass oscillator in two FMUs against its closed form: orders of the masters, variable steps, energies."""
+
+from dataclasses import replace
+from math import log2, sqrt
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from modelica_like import Solution
+from modelica_like.cosimulation.run import cosim
+from modelica_like.cosimulation.split import Split, split
+from modelica_like.cosimulation.system import System
+
+M, J1, J2, C, D = 5.0, 0.02, 0.08, 400.0, 0.2
+MASTERS = pytest.mark.parametrize("master", ["jacobi", "gauss-seidel"])
+SIGNALS = ("J2.w", "shaft.tau")
+PRECISE = {"until": 0.2, "fmu_tolerance": 1e-9, "outputs": [*SIGNALS, "J1.w"]}
+
+
+def closed_form(time: np.ndarray) -> dict[str, np.ndarray]:
+    """A damped oscillation of the twist around its mean, on top of a constant acceleration of the centre of mass."""
+    total, reduced = J1 + J2, J1 * J2 / (J1 + J2)
+    mean, decay = -M * J2 / (total * C), D / (2 * reduced)
+    w = sqrt(C / reduced - decay**2)
+    swing = np.exp(-decay * time)
+    twist = mean - mean * swing * (np.cos(w * time) + decay / w * np.sin(w * time))
+    rate = mean * swing * (w + decay**2 / w) * np.sin(w * time)
+    return {"J2.w": M / total * time + J1 / total * rate, "shaft.tau": C * twist + D * rate}
+
+
+def error(run: Solution) -> float:
+    """Largest deviation from the closed form, in parts of a signal's range."""
+    truth = closed_form(run.time)
+    return max(float(np.abs(run[name] - truth[name]).max() / np.ptp(truth[name])) for name in SIGNALS)
+
+
+def test_the_closed_form_is_that_of_two_masses() -> None:
+    """d'Alembert on J2, by central differences; the first instant by hand: nothing has moved."""
+    step = 1e-6
+    time = np.array([0.05 - step, 0.05, 0.05 + step])
+    truth = closed_form(time)
+    assert J2 * (truth["J2.w"][2] - truth["J2.w"][0]) / (2 * step) == pytest.approx(-truth["shaft.tau"][1], rel=1e-6)
+    assert closed_form(np.zeros(1))["shaft.tau"][0] == pytest.approx(0.0, abs=1e-12)
+
+
+@MASTERS
+def test_inputs_on_straight_lines_make_the_second_order(oscillator: Split, master: str) -> None:
+    coarse, fine = (error(cosim(oscillator.system, step=h, master=master, **PRECISE)) for h in (4e-4, 2e-4))
+    assert fine < 1e-3
+    assert log2(coarse / fine) == pytest.approx(2.0, abs=0.1)
+
+
+def test_held_inputs_make_the_first_order(oscillator: Split) -> None:
+    coarse, fine = (error(cosim(oscillator.system, step=h, inputs="hold", **PRECISE)) for h in (4e-5, 2e-5))
+    assert log2(coarse / fine) == pytest.approx(1.0, abs=0.15)
+
+
+@MASTERS
+def test_a_variable_step_follows_its_tolerance(oscillator: Split, master: str) -> None:
+    loose, tight = (cosim(oscillator.system, master=master, tolerance=tol, **PRECISE) for tol in (1e-4, 1e-6))
+    assert error(loose) < 1e-2
+    assert error(tight) < 1e-3
+    assert error(tight) < error(loose) / 5
+    assert tight.steps > 3 * loose.steps
+    assert tight.shortest < tight.longest
+
+
+def test_a_step_that_was_too_long_is_taken_back(oscillator: Split) -> None:
+    """Without a trace: the run that began with 50 ms is as good as the one that began with a microsecond."""
+    bold = cosim(oscillator.system, step=0.05, tolerance=1e-5, **PRECISE)
+    careful = cosim(oscillator.system, step=1e-6, tolerance=1e-5, **PRECISE)
+    assert bold.rejected > 0
+    assert error(bold) < 2 * error(careful)
+    assert (np.diff(bold.time) > 0).all()
+
+
+def test_the_residual_vanishes_with_the_square_of_the_step(oscillator: Split) -> None:
+    coarse, fine = (cosim(oscillator.system, step=h, **PRECISE).couplings[0] for h in (4e-4, 2e-4))
+    assert abs(coarse.residual) < 2e-2 * coarse.throughput
+    assert log2(coarse.residual / fine.residual) == pytest.approx(2.0, abs=0.2)
+    assert fine.throughput == pytest.approx(coarse.throughput, rel=1e-2)
+
+
+@MASTERS
+def test_the_residual_is_the_energy_that_the_wheel_has_got_too_much(oscillator: Split, master: str) -> None:
+    """What the wheel receives becomes its kinetic energy, whatever the coupling does on the way."""
+    run = cosim(oscillator.system, step=1e-3, master=master, inputs="hold", **PRECISE)
+    (coupling,) = run.couplings
+    assert coupling.received == pytest.approx(J2 / 2 * run["J2.w"][-1] ** 2, rel=1e-3)
+    assert abs(coupling.residual) > 0.05 * coupling.throughput
+    assert run["shaft.residual_energy"][-1] == pytest.approx(coupling.residual)
+
+
+def test_held_inputs_pump_energy_into_an_undamped_oscillation(oscillator: Split) -> None:
+    """They come half a step late, which works like negative damping; straight lines do not."""
+    system = with_values(oscillator.system, {"motor": {"shaft.d": 1e-6}})
+    amplitude = {}
+    for inputs in ("hold", "linear"):
+        run = cosim(system, step=2e-4, inputs=inputs, **PRECISE)
+        amplitude[inputs] = np.ptp(run["shaft.tau"][run.time > 0.15]) / 2
+    undamped = M * J2 / (J1 + J2)
+    assert amplitude["hold"] > 1.05 * undamped
+    assert amplitude["linear"] == pytest.approx(undamped, rel=5e-3)
+
+
+def with_values(system: System, values: dict[str, dict[str, float]]) -> System:
+    return replace(system, units=tuple(replace(u, parameters=values.get(u.name, {})) for u in system.units))
+
+
+def test_parameters_are_those_of_the_fmus(oscillator: Split) -> None:
+    """Half the motor's torque, half of everything."""
+    whole, half = (
+        cosim(oscillator.system, step=2e-4, parameters=values, **PRECISE) for values in ({}, {"motor.motor.tau": M / 2})
+    )
+    assert half["J2.w"] == pytest.approx(whole["J2.w"] / 2, abs=1e-6)
+
+
+def test_fmi_3(oscillator: Split, tmp_path: Path) -> None:
+    """Its inputs are held, so it is of the first order."""
+    netlist = Path(__file__).parents[2] / "examples" / "two_mass.toml"
+    cut = split(netlist, "shaft", tmp_path, version="3.0", check=False)
+    third = cosim(cut.path, step=4e-5, **PRECISE)
+    second = cosim(oscillator.system, step=4e-5, inputs="hold", **PRECISE)
+    for name in SIGNALS:
+        assert third[name] == pytest.approx(second[name], abs=1e-5 * np.ptp(second[name]))
+
+
+def test_the_result_is_a_solution_like_any_other(oscillator: Split) -> None:
+    run = cosim(oscillator.path, until="0.1 s", step="1 ms")
+    assert isinstance(run, Solution)
+    assert len(run.time) == 101
+    assert run.at(0.05)["J2.w"] == pytest.approx(float(np.interp(0.05, run.time, run["J2.w"])))
+    assert run["J2.J"][0] == J2
+    assert {"J1.w", "J2.w", "shaft.tau", "shaft.power", "shaft.residual_energy"} <= set(run.names)
+    assert run.steps == 100
