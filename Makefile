@@ -33,6 +33,10 @@ benchmark: .venv/installed-dev
 	$(BIN)/python benchmarks/bad_input.py
 	$(BIN)/python benchmarks/coupled_clutches.py
 	$(BIN)/python benchmarks/chain.py 10 100 1000 5000
+	$(BIN)/python benchmarks/fmu_export.py 10 100 1000
+	$(BIN)/python benchmarks/gradient.py
+	$(BIN)/python benchmarks/linearize.py 100 1000
+	$(BIN)/python benchmarks/sweep.py 900
 
 fmus: .venv/installed
 	$(BIN)/python fmus/build.py

@@ -1,6 +1,6 @@
 """Gradients against simulations of the same run: `python benchmarks/gradient.py`.
 
-Ratios are measured in the same run, best of several; times are for orientation only. The gradient includes everything
+Ratios of CPU times of the same run, best of several; times are for orientation only. The gradient includes everything
 from the finished simulation on: the replay, and the sweep along it.
 """
 
@@ -27,13 +27,13 @@ CASES = {
 
 
 def best(action: Callable[[], Any], repeats: int = 5) -> float:
-    """Shortest wall time of several runs, after one to warm up."""
+    """Shortest CPU time of several runs, after one to warm up."""
     action()
     times: list[float] = []
     for _ in range(repeats):
-        begin = time.perf_counter()
+        begin = time.process_time()
         action()
-        times.append(time.perf_counter() - begin)
+        times.append(time.process_time() - begin)
     return min(times)
 
 

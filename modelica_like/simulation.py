@@ -93,17 +93,17 @@ def simulate(
     return Solution(model, chosen, tuple(record.segments), tuple(record.events), statistics)
 
 
-def seconds(until: float | str | None) -> float:
-    """Return an end time or a step, a number in s or a quantity, in s."""
+def seconds(until: float | str | None, name: str = "until") -> float:
+    """Return an end time or a step, a number in s or a quantity, in s; `name` is what messages call it."""
     if until is None:
         raise ValueOutOfRange(
             "There is no end time.",
             advice='Say simulate(…, until="2 s"), or put `until` under [simulate] in the netlist.',
         )
     try:
-        return to_si(until, _SECOND, "until")
+        return to_si(until, _SECOND, name)
     except UnitError as error:
-        error.advice = error.advice or 'Give seconds or a time, e.g. until="2 s".'
+        error.advice = error.advice or f'Give seconds or a time, e.g. {name}="2 s".'
         raise
 
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from importlib import import_module
 from typing import Any
 
 import casadi as ca
@@ -226,6 +227,17 @@ class CompiledDae:
         twin = replace(self, p=p, u=u)
         twin.__dict__.update({k: v for k, v in self.__dict__.items() if k not in twin.__dict__})
         return twin
+
+    def function(self, inputs: Sequence[str], outputs: Sequence[str], **run: Any) -> ca.Function:
+        """Return the whole simulation as a differentiable CasADi function of parameters.
+
+        Args:
+            inputs: parameters and inputs.
+            outputs: numbers read off the run.
+            run: further arguments of `modelica_like.simulation_function`, which says more.
+        """
+        # Analysis stands above this layer: only the face of the package knows where.
+        return import_module("modelica_like").simulation_function(self, inputs, outputs, **run)
 
     def __getstate__(self) -> dict[str, Any]:
         if self._make_energy is not None:

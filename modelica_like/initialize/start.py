@@ -8,6 +8,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from modelica_like.compile.buffers import buffered
 from modelica_like.compile.compiled import CompiledDae, StartEntry, Vector
 from modelica_like.errors import ContradictingStart, InitializationError, MissingStart
 from modelica_like.initialize.matching import Matching
@@ -15,6 +16,7 @@ from modelica_like.initialize.point import Point, call, solve_implicit
 
 _CONSISTENT = 1e-8
 _MAX_NEWTON = 50
+_DENSE = 100
 
 
 @dataclass
@@ -217,12 +219,13 @@ class _StartSystem:
         nx, ny = len(model.states), len(y)
         state = np.concatenate([point.x, y, point.z])
         error = np.zeros(len(target))
+        system = _Evaluation(model, wanted, columns)
         for _ in range(_MAX_NEWTON):
-            _, jacobian, values = model.start_system(
+            matrix, values = system(
                 point.t, state[:nx], state[nx : nx + ny], state[nx + ny :], model.p, model.u, point.d
             )
-            error = np.array(values).ravel()[wanted] - target
-            step = _sparse_solve(jacobian[wanted, columns], -error)
+            error = values - target
+            step = _solve(matrix, -error)
             state[columns] += step
             if step.size == 0 or np.max(np.abs(step) / (1.0 + np.abs(state[columns]))) < 1e-13:
                 break
@@ -236,7 +239,38 @@ class _StartSystem:
         point.x, point.z = state[:nx], state[nx + ny :]
 
 
-def _sparse_solve(matrix: Any, right: Vector) -> Vector:
+class _Evaluation:
+    """Some rows of the start system, and their Jacobian by some columns: a small one dense, a large one sparse."""
+
+    def __init__(self, model: CompiledDae, rows: list[int], columns: list[int]) -> None:
+        self._fast = buffered(model._cache, "start system", lambda: _dense_values(model.start_system), (1, 2))
+        self._pattern = model.start_system.sparsity_out(1)
+        self._entries = self._pattern.get_triplet()
+        self._rows, self._columns = rows, columns
+
+    def __call__(self, *arguments: Any) -> tuple[Any, Vector]:
+        entries, values = self._fast(*arguments)
+        if max(self._pattern.shape) > _DENSE:
+            return ca.DM(self._pattern, entries)[self._rows, self._columns], values[self._rows]
+        whole = np.zeros(self._pattern.shape)
+        whole[self._entries] = entries
+        return whole[np.ix_(self._rows, self._columns)], values[self._rows]
+
+
+def _dense_values(system: ca.Function) -> ca.Function:
+    """The start system with all of its values, also those that are always zero."""
+    arguments = system.mx_in()
+    own, jacobian, values = system(*arguments)
+    return ca.Function("start", arguments, [own, jacobian, ca.densify(values)])
+
+
+def _solve(matrix: Any, right: Vector) -> Vector:
+    """Solve a square system; nan where it is singular."""
     if not right.size:
         return right
-    return np.array(ca.solve(matrix, ca.DM(right))).ravel()
+    if isinstance(matrix, ca.DM):
+        return np.array(ca.solve(matrix, ca.DM(right))).ravel()
+    try:
+        return np.linalg.solve(matrix, right)
+    except np.linalg.LinAlgError:
+        return np.full(right.shape, np.nan)

@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from modelica_like import load, simulation_function
+from modelica_like import build, load, simulation_function
 from modelica_like.errors import LanguageError, NoGradient
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -32,6 +32,13 @@ def test_values_and_jacobian_are_those_of_the_paper() -> None:
     assert np.array(function([90.0, 14.0])).ravel() == pytest.approx([J * w / 76, 90 * J * w**2 / 76 / 2], rel=1e-9)
     expected = [[-J * w / 76**2, J * w / 76**2], [-J * w**2 * 14 / 76**2 / 2, 90 * J * w**2 / 76**2 / 2]]
     assert np.array(jacobian([90.0, 14.0])) == pytest.approx(np.array(expected), rel=1e-8)
+
+
+def test_a_compiled_drive_offers_it_itself() -> None:
+    drive = load(EXAMPLES / "machine_table_direct.toml")
+    drive.set("clutch_torque", f"{M!r} N.m")
+    function = build(drive).function(INPUTS, ["clutch.lock_time"])
+    assert float(function([90.0, 14.0])) == pytest.approx(J * w / 76, rel=1e-9)
 
 
 def test_value_and_jacobian_share_one_simulation() -> None:

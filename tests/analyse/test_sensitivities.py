@@ -8,7 +8,17 @@ import numpy as np
 import pytest
 
 from components import Fixed, Inertia, SpringDamper
-from modelica_like import Assembly, CompiledDae, Component, Options, build, load, sensitivities, simulate
+from modelica_like import (
+    Assembly,
+    CompiledDae,
+    Component,
+    Options,
+    build,
+    load,
+    sensitivities,
+    simulate,
+    simulation_function,
+)
 from modelica_like.analyse.sensitivity.derivatives import Sensitivities
 from modelica_like.language import Equations, Events, Mode, Parameter, Variable, der, param, series, var, where
 
@@ -116,7 +126,9 @@ TIGHT = Options(rtol=1e-11, atol=1e-12)
 
 
 def values_at(model: CompiledDae, outputs: tuple[str, ...], given: dict[str, float], until: float | None) -> np.ndarray:
-    result = sensitivities(model, outputs, [next(iter(given))], until=until, parameters=given, options=TIGHT)
+    result = sensitivities(
+        model, outputs, [next(iter(given))], until=until, parameters=given, options=TIGHT, precision=1e-11
+    )
     return np.array([one.value for one in result.outputs])
 
 
@@ -200,6 +212,14 @@ def test_final_values_times_and_integrals_of_an_oscillator() -> None:
     end = complex_step(lambda v: damped(v, 1.3), values)
     inside = complex_step(lambda v: damped(v, 0.31), values)
     assert relative_error(result, np.vstack([end, inside[:1], end[2:]])) < 1e-8
+
+
+@pytest.mark.parametrize("precision", [1e-4, 1e-6, 1e-8])
+def test_derivatives_keep_the_precision(precision: float) -> None:
+    run = simulate(Bench(), "1.3 s", rtol=1e-10, atol=1e-12)
+    result = sensitivities(run, ["mass.phi", "mass.w"], ["spring.c", "spring.d", "mass.J"], precision=precision)
+    paper = complex_step(lambda v: damped(v, 1.3)[:2], np.array([100.0, 1.0, 1.0]))
+    assert relative_error(result, paper) < 10 * precision
 
 
 def test_a_peak_follows_the_envelope_theorem() -> None:
@@ -318,6 +338,34 @@ def test_a_breakpoint_within_a_segment_does_not_spoil_derivatives() -> None:
     assert relative_error(result, complex_step(paper, np.array([1.0, 2.0]))) < 1e-9
 
 
+class Touching(Component):
+    """A body thrown up that just touches a spring at the top."""
+
+    edge: Parameter = param("m", "where the spring begins", default=0.0499)
+    k: Parameter = param("1/s2", "stiffness over mass", default=2e4)
+    g: Parameter = param("m/s2", "gravity", default=10.0)
+    s: Variable = var("m", "height", state="always")
+    v: Variable = var("m/s", "speed", state="always")
+
+    def equations(self) -> Equations:
+        yield der(self.s) == self.v
+        yield der(self.v) == -self.g - self.k * where(self.s > self.edge, self.s - self.edge, 0 * self.s)
+
+
+def test_a_breakpoint_passed_there_and_back_within_one_step() -> None:
+    # Parabolas before and behind: one step would take them all.
+    result = sensitivities(Touching(s=0.0, v=1.0), ["s", "v"], ["edge", "k", "g"], until="0.19 s")
+
+    def paper(values: np.ndarray) -> np.ndarray:
+        edge, k, g = values
+        v = np.sqrt(1.0 - 2 * g * edge)
+        contact = 2 / np.sqrt(k) * np.arctan(v * np.sqrt(k) / g)
+        rest = 0.19 - (1.0 - v) / g - contact
+        return np.array([edge - v * rest - g * rest**2 / 2, -v - g * rest])
+
+    assert relative_error(result, complex_step(paper, np.array([0.0499, 2e4, 10.0]))) < 1e-8
+
+
 def test_a_printed_result_names_units_and_values() -> None:
     text = str(sensitivities(direct_table(), ["clutch.lock_time"], ["clutch_torque", "load_torque"]))
     assert text.splitlines()[0] == "clutch.lock_time = 0.2 s"
@@ -400,6 +448,35 @@ def test_a_parameter_that_equals_another_stands_for_it() -> None:
     )
     assert [one.name for one in result.parameters] == ["k1", "k1"]
     assert result.derivatives[0, 0] == result.derivatives[0, 1]
+
+
+ACCELERATING = (0.018 + (0.023 + 500 * (0.015 / (2 * pi)) ** 2) / 0.24**2) * 1440 * pi / 30 / 0.2
+"""Torque J w/0.2 s of document 000 with the gear."""
+
+
+def test_a_parameter_with_a_formula_moves_on_its_own_and_follows_the_others() -> None:
+    # The clutch torque is computed for an acceleration within 0.2 s: M_K = J w/0.2 + M_L/i, at any speed.
+    netlist, output = EXAMPLES / "machine_table_geared.toml", "clutch.lock_time"
+    result = sensitivities(netlist, [output], ["clutch_torque", "motor_speed"])
+    assert result[output, "clutch_torque"] == pytest.approx(-0.2 / ACCELERATING, rel=1e-8)
+    assert abs(result[output, "motor_speed"]) < 1e-12
+    assert abs(sensitivities(netlist, [output], ["motor_speed"])[output, "motor_speed"]) < 1e-12
+
+
+def test_one_name_needs_no_list() -> None:
+    run = simulate(EXAMPLES / "machine_table_geared.toml")
+    one, listed = sensitivities(run, "table.s", "lead"), sensitivities(run, ["table.s"], ["lead"])
+    assert one["table.s", "lead"] == listed["table.s", "lead"]
+
+
+def test_a_formula_takes_the_values_of_the_run() -> None:
+    netlist, output = EXAMPLES / "machine_table_geared.toml", "clutch.lock_time"
+    result = sensitivities(netlist, [output], ["clutch_torque"], parameters={"load_torque": 5.0})
+    paper = ACCELERATING + 5.0 / 0.24
+    assert result.parameters[0].value == pytest.approx(paper, rel=1e-12)
+    assert result[output, "clutch_torque"] == pytest.approx(-0.2 / ACCELERATING, rel=1e-8)
+    function = simulation_function(netlist, ["clutch_torque"], [output], parameters={"load_torque": 5.0})
+    assert function.start_values == pytest.approx([paper], rel=1e-12)
 
 
 def test_only_parameters_that_tell_coinciding_events_apart_are_refused() -> None:

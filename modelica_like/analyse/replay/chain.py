@@ -29,7 +29,9 @@ from modelica_like.solve.solution import Solution
 
 _ITERATIONS = 12
 _CONVERGED = 1e-2
-_SHRINK, _GROW, _SAFETY = 0.2, 8.0, 0.9
+_ABSOLUTE = 1e-2
+_ORDERS = 0.75
+_SHRINK, _GROW, _SAFETY = 0.2, 8.0, 0.8
 _SMALLEST = 1e-14
 _FINEST, _COARSEST = 1e-13, 1e-3
 _AHEAD = 2e-13
@@ -50,16 +52,28 @@ class Step:
     stages: Vector
     quadratures: Vector
 
+    def inside(self, nodes: Vector) -> list[Point]:
+        """Return the points at the stages but the last, which is the end."""
+        nx, stages = len(self.before.x), self.stages.reshape(len(nodes), -1)
+        return [
+            Point(self.before.t + c * self.h, w[:nx], w[nx:], self.before.d)
+            for c, w in zip(nodes[:-1], stages[:-1], strict=True)
+        ]
+
 
 Move = Step | Jump
 
 
 @dataclass(frozen=True)
 class Tolerances:
-    """How precisely to integrate again: relative, and absolute in nominal values."""
+    """How precisely to integrate again: relative to the states, or to a hundredth of their nominal values.
+
+    What a step can estimate is the error of order s that its s stages leave; its end is of order 2 s - 1. The estimate
+    may therefore be larger than the error that is wanted: by the power `_ORDERS`, where the orders alone would allow
+    (s + 1)/(2 s), because for stiff motions the end loses order.
+    """
 
     rtol: float = 1e-8
-    atol: float = 1e-10
 
     def __post_init__(self) -> None:
         if not _FINEST <= self.rtol <= _COARSEST:
@@ -67,6 +81,11 @@ class Tolerances:
                 f"The precision of a replay, {self.rtol:g}, is out of range: "
                 f"it must be between {_FINEST:g} and {_COARSEST:g}."
             )
+
+    def norm(self, error: Vector, before: Point, after: Point, nominals: Vector) -> float:
+        """Estimated error of a step over what is allowed."""
+        scale = np.maximum(np.abs(before.x), np.abs(after.x)) + _ABSOLUTE * nominals
+        return float(np.linalg.norm(error / scale)) / (len(error) ** 0.5 * self.rtol**_ORDERS)
 
 
 @dataclass(eq=False)
@@ -143,11 +162,12 @@ class _Maker:
         self.model = solution.model
         self.functions = functions
         self.tolerances = tolerances
-        self.stops = stops
+        self.kinks = Kinks(solution.model, solution.segments)
+        # A step could begin and end on the same side of a kink that the run has passed twice in between.
+        self.stops = np.union1d(stops, self.kinks.seen())
         self.nodes: list[Point] = []
         self.moves: list[Move] = []
         self.h = np.inf
-        self.kinks = Kinks(solution.model)
         self.span = float(solution.segments[-1].times[-1] - solution.segments[0].times[0])
         self.events: list[list[Event]] = [[] for _ in solution.segments]
         for event in solution.events:
@@ -157,7 +177,7 @@ class _Maker:
         """The first node, and how it depends on parameters."""
         size = Sizes.of(self.model)
         t0 = float(self.solution.segments[0].times[0])
-        point = initialize(self.model, t0, kind)
+        point = initialize(self.model, t0, kind) if self.events[0] else self.solution.segments[0].start
         begin = StartSlopes(self.model, point, kind)
         self.start_x, self.start_d = begin.x, begin.d
         if self.events[0]:
@@ -215,9 +235,7 @@ class _Maker:
             if h < _SMALLEST * max(1.0, abs(here.t)) and h < left:
                 raise _stuck(here)
             made, error = try_step(self.functions, here, h, before, self.tolerances)
-            factor = (
-                _SHRINK if made is None else float(np.clip(_SAFETY * (error + 1e-16) ** self._exponent, _SHRINK, _GROW))
-            )
+            factor = max(_SHRINK, min(_GROW, _SAFETY * (error + 1e-16) ** self._exponent))
             if made is not None and error <= 1.0:
                 if h == left:
                     made.after.t = end
@@ -231,19 +249,26 @@ class _Maker:
     def _up_to_kink(self, step: Step) -> Step:
         """Shorten a step so that it ends just before the first kink of the equations within it."""
         begin = self.kinks.at(step.before)
-        passed = self.kinks.passed(begin, self.kinks.at(step.after))
-        while np.any(passed):
-            shorter = self._first_kink(step, begin, int(np.flatnonzero(passed)[0]))
+        for _ in range(self.kinks.count):
+            passed = self._passed(step, begin)
+            shorter = None if passed is None else self._first_kink(step, begin, *passed)
             if shorter is None:
                 break
             step = shorter
-            passed &= self.kinks.passed(begin, self.kinks.at(step.after))
         return step
 
-    def _first_kink(self, step: Step, begin: Vector, number: int) -> Step | None:
-        """Find where a kink is (Illinois); the step returned ends on its near side."""
-        low, high = 0.0, step.h
-        f_low, f_high = float(begin[number]), float(self.kinks.at(step.after)[number])
+    def _passed(self, step: Step, begin: Vector) -> tuple[int, float, float] | None:
+        """Which kink lies behind the step at the first of its stages, how far in, and its function there."""
+        for point in [*step.inside(self.functions.tableau.nodes), step.after]:
+            values = self.kinks.at(point)
+            passed = np.flatnonzero(self.kinks.passed(begin, values))
+            if passed.size:
+                return int(passed[0]), point.t - step.before.t, float(values[passed[0]])
+        return None
+
+    def _first_kink(self, step: Step, begin: Vector, number: int, high: float, f_high: float) -> Step | None:
+        """Find where a kink is (Illinois) up to `high`; the step returned ends on its near side."""
+        low, f_low = 0.0, float(begin[number])
         found: Step | None = None
         small = _AHEAD * max(1.0, abs(step.before.t))
         for _ in range(_TRIALS):
@@ -295,45 +320,49 @@ def try_step(
 ) -> tuple[Step | None, float]:
     """Make a step; return it and its error relative to the tolerances, or None if it did not converge."""
     model, nx, nz = functions.model, functions.nx, functions.nz
-    stages = len(functions.tableau.nodes)
-    scale = tolerances.rtol * np.abs(point.x) + tolerances.atol * model.nominals
-    weights = np.tile(np.concatenate([scale, tolerances.rtol * (1.0 + np.abs(point.z))]), stages)
-    W = _predicted(functions, point, h, last)
     theta = model.p, model.u, point.d
+    if functions.linear:
+        begin = _unchanged(functions, point)
+        W, error, quadratures = functions.whole(point.t, h, point.x, begin, *theta, point.z)
+    else:
+        W = _solved(functions, point, h, last, tolerances.rtol)
+        if W is None:
+            return None, np.inf
+        error, quadratures = functions.finish(point.t, h, point.x, W, *theta, point.z)
+    after = Point(point.t + h, W[-nx - nz : W.size - nz].copy(), W[W.size - nz :].copy(), point.d)
+    norm = tolerances.norm(error, point, after, model.nominals)
+    return (Step(point, after, h, W, quadratures), norm) if norm < np.inf else (None, np.inf)
+
+
+def _solved(functions: StepFunctions, point: Point, h: float, last: Step | None, rtol: float) -> Vector | None:
+    """The stages by Newton's method, or None if it does not converge."""
+    model = functions.model
+    W = _predicted(functions, point, h, last)
+    scale = np.concatenate([np.abs(point.x) + _ABSOLUTE * model.nominals, 1.0 + np.abs(point.z)])
+    weights = np.concatenate([rtol * scale] * len(functions.tableau.nodes))
     size = np.inf
     for _ in range(_ITERATIONS):
-        correction = functions.newton(point.t, h, point.x, W, *theta)[0]
+        correction = functions.newton(point.t, h, point.x, W, model.p, model.u, point.d)[0]
         W = W + correction
-        before, size = size, float(np.max(np.abs(correction) / weights, initial=0.0))
+        before, size = size, float(np.abs(correction / weights).max(initial=0.0))
         if not np.isfinite(size):
-            return None, np.inf
+            return None
         # Newton's method converges quadratically: the next correction is far below this one.
-        if functions.linear or size <= _CONVERGED or size * size <= _CONVERGED * before < np.inf:
-            break
-    else:
-        return None, np.inf
-    error, quadratures = functions.finish(point.t, h, point.x, W, *theta, point.z)
-    after = Point(point.t + h, W[-nx - nz : W.size - nz].copy(), W[W.size - nz :].copy(), point.d)
-    scale = tolerances.rtol * np.maximum(np.abs(point.x), np.abs(after.x)) + tolerances.atol * model.nominals
-    norm = float(np.sqrt(np.mean((error / scale) ** 2))) if nx else 0.0
-    return Step(point, after, h, W, quadratures), norm
+        if size <= _CONVERGED or size * size <= _CONVERGED * before < np.inf:
+            return W
+    return None
 
 
 def _predicted(functions: StepFunctions, point: Point, h: float, last: Step | None) -> Vector:
     """Stages to begin with: the polynomial of the step before, or no change."""
-    nodes = functions.tableau.nodes
     if last is None:
-        return np.tile(np.concatenate([point.x, point.z]), len(nodes))
-    stages = last.stages.reshape(len(nodes), -1)
-    return (_extrapolation(nodes, 1.0 + nodes * (h / last.h)) @ stages).ravel()
+        return _unchanged(functions, point)
+    tableau = functions.tableau
+    return tableau.continued(last.stages.reshape(len(tableau.nodes), -1), h / last.h).ravel()
 
 
-def _extrapolation(nodes: Vector, at: Vector) -> Vector:
-    """Values of the Lagrange polynomials of `nodes` at other places, shape (places, nodes)."""
-    differences = at[:, None, None] - nodes[None, None, :]
-    spread = nodes[:, None] - nodes[None, :] + np.eye(len(nodes))
-    factors = np.where(np.eye(len(nodes), dtype=bool)[None], 1.0, differences / spread[None])
-    return np.prod(factors, axis=2)
+def _unchanged(functions: StepFunctions, point: Point) -> Vector:
+    return np.concatenate([point.x, point.z] * len(functions.tableau.nodes))
 
 
 def _stuck(point: Point) -> StepFailed:

@@ -5,6 +5,7 @@ States pass them smoothly, their sensitivities do not: a step must end there.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import casadi as ca
@@ -13,6 +14,7 @@ import numpy as np
 from modelica_like.compile.buffers import Vector, buffered
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.initialize import Point
+from modelica_like.solve.recorder import Segment
 
 _DIFFERENCES = (ca.OP_LT, ca.OP_LE, ca.OP_FMIN, ca.OP_FMAX)
 _ZEROS = (ca.OP_FABS, ca.OP_SIGN)
@@ -21,14 +23,21 @@ _AT_IT = 1e-9
 
 
 class Kinks:
-    """Functions of the state whose zeros are kinks of a model's equations."""
+    """Functions of the state whose zeros are kinks of a model's equations.
 
-    def __init__(self, model: CompiledDae) -> None:
+    Args:
+        model: the compiled model.
+        segments: the run; how large the functions become in it tells what is zero but for rounding.
+    """
+
+    def __init__(self, model: CompiledDae, segments: Sequence[Segment] = ()) -> None:
         self.model = model
         if "kinks" not in model._cache:
             model._cache["kinks"] = _switches(model)
         self.count = int(model._cache["kinks"].size1_out(0))
-        self.largest = np.full(self.count, _NOISE)
+        self._along = [(one.times, self._over(one)) for one in segments if self.count]
+        largest = [np.abs(values).max(axis=1) for _, values in self._along]
+        self._zero = np.maximum(_AT_IT * np.max(largest, axis=0), _NOISE) if largest else np.full(self.count, _NOISE)
 
     def at(self, point: Point) -> Vector:
         """Values at a point."""
@@ -36,14 +45,23 @@ class Kinks:
         if not self.count:
             return np.zeros(0)
         fast = buffered(model._cache, "kinks along", lambda: model._cache["kinks"])
-        values = fast(point.t, point.x, point.z, model.p, model.u, point.d)[0]
-        self.largest = np.maximum(self.largest, np.abs(values))
-        return values
+        return fast(point.t, point.x, point.z, model.p, model.u, point.d)[0]
 
     def passed(self, before: Vector, after: Vector) -> Any:
-        """Which kinks lie between two points; one at which a step begins does not."""
-        away = np.abs(before) > _AT_IT * self.largest
-        return away & (before * after < 0.0) & (np.abs(after) > _NOISE * self.largest)
+        """Which kinks lie between two points (or rows of points); one at which a point lies does not."""
+        zero = self._zero if before.ndim == 1 else self._zero[:, None]
+        return (before * after < 0.0) & (np.abs(before) > zero) & (np.abs(after) > zero)
+
+    def seen(self) -> Vector:
+        """Times at which the results of the run first lie behind a kink, in s."""
+        found = [times[1:][self.passed(values[:, :-1], values[:, 1:]).any(axis=0)] for times, values in self._along]
+        return np.concatenate([np.zeros(0), *found])
+
+    def _over(self, segment: Segment) -> Vector:
+        """Values at the results of a segment, shape (count, n)."""
+        model, times = self.model, segment.times
+        fixed = (np.repeat(one[:, None], len(times), axis=1) for one in (model.p, model.u, segment.d))
+        return np.asarray(model._cache["kinks"](times[None, :], segment.x, segment.z, *fixed).full())
 
 
 def _switches(model: CompiledDae) -> ca.Function:

@@ -5,54 +5,20 @@ Source: E. Hairer, G. Wanner: Solving Ordinary Differential Equations II, sectio
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
+from modelica_like.analyse.replay.tableau import radau
 from modelica_like.compile.buffers import Vector, buffered
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.initialize import Point
 
-STAGES = 5
+STAGES = 7
 _DENSE = 60
 """Largest linear system of a step that is solved as a dense one; beyond it LAPACK would start threads."""
-
-
-@dataclass(frozen=True)
-class Tableau:
-    """Radau IIA collocation.
-
-    Attributes:
-        nodes: shape (s,), in (0, 1], the last is 1.
-        matrix: integrals of the Lagrange polynomials up to each node, shape (s, s).
-        gamma: weight of the beginning of the step in the error estimate.
-        estimate: weights of the stages in the error estimate.
-    """
-
-    nodes: Vector
-    matrix: Vector
-    gamma: float
-    estimate: Vector
-
-    @property
-    def weights(self) -> Vector:
-        """Weights of the quadrature over the step."""
-        return self.matrix[-1]
-
-
-def radau(stages: int) -> Tableau:
-    """Return the Radau IIA method with an odd number of stages; its order is 2 stages - 1."""
-    nodes = np.array(ca.collocation_points(stages, "radau"))
-    powers = np.arange(1, stages + 1)
-    vandermonde = nodes[:, None] ** (powers - 1)
-    matrix = np.linalg.solve(vandermonde.T, (nodes[:, None] ** powers / powers).T).T
-    eigenvalues = np.linalg.eigvals(matrix)
-    gamma = float(next(one.real for one in eigenvalues if abs(one.imag) < 1e-12))
-    estimate = np.linalg.solve(vandermonde.T, np.append(-gamma, np.zeros(stages - 1)))
-    return Tableau(nodes, np.asarray(matrix, np.float64), gamma, estimate)
 
 
 class StepFunctions:
@@ -74,7 +40,6 @@ class StepFunctions:
         self.nt = len(model.p) + len(model.u) + len(model.flat_discretes)
         self.nq = int(quadratures.numel())
         self.size = stages * (self.nx + self.nz)
-        self._built: dict[Any, Any] = {}
 
     def _cached(self, key: Any, make: Any) -> Any:
         return buffered(self.model._cache, ("replay", self.name, self.tableau.nodes.size, key), make)
@@ -108,7 +73,7 @@ class StepFunctions:
 
     @cached_property
     def _residual(self) -> ca.Function:
-        """Residual of the stages and its Jacobian by W."""
+        """Residual of the stages; unless the stages come apart, its Jacobian by W."""
         arguments, stages, _ = self._symbols
         x = arguments[2]
         values = self._at_stages(self._equations)
@@ -117,7 +82,7 @@ class StepFunctions:
         for i, w in enumerate(stages):
             residuals += [w[: self.nx] - x - self._weighted(self.tableau.matrix[i], [one[0] for one in values])]
             residuals += [values[i][1]]
-            rows.append(self._row(i, arguments[1], values))
+            rows += [] if self._constant else [self._row(i, arguments[1], values)]
         return ca.Function("residual", arguments, [ca.densify(ca.vertcat(*residuals)), ca.vertcat(*rows)])
 
     def _row(self, i: int, h: Any, values: list[Any]) -> Any:
@@ -132,11 +97,9 @@ class StepFunctions:
 
     @cached_property
     def _sources(self) -> ca.Function:
-        """Jacobian of the residual by (p, u, d); Jacobians of the quadratures by W and by (p, u, d)."""
+        """Jacobians of ode and alg at the stages by (p, u, d); of the quadratures by W and by (p, u, d)."""
         values = self._at_stages(self._parameters)
-        by_theta: list[Any] = []
-        for i in range(len(values)):
-            by_theta += [-self._weighted(self.tableau.matrix[i], [one[0] for one in values]), values[i][1]]
+        by_theta = [part for one in values for part in one[:2]]
         h, weights = self._symbols[0][1], self.tableau.weights
         by_w = ca.horzcat(*(h * b * one[2] for b, one in zip(weights, values, strict=True)))
         outputs = [ca.vertcat(*by_theta), by_w, self._weighted(weights, [one[3] for one in values])]
@@ -186,13 +149,27 @@ class StepFunctions:
         w = ca.vertcat(given["x"], given["z"])
         return self._function("parameters", *by, *(ca.jacobian(self.quadratures, one) for one in (w, theta)))
 
-    @cached_property
+    @property
     def linear(self) -> bool:
         """Whether the equations are linear in x and z: then one iteration solves a step."""
-        given = self.model.arguments
-        _, _, *jacobians = self._equations(*given.values())
-        entries = ca.vertcat(*(ca.vertcat(*one.nonzeros()) for one in jacobians))
-        return not ca.depends_on(entries, ca.vertcat(given["x"], given["z"]))
+        return not self._dependence[0]
+
+    @property
+    def _constant(self) -> bool:
+        """Whether they are linear with coefficients that do not change during a segment."""
+        return not any(self._dependence)
+
+    @property
+    def _dependence(self) -> tuple[bool, bool]:
+        """Whether the Jacobians depend on x and z, and on time."""
+        known = self.model._cache
+        if "replay dependence" not in known:
+            given = self.model.arguments
+            _, _, *jacobians = self._equations(*given.values())
+            entries = ca.veccat(*(one.nz[:] for one in jacobians))
+            states = ca.vertcat(given["x"], given["z"])
+            known["replay dependence"] = ca.depends_on(entries, states), ca.depends_on(entries, given["t"])
+        return known["replay dependence"]
 
     def integrands(self, point: Point) -> Vector:
         """Return the integrands of the quadratures at a point."""
@@ -202,28 +179,79 @@ class StepFunctions:
     @property
     def newton(self) -> Any:
         """Function of (t, h, x, W, p, u, d): the Newton correction of W."""
-        return self._cached("newton", self._make_newton)
+        return self._cached("newton", lambda: ca.Function("newton", self._names, [self._correction()]))
 
-    def _make_newton(self) -> ca.Function:
-        residual, by_w = self._residual(*self._names)
-        step = _solve(by_w, -residual, self._order)
-        return ca.Function("newton", self._names, [step])
+    def _correction(self) -> Any:
+        return self._solve_stages(-self._residual(*self._names)[0])
 
     @property
     def finish(self) -> Any:
-        """Function of (t, h, x, W, p, u, d) of the beginning and the solved W: error estimate and quadratures."""
+        """Function of (t, h, x, W, p, u, d, z) of the beginning and the solved W: error estimate and quadratures."""
         return self._cached("finish", self._make_finish)
 
     def _make_finish(self) -> ca.Function:
-        t, h, x, _, p, u, d = self._names
         z = ca.MX.sym("z", self.nz)
-        rates, quadratures = self._ending(*self._names)
-        ode, _, ode_x, ode_z, alg_x, alg_z = self._equations(t, x, z, p, u, d)
-        gamma = self.tableau.gamma * h
-        top = ca.horzcat(ca.MX.eye(self.nx) - gamma * ode_x, -gamma * ode_z)
-        matrix = ca.vertcat(top, ca.horzcat(alg_x, alg_z))
-        error = _solve(matrix, ca.vertcat(rates + gamma * ode, ca.MX(self.nz, 1)), self._node_order)
-        return ca.Function("finish", [*self._names, z], [error[: self.nx], ca.densify(quadratures)])
+        return ca.Function("finish", [*self._names, z], self._end(self._names[3], z))
+
+    @property
+    def whole(self) -> Any:
+        """The same of any W, for linear equations: the solved W, error estimate and quadratures."""
+        return self._cached("whole", self._make_whole)
+
+    def _make_whole(self) -> ca.Function:
+        z = ca.MX.sym("z", self.nz)
+        W = self._names[3] + self._correction()
+        return ca.Function("whole", [*self._names, z], [W, *self._end(W, z)])
+
+    def _end(self, W: Any, z: Any) -> list[Any]:
+        """Error estimate and quadratures of a step with the stages W that begins with z."""
+        t, h, x, _, p, u, d = self._names
+        rates, quadratures = self._ending(t, h, x, W, p, u, d)
+        ode = self._equations(t, x, z, p, u, d)[0]
+        matrix = self._shifted("estimate", np.array([[self.tableau.gamma]]))(t, h, x, z, p, u, d)
+        right = ca.vertcat(rates + self.tableau.gamma * h * ode, ca.MX(self.nz, 1))
+        return [_solve(matrix, right, self._node_order)[: self.nx], ca.densify(quadratures)]
+
+    def _shifted(self, name: str, *blocks: Vector) -> ca.Function:
+        """I ⊗ E - h B ⊗ F for each block, of the linearised equations E y' = F y at the beginning of the step."""
+        arguments = self._symbols[0]
+        t, h, x, _, p, u, d = arguments
+        z = ca.SX.sym("z", self.nz)
+        _, _, ode_x, ode_z, alg_x, alg_z = self._equations(t, x, z, p, u, d)
+        own = ca.blockcat([[ca.SX.eye(self.nx), ca.SX(self.nx, self.nz)], [alg_x, alg_z]])
+        rate = ca.blockcat([[ode_x, ode_z], [ca.SX(self.nz, self.nx), ca.SX(self.nz, self.nz)]])
+        shifted = [ca.kron(ca.SX.eye(len(one)), own) - h * ca.kron(ca.SX(ca.DM(one)), rate) for one in blocks]
+        return ca.Function(name, [t, h, x, z, p, u, d], shifted)
+
+    def _residuals(self, values: Any, *, transposed: bool = False) -> Any:
+        """What changes of ode and alg at the stages make of the residual, or the transpose of that."""
+        stages, h = len(self.tableau.nodes), self._names[1]
+        rows = [ca.diag(ca.DM([a] * self.nx + [b] * self.nz)) for a, b in ((1.0, 0.0), (0.0, 1.0))]
+        matrix = self.tableau.matrix.T if transposed else self.tableau.matrix
+        ode = ca.mtimes(ca.kron(ca.DM(matrix), ca.sparsify(rows[0])), values)
+        return ca.mtimes(ca.kron(ca.DM.eye(stages), ca.sparsify(rows[1])), values) - h * ode
+
+    def _solve_stages(self, right: Any, *, transposed: bool = False) -> Any:
+        """Solve with the Jacobian of the residual by W, or its transpose.
+
+        Where it is the same at all stages they come apart, by the eigenvalues of the tableau (Hairer, Wanner, IV.8).
+        """
+        if not self._constant:
+            by_w = self._residual(*self._names)[1]
+            return _solve(by_w.T if transposed else by_w, right, self._order)
+        own = self.nx + self.nz
+        basis, blocks = self.tableau.real_form
+        back, there = (np.linalg.inv(basis).T, basis.T) if transposed else (basis, np.linalg.inv(basis))
+        mixed = ca.mtimes(ca.kron(ca.DM(there), ca.DM.eye(own)), ca.densify(right))
+        t, h, x, _, p, u, d = self._names
+        shifted = self._shifted("shifted", *blocks)(t, h, x, ca.MX(self.nz, 1), p, u, d)
+        solved, begin = [], 0
+        for block, matrix in zip(blocks, shifted, strict=True):
+            end = begin + own * len(block)
+            order = [k * own + node for node in self._node_order for k in range(len(block))]
+            solved.append(_solve(matrix.T if transposed else matrix, mixed[begin:end, :], order))
+            begin = end
+        return ca.mtimes(ca.kron(ca.DM(back), ca.DM.eye(own)), ca.vertcat(*solved))
 
     def forward(self, columns: int) -> Any:
         """Return the function of (t, h, x, W, p, u, d, S, P): S at the end, change of the quadratures.
@@ -234,10 +262,9 @@ class StepFunctions:
 
     def _make_forward(self, columns: int) -> ca.Function:
         S, P = ca.MX.sym("S", self.nx, columns), ca.MX.sym("P", self.nt, columns)
-        by_w = self._residual(*self._names)[1]
         by_theta, q_w, q_theta = self._sources(*self._names)
         begin = ca.repmat(ca.vertcat(S, ca.MX(self.nz, columns)), len(self.tableau.nodes), 1)
-        change = _solve(by_w, begin - ca.mtimes(by_theta, P), self._order)
+        change = self._solve_stages(begin - self._residuals(ca.mtimes(by_theta, P)))
         last = change[self.size - self.nx - self.nz : self.size - self.nz, :]
         quadratures = ca.mtimes(q_w, change) + ca.mtimes(q_theta, P)
         return ca.Function("forward", [*self._names, S, P], [last, ca.densify(quadratures)])
@@ -252,15 +279,14 @@ class StepFunctions:
 
     def _make_adjoint(self, columns: int) -> ca.Function:
         L, Q = ca.MX.sym("L", self.nx, columns), ca.MX.sym("Q", self.nq, columns)
-        by_w = self._residual(*self._names)[1]
         by_theta, q_w, q_theta = self._sources(*self._names)
         before = self.size - self.nx - self.nz
         seed = ca.vertcat(ca.MX(before, columns), L, ca.MX(self.nz, columns)) + ca.mtimes(q_w.T, Q)
-        multiplier = _solve(by_w.T, seed, self._order)
+        multiplier = self._solve_stages(seed, transposed=True)
         own = self.nx + self.nz
         begin = sum((multiplier[k * own : k * own + self.nx, :] for k in range(1, len(self.tableau.nodes))),
                     multiplier[: self.nx, :])  # fmt: skip
-        gradient = ca.mtimes(q_theta.T, Q) - ca.mtimes(by_theta.T, multiplier)
+        gradient = ca.mtimes(q_theta.T, Q) - ca.mtimes(by_theta.T, self._residuals(multiplier, transposed=True))
         return ca.Function("adjoint", [*self._names, L, Q], [ca.densify(begin), ca.densify(gradient)])
 
 

@@ -138,8 +138,7 @@ def adjoint(replay: Replay, readings: Sequence[Reading]) -> Vector:
                 L, G = _adjoint_jump(size, move, L, G, Q, {n: readings[n].rate for n in at_jump.get(k, ())})
         for number in at_node.get(k, ()):
             _seed(replay, readings[number], number, L, G)
-    whole = np.vstack([replay.start_x, np.eye(size.fixed), replay.start_d])
-    return np.vstack([L, G]).T @ whole
+    return G[: size.fixed].T + L.T @ replay.start_x + G[size.fixed :].T @ replay.start_d
 
 
 def _adjoint_step(replay: Replay, step: Step, L: Vector, Q: Vector) -> tuple[Vector, Vector]:

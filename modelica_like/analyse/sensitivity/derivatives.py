@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
 from modelica_like.analyse.replay.chain import Replay, Tolerances, replay
 from modelica_like.analyse.replay.slopes import Sizes
 from modelica_like.analyse.replay.sweeps import adjoint, forward
-from modelica_like.analyse.sensitivity.outputs import Output, quadratures, read_off, read_output, value_at
+from modelica_like.analyse.sensitivity.formulas import Freed, bound_by_formula, equal_to, free_formulas
+from modelica_like.analyse.sensitivity.outputs import Output, listed, quadratures, read_off, read_output, value_at
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import LanguageError, UnknownName, did_you_mean
@@ -132,7 +133,7 @@ def _position(names: list[str], name: str, what: str) -> int:
 
 
 def sensitivities(
-    drive: Model | Solution, of: Sequence[str], to: Sequence[str] = (), *, until: float | str | None = None,
+    drive: Model | Solution, of: str | Sequence[str], to: str | Sequence[str] = (), *, until: float | str | None = None,
     parameters: Mapping[str, Any] | None = None, method: Method = "auto", start: StartKind | None = None,
     options: Options | None = None, precision: float = 1e-8,
 ) -> Sensitivities:  # fmt: skip
@@ -143,7 +144,8 @@ def sensitivities(
         of: final values (`table.s`), `max(shaft.tau)`, `min(…)`, `at(table.s, 0.3 s)`, `integral(…)`, `series(…)`; of
             components `clutch.loss_energy`, `source_energy`, `lock_time`, `unlock_time`; times of mode changes
             `time(clutch.mode: forward -> stuck)`, the second one with `, 2`.
-        to: parameters and inputs; by default all that can change.
+        to: parameters and inputs; by default all that can change. One with a formula moves on its own, from the
+            formula's value; moved by another one it follows its formula.
         until: end time, as in `simulate`.
         parameters: other values of parameters, as in `simulate`.
         method: `forward` (cost grows with the parameters), `adjoint` (with the outputs), or what is cheaper.
@@ -153,23 +155,30 @@ def sensitivities(
 
     Raises:
         NoGradient: a derivative does not exist; the message says at which event.
-        UnknownName: an output or a parameter does not exist.
-        LanguageError: a parameter follows from others.
+        UnknownName: an output, a parameter or the method does not exist.
+        ValueOutOfRange: there is no output, or no such precision.
+        LanguageError: a parameter follows from others, and the drive is compiled already.
         ModelicaLikeError: the simulation is not possible.
     """
+    of, to = listed(of, "output to differentiate"), listed(to, "parameter") if to else []
+    if method not in get_args(Method):
+        raise UnknownName(
+            f"There is no method '{method}'{did_you_mean(method, get_args(Method)) or '.'}",
+            advice="Derivatives are found by forward or adjoint, or by what is cheaper: auto.",
+        )
     if isinstance(drive, Solution):
-        solution = drive
+        freed, solution = Freed(drive.model, {}), drive
     else:
-        solution = simulate(drive, until, parameters=parameters, start=start, options=options)
+        freed = free_formulas(drive, to, parameters)
+        solution = simulate(freed.model, until, parameters=freed.values, start=start, options=options)
     model = solution.model
     outputs = [read_output(model, name) for name in of]
     chosen = _chosen(model, to)
     column, name = quadratures(model, outputs)
     stops = solution.time if any(one.kind == "series" for one in outputs) else ()
-    tolerances = Tolerances(precision, 1e-2 * precision)
-    chain = replay(solution, column, name, start=start, stops=stops, tolerances=tolerances)
+    chain = replay(solution, column, name, start=start, stops=stops, tolerances=Tolerances(precision))
     _check_disputed(chain, chosen)
-    return _differentiate(solution, chain, outputs, chosen, method)
+    return _differentiate(solution, chain, outputs, chosen, method, freed)
 
 
 def _chosen(model: CompiledDae, names: Sequence[str]) -> list[tuple[int, Quantity]]:
@@ -182,32 +191,21 @@ def _chosen(model: CompiledDae, names: Sequence[str]) -> list[tuple[int, Quantit
     found: list[tuple[int, Quantity]] = []
     for name in names or [*tunable, *inputs]:
         if name in model.derived_position:
-            name = _origin(model, name)
+            equal = equal_to(model, name)
+            if equal is None:
+                raise bound_by_formula(model, name)
+            name = equal
         if name not in known:
             everything = [*known, *model.derived_position]
             raise UnknownName(f"{model.name} has no parameter '{name}'{did_you_mean(name, everything) or '.'}")
         k = known[name]
+        if k < len(model.p) and not model.flat_parameters[k].tunable:
+            raise LanguageError(
+                f"{name} cannot change after compilation, so nothing can be differentiated by it.",
+                advice="Compare runs of models that were built with other values.",
+            )
         found.append((k, Quantity(name, float(values[k]), coherent(units[k]))))
     return found
-
-
-def _origin(model: CompiledDae, name: str) -> str:
-    """The independent parameter that a derived one is equal to.
-
-    Raises:
-        LanguageError: it follows from others by a formula.
-    """
-    import casadi as ca
-
-    formula = model.derived(model.arguments["p"])[model.derived_position[name]]
-    places = [k for k in range(len(model.p)) if ca.depends_on(formula, model.arguments["p"][k])]
-    if len(places) == 1 and ca.is_equal(formula, model.arguments["p"][places[0]]):
-        return model.flat_parameters[places[0]].path
-    names = ", ".join(model.flat_parameters[k].path for k in places)
-    raise LanguageError(
-        f"{name} follows from other parameters ({names}).",
-        advice=f"Ask for these, or give {name} a value of its own.",
-    )
 
 
 def _check_disputed(chain: Replay, chosen: list[tuple[int, Quantity]]) -> None:
@@ -220,8 +218,9 @@ def _check_disputed(chain: Replay, chosen: list[tuple[int, Quantity]]) -> None:
 
 
 def _differentiate(
-    solution: Solution, chain: Replay, outputs: list[Output], chosen: list[tuple[int, Quantity]], method: Method
-) -> Sensitivities:
+    solution: Solution, chain: Replay, outputs: list[Output], chosen: list[tuple[int, Quantity]], method: Method,
+    freed: Freed,
+) -> Sensitivities:  # fmt: skip
     size = Sizes.of(chain.model)
     plain = [one for one in outputs if one.kind != "series"]
     series = [one for one in outputs if one.kind == "series"]
@@ -235,7 +234,11 @@ def _differentiate(
     if way == "adjoint":
         derivatives = adjoint(chain, total)[:, positions]
     else:
-        derivatives = forward(chain, total, np.eye(size.fixed)[:, positions])
+        directions = np.zeros((size.fixed, len(positions)))
+        directions[positions, range(len(positions))] = 1.0
+        derivatives = forward(chain, total, directions)
+    if freed.slopes:
+        derivatives = derivatives @ freed.taken_along([quantity.name for _, quantity in chosen])
     count = len(plain)
     rows = derivatives[count:].reshape(len(series), len(nodes), len(chosen))
     return Sensitivities(

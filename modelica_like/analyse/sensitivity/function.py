@@ -9,10 +9,12 @@ import casadi as ca
 import numpy as np
 
 from modelica_like.analyse.sensitivity.derivatives import Sensitivities, sensitivities
+from modelica_like.analyse.sensitivity.formulas import free_formulas
+from modelica_like.analyse.sensitivity.outputs import listed
 from modelica_like.compile.buffers import Vector
 from modelica_like.errors import LanguageError, ModelicaLikeError, NoGradient
 from modelica_like.initialize import StartKind
-from modelica_like.simulation import Model, build, simulate
+from modelica_like.simulation import Model, simulate
 from modelica_like.solve.options import Options
 from modelica_like.solve.recorder import Event
 from modelica_like.solve.solution import Solution
@@ -43,8 +45,9 @@ class SimulationFunction(ca.Callback):
         self.outputs = tuple(outputs)
         self.runs = 0
         self.refusal: ModelicaLikeError | None = None
-        self._model = build(drive)
-        self._run = dict(run)
+        freed = free_formulas(drive, inputs, run["parameters"])
+        self._model = freed.model
+        self._run = {**run, "parameters": freed.values}
         self._precision = precision
         self._nan_where_refused = nan_where_refused
         self._last: tuple[bytes, Sensitivities] | None = None
@@ -71,7 +74,7 @@ class SimulationFunction(ca.Callback):
         values = np.asarray(p, float).ravel()
         key = values.tobytes()
         if self._last is None or self._last[0] != key:
-            given = {**(self._run.get("parameters") or {}), **dict(zip(self.inputs, map(float, values), strict=True))}
+            given = {**self._run["parameters"], **dict(zip(self.inputs, map(float, values), strict=True))}
             self.runs += 1
             solution = simulate(self._model, **{**self._run, "parameters": given})
             self._check_sequence(solution)
@@ -167,7 +170,7 @@ class _Jacobian(ca.Callback):
 
 
 def simulation_function(
-    drive: Model, inputs: Sequence[str], outputs: Sequence[str], *, until: float | str | None = None,
+    drive: Model, inputs: str | Sequence[str], outputs: str | Sequence[str], *, until: float | str | None = None,
     parameters: Mapping[str, Any] | None = None, start: StartKind | None = None, options: Options | None = None,
     precision: float = 1e-8, any_sequence: bool = False, nan_where_refused: bool = False,
 ) -> SimulationFunction:  # fmt: skip
@@ -190,8 +193,10 @@ def simulation_function(
     Raises:
         NoGradient: at the start values a derivative does not exist.
         LanguageError: a series is no output of a function.
+        ValueOutOfRange: there is no input or no output.
         ModelicaLikeError: the model or a name is wrong, or the simulation is not possible.
     """
+    inputs, outputs = listed(inputs, "parameter as input"), listed(outputs, "output")
     series = [name for name in outputs if name.replace(" ", "").startswith("series(")]
     if series:
         raise LanguageError(

@@ -51,6 +51,18 @@ class Output:
     change: tuple[str, str, int] = ("", "", 1)
 
 
+def listed(names: str | Sequence[str], what: str) -> list[str]:
+    """Return names that were given as one or as several.
+
+    Raises:
+        ValueOutOfRange: there is none.
+    """
+    found = [names] if isinstance(names, str) else list(names)
+    if not found:
+        raise ValueOutOfRange(f"There is no {what}: give at least one name.")
+    return found
+
+
 def read_output(model: CompiledDae, name: str) -> Output:
     """Read the name of an output.
 
@@ -133,6 +145,8 @@ def expression_of(model: CompiledDae, path: str) -> tuple[Callable[[], Any], Uni
         unit = _JOULE if last in (*_ENERGY, "stored_energy") else _WATT
         return lambda: ca.sum1(model.energy(*arguments)[rows, columns[last]]), unit
     known = [*model.position, *(f"{one}.{last}" for one in model.components if last in columns)]
+    if owner in model.components:
+        known += [f"{owner}.{word}" for word in (*columns, "lock_time", "unlock_time")]
     raise UnknownName(
         f"{model.name} has no variable '{path}'{did_you_mean(path, known) or '.'}",
         advice="Besides variables there are max(…), min(…), integral(…), at(…, time), series(…), "

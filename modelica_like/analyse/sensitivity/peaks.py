@@ -37,7 +37,9 @@ def peak(replay: Replay, name: str, expression: Callable[[], Any], sign: float) 
     """
     at_nodes = sign * _along(replay, name, expression, replay.nodes)
     inside = [
-        sign * _along(replay, name, expression, _stages(replay, move)) if isinstance(move, Step) else np.zeros(0)
+        sign * _along(replay, name, expression, move.inside(replay.functions.tableau.nodes))
+        if isinstance(move, Step)
+        else np.zeros(0)
         for move in replay.moves
     ]
     best = int(np.argmax(at_nodes))
@@ -63,14 +65,6 @@ def _along(replay: Replay, name: str, expression: Callable[[], Any], points: lis
     return np.array([fast(o.t, o.x, o.z, model.p, model.u, o.d)[0][0] for o in points])
 
 
-def _stages(replay: Replay, step: Step) -> list[Point]:
-    nodes, nx = replay.functions.tableau.nodes[:-1], replay.functions.nx
-    stages = step.stages.reshape(len(nodes) + 1, -1)
-    return [
-        Point(step.before.t + c * step.h, w[:nx], w[nx:], step.before.d) for c, w in zip(nodes, stages, strict=False)
-    ]
-
-
 def _beside(replay: Replay, node: int) -> int | None:
     """The jump that a node is one side of, where the event may move."""
     for k in (node, node - 1):
@@ -86,7 +80,7 @@ def _inside(replay: Replay, name: str, expression: Callable[[], Any], sign: floa
     """Find the zero of the rate inside step k, from rising to falling."""
     step = replay.moves[k]
     assert isinstance(step, Step)
-    points = [step.before, *_stages(replay, step), step.after]
+    points = [step.before, *step.inside(replay.functions.tableau.nodes), step.after]
     rates = [sign * _rate(replay, name, expression, point) for point in points]
     found: Peak | None = None
     for (a, first), (b, second) in zip(

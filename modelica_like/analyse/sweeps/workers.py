@@ -106,7 +106,11 @@ def in_processes(job: Job, chunks: Sequence[Chunk], count: int) -> Iterator[Done
                 for future in futures:
                     future.cancel()
         return
-    raise _lost(left, f"worker processes of this machine died {_RESTARTS} times")
+    raise _lost(
+        left, f"worker processes of this machine died {_RESTARTS} times",
+        'If they died at their start: a script that sweeps keeps its own work behind if __name__ == "__main__":, '
+        "or says processes=1.",
+    )  # fmt: skip
 
 
 def on_cluster(job: Job, chunks: Sequence[Chunk], scheduler: str) -> Iterator[Done]:
@@ -144,11 +148,11 @@ def on_cluster(job: Job, chunks: Sequence[Chunk], scheduler: str) -> Iterator[Do
             client.cancel(futures)
 
 
-def _lost(left: dict[int, Any], why: str) -> WorkersLost:
+def _lost(left: dict[int, Any], why: str, hint: str = "") -> WorkersLost:
     count = sum(len(points) for points in left.values())
     return WorkersLost(
         f"{count} runs of the sweep were not done: {why}.",
-        advice="What was done is in the checkpoint, if there is one: start the sweep again with it.",
+        advice=f"What was done is in the checkpoint, if there is one: start the sweep again with it. {hint}".rstrip(),
     )
 
 
