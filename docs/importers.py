@@ -27,9 +27,9 @@ SECTIONS = {"reference": "<!-- reference FMUs -->", "exports": "<!-- exports -->
 
 
 def drives() -> list[str]:
-    """Return the netlists of examples/, by name, but for the demonstrations of single components."""
+    """Return the netlists of examples/, by name, but for those that are made of FMUs themselves."""
     netlists = (path.relative_to(EXAMPLES) for path in EXAMPLES.rglob("*.toml") if _is_netlist(path))
-    return sorted(path.with_suffix("").as_posix() for path in netlists if path.parts[0] != "components")
+    return sorted(path.with_suffix("").as_posix() for path in netlists if path.parts[0] != "cosim")
 
 
 def _is_netlist(path: Path) -> bool:

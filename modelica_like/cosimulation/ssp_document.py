@@ -26,6 +26,8 @@ NAMES = {
 }
 COSIMULATION = "modelica_like.cosimulation"
 """Type of the annotation that keeps what the standard has no words for."""
+PARAMETER_SET = "initialValues"
+"""Name of all parameter sets: some importers ask by which name values are to be applied."""
 FMU_TYPE = "application/x-fmu-sharedlibrary"
 _REAL = ("Real", "Float64", "Float32")
 
@@ -78,7 +80,7 @@ def _component(
     if unit.parameters:
         binding = element(element(one, tag("ssd:ParameterBindings")), tag("ssd:ParameterBinding"))
         values = element(binding, tag("ssd:ParameterValues"))
-        group = element(values, tag("ssv:ParameterSet"), version=version, name=f"{unit.name}_parameters")
+        group = element(values, tag("ssv:ParameterSet"), version=version, name=PARAMETER_SET)
         given = element(group, tag("ssv:Parameters"))
         for name, value in unit.parameters.items():
             parameter = element(given, tag("ssv:Parameter"), name=name)

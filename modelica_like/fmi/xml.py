@@ -8,7 +8,7 @@ import lxml.etree as etree
 
 from modelica_like.units import ANY, ONE, Unit
 
-INLINE = ("ScalarVariable", "Float64", "Int32", "Unit")
+INLINE = ("ScalarVariable", "Float64", "Unit")
 """Elements that stand in one line with all that is in them."""
 
 

@@ -13,7 +13,9 @@ import numpy as np
 import pytest
 from fmpy.ssp.simulation import simulate_ssp
 from fmpy.ssp.ssd import read_ssd
+from typer.testing import CliRunner
 
+from modelica_like.cli import app
 from modelica_like.cosimulation.described import DescribedFmu, FmuVariable, UnitDefinition
 from modelica_like.cosimulation.run import cosim
 from modelica_like.cosimulation.split import Split
@@ -22,6 +24,7 @@ from modelica_like.cosimulation.ssp_document import NAMES, ssd
 from modelica_like.cosimulation.system import Link, Port, Settings, System, Unit
 
 M, J1, J2, C, D = 5.0, 0.02, 0.08, 400.0, 0.2
+NETLIST = Path(__file__).parents[2] / "examples" / "two_mass.toml"
 VERSIONS = pytest.mark.parametrize("version", ["1.0", "2.0"])
 END = 0.1
 ECOS = """
@@ -31,7 +34,7 @@ load_tbb()
 import ecospy
 speeds = []
 with ecospy.EcosSimulation(ssp_path=sys.argv[1], step_size=float(sys.argv[2])) as simulation:
-    assert simulation.init()
+    assert simulation.init(parameter_set="initialValues")
     for _ in range(int(sys.argv[3])):
         simulation.step(1)
         speeds.append(simulation.get_real("wheel::J2.w"))
@@ -84,6 +87,21 @@ def test_an_fmu_that_is_used_twice_is_packed_once(oscillator: Split, tmp_path: P
         assert archive.namelist() == ["SystemStructure.ssd", "resources/left.fmu"]
 
 
+def test_split_writes_an_ssp_on_the_command_line(tmp_path: Path) -> None:
+    path = tmp_path / "parts.ssp"
+    options = ["--at", "shaft", "--name", "motor", "--name", "wheel", "--ssp", "2.0", "--no-check"]
+    result = CliRunner().invoke(app, ["split", str(NETLIST), *options, "-o", str(path)])
+    assert result.exit_code == 0, result.output
+    assert [line.strip() for line in result.stdout.splitlines()] == [
+        f"{path}: motor.fmu, wheel.fmu",
+        "shaft.flange_b is moved and tells its torque",
+        "J2.flange_a takes the torque and tells how it moves",
+    ]
+    with zipfile.ZipFile(path) as archive:
+        assert etree.fromstring(archive.read("SystemStructure.ssd")).get("version") == "2.0"
+        assert archive.namelist()[1:] == ["resources/motor.fmu", "resources/wheel.fmu"]
+
+
 def test_the_description_is_valid(system: System, tmp_path: Path) -> None:
     """FMPy checks with the schemas of the standard, 1.0."""
     path = write_ssp(system, tmp_path / "system.ssp")
@@ -127,7 +145,7 @@ def test_types_of_both_versions() -> None:
 # -- whether others understand it ----------------------------------------------------------------------------------
 
 
-def closed_form(time: float) -> float:
+def closed_form(time: float, J2: float = J2) -> float:
     """Speed of the second mass: a constant acceleration of the centre of mass, and a damped oscillation."""
     total, reduced = J1 + J2, J1 * J2 / (J1 + J2)
     decay = D / (2 * reduced)
@@ -164,6 +182,13 @@ def test_others_run_it(oscillator: Split, tmp_path: Path) -> None:
     assert coarse / fine == pytest.approx(2.0, abs=0.1)
     assert 2 * ends[1] - ends[0] == pytest.approx(truth, rel=2e-3)
     assert cosim(path, END, step=1e-4)["J2.w"][-1] == pytest.approx(truth, rel=2e-3)
+
+
+def test_ecos_applies_the_parameters(oscillator: Split, tmp_path: Path) -> None:
+    motor, wheel = oscillator.system.units
+    heavy = replace(oscillator.system, units=(motor, replace(wheel, parameters={"J2.J": 2 * J2})))
+    ends = [in_ecos(write_ssp(heavy, tmp_path / "heavy.ssp"), step)[-1] for step in (1e-4, 5e-5)]
+    assert 2 * ends[1] - ends[0] == pytest.approx(closed_form(END, 2 * J2), rel=2e-3)
 
 
 # -- foreign packages ----------------------------------------------------------------------------------------------

@@ -66,14 +66,14 @@ static void refuses_wrong_values(fmi3Instance c) {
     size_t count, elements[64];
     fmi3DependencyKind kinds[64];
     double value = 0, nan_value = NAN, two[2];
-    fmi3Int32 number = 99;
+    fmi3Int64 number = 99;
     REFUSED(fmi3GetFloat64(c, &unknown, 1, &value, 1));
     REFUSED(fmi3GetFloat64(c, &mode, 1, &value, 1));
     REFUSED(fmi3GetFloat64(c, NULL, 1, &value, 1));
     REFUSED(fmi3GetFloat64(c, &state, 1, NULL, 1));
     REFUSED(fmi3GetFloat64(c, &state, 1, two, 2));
-    REFUSED(fmi3GetInt32(c, &state, 1, &number, 1));
-    REFUSED(fmi3GetInt32(c, &mode, 1, &number, 0));
+    REFUSED(fmi3GetInt64(c, &state, 1, &number, 1));
+    REFUSED(fmi3GetInt64(c, &mode, 1, &number, 0));
     REFUSED(fmi3GetBoolean(c, &state, 1, NULL, 1));
     REFUSED(fmi3GetString(c, &state, 1, NULL, 1));
     REFUSED(fmi3GetFloat32(c, &state, 1, NULL, 1));
@@ -81,7 +81,7 @@ static void refuses_wrong_values(fmi3Instance c) {
     REFUSED(fmi3GetClock(c, &state, 1, NULL));
     REFUSED(fmi3SetFloat64(c, &parameter, 1, &nan_value, 1));
     REFUSED(fmi3SetFloat64(c, &state, 1, &value, 1));
-    REFUSED(fmi3SetInt32(c, &mode, 1, &number, 1));
+    REFUSED(fmi3SetInt64(c, &mode, 1, &number, 1));
     REFUSED(fmi3GetDirectionalDerivative(c, &mode, 1, &state, 1, &value, 1, &value, 1));
     REFUSED(fmi3GetDirectionalDerivative(c, &rate, 1, &state, 1, &value, 2, &value, 1));
     REFUSED(fmi3GetDirectionalDerivative(c, &rate, 1, &state, 1, &value, 1, &value, 2));

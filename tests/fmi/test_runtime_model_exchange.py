@@ -155,7 +155,7 @@ def values_at(case, fmu):
     d = np.zeros(len(model.flat_discretes))
     for k in references:
         one = case.face.variables[k]
-        d[one.slot[1]] = (fmu.getInteger if one.type == "Int32" else fmu.getReal)([k])[0]
+        d[one.slot[1]] = (fmu.getInteger if one.modes else fmu.getReal)([k])[0]
     point = Point(0.0, x, model.z_guesses.copy(), d)
     solve_implicit(model, point)
     return [0.0, point.x, point.z, model.p, model.u, point.d]

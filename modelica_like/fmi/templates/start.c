@@ -176,6 +176,20 @@ static void apply_defaults(Instance *c, const double *values) {
     }
 }
 
+/* Surfaces that stick against too large a torque are not in equilibrium. */
+static Result check_modes_hold(Instance *c) {
+    const State *s = &c->state;
+    double *guards = c->work.guards;
+    if (N_GUARDS == 0) return RESULT_OK;
+    evaluate(c, &tape_guards, s->t, s->x, s->z, guards);
+    for (int k = 0; k < N_GUARDS; k++) {
+        const Transition *one = &model_transitions[model_guard_transition[k]];
+        if (guard_active(s, k) && guards[k] > 0) return report(c, LOG_ERROR, RESULT_ERROR,
+            "No steady state was found at t = %.9g s: %s does not stay in its mode.", s->t, one->name);
+    }
+    return RESULT_OK;
+}
+
 /* States from parameters and start values; events at the start have not happened yet. */
 Result start_solve(Instance *c) {
     State *s = &c->state;
@@ -202,6 +216,7 @@ Result start_solve(Instance *c) {
         return report(c, LOG_ERROR, RESULT_ERROR,
             "The modes at the start do not settle: they and the start values change each other in a circle.");
     if (solve_implicit(c, s->t, s->x, s->z, 0) != RESULT_OK || check_singular(c) != RESULT_OK) return RESULT_ERROR;
+    if (START_STEADY && check_modes_hold(c) != RESULT_OK) return RESULT_ERROR;
     s->z_valid = s->solved = 1;
     s->piece_valid = s->event_pending = 0;
     c->variables_valid = 0;

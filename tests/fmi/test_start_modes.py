@@ -1,0 +1,73 @@
+"""Starts of FMUs: steady ones, and every drive of examples/ in the states and modes of a simulation."""
+
+import tomllib
+from pathlib import Path
+
+import pytest
+from fmpy.fmi1 import FMICallException
+
+from components import BearingFriction, ConstantTorque, Inertia
+from modelica_like import simulate
+from modelica_like.initialize import initialize
+from modelica_like.language import Assembly, guess
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+INSTANT = 1e-9
+# Those of cosim/ are made of FMUs.
+NETLISTS = sorted(
+    path.relative_to(EXAMPLES).as_posix()
+    for path in EXAMPLES.rglob("*.toml")
+    if path.parent.name != "cosim" and "parts" in tomllib.loads(path.read_text(encoding="utf-8"))
+)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("netlist", NETLISTS)
+def test_the_fmu_starts_in_the_modes_of_a_simulation(exported, netlist):
+    case = exported(netlist)
+    model = case.model
+    modes = [(one.path, one.names) for one in model.flat_discretes if one.names]
+    point = initialize(model, start=model.settings.get("start", "given"))
+    run = simulate(model, INSTANT)
+
+    fmu = case.started("me")
+    assert case.states(fmu) == pytest.approx(
+        [x for name, x in zip(model.states, point.x, strict=True) if name in case.face.by_name], rel=1e-9, abs=1e-9
+    )
+    fmu.newDiscreteStates()
+    # Before its events the mode of two parts at the same speed hangs on the last bit of that speed.
+    settled = fmu.getInteger([case.ref(path) for path, _ in modes])
+    assert {path: names[m] for (path, names), m in zip(modes, settled, strict=True)} == {
+        path: names[int(run[path][run.time == 0.0][-1])] for path, names in modes
+    }
+
+
+def rubbing():
+    """5 N.m against a bearing with 1 N.m + 1 N.m s/rad w; sliding, it is steady at 4 rad/s."""
+    parts = {
+        "push": ConstantTorque(tau_constant=5.0),
+        "rotor": Inertia(J=1.0),
+        "bearing": BearingFriction(tau_pos=((0, 1), (1, 2)), w=guess(1.0)),
+    }
+    joints = {"a": ["push.flange", "rotor.flange_a"], "b": ["rotor.flange_b", "bearing.flange_a"]}
+    drive = Assembly("rubbing", parts=parts, connect=joints)
+    drive.simulate.update(start="steady", until=1.0)
+    return drive
+
+
+def test_a_steady_start_follows_the_guess_and_the_parameters(exported):
+    case = exported(rubbing())
+    fmu = case.started("me")
+    assert fmu.getReal([case.ref("rotor.w")]) == pytest.approx([4.0], rel=1e-12)
+    faster = case.started("me", **{"push.tau_constant": 7.0})
+    assert faster.getReal([case.ref("rotor.w")]) == pytest.approx([6.0], rel=1e-12)
+
+
+def test_a_steady_start_that_no_mode_allows_is_refused(exported):
+    """At rest the bearing sticks, and 5 N.m break it away."""
+    case = exported(rubbing(), "3.0")
+    told = []
+    fmu = case.instance("me", logMessage=lambda _environment, _status, _category, text: told.append(text.decode()))
+    with pytest.raises(FMICallException):
+        case.initialize(fmu, **{"bearing.w": 0.0})
+    assert told == ["No steady state was found at t = 0 s: bearing.mode does not stay in its mode."]
