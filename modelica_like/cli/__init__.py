@@ -8,7 +8,17 @@ from importlib import import_module
 from modelica_like.cli.app import app as app
 
 # In the order in which the help lists their commands.
-for _group in ("models", "analysis", "sweeps", "sensitivity", "export", "cosimulation", "types", "validation", "design"):
+for _group in (
+    "models",
+    "analysis",
+    "sweeps",
+    "sensitivity",
+    "export",
+    "cosimulation",
+    "types",
+    "validation",
+    "design",
+):
     import_module(f"modelica_like.cli.{_group}")
 
 

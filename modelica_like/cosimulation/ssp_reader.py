@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain, count
 from math import isfinite
 from pathlib import Path
@@ -23,7 +23,7 @@ from modelica_like.cosimulation.ssp_elements import (
     read_element,
     unit_definitions,
 )
-from modelica_like.cosimulation.ssp_values import Target, bound_values
+from modelica_like.cosimulation.ssp_values import Bound, Target, bound_values
 from modelica_like.cosimulation.system import (
     Bond,
     Inputs,
@@ -106,7 +106,8 @@ class _Reader:
         note = self.top.find(f"ssd:Annotations/ssc:Annotation[@type='{COSIMULATION}']/ml:Cosimulation", NAMES)
         between = {target: way for target, way in targets.items() if way[-1].source[0] in self.fmus}
         links = self._links(between, own=note is not None)
-        parameters = self._parameters({target: way[-1].source for target, way in targets.items()})
+        outer = {target: way[-1].source for target, way in targets.items() if target not in between}
+        parameters = self._parameters(outer)
         units = tuple(
             Unit(self.names[one.path], one.file, parameters[one.path])
             for one in self.components
@@ -174,14 +175,12 @@ class _Reader:
             self._check_units(target, way)
             grouped.setdefault((way[-1].source, way[0].description if own else ""), []).append(target)
         links: list[Link] = []
-        for (source, name), taken in grouped.items():
-            name = name or self._unused_name(targets[taken[0]][0].description, source, [link.name for link in links])
-            links.append(Link(name, self._port(source), tuple(map(self._port, taken))))
+        for (source, _), taken in grouped.items():
+            said = targets[taken[0]][0].description
+            is_name = said != "" if own else said.isidentifier()
+            chosen = said if is_name else _word(_text(source))
+            links.append(Link(_unused(chosen, links), self._port(source), tuple(map(self._port, taken))))
         return tuple(links)
-
-    def _unused_name(self, description: str, source: Target, used: Sequence[str]) -> str:
-        name = description if description.isidentifier() else _word(_text(source))
-        return next(one for one in chain([name], (f"{name}_{k}" for k in count(2))) if one not in used)
 
     def _port(self, target: Target) -> Port:
         return Port(self.names[target[0]], target[1])
@@ -189,8 +188,7 @@ class _Reader:
     def _check_units(self, target: Target, way: list[_Drive]) -> None:
         """Refuse connections on which a unit would have to be converted."""
         ends = [target, *(drive.source for drive in way)]
-        found = {unit.name: unit for end in ends for unit in self._units_of(end)}
-        first, *others = [*found.values()] or [UnitDefinition("1")]
+        first, *others = [unit for end in ends for unit in self._units_of(end)] or [UnitDefinition("1")]
         other = next((unit for unit in others if not first.same_scale(unit)), None)
         if other is not None and all(drive.converts for drive in way):
             raise NetlistError(
@@ -207,25 +205,26 @@ class _Reader:
 
     # -- values ------------------------------------------------------------------------------------------------------
 
-    def _parameters(self, origins: Mapping[Target, Target]) -> dict[ElementPath, dict[str, float]]:
-        """Return the values of each component: those bound to it, and those bound to what drives it."""
+    def _parameters(self, outer: Mapping[Target, Target]) -> dict[ElementPath, dict[str, float]]:
+        """Return the values of each component: those bound to it, and those bound to what drives it from outside."""
         bound = bound_values(self.root, self.files, self.units)
         found: dict[ElementPath, dict[str, float]] = {path: {} for path in self.fmus}
-        passed = {
-            target: bound[source]
-            for target, source in origins.items()
-            if source in bound and source[0] not in self.fmus
-        }
-        for (path, name), value in (bound | passed).items():
+        sources = {target: source for target, source in outer.items() if source in bound}
+        passed = {target: self._in_its_unit(bound[source], source) for target, source in sources.items()}
+        for (path, name), given in (bound | passed).items():
             fmu = self.fmus.get(path)
             if fmu is None or name not in fmu.variables:  # the standard lets values go that nothing takes
                 continue
             own = fmu.unit_of(name)
-            number = value.unit.convert(value.value, own) if value.unit and own else value.value
-            if not isfinite(number):
-                raise NetlistError(f"{_text((path, name))} = {number:g} is not finite.", where=value.place)
-            found[path][name] = number
+            value = given.unit.convert(given.value, own) if given.unit and own else given.value
+            if not isfinite(value):
+                raise NetlistError(f"{_text((path, name))} = {value:g} is not finite.", where=given.place)
+            found[path][name] = value
         return found
+
+    def _in_its_unit(self, given: Bound, end: Target) -> Bound:
+        """Return a value that was given for a connector of a system, in the connector's unit if it has none."""
+        return replace(given, unit=given.unit or self.units.get(self.elements[end[0]].connectors[end[1]].unit))
 
     def _settings(self, note: Any) -> Settings:
         experiment = self.top.find("ssd:DefaultExperiment", NAMES)
@@ -253,6 +252,11 @@ def _is_identity(transformation: Any) -> bool:
 
 def _bond(xml: Any) -> Bond:
     return Bond(needed(xml, "name"), needed(xml, "flow"), needed(xml, "rate"))
+
+
+def _unused(name: str, links: Sequence[Link]) -> str:
+    used = [link.name for link in links]
+    return next(one for one in chain([name], (f"{name}_{k}" for k in count(2))) if one not in used)
 
 
 def _flat_names(components: list[Element]) -> dict[ElementPath, str]:
