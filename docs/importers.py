@@ -67,14 +67,16 @@ def reference_rows(folder: Path) -> list[str]:
     ]
 
 
+def export(drive: str, version: str, folder: Path) -> Path:
+    """Export one drive."""
+    path = folder / f"{Path(drive).name}_fmi{version[0]}.fmu"
+    export_fmu(EXAMPLES / f"{drive}.toml", path, version, check=False)
+    return path
+
+
 def drive_rows(drive: str, folder: Path) -> list[str]:
     """Export and check one drive, in both versions of the standard."""
-    made: list[str] = []
-    for version in VERSIONS:
-        path = folder / f"{Path(drive).name}_fmi{version[0]}.fmu"
-        export_fmu(EXAMPLES / f"{drive}.toml", path, version, check=False)
-        made.append(row(drive, version, validate_fmu(path)))
-    return made
+    return [row(drive, version, validate_fmu(export(drive, version, folder))) for version in VERSIONS]
 
 
 def rows(section: str) -> list[str]:

@@ -190,9 +190,12 @@ def test_modes_change_often(run: Solution) -> None:
     assert len(friction) >= 12
     # In each shift one element is closed and another opened; both slip in between.
     for name, opened, stuck in (("brake_d", 1, 1), ("brake_c", 1, 2), ("clutch_b", 2, 2), ("clutch_a", 1, 1)):
-        changes = [event.after for event in friction if event.mode == f"box.{name}.mode"]
+        mode = f"box.{name}.mode"
+        changes = [event.after for event in friction if event.mode == mode]
         assert changes.count("free") == opened
-        assert changes.count("stuck") >= stuck
+        # At standstill the sign of a rounding decides whether brake D sticks from the beginning or by an event at 0 s.
+        from_the_beginning = run[mode][0] == 1.0
+        assert changes.count("stuck") + from_the_beginning >= stuck
 
 
 def pressures(run: Solution) -> dict[str, Any]:

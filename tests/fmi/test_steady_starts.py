@@ -1,45 +1,10 @@
-"""Starts of FMUs: steady ones, and every drive of examples/ in the states and modes of a simulation."""
-
-import tomllib
-from pathlib import Path
+"""Steady starts of FMUs."""
 
 import pytest
 from fmpy.fmi1 import FMICallException
 
 from components import BearingFriction, ConstantTorque, Inertia
-from modelica_like import simulate
-from modelica_like.initialize import initialize
 from modelica_like.language import Assembly, guess
-
-EXAMPLES = Path(__file__).parents[2] / "examples"
-INSTANT = 1e-9
-# Those of cosim/ are made of FMUs.
-NETLISTS = sorted(
-    path.relative_to(EXAMPLES).as_posix()
-    for path in EXAMPLES.rglob("*.toml")
-    if path.parent.name != "cosim" and "parts" in tomllib.loads(path.read_text(encoding="utf-8"))
-)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("netlist", NETLISTS)
-def test_the_fmu_starts_in_the_modes_of_a_simulation(exported, netlist):
-    case = exported(netlist)
-    model = case.model
-    modes = [(one.path, one.names) for one in model.flat_discretes if one.names]
-    point = initialize(model, start=model.settings.get("start", "given"))
-    run = simulate(model, INSTANT)
-
-    fmu = case.started("me")
-    assert case.states(fmu) == pytest.approx(
-        [x for name, x in zip(model.states, point.x, strict=True) if name in case.face.by_name], rel=1e-9, abs=1e-9
-    )
-    fmu.newDiscreteStates()
-    # Before its events the mode of two parts at the same speed hangs on the last bit of that speed.
-    settled = fmu.getInteger([case.ref(path) for path, _ in modes])
-    assert {path: names[m] for (path, names), m in zip(modes, settled, strict=True)} == {
-        path: names[int(run[path][run.time == 0.0][-1])] for path, names in modes
-    }
 
 
 def rubbing():
