@@ -6,6 +6,7 @@
 PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11; do \
 	$$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$p && break; done)
 BIN := .venv/bin
+C := $(wildcard modelica_like/fmi/templates/*.[ch] fmus/*/*.[ch] tests/fmi/*.c tests/fmus/*/*.c)
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
 
 .PHONY: demo test lint types layers pytest benchmark fmus format clean
@@ -18,6 +19,7 @@ test: lint types layers pytest
 lint: .venv/installed-dev
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
+	$(BIN)/clang-format --dry-run --Werror $(C)
 
 types: .venv/installed-dev
 	$(BIN)/basedpyright
@@ -44,6 +46,7 @@ fmus: .venv/installed
 format: .venv/installed-dev
 	$(BIN)/ruff check --fix
 	$(BIN)/ruff format
+	$(BIN)/clang-format -i $(C)
 
 clean:
 	rm -rf .venv build

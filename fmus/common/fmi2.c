@@ -14,18 +14,16 @@ EXPORT fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t n,
     return STATUS(c);
 }
 
-EXPORT fmi2Component fmi2Instantiate(
-    fmi2String name, fmi2Type type, fmi2String token, fmi2String resources, const fmi2CallbackFunctions *functions,
-    fmi2Boolean visible, fmi2Boolean logging) {
+EXPORT fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String token, fmi2String resources,
+    const fmi2CallbackFunctions *functions, fmi2Boolean visible, fmi2Boolean logging) {
     UNUSED(resources), UNUSED(functions), UNUSED(visible), UNUSED(logging);
     return type == fmi2ModelExchange && !STATES ? NULL : new_model(name, token);
 }
 
 EXPORT void fmi2FreeInstance(fmi2Component c) { free(c); }
 
-EXPORT fmi2Status fmi2SetupExperiment(
-    fmi2Component c, fmi2Boolean toleranceDefined, fmi2Real tolerance, fmi2Real start, fmi2Boolean stopDefined,
-    fmi2Real stop) {
+EXPORT fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranceDefined, fmi2Real tolerance, fmi2Real start,
+    fmi2Boolean stopDefined, fmi2Real stop) {
     UNUSED(toleranceDefined), UNUSED(tolerance), UNUSED(stopDefined), UNUSED(stop);
     return STATUS(set_time(c, start));
 }
@@ -60,10 +58,10 @@ EXPORT fmi2Status fmi2SetReal(fmi2Component c, const Ref vr[], size_t n, const f
 }
 
 /* Types that no reference model has: only empty lists make sense. */
-#define ABSENT(name, value_type) \
+#define ABSENT(name, value_type)                                                            \
     EXPORT fmi2Status name(fmi2Component c, const Ref vr[], size_t n, value_type value[]) { \
-        UNUSED(vr), UNUSED(value); \
-        return STATUS(c && !n); \
+        UNUSED(vr), UNUSED(value);                                                          \
+        return STATUS(c && !n);                                                             \
     }
 ABSENT(fmi2GetBoolean, fmi2Boolean)
 ABSENT(fmi2GetString, fmi2String)
@@ -96,10 +94,10 @@ EXPORT fmi2Status fmi2GetDirectionalDerivative(
 
 /* Co-Simulation */
 
-#define NO_DERIVATIVES(name, value_type) \
+#define NO_DERIVATIVES(name, value_type)                                                                               \
     EXPORT fmi2Status name(fmi2Component c, const Ref vr[], size_t n, const fmi2Integer order[], value_type value[]) { \
-        UNUSED(vr), UNUSED(order), UNUSED(value); \
-        return STATUS(c && !n); \
+        UNUSED(vr), UNUSED(order), UNUSED(value);                                                                      \
+        return STATUS(c && !n);                                                                                        \
     }
 NO_DERIVATIVES(fmi2SetRealInputDerivatives, const fmi2Real)
 NO_DERIVATIVES(fmi2GetRealOutputDerivatives, fmi2Real)
@@ -114,10 +112,10 @@ EXPORT fmi2Status fmi2CancelStep(fmi2Component c) {
     return fmi2Error;
 }
 
-#define NO_STATUS(name, type) \
+#define NO_STATUS(name, type)                                                         \
     EXPORT fmi2Status name(fmi2Component c, const fmi2StatusKind kind, type *value) { \
-        UNUSED(c), UNUSED(kind), UNUSED(value); \
-        return fmi2Discard; \
+        UNUSED(c), UNUSED(kind), UNUSED(value);                                       \
+        return fmi2Discard;                                                           \
     }
 NO_STATUS(fmi2GetStatus, fmi2Status)
 NO_STATUS(fmi2GetRealStatus, fmi2Real)

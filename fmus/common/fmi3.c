@@ -13,26 +13,24 @@ EXPORT fmi3Status fmi3SetDebugLogging(fmi3Instance c, fmi3Boolean on, size_t n, 
     return STATUS(c);
 }
 
-EXPORT fmi3Instance fmi3InstantiateModelExchange(
-    fmi3String name, fmi3String token, fmi3String resources, fmi3Boolean visible, fmi3Boolean logging,
-    fmi3InstanceEnvironment environment, fmi3LogMessageCallback log) {
+EXPORT fmi3Instance fmi3InstantiateModelExchange(fmi3String name, fmi3String token, fmi3String resources,
+    fmi3Boolean visible, fmi3Boolean logging, fmi3InstanceEnvironment environment, fmi3LogMessageCallback log) {
     UNUSED(resources), UNUSED(visible), UNUSED(logging), UNUSED(environment), UNUSED(log);
     return STATES ? new_model(name, token) : NULL;
 }
 
-EXPORT fmi3Instance fmi3InstantiateCoSimulation(
-    fmi3String name, fmi3String token, fmi3String resources, fmi3Boolean visible, fmi3Boolean logging,
-    fmi3Boolean eventModeUsed, fmi3Boolean earlyReturnAllowed, const Ref intermediate[], size_t n,
-    fmi3InstanceEnvironment environment, fmi3LogMessageCallback log, fmi3IntermediateUpdateCallback update) {
+EXPORT fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3String resources,
+    fmi3Boolean visible, fmi3Boolean logging, fmi3Boolean eventModeUsed, fmi3Boolean earlyReturnAllowed,
+    const Ref intermediate[], size_t n, fmi3InstanceEnvironment environment, fmi3LogMessageCallback log,
+    fmi3IntermediateUpdateCallback update) {
     UNUSED(resources), UNUSED(visible), UNUSED(logging), UNUSED(eventModeUsed), UNUSED(earlyReturnAllowed);
     UNUSED(intermediate), UNUSED(n), UNUSED(environment), UNUSED(log), UNUSED(update);
     return new_model(name, token);
 }
 
-EXPORT fmi3Instance fmi3InstantiateScheduledExecution(
-    fmi3String name, fmi3String token, fmi3String resources, fmi3Boolean visible, fmi3Boolean logging,
-    fmi3InstanceEnvironment environment, fmi3LogMessageCallback log, fmi3ClockUpdateCallback clock,
-    fmi3LockPreemptionCallback lock, fmi3UnlockPreemptionCallback unlock) {
+EXPORT fmi3Instance fmi3InstantiateScheduledExecution(fmi3String name, fmi3String token, fmi3String resources,
+    fmi3Boolean visible, fmi3Boolean logging, fmi3InstanceEnvironment environment, fmi3LogMessageCallback log,
+    fmi3ClockUpdateCallback clock, fmi3LockPreemptionCallback lock, fmi3UnlockPreemptionCallback unlock) {
     UNUSED(name), UNUSED(token), UNUSED(resources), UNUSED(visible), UNUSED(logging), UNUSED(environment);
     UNUSED(log), UNUSED(clock), UNUSED(lock), UNUSED(unlock);
     return NULL;
@@ -40,9 +38,8 @@ EXPORT fmi3Instance fmi3InstantiateScheduledExecution(
 
 EXPORT void fmi3FreeInstance(fmi3Instance c) { free(c); }
 
-EXPORT fmi3Status fmi3EnterInitializationMode(
-    fmi3Instance c, fmi3Boolean toleranceDefined, fmi3Float64 tolerance, fmi3Float64 start, fmi3Boolean stopDefined,
-    fmi3Float64 stop) {
+EXPORT fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean toleranceDefined, fmi3Float64 tolerance,
+    fmi3Float64 start, fmi3Boolean stopDefined, fmi3Float64 stop) {
     UNUSED(toleranceDefined), UNUSED(tolerance), UNUSED(stopDefined), UNUSED(stop);
     return STATUS(initialize(c, start));
 }
@@ -69,10 +66,10 @@ EXPORT fmi3Status fmi3GetInt64(fmi3Instance c, const Ref vr[], size_t n, fmi3Int
 }
 
 /* Types that no reference model has: only empty lists make sense. */
-#define ABSENT(name, value_type) \
+#define ABSENT(name, value_type)                                                                     \
     EXPORT fmi3Status name(fmi3Instance c, const Ref vr[], size_t n, value_type value[], size_t m) { \
-        UNUSED(vr), UNUSED(value); \
-        return STATUS(c && !n && !m); \
+        UNUSED(vr), UNUSED(value);                                                                   \
+        return STATUS(c && !n && !m);                                                                \
     }
 #define ABSENT_TYPE(type) ABSENT(fmi3Get##type, fmi3##type) ABSENT(fmi3Set##type, const fmi3##type)
 ABSENT_TYPE(Float32)
@@ -100,26 +97,22 @@ EXPORT fmi3Status fmi3SetBinary(
 }
 
 /* Clocks, and what else no reference model has. */
-#define REFUSED(name, ...) \
+#define REFUSED(name, ...)                                \
     EXPORT fmi3Status name(fmi3Instance c, __VA_ARGS__) { \
-        UNUSED(c); \
-        return fmi3Error; \
+        UNUSED(c);                                        \
+        return fmi3Error;                                 \
     }
 REFUSED(fmi3GetClock, const Ref vr[], size_t n, fmi3Clock value[])
 REFUSED(fmi3SetClock, const Ref vr[], size_t n, const fmi3Clock value[])
 REFUSED(fmi3GetNumberOfVariableDependencies, Ref vr, size_t *n)
-REFUSED(
-    fmi3GetVariableDependencies, Ref vr, size_t elements[], Ref independents[], size_t others[],
+REFUSED(fmi3GetVariableDependencies, Ref vr, size_t elements[], Ref independents[], size_t others[],
     fmi3DependencyKind kinds[], size_t n)
-REFUSED(
-    fmi3GetDirectionalDerivative, const Ref z[], size_t nz, const Ref v[], size_t nv, const fmi3Float64 seed[],
+REFUSED(fmi3GetDirectionalDerivative, const Ref z[], size_t nz, const Ref v[], size_t nv, const fmi3Float64 seed[],
     size_t ns, fmi3Float64 result[], size_t nr)
-REFUSED(
-    fmi3GetAdjointDerivative, const Ref z[], size_t nz, const Ref v[], size_t nv, const fmi3Float64 seed[], size_t ns,
-    fmi3Float64 result[], size_t nr)
+REFUSED(fmi3GetAdjointDerivative, const Ref z[], size_t nz, const Ref v[], size_t nv, const fmi3Float64 seed[],
+    size_t ns, fmi3Float64 result[], size_t nr)
 REFUSED(fmi3GetIntervalDecimal, const Ref vr[], size_t n, fmi3Float64 value[], fmi3IntervalQualifier qualifiers[])
-REFUSED(
-    fmi3GetIntervalFraction, const Ref vr[], size_t n, fmi3UInt64 counters[], fmi3UInt64 resolutions[],
+REFUSED(fmi3GetIntervalFraction, const Ref vr[], size_t n, fmi3UInt64 counters[], fmi3UInt64 resolutions[],
     fmi3IntervalQualifier qualifiers[])
 REFUSED(fmi3GetShiftDecimal, const Ref vr[], size_t n, fmi3Float64 value[])
 REFUSED(fmi3GetShiftFraction, const Ref vr[], size_t n, fmi3UInt64 counters[], fmi3UInt64 resolutions[])
@@ -150,9 +143,8 @@ EXPORT fmi3Status fmi3DeserializeFMUState(fmi3Instance c, const fmi3Byte bytes[]
     return STATUS(c && size == sizeof(Model) && save(bytes, state));
 }
 
-EXPORT fmi3Status fmi3UpdateDiscreteStates(
-    fmi3Instance c, fmi3Boolean *again, fmi3Boolean *terminate, fmi3Boolean *nominals, fmi3Boolean *states,
-    fmi3Boolean *timeDefined, fmi3Float64 *time) {
+EXPORT fmi3Status fmi3UpdateDiscreteStates(fmi3Instance c, fmi3Boolean *again, fmi3Boolean *terminate,
+    fmi3Boolean *nominals, fmi3Boolean *states, fmi3Boolean *timeDefined, fmi3Float64 *time) {
     if (!c || !again || !terminate || !nominals || !states || !timeDefined || !time) return fmi3Error;
     *again = *terminate = *nominals = *timeDefined = fmi3False;
     *time = 0;
@@ -214,9 +206,8 @@ EXPORT fmi3Status fmi3GetOutputDerivatives(
     return STATUS(c && !n && !m);
 }
 
-EXPORT fmi3Status fmi3DoStep(
-    fmi3Instance c, fmi3Float64 from, fmi3Float64 step, fmi3Boolean noRollback, fmi3Boolean *event,
-    fmi3Boolean *terminate, fmi3Boolean *early, fmi3Float64 *reached) {
+EXPORT fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 from, fmi3Float64 step, fmi3Boolean noRollback,
+    fmi3Boolean *event, fmi3Boolean *terminate, fmi3Boolean *early, fmi3Float64 *reached) {
     UNUSED(noRollback);
     if (!event || !terminate || !early || !reached || !advance(c, from, step)) return fmi3Error;
     *event = *terminate = *early = fmi3False;

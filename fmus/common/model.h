@@ -1,8 +1,8 @@
 /* What a reference model hands to the shared FMI functions, and what it gets from them.
  *
- * `variables.h` is written by build.py from the model's model.toml: value references (NAME_OF_VARIABLE), VARIABLES, STATES,
- * INDICATORS, FIRST_STATE, FIRST_DERIVATIVE, the tables start_value and is_integer, MODEL_TOKEN.
- * States, their derivatives and the event indicators stand one after the other in the values. */
+ * `variables.h` is written by build.py from the model's model.toml: value references (NAME_OF_VARIABLE), VARIABLES,
+ * STATES, INDICATORS, FIRST_STATE, FIRST_DERIVATIVE, the tables start_value and is_integer, MODEL_TOKEN. States, their
+ * derivatives and the event indicators stand one after the other in the values. */
 #ifndef MODEL_H
 #define MODEL_H
 

@@ -16,9 +16,7 @@ static double actuated(const Model *m, double t) {
 
 static double motor_current(const Model *m, double w1) { return (V(supply) - V(k) * V(ratio) * w1) / V(R); }
 
-static double motor_torque(const Model *m, double w1) {
-    return V(ratio) * (V(k) * motor_current(m, w1) - V(friction));
-}
+static double motor_torque(const Model *m, double w1) { return V(ratio) * (V(k) * motor_current(m, w1) - V(friction)); }
 
 static double driving_inertia(const Model *m) { return V(pulley) + V(ratio) * V(ratio) * V(rotor); }
 static double driven_inertia(const Model *m) { return V(pulley) + V(disc) + V(ratio) * V(ratio) * V(rotor); }

@@ -1,5 +1,5 @@
-/* Ravigneaux set, small sun driven, large sun braked: the carrier speed decays exponentially until the large sun stands.
- * See README.md. */
+/* Ravigneaux set, small sun driven, large sun braked: the carrier speed decays exponentially until the large sun
+ * stands. See README.md. */
 #include <math.h>
 
 #include "function_of_time.h"

@@ -1,4 +1,5 @@
-/* Mass on a moving belt: sticking is uniform motion, sliding a harmonic oscillation; both in closed form. See README.md. */
+/* Mass on a moving belt: sticking is uniform motion, sliding a harmonic oscillation; both in closed form. See
+ * README.md. */
 #include <math.h>
 
 #include "model.h"

@@ -35,7 +35,10 @@ LOG_CATEGORIES = {
 }
 """Log categories of every FMU with a description; errors are always reported."""
 
-_FACES = {"2.0": ("fmi2.c",), "3.0": ("fmi3.h", "fmi3.c", "fmi3_unused.c")}
+_FACES = {
+    "2.0": ("fmi2.h", "fmi2.c", "fmi2_values.c"),
+    "3.0": ("fmi3.h", "fmi3.c", "fmi3_values.c", "fmi3_unused.c"),
+}
 _HEADERS = {
     "2.0": ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h"),
     "3.0": ("fmi3Functions.h", "fmi3FunctionTypes.h", "fmi3PlatformTypes.h"),
@@ -70,7 +73,7 @@ def generate(
     folder = files("modelica_like.fmi") / "templates"
     names = (
         "core.h",
-        *(["fmi3.h"] if version == "3.0" else []),
+        *(name for name in _FACES[version] if name.endswith(".h")),
         *(name for name in source_files(version) if name != "model.c"),
     )
     return {

@@ -7,22 +7,29 @@
 #include "core.h"
 #include "fmi2Functions.h"
 
-#define EXPECT(what, call)                                                                  \
-    do {                                                                                    \
-        int got = (int)(call);                                                              \
-        if (got != (what)) { printf("line %d: %s gave %d\n", __LINE__, #call, got); surprises++; } \
+#define EXPECT(what, call)                                         \
+    do {                                                           \
+        int got = (int)(call);                                     \
+        if (got != (what)) {                                       \
+            printf("line %d: %s gave %d\n", __LINE__, #call, got); \
+            surprises++;                                           \
+        }                                                          \
     } while (0)
 #define OK(call) EXPECT(fmi2OK, call)
-#define REFUSED(call)                                                                       \
-    do {                                                                                    \
-        int before = told;                                                                  \
-        EXPECT(fmi2Error, call);                                                            \
-        if (told == before) { printf("line %d: %s told nothing\n", __LINE__, #call); surprises++; } \
+#define REFUSED(call)                                              \
+    do {                                                           \
+        int before = told;                                         \
+        EXPECT(fmi2Error, call);                                   \
+        if (told == before) {                                      \
+            printf("line %d: %s told nothing\n", __LINE__, #call); \
+            surprises++;                                           \
+        }                                                          \
     } while (0)
 
 static int surprises, told;
 
-static void logger(fmi2ComponentEnvironment e, fmi2String name, fmi2Status s, fmi2String category, fmi2String message, ...) {
+static void logger(
+    fmi2ComponentEnvironment e, fmi2String name, fmi2Status s, fmi2String category, fmi2String message, ...) {
     (void)e, (void)name, (void)category;
     if (s == fmi2Error) {
         told++;
@@ -33,7 +40,8 @@ static void logger(fmi2ComponentEnvironment e, fmi2String name, fmi2Status s, fm
 static const fmi2CallbackFunctions callbacks = {logger, calloc, free, NULL, NULL};
 
 static fmi2ValueReference first_of(Kind kind) {
-    for (int k = 0; k < N_VARIABLES; k++) if (model_variables[k].kind == kind) return model_variables[k].reference;
+    for (int k = 0; k < N_VARIABLES; k++)
+        if (model_variables[k].kind == kind) return model_variables[k].reference;
     return 0;
 }
 
@@ -47,7 +55,8 @@ static fmi2Component started(fmi2Type type) {
 }
 
 static void refuses_wrong_values(fmi2Component c) {
-    fmi2ValueReference unknown = 4000000000u, state = first_of(KIND_STATE), mode = first_of(KIND_DISCRETE), parameter = first_of(KIND_PARAMETER);
+    fmi2ValueReference unknown = 4000000000u, state = first_of(KIND_STATE), mode = first_of(KIND_DISCRETE),
+                       parameter = first_of(KIND_PARAMETER);
     double value = 0, nan_value = NAN;
     int number = 99;
     REFUSED(fmi2GetReal(c, &unknown, 1, &value));
@@ -167,7 +176,8 @@ static void runs(void) {
     for (int k = 0; k < 50; k++) {
         OK(fmi2DoStep(c, k / 50.0, 1 / 50.0, 1));
         for (int n = 0; n < N_VARIABLES; n++)
-            if (model_variables[n].type == TYPE_FLOAT64) OK(fmi2GetReal(c, &model_variables[n].reference, 1, values + n));
+            if (model_variables[n].type == TYPE_FLOAT64)
+                OK(fmi2GetReal(c, &model_variables[n].reference, 1, values + n));
     }
     fmi2FreeInstance(c);
 }

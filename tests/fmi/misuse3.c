@@ -7,17 +7,23 @@
 #include "core.h"
 #include "fmi3Functions.h"
 
-#define EXPECT(what, call)                                                                  \
-    do {                                                                                    \
-        int got = (int)(call);                                                              \
-        if (got != (what)) { printf("line %d: %s gave %d\n", __LINE__, #call, got); surprises++; } \
+#define EXPECT(what, call)                                         \
+    do {                                                           \
+        int got = (int)(call);                                     \
+        if (got != (what)) {                                       \
+            printf("line %d: %s gave %d\n", __LINE__, #call, got); \
+            surprises++;                                           \
+        }                                                          \
     } while (0)
 #define OK(call) EXPECT(fmi3OK, call)
-#define REFUSED(call)                                                                       \
-    do {                                                                                    \
-        int before = told;                                                                  \
-        EXPECT(fmi3Error, call);                                                            \
-        if (told == before) { printf("line %d: %s told nothing\n", __LINE__, #call); surprises++; } \
+#define REFUSED(call)                                              \
+    do {                                                           \
+        int before = told;                                         \
+        EXPECT(fmi3Error, call);                                   \
+        if (told == before) {                                      \
+            printf("line %d: %s told nothing\n", __LINE__, #call); \
+            surprises++;                                           \
+        }                                                          \
     } while (0)
 
 static int surprises, told;
@@ -31,14 +37,15 @@ static void logger(fmi3InstanceEnvironment e, fmi3Status s, fmi3String category,
 }
 
 static fmi3ValueReference first_of(Kind kind) {
-    for (int k = 0; k < N_VARIABLES; k++) if (model_variables[k].kind == kind) return model_variables[k].reference;
+    for (int k = 0; k < N_VARIABLES; k++)
+        if (model_variables[k].kind == kind) return model_variables[k].reference;
     return 0;
 }
 
 static fmi3Instance made(int co_simulation, int events) {
-    fmi3Instance c = co_simulation
-        ? fmi3InstantiateCoSimulation("driver", model_token, NULL, 0, 0, events, events, NULL, 0, NULL, logger, NULL)
-        : fmi3InstantiateModelExchange("driver", model_token, NULL, 0, 0, NULL, logger);
+    fmi3Instance c = co_simulation ? fmi3InstantiateCoSimulation(
+                                         "driver", model_token, NULL, 0, 0, events, events, NULL, 0, NULL, logger, NULL)
+                                   : fmi3InstantiateModelExchange("driver", model_token, NULL, 0, 0, NULL, logger);
     if (c == NULL) exit(2);
     return c;
 }
@@ -53,7 +60,9 @@ static fmi3Instance started(int co_simulation, int events) {
 static fmi3Boolean flag, more, early;
 static double time_reached;
 
-static fmi3Status step(fmi3Instance c, double t, double h) { return fmi3DoStep(c, t, h, 1, &flag, &more, &early, &time_reached); }
+static fmi3Status step(fmi3Instance c, double t, double h) {
+    return fmi3DoStep(c, t, h, 1, &flag, &more, &early, &time_reached);
+}
 
 static fmi3Status update(fmi3Instance c) {
     fmi3Boolean a, b, d, e, f;
@@ -135,7 +144,8 @@ static void refuses_wrong_order(void) {
     EXPECT(1, fmi3InstantiateModelExchange("driver", "{another}", NULL, 0, 0, NULL, logger) == NULL);
     EXPECT(1, fmi3InstantiateModelExchange(NULL, model_token, NULL, 0, 0, NULL, logger) == NULL);
     EXPECT(1, fmi3InstantiateModelExchange("driver", "{another}", NULL, 0, 0, NULL, NULL) == NULL);
-    EXPECT(1, fmi3InstantiateScheduledExecution("driver", model_token, NULL, 0, 0, NULL, logger, NULL, NULL, NULL) == NULL);
+    EXPECT(1,
+        fmi3InstantiateScheduledExecution("driver", model_token, NULL, 0, 0, NULL, logger, NULL, NULL, NULL) == NULL);
 }
 
 static void refuses_wrong_sizes(void) {
@@ -194,7 +204,8 @@ static void runs(void) {
     while (time_reached < 1) {
         OK(step(c, time_reached, 1 - time_reached));
         for (int n = 0; n < N_VARIABLES; n++)
-            if (model_variables[n].type == TYPE_FLOAT64) OK(fmi3GetFloat64(c, &model_variables[n].reference, 1, values + n, 1));
+            if (model_variables[n].type == TYPE_FLOAT64)
+                OK(fmi3GetFloat64(c, &model_variables[n].reference, 1, values + n, 1));
         if (!flag) continue;
         double reached = time_reached;
         OK(fmi3EnterEventMode(c));

@@ -19,7 +19,11 @@
 #define OLD(f) __asm__(".symver " #f "," #f "@GLIBC_2.17")
 #endif
 #ifdef OLD
-OLD(exp); OLD(log); OLD(pow); OLD(hypot); OLD(fmod);
+OLD(exp);
+OLD(log);
+OLD(pow);
+OLD(hypot);
+OLD(fmod);
 #endif
 
 #define AT_LEAST_ONE(n) ((n) > 0 ? (n) : 1)
@@ -39,6 +43,7 @@ typedef enum { RESULT_OK, RESULT_DISCARD, RESULT_ERROR } Result;
 
 /* ---- tables of the model (model.c) ------------------------------------------------------------------------------ */
 
+/* clang-format off */
 /* The order is that of OPERATIONS in tape.py. */
 typedef enum {
     OPERATION_ADD, OPERATION_SUB, OPERATION_MUL, OPERATION_DIV, OPERATION_NEG, OPERATION_EXP, OPERATION_LOG,
@@ -49,24 +54,38 @@ typedef enum {
     OPERATION_FMIN, OPERATION_FMAX, OPERATION_INV, OPERATION_SINH, OPERATION_COSH, OPERATION_TANH, OPERATION_ASINH,
     OPERATION_ACOSH, OPERATION_ATANH, OPERATION_ATAN2, OPERATION_HYPOT, OPERATION_LOG1P, OPERATION_EXPM1
 } OperationCode;
+/* clang-format on */
 
-typedef struct { int operation, count; } Run;
-typedef struct { int left, right; } Operands;    /* slots */
+typedef struct {
+    int operation, count;
+} Run;
+typedef struct {
+    int left, right;
+} Operands; /* slots */
 
-typedef struct {                     /* see tape.py */
+typedef struct { /* see tape.py */
     int n_operations, n_runs, n_outputs;
-    const Run *runs;                 /* equal operations that follow each other */
-    const Operands *operands;        /* of all operations; operation k writes slot SLOT_RESULTS + k */
-    const int *outputs;              /* slots */
+    const Run *runs;          /* equal operations that follow each other */
+    const Operands *operands; /* of all operations; operation k writes slot SLOT_RESULTS + k */
+    const int *outputs;       /* slots */
 } Tape;
 
-typedef struct {                     /* pattern of a square matrix and of its QR factors, see sparse.py */
+typedef struct { /* pattern of a square matrix and of its QR factors, see sparse.py */
     int size, n_nonzeros, n_v, n_r;
     const int *colind, *row, *v_colind, *v_row, *r_colind, *r_row, *row_place, *column_order;
 } QrPattern;
 
-typedef enum { KIND_TIME, KIND_STATE, KIND_DERIVATIVE, KIND_VARIABLE, KIND_PARAMETER, KIND_DERIVED, KIND_INPUT,
-    KIND_DISCRETE, KIND_GUARD } Kind;
+typedef enum {
+    KIND_TIME,
+    KIND_STATE,
+    KIND_DERIVATIVE,
+    KIND_VARIABLE,
+    KIND_PARAMETER,
+    KIND_DERIVED,
+    KIND_INPUT,
+    KIND_DISCRETE,
+    KIND_GUARD
+} Kind;
 typedef enum { TYPE_FLOAT64, TYPE_ENUMERATION } ValueType;
 
 typedef struct {
@@ -74,29 +93,45 @@ typedef struct {
     ValueType type;
     Kind kind;
     int index;
-    int start;                       /* start value that determines it, or -1 */
-    int tunable;                     /* a parameter that may change during a run */
+    int start;   /* start value that determines it, or -1 */
+    int tunable; /* a parameter that may change during a run */
     const char *name;
-} Variable;                          /* sorted by reference */
+} Variable; /* sorted by reference */
 
 typedef enum { RESET_STATE, RESET_DISCRETE, RESET_VALUE } ResetKind;
-typedef struct { ResetKind kind; int index; double factor; int value, target; } Reset;
-typedef struct { int mode; uint64_t sources; int target, timed, index, first_reset, n_resets; const char *name,
-    *notice; } Transition;
-typedef struct { int mode, target; } StartMode;
-typedef struct { int position, start; double factor; } StartOf;
-typedef struct { int start, node, row; } StartRow;
+typedef struct {
+    ResetKind kind;
+    int index;
+    double factor;
+    int value, target;
+} Reset;
+typedef struct {
+    int mode;
+    uint64_t sources;
+    int target, timed, index, first_reset, n_resets;
+    const char *name, *notice;
+} Transition;
+typedef struct {
+    int mode, target;
+} StartMode;
+typedef struct {
+    int position, start;
+    double factor;
+} StartOf;
+typedef struct {
+    int start, node, row;
+} StartRow;
 
 extern const char *const model_token;
 extern const double model_constants[], model_parameters[], model_inputs[], model_guesses[], model_z_guesses[],
     model_nominals[];
 extern const double model_parameter_min[], model_parameter_max[];
 extern const Variable model_variables[];
-extern const Transition model_transitions[];   /* in the order in which they are declared */
-extern const int model_guard_transition[];     /* transition of every guard */
+extern const Transition model_transitions[]; /* in the order in which they are declared */
+extern const int model_guard_transition[];   /* transition of every guard */
 extern const Reset model_resets[];
 extern const int model_reset_nodes[];
-extern const char *const *const model_mode_names[];   /* by position in d; NULL for discrete values */
+extern const char *const *const model_mode_names[]; /* by position in d; NULL for discrete values */
 extern const int model_mode_counts[];
 extern const char *const model_state_names[], *const model_implicit_names[], *const model_singular_names[];
 
@@ -109,17 +144,23 @@ extern const Tape tape_rates, tape_jacobian, tape_alg, tape_alg_jacobian, tape_v
 extern const Tape tape_moments, tape_resets, tape_start_conditions, tape_start_values, tape_discrete_starts;
 extern const Tape tape_determinants, tape_start_system, tape_start_jacobian, tape_derived;
 extern const QrPattern pattern_step, pattern_start;
-extern const int jacobian_to_step[];           /* nonzero of the Jacobian -> nonzero of the step matrix */
-extern const int step_diagonal[];              /* nonzero of the step matrix on the diagonal of state k */
+extern const int jacobian_to_step[]; /* nonzero of the Jacobian -> nonzero of the step matrix */
+extern const int step_diagonal[];    /* nonzero of the step matrix on the diagonal of state k */
 
 /* ---- state and instance ----------------------------------------------------------------------------------------- */
 
 typedef enum {
-    PHASE_INSTANTIATED = 1, PHASE_INITIALIZATION = 2, PHASE_EVENT = 4, PHASE_CONTINUOUS = 8, PHASE_STEP = 16,
-    PHASE_TERMINATED = 32, PHASE_CONFIGURATION = 64, PHASE_FAILED = 128
+    PHASE_INSTANTIATED = 1,
+    PHASE_INITIALIZATION = 2,
+    PHASE_EVENT = 4,
+    PHASE_CONTINUOUS = 8,
+    PHASE_STEP = 16,
+    PHASE_TERMINATED = 32,
+    PHASE_CONFIGURATION = 64,
+    PHASE_FAILED = 128
 } Phase;
 
-typedef struct {                     /* an accepted integrator step with its dense output */
+typedef struct { /* an accepted integrator step with its dense output */
     double begin, end;
     double first[AT_LEAST_ONE(N_UNKNOWNS)], last[AT_LEAST_ONE(N_UNKNOWNS)];
     double dense[3][AT_LEAST_ONE(N_UNKNOWNS)];
@@ -128,20 +169,20 @@ typedef struct {                     /* an accepted integrator step with its den
 typedef struct {
     double t, x[AT_LEAST_ONE(N_X)], z[AT_LEAST_ONE(N_Z)], p[AT_LEAST_ONE(N_P)], u[AT_LEAST_ONE(N_U)],
         d[AT_LEAST_ONE(N_D)];
-    double u_rate[AT_LEAST_ONE(N_U)], u_time;              /* inputs are u + u_rate * (t - u_time) */
+    double u_rate[AT_LEAST_ONE(N_U)], u_time; /* inputs are u + u_rate * (t - u_time) */
     double start_value[AT_LEAST_ONE(N_STARTS)];
     unsigned char start_given[AT_LEAST_ONE(N_STARTS)], mode_given[AT_LEAST_ONE(N_D)];
-    unsigned char wanting[AT_LEAST_ONE(N_TRANSITIONS)];    /* transitions that fire at the end of the piece */
+    unsigned char wanting[AT_LEAST_ONE(N_TRANSITIONS)]; /* transitions that fire at the end of the piece */
     int phase, solved, z_valid, inputs_changed, piece_valid, event_pending, at_event;
     double tolerance, start_time, stop_time;
     int stop_time_defined;
     Piece piece;
-    double step;                                           /* next step size, 0: choose one */
+    double step; /* next step size, 0: choose one */
     double last_event, events_since;
     double n_steps, n_rejected, n_events;
 } State;
 
-typedef void (*AnyFunction)(void);  /* a callback of the importer, cast back before it is called */
+typedef void (*AnyFunction)(void); /* a callback of the importer, cast back before it is called */
 
 struct Instance;
 typedef void (*LogFunction)(const struct Instance *c, int status, const char *category, const char *message);
@@ -149,9 +190,9 @@ typedef void (*LogFunction)(const struct Instance *c, int status, const char *ca
 typedef enum { LOG_ERROR = 1, LOG_WARNING = 2, LOG_EVENTS = 4, LOG_INTEGRATOR = 8, LOG_ALL = 15 } LogCategory;
 
 typedef struct {
-    double *slots, *dots;            /* values, and derivatives in either direction, of tape slots */
+    double *slots, *dots; /* values, and derivatives in either direction, of tape slots */
     double *jacobian, *matrix, *qr_v, *qr_r, *qr_beta, *qr_work;
-    double *stages, *point;          /* of the integrator: 8 stages, a point */
+    double *stages, *point; /* of the integrator: 8 stages, a point */
     double *variables, *guards, *guards_before, *rhs, *dense_matrix, *square, *vector;
     double *start_unknowns, *start_values, *start_residual;
 } Work;
@@ -164,12 +205,12 @@ typedef struct Instance {
     void *environment;
     AnyFunction logger, intermediate_update;
     LogFunction log;
-    double (*step_finished)(struct Instance *c);  /* tells until when to go on; or NULL */
+    double (*step_finished)(struct Instance *c); /* tells until when to go on; or NULL */
     unsigned log_enabled;
     int co_simulation, event_mode_used, early_return_allowed;
     void *(*allocate)(size_t count, size_t size);
     void (*release)(void *memory);
-    int variables_valid;           /* work.variables belong to the present point */
+    int variables_valid; /* work.variables belong to the present point */
 } Instance;
 
 /* tape.c */
@@ -205,8 +246,8 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located);
 double number_or_false(double guard);
 
 /* rosenbrock.c */
-int rosenbrock_step(Instance *c, double t, const double *first, double h, int keep_jacobian, Piece *piece,
-    double *error);
+int rosenbrock_step(
+    Instance *c, double t, const double *first, double h, int keep_jacobian, Piece *piece, double *error);
 void piece_at(const Piece *piece, double t, double *point);
 double first_step(Instance *c);
 
@@ -241,12 +282,12 @@ Result output_rate(Instance *c, uint32_t reference, double *value);
 size_t dependencies(Instance *c, uint32_t unknown, uint32_t *knowns, size_t capacity, Result *result);
 
 /* instance.c */
-Instance *instance_new(const char *name, const char *token, void *(*allocate)(size_t, size_t),
-    void (*release)(void *), LogFunction log, AnyFunction logger, void *environment, int logging);
+Instance *instance_new(const char *name, const char *token, void *(*allocate)(size_t, size_t), void (*release)(void *),
+    LogFunction log, AnyFunction logger, void *environment, int logging);
 void instance_free(Instance *c);
 void instance_reset(Instance *c);
-Result set_experiment(Instance *c, int tolerance_defined, double tolerance, double start, int stop_defined,
-    double stop);
+Result set_experiment(
+    Instance *c, int tolerance_defined, double tolerance, double start, int stop_defined, double stop);
 Result state_copy_out(Instance *c, void **copy);
 Result state_copy_in(Instance *c, const void *copy);
 void state_release(Instance *c, void **copy);

@@ -19,8 +19,9 @@ static Result check_knowns(Instance *c, const uint32_t *knowns, size_t n) {
     for (size_t k = 0; k < n; k++) {
         const Variable *v = known_variable(c, knowns[k], TYPE_FLOAT64);
         if (v == NULL) return RESULT_ERROR;
-        if (known_slot(v) < 0) return report(c, LOG_ERROR, RESULT_ERROR,
-            "Derivatives by %s are not available: it is neither state, input nor parameter.", v->name);
+        if (known_slot(v) < 0)
+            return report(c, LOG_ERROR, RESULT_ERROR,
+                "Derivatives by %s are not available: it is neither state, input nor parameter.", v->name);
     }
     return RESULT_OK;
 }
@@ -29,8 +30,8 @@ static Result check_unknowns(Instance *c, const uint32_t *unknowns, size_t n) {
     for (size_t k = 0; k < n; k++) {
         const Variable *v = known_variable(c, unknowns[k], TYPE_FLOAT64);
         if (v == NULL) return RESULT_ERROR;
-        if (v->kind == KIND_DISCRETE) return report(c, LOG_ERROR, RESULT_ERROR,
-            "%s changes at events only: it has no derivatives.", v->name);
+        if (v->kind == KIND_DISCRETE)
+            return report(c, LOG_ERROR, RESULT_ERROR, "%s changes at events only: it has no derivatives.", v->name);
     }
     return RESULT_OK;
 }
@@ -40,8 +41,8 @@ static Result factor_implicit(Instance *c, int *order) {
     State *s = &c->state;
     if (settle(c) != RESULT_OK) return RESULT_ERROR;
     evaluate(c, &tape_alg_jacobian, s->t, s->x, s->z, c->work.dense_matrix);
-    if (!lu_factor(N_Z, c->work.dense_matrix, order)) return report(c, LOG_ERROR, RESULT_ERROR,
-        "The implicit equations are singular at t = %.9g s.", s->t);
+    if (!lu_factor(N_Z, c->work.dense_matrix, order))
+        return report(c, LOG_ERROR, RESULT_ERROR, "The implicit equations are singular at t = %.9g s.", s->t);
     return RESULT_OK;
 }
 
@@ -63,8 +64,8 @@ Result directional(Instance *c, const uint32_t *unknowns, size_t n_unknowns, con
     Work *w = &c->work;
     State *s = &c->state;
     int order[AT_LEAST_ONE(N_Z)];
-    if (check_unknowns(c, unknowns, n_unknowns) != RESULT_OK || check_knowns(c, knowns,
-        n_knowns) != RESULT_OK) return RESULT_ERROR;
+    if (check_unknowns(c, unknowns, n_unknowns) != RESULT_OK || check_knowns(c, knowns, n_knowns) != RESULT_OK)
+        return RESULT_ERROR;
     if (factor_implicit(c, order) != RESULT_OK) return RESULT_ERROR;
     memset(w->dots, 0, SLOT_RESULTS * sizeof(double));
     for (size_t k = 0; k < n_knowns; k++) w->dots[known_slot(find_variable(knowns[k]))] += seed[k];
@@ -109,8 +110,8 @@ Result adjoint(Instance *c, const uint32_t *unknowns, size_t n_unknowns, const u
     Work *w = &c->work;
     State *s = &c->state;
     int order[AT_LEAST_ONE(N_Z)];
-    if (check_unknowns(c, unknowns, n_unknowns) != RESULT_OK || check_knowns(c, knowns,
-        n_knowns) != RESULT_OK) return RESULT_ERROR;
+    if (check_unknowns(c, unknowns, n_unknowns) != RESULT_OK || check_knowns(c, knowns, n_knowns) != RESULT_OK)
+        return RESULT_ERROR;
     if (factor_implicit(c, order) != RESULT_OK) return RESULT_ERROR;
     memset(w->dots, 0, SLOT_RESULTS * sizeof(double));
     for (size_t k = 0; k < n_unknowns; k++) {
@@ -119,17 +120,23 @@ Result adjoint(Instance *c, const uint32_t *unknowns, size_t n_unknowns, const u
     }
     c->variables_valid = 0;
     for (int pass = 0; pass < 4; pass++) {
-        const struct { const Tape *tape; Kind kind; double *outputs; } of[] = {
-            {&tape_rates, KIND_DERIVATIVE, w->rhs}, {&tape_variables, KIND_VARIABLE, w->variables},
-            {&tape_derived, KIND_DERIVED, w->guards}, {&tape_guards, KIND_GUARD, w->guards_before},
+        const struct {
+            const Tape *tape;
+            Kind kind;
+            double *outputs;
+        } of[] = {
+            {&tape_rates, KIND_DERIVATIVE, w->rhs},
+            {&tape_variables, KIND_VARIABLE, w->variables},
+            {&tape_derived, KIND_DERIVED, w->guards},
+            {&tape_guards, KIND_GUARD, w->guards_before},
         };
         double *bars = of[pass].outputs;
         evaluate(c, of[pass].tape, s->t, s->x, s->z, bars);
         memset(bars, 0, (size_t)of[pass].tape->n_outputs * sizeof(double));
         for (size_t k = 0; k < n_unknowns; k++) {
             const Variable *v = find_variable(unknowns[k]);
-            if (v->kind == of[pass].kind && (v->kind != KIND_GUARD || guard_active(s,
-                v->index))) bars[v->index] += seed[k];
+            if (v->kind == of[pass].kind && (v->kind != KIND_GUARD || guard_active(s, v->index)))
+                bars[v->index] += seed[k];
         }
         tape_adjoint(of[pass].tape, w->slots, w->dots, bars);
     }
@@ -165,8 +172,8 @@ Result output_rate(Instance *c, uint32_t reference, double *value) {
     State *s = &c->state;
     int order[AT_LEAST_ONE(N_Z)];
     if (v == NULL) return RESULT_ERROR;
-    if (v->kind != KIND_VARIABLE && v->kind != KIND_STATE) return report(c, LOG_ERROR, RESULT_ERROR,
-        "%s has no time derivative: it is not a variable.", v->name);
+    if (v->kind != KIND_VARIABLE && v->kind != KIND_STATE)
+        return report(c, LOG_ERROR, RESULT_ERROR, "%s has no time derivative: it is not a variable.", v->name);
     if (factor_implicit(c, order) != RESULT_OK) return RESULT_ERROR;
     evaluate(c, &tape_rates, s->t, s->x, s->z, w->rhs);
     if (v->kind == KIND_STATE) {
@@ -192,8 +199,8 @@ size_t dependencies(Instance *c, uint32_t unknown, uint32_t *knowns, size_t capa
     const Tape *tape;
     size_t count = 0;
     *result = RESULT_ERROR;
-    if (v == NULL || (v->kind != KIND_DERIVATIVE && v->kind != KIND_VARIABLE && v->kind != KIND_STATE
-        && v->kind != KIND_GUARD)) {
+    if (v == NULL ||
+        (v->kind != KIND_DERIVATIVE && v->kind != KIND_VARIABLE && v->kind != KIND_STATE && v->kind != KIND_GUARD)) {
         report(c, LOG_ERROR, RESULT_ERROR, "The variable with value reference %u is no output.", (unsigned)unknown);
         return 0;
     }
@@ -204,8 +211,9 @@ size_t dependencies(Instance *c, uint32_t unknown, uint32_t *knowns, size_t capa
     else {
         int implicit = 0;
         tape = v->kind == KIND_DERIVATIVE ? &tape_rates : v->kind == KIND_GUARD ? &tape_guards : &tape_variables;
-        outputs = v->kind == KIND_DERIVATIVE ? c->work.rhs : v->kind == KIND_GUARD ? c->work.guards_before
-            : c->work.variables;
+        outputs = v->kind == KIND_DERIVATIVE ? c->work.rhs
+                  : v->kind == KIND_GUARD    ? c->work.guards_before
+                                             : c->work.variables;
         memset(outputs, 0, (size_t)tape->n_outputs * sizeof(double));
         outputs[v->index] = 1;
         tape_reaches(tape, marks, outputs);

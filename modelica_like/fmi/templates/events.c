@@ -27,8 +27,8 @@ double next_moment(Instance *c) {
     evaluate(c, &tape_moments, s->t, s->x, s->z, moments);
     for (int k = 0; k < N_TRANSITIONS; k++) {
         const Transition *one = &model_transitions[k];
-        if (one->timed && is_source(s, one) && moments[one->index] > just_after(s)) next = fmin(next,
-            moments[one->index]);
+        if (one->timed && is_source(s, one) && moments[one->index] > just_after(s))
+            next = fmin(next, moments[one->index]);
     }
     return next;
 }
@@ -45,7 +45,8 @@ int find_wanting(Instance *c, unsigned char *wanting, int guards_too) {
     }
     if (N_GUARDS > 0 && guards_too) {
         evaluate(c, &tape_guards_soon, s->t, s->x, s->z, values);
-        for (int k = 0; k < N_GUARDS; k++) if (number_or_false(values[k]) > 0) wanting[model_guard_transition[k]] = 1;
+        for (int k = 0; k < N_GUARDS; k++)
+            if (number_or_false(values[k]) > 0) wanting[model_guard_transition[k]] = 1;
     }
     for (int k = 0; k < N_TRANSITIONS; k++) {
         wanting[k] = wanting[k] && is_source(s, &model_transitions[k]);
@@ -124,7 +125,7 @@ static Result crowded(Instance *c) {
     }
     if (++s->events_since <= CROWD) return RESULT_OK;
     return report(c, LOG_ERROR, RESULT_ERROR,
-                  "Events follow each other ever faster at t = %.12g s. Give the switching a hysteresis, or smooth it.", s->t);
+        "Events follow each other ever faster at t = %.12g s. Give the switching a hysteresis, or smooth it.", s->t);
 }
 
 /* Fire what wants to fire until nothing does. `wanting` holds the state events that were located, if `located`. */
@@ -144,5 +145,5 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
     }
     return report(c, LOG_ERROR, RESULT_ERROR,
         "Modes still switch after %d rounds at t = %.12g s. Give the switching a hysteresis, or smooth what drives it.",
-                  ROUNDS, s->t);
+        ROUNDS, s->t);
 }

@@ -1,30 +1,8 @@
-/* FMI 2.0: checks every call, then leaves the work to the run-time. */
+/* FMI 2.0, life of an instance and its steps: checks every call, then leaves the work to the run-time. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include "core.h"
-#include "fmi2Functions.h"
-
-#define READABLE (PHASE_INITIALIZATION | PHASE_EVENT | PHASE_CONTINUOUS | PHASE_STEP | PHASE_TERMINATED)
-#define SETTABLE (PHASE_INSTANTIATED | PHASE_INITIALIZATION | PHASE_EVENT | PHASE_CONTINUOUS | PHASE_STEP)
-#define ANY_PHASE (~0)
-
-/* Refuses calls without an instance, or in a state in which the standard does not allow them. */
-#define ENTER(name, phases)      \
-    Instance *c = component;     \
-    if (c == NULL || allowed(c, #name, phases) != RESULT_OK) return fmi2Error
-
-#define NEED(pointer, n) \
-    if ((n) > 0 && (pointer) == NULL) return refuse(c, "The argument " #pointer " is a null pointer.")
-
-static fmi2Status status(Result result) {
-    if (result == RESULT_OK) return fmi2OK;
-    return result == RESULT_DISCARD ? fmi2Discard : fmi2Error;
-}
-
-static fmi2Status refuse(Instance *c, const char *why) {
-    return status(report(c, LOG_ERROR, RESULT_ERROR, "%s", why));
-}
+#include "fmi2.h"
 
 static fmi2Status failed(Instance *c) {
     c->state.phase = PHASE_FAILED;
@@ -48,16 +26,16 @@ const char *fmi2GetTypesPlatform(void) { return fmi2TypesPlatform; }
 const char *fmi2GetVersion(void) { return fmi2Version; }
 
 fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2String fmuGUID,
-    fmi2String fmuResourceLocation,
-                              const fmi2CallbackFunctions *functions, fmi2Boolean visible, fmi2Boolean loggingOn) {
+    fmi2String fmuResourceLocation, const fmi2CallbackFunctions *functions, fmi2Boolean visible,
+    fmi2Boolean loggingOn) {
     Instance *c;
     int own_memory;
     (void)fmuResourceLocation, (void)visible;
     if (functions == NULL || (fmuType != fmi2ModelExchange && fmuType != fmi2CoSimulation)) return NULL;
     own_memory = functions->allocateMemory == NULL || functions->freeMemory == NULL;
     c = instance_new(instanceName, fmuGUID, own_memory ? calloc : functions->allocateMemory,
-                     own_memory ? free : functions->freeMemory, functions->logger ? log_fmi2 : NULL,
-                     (AnyFunction)functions->logger, functions->componentEnvironment, loggingOn);
+        own_memory ? free : functions->freeMemory, functions->logger ? log_fmi2 : NULL, (AnyFunction)functions->logger,
+        functions->componentEnvironment, loggingOn);
     if (c != NULL) c->co_simulation = fmuType == fmi2CoSimulation;
     return c;
 }
@@ -66,8 +44,8 @@ void fmi2FreeInstance(fmi2Component component) {
     if (component != NULL) instance_free(component);
 }
 
-fmi2Status fmi2SetDebugLogging(fmi2Component component, fmi2Boolean loggingOn, size_t nCategories,
-    const fmi2String categories[]) {
+fmi2Status fmi2SetDebugLogging(
+    fmi2Component component, fmi2Boolean loggingOn, size_t nCategories, const fmi2String categories[]) {
     Result result = RESULT_OK;
     ENTER(fmi2SetDebugLogging, ANY_PHASE);
     NEED(categories, nCategories);
@@ -80,8 +58,7 @@ fmi2Status fmi2SetDebugLogging(fmi2Component component, fmi2Boolean loggingOn, s
 /* ---- life of an instance ---------------------------------------------------------------------------------------- */
 
 fmi2Status fmi2SetupExperiment(fmi2Component component, fmi2Boolean toleranceDefined, fmi2Real tolerance,
-    fmi2Real startTime,
-                               fmi2Boolean stopTimeDefined, fmi2Real stopTime) {
+    fmi2Real startTime, fmi2Boolean stopTimeDefined, fmi2Real stopTime) {
     ENTER(fmi2SetupExperiment, PHASE_INSTANTIATED);
     return status(set_experiment(c, toleranceDefined, tolerance, startTime, stopTimeDefined, stopTime));
 }
@@ -113,132 +90,7 @@ fmi2Status fmi2Reset(fmi2Component component) {
     return fmi2OK;
 }
 
-/* ---- values ----------------------------------------------------------------------------------------------------- */
-
-fmi2Status fmi2GetReal(fmi2Component component, const fmi2ValueReference vr[], size_t nvr, fmi2Real value[]) {
-    ENTER(fmi2GetReal, READABLE);
-    NEED(vr, nvr);
-    NEED(value, nvr);
-    for (size_t k = 0; k < nvr; k++) if (get_float(c, vr[k], &value[k]) != RESULT_OK) return fmi2Error;
-    return fmi2OK;
-}
-
-fmi2Status fmi2GetInteger(fmi2Component component, const fmi2ValueReference vr[], size_t nvr, fmi2Integer value[]) {
-    ENTER(fmi2GetInteger, READABLE);
-    NEED(vr, nvr);
-    NEED(value, nvr);
-    for (size_t k = 0; k < nvr; k++) if (get_mode(c, vr[k], &value[k]) != RESULT_OK) return fmi2Error;
-    return fmi2OK;
-}
-
-static fmi2Status no_such_type(Instance *c, size_t nvr, const char *type) {
-    return nvr == 0 ? fmi2OK : status(report(c, LOG_ERROR, RESULT_ERROR, "This model has no variables of type %s.",
-        type));
-}
-
-fmi2Status fmi2GetBoolean(fmi2Component component, const fmi2ValueReference vr[], size_t nvr, fmi2Boolean value[]) {
-    ENTER(fmi2GetBoolean, READABLE);
-    (void)vr, (void)value;
-    return no_such_type(c, nvr, "Boolean");
-}
-
-fmi2Status fmi2GetString(fmi2Component component, const fmi2ValueReference vr[], size_t nvr, fmi2String value[]) {
-    ENTER(fmi2GetString, READABLE);
-    (void)vr, (void)value;
-    return no_such_type(c, nvr, "String");
-}
-
-fmi2Status fmi2SetReal(fmi2Component component, const fmi2ValueReference vr[], size_t nvr, const fmi2Real value[]) {
-    ENTER(fmi2SetReal, SETTABLE);
-    NEED(vr, nvr);
-    NEED(value, nvr);
-    for (size_t k = 0; k < nvr; k++) if (set_float(c, vr[k], value[k]) != RESULT_OK) return fmi2Error;
-    return fmi2OK;
-}
-
-fmi2Status fmi2SetInteger(fmi2Component component, const fmi2ValueReference vr[], size_t nvr,
-    const fmi2Integer value[]) {
-    ENTER(fmi2SetInteger, SETTABLE);
-    NEED(vr, nvr);
-    NEED(value, nvr);
-    for (size_t k = 0; k < nvr; k++) if (set_mode(c, vr[k], value[k]) != RESULT_OK) return fmi2Error;
-    return fmi2OK;
-}
-
-fmi2Status fmi2SetBoolean(fmi2Component component, const fmi2ValueReference vr[], size_t nvr,
-    const fmi2Boolean value[]) {
-    ENTER(fmi2SetBoolean, SETTABLE);
-    (void)vr, (void)value;
-    return no_such_type(c, nvr, "Boolean");
-}
-
-fmi2Status fmi2SetString(fmi2Component component, const fmi2ValueReference vr[], size_t nvr, const fmi2String value[]) {
-    ENTER(fmi2SetString, SETTABLE);
-    (void)vr, (void)value;
-    return no_such_type(c, nvr, "String");
-}
-
-fmi2Status fmi2GetDirectionalDerivative(fmi2Component component, const fmi2ValueReference vUnknown_ref[],
-    size_t nUnknown,
-                                        const fmi2ValueReference vKnown_ref[], size_t nKnown,
-                                            const fmi2Real dvKnown[], fmi2Real dvUnknown[]) {
-    ENTER(fmi2GetDirectionalDerivative, PHASE_EVENT | PHASE_CONTINUOUS | PHASE_STEP | PHASE_TERMINATED);
-    NEED(vUnknown_ref, nUnknown);
-    NEED(dvUnknown, nUnknown);
-    NEED(vKnown_ref, nKnown);
-    NEED(dvKnown, nKnown);
-    return status(directional(c, vUnknown_ref, nUnknown, vKnown_ref, nKnown, dvKnown, dvUnknown));
-}
-
-/* ---- copies of the state ---------------------------------------------------------------------------------------- */
-
-fmi2Status fmi2GetFMUstate(fmi2Component component, fmi2FMUstate *FMUstate) {
-    ENTER(fmi2GetFMUstate, ANY_PHASE);
-    NEED(FMUstate, 1);
-    return status(state_copy_out(c, FMUstate));
-}
-
-fmi2Status fmi2SetFMUstate(fmi2Component component, fmi2FMUstate FMUstate) {
-    ENTER(fmi2SetFMUstate, ANY_PHASE);
-    NEED(FMUstate, 1);
-    return status(state_copy_in(c, FMUstate));
-}
-
-fmi2Status fmi2FreeFMUstate(fmi2Component component, fmi2FMUstate *FMUstate) {
-    ENTER(fmi2FreeFMUstate, ANY_PHASE);
-    if (FMUstate != NULL) state_release(c, FMUstate);
-    return fmi2OK;
-}
-
-fmi2Status fmi2SerializedFMUstateSize(fmi2Component component, fmi2FMUstate FMUstate, size_t *size) {
-    ENTER(fmi2SerializedFMUstateSize, ANY_PHASE);
-    NEED(FMUstate, 1);
-    NEED(size, 1);
-    *size = state_size();
-    return fmi2OK;
-}
-
-fmi2Status fmi2SerializeFMUstate(fmi2Component component, fmi2FMUstate FMUstate, fmi2Byte serializedState[],
-    size_t size) {
-    ENTER(fmi2SerializeFMUstate, ANY_PHASE);
-    NEED(FMUstate, 1);
-    NEED(serializedState, 1);
-    return status(state_write(c, FMUstate, (unsigned char *)serializedState, size));
-}
-
-fmi2Status fmi2DeSerializeFMUstate(fmi2Component component, const fmi2Byte serializedState[], size_t size,
-    fmi2FMUstate *FMUstate) {
-    ENTER(fmi2DeSerializeFMUstate, ANY_PHASE);
-    NEED(FMUstate, 1);
-    NEED(serializedState, 1);
-    return status(state_read(c, (const unsigned char *)serializedState, size, FMUstate));
-}
-
 /* ---- Model Exchange --------------------------------------------------------------------------------------------- */
-
-static fmi2Status wrong_size(Instance *c, size_t given, size_t wanted, const char *what) {
-    return status(report(c, LOG_ERROR, RESULT_ERROR, "This model has %zu %s, not %zu.", wanted, what, given));
-}
 
 fmi2Status fmi2EnterEventMode(fmi2Component component) {
     ENTER(fmi2EnterEventMode, PHASE_CONTINUOUS | PHASE_EVENT);
@@ -270,8 +122,7 @@ fmi2Status fmi2EnterContinuousTimeMode(fmi2Component component) {
 }
 
 fmi2Status fmi2CompletedIntegratorStep(fmi2Component component, fmi2Boolean noSetFMUStatePriorToCurrentPoint,
-    fmi2Boolean *enterEventMode,
-                                       fmi2Boolean *terminateSimulation) {
+    fmi2Boolean *enterEventMode, fmi2Boolean *terminateSimulation) {
     unsigned char wanting[AT_LEAST_ONE(N_TRANSITIONS)] = {0};
     ENTER(fmi2CompletedIntegratorStep, PHASE_CONTINUOUS);
     (void)noSetFMUStatePriorToCurrentPoint;
@@ -290,14 +141,14 @@ fmi2Status fmi2SetTime(fmi2Component component, fmi2Real time) {
 
 fmi2Status fmi2SetContinuousStates(fmi2Component component, const fmi2Real x[], size_t nx) {
     ENTER(fmi2SetContinuousStates, PHASE_EVENT | PHASE_CONTINUOUS);
-    if (nx != N_X) return wrong_size(c, nx, N_X, "continuous states");
+    NEED_SIZE(nx, N_X, "continuous states");
     NEED(x, nx);
     return status(set_states(c, x));
 }
 
 fmi2Status fmi2GetDerivatives(fmi2Component component, fmi2Real derivatives[], size_t nx) {
     ENTER(fmi2GetDerivatives, READABLE);
-    if (nx != N_X) return wrong_size(c, nx, N_X, "continuous states");
+    NEED_SIZE(nx, N_X, "continuous states");
     NEED(derivatives, nx);
     if (make_consistent(c) != RESULT_OK) return fmi2Error;
     get_derivatives(c, derivatives);
@@ -306,7 +157,7 @@ fmi2Status fmi2GetDerivatives(fmi2Component component, fmi2Real derivatives[], s
 
 fmi2Status fmi2GetEventIndicators(fmi2Component component, fmi2Real eventIndicators[], size_t ni) {
     ENTER(fmi2GetEventIndicators, READABLE);
-    if (ni != N_GUARDS) return wrong_size(c, ni, N_GUARDS, "event indicators");
+    NEED_SIZE(ni, N_GUARDS, "event indicators");
     NEED(eventIndicators, ni);
     if (make_consistent(c) != RESULT_OK) return fmi2Error;
     get_indicators(c, eventIndicators);
@@ -315,7 +166,7 @@ fmi2Status fmi2GetEventIndicators(fmi2Component component, fmi2Real eventIndicat
 
 fmi2Status fmi2GetContinuousStates(fmi2Component component, fmi2Real x[], size_t nx) {
     ENTER(fmi2GetContinuousStates, READABLE);
-    if (nx != N_X) return wrong_size(c, nx, N_X, "continuous states");
+    NEED_SIZE(nx, N_X, "continuous states");
     NEED(x, nx);
     if (make_consistent(c) != RESULT_OK) return fmi2Error;
     memcpy(x, c->state.x, nx * sizeof(double));
@@ -324,7 +175,7 @@ fmi2Status fmi2GetContinuousStates(fmi2Component component, fmi2Real x[], size_t
 
 fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component component, fmi2Real x_nominal[], size_t nx) {
     ENTER(fmi2GetNominalsOfContinuousStates, ANY_PHASE);
-    if (nx != N_X) return wrong_size(c, nx, N_X, "continuous states");
+    NEED_SIZE(nx, N_X, "continuous states");
     NEED(x_nominal, nx);
     memcpy(x_nominal, model_nominals, nx * sizeof(double));
     return fmi2OK;
@@ -345,8 +196,8 @@ fmi2Status fmi2SetRealInputDerivatives(fmi2Component component, const fmi2ValueR
     return fmi2OK;
 }
 
-fmi2Status fmi2GetRealOutputDerivatives(fmi2Component component, const fmi2ValueReference vr[], size_t nvr,
-    const fmi2Integer order[], fmi2Real value[]) {
+fmi2Status fmi2GetRealOutputDerivatives(
+    fmi2Component component, const fmi2ValueReference vr[], size_t nvr, const fmi2Integer order[], fmi2Real value[]) {
     ENTER(fmi2GetRealOutputDerivatives, PHASE_STEP | PHASE_TERMINATED);
     NEED(vr, nvr);
     NEED(order, nvr);
@@ -373,8 +224,9 @@ fmi2Status fmi2CancelStep(fmi2Component component) {
 }
 
 /* fmi2DoStep is never pending or discarded. */
-static fmi2Status no_status(Instance *c) { return status(report(c, LOG_WARNING, RESULT_DISCARD,
-    "The last step was neither pending nor discarded.")); }
+static fmi2Status no_status(Instance *c) {
+    return status(report(c, LOG_WARNING, RESULT_DISCARD, "The last step was neither pending nor discarded."));
+}
 
 fmi2Status fmi2GetStatus(fmi2Component component, const fmi2StatusKind kind, fmi2Status *value) {
     ENTER(fmi2GetStatus, PHASE_STEP | PHASE_TERMINATED | PHASE_FAILED);

@@ -1,4 +1,4 @@
-/* FMI 3.0: checks every call, then leaves the work to the run-time. */
+/* FMI 3.0, life of an instance and its steps: checks every call, then leaves the work to the run-time. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -9,7 +9,6 @@ static fmi3Status failed(Instance *c) {
     return fmi3Error;
 }
 
-
 static void log_fmi3(const Instance *c, int result, const char *category, const char *message) {
     ((fmi3LogMessageCallback)c->logger)(c->environment, status((Result)result), category, message);
 }
@@ -19,9 +18,8 @@ static void log_fmi3(const Instance *c, int result, const char *category, const 
 const char *fmi3GetVersion(void) { return fmi3Version; }
 
 fmi3Instance fmi3InstantiateModelExchange(fmi3String instanceName, fmi3String instantiationToken,
-    fmi3String resourcePath, fmi3Boolean visible,
-                                          fmi3Boolean loggingOn, fmi3InstanceEnvironment instanceEnvironment,
-                                              fmi3LogMessageCallback logMessage) {
+    fmi3String resourcePath, fmi3Boolean visible, fmi3Boolean loggingOn, fmi3InstanceEnvironment instanceEnvironment,
+    fmi3LogMessageCallback logMessage) {
     (void)resourcePath, (void)visible;
     return instance_new(instanceName, instantiationToken, calloc, free, logMessage ? log_fmi3 : NULL,
         (AnyFunction)logMessage, instanceEnvironment, loggingOn);
@@ -31,21 +29,18 @@ fmi3Instance fmi3InstantiateModelExchange(fmi3String instanceName, fmi3String in
 static double step_finished(Instance *c) {
     fmi3Boolean early = fmi3False;
     fmi3Float64 time = c->state.t;
-    ((fmi3IntermediateUpdateCallback)c->intermediate_update)(c->environment, c->state.t, fmi3False, fmi3True, fmi3True,
-                                                             c->early_return_allowed != 0, &early, &time);
+    ((fmi3IntermediateUpdateCallback)c->intermediate_update)(
+        c->environment, c->state.t, fmi3False, fmi3True, fmi3True, c->early_return_allowed != 0, &early, &time);
     return early && c->early_return_allowed && isfinite(time) ? time : INFINITY;
 }
 
 fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String instantiationToken,
-    fmi3String resourcePath, fmi3Boolean visible,
-                                         fmi3Boolean loggingOn, fmi3Boolean eventModeUsed,
-                                             fmi3Boolean earlyReturnAllowed,
-                                         const fmi3ValueReference requiredIntermediateVariables[],
-                                             size_t nRequiredIntermediateVariables,
-                                         fmi3InstanceEnvironment instanceEnvironment, fmi3LogMessageCallback logMessage,
-                                         fmi3IntermediateUpdateCallback intermediateUpdate) {
-    Instance *c = fmi3InstantiateModelExchange(instanceName, instantiationToken, resourcePath, visible, loggingOn,
-        instanceEnvironment, logMessage);
+    fmi3String resourcePath, fmi3Boolean visible, fmi3Boolean loggingOn, fmi3Boolean eventModeUsed,
+    fmi3Boolean earlyReturnAllowed, const fmi3ValueReference requiredIntermediateVariables[],
+    size_t nRequiredIntermediateVariables, fmi3InstanceEnvironment instanceEnvironment,
+    fmi3LogMessageCallback logMessage, fmi3IntermediateUpdateCallback intermediateUpdate) {
+    Instance *c = fmi3InstantiateModelExchange(
+        instanceName, instantiationToken, resourcePath, visible, loggingOn, instanceEnvironment, logMessage);
     (void)requiredIntermediateVariables, (void)nRequiredIntermediateVariables;
     if (c == NULL) return NULL;
     c->co_simulation = 1;
@@ -57,16 +52,14 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String ins
 }
 
 fmi3Instance fmi3InstantiateScheduledExecution(fmi3String instanceName, fmi3String instantiationToken,
-    fmi3String resourcePath, fmi3Boolean visible,
-                                               fmi3Boolean loggingOn, fmi3InstanceEnvironment instanceEnvironment,
-                                                   fmi3LogMessageCallback logMessage,
-                                               fmi3ClockUpdateCallback clockUpdate, fmi3LockPreemptionCallback lockPreemption,
-                                               fmi3UnlockPreemptionCallback unlockPreemption) {
+    fmi3String resourcePath, fmi3Boolean visible, fmi3Boolean loggingOn, fmi3InstanceEnvironment instanceEnvironment,
+    fmi3LogMessageCallback logMessage, fmi3ClockUpdateCallback clockUpdate, fmi3LockPreemptionCallback lockPreemption,
+    fmi3UnlockPreemptionCallback unlockPreemption) {
     (void)instantiationToken, (void)resourcePath, (void)visible, (void)loggingOn, (void)clockUpdate,
         (void)lockPreemption, (void)unlockPreemption;
     (void)instanceName;
-    if (logMessage != NULL) logMessage(instanceEnvironment, fmi3Error, "logStatusError",
-        "This model has no scheduled execution.");
+    if (logMessage != NULL)
+        logMessage(instanceEnvironment, fmi3Error, "logStatusError", "This model has no scheduled execution.");
     return NULL;
 }
 
@@ -74,8 +67,8 @@ void fmi3FreeInstance(fmi3Instance instance) {
     if (instance != NULL) instance_free(instance);
 }
 
-fmi3Status fmi3SetDebugLogging(fmi3Instance instance, fmi3Boolean loggingOn, size_t nCategories,
-    const fmi3String categories[]) {
+fmi3Status fmi3SetDebugLogging(
+    fmi3Instance instance, fmi3Boolean loggingOn, size_t nCategories, const fmi3String categories[]) {
     Result result = RESULT_OK;
     ENTER(fmi3SetDebugLogging, ANY_PHASE);
     NEED(categories, nCategories);
@@ -86,11 +79,10 @@ fmi3Status fmi3SetDebugLogging(fmi3Instance instance, fmi3Boolean loggingOn, siz
 }
 
 fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean toleranceDefined, fmi3Float64 tolerance,
-    fmi3Float64 startTime,
-                                       fmi3Boolean stopTimeDefined, fmi3Float64 stopTime) {
+    fmi3Float64 startTime, fmi3Boolean stopTimeDefined, fmi3Float64 stopTime) {
     ENTER(fmi3EnterInitializationMode, PHASE_INSTANTIATED);
-    if (set_experiment(c, toleranceDefined, tolerance, startTime, stopTimeDefined,
-        stopTime) != RESULT_OK) return fmi3Error;
+    if (set_experiment(c, toleranceDefined, tolerance, startTime, stopTimeDefined, stopTime) != RESULT_OK)
+        return fmi3Error;
     c->state.phase = PHASE_INITIALIZATION;
     return fmi3OK;
 }
@@ -128,163 +120,12 @@ fmi3Status fmi3Reset(fmi3Instance instance) {
     return fmi3OK;
 }
 
-/* ---- values ----------------------------------------------------------------------------------------------------- */
-
-fmi3Status fmi3GetFloat64(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
-    fmi3Float64 values[], size_t nValues) {
-    ENTER(fmi3GetFloat64, READABLE);
-    NEED_SIZE(nValues, nValueReferences, "values");
-    NEED(valueReferences, nValues);
-    NEED(values, nValues);
-    for (size_t k = 0; k < nValues; k++) if (get_float(c, valueReferences[k],
-        &values[k]) != RESULT_OK) return fmi3Error;
-    return fmi3OK;
-}
-
-fmi3Status fmi3GetInt64(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
-    fmi3Int64 values[], size_t nValues) {
-    ENTER(fmi3GetInt64, READABLE);
-    NEED_SIZE(nValues, nValueReferences, "values");
-    NEED(valueReferences, nValues);
-    NEED(values, nValues);
-    for (size_t k = 0; k < nValues; k++) {
-        int mode;
-        if (get_mode(c, valueReferences[k], &mode) != RESULT_OK) return fmi3Error;
-        values[k] = mode;
-    }
-    return fmi3OK;
-}
-
-fmi3Status fmi3SetFloat64(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
-    const fmi3Float64 values[], size_t nValues) {
-    ENTER(fmi3SetFloat64, SETTABLE);
-    NEED_SIZE(nValues, nValueReferences, "values");
-    NEED(valueReferences, nValues);
-    NEED(values, nValues);
-    for (size_t k = 0; k < nValues; k++) if (set_float(c, valueReferences[k], values[k]) != RESULT_OK) return fmi3Error;
-    return fmi3OK;
-}
-
-fmi3Status fmi3SetInt64(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
-    const fmi3Int64 values[], size_t nValues) {
-    ENTER(fmi3SetInt64, SETTABLE);
-    NEED_SIZE(nValues, nValueReferences, "values");
-    NEED(valueReferences, nValues);
-    NEED(values, nValues);
-    for (size_t k = 0; k < nValues; k++) if (set_mode(c, valueReferences[k], values[k]) != RESULT_OK) return fmi3Error;
-    return fmi3OK;
-}
-
-/* ---- dependencies and derivatives ------------------------------------------------------------------------------- */
-
-fmi3Status fmi3GetNumberOfVariableDependencies(fmi3Instance instance, fmi3ValueReference valueReference,
-    size_t *nDependencies) {
-    Result result;
-    ENTER(fmi3GetNumberOfVariableDependencies, ANY_PHASE);
-    NEED(nDependencies, 1);
-    *nDependencies = dependencies(c, valueReference, NULL, 0, &result);
-    return status(result);
-}
-
-fmi3Status fmi3GetVariableDependencies(fmi3Instance instance, fmi3ValueReference dependent,
-    size_t elementIndicesOfDependent[],
-                                       fmi3ValueReference independents[], size_t elementIndicesOfIndependents[],
-                                       fmi3DependencyKind dependencyKinds[], size_t nDependencies) {
-    Result result;
-    size_t count;
-    ENTER(fmi3GetVariableDependencies, ANY_PHASE);
-    NEED(elementIndicesOfDependent, nDependencies);
-    NEED(independents, nDependencies);
-    NEED(elementIndicesOfIndependents, nDependencies);
-    NEED(dependencyKinds, nDependencies);
-    count = dependencies(c, dependent, independents, nDependencies, &result);
-    if (result != RESULT_OK) return fmi3Error;
-    NEED_SIZE(nDependencies, count, "dependencies");
-    for (size_t k = 0; k < count; k++) {
-        elementIndicesOfDependent[k] = elementIndicesOfIndependents[k] = 0;    /* 0: the whole variable */
-        dependencyKinds[k] = fmi3Dependent;
-    }
-    return fmi3OK;
-}
-
-fmi3Status fmi3GetDirectionalDerivative(fmi3Instance instance, const fmi3ValueReference unknowns[], size_t nUnknowns,
-    const fmi3ValueReference knowns[],
-                                        size_t nKnowns, const fmi3Float64 seed[], size_t nSeed,
-                                            fmi3Float64 sensitivity[], size_t nSensitivity) {
-    ENTER(fmi3GetDirectionalDerivative, PHASE_EVENT | PHASE_CONTINUOUS | PHASE_STEP | PHASE_TERMINATED);
-    NEED_SIZE(nSeed, nKnowns, "seeds, one per known");
-    NEED_SIZE(nSensitivity, nUnknowns, "sensitivities, one per unknown");
-    NEED(unknowns, nUnknowns);
-    NEED(knowns, nKnowns);
-    NEED(seed, nSeed);
-    NEED(sensitivity, nSensitivity);
-    return status(directional(c, unknowns, nUnknowns, knowns, nKnowns, seed, sensitivity));
-}
-
-fmi3Status fmi3GetAdjointDerivative(fmi3Instance instance, const fmi3ValueReference unknowns[], size_t nUnknowns,
-    const fmi3ValueReference knowns[],
-                                    size_t nKnowns, const fmi3Float64 seed[], size_t nSeed, fmi3Float64 sensitivity[],
-                                        size_t nSensitivity) {
-    ENTER(fmi3GetAdjointDerivative, PHASE_EVENT | PHASE_CONTINUOUS | PHASE_STEP | PHASE_TERMINATED);
-    NEED_SIZE(nSeed, nUnknowns, "seeds, one per unknown");
-    NEED_SIZE(nSensitivity, nKnowns, "sensitivities, one per known");
-    NEED(unknowns, nUnknowns);
-    NEED(knowns, nKnowns);
-    NEED(seed, nSeed);
-    NEED(sensitivity, nSensitivity);
-    return status(adjoint(c, unknowns, nUnknowns, knowns, nKnowns, seed, sensitivity));
-}
-
-/* ---- copies of the state ---------------------------------------------------------------------------------------- */
-
-fmi3Status fmi3GetFMUState(fmi3Instance instance, fmi3FMUState *FMUState) {
-    ENTER(fmi3GetFMUState, ANY_PHASE);
-    NEED(FMUState, 1);
-    return status(state_copy_out(c, FMUState));
-}
-
-fmi3Status fmi3SetFMUState(fmi3Instance instance, fmi3FMUState FMUState) {
-    ENTER(fmi3SetFMUState, ANY_PHASE);
-    NEED(FMUState, 1);
-    return status(state_copy_in(c, FMUState));
-}
-
-fmi3Status fmi3FreeFMUState(fmi3Instance instance, fmi3FMUState *FMUState) {
-    ENTER(fmi3FreeFMUState, ANY_PHASE);
-    if (FMUState != NULL) state_release(c, FMUState);
-    return fmi3OK;
-}
-
-fmi3Status fmi3SerializedFMUStateSize(fmi3Instance instance, fmi3FMUState FMUState, size_t *size) {
-    ENTER(fmi3SerializedFMUStateSize, ANY_PHASE);
-    NEED(FMUState, 1);
-    NEED(size, 1);
-    *size = state_size();
-    return fmi3OK;
-}
-
-fmi3Status fmi3SerializeFMUState(fmi3Instance instance, fmi3FMUState FMUState, fmi3Byte serializedState[],
-    size_t size) {
-    ENTER(fmi3SerializeFMUState, ANY_PHASE);
-    NEED(FMUState, 1);
-    NEED(serializedState, 1);
-    return status(state_write(c, FMUState, serializedState, size));
-}
-
-fmi3Status fmi3DeserializeFMUState(fmi3Instance instance, const fmi3Byte serializedState[], size_t size,
-    fmi3FMUState *FMUState) {
-    ENTER(fmi3DeserializeFMUState, ANY_PHASE);
-    NEED(FMUState, 1);
-    NEED(serializedState, 1);
-    return status(state_read(c, serializedState, size, FMUState));
-}
-
 /* ---- events ----------------------------------------------------------------------------------------------------- */
 
 fmi3Status fmi3EnterEventMode(fmi3Instance instance) {
     ENTER(fmi3EnterEventMode, PHASE_CONTINUOUS | PHASE_STEP);
-    if (c->co_simulation && !c->event_mode_used) return refuse(c,
-        "fmi3EnterEventMode: this instance was made with eventModeUsed = false.");
+    if (c->co_simulation && !c->event_mode_used)
+        return refuse(c, "fmi3EnterEventMode: this instance was made with eventModeUsed = false.");
     c->state.phase = PHASE_EVENT;
     return fmi3OK;
 }
@@ -295,10 +136,8 @@ fmi3Status fmi3EvaluateDiscreteStates(fmi3Instance instance) {
 }
 
 fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discreteStatesNeedUpdate,
-    fmi3Boolean *terminateSimulation,
-                                    fmi3Boolean *nominalsOfContinuousStatesChanged,
-                                        fmi3Boolean *valuesOfContinuousStatesChanged,
-                                    fmi3Boolean *nextEventTimeDefined, fmi3Float64 *nextEventTime) {
+    fmi3Boolean *terminateSimulation, fmi3Boolean *nominalsOfContinuousStatesChanged,
+    fmi3Boolean *valuesOfContinuousStatesChanged, fmi3Boolean *nextEventTimeDefined, fmi3Float64 *nextEventTime) {
     double before[AT_LEAST_ONE(N_X)], next;
     ENTER(fmi3UpdateDiscreteStates, PHASE_EVENT);
     NEED(discreteStatesNeedUpdate, 1);
@@ -327,8 +166,7 @@ fmi3Status fmi3EnterContinuousTimeMode(fmi3Instance instance) {
 }
 
 fmi3Status fmi3CompletedIntegratorStep(fmi3Instance instance, fmi3Boolean noSetFMUStatePriorToCurrentPoint,
-    fmi3Boolean *enterEventMode,
-                                       fmi3Boolean *terminateSimulation) {
+    fmi3Boolean *enterEventMode, fmi3Boolean *terminateSimulation) {
     unsigned char wanting[AT_LEAST_ONE(N_TRANSITIONS)] = {0};
     ENTER(fmi3CompletedIntegratorStep, PHASE_CONTINUOUS);
     (void)noSetFMUStatePriorToCurrentPoint;
@@ -345,29 +183,29 @@ fmi3Status fmi3SetTime(fmi3Instance instance, fmi3Float64 time) {
     return status(set_time(c, time));
 }
 
-fmi3Status fmi3SetContinuousStates(fmi3Instance instance, const fmi3Float64 continuousStates[],
-    size_t nContinuousStates) {
+fmi3Status fmi3SetContinuousStates(
+    fmi3Instance instance, const fmi3Float64 continuousStates[], size_t nContinuousStates) {
     ENTER(fmi3SetContinuousStates, PHASE_EVENT | PHASE_CONTINUOUS);
     NEED_SIZE(nContinuousStates, N_X, "continuous states");
     NEED(continuousStates, nContinuousStates);
     return status(set_states(c, continuousStates));
 }
 
-#define GET_ALL(name, phases, count, what, action)              \
+#define GET_ALL(name, phases, count, what, action)                           \
     fmi3Status name(fmi3Instance instance, fmi3Float64 values[], size_t n) { \
-        ENTER(name, phases);                                    \
-        NEED_SIZE(n, count, what);                              \
-        NEED(values, n);                                        \
-        if (make_consistent(c) != RESULT_OK) return fmi3Error;  \
-        action;                                                 \
-        return fmi3OK;                                          \
+        ENTER(name, phases);                                                 \
+        NEED_SIZE(n, count, what);                                           \
+        NEED(values, n);                                                     \
+        if (make_consistent(c) != RESULT_OK) return fmi3Error;               \
+        action;                                                              \
+        return fmi3OK;                                                       \
     }
 
 GET_ALL(fmi3GetContinuousStateDerivatives, READABLE, N_X, "continuous states", get_derivatives(c, values))
 GET_ALL(fmi3GetEventIndicators, READABLE, N_GUARDS, "event indicators", get_indicators(c, values))
 GET_ALL(fmi3GetContinuousStates, READABLE, N_X, "continuous states", memcpy(values, c->state.x, N_X * sizeof(double)))
-GET_ALL(fmi3GetNominalsOfContinuousStates, READABLE, N_X, "continuous states", memcpy(values, model_nominals,
-    N_X * sizeof(double)))
+GET_ALL(fmi3GetNominalsOfContinuousStates, READABLE, N_X, "continuous states",
+    memcpy(values, model_nominals, N_X * sizeof(double)))
 
 fmi3Status fmi3GetNumberOfEventIndicators(fmi3Instance instance, size_t *nEventIndicators) {
     ENTER(fmi3GetNumberOfEventIndicators, ANY_PHASE);
@@ -393,8 +231,7 @@ fmi3Status fmi3EnterStepMode(fmi3Instance instance) {
 }
 
 fmi3Status fmi3GetOutputDerivatives(fmi3Instance instance, const fmi3ValueReference valueReferences[],
-    size_t nValueReferences, const fmi3Int32 orders[],
-                                    fmi3Float64 values[], size_t nValues) {
+    size_t nValueReferences, const fmi3Int32 orders[], fmi3Float64 values[], size_t nValues) {
     ENTER(fmi3GetOutputDerivatives, PHASE_STEP | PHASE_TERMINATED);
     NEED_SIZE(nValues, nValueReferences, "values");
     NEED(valueReferences, nValues);
@@ -408,9 +245,8 @@ fmi3Status fmi3GetOutputDerivatives(fmi3Instance instance, const fmi3ValueRefere
 }
 
 fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoint, fmi3Float64 communicationStepSize,
-                      fmi3Boolean noSetFMUStatePriorToCurrentPoint, fmi3Boolean *eventHandlingNeeded,
-                          fmi3Boolean *terminateSimulation,
-                      fmi3Boolean *earlyReturn, fmi3Float64 *lastSuccessfulTime) {
+    fmi3Boolean noSetFMUStatePriorToCurrentPoint, fmi3Boolean *eventHandlingNeeded, fmi3Boolean *terminateSimulation,
+    fmi3Boolean *earlyReturn, fmi3Float64 *lastSuccessfulTime) {
     double target;
     Arrival arrival;
     ENTER(fmi3DoStep, PHASE_STEP);

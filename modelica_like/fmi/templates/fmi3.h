@@ -11,8 +11,8 @@
 #define ANY_PHASE (~0)
 
 /* Refuses calls without an instance, or in a state in which the standard does not allow them. */
-#define ENTER(name, phases)    \
-    Instance *c = instance;    \
+#define ENTER(name, phases) \
+    Instance *c = instance; \
     if (c == NULL || allowed(c, #name, phases) != RESULT_OK) return fmi3Error
 
 /* Refuses arguments. */

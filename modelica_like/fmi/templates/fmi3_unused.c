@@ -1,10 +1,11 @@
-/* FMI 3.0 functions for types, clocks and partitions that no model has: they refuse every call that asks for something. */
+/* FMI 3.0 functions for types, clocks and partitions that no model has: they refuse every call that asks for something.
+ */
 #include "fmi3.h"
 
 #define REFERENCES fmi3Instance instance, const fmi3ValueReference r[], size_t n
-#define UNLESS_EMPTY(name, phases, why)  \
-    ENTER(name, phases);                 \
-    (void)r;                             \
+#define UNLESS_EMPTY(name, phases, why) \
+    ENTER(name, phases);                \
+    (void)r;                            \
     return n == 0 ? fmi3OK : refuse(c, why)
 
 /* Types that no variable of this model has. */
@@ -40,14 +41,14 @@ fmi3Status fmi3SetBinary(REFERENCES, const size_t sizes[], const fmi3Binary valu
 }
 
 /* Functions of clocks: one array of values, or two. */
-#define CLOCK_VALUES(name, type)                               \
-    fmi3Status name(REFERENCES, type values[]) {               \
-        (void)values;                                          \
+#define CLOCK_VALUES(name, type)                                    \
+    fmi3Status name(REFERENCES, type values[]) {                    \
+        (void)values;                                               \
         UNLESS_EMPTY(name, ANY_PHASE, "This model has no clocks."); \
     }
-#define CLOCK_PAIRS(name, type, other)                         \
-    fmi3Status name(REFERENCES, type values[], other more[]) { \
-        (void)values, (void)more;                              \
+#define CLOCK_PAIRS(name, type, other)                              \
+    fmi3Status name(REFERENCES, type values[], other more[]) {      \
+        (void)values, (void)more;                                   \
         UNLESS_EMPTY(name, ANY_PHASE, "This model has no clocks."); \
     }
 
@@ -61,14 +62,14 @@ CLOCK_PAIRS(fmi3GetShiftFraction, fmi3UInt64, fmi3UInt64)
 CLOCK_PAIRS(fmi3SetShiftFraction, const fmi3UInt64, const fmi3UInt64)
 CLOCK_PAIRS(fmi3SetIntervalFraction, const fmi3UInt64, const fmi3UInt64)
 
-fmi3Status fmi3GetIntervalFraction(REFERENCES, fmi3UInt64 counters[], fmi3UInt64 resolutions[],
-                                   fmi3IntervalQualifier qualifiers[]) {
+fmi3Status fmi3GetIntervalFraction(
+    REFERENCES, fmi3UInt64 counters[], fmi3UInt64 resolutions[], fmi3IntervalQualifier qualifiers[]) {
     (void)counters, (void)resolutions, (void)qualifiers;
     UNLESS_EMPTY(fmi3GetIntervalFraction, ANY_PHASE, "This model has no clocks.");
 }
 
-fmi3Status fmi3ActivateModelPartition(fmi3Instance instance, fmi3ValueReference clockReference,
-    fmi3Float64 activationTime) {
+fmi3Status fmi3ActivateModelPartition(
+    fmi3Instance instance, fmi3ValueReference clockReference, fmi3Float64 activationTime) {
     ENTER(fmi3ActivateModelPartition, ANY_PHASE);
     (void)clockReference, (void)activationTime;
     return refuse(c, "This model has no scheduled execution.");

@@ -8,9 +8,14 @@
 
 #define MESSAGE_LENGTH 512
 
-static const struct { LogCategory category; const char *name; } categories[] = {
-    {LOG_ERROR, "logStatusError"}, {LOG_WARNING, "logStatusWarning"}, {LOG_EVENTS, "logEvents"}, {LOG_INTEGRATOR,
-        "logIntegrator"},
+static const struct {
+    LogCategory category;
+    const char *name;
+} categories[] = {
+    {LOG_ERROR, "logStatusError"},
+    {LOG_WARNING, "logStatusWarning"},
+    {LOG_EVENTS, "logEvents"},
+    {LOG_INTEGRATOR, "logIntegrator"},
 };
 enum { N_CATEGORIES = sizeof categories / sizeof categories[0] };
 
@@ -25,7 +30,8 @@ Result report(Instance *c, LogCategory category, Result result, const char *form
     va_start(arguments, format);
     vsnprintf(message, sizeof message, format, arguments);
     va_end(arguments);
-    for (int k = 0; k < N_CATEGORIES; k++) if (categories[k].category == category) name = categories[k].name;
+    for (int k = 0; k < N_CATEGORIES; k++)
+        if (categories[k].category == category) name = categories[k].name;
     c->log(c, (int)result, name, message);
     return result;
 }
@@ -33,8 +39,9 @@ Result report(Instance *c, LogCategory category, Result result, const char *form
 Result set_log_category(Instance *c, const char *category, int on) {
     unsigned chosen = 0;
     if (category == NULL || strcmp(category, "logAll") == 0) chosen = LOG_ALL;
-    else for (int k = 0; k < N_CATEGORIES; k++) if (strcmp(category,
-        categories[k].name) == 0) chosen = categories[k].category;
+    else
+        for (int k = 0; k < N_CATEGORIES; k++)
+            if (strcmp(category, categories[k].name) == 0) chosen = categories[k].category;
     if (chosen == 0) return report(c, LOG_ERROR, RESULT_ERROR, "There is no log category '%.100s'.", category);
     c->log_enabled = on ? c->log_enabled | chosen : c->log_enabled & ~chosen;
     return RESULT_OK;
@@ -65,20 +72,33 @@ static size_t larger(size_t a, size_t b) { return a > b ? a : b; }
 /* Lays all work arrays out in one block; with memory == NULL only measures it. */
 static size_t lay_out(Work *w, double *memory) {
     size_t used = 0, small = larger(larger(N_GUARDS, N_MOMENTS), larger(larger(N_START_MODES, N_D), N_DERIVED));
-    size_t qr_v = larger((size_t)pattern_step.n_v, (size_t)pattern_start.n_v), qr_r = larger((size_t)pattern_step.n_r,
-        (size_t)pattern_start.n_r);
+    size_t qr_v = larger((size_t)pattern_step.n_v, (size_t)pattern_start.n_v),
+           qr_r = larger((size_t)pattern_step.n_r, (size_t)pattern_start.n_r);
     size_t rows = larger((size_t)pattern_step.size, (size_t)pattern_start.size);
     size_t square = larger(START_STEADY ? (size_t)(N_STEADY + N_Z) * (N_STEADY + N_Z) : 0, (size_t)N_RESETS * N_X);
-    struct { double **array; size_t size; } arrays[] = {
-        {&w->slots, N_SLOTS}, {&w->dots, N_SLOTS}, {&w->jacobian, larger(N_JACOBIAN, N_START_JACOBIAN)},
-        {&w->matrix, (size_t)pattern_step.n_nonzeros}, {&w->qr_v, qr_v}, {&w->qr_r, qr_r}, {&w->qr_beta, rows},
-            {&w->qr_work, rows},
-        {&w->stages, 9 * (size_t)AT_LEAST_ONE(N_UNKNOWNS)}, {&w->point, N_UNKNOWNS}, {&w->variables, N_NODES},
-            {&w->guards, small},
-        {&w->guards_before, 9 * (size_t)N_GUARDS}, {&w->rhs, larger(N_UNKNOWNS, N_DETERMINANTS)}, {&w->dense_matrix,
-            (size_t)N_Z * N_Z},
-        {&w->square, square}, {&w->vector, N_UNKNOWNS + (size_t)N_Z}, {&w->start_unknowns, N_START_UNKNOWNS},
-            {&w->start_values, N_STARTS},
+    struct {
+        double **array;
+        size_t size;
+    } arrays[] = {
+        {&w->slots, N_SLOTS},
+        {&w->dots, N_SLOTS},
+        {&w->jacobian, larger(N_JACOBIAN, N_START_JACOBIAN)},
+        {&w->matrix, (size_t)pattern_step.n_nonzeros},
+        {&w->qr_v, qr_v},
+        {&w->qr_r, qr_r},
+        {&w->qr_beta, rows},
+        {&w->qr_work, rows},
+        {&w->stages, 9 * (size_t)AT_LEAST_ONE(N_UNKNOWNS)},
+        {&w->point, N_UNKNOWNS},
+        {&w->variables, N_NODES},
+        {&w->guards, small},
+        {&w->guards_before, 9 * (size_t)N_GUARDS},
+        {&w->rhs, larger(N_UNKNOWNS, N_DETERMINANTS)},
+        {&w->dense_matrix, (size_t)N_Z * N_Z},
+        {&w->square, square},
+        {&w->vector, N_UNKNOWNS + (size_t)N_Z},
+        {&w->start_unknowns, N_START_UNKNOWNS},
+        {&w->start_values, N_STARTS},
         {&w->start_residual, larger(N_START_VALUES, N_RESETS)},
     };
     for (size_t k = 0; k < sizeof arrays / sizeof arrays[0]; k++) {
@@ -97,9 +117,8 @@ void instance_reset(Instance *c) {
     start_defaults(c);
 }
 
-Instance *instance_new(const char *name, const char *token, void *(*allocate)(size_t, size_t),
-    void (*release)(void *), LogFunction log,
-                       AnyFunction logger, void *environment, int logging) {
+Instance *instance_new(const char *name, const char *token, void *(*allocate)(size_t, size_t), void (*release)(void *),
+    LogFunction log, AnyFunction logger, void *environment, int logging) {
     Instance bare = {0}, *c;
     size_t length = name == NULL ? 0 : strlen(name);
     bare.log = log;
@@ -143,8 +162,8 @@ void instance_free(Instance *c) {
     release(c);
 }
 
-Result set_experiment(Instance *c, int tolerance_defined, double tolerance, double start, int stop_defined,
-    double stop) {
+Result set_experiment(
+    Instance *c, int tolerance_defined, double tolerance, double start, int stop_defined, double stop) {
     State *s = &c->state;
     if (!isfinite(start) || (stop_defined && !(stop >= start)))
         return report(c, LOG_ERROR, RESULT_ERROR,
@@ -165,7 +184,7 @@ typedef struct {
     uint64_t size, model, check;
 } Header;
 
-static uint64_t hash(const unsigned char *bytes, size_t size) {    /* FNV-1a */
+static uint64_t hash(const unsigned char *bytes, size_t size) { /* FNV-1a */
     uint64_t value = 14695981039346656037u;
     for (size_t k = 0; k < size; k++) value = (value ^ bytes[k]) * 1099511628211u;
     return value;
@@ -200,8 +219,8 @@ size_t state_size(void) { return sizeof(Header) + sizeof(State); }
 
 Result state_write(Instance *c, const void *copy, unsigned char *bytes, size_t size) {
     Header h = header_of(copy);
-    if (size < state_size()) return report(c, LOG_ERROR, RESULT_ERROR, "The state needs %zu bytes, not %zu.",
-        state_size(), size);
+    if (size < state_size())
+        return report(c, LOG_ERROR, RESULT_ERROR, "The state needs %zu bytes, not %zu.", state_size(), size);
     memcpy(bytes, &h, sizeof h);
     memcpy(bytes + sizeof h, copy, sizeof(State));
     return RESULT_OK;
@@ -210,8 +229,8 @@ Result state_write(Instance *c, const void *copy, unsigned char *bytes, size_t s
 Result state_read(Instance *c, const unsigned char *bytes, size_t size, void **copy) {
     Header h, expected;
     State s;
-    if (size != state_size()) return report(c, LOG_ERROR, RESULT_ERROR,
-        "A state of this model has %zu bytes, not %zu.", state_size(), size);
+    if (size != state_size())
+        return report(c, LOG_ERROR, RESULT_ERROR, "A state of this model has %zu bytes, not %zu.", state_size(), size);
     memcpy(&h, bytes, sizeof h);
     memcpy(&s, bytes + sizeof h, sizeof s);
     expected = header_of(&s);

@@ -7,16 +7,16 @@
 #include <string.h>
 #include "core.h"
 
-#define LOOKS 3                     /* looks at the guards per step */
+#define LOOKS 3 /* looks at the guards per step */
 #define LOCATED 1e-13
 #define MAX_TRIALS 60
 #define MAX_REJECTIONS 60
-#define TIME_RESOLUTION 1e-10       /* as in guards_soon */
+#define TIME_RESOLUTION 1e-10 /* as in guards_soon */
 #define NEAR 0.1
-#define SAME_POINT 1e-9            /* rounding of the importer's communication points */
-#define LEAST_LOOKS 500             /* steps per run, where guards could hide between longer ones */
+#define SAME_POINT 1e-9 /* rounding of the importer's communication points */
+#define LEAST_LOOKS 500 /* steps per run, where guards could hide between longer ones */
 
-typedef struct {                    /* guards and their rates at a time within a step */
+typedef struct { /* guards and their rates at a time within a step */
     double t, *values, *rates;
 } Look;
 
@@ -60,12 +60,16 @@ static double cubic_guess(double g0, double r0, double g1, double r1) {
     double best = -INFINITY, place = 0.5;
     for (int k = 1; k <= 40; k++) {
         double value = cubic(k / 40.0, g0, r0, g1, r1);
-        if (value > best) { best = value; place = k / 40.0; }
+        if (value > best) {
+            best = value;
+            place = k / 40.0;
+        }
         if (value > 0) {
             double low = (k - 1) / 40.0, high = k / 40.0;
             for (int n = 0; n < 30; n++) {
                 double middle = 0.5 * (low + high);
-                if (cubic(middle, g0, r0, g1, r1) > 0) high = middle; else low = middle;
+                if (cubic(middle, g0, r0, g1, r1) > 0) high = middle;
+                else low = middle;
             }
             return high;
         }
@@ -106,13 +110,14 @@ static int trial(Instance *c, const Piece *whole, double t, Piece *piece, Look *
 
 static double newton(const Look *look, const unsigned char *kinds) {
     double step = INFINITY;
-    for (int g = 0; g < N_GUARDS; g++) if (kinds[g] != QUIET && look->rates[g] > 0) step = fmin(step,
-        -look->values[g] / look->rates[g]);
+    for (int g = 0; g < N_GUARDS; g++)
+        if (kinds[g] != QUIET && look->rates[g] > 0) step = fmin(step, -look->values[g] / look->rates[g]);
     return step;
 }
 
 static int any_positive(const Look *look, const unsigned char *kinds) {
-    for (int g = 0; g < N_GUARDS; g++) if (kinds[g] != QUIET && look->values[g] > 0) return 1;
+    for (int g = 0; g < N_GUARDS; g++)
+        if (kinds[g] != QUIET && look->values[g] > 0) return 1;
     return 0;
 }
 
@@ -125,8 +130,12 @@ static int positive_top(Instance *c, const Piece *whole, const Look *before, con
         t = low + h * cubic_guess(before->values[g], before->rates[g] * h, after->values[g], after->rates[g] * h);
         for (int n = 0; n < MAX_TRIALS; n++) {
             if (!trial(c, whole, t, piece, look)) return 0;
-            if (look->values[g] > 0) { *time = t; return 1; }
-            if (look->rates[g] > 0) low = t; else high = t;
+            if (look->values[g] > 0) {
+                *time = t;
+                return 1;
+            }
+            if (look->rates[g] > 0) low = t;
+            else high = t;
             if (look->values[g] + fabs(look->rates[g]) * (high - low) < 0 || high - low < 1e-12) break;
             t = 0.5 * (low + high);
         }
@@ -145,12 +154,13 @@ static int locate(Instance *c, const Piece *whole, const Look *before, const Loo
     for (int g = 0; g < N_GUARDS; g++)
         if (kinds[g] != QUIET)
             t = fmin(t, before->t + h * cubic_guess(before->values[g], before->rates[g] * h, after->values[g],
-                after->rates[g] * h));
+                                            after->rates[g] * h));
     t = fmin(t, high);
     for (int n = 0; n < MAX_TRIALS; n++) {
         double step;
         if (!trial(c, whole, t, piece, look)) return 0;
-        if (any_positive(look, kinds)) high = t; else low = t;
+        if (any_positive(look, kinds)) high = t;
+        else low = t;
         step = newton(look, kinds);
         if (fabs(step) <= tolerance) return 1;
         if (high - low <= tolerance) break;
@@ -160,8 +170,8 @@ static int locate(Instance *c, const Piece *whole, const Look *before, const Loo
 }
 
 /* Which of the located guards want to fire. */
-static int mark_wanting(Instance *c, const Piece *piece, const Look *look, const unsigned char *kinds,
-    double tolerance) {
+static int mark_wanting(
+    Instance *c, const Piece *piece, const Look *look, const unsigned char *kinds, double tolerance) {
     State *s = &c->state;
     double *soon = look->values + 2 * (size_t)N_GUARDS;
     int any = 0;
@@ -174,12 +184,13 @@ static int mark_wanting(Instance *c, const Piece *piece, const Look *look, const
 }
 
 /* Go on by the time resolution; what crossed and is still positive there wants to fire, else the search begins anew. */
-static int look_behind(Instance *c, const Piece *whole, double end, const unsigned char *kinds, Piece *piece,
-    Look *look) {
+static int look_behind(
+    Instance *c, const Piece *whole, double end, const unsigned char *kinds, Piece *piece, Look *look) {
     double behind = fmin(piece->end + TIME_RESOLUTION * fmax(1, fabs(piece->end)), end);
     if (!trial(c, whole, behind, piece, look)) return 0;
-    for (int g = 0; g < N_GUARDS; g++) if (kinds[g] == CROSSING
-        && look->values[g] > 0) c->state.event_pending = c->state.wanting[model_guard_transition[g]] = 1;
+    for (int g = 0; g < N_GUARDS; g++)
+        if (kinds[g] == CROSSING && look->values[g] > 0)
+            c->state.event_pending = c->state.wanting[model_guard_transition[g]] = 1;
     return 1;
 }
 
@@ -187,8 +198,8 @@ static int look_behind(Instance *c, const Piece *whole, double end, const unsign
 static int search_events(Instance *c) {
     State *s = &c->state;
     double *memory = c->work.guards_before, *point = c->work.vector + N_Z, t0 = s->piece.begin;
-    Look before = {0, memory, NULL}, after = {0, memory + 3 * (size_t)N_GUARDS, NULL}, found = {0,
-        memory + 6 * (size_t)N_GUARDS, NULL};
+    Look before = {0, memory, NULL}, after = {0, memory + 3 * (size_t)N_GUARDS, NULL},
+         found = {0, memory + 6 * (size_t)N_GUARDS, NULL};
     unsigned char kinds[AT_LEAST_ONE(N_GUARDS)];
     Piece whole = s->piece, *piece = &s->piece;
     memcpy(point, whole.first, sizeof(double) * N_UNKNOWNS);
@@ -257,8 +268,8 @@ static Result take_step(Instance *c, double limit) {
             wished = h * fmax(0.1, factor);
             continue;
         }
-        if (solve_implicit(c, s->piece.end, s->piece.last, s->piece.last + N_X, 1) != RESULT_OK || (N_GUARDS > 0
-            && !search_events(c))) {
+        if (solve_implicit(c, s->piece.end, s->piece.last, s->piece.last + N_X, 1) != RESULT_OK ||
+            (N_GUARDS > 0 && !search_events(c))) {
             rejected++;
             s->n_rejected++;
             wished = 0.25 * h;
@@ -270,14 +281,14 @@ static Result take_step(Instance *c, double limit) {
         s->piece_valid = 1;
         if (c->log_enabled & LOG_INTEGRATOR)
             report(c, LOG_INTEGRATOR, RESULT_OK, "t = %.12g s: step %.3e s, error %.2e of the tolerance, %d rejected",
-                s->piece.end,
-                   s->piece.end - s->piece.begin, error, rejected);
+                s->piece.end, s->piece.end - s->piece.begin, error, rejected);
         return RESULT_OK;
     }
     leave_piece(c);
     return report(c, LOG_ERROR, RESULT_ERROR,
         "The integrator gave up at t = %.12g s: the step became too small. Look for a stiff spring, a vanishing "
-                  "mass or a speed without bound.", s->t);
+        "mass or a speed without bound.",
+        s->t);
 }
 
 /* Makes a point of the piece the present one. */
@@ -336,8 +347,8 @@ Result check_step(Instance *c, double point, double size, double *target) {
     if (!isfinite(point) || fabs(point - s->t) > slack)
         return report(c, LOG_ERROR, RESULT_ERROR,
             "The communication point is %.12g s, but the instance stands at %.12g s.", point, s->t);
-    if (!(size > 0) || !isfinite(*target)) return report(c, LOG_ERROR, RESULT_ERROR,
-        "The communication step size %g s is not positive.", size);
+    if (!(size > 0) || !isfinite(*target))
+        return report(c, LOG_ERROR, RESULT_ERROR, "The communication step size %g s is not positive.", size);
     if (!s->stop_time_defined || *target <= s->stop_time) return RESULT_OK;
     if (*target > s->stop_time + slack)
         return report(c, LOG_ERROR, RESULT_ERROR, "The step to %.12g s goes beyond the stop time %.12g s.", *target,

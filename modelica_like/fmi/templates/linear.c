@@ -67,19 +67,22 @@ int lu_factor(int n, double *m, int *order) {
     for (int j = 0; j < n; j++) {
         int pivot = j;
         double size;
-        for (int i = j + 1; i < n; i++) if (fabs(m[i + n * j]) > fabs(m[pivot + n * j])) pivot = i;
+        for (int i = j + 1; i < n; i++)
+            if (fabs(m[i + n * j]) > fabs(m[pivot + n * j])) pivot = i;
         size = fabs(m[pivot + n * j]);
         if (!isfinite(size) || size == 0) return 0;
         if (size > largest) largest = size;
         if (size < smallest) smallest = size;
         order[j] = pivot;
-        if (pivot != j) for (int k = 0; k < n; k++) {
-            double swap = m[j + n * k];
-            m[j + n * k] = m[pivot + n * k];
-            m[pivot + n * k] = swap;
-        }
+        if (pivot != j)
+            for (int k = 0; k < n; k++) {
+                double swap = m[j + n * k];
+                m[j + n * k] = m[pivot + n * k];
+                m[pivot + n * k] = swap;
+            }
         for (int i = j + 1; i < n; i++) m[i + n * j] /= m[j + n * j];
-        for (int k = j + 1; k < n; k++) for (int i = j + 1; i < n; i++) m[i + n * k] -= m[i + n * j] * m[j + n * k];
+        for (int k = j + 1; k < n; k++)
+            for (int i = j + 1; i < n; i++) m[i + n * k] -= m[i + n * j] * m[j + n * k];
     }
     return n == 0 || smallest > largest * n * DBL_EPSILON;
 }
@@ -90,7 +93,8 @@ void lu_solve(int n, const double *m, const int *order, double *x) {
         x[j] = x[order[j]];
         x[order[j]] = swap;
     }
-    for (int j = 0; j < n; j++) for (int i = j + 1; i < n; i++) x[i] -= m[i + n * j] * x[j];
+    for (int j = 0; j < n; j++)
+        for (int i = j + 1; i < n; i++) x[i] -= m[i + n * j] * x[j];
     for (int j = n - 1; j >= 0; j--) {
         x[j] /= m[j + n * j];
         for (int i = 0; i < j; i++) x[i] -= m[i + n * j] * x[j];
@@ -102,7 +106,8 @@ void lu_solve_transposed(int n, const double *m, const int *order, double *x) {
         for (int i = 0; i < j; i++) x[j] -= m[i + n * j] * x[i];
         x[j] /= m[j + n * j];
     }
-    for (int j = n - 1; j >= 0; j--) for (int i = j + 1; i < n; i++) x[j] -= m[i + n * j] * x[i];
+    for (int j = n - 1; j >= 0; j--)
+        for (int i = j + 1; i < n; i++) x[j] -= m[i + n * j] * x[i];
     for (int j = n - 1; j >= 0; j--) {
         double swap = x[j];
         x[j] = x[order[j]];
@@ -116,29 +121,30 @@ void least_squares(int rows, int columns, double *a, double *b, double *x) {
     double largest = 0;
     for (int sweep = 0; sweep < 60; sweep++) {
         int rotated = 0;
-        for (int i = 0; i < rows; i++) for (int j = i + 1; j < rows; j++) {
-            double *p = a + (size_t)i * columns, *q = a + (size_t)j * columns, pp = 0, qq = 0, pq = 0, angle, t, c, s,
-                swap;
-            for (int k = 0; k < columns; k++) {
-                pp += p[k] * p[k];
-                qq += q[k] * q[k];
-                pq += p[k] * q[k];
+        for (int i = 0; i < rows; i++)
+            for (int j = i + 1; j < rows; j++) {
+                double *p = a + (size_t)i * columns, *q = a + (size_t)j * columns, pp = 0, qq = 0, pq = 0, angle, t, c,
+                       s, swap;
+                for (int k = 0; k < columns; k++) {
+                    pp += p[k] * p[k];
+                    qq += q[k] * q[k];
+                    pq += p[k] * q[k];
+                }
+                if (pq == 0 || fabs(pq) <= DBL_EPSILON * sqrt(pp * qq)) continue;
+                rotated = 1;
+                angle = (qq - pp) / (2 * pq);
+                t = (angle >= 0 ? 1 : -1) / (fabs(angle) + sqrt(1 + angle * angle));
+                c = 1 / sqrt(1 + t * t);
+                s = c * t;
+                for (int k = 0; k < columns; k++) {
+                    swap = c * p[k] - s * q[k];
+                    q[k] = s * p[k] + c * q[k];
+                    p[k] = swap;
+                }
+                swap = c * b[i] - s * b[j];
+                b[j] = s * b[i] + c * b[j];
+                b[i] = swap;
             }
-            if (pq == 0 || fabs(pq) <= DBL_EPSILON * sqrt(pp * qq)) continue;
-            rotated = 1;
-            angle = (qq - pp) / (2 * pq);
-            t = (angle >= 0 ? 1 : -1) / (fabs(angle) + sqrt(1 + angle * angle));
-            c = 1 / sqrt(1 + t * t);
-            s = c * t;
-            for (int k = 0; k < columns; k++) {
-                swap = c * p[k] - s * q[k];
-                q[k] = s * p[k] + c * q[k];
-                p[k] = swap;
-            }
-            swap = c * b[i] - s * b[j];
-            b[j] = s * b[i] + c * b[j];
-            b[i] = swap;
-        }
         if (!rotated) break;
     }
     memset(x, 0, (size_t)columns * sizeof(double));
@@ -151,7 +157,7 @@ void least_squares(int rows, int columns, double *a, double *b, double *x) {
         const double *p = a + (size_t)i * columns;
         double size = 0;
         for (int k = 0; k < columns; k++) size += p[k] * p[k];
-        if (size <= largest * 1e-24) continue;    /* singular value below 1e-12 of the largest */
+        if (size <= largest * 1e-24) continue; /* singular value below 1e-12 of the largest */
         for (int k = 0; k < columns; k++) x[k] += p[k] * b[i] / size;
     }
 }

@@ -26,7 +26,8 @@ void evaluate(Instance *c, const Tape *tape, double t, const double *x, const do
 static Result singular(Instance *c, double t, const char *names) {
     return report(c, LOG_ERROR, RESULT_ERROR,
         "The Jacobian is singular at t = %.9g s in the equations for %s. Where two frictions stick on the "
-                  "same motion, make one compliant, or let one start open.", t, names);
+        "same motion, make one compliant, or let one start open.",
+        t, names);
 }
 
 Result solve_implicit(Instance *c, double t, const double *x, double *z, int quiet) {
@@ -36,8 +37,8 @@ Result solve_implicit(Instance *c, double t, const double *x, double *z, int qui
     for (int round = 0; round < MAX_NEWTON; round++) {
         evaluate(c, &tape_alg, t, x, z, step);
         tape_run(&tape_alg_jacobian, c->work.slots, matrix);
-        for (int k = 0; k < N_Z; k++) if (!isfinite(step[k])) return quiet ? RESULT_ERROR : singular(c, t,
-            model_implicit_names[k]);
+        for (int k = 0; k < N_Z; k++)
+            if (!isfinite(step[k])) return quiet ? RESULT_ERROR : singular(c, t, model_implicit_names[k]);
         if (!lu_factor(N_Z, matrix, order)) return quiet ? RESULT_ERROR : singular(c, t, model_implicit_names[0]);
         lu_solve(N_Z, matrix, order, step);
         change = 0;
@@ -48,8 +49,9 @@ Result solve_implicit(Instance *c, double t, const double *x, double *z, int qui
         if (change < 1e-13) return RESULT_OK;
     }
     if (change <= 1e-9) return RESULT_OK;
-    return quiet ? RESULT_ERROR : report(c, LOG_ERROR, RESULT_ERROR,
-        "The equations for %s were not solved at t = %.9g s.", model_implicit_names[0], t);
+    return quiet ? RESULT_ERROR
+                 : report(c, LOG_ERROR, RESULT_ERROR, "The equations for %s were not solved at t = %.9g s.",
+                       model_implicit_names[0], t);
 }
 
 Result check_singular(Instance *c) {
@@ -63,7 +65,7 @@ Result check_singular(Instance *c) {
         if (!isfinite(values[k]))
             return report(c, LOG_ERROR, RESULT_ERROR,
                 "The derivative of %s is not finite at t = %.9g s. Look for a mass, inertia or ratio of zero.",
-                          model_state_names[k], s->t);
+                model_state_names[k], s->t);
     return RESULT_OK;
 }
 

@@ -1,7 +1,7 @@
-/* One step of RODAS5P: a stiffly accurate, L-stable Rosenbrock method of order 5(4) for index-1 systems with dense output
- * of order 4 (G. Steinebach, BIT Numerical Mathematics 63:27, 2023). Notation as in Hairer & Wanner II, ch. IV.7, with the
- * transformation that avoids products with the Jacobian, M = diag(1 for x, 0 for z):
- *   (M/(h gamma) - J) k_i = f(t + c_i h, y + sum a_ij k_j) + sum (C_ij/h) M k_j + h d_i df/dt.
+/* One step of RODAS5P: a stiffly accurate, L-stable Rosenbrock method of order 5(4) for index-1 systems with dense
+ * output of order 4 (G. Steinebach, BIT Numerical Mathematics 63:27, 2023). Notation as in Hairer & Wanner II, ch.
+ * IV.7, with the transformation that avoids products with the Jacobian, M = diag(1 for x, 0 for z): (M/(h gamma) - J)
+ * k_i = f(t + c_i h, y + sum a_ij k_j) + sum (C_ij/h) M k_j + h d_i df/dt.
  */
 #include <math.h>
 #include <string.h>
@@ -33,20 +33,17 @@ static const double C[STAGES][STAGES - 1] = {
     {37.80277123390563, -3.2571969029072276, 112.26918849496327, 66.9347231244047, -40.06618937091002,
         -54.66780262877968, -9.48861652309627},
 };
-static const double C_TIME[STAGES] = {0, 0.6358126895828704, 0.4095798393397535, 0.9769306725060716,
-    0.4288403609558664, 1, 1, 1};
-static const double D_TIME[STAGES] = {0.21193756319429014, -0.42387512638858027, -0.3384627126235924,
-    1.8046452872882734, 2.325825639765069, 0, 0, 0};
+static const double C_TIME[STAGES] = {
+    0, 0.6358126895828704, 0.4095798393397535, 0.9769306725060716, 0.4288403609558664, 1, 1, 1};
+static const double D_TIME[STAGES] = {
+    0.21193756319429014, -0.42387512638858027, -0.3384627126235924, 1.8046452872882734, 2.325825639765069, 0, 0, 0};
 static const double DENSE[3][STAGES] = {
     {25.948786856663858, -2.5579724845846235, 10.433815404888879, -2.3679251022685204, 0.524948541321073,
-        1.1241088310450404,
-     0.4272876194431874, -0.17202221070155493},
+        1.1241088310450404, 0.4272876194431874, -0.17202221070155493},
     {-9.91568850695171, -0.9689944594115154, 3.0438037242978453, -24.495224566215796, 20.176138334709044,
-        15.98066361424651,
-     -6.789040303419874, -6.710236069923372},
+        15.98066361424651, -6.789040303419874, -6.710236069923372},
     {11.419903575922262, 2.8879645146136994, 72.92137995996029, 80.12511834622643, -52.072871366152654,
-        -59.78993625266729,
-     -0.15582684282751913, 4.883087185713722},
+        -59.78993625266729, -0.15582684282751913, 4.883087185713722},
 };
 
 static void evaluate_jacobian(Instance *c, double t, const double *y) {
@@ -90,8 +87,8 @@ static double error_norm(const Instance *c, const double *first, const double *l
 
 /* Steps from `first` at t to t + h. With `keep_jacobian` that of the step before from the same point is used.
  * Returns 0 if the equations gave values that are not finite, or a singular matrix. */
-int rosenbrock_step(Instance *c, double t, const double *first, double h, int keep_jacobian, Piece *piece,
-    double *error) {
+int rosenbrock_step(
+    Instance *c, double t, const double *first, double h, int keep_jacobian, Piece *piece, double *error) {
     Work *w = &c->work;
     double *slope = w->stages + (size_t)STAGES * AT_LEAST_ONE(N), *y = w->point;
     piece->begin = t;
@@ -108,7 +105,8 @@ int rosenbrock_step(Instance *c, double t, const double *first, double h, int ke
         for (int j = 0; j < i; j++)
             for (int k = 0; k < N; k++) y[k] += A[i][j] * w->stages[j * N + k];
         evaluate(c, &tape_rates, t + C_TIME[i] * h, y, y + N_X, stage);
-        for (int j = 0; j < i; j++) for (int k = 0; k < N_X; k++) stage[k] += C[i][j] / h * w->stages[j * N + k];
+        for (int j = 0; j < i; j++)
+            for (int k = 0; k < N_X; k++) stage[k] += C[i][j] / h * w->stages[j * N + k];
         for (int k = 0; k < N; k++) {
             stage[k] += h * D_TIME[i] * slope[k];
             if (!isfinite(stage[k])) return 0;
@@ -136,8 +134,8 @@ void piece_at(const Piece *piece, double t, double *point) {
         return;
     }
     for (int k = 0; k < N; k++)
-        point[k] = r * piece->first[k] + s * (piece->last[k] + r * (piece->dense[0][k] + s * (piece->dense[1][k] +
-                   s * piece->dense[2][k])));
+        point[k] = r * piece->first[k] +
+                   s * (piece->last[k] + r * (piece->dense[0][k] + s * (piece->dense[1][k] + s * piece->dense[2][k])));
 }
 
 /* A first step at which states change by a hundredth (Hairer, Norsett & Wanner I, II.4). */

@@ -19,7 +19,8 @@ void start_defaults(Instance *c) {
 static const double *start_values(Instance *c) {
     const State *s = &c->state;
     evaluate(c, &tape_start_values, s->t, s->x, s->z, c->work.start_values);
-    for (int k = 0; k < N_STARTS; k++) if (s->start_given[k]) c->work.start_values[k] = s->start_value[k];
+    for (int k = 0; k < N_STARTS; k++)
+        if (s->start_given[k]) c->work.start_values[k] = s->start_value[k];
     return c->work.start_values;
 }
 
@@ -31,8 +32,7 @@ static Result apply_direct(Instance *c, const double *values) {
         double value = values[one->start] / one->factor;
         if (known[one->position] && fabs(value - x[one->position]) > CONSISTENT * (1 + fabs(x[one->position])))
             return report(c, LOG_ERROR, RESULT_ERROR, "Two start values of %s contradict each other: %.9g and %.9g.",
-                model_state_names[one->position],
-                          x[one->position], value);
+                model_state_names[one->position], x[one->position], value);
         if (!known[one->position]) x[one->position] = value;
         known[one->position] = 1;
     }
@@ -70,7 +70,10 @@ static Result solve_start_system(Instance *c, const double *values) {
             step[k] = residual[row] - target;
             error = fmax(error, isfinite(step[k]) ? fabs(step[k]) / (1 + fabs(target)) : INFINITY);
         }
-        if (!isfinite(error) || !qr_factor(&pattern_start, c->work.jacobian, &c->work)) { error = INFINITY; break; }
+        if (!isfinite(error) || !qr_factor(&pattern_start, c->work.jacobian, &c->work)) {
+            error = INFINITY;
+            break;
+        }
         qr_solve(&pattern_start, &c->work, step);
         for (int k = 0; k < N_START_UNKNOWNS; k++) {
             double *unknown = start_unknown(c, model_start_columns[k]);
@@ -90,7 +93,7 @@ static Result check_dependent(Instance *c, const double *values) {
     evaluate(c, &tape_variables, s->t, s->x, s->z, c->work.variables);
     for (int k = 0; k < N_START_DEPENDENT; k++) {
         double value = values[model_start_dependent[k].start],
-            actual = c->work.variables[model_start_dependent[k].node];
+               actual = c->work.variables[model_start_dependent[k].node];
         if (!(fabs(actual - value) <= CONSISTENT * (1 + fabs(value))))
             return report(c, LOG_ERROR, RESULT_ERROR,
                 "A start value of %.9g cannot be met: the variable follows to be %.9g.", value, actual);
@@ -124,8 +127,8 @@ static Result solve_steady(Instance *c) {
             int column = j < N_STEADY ? model_steady_states[j] : N_X + j - N_STEADY;
             for (int k = pattern_step.colind[column]; k < pattern_step.colind[column + 1]; k++)
                 for (int i = 0; i < n; i++)
-                    if ((i < N_STEADY ? model_steady_states[i]
-                        : N_X + i - N_STEADY) == pattern_step.row[k]) a[i * n + j] = c->work.matrix[k];
+                    if ((i < N_STEADY ? model_steady_states[i] : N_X + i - N_STEADY) == pattern_step.row[k])
+                        a[i * n + j] = c->work.matrix[k];
         }
         residual = 0;
         for (int i = 0; i < n; i++) {
@@ -166,7 +169,8 @@ static void discrete_starts(Instance *c) {
     State *s = &c->state;
     double *values = c->work.guards;
     evaluate(c, &tape_discrete_starts, s->t, s->x, s->z, values);
-    for (int k = 0; k < N_D; k++) if (!s->mode_given[k]) s->d[k] = values[k];
+    for (int k = 0; k < N_D; k++)
+        if (!s->mode_given[k]) s->d[k] = values[k];
 }
 
 static void apply_defaults(Instance *c, const double *values) {
@@ -184,8 +188,9 @@ static Result check_modes_hold(Instance *c) {
     evaluate(c, &tape_guards, s->t, s->x, s->z, guards);
     for (int k = 0; k < N_GUARDS; k++) {
         const Transition *one = &model_transitions[model_guard_transition[k]];
-        if (guard_active(s, k) && guards[k] > 0) return report(c, LOG_ERROR, RESULT_ERROR,
-            "No steady state was found at t = %.9g s: %s does not stay in its mode.", s->t, one->name);
+        if (guard_active(s, k) && guards[k] > 0)
+            return report(c, LOG_ERROR, RESULT_ERROR,
+                "No steady state was found at t = %.9g s: %s does not stay in its mode.", s->t, one->name);
     }
     return RESULT_OK;
 }

@@ -7,13 +7,13 @@ static double sign(double a) { return a < 0 ? -1 : a > 0 ? 1 : a; }
 
 /* Results of one run of equal operations. */
 static void run_one(int operation, const Operands *operand, int count, const double *slots, double *result) {
-#define EACH(name, expression)                                                        \
-    case OPERATION_##name:                                                            \
-        for (int k = 0; k < count; k++) {                                             \
-            double a = slots[operand[k].left], b = slots[operand[k].right];           \
-            (void)b;                                                                  \
-            result[k] = expression;                                                   \
-        }                                                                             \
+#define EACH(name, expression)                                              \
+    case OPERATION_##name:                                                  \
+        for (int k = 0; k < count; k++) {                                   \
+            double a = slots[operand[k].left], b = slots[operand[k].right]; \
+            (void)b;                                                        \
+            result[k] = expression;                                         \
+        }                                                                   \
         break;
     switch (operation) {
         EACH(ADD, a + b)
@@ -71,6 +71,7 @@ static void run_one(int operation, const Operands *operand, int count, const dou
 /* Partial derivatives of a value f = operation(a, b). */
 static void slopes(int operation, double a, double b, double f, double *by_a, double *by_b) {
     double da = 0, db = 0;
+    /* clang-format off */
     switch (operation) {
         case OPERATION_ADD: da = 1; db = 1; break;
         case OPERATION_SUB: da = 1; db = -1; break;
@@ -111,6 +112,7 @@ static void slopes(int operation, double a, double b, double f, double *by_a, do
         case OPERATION_EXPM1: da = f + 1; break;
         default: break;              /* comparisons and roundings are constant between jumps */
     }
+    /* clang-format on */
     *by_a = da;
     *by_b = db;
 }
@@ -118,10 +120,19 @@ static void slopes(int operation, double a, double b, double f, double *by_a, do
 /* A unary operation has its operand on both sides. */
 static int is_binary(int operation) {
     switch (operation) {
-        case OPERATION_ADD: case OPERATION_SUB: case OPERATION_MUL: case OPERATION_DIV: case OPERATION_POW:
-        case OPERATION_FMOD: case OPERATION_REMAINDER: case OPERATION_COPYSIGN: case OPERATION_IF_ELSE_ZERO:
+        case OPERATION_ADD:
+        case OPERATION_SUB:
+        case OPERATION_MUL:
+        case OPERATION_DIV:
+        case OPERATION_POW:
+        case OPERATION_FMOD:
+        case OPERATION_REMAINDER:
+        case OPERATION_COPYSIGN:
+        case OPERATION_IF_ELSE_ZERO:
         case OPERATION_FMIN:
-        case OPERATION_FMAX: case OPERATION_ATAN2: case OPERATION_HYPOT: return 1;
+        case OPERATION_FMAX:
+        case OPERATION_ATAN2:
+        case OPERATION_HYPOT: return 1;
         default: return 0;
     }
 }

@@ -8,7 +8,8 @@ const Variable *find_variable(uint32_t reference) {
     while (low <= high) {
         int middle = low + (high - low) / 2;
         if (model_variables[middle].reference == reference) return &model_variables[middle];
-        if (model_variables[middle].reference < reference) low = middle + 1; else high = middle - 1;
+        if (model_variables[middle].reference < reference) low = middle + 1;
+        else high = middle - 1;
     }
     return NULL;
 }
@@ -16,9 +17,10 @@ const Variable *find_variable(uint32_t reference) {
 const Variable *known_variable(Instance *c, uint32_t reference, ValueType type) {
     const Variable *v = find_variable(reference);
     if (v != NULL && v->type == type) return v;
-    report(c, LOG_ERROR, RESULT_ERROR, v == NULL ? "There is no variable with value reference %u."
-        : "The variable with value reference %u is not of type %s.",
-           (unsigned)reference, type == TYPE_FLOAT64 ? "Real (Float64)" : "Enumeration (Integer, Int64)");
+    report(c, LOG_ERROR, RESULT_ERROR,
+        v == NULL ? "There is no variable with value reference %u."
+                  : "The variable with value reference %u is not of type %s.",
+        (unsigned)reference, type == TYPE_FLOAT64 ? "Real (Float64)" : "Enumeration (Integer, Int64)");
     return NULL;
 }
 
@@ -34,9 +36,8 @@ static const double *all_variables(Instance *c) {
 /* In initialization mode, whatever was set since the last time must have its effect before anything is read. */
 static Result make_ready(Instance *c, const Variable *v) {
     State *s = &c->state;
-    if (s->phase != PHASE_INITIALIZATION || s->solved || v->kind == KIND_PARAMETER || v->kind == KIND_INPUT
-        || v->kind == KIND_TIME ||
-        v->kind == KIND_DERIVED)
+    if (s->phase != PHASE_INITIALIZATION || s->solved || v->kind == KIND_PARAMETER || v->kind == KIND_INPUT ||
+        v->kind == KIND_TIME || v->kind == KIND_DERIVED)
         return RESULT_OK;
     return start_solve(c);
 }
@@ -87,8 +88,8 @@ void get_derivatives(Instance *c, double *derivatives) {
     memcpy(derivatives, c->work.rhs, N_X * sizeof(double));
 }
 
-/* Guards of active modes, as event iteration judges them: an indicator above zero is an event that wants to fire, so that
- * after every event all are at or below zero. The others are constant, so that nobody looks for their zeros. */
+/* Guards of active modes, as event iteration judges them: an indicator above zero is an event that wants to fire, so
+ * that after every event all are at or below zero. The others are constant, so that nobody looks for their zeros. */
 void get_indicators(Instance *c, double *indicators) {
     State *s = &c->state;
     double *values = c->work.guards_before;
@@ -113,16 +114,17 @@ static void touch(Instance *c) {
     c->variables_valid = 0;
 }
 
-static int before_start(const State *s) { return s->phase == PHASE_INSTANTIATED || s->phase == PHASE_INITIALIZATION
-    || s->phase == PHASE_CONFIGURATION; }
+static int before_start(const State *s) {
+    return s->phase == PHASE_INSTANTIATED || s->phase == PHASE_INITIALIZATION || s->phase == PHASE_CONFIGURATION;
+}
 
 static Result set_parameter(Instance *c, const Variable *v, double value) {
     State *s = &c->state;
     double low = model_parameter_min[v->index], high = model_parameter_max[v->index];
-    if (!v->tunable && !before_start(s)) return refuse(c, v,
-        "it is a fixed parameter. Set it before the end of the initialization.");
-    if (v->tunable && s->phase == PHASE_CONTINUOUS) return refuse(c, v,
-        "tunable parameters change in event mode only.");
+    if (!v->tunable && !before_start(s))
+        return refuse(c, v, "it is a fixed parameter. Set it before the end of the initialization.");
+    if (v->tunable && s->phase == PHASE_CONTINUOUS)
+        return refuse(c, v, "tunable parameters change in event mode only.");
     if (value < low || value > high)
         return report(c, LOG_ERROR, RESULT_ERROR, "%s = %g is out of range: it must be between %g and %g.", v->name,
             value, low, high);
@@ -195,8 +197,9 @@ Result set_time(Instance *c, double time) {
 
 Result set_states(Instance *c, const double *x) {
     for (int k = 0; k < N_X; k++)
-        if (!isfinite(x[k])) return report(c, LOG_ERROR, RESULT_ERROR,
-            "%s cannot be set: the value is not a finite number.", model_state_names[k]);
+        if (!isfinite(x[k]))
+            return report(c, LOG_ERROR, RESULT_ERROR, "%s cannot be set: the value is not a finite number.",
+                model_state_names[k]);
     memcpy(c->state.x, x, N_X * sizeof(double));
     c->state.z_valid = c->variables_valid = 0;
     return RESULT_OK;

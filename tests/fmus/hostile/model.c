@@ -26,7 +26,10 @@ void model_advance(Model *m, double end) {
     if (end < 0.5) return;
     switch ((int)m->v[misdeed]) {
         case CRASH: crash(); break;
-        case HANG: for (volatile int k = 0;; k++) { } break;
+        case HANG:
+            for (volatile int k = 0;; k++) {
+            }
+            break;
         case LEAVE: exit(0);
         case RUN_BACK: m->time = 0; break; /* the next step does not begin where this one has ended: an error */
         case NOT_A_NUMBER: m->v[x] = NAN; break;
