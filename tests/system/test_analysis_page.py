@@ -6,20 +6,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-
-
-@pytest.fixture(scope="module")
-def page(tmp_path_factory):
-    """Execute the blocks of the page one after the other."""
-    text = (ROOT / "docs" / "analysis.md").read_text(encoding="utf-8")
-    folder = tmp_path_factory.mktemp("page")
-    (folder / "examples").symlink_to(ROOT / "examples")
-    names: dict = {}
-    with pytest.MonkeyPatch.context() as patch:
-        patch.chdir(folder)
-        for block in re.findall(r"```python\n(.*?)```", text, re.DOTALL):
-            exec(compile(block, "docs/analysis.md", "exec"), names)
-    return text, names, folder
+PAGE = ROOT / "docs" / "analysis.md"
 
 
 def test_printed_modes_are_those_of_the_page(page):

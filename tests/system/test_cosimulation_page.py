@@ -15,20 +15,6 @@ ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "cosimulation.md"
 
 
-@pytest.fixture(scope="module")
-def page(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, dict[str, Any], Path]:
-    """Execute the blocks of the page one after the other."""
-    text = PAGE.read_text(encoding="utf-8")
-    folder = tmp_path_factory.mktemp("page")
-    (folder / "examples").symlink_to(ROOT / "examples")
-    names: dict[str, Any] = {}
-    with pytest.MonkeyPatch.context() as patch:
-        patch.chdir(folder)
-        for block in re.findall(r"```python\n(.*?)```", text, re.DOTALL):
-            exec(compile(block, PAGE.name, "exec"), names)
-    return text, names, folder
-
-
 def measuring() -> Any:
     """docs/cosimulation.py"""
     spec = importlib.util.spec_from_file_location("measure_cosimulation", ROOT / "docs" / "cosimulation.py")
