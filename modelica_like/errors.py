@@ -216,6 +216,11 @@ class MissingExtra(ModelicaLikeError):
     """An optional package is not installed."""
 
 
+def missing_extra(package: str, extra: str) -> MissingExtra:
+    """Return the error about a package that an extra installs."""
+    return MissingExtra(f"{package} is not installed.", advice=f'Install it with: pip install "modelica-like[{extra}]"')
+
+
 def did_you_mean(name: str, known: Iterable[str]) -> str:
     """Return `; did you mean 'sun'?` for the known name nearest to `name`, or an empty string."""
     names = list(known)

@@ -86,8 +86,8 @@ def cosim(
 ) -> None:  # fmt: skip
     """Run a system of FMUs together: mode changes, energies at the couplings, results as table and picture."""
     with told(debug):
+        from modelica_like.cosimulation.load import opened
         from modelica_like.cosimulation.run import cosim as run
-        from modelica_like.cosimulation.run import opened
         from modelica_like.report.cosimulation import cosimulation_report
         from modelica_like.report.progress import Bar
 

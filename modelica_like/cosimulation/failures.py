@@ -17,7 +17,7 @@ from modelica_like.errors import (
     UnknownName,
     did_you_mean,
 )
-from modelica_like.fmi.run import _article
+from modelica_like.fmi.run import article
 from modelica_like.fmi.unpack import printable
 
 
@@ -52,7 +52,7 @@ def _no_output(system: str, unit: str, error: dict[str, Any]) -> ModelicaLikeErr
 
 def _no_input(system: str, unit: str, error: dict[str, Any]) -> ModelicaLikeError:
     has = f"It has {', '.join(error['known'])}." if error["known"] else "It has none."
-    return UnknownName(f"{unit}: '{error['name']}' is no input but {_article(error['causality'] or 'local')}. {has}")
+    return UnknownName(f"{unit}: '{error['name']}' is no input but {article(error['causality'] or 'local')}. {has}")
 
 
 def _no_cosimulation(system: str, unit: str, error: dict[str, Any]) -> ModelicaLikeError:

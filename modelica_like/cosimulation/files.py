@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, cast, get_args
@@ -25,12 +24,11 @@ from modelica_like.cosimulation.system import (
 from modelica_like.errors import (
     ModelicaLikeError,
     NetlistError,
-    Source,
     UnknownName,
     did_you_mean,
     raise_together_or_one,
 )
-from modelica_like.netlist.document import read_text
+from modelica_like.netlist.document import parse_toml, read_text
 from modelica_like.netlist.locate import Lines, locate
 from modelica_like.units import parse_unit, to_si
 
@@ -38,39 +36,30 @@ _SECTIONS = ("name", "own_names", "fmus", "connect", "bonds", "simulate")
 _OPTIONS = ("until", "step", "master", "inputs", "tolerance")
 
 
-def load_system(path: Path, work: Path) -> System:
-    """Read a system: a TOML file, an SSP, or a netlist with FMUs as parts.
-
-    Args:
-        path: the file.
-        work: an empty folder for what has to be unpacked or exported.
+def read_toml(path: Path) -> tuple[dict[str, Any], Lines]:
+    """Read a TOML file, and where its entries stand.
 
     Raises:
-        NetlistError, UnknownName: it is none of these, or something in it is wrong.
-        FmuRefused: an SSP is not sound.
-        ModelicaLikeError: the netlist's own parts cannot be exported.
+        NetlistError: it is not TOML, or does not exist.
+        DuplicateName: a name is used twice.
     """
-    if path.suffix.lower() == ".ssp":
-        from modelica_like.cosimulation.ssp import load_ssp
-
-        return load_ssp(path, work)
     text = read_text(path)
-    data = _toml(text, path)
-    if "fmus" not in data and "parts" in data:
-        from modelica_like.cosimulation.fmu_parts import system_of_netlist
-
-        return system_of_netlist(path, work)
-    return _Reader(locate(text, str(path)), path).system(data)
+    lines = locate(text, str(path))
+    return parse_toml(text, lines), lines
 
 
-def _toml(text: str, path: Path) -> dict[str, Any]:
-    try:
-        return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        message = str(error)
-        raise NetlistError(
-            f"'{path.name}' is not TOML: {message[:1].lower()}{message[1:]}.", where=Source(str(path))
-        ) from None
+def read_system(data: Mapping[str, Any], lines: Lines, path: Path) -> System:
+    """Return the system that a TOML file describes.
+
+    Args:
+        data: its content, from `read_toml`.
+        lines: where its entries stand.
+        path: the file.
+
+    Raises:
+        NetlistError, UnknownName: something in it is wrong.
+    """
+    return _Reader(lines, path).system(data)
 
 
 class _Reader:

@@ -8,8 +8,7 @@ import struct
 import tempfile
 import threading
 import time as clock
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, get_args
@@ -17,7 +16,7 @@ from typing import Any, get_args
 import numpy as np
 
 from modelica_like.cosimulation.failures import tell_error, tell_loss
-from modelica_like.cosimulation.files import load_system
+from modelica_like.cosimulation.load import opened
 from modelica_like.cosimulation.solution import CosimSolution, Coupling, cosim_solution
 from modelica_like.cosimulation.system import Inputs, Master, Settings, System, check_system, one_of
 from modelica_like.errors import FmuCrashed, FmuTimeout, UnknownName, ValueOutOfRange, did_you_mean
@@ -98,13 +97,6 @@ def cosim(
         table = np.load(folder / "result.npy")
         meta = json.loads((folder / "meta.json").read_text())
     return cosim_solution(system, meta, table, clock.perf_counter() - begin)
-
-
-@contextmanager
-def opened(path: Path) -> Iterator[System]:
-    """Open a system, and keep what had to be unpacked for it as long as it is needed; see `load_system`."""
-    with tempfile.TemporaryDirectory(prefix="modelica_like_", ignore_cleanup_errors=True) as work:
-        yield load_system(path, Path(work))
 
 
 def _with_parameters(system: System, given: Mapping[str, float]) -> System:

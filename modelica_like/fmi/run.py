@@ -109,7 +109,7 @@ def _tell_error(name: str, folder: Path) -> None:
         raise UnknownName(f"{name} has no variable '{error['name']}'{hint or '.'}")
     if kind == "no input":
         has = f"It has {', '.join(error['known'])}." if error["known"] else "It has none."
-        raise UnknownName(f"{name}: '{error['name']}' is no input but {_article(error['causality'])}. {has}")
+        raise UnknownName(f"{name}: '{error['name']}' is no input but {article(error['causality'])}. {has}")
     if kind == "no kind":
         raise FmuRefused(f"{name} has no {error['wanted']} part.", advice="Ask for the other kind, or for none.")
     said = [printable(text) for text in error["messages"]]
@@ -119,7 +119,8 @@ def _tell_error(name: str, folder: Path) -> None:
     )
 
 
-def _article(word: str) -> str:
+def article(word: str) -> str:
+    """Return a word with its indefinite article."""
     return f"{'an' if word[0] in 'aeiou' else 'a'} {word}"
 
 

@@ -102,15 +102,29 @@ def parse(text: str, file: str) -> Document:
         raise NetlistError(
             f"'{Path(file).name}' is empty.", where=Source(file), advice="A netlist has at least one part in [parts]."
         )
-    try:
-        data = tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise _not_toml(str(error), lines) from None
+    data = parse_toml(text, lines)
     errors: list[ModelicaLikeError] = []
     document = _document(data, lines, errors)
     if errors:
         raise raise_together_or_one(errors)
     return document
+
+
+def parse_toml(text: str, lines: Lines) -> dict[str, Any]:
+    """Parse TOML.
+
+    Args:
+        text: TOML.
+        lines: of the same text, for messages.
+
+    Raises:
+        NetlistError: the text is not TOML.
+        DuplicateName: a name is used twice.
+    """
+    try:
+        return tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise _not_toml(str(error), lines) from None
 
 
 def _not_toml(message: str, lines: Lines) -> ModelicaLikeError:

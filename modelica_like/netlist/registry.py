@@ -24,7 +24,7 @@ def library_types() -> Mapping[str, type[Component]]:
     """
     types: dict[str, type[Component]] = {}
     for entry in sorted(entry_points(group=GROUP), key=lambda entry: entry.name):
-        for name, kind in _types_of(_imported(entry.value, f"The library '{entry.name}'")).items():
+        for name, kind in _types_of(imported(entry.value, f"The library '{entry.name}'")).items():
             if types.setdefault(name, kind) is not kind:
                 raise NetlistError(
                     f"Two libraries have a component '{name}': {types[name].__module__} and {kind.__module__}.",
@@ -42,7 +42,16 @@ def _types_of(module: ModuleType) -> dict[str, type[Component]]:
     }
 
 
-def _imported(module: str, what: str) -> ModuleType:
+def imported(module: str, what: str) -> ModuleType:
+    """Import a module.
+
+    Args:
+        module: its full name.
+        what: how to call it in a message.
+
+    Raises:
+        NetlistError: it cannot be imported.
+    """
     try:
         return importlib.import_module(module)
     except (ImportError, SyntaxError) as error:
@@ -73,7 +82,7 @@ def _class_of_module(name: str) -> type[Component]:
     module_name, _, class_name = name.partition(":")
     if not all(part.isidentifier() for part in module_name.split(".")):
         raise NetlistError(f"'{name}' is no class of a module.", advice='Write "package.module:Class".')
-    module = _imported(module_name, f"The module '{module_name}'")
+    module = imported(module_name, f"The module '{module_name}'")
     kind = getattr(module, class_name, None)
     if kind is None:
         known = [key for key, value in vars(module).items() if isinstance(value, type) and issubclass(value, Component)]

@@ -12,7 +12,7 @@ from types import MappingProxyType, ModuleType
 from typing import Any, get_args, get_type_hints
 
 from modelica_like.errors import NetlistError, UnknownName, did_you_mean
-from modelica_like.netlist.registry import GROUP, _imported
+from modelica_like.netlist.registry import GROUP, imported
 from modelica_like.units import ONE, Unit, parse_unit
 
 Check = Callable[..., Any]
@@ -38,11 +38,11 @@ def design_checks() -> Mapping[str, Check]:
 
 
 def _checks_of(library: str, entry: str) -> Iterator[tuple[str, Check]]:
-    package = _imported(library, f"The library '{entry}'")
+    package = imported(library, f"The library '{entry}'")
     name = f"{library}.sizing"
     if not hasattr(package, "__path__") or importlib.util.find_spec(name) is None:
         return
-    module: ModuleType = _imported(name, f"The design checks of the library '{entry}'")
+    module: ModuleType = imported(name, f"The design checks of the library '{entry}'")
     for member in getattr(module, "__all__", ()):
         function = getattr(module, member)
         if inspect.isfunction(function) and hasattr(_hints(function).get("return"), "lines"):

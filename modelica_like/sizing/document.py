@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import tomllib
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from modelica_like.errors import ModelicaLikeError, NetlistError, Source, UnknownName, did_you_mean
-from modelica_like.netlist.document import _not_toml, read_text
+from modelica_like.netlist.document import parse_toml, read_text
 from modelica_like.netlist.locate import Lines, locate
 
 _ENTRIES = ("name", "description", "parameters", "checks", "compare")
@@ -45,10 +44,7 @@ def read_document(path: Path) -> SizingDocument:
         raise NetlistError(f"The sizing file '{path}' does not exist.")
     text = read_text(path)
     lines = locate(text, str(path))
-    try:
-        data = tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise _not_toml(str(error), lines) from None
+    data = parse_toml(text, lines)
     document = SizingDocument(lines, path.stem)
     for key, value in data.items():
         _entry(document, key, value)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, Vector
-from modelica_like.errors import MissingExtra, UnknownName, ValueOutOfRange, did_you_mean
+from modelica_like.errors import UnknownName, ValueOutOfRange, did_you_mean, missing_extra
 from modelica_like.initialize import Point
 from modelica_like.language.expr import Symbol
 from modelica_like.language.mode import BoundMode
@@ -252,7 +252,7 @@ class Solution:
         try:
             import pandas
         except ImportError:
-            raise _missing("pandas") from None
+            raise missing_extra("pandas", "data") from None
         columns = {name: self[name] for name in self.names}
         return pandas.DataFrame(columns, index=pandas.Index(self.time, name="time"))
 
@@ -265,7 +265,7 @@ class Solution:
         try:
             import xarray
         except ImportError:
-            raise _missing("xarray") from None
+            raise missing_extra("xarray", "data") from None
         info = {
             v.path: {"units": str(v.unit), "long_name": v.description}
             for v in (*self.model.flat_variables, *self.model.flat_discretes)
@@ -282,7 +282,3 @@ class Solution:
             f"<Solution of {self.model.name}: {len(self.model.flat_variables)} variables, {span}, "
             f"{len(self.events)} mode changes, {self.statistics.steps} steps in {self.statistics.seconds * 1e3:.1f} ms>"
         )
-
-
-def _missing(package: str) -> MissingExtra:
-    return MissingExtra(f"{package} is not installed.", advice='Install it with: pip install "modelica-like[data]"')

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 
 from modelica_like import load, simulate
 from modelica_like.cosimulation.cut import cut_netlist, part_of
-from modelica_like.cosimulation.files import load_system, write_system
+from modelica_like.cosimulation.files import write_system
+from modelica_like.cosimulation.load import load_system
 from modelica_like.cosimulation.run import cosim
 from modelica_like.cosimulation.split import Split, split
 from modelica_like.cosimulation.system import find_bonds

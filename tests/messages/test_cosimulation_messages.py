@@ -8,7 +8,7 @@ import pytest
 
 from modelica_like.cosimulation.cut import cut_netlist
 from modelica_like.cosimulation.failures import tell_error
-from modelica_like.cosimulation.files import load_system
+from modelica_like.cosimulation.load import load_system
 from modelica_like.cosimulation.run import cosim
 from modelica_like.cosimulation.split import split
 from modelica_like.cosimulation.system import Link, Port, Settings, System, Unit, check_system
@@ -152,7 +152,7 @@ def test_too_many_cuts(tmp_path: Path) -> None:
 
 GOOD = '[fmus]\na = "a.fmu"\nb = { file = "b.fmu" }\n[connect]\ntau = ["a.tau", "b.tau"]\nw = ["b.w", "a.w"]\n'
 FILES: dict[str, tuple[str, str]] = {
-    "no TOML": ("x = ", "'bench.toml' is not TOML: invalid value (at end of document).\n  in bench.toml"),
+    "no TOML": ("x = ", "'bench.toml' is not TOML: invalid value.\n  in bench.toml:1 `x =`"),
     "entry": (
         "parts = 1\nfmus = {}",
         "A system has no entry 'parts'. It has name, own_names, fmus, connect, bonds, simulate.\n"

@@ -13,10 +13,10 @@ from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import (
     CalibrationFailed,
     InitializationError,
-    MissingExtra,
     SolveError,
     UnknownName,
     ValueOutOfRange,
+    missing_extra,
 )
 from modelica_like.simulation import Model, build
 from modelica_like.units import coherent, to_si
@@ -184,9 +184,7 @@ class _Problem:
         try:
             from scipy.optimize import least_squares
         except ImportError:
-            raise MissingExtra(
-                "scipy is not installed.", advice='Install it with: pip install "modelica-like[analyse]"'
-            ) from None
+            raise missing_extra("scipy", "analyse") from None
         slopes: Any = lambda q: self.evaluate(q)[1]  # noqa: E731 - scipy's stubs know names only
         return least_squares(
             lambda q: self.evaluate(q)[0], begin, slopes, bounds=(0.0, 1.0), x_scale="jac",

@@ -12,7 +12,7 @@ import numpy as np
 from modelica_like.analyse.linear.held import free_motions
 from modelica_like.analyse.linear.points import At, Drive, point_of
 from modelica_like.compile.compiled import CompiledDae
-from modelica_like.errors import MissingExtra, UnknownName, did_you_mean
+from modelica_like.errors import UnknownName, did_you_mean, missing_extra
 from modelica_like.initialize import Point
 
 if TYPE_CHECKING:
@@ -101,7 +101,7 @@ class LinearModel:
         try:
             from scipy.signal import StateSpace
         except ImportError:
-            raise _missing("scipy") from None
+            raise missing_extra("scipy", "analyse") from None
         return StateSpace(self.A, self.B, self.C, self.D)
 
     def to_control(self) -> Any:
@@ -113,7 +113,7 @@ class LinearModel:
         try:
             import control
         except ImportError:
-            raise _missing("control") from None
+            raise missing_extra("control", "analyse") from None
         # python-control reserves dots for signals of interconnected systems.
         plain = {kind: [_plain(name) for name in getattr(self, kind)] for kind in ("states", "inputs", "outputs")}
         return control.ss(self.A, self.B, self.C, self.D, name=_plain(self.model.name), **plain)
@@ -248,7 +248,3 @@ def _unit(variables: Mapping[str, str], name: str) -> str:
 
 def _plain(name: str) -> str:
     return name.replace(".", "_")
-
-
-def _missing(package: str) -> MissingExtra:
-    return MissingExtra(f"{package} is not installed.", advice='Install it with: pip install "modelica-like[analyse]"')

@@ -15,7 +15,7 @@ from modelica_like.analyse.sensitivity.formulas import Freed, bound_by_formula, 
 from modelica_like.analyse.sensitivity.outputs import Output, listed, quadratures, read_off, read_output, value_at
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae
-from modelica_like.errors import LanguageError, UnknownName, did_you_mean
+from modelica_like.errors import LanguageError, UnknownName, did_you_mean, missing_extra
 from modelica_like.initialize import StartKind
 from modelica_like.simulation import Model, simulate
 from modelica_like.solve.options import Options
@@ -114,9 +114,7 @@ class Sensitivities:
         try:
             import pandas
         except ImportError:
-            from modelica_like.solve.solution import _missing
-
-            raise _missing("pandas") from None
+            raise missing_extra("pandas", "data") from None
         rows, columns = ([one.name for one in side] for side in (self.outputs, self.parameters))
         return pandas.DataFrame(self.derivatives, index=rows, columns=columns)
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from modelica_like.analyse.sweeps.plan import Plan
 from modelica_like.analyse.sweeps.workers import Chunk, Done, Job
-from modelica_like.errors import CheckpointMismatch, MissingExtra
+from modelica_like.errors import CheckpointMismatch, missing_extra
 
 
 class Checkpoint:
@@ -88,7 +88,5 @@ def _zarr() -> Any:
     try:
         import zarr
     except ImportError:
-        raise MissingExtra(
-            "zarr is not installed.", advice='Install it with: pip install "modelica-like[analyse]"'
-        ) from None
+        raise missing_extra("zarr", "analyse") from None
     return zarr

@@ -10,7 +10,7 @@ import numpy as np
 
 from modelica_like.analyse.sweeps.plan import Samples
 from modelica_like.analyse.sweeps.sweep import sweep
-from modelica_like.errors import MissingExtra, UnknownName, ValueOutOfRange
+from modelica_like.errors import UnknownName, ValueOutOfRange, missing_extra
 from modelica_like.simulation import Model
 
 Kind = Literal["sobol", "morris"]
@@ -125,9 +125,7 @@ def _salib(method: str) -> tuple[Any, Any]:
         from SALib.sample import morris as sample_morris
         from SALib.sample import sobol as sample_sobol
     except ImportError:
-        raise MissingExtra(
-            "SALib is not installed.", advice='Install it with: pip install "modelica-like[analyse]"'
-        ) from None
+        raise missing_extra("SALib", "analyse") from None
     if method not in ("sobol", "morris"):
         raise UnknownName(f"There is no method '{method}'. There are sobol and morris.")
     return (sample_sobol, analyse_sobol) if method == "sobol" else (sample_morris, analyse_morris)

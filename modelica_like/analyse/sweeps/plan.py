@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae
-from modelica_like.errors import LanguageError, MissingExtra, UnknownName, ValueOutOfRange, did_you_mean
+from modelica_like.errors import LanguageError, UnknownName, ValueOutOfRange, did_you_mean, missing_extra
 from modelica_like.units import Unit, coherent, to_si
 
 
@@ -140,7 +140,5 @@ def _qmc() -> Any:
     try:
         from scipy.stats import qmc
     except ImportError:
-        raise MissingExtra(
-            "scipy is not installed.", advice='Install it with: pip install "modelica-like[analyse]"'
-        ) from None
+        raise missing_extra("scipy", "analyse") from None
     return qmc

@@ -13,7 +13,7 @@ from modelica_like.analyse.sweeps.checkpoint import Checkpoint
 from modelica_like.analyse.sweeps.plan import Plan, Sampling, make_plan
 from modelica_like.analyse.sweeps.workers import Chunk, Done, Job, cores, in_processes, in_this_process, on_cluster
 from modelica_like.compile.compiled import CompiledDae
-from modelica_like.errors import MissingExtra, ValueOutOfRange
+from modelica_like.errors import ValueOutOfRange, missing_extra
 from modelica_like.simulation import Model, build
 
 if TYPE_CHECKING:
@@ -116,9 +116,7 @@ def _dataset(
     try:
         import xarray
     except ImportError:
-        raise MissingExtra(
-            "xarray is not installed.", advice='Install it with: pip install "modelica-like[data]"'
-        ) from None
+        raise missing_extra("xarray", "data") from None
     told = np.array([failures.get(k, "") for k in range(len(plan))], dtype=str)
     data: dict[str, Any] = {
         name: (plan.dims, values[:, k].reshape(plan.shape), {"units": unit})

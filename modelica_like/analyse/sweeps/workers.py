@@ -15,7 +15,7 @@ from typing import Any
 from modelica_like.analyse.sensitivity.outputs import read_output
 from modelica_like.analyse.sweeps.readings import read_all
 from modelica_like.compile.compiled import CompiledDae
-from modelica_like.errors import MissingExtra, ModelicaLikeError, WorkersLost
+from modelica_like.errors import ModelicaLikeError, WorkersLost, missing_extra
 from modelica_like.simulation import simulate
 
 _RESTARTS = 3
@@ -124,9 +124,7 @@ def on_cluster(job: Job, chunks: Sequence[Chunk], scheduler: str) -> Iterator[Do
         from distributed import Client, as_completed
         from distributed.scheduler import KilledWorker
     except ImportError:
-        raise MissingExtra(
-            "Dask is not installed.", advice='Install it with: pip install "modelica-like[cluster]"'
-        ) from None
+        raise missing_extra("Dask", "cluster") from None
     try:
         client = Client(scheduler, set_as_default=False, timeout=_PATIENCE)
     except (OSError, ValueError):
