@@ -29,7 +29,7 @@ def validate(
 
 @app.command()
 def compare(
-    a: Annotated[Path, typer.Argument(metavar="A", help="netlist, FMU or CSV file", show_default=False)],
+    a: Annotated[Path, typer.Argument(metavar="A", help="netlist, FMU, system or CSV file", show_default=False)],
     b: Annotated[Path, typer.Argument(metavar="B", help="what to compare it with", show_default=False)],
     signals: Annotated[
         list[str] | None, typer.Option(metavar="PATTERN", help="What to compare, e.g. '*.w'; else all.")

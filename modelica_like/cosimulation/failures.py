@@ -97,9 +97,11 @@ def _ends(system: str, unit: str, error: dict[str, Any]) -> ModelicaLikeError:
 
 def _failed(system: str, unit: str, error: dict[str, Any]) -> ModelicaLikeError:
     said = [printable(text) for text in error["messages"]]
+    in_a_step = "DoStep" in error["text"]
     return FmuFailed(
         f"{unit} failed: {printable(error['text']).rstrip('.')}.",
         why="\n".join(f"It said: {text}" for text in said[-3:]),
+        advice="If what the FMUs exchange grows without bounds, take a shorter step." if in_a_step else "",
     )
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from modelica_like.cosimulation.files import read_system, read_toml
 from modelica_like.cosimulation.system import System
+from modelica_like.netlist.read import FMU_PART
 
 
 def load_system(path: Path, work: Path) -> System:
@@ -33,6 +34,20 @@ def load_system(path: Path, work: Path) -> System:
 
         return system_of_netlist(path, work)
     return read_system(data, lines, path)
+
+
+def describes_system(path: Path) -> bool:
+    """Return whether a file describes FMUs that run together, and not a netlist that is simulated.
+
+    Raises:
+        NetlistError: it is not TOML, or does not exist.
+    """
+    if path.suffix.lower() == ".ssp":
+        return True
+    data, _ = read_toml(path)
+    parts = data.get("parts")
+    parts = parts.values() if isinstance(parts, dict) else ()
+    return "fmus" in data or any(isinstance(part, dict) and part.get("is") == FMU_PART for part in parts)
 
 
 @contextmanager

@@ -86,6 +86,7 @@ class Comparison:
         second: the other.
         deviations: largest first.
         events: by time.
+        labels: what to call the two: their files, or the names of their models.
         interpolated: the results lie at different times; the second is interpolated in between, which costs precision.
     """
 
@@ -93,6 +94,7 @@ class Comparison:
     second: Solution
     deviations: tuple[Deviation, ...]
     events: tuple[EventDifference, ...]
+    labels: tuple[str, str]
     interpolated: bool
 
     @property
@@ -133,7 +135,7 @@ def compare(
     in its own way, and the difference of the times is told instead.
 
     Args:
-        a: a netlist, an FMU, a CSV file, or a solution.
+        a: a netlist, an FMU, a system of FMUs (TOML or SSP), a CSV file, or a solution.
         b: the other.
         signals: names or patterns (`*.w`); by default all continuous variables that both have.
         until: end time in s of what is still to be run; by default that of `a`.
@@ -147,22 +149,27 @@ def compare(
     """
     first = trajectories(a, until, points, tolerance)
     second = trajectories(b, until if until is not None else float(first.time[-1]), points, tolerance)
+    labels = _label(a), _label(b)
     if min(first.time[-1], second.time[-1]) <= max(first.time[0], second.time[0]):
-        raise ValueOutOfRange(f"{first.model.name} and {second.model.name} have no time in common.")
-    names = _signals(first, second, signals)
+        raise ValueOutOfRange(f"{' and '.join(labels)} have no time in common.")
+    names = _signals(first, second, labels, signals)
     events = tuple(_match_events(first, second))
     grid = _Grid.of(first, second, events)
     scales = ranges(first, names)
     deviations = [_deviation(first, second, name, grid, scales[name]) for name in names]
     ordered = tuple(sorted(deviations, key=lambda deviation: -deviation.relative))
-    return Comparison(first, second, ordered, events, grid.interpolated)
+    return Comparison(first, second, ordered, events, labels, grid.interpolated)
 
 
-def _signals(first: Solution, second: Solution, patterns: Sequence[str]) -> list[str]:
+def _label(source: Source) -> str:
+    return source.model.name if isinstance(source, Solution) else Path(source).name
+
+
+def _signals(first: Solution, second: Solution, labels: tuple[str, str], patterns: Sequence[str]) -> list[str]:
     common = [name for name in first.names if name in first.model.position and name in second.model.position]
     if not common:
         raise UnknownName(
-            f"{first.model.name} and {second.model.name} have no signal in common.",
+            f"{' and '.join(labels)} have no signal in common.",
             advice="Signals are compared by their names, such as clutch.tau.",
         )
     chosen: dict[str, None] = {}
@@ -276,8 +283,9 @@ def comparison_report(comparison: Comparison) -> RenderableType:
 
 
 def _deviation_table(comparison: Comparison) -> Table:
-    title = f"{comparison.first.model.name} and {comparison.second.model.name}"
-    made = table(escape(title), "signal", "largest deviation>", "", "of the range>", "at time in s>")
+    made = table(
+        escape(" and ".join(comparison.labels)), "signal", "largest deviation>", "", "of the range>", "at time in s>"
+    )
     for row in comparison.deviations[:_SHOWN]:
         unit = "" if row.unit == "1" else row.unit
         made.add_row(escape(row.signal), f"{row.largest:.3e}", unit, f"{row.relative:.1e}", f"{row.time:.6g}")

@@ -38,8 +38,8 @@ def plot_comparison(comparison: Comparison, patterns: Sequence[str] = ()) -> Fig
         panels = figure.subplots(2 * len(names), 1, sharex=True, squeeze=False, height_ratios=ratios)[:, 0]
         for name, upper, lower in zip(names, panels[::2], panels[1::2], strict=True):
             unit = comparison[name].unit.replace(".", "\N{MIDDLE DOT}")
-            upper.plot(first.time, first[name], color=COLOURS[0], label=first.model.name)
-            upper.plot(second.time, second[name], "--", color=COLOURS[1], label=second.model.name)
+            upper.plot(first.time, first[name], color=COLOURS[0], label=comparison.labels[0])
+            upper.plot(second.time, second[name], "--", color=COLOURS[1], label=comparison.labels[1])
             upper.set_ylabel(name if unit == "1" else f"{name} in {unit}")
             scale = ranges(first, [name])[name]
             times, difference = comparison.difference(name)

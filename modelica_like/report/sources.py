@@ -1,4 +1,4 @@
-"""Trajectories from wherever they are: a netlist is simulated, an FMU is run, a table is read."""
+"""Trajectories from wherever they are: a netlist is simulated, FMUs are run, a table is read."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
+from modelica_like.cosimulation.load import describes_system
+from modelica_like.cosimulation.run import cosim
 from modelica_like.errors import NetlistError
 from modelica_like.fmi.run import run_fmu
 from modelica_like.simulation import build, simulate
@@ -19,13 +21,13 @@ _POINTS = 500
 def trajectories(
     source: str | Path | Solution, until: float | None = None, points: int = _POINTS, tolerance: float | None = None
 ) -> Solution:
-    """Return the trajectories of a netlist, an FMU or a CSV file; a solution is returned as it is.
+    """Return the trajectories of a netlist, an FMU, a system of FMUs or a CSV file; a solution is returned as it is.
 
     Args:
-        source: a file that ends in `.toml`, `.fmu` or `.csv`.
-        until: end time in s of a netlist or an FMU; by default its own.
-        points: number of equal intervals of its results.
-        tolerance: relative tolerance of its run.
+        source: a file that ends in `.toml`, `.fmu`, `.ssp` or `.csv`.
+        until: end time in s of what is run; by default its own.
+        points: number of equal intervals of its results; a system has results at its communication points.
+        tolerance: relative tolerance of its run; for a system, of its FMUs.
 
     Raises:
         NetlistError: the file is none of these, or the table is not one.
@@ -36,13 +38,18 @@ def trajectories(
         return source
     path = Path(source)
     kind = path.suffix.lower()
-    if kind == ".toml":
-        return simulate(build(path), until, points=points, rtol=tolerance)
     if kind == ".fmu":
         return run_fmu(path, stop=until, points=points, tolerance=tolerance)
     if kind == ".csv":
         return read_csv(path)
-    raise NetlistError(f"'{path.name}' is neither a netlist (.toml) nor an FMU (.fmu) nor a table (.csv).")
+    if kind not in (".toml", ".ssp"):
+        raise NetlistError(
+            f"'{path.name}' has no trajectories.",
+            advice="Netlists and systems of FMUs (.toml), FMUs (.fmu), SSPs (.ssp) and tables (.csv) have.",
+        )
+    if describes_system(path):
+        return cosim(path, until, fmu_tolerance=tolerance)
+    return simulate(build(path), until, points=points, rtol=tolerance)
 
 
 def read_csv(path: Path) -> RecordedSolution:

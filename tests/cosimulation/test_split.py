@@ -15,6 +15,7 @@ from modelica_like.cosimulation.run import cosim
 from modelica_like.cosimulation.split import Split, split
 from modelica_like.cosimulation.system import find_bonds
 from modelica_like.netlist import loads
+from modelica_like.report.compare import compare
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -59,6 +60,14 @@ def test_bonds_follow_from_names(oscillator: Split) -> None:
     (given_bond,) = oscillator.system.bonds
     (found,) = find_bonds(oscillator.system.links)
     assert (found.flow, found.rate) == (given_bond.flow, given_bond.rate)
+
+
+def test_a_system_is_compared_with_its_drive(oscillator: Split) -> None:
+    """A thousandth of 0.1 s is a four-hundredth of the period: an error of second order is far below 1e-3."""
+    comparison = compare(EXAMPLES / "two_mass.toml", oscillator.path, signals=["J?.w"], until=0.1)
+    assert comparison.labels == ("two_mass.toml", "system.toml")
+    assert {row.signal for row in comparison.deviations} == {"J1.w", "J2.w"}
+    assert comparison.largest < 1e-3
 
 
 def test_the_netlists_of_the_parts_are_netlists(oscillator: Split) -> None:

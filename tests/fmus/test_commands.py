@@ -52,4 +52,4 @@ def test_compare_of_strangers_is_told(run: CliRunner, reference_fmus: Built) -> 
     fmus = [str(reference_fmus[name, "2.0"]) for name in ("two_mass", "stick_slip")]
     result = run.invoke(app, ["compare", *fmus])
     assert result.exit_code == 2
-    assert result.stderr.startswith("two_mass and stick_slip have no signal in common.")
+    assert result.stderr.startswith("two_mass_fmi2.fmu and stick_slip_fmi2.fmu have no signal in common.")

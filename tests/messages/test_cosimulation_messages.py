@@ -317,7 +317,8 @@ FAILURES: dict[str, tuple[dict[str, Any], str]] = {
     "ends": ({"kind": "ends", "unit": "a", "time": 0.25}, "a (a.fmu) wants to end the run after t = 0.25 s."),
     "failed": (
         {"kind": "failed", "unit": "a", "text": "fmi2DoStep failed.", "messages": ["giving up"]},
-        "a (a.fmu) failed: fmi2DoStep failed.\nIt said: giving up",
+        "a (a.fmu) failed: fmi2DoStep failed.\nIt said: giving up\n"
+        "If what the FMUs exchange grows without bounds, take a shorter step.",
     ),
 }  # fmt: skip
 

@@ -123,13 +123,13 @@ MESSAGES = {
         ("time,x", "0,0", "1,1"),
         ("time,y", "0,0", "1,1"),
         (),
-        "a and b have no signal in common.\nSignals are compared by their names, such as clutch.tau.",
+        "a.csv and b.csv have no signal in common.\nSignals are compared by their names, such as clutch.tau.",
     ),
     "no time in common": (
         ("time,x", "0,0", "1,1"),
         ("time,x", "2,0", "3,1"),
         (),
-        "a and b have no time in common.",
+        "a.csv and b.csv have no time in common.",
     ),
     "unknown signal": (
         ("time,speed", "0,0", "1,1"),
@@ -167,4 +167,7 @@ def test_picture_of_nothing() -> None:
 def test_other_files() -> None:
     with pytest.raises(ModelicaLikeError) as told:
         trajectories("drive.txt")
-    assert str(told.value) == "'drive.txt' is neither a netlist (.toml) nor an FMU (.fmu) nor a table (.csv)."
+    assert str(told.value) == (
+        "'drive.txt' has no trajectories.\n"
+        "Netlists and systems of FMUs (.toml), FMUs (.fmu), SSPs (.ssp) and tables (.csv) have."
+    )
