@@ -89,7 +89,11 @@ MISDEEDS: dict[str, tuple[float, type[ModelicaLikeError], str]] = {
         "bench has not come to its end within 3 s, and was stopped after t = 0.49 s.\n"
         f"{BAD} was at work.\nGive it more time with `timeout`, or a shorter run.",
     ),
-    "fail": (4.0, FmuFailed, f"{BAD} failed: fmi2DoStep failed with status 3 (error)."),
+    "fail": (
+        4.0, FmuFailed,
+        f"{BAD} failed: fmi2DoStep failed with status 3 (error).\n"
+        "If what the FMUs exchange grows without bounds, take a shorter step.",
+    ),
 }  # fmt: skip
 
 
