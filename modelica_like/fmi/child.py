@@ -34,6 +34,8 @@ DISCRETE = (
     "Int64",
     "UInt64",
 )
+POINTS = 500
+"""Number of equal intervals where nobody says anything, as in simulations."""
 _MESSAGES = 20
 _TIME_RESOLUTION = 1e-12
 
@@ -168,6 +170,15 @@ def input_table(inputs: dict[str, Any], stop: float) -> Any:
     return np.array(list(zip(*columns, strict=True)), dtype=[("time", float), *((n, float) for n in series)])
 
 
+def output_step(job: dict[str, Any], stop: float, suggested: Any) -> float | None:
+    """Return the communication step; None is what the FMU suggests."""
+    if job["step"] is not None and not job["points"]:
+        return job["step"]
+    if suggested is not None and not job["points"]:
+        return None
+    return (stop - job["start"]) / (job["points"] or POINTS)
+
+
 def can_locate(description: Any, kind: str) -> bool:
     """Return whether mode changes inside a communication step can be found by stepping again."""
     if kind != "cs" or description.fmiVersion == "1.0":
@@ -204,7 +215,7 @@ def run(folder: Path) -> None:
     experiment = description.defaultExperiment
     stop = job["stop"] if job["stop"] is not None else getattr(experiment, "stopTime", None)
     stop = float(stop) if stop is not None else job["start"] + 1.0
-    step = (stop - job["start"]) / job["points"] if job["points"] else job["step"]
+    step = output_step(job, stop, getattr(experiment, "stepSize", None))
     outputs = job["outputs"] or [v["name"] for v in found if v["causality"] != "parameter"]
     event_mode = bool(getattr(description.coSimulation, "hasEventMode", False))
     messages: list[str] = []

@@ -43,7 +43,8 @@ def run_fmu(
         stop: end time in s; by default that of the FMU.
         kind: `me` (Model Exchange) or `cs` (Co-Simulation); by default `cs` if the FMU has it.
         tolerance: relative tolerance.
-        step: communication step, or interval of the results, in s; by default what the FMU suggests.
+        step: communication step, or interval of the results, in s; by default what the FMU suggests,
+            or a five-hundredth of the run.
         points: number of equal steps instead.
         outputs: variables to record; by default all that are not parameters.
         timeout: time limit in s.

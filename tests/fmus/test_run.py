@@ -6,9 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from modelica_like import Solution
+from modelica_like import Solution, simulate
 from modelica_like.errors import MissingValue, UnknownName, ValueOutOfRange
+from modelica_like.fmi.export import export_fmu
 from modelica_like.fmi.run import run_fmu
+from modelica_like.netlist import loads
 
 Built = Mapping[tuple[str, str], Path]
 VERSIONS = pytest.mark.parametrize("version", ["2.0", "3.0"])
@@ -57,6 +59,14 @@ def test_records_what_was_asked_for(reference_fmus: Built) -> None:
     run = run_fmu(reference_fmus["two_mass", "3.0"], outputs=["J2.w"], stop=0.1, step=0.01)
     assert run.names == ("J2.w",)
     assert len(run.time) == 11
+
+
+def test_has_the_times_of_a_simulation_where_nobody_wants_others(tmp_path: Path) -> None:
+    """An FMU without a suggested step."""
+    drive = loads('[parts]\nwheel = { is = "Inertia", J = 1, phi = 0, w = 1 }')
+    export_fmu(drive, tmp_path / "wheel.fmu", check=False)
+    run = run_fmu(tmp_path / "wheel.fmu", stop=3.0)
+    assert run.time == pytest.approx(simulate(drive, 3.0).time, abs=1e-12)
 
 
 def test_starts_later(reference_fmus: Built) -> None:
