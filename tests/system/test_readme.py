@@ -1,13 +1,16 @@
 """The drive of the README: both forms run, and give the same."""
 
 import re
+import shlex
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 from modelica_like import Solution, simulate
+from modelica_like.cli import app
 from modelica_like.netlist import loads
 
 README = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
@@ -33,6 +36,19 @@ def test_the_clutch_locks_after_slipping(run: Solution) -> None:
     # The shaft swings a little, so the lock-up is near, not at, the time of the rigid drive.
     assert run.events[0].time == pytest.approx(inertia * speed / 25, rel=0.05)
     assert run.energy().closure < 1e-8
+
+
+@pytest.mark.slow
+def test_what_follows_follows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """All commands on the drive run, in their order."""
+    (tmp_path / "spindle_drive.toml").write_text(block("toml"), encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    lines = re.findall(r"^modelica-like (.*spindle_drive.*)$", README, re.MULTILINE)
+    assert len(lines) == 6
+    for line in lines:
+        result = CliRunner().invoke(app, shlex.split(line, comments=True))
+        assert result.exit_code == 0, f"{line}: {result.stderr}"
+    assert (tmp_path / "parts" / "system.toml").exists()
 
 
 def test_the_netlist_is_the_same_drive(run: Solution) -> None:
