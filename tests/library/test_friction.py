@@ -1,28 +1,22 @@
 """Dry friction against closed forms: sliding, sticking, breaking away."""
 
 from math import atan, log, pi, sqrt
-from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.integrate import solve_ivp
 
 from components import (
     BearingFriction,
     Brake,
     Clutch,
-    ConstantForce,
     ConstantSpeed,
     ConstantTorque,
     Inertia,
-    MachineTable,
-    MultiPlateClutch,
     Pulse,
     Ramp,
     Sine,
-    SpeedDependentLoad,
     Spring,
     Torque,
 )
@@ -87,90 +81,6 @@ def test_torque_follows_normal_force_radius_and_coefficient() -> None:
         points=10,
     )
     np.testing.assert_allclose(run["clutch.tau"], -(0.1 + 0.2 * 0.3 * 50.0 * run.time), rtol=1e-12)
-
-
-MU = ((0.0, 0.5), (5.0, 0.3), (20.0, 0.4))
-
-
-def mu_linear(v: float) -> float:
-    return 0.5 - 0.04 * v if v < 5 else 0.3 + 0.1 * (v - 5) / 15
-
-
-@pytest.mark.parametrize("kind", [Clutch, Brake])
-def test_coefficient_from_a_table(kind: type[Component]) -> None:
-    """Beyond the last row the last slope goes on."""
-    brake = kind(fn_max=2.0, cgeo=1.5, mu_pos=MU)
-    parts = {"mass": still(30.0), "brake": brake}
-    run = simulate(shaft(**parts, **({"wall": ConstantSpeed(w_fixed=0.0)} if kind is Clutch else {})), "40 s", **TIGHT)
-    stop = run.events[-1].time
-    reference = solve_ivp(
-        lambda t, w: [-3.0 * mu_linear(w[0])],
-        (0, stop),
-        [30.0],
-        rtol=1e-11,
-        atol=1e-12,
-        max_step=0.01,
-        t_eval=[0.3 * stop, 0.9 * stop],
-    )
-    for t, w in zip(reference.t, reference.y[0], strict=True):
-        assert run.at(t)["mass.w"] == pytest.approx(w, abs=1e-6)
-    # Both pieces are exponentials: from 30 to 5 rad/s, and from 5 to 0.
-    assert stop == pytest.approx(50 * log(mu_linear(30.0) / 0.3) + log(0.5 / 0.3) / 0.12, abs=1e-6)
-
-
-def test_smooth_table_meets_its_rows_without_overshoot() -> None:
-    for speed, mu in MU:
-        run = simulate(
-            shaft(motor=ConstantSpeed(w_fixed=speed + 1e-12), brake=Brake(fn_max=1.0, mu_pos=MU, smooth=True)), "1 ms"
-        )
-        assert run["brake.tau"][0] == pytest.approx(mu, abs=1e-9)
-    between = simulate(shaft(motor=ConstantSpeed(w_fixed=4.0), brake=Brake(fn_max=1.0, mu_pos=MU, smooth=True)), "1 ms")
-    assert 0.3 < between["brake.tau"][0] < 0.5
-
-
-def test_scales_of_tables() -> None:
-    run = simulate(
-        shaft(
-            motor=ConstantSpeed(w_fixed="500 rpm"),
-            bearing=BearingFriction(tau_pos=((0, 10), (1000, 30)), w_scale="1 rpm", tau_scale="0.01 N.m"),
-        ),
-        "1 ms",
-    )
-    assert run["bearing.tau"][0] == pytest.approx(0.2, rel=1e-12)
-
-
-def test_law_of_the_multi_plate_clutch() -> None:
-    clutch = {
-        "mu_min": 0.04,
-        "w_min": 12.57,
-        "curvature": 3.023e-5,
-        "slope": 1.55e-4,
-        "mu_static": 0.133,
-        "fn_max": 1000.0,
-        "cgeo": 2.0,
-    }
-    for slip, mu in ((1.0, 3.023e-5 * 11.57**3 + 0.04), (12.57, 0.04), (32.57, 0.04 + 1.55e-4 * 20)):
-        run = simulate(
-            shaft(
-                motor=ConstantSpeed(w_fixed=slip),
-                clutch=MultiPlateClutch(**clutch, tau_drag=2.5),
-                wall=ConstantSpeed(w_fixed=0.0),
-            ),
-            "1 ms",
-        )
-        assert -run["clutch.tau"][0] == pytest.approx(2000.0 * mu + 2.5, rel=1e-12)
-    hold = 2000.0 * 0.133
-    for factor, moves in ((0.999, False), (1.001, True)):
-        run = simulate(
-            shaft(
-                torque=ConstantTorque(tau_constant=factor * hold),
-                mass=still(),
-                clutch=MultiPlateClutch(**clutch),
-                wall=ConstantSpeed(w_fixed=0.0),
-            ),
-            "1 ms",
-        )
-        assert (run.final["mass.w"] > 0) == moves
 
 
 # -- sticking and breaking away ----------------------------------------------------------------------------------------
@@ -347,60 +257,6 @@ def test_friction_that_vanishes_at_standstill(kind: type[Component], sign: int) 
     run = simulate(shaft(mass=still(sign * 5.0), friction=friction), "1 s", **TIGHT)
     np.testing.assert_allclose(run["mass.w"], sign * 5.0 * np.exp(-2.0 * run.time), rtol=1e-8)
     assert run.events == ()
-
-
-# -- tables and loads --------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("force", [150.0, 60.0, -150.0])
-def test_machine_table_on_its_slideway(force: float) -> None:
-    table = MachineTable(m=20.0, f_friction=50.0, f_load=30.0, s=0.0, v=0.0)
-    run = simulate(shaft(push=ConstantForce(f_constant=force), table=table), "0.5 s", **TIGHT)
-    net = force - 30.0
-    acceleration = 0.0 if abs(net) <= 50.0 else (net - np.sign(net) * 50.0) / 20.0
-    np.testing.assert_allclose(run["table.v"], acceleration * run.time, rtol=1e-9, atol=1e-12)
-    np.testing.assert_allclose(run["table.s"], acceleration * run.time**2 / 2, atol=1e-9)
-
-
-@pytest.mark.parametrize("sign", [1, -1])
-def test_load_with_exponent_one_and_two(sign: int) -> None:
-    """Coasting: J w' = -(a + b·w), and J w' = -(a + b·w²)."""
-    linear = simulate(shaft(mass=still(sign * 4.0), load=SpeedDependentLoad(a=1.0, b=2.0)), "3 s", **TIGHT)
-    assert linear.events[-1].time == pytest.approx(log(9.0) / 2, abs=1e-8)
-    square = simulate(shaft(mass=still(sign * 4.0), load=SpeedDependentLoad(a=1.0, b=2.0, p=2)), "3 s", **TIGHT)
-    assert square.events[-1].time == pytest.approx(atan(4.0 * sqrt(2.0)) / sqrt(2.0), abs=1e-8)
-    for run in (linear, square):
-        assert run.final["mass.w"] == 0.0
-        assert np.all(run["load.loss_power"] >= -1e-12)
-
-
-@pytest.mark.parametrize("p", [2 / 3, 0.5, 1.5])
-def test_load_with_any_exponent(p: float) -> None:
-    run = simulate(
-        shaft(
-            torque=ConstantTorque(tau_constant=20.0),
-            mass=still(),
-            load=SpeedDependentLoad(a=9.0, b=2.0, p=p, w_ref=2.0),
-        ),
-        "3 s",
-        **TIGHT,
-    )
-
-    def rates(t: float, w: Any) -> list[float]:
-        return [20.0 - 9.0 - 2.0 * (max(w[0], 0.0) / 2.0) ** p]
-
-    reference = solve_ivp(rates, (0, 3), [0.0], "DOP853", rtol=1e-11, atol=1e-12, t_eval=[0.1, 1.0, 3.0])
-    for t, w in zip(reference.t, reference.y[0], strict=True):
-        assert run.at(t)["mass.w"] == pytest.approx(w, rel=1e-7)
-
-
-def test_load_holds_at_standstill_and_is_free_without_a_constant_part() -> None:
-    held = simulate(shaft(torque=ConstantTorque(tau_constant=8.9), mass=still(), load=SpeedDependentLoad(a=9.0)), "1 s")
-    assert np.all(held["mass.w"] == 0.0)
-    free = simulate(
-        shaft(torque=ConstantTorque(tau_constant=1.0), mass=still(), load=SpeedDependentLoad(b=2.0)), "1 s", **TIGHT
-    )
-    assert free.final["mass.w"] == pytest.approx(0.5 * (1 - np.exp(-2.0)), rel=1e-8)
 
 
 # -- properties --------------------------------------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""From flat equations to states: index reduction, state selection, blocks, and what cannot be solved."""
+"""From flat equations to states: index reduction and state selection."""
 
 import dataclasses
 from pathlib import Path
@@ -7,9 +7,9 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from components import ConstantSpeed, ConstantTorque, Damper, Fixed, IdealGear, Inertia, Speed, SpringDamper, Table
+from components import ConstantSpeed, ConstantTorque, IdealGear, Inertia, SpringDamper
 from modelica_like import build, load, simulate
-from modelica_like.errors import Overdetermined, SingularAtStart, StructureError, Underdetermined
+from modelica_like.errors import SingularAtStart, StructureError, Underdetermined
 from modelica_like.flatten import flatten
 from modelica_like.language import (
     Assembly,
@@ -19,7 +19,6 @@ from modelica_like.language import (
     Parameter,
     Variable,
     der,
-    exp,
     guess,
     param,
     series,
@@ -82,6 +81,12 @@ def test_rigid_constraints_do_not_drift_in_a_hundred_seconds():
         for name in ("phi", "w"):
             before, after = run[f"inertias[{k}].{name}"], run[f"inertias[{k + 1}].{name}"]
             np.testing.assert_allclose(before, -1.7 * after, rtol=1e-14, atol=1e-10)
+
+
+def test_a_missing_equation_is_told():
+    flat = flatten(RigidTrain(n=2))
+    with pytest.raises(Underdetermined, match="1 more equation is needed"):
+        reduce(dataclasses.replace(flat, linear=flat.linear[:-1]))
 
 
 @pytest.mark.parametrize(("name", "count"), [("First", 4), ("CoupledClutches", 8)])
@@ -272,187 +277,3 @@ def test_the_derivative_of_an_input_is_told():
 
     with pytest.raises(StructureError, match=r"^rotor\.w is the derivative of the input ref, which is not known\."):
         reduce(flatten(Drive()))
-
-
-# -- systems without a unique solution -------------------------------------------------------------------------------
-
-
-def two(first: Component, second: Component) -> Assembly:
-    parts = {"first": first, "second": second, "rotor": Inertia(J=1.0)}
-    return Assembly(
-        "drive",
-        parts=parts,
-        connect={"a": ["first.flange", "rotor.flange_a"], "b": ["second.flange", "rotor.flange_b"]},
-    )
-
-
-@pytest.mark.parametrize(
-    ("first", "second"),
-    [
-        (ConstantSpeed(w_fixed=1.0), ConstantSpeed(w_fixed=1.0)),
-        (ConstantSpeed(w_fixed=1.0), Speed(w_ref=2.0)),
-        (ConstantSpeed(w_fixed=1.0), Fixed()),
-        (Fixed(), Fixed()),
-    ],
-)
-def test_two_parts_that_fix_one_motion(first, second):
-    with pytest.raises(Overdetermined) as caught:
-        reduce(flatten(two(first, second)))
-    assert "first" in str(caught.value)
-    assert "second" in str(caught.value)
-    assert caught.value.advice == "Remove one, or put a spring or clutch between."
-
-
-@pytest.mark.parametrize("ratio", [2.0, -0.5])
-def test_parallel_gears_of_one_ratio_are_told(ratio):
-    parts = {"a": Inertia(J=1.0), "b": Inertia(J=1.0), "g": IdealGear(ratio=ratio), "h": IdealGear(ratio=ratio)}
-    drive = Assembly("drive", parts=parts, series={"one": ["a", "g", "b"], "two": ["a", "h", "b"]})
-    with pytest.raises(Overdetermined, match="The motion is constrained twice") as caught:
-        reduce(flatten(drive))
-    assert "gears.py" in str(caught.value)
-
-
-def test_parallel_gears_of_different_ratios_lock():
-    parts = {
-        "a": Inertia(J=1.0),
-        "b": Inertia(J=1.0),
-        "g": IdealGear(ratio=2.0),
-        "h": IdealGear(ratio=3.0),
-        "push": ConstantTorque(tau_constant=6.0),
-    }
-    drive = Assembly("drive", parts=parts, series={"one": ["push", "a", "g", "b"], "two": ["a", "h", "b"]})
-    reduced = reduce(flatten(drive))
-    assert reduced.states == ()
-    run = simulate(drive, 1.0, points=1)
-    # No motion: both torques on a sum to -6, both on b to 0, so tau_g + tau_h = 6 and 2 tau_g + 3 tau_h = 0.
-    assert run.final["g.flange_a.tau"] == pytest.approx(18.0)
-    assert run.final["h.flange_a.tau"] == pytest.approx(-12.0)
-    assert run.final["a.phi"] == 0.0
-
-
-def test_torques_that_meet_without_a_mass_are_told():
-    parts = {"one": ConstantTorque(tau_constant=1.0), "two": ConstantTorque(tau_constant=2.0)}
-    with pytest.raises(Overdetermined):
-        reduce(flatten(Assembly("drive", parts=parts, connect={"w": ["one.flange", "two.flange"]})))
-
-
-def test_too_many_equations_here_and_too_few_there():
-    """Two equations for x, none for y: probably one of them means y."""
-
-    class Mistaken(Component):
-        x: Variable = var("1", "x")
-        y: Variable = var("1", "y")
-        T: Parameter = param("s", "time constant", default=1.0)
-
-        def equations(self) -> Equations:
-            yield self.x == sin(self.time / self.T)
-            yield 2 * self.x == exp(self.time / self.T)
-
-    with pytest.raises(Overdetermined, match=r"2 equations determine only 1 unknown \(x\): Mistaken\.") as caught:
-        reduce(flatten(Mistaken()))
-    assert caught.value.why == "On the other hand y lacks an equation."
-
-
-def test_a_missing_equation_is_told():
-    flat = flatten(RigidTrain(n=2))
-    with pytest.raises(Underdetermined, match="1 more equation is needed"):
-        reduce(dataclasses.replace(flat, linear=flat.linear[:-1]))
-
-
-# -- blocks ----------------------------------------------------------------------------------------------------------
-
-
-class Coupled(Component):
-    """n nonlinear equations in a ring: x_k + a sin(x_(k+1)) = b_k."""
-
-    n: int = 4
-    a: Parameter = param("1", "coupling", default=0.5)
-
-    def build(self) -> None:
-        self.cells = [Cell(a=0.5, b=0.1 * (k + 1)) for k in range(self.n)]
-
-    def equations(self) -> Equations:
-        from modelica_like.language import connect
-
-        for k in range(self.n):
-            yield connect(self.cells[k - 1].x, self.cells[k].u)
-
-
-class Cell(Component):
-    a: Parameter = param("1", "coupling")
-    b: Parameter = param("1", "constant")
-    u: Input = signal_in("1", "neighbour")
-
-    def equations(self) -> Equations:
-        yield self.x + self.a * sin(self.u) == self.b
-
-    from modelica_like.language import Output, signal_out
-
-    x: Output = signal_out("1", "own")
-
-
-@pytest.mark.parametrize("n", [2, 5, 12])
-def test_a_nonlinear_ring_is_torn_to_one_unknown(n):
-    model = build(Coupled(n=n))
-    assert len(model.implicit) == 1
-    run = simulate(Coupled(n=n), 1.0, points=1)
-    x = np.array([run.final[f"cells[{k}].x"] for k in range(1, n + 1)])
-    residual = x + 0.5 * np.sin(np.roll(x, 1)) - 0.1 * np.arange(1, n + 1)
-    assert np.max(np.abs(residual)) < 1e-13
-
-
-def test_small_linear_blocks_are_solved_by_symbols_large_ones_stay_implicit():
-    class Full(Component):
-        n: int = 3
-        T: Parameter = param("s", "time", default=1.0)
-
-        def build(self) -> None:
-            self.rows = [Row(number=k, n=self.n) for k in range(self.n)]
-
-        def equations(self) -> Equations:
-            from modelica_like.language import connect
-
-            for k in range(self.n):
-                for j in range(self.n - 1):
-                    yield connect(self.rows[(k + j + 1) % self.n].y, getattr(self.rows[k], f"u{j}"))
-
-    class Row(Component):
-        number: int = 0
-        n: int = 3
-        c: Parameter = param("1", "coefficient", default=0.25)
-        u0: Input = signal_in("1", "other", default=0.0)
-        u1: Input = signal_in("1", "other", default=0.0)
-        u2: Input = signal_in("1", "other", default=0.0)
-        u3: Input = signal_in("1", "other", default=0.0)
-
-        def equations(self) -> Equations:
-            # The coefficient of the own unknown depends on time: no equation can be solved for it before the run.
-            weight = 2 + sin(self.time / self.second)
-            yield weight * self.y + weight * self.c * (self.u0 + 2 * self.u1 - self.u2 + self.u3) == 1.0 + self.number
-
-        second: Parameter = param("s", "unit", default=1.0)
-        from modelica_like.language import Output, signal_out
-
-        y: Output = signal_out("1", "own")
-
-    for n, implicit in ((2, 0), (3, 0), (5, 5)):
-        model = build(Full(n=n))
-        assert len(model.implicit) <= implicit
-        run = simulate(Full(n=n), 1.0, points=3)
-        matrix = np.eye(n)
-        for k in range(n):
-            for j, c in zip(range(n - 1), (1, 2, -1, 1), strict=False):
-                matrix[k, (k + j + 1) % n] += 0.25 * c
-        for moment in (0, -1):
-            weight = 2 + np.sin(run.time[moment])
-            expected = np.linalg.solve(weight * matrix, 1.0 + np.arange(n))
-            found = [run[f"rows[{k}].y"][moment] for k in range(1, n + 1)]
-            assert found == pytest.approx(expected, rel=1e-12)
-
-
-def test_a_damper_to_ground_and_a_table_are_explicit():
-    parts = {"wave": Table(table=((0, 0), (1, 2))), "rotor": Inertia(J=1.0), "damper": Damper(d=1.0), "ground": Fixed()}
-    drive = Assembly("drive", parts=parts, series={"shaft": ["rotor", "damper", "ground"]})
-    reduced = reduce(flatten(drive))
-    assert all(block.kind == "explicit" for block in reduced.blocks)
-    assert len(reduced.states) == 2

@@ -1,0 +1,334 @@
+"""Errors of how a drive is put together: wiring, equations, start values.
+
+Lines of this file are written as {marker}, the line that ends in `# marker`.
+"""
+
+import pickle
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+
+import modelica_like.errors as errors
+from components import (
+    Clutch,
+    ConstantSpeed,
+    ConstantTorque,
+    Fixed,
+    IdealGear,
+    IdealPlanetary,
+    Inertia,
+    Mass,
+    Speed,
+    SpringDamper,
+    TorqueSensor,
+)
+from modelica_like import build
+from modelica_like.errors import ModelicaLikeError
+from modelica_like.flatten import flatten
+from modelica_like.initialize import initialize
+from modelica_like.language import Assembly, Component, Equations, Input, Variable, connect, series, signal_in, var
+from modelica_like.structure import reduce
+
+
+class Typo(Component):
+    x: Variable = var("1", "x")
+    y: Variable = var("1", "y")
+
+    def equations(self) -> Equations:
+        yield self.x + self.x**3 == 1  # typo one
+        yield self.x + self.x**5 == 2  # typo two
+
+
+class Follower(Component):
+    w_ref: Input = signal_in("rad/s", "speed")
+    drive, rotor = Speed(), Inertia(J=1.0)
+
+    def equations(self) -> Equations:
+        yield connect(self.w_ref, self.drive.w_ref)
+        yield connect(self.drive.flange, self.rotor.flange_a)
+
+
+class Geared(Component):
+    a, gear, b = Inertia(J=1.0), IdealGear(ratio=2.0), Inertia(J=2.0)
+
+    def equations(self) -> Equations:
+        yield from series(self.a, self.gear, self.b)
+
+
+class Wires(Component):
+    """Whatever is to be connected."""
+
+    rotor, slide, sensor, gear = Inertia(J=1.0), Mass(m=1.0), TorqueSensor(), IdealPlanetary(ratio=2.0)
+
+
+def drive(**wires: str) -> Assembly:
+    parts = {
+        "rotor": Inertia(J=1.0, phi=0.0, w=5.0), "load": Inertia(J=1.0, w=0.0), "motor": ConstantSpeed(w_fixed=1.0),
+        "second": ConstantSpeed(w_fixed=2.0), "one": Clutch(capacity=1.0), "two": Clutch(capacity=2.0),
+        "gear": IdealGear(ratio=2.0),
+        "twin": IdealGear(ratio=2.0), "wall": Fixed(), "other": Fixed(), "push": ConstantTorque(tau_constant=1.0),
+        "spring": SpringDamper(c=1.0, d=1.0), "sensor": TorqueSensor(), "planet": IdealPlanetary(ratio=2.0),
+    }  # fmt: skip
+    ends = {key: text.split() for key, text in wires.items()}
+    used = {end.split(".")[0] for group in ends.values() for end in group}
+    chosen = {name: part for name, part in parts.items() if name in used}
+    return Assembly("drive", parts=chosen, connect=ends)  # wired
+
+
+def with_wire(wire: Callable[[Wires], object]) -> Component:
+    class Wired(Wires):
+        def equations(self) -> Equations:
+            yield wire(self)  # type: ignore[misc]  # wire
+
+    return Wired()
+
+
+def start(component: Component, **values: float) -> None:
+    for key, value in values.items():
+        component.set(key.replace("__", "."), value)
+    initialize(build(component))
+
+
+def short_by_one() -> None:
+    flat = flatten(Geared())
+    reduce(replace(flat, linear=flat.linear[:-1]))
+
+
+CASES: dict[str, tuple[type[ModelicaLikeError], Callable[[], object], str]] = {}
+
+
+def case(kind: type[ModelicaLikeError], name: str, make: Callable[[], object], text: str) -> None:
+    CASES[name] = kind, make, text
+
+
+# -- wiring ----------------------------------------------------------------------------------------------------------
+
+
+case(
+    errors.FreeFlange,
+    "a flange is free",
+    lambda: flatten(drive(a="rotor.flange_a planet.sun", b="planet.carrier load.flange_a")),
+    """\
+planet.ring is free, so planet (IdealPlanetary) carries no torque.
+  in test_drive_messages.py:{wired} `parts.planet`
+Connect it, or say free(planet.ring).""",
+)
+case(
+    errors.WiringErrors,
+    "several errors of the wiring",
+    lambda: flatten(with_wire(lambda c: connect(c.rotor.flange_b, c.slide.flange_a, c.gear.sun))),
+    """\
+connect(rotor.flange_b, slide.flange_a): a Flange (rad, N.m) cannot join a LinearFlange (m, N). \
+A spindle or rack goes between.
+  in test_drive_messages.py:{wire} `yield wire(self)`
+
+sensor.flange_a is free, so sensor (TorqueSensor) carries no torque.
+Connect it, or say free(sensor.flange_a).
+
+sensor.flange_b is free, so sensor (TorqueSensor) carries no torque.
+Connect it, or say free(sensor.flange_b).
+
+gear.carrier is free, so gear (IdealPlanetary) carries no torque.
+Connect it, or say free(gear.carrier).
+
+gear.ring is free, so gear (IdealPlanetary) carries no torque.
+Connect it, or say free(gear.ring).""",
+)
+case(
+    errors.WrongConnection,
+    "a signal on a flange",
+    lambda: flatten(
+        drive(a="sensor.tau rotor.flange_b", b="sensor.flange_a rotor.flange_a", c="sensor.flange_b load.flange_a")
+    ),
+    """\
+connect joins the signal sensor.tau with the connector rotor.flange_b.
+Signals go to signals: use a sensor or a source between.""",
+)
+case(
+    errors.WrongConnection,
+    "a variable as a signal",
+    lambda: flatten(
+        drive(a="sensor.tau rotor.w", b="sensor.flange_a rotor.flange_a", c="sensor.flange_b load.flange_a")
+    ),
+    """\
+connect joins rotor.w, which is neither an input nor an output.
+Connect one output with any number of inputs; a sensor makes a signal of a variable.""",
+)
+case(
+    errors.UnknownName,
+    "an unknown flange",
+    lambda: flatten(drive(a="planet.sum rotor.flange_a")),
+    """\
+planet (IdealPlanetary) has no connector 'sum'; did you mean 'sun'? It has sun, carrier, ring.
+  in test_drive_messages.py:{wired} `connect.a = ['planet.sum', 'rotor.flange_a']`""",
+)
+case(
+    errors.WrongConnection,
+    "a connector in a series",
+    lambda: flatten(Assembly(parts={"j": Inertia(J=1.0)}, series={"s": ["j.flange_a", "j"]})),  # connector in series
+    """\
+j.flange_a is a connector, and a series joins parts.
+  in test_drive_messages.py:{connector in series} `series.s = ['j.flange_a', 'j']`
+Write j in the series, or join j.flange_a in a connection of its own.""",
+)
+case(
+    errors.UnknownName,
+    "an unknown parameter",
+    lambda: Inertia(j=1.0),  # unknown parameter
+    """\
+Inertia has no parameter or variable 'j'. It has J, phi, w.
+  in test_drive_messages.py:{unknown parameter} `Inertia(j=1.0)`""",
+)
+case(
+    errors.DuplicateName,
+    "a name twice",
+    lambda: Assembly("drive", parts={"m": Inertia()}, parameters={"m": 1.0}),  # twice
+    """\
+drive: 'm' is already the name of something else.
+  in test_drive_messages.py:{twice} `Assembly("drive", parts={"m": Inertia()}, parameters={"m": 1.0})`""",
+)
+case(
+    errors.MissingValue,
+    "a parameter without a value",
+    lambda: flatten(Assembly("drive", parts={"rotor": Inertia()})),  # no value
+    """\
+rotor.J (Inertia) has no value.
+  in test_drive_messages.py:{no value} `parts.rotor`
+Give it one: J = …""",
+)
+case(
+    errors.MissingValue,
+    "an input without a value",
+    lambda: flatten(Assembly(parts={"motor": Speed(), "j": Inertia(J=1.0)}, series={"s": ["motor", "j"]})),  # no signal
+    """\
+motor.w_ref is an input without a value.
+  in test_drive_messages.py:{no signal} `parts.motor`
+Connect it or give it a value.""",
+)
+
+
+# -- structure -------------------------------------------------------------------------------------------------------
+
+
+case(
+    errors.Underdetermined,
+    "too few equations",
+    short_by_one,
+    """\
+Geared: 3 equations, 4 unknowns. a.phi, b.phi, a.flange_b.tau, gear.flange_b.tau occur only in the equations below, \
+3 for 4 unknowns.
+  in inertias.py:{inertias.py:yield self.J * der(self.w) == a.tau + b.tau} `yield self.J * der(self.w) == a.tau + b.tau`
+  in gears.py:{gears.py:yield a.phi - self.phi_support == self.ratio * (b.phi - self.phi_support)} \
+`yield a.phi - self.phi_support == self.ratio * (b.phi - self.phi_support)`
+  in gears.py:{gears.py:yield self.ratio * a.tau + b.tau == 0} `yield self.ratio * a.tau + b.tau == 0`
+1 more equation is needed: connect what is open, or fix it.""",
+)
+case(
+    errors.Overdetermined,
+    "two speeds on one shaft",
+    lambda: reduce(flatten(drive(a="motor.flange rotor.flange_a", b="second.flange rotor.flange_b"))),
+    """\
+2 equations determine only 1 unknown (rotor.phi): second, motor.
+  in sources.py:{sources.py:yield self.w == self.speed()} `yield self.w == self.speed()`
+Two rigid parts fix the same speed or torque.
+Remove one, or put a spring or clutch between.""",
+)
+case(
+    errors.Overdetermined,
+    "a shaft fixed twice",
+    lambda: reduce(flatten(drive(a="wall.flange rotor.flange_a", b="other.flange rotor.flange_b"))),
+    """\
+other, wall fix the same angle, speed or torque more than once.
+  in fixed.py:{fixed.py:yield self.flange.phi == self.phi0} `yield self.flange.phi == self.phi0`
+Two parts prescribe it, or rigid parts form a loop.
+Remove one, or put a spring or clutch between.""",
+)
+case(
+    errors.Overdetermined,
+    "parallel gears",
+    lambda: reduce(
+        flatten(drive(a="rotor.flange_b gear.flange_a twin.flange_a", b="load.flange_a gear.flange_b twin.flange_b"))
+    ),
+    """\
+The motion is constrained twice: the constraint of twin follows from others.
+  in gears.py:{gears.py:yield a.phi - self.phi_support == self.ratio * (b.phi - self.phi_support)} \
+`yield a.phi - self.phi_support == self.ratio * (b.phi - self.phi_support)`
+Rigid parts form a loop, or two parts fix the same speed.
+Remove one, or put a spring or clutch between.""",
+)
+case(
+    errors.Overdetermined,
+    "another variable was meant",
+    lambda: reduce(flatten(Typo())),
+    """\
+2 equations determine only 1 unknown (x): Typo.
+  in test_drive_messages.py:{typo two} `yield self.x + self.x**5 == 2`
+  in test_drive_messages.py:{typo one} `yield self.x + self.x**3 == 1`
+On the other hand y lacks an equation.
+Look at the equations of Typo: is another variable meant in one of them?""",
+)
+case(
+    errors.StructureError,
+    "the derivative of an input",
+    lambda: reduce(flatten(Follower())),
+    """\
+der(rotor.w) is the derivative of the input w_ref, which is not known.
+Give the derivative as an input of its own, or filter the input before it prescribes a motion.""",
+)
+
+
+# -- start -----------------------------------------------------------------------------------------------------------
+
+
+case(
+    errors.MissingStart,
+    "a start value is missing",
+    lambda: start(Geared(), a__w=1.0),
+    """\
+Initialisation (not the model) lacks one equation: give a.phi a start value.
+Or start from rest (start = "rest") or in the steady state (start = "steady").""",
+)
+case(
+    errors.ContradictingStart,
+    "start values contradict each other",
+    lambda: start(Geared(), a__phi=0.0, a__w=1.0, b__w=1.0),
+    """\
+a.w = 1 and b.w = 1 contradict each other: b.w follows to be 0.5.
+  in gears.py:{gears.py:yield a.phi - self.phi_support == self.ratio * (b.phi - self.phi_support)} \
+`yield a.phi - self.phi_support == self.ratio * (b.phi - self.phi_support)`
+Remove one of the start values, or make one a guess.""",
+)
+case(
+    errors.InitializationError,
+    "no steady state",
+    lambda: initialize(build(drive(a="push.flange load.flange_a")), start="steady"),
+    """\
+No steady state was found at t = 0 s: load.w keeps changing.
+Check that the drive can be in equilibrium there, or give start values instead.""",
+)
+
+
+def test_a_high_index_is_a_notice():
+    assert [notice.text for notice in reduce(flatten(Geared())).notices] == [
+        "Index 3: gear couples motions. 1 constraint differentiated; states kept: a.phi, a.w."
+    ]
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_errors_pickle(name):
+    """A worker process hands its error on."""
+    with pytest.raises(ModelicaLikeError) as caught:
+        CASES[name][1]()
+    twin = pickle.loads(pickle.dumps(caught.value))
+    assert str(twin) == str(caught.value)
+    assert type(twin) is type(caught.value)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_message(expand, name):
+    kind, make, text = CASES[name]
+    with pytest.raises(ModelicaLikeError) as caught:
+        make()
+    assert str(caught.value) == expand(text)
+    assert type(caught.value) is kind

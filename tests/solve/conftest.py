@@ -1,0 +1,29 @@
+"""A model at its start."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from modelica_like import build
+from modelica_like.initialize import Point, initialize
+from modelica_like.language import Component
+
+
+@pytest.fixture
+def start() -> Callable[..., dict[str, float]]:
+    """Set start values (`a__w` for a.w), initialise, and return all variables."""
+
+    def started(model: Component, how: str = "given", **values: object) -> dict[str, float]:
+        for key, value in values.items():
+            model.set(key.replace("__", "."), value)
+        compiled = build(model)
+        point: Point = initialize(compiled, 0.0, how)  # type: ignore[arg-type]
+        found = np.array(compiled.variables(point.t, point.x, point.z, compiled.p, compiled.u, point.d)).ravel()
+        names = {variable.path: float(value) for variable, value in zip(compiled.flat_variables, found, strict=True)}
+        modes = {
+            one.path: one.names[int(d)] for one, d in zip(compiled.flat_discretes, point.d, strict=True) if one.names
+        }
+        return {**names, **modes}  # type: ignore[dict-item]
+
+    return started

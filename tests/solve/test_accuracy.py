@@ -1,0 +1,72 @@
+"""Runs against closed forms: long grids, inputs, tolerances, time derivatives."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from components import ConstantTorque, Fixed, IdealGear, Inertia, SpringDamper
+from modelica_like import build, simulate
+from modelica_like.language import Component, Equations, Input, Parameter, Variable, der, param, series, signal_in, var
+
+
+def test_the_grid_is_exact_for_long_runs_with_odd_numbers():
+    class Idle(Component):
+        rotor = Inertia(J=1.0, phi=0.0, w=1.0)
+
+    found = simulate(Idle(), 1234.567, t0=17.3, points=977)
+    np.testing.assert_allclose(found.time, np.linspace(17.3, 1234.567, 978), rtol=1e-15, atol=1e-12)
+    assert found.time[-1] == 1234.567
+    np.testing.assert_allclose(found["rotor.phi"], found.time - 17.3, rtol=1e-12)
+
+
+def test_inputs_are_values_of_a_run():
+    class Open(Component):
+        u: Input = signal_in("1/s", "rate", default=2.0)
+        x: Variable = var("1", "integral")
+
+        def equations(self) -> Equations:
+            yield der(self.x) == self.u
+
+    model = build(Open(x=0.0))
+    assert simulate(model, 3.0, points=1).final["x"] == pytest.approx(6.0, rel=1e-12)
+    assert simulate(model, 3.0, points=1, parameters={"u": -1.0}).final["x"] == pytest.approx(-3.0, rel=1e-12)
+
+
+def test_tighter_tolerances_come_nearer():
+    """Damped oscillator against its closed form."""
+
+    class Swing(Component):
+        ground, spring, rotor = Fixed(), SpringDamper(c=100.0, d=0.4), Inertia(J=1.0, phi=0.1, w=0.0)
+        gear, load = IdealGear(ratio=1.0), Inertia(J=0.0)
+        push = ConstantTorque(tau_constant=0.0)
+
+        def equations(self) -> Equations:
+            yield from series(self.ground, self.spring, self.rotor, self.gear, self.load, self.push)
+
+    model = build(Swing())
+    damping, frequency = 0.2, np.sqrt(100.0 - 0.04)
+    errors = []
+    for rtol in (1e-4, 1e-6, 1e-8, 1e-10):
+        found = simulate(model, 5.0, points=50, rtol=rtol, atol=rtol * 1e-2)
+        t = found.time
+        exact = 0.1 * np.exp(-damping * t) * (np.cos(frequency * t) + damping / frequency * np.sin(frequency * t))
+        errors.append(np.max(np.abs(found["rotor.phi"] - exact)))
+    assert errors[-1] < 1e-8
+    assert all(later < 0.3 * earlier for earlier, later in pairwise(errors))
+
+
+def test_time_derivative_of_an_implicit_unknown() -> None:
+    """y + y³ = t: der(y) = 1/(1 + 3·y²)."""
+
+    class Cubic(Component):
+        y: Variable = var("1", "root")
+
+        def equations(self) -> Equations:
+            yield self.y + self.y**3 == self.time / self.second
+
+        second: Parameter = param("s", "time that counts as 1", default=1.0)
+
+    run = simulate(Cubic(), 2.0)
+    np.testing.assert_allclose(run["der(y)"], 1 / (1 + 3 * run["y"] ** 2), rtol=1e-10)
+    assert run.at(1.234)["der(y)"] == pytest.approx(1 / (1 + 3 * run.at(1.234)["y"] ** 2), rel=1e-10)

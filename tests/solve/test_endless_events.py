@@ -1,0 +1,193 @@
+"""Very many events, events without end, and runs that find no way on."""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from modelica_like import Solution, simulate
+from modelica_like.errors import Chattering, StepFailed
+from modelica_like.language import (
+    Component,
+    Discrete,
+    Equations,
+    Events,
+    Mode,
+    Parameter,
+    Variable,
+    der,
+    discrete,
+    param,
+    var,
+)
+
+TIGHT = {"rtol": 1e-11, "atol": 1e-13}
+
+
+def times(run: Solution) -> np.ndarray:
+    return np.array([event.time for event in run.events])
+
+
+# -- many events, and without end ------------------------------------------------------------------------------------
+
+
+class Saw(Component):
+    x: Variable = var("s", "since the last tooth")
+    teeth: Discrete = discrete("1", "count")
+    width: Parameter = param("s", "of a tooth", default=1e-3)
+    tooth = Mode("one")
+
+    def equations(self) -> Equations:
+        yield der(self.x) == 1
+
+    def events(self) -> Events:
+        yield self.tooth.go("one", "one", when=self.x > self.width, reset={self.x: 0, self.teeth: self.teeth + 1})
+
+
+@pytest.mark.parametrize("width", [1e-3, 1e-2])
+def test_a_thousand_events(width):
+    run = simulate(Saw(x=0.0, width=width), 1000.5 * width, points=100)
+    np.testing.assert_allclose(times(run), width * np.arange(1, 1001), rtol=0, atol=1e-10)
+    assert run.final["teeth"] == 1000
+
+
+def test_a_limit_of_events_is_kept():
+    from modelica_like import Options
+
+    with pytest.raises(Chattering, match="more than 10 events"):
+        simulate(Saw(x=0.0), 1.0, options=Options(max_events=10))
+
+
+class Ball(Component):
+    """Bouncing ball: an infinite number of bounces in a finite time (Zeno)."""
+
+    h: Variable = var("m", "height")
+    v: Variable = var("m/s", "velocity")
+    g: Parameter = param("m/s2", "gravity", default=9.81)
+    e: Parameter = param("1", "restitution", default=0.7)
+    air = Mode("flying")
+
+    def equations(self) -> Equations:
+        yield der(self.h) == self.v
+        yield der(self.v) == -self.g
+
+    def events(self) -> Events:
+        yield self.air.go("flying", "flying", when=self.h < 0, reset={self.v: -self.e * self.v})
+
+
+def bounces(e: float, count: int) -> np.ndarray:
+    """Bounce n of a ball dropped from 1 m: T (1 + 2 (e + e² + … + e^(n-1))), T = sqrt(2 h / g)."""
+    powers = np.concatenate([[0.0], np.cumsum(e ** np.arange(1, count))])
+    return math.sqrt(2 / 9.81) * (1 + 2 * powers)
+
+
+def test_a_bouncing_ball_follows_its_closed_form():
+    run = simulate(Ball(h=1.0, v=0.0), 2.4, points=100, **TIGHT)
+    expected = bounces(0.7, 20)
+    expected = expected[expected < 2.4]
+    np.testing.assert_allclose(times(run), expected, rtol=0, atol=1e-9)
+    for before, after in pairwise(expected):
+        middle = run.at(0.5 * (before + after))
+        flight = after - before
+        assert middle["h"] == pytest.approx(9.81 * flight**2 / 8, rel=1e-7)  # the top of its parabola
+        assert middle["v"] == pytest.approx(0.0, abs=1e-7)
+
+
+@pytest.mark.parametrize("e", [0.7, 0.9, 0.5])
+def test_the_zeno_limit_ends_with_a_sentence(e):
+    limit = math.sqrt(2 / 9.81) * (1 + 2 * e / (1 - e))
+    with pytest.raises(Chattering) as caught:
+        simulate(Ball(h=1.0, v=0.0, e=e), 1.2 * limit, points=100)
+    assert "air switched" in caught.value.what
+    last = float(caught.value.what.split("…")[1].split(" s")[0])
+    assert last == pytest.approx(limit, rel=1e-4)
+    assert "test_endless_events.py" in str(caught.value)
+
+
+def test_a_ball_at_rest_on_the_floor_ends_with_a_sentence():
+    for e in (0.0, 0.7):
+        with pytest.raises(Chattering):
+            simulate(Ball(h=0.0, v=0.0, e=e), 1.0)
+
+
+def test_a_ball_thrown_from_the_floor_flies():
+    run = simulate(Ball(h=0.0, v=1.0), 0.3, **TIGHT)
+    np.testing.assert_allclose(times(run), [2 / 9.81], rtol=0, atol=1e-10)
+
+
+class Relay(Component):
+    """Each mode drives the other on: sliding mode, which needs a law of its own."""
+
+    x: Variable = var("1", "error")
+    T: Parameter = param("s", "time", default=1.0)
+    state = Mode("up", "down")
+
+    def equations(self) -> Equations:
+        yield self.T * der(self.x) == self.state.choose(up=1, down=-1)
+
+    def events(self) -> Events:
+        yield self.state.go("up", "down", when=self.x > 0)
+        yield self.state.go("down", "up", when=self.x < 0)
+
+
+@pytest.mark.parametrize("x", [-0.5, 0.0])
+def test_two_modes_that_drive_each_other_on_end_with_a_sentence(x):
+    with pytest.raises(Chattering) as caught:
+        simulate(Relay(x=x), 1.0)
+    text = str(caught.value)
+    assert f"state switched 20 times at t = {abs(x):g} s (up ⇄ down)." in text
+    assert "self.state.go" in text
+    assert "Modes still switch after 20 rounds at one instant." in text
+
+
+def test_a_relay_with_hysteresis_is_no_chattering():
+    class Hysteresis(Relay):
+        width: Parameter = param("1", "half the hysteresis", default=0.01)
+
+        def events(self) -> Events:
+            yield self.state.go("up", "down", when=self.x > self.width)
+            yield self.state.go("down", "up", when=self.x < -self.width)
+
+    run = simulate(Hysteresis(x=0.0), 1.0)
+    np.testing.assert_allclose(times(run), 0.01 + 0.02 * np.arange(len(run.events)), rtol=0, atol=1e-9)
+    assert len(run.events) == 50
+
+
+# -- no way on -------------------------------------------------------------------------------------------------------
+
+
+def test_a_blow_up_in_finite_time_is_told():
+    class Blow(Component):
+        x: Variable = var("1", "grows")
+        T: Parameter = param("s", "time", default=1.0)
+
+        def equations(self) -> Equations:
+            yield self.T * der(self.x) == self.x**2  # x = 1 / (1 - t)
+
+    with pytest.raises(StepFailed) as caught:
+        simulate(Blow(x=1.0), 2.0)
+    moment = float(caught.value.what.split("t = ")[1].split(" s")[0])
+    assert moment == pytest.approx(1.0, abs=1e-3)
+    assert caught.value.why == "x changes fastest relative to its tolerance."
+
+
+def test_a_panel_that_runs_past_an_event_into_nonsense_is_shortened():
+    """The root of a negative number lies behind the event."""
+    from modelica_like.language import sqrt
+
+    class Drain(Component):
+        level: Variable = var("1", "level")
+        T: Parameter = param("s", "time", default=1.0)
+        tank = Mode("full", "empty")
+
+        def equations(self) -> Equations:
+            yield self.T * der(self.level) == self.tank.choose(full=-sqrt(self.level + 1e-4), empty=0)
+
+        def events(self) -> Events:
+            yield self.tank.go("full", "empty", when=self.level < 0, reset={self.level: 0})
+
+    run = simulate(Drain(level=1.0), 5.0, **TIGHT)
+    # sqrt(level + d) = sqrt(1 + d) - t / 2, zero level at sqrt(d).
+    np.testing.assert_allclose(times(run), [2 * (math.sqrt(1.0001) - 0.01)], rtol=0, atol=1e-9)
+    assert run.final["level"] == 0.0

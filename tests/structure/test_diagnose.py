@@ -1,0 +1,86 @@
+"""Systems without a unique solution: what is told of equations that are too many, and where."""
+
+import pytest
+
+from components import ConstantSpeed, ConstantTorque, Fixed, IdealGear, Inertia, Speed
+from modelica_like import simulate
+from modelica_like.errors import Overdetermined
+from modelica_like.flatten import flatten
+from modelica_like.language import Assembly, Component, Equations, Parameter, Variable, exp, param, sin, var
+from modelica_like.structure import reduce
+
+
+def two(first: Component, second: Component) -> Assembly:
+    parts = {"first": first, "second": second, "rotor": Inertia(J=1.0)}
+    return Assembly(
+        "drive",
+        parts=parts,
+        connect={"a": ["first.flange", "rotor.flange_a"], "b": ["second.flange", "rotor.flange_b"]},
+    )
+
+
+@pytest.mark.parametrize(
+    ("first", "second"),
+    [
+        (ConstantSpeed(w_fixed=1.0), ConstantSpeed(w_fixed=1.0)),
+        (ConstantSpeed(w_fixed=1.0), Speed(w_ref=2.0)),
+        (ConstantSpeed(w_fixed=1.0), Fixed()),
+        (Fixed(), Fixed()),
+    ],
+)
+def test_two_parts_that_fix_one_motion(first, second):
+    with pytest.raises(Overdetermined) as caught:
+        reduce(flatten(two(first, second)))
+    assert "first" in str(caught.value)
+    assert "second" in str(caught.value)
+    assert caught.value.advice == "Remove one, or put a spring or clutch between."
+
+
+@pytest.mark.parametrize("ratio", [2.0, -0.5])
+def test_parallel_gears_of_one_ratio_are_told(ratio):
+    parts = {"a": Inertia(J=1.0), "b": Inertia(J=1.0), "g": IdealGear(ratio=ratio), "h": IdealGear(ratio=ratio)}
+    drive = Assembly("drive", parts=parts, series={"one": ["a", "g", "b"], "two": ["a", "h", "b"]})
+    with pytest.raises(Overdetermined, match="The motion is constrained twice") as caught:
+        reduce(flatten(drive))
+    assert "gears.py" in str(caught.value)
+
+
+def test_parallel_gears_of_different_ratios_lock():
+    parts = {
+        "a": Inertia(J=1.0),
+        "b": Inertia(J=1.0),
+        "g": IdealGear(ratio=2.0),
+        "h": IdealGear(ratio=3.0),
+        "push": ConstantTorque(tau_constant=6.0),
+    }
+    drive = Assembly("drive", parts=parts, series={"one": ["push", "a", "g", "b"], "two": ["a", "h", "b"]})
+    reduced = reduce(flatten(drive))
+    assert reduced.states == ()
+    run = simulate(drive, 1.0, points=1)
+    # No motion: both torques on a sum to -6, both on b to 0, so tau_g + tau_h = 6 and 2 tau_g + 3 tau_h = 0.
+    assert run.final["g.flange_a.tau"] == pytest.approx(18.0)
+    assert run.final["h.flange_a.tau"] == pytest.approx(-12.0)
+    assert run.final["a.phi"] == 0.0
+
+
+def test_torques_that_meet_without_a_mass_are_told():
+    parts = {"one": ConstantTorque(tau_constant=1.0), "two": ConstantTorque(tau_constant=2.0)}
+    with pytest.raises(Overdetermined):
+        reduce(flatten(Assembly("drive", parts=parts, connect={"w": ["one.flange", "two.flange"]})))
+
+
+def test_too_many_equations_here_and_too_few_there():
+    """Two equations for x, none for y: probably one of them means y."""
+
+    class Mistaken(Component):
+        x: Variable = var("1", "x")
+        y: Variable = var("1", "y")
+        T: Parameter = param("s", "time constant", default=1.0)
+
+        def equations(self) -> Equations:
+            yield self.x == sin(self.time / self.T)
+            yield 2 * self.x == exp(self.time / self.T)
+
+    with pytest.raises(Overdetermined, match=r"2 equations determine only 1 unknown \(x\): Mistaken\.") as caught:
+        reduce(flatten(Mistaken()))
+    assert caught.value.why == "On the other hand y lacks an equation."
