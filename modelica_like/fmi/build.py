@@ -50,6 +50,7 @@ PLATFORMS = {
 # -O1 runs as fast as -O2 here and compiles in two thirds of the time. Changed flags make zig compile its C runtime
 # again, which takes minutes for Windows.
 _FLAGS = ("-std=c99", "-O1", "-ffp-contract=off", "-fvisibility=hidden", "-shared", "-Wall", "-Wextra", "-DOLD_GLIBC")
+_WHOLE = "whole.c"
 _COMPILERS = ("cc", "gcc", "clang")
 _SYSTEMS = {"Linux": "linux", "Windows": "windows", "Darwin": "darwin"}
 _MACHINES = {"x86_64": "x86_64", "AMD64": "x86_64", "aarch64": "aarch64", "arm64": "aarch64", "ARM64": "aarch64"}
@@ -101,12 +102,14 @@ def build(sources: Mapping[str, str], platform: str, output_dir: Path, identifie
     with tempfile.TemporaryDirectory(prefix="modelica_like_") as folder:
         for name, content in sources.items():
             (Path(folder) / name).write_text(content, encoding="utf-8")
-        files = [name for name in sources if name.endswith(".c")]
+        # As one file: what all of them include is read once, which saves a third of the time.
+        whole = "".join(f'#include "{name}"\n' for name in sources if name.endswith(".c"))
+        (Path(folder) / _WHOLE).write_text(whole, encoding="utf-8")
         position = [] if chosen.suffix == ".dll" else ["-fPIC"]
         # Windows has the mathematical functions in its C runtime.
         libraries = [] if chosen.suffix == ".dll" else ["-lm"]
         built = Path(folder) / f"{identifier}{chosen.suffix}"
-        _run([*command, *_FLAGS, *position, "-o", str(built), *files, *libraries], folder, platform)
+        _run([*command, *_FLAGS, *position, "-o", str(built), _WHOLE, *libraries], folder, platform)
         shutil.copyfile(built, library)
     return library
 

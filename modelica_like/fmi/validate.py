@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -38,6 +39,7 @@ _NEAR = 0.1
 _LEAST_RANGE = 1e-2
 """Of the largest value among the signals of a unit."""
 _OBSERVED = 50
+_ROUNDING = 1e-9
 _SCHEMAS = {
     "model description": ("modelDescription.xml", "ModelDescription"),
     "terminals and icons": ("terminalsAndIcons/terminalsAndIcons.xml", "TerminalsAndIcons"),
@@ -108,8 +110,9 @@ class _Subject:
 
     @property
     def euler_stop(self) -> float:
-        """How far the explicit steps go."""
-        return min(_EULER_FRACTION * self.stop, _EULER_STEPS * _EULER_STEP)
+        """How far the explicit steps go: to a result of the other runs, where there is one so early."""
+        most = min(_EULER_FRACTION * self.stop, _EULER_STEPS * _EULER_STEP)
+        return math.floor(most / self.step * (1 + _ROUNDING)) * self.step or most
 
     def run(self, kind: Kind, stop: float, step: float, solver: Solver = "CVode") -> RecordedSolution:
         """Run with FMPy."""
@@ -122,6 +125,10 @@ class _Subject:
     @property
     def step(self) -> float:
         return self.stop / _STEPS
+
+    def at(self, time: float, known: RecordedSolution) -> Values:
+        """Return the values at a time from a run, or from one to that time where it is before the first result."""
+        return known.at(min(time, known.final.time)) if time >= self.step else self.run("me", time, time).final
 
     def observed(self) -> list[str]:
         """Continuous outputs, or else some local variables."""
@@ -214,7 +221,7 @@ def _run_check(name: str, subject: _Subject, kind: Kind, solver: Solver, runs: d
     stop = subject.euler_stop if solver == "Euler" else subject.stop
     try:
         run = subject.run(kind, stop, stop / _STEPS, solver)
-        expected = subject.run("me", stop, stop).final if solver == "Euler" else before and before.final
+        expected = before and subject.at(stop, before)
     except ModelicaLikeError as error:
         return Check(name, FAILED, str(error).replace("\n", " "))
     values = np.array([run[name] for name in run.recorded.position])

@@ -3,6 +3,8 @@
  * A model is data: sizes in model.h, tables and tapes in model.c. All that changes lives in `State`, which holds no
  * pointers, so that a copy of its bytes is a copy of the instance's state. Work memory holds only what can be computed
  * again. Nothing is static and mutable, so instances are independent of each other.
+ *
+ * The files are compiled one by one or all as one: names of static functions are not used twice.
  */
 #ifndef CORE_H
 #define CORE_H

@@ -104,7 +104,7 @@ Result get_mode(Instance *c, uint32_t reference, int *value) {
     return RESULT_OK;
 }
 
-static Result refuse(Instance *c, const Variable *v, const char *why) {
+static Result refuse_value(Instance *c, const Variable *v, const char *why) {
     return report(c, LOG_ERROR, RESULT_ERROR, "%s cannot be set: %s", v->name, why);
 }
 
@@ -122,9 +122,9 @@ static Result set_parameter(Instance *c, const Variable *v, double value) {
     State *s = &c->state;
     double low = model_parameter_min[v->index], high = model_parameter_max[v->index];
     if (!v->tunable && !before_start(s))
-        return refuse(c, v, "it is a fixed parameter. Set it before the end of the initialization.");
+        return refuse_value(c, v, "it is a fixed parameter. Set it before the end of the initialization.");
     if (v->tunable && s->phase == PHASE_CONTINUOUS)
-        return refuse(c, v, "tunable parameters change in event mode only.");
+        return refuse_value(c, v, "tunable parameters change in event mode only.");
     if (value < low || value > high)
         return report(c, LOG_ERROR, RESULT_ERROR, "%s = %g is out of range: it must be between %g and %g.", v->name,
             value, low, high);
@@ -135,14 +135,15 @@ static Result set_parameter(Instance *c, const Variable *v, double value) {
 
 static Result set_start(Instance *c, const Variable *v, double value) {
     State *s = &c->state;
-    if (!before_start(s)) return refuse(c, v, "start values are settable before the end of the initialization only.");
+    if (!before_start(s))
+        return refuse_value(c, v, "start values are settable before the end of the initialization only.");
     if (v->kind == KIND_DISCRETE) {
         s->d[v->index] = value;
         s->mode_given[v->index] = 1;
     } else if (v->start >= 0 && v->start < N_STARTS) {
         s->start_value[v->start] = value;
         s->start_given[v->start] = 1;
-    } else return refuse(c, v, "it follows from other variables.");
+    } else return refuse_value(c, v, "it follows from other variables.");
     touch(c);
     return RESULT_OK;
 }
@@ -151,7 +152,7 @@ Result set_float(Instance *c, uint32_t reference, double value) {
     const Variable *v = known_variable(c, reference, TYPE_FLOAT64);
     State *s = &c->state;
     if (v == NULL) return RESULT_ERROR;
-    if (!isfinite(value)) return refuse(c, v, "the value is not a finite number.");
+    if (!isfinite(value)) return refuse_value(c, v, "the value is not a finite number.");
     if (v->kind == KIND_PARAMETER) return set_parameter(c, v, value);
     if (v->kind != KIND_INPUT) return set_start(c, v, value);
     if (input_at(s, v->index, s->t) == value && s->u_rate[v->index] == 0) return RESULT_OK;
@@ -168,8 +169,8 @@ Result set_input_rate(Instance *c, uint32_t reference, double rate) {
     const Variable *v = known_variable(c, reference, TYPE_FLOAT64);
     State *s = &c->state;
     if (v == NULL) return RESULT_ERROR;
-    if (v->kind != KIND_INPUT) return refuse(c, v, "it is no input, so it has no input derivative.");
-    if (!isfinite(rate)) return refuse(c, v, "the derivative is not a finite number.");
+    if (v->kind != KIND_INPUT) return refuse_value(c, v, "it is no input, so it has no input derivative.");
+    if (!isfinite(rate)) return refuse_value(c, v, "the derivative is not a finite number.");
     if (s->u_rate[v->index] == rate) return RESULT_OK;
     for (int k = 0; k < N_U; k++) s->u[k] = input_at(s, k, s->t);
     s->u_time = s->t;
@@ -181,7 +182,7 @@ Result set_input_rate(Instance *c, uint32_t reference, double rate) {
 Result set_mode(Instance *c, uint32_t reference, int64_t value) {
     const Variable *v = known_variable(c, reference, TYPE_ENUMERATION);
     if (v == NULL) return RESULT_ERROR;
-    if (v->kind != KIND_DISCRETE) return refuse(c, v, "it is calculated.");
+    if (v->kind != KIND_DISCRETE) return refuse_value(c, v, "it is calculated.");
     if (value < 0 || value >= model_mode_counts[v->index])
         return report(c, LOG_ERROR, RESULT_ERROR, "%s has no mode %lld: they are 0 to %d.", v->name, (long long)value,
             model_mode_counts[v->index] - 1);
