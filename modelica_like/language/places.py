@@ -42,7 +42,7 @@ def located(generator: Any, label: str = "equations()") -> Iterator[tuple[Any, S
         label: name of that method, for messages.
 
     Raises:
-        LanguageError: it is not iterable.
+        LanguageError: it is not iterable, or it asks for what a partial base leaves open.
     """
     if not isinstance(generator, Iterable) or isinstance(generator, ca.SX):
         raise LanguageError(
@@ -54,7 +54,7 @@ def located(generator: Any, label: str = "equations()") -> Iterator[tuple[Any, S
         try:
             item = next(items, _END)
         except RuntimeError as error:
-            raise _undecided(error, label) or error from None
+            raise _undecided(error, label) or _left_open(error) or error from None
         if item is _END:
             return
         yield item, _place(items)
@@ -74,6 +74,35 @@ def _undecided(error: RuntimeError, label: str) -> LanguageError | None:
         where=place,
         advice="Write where(condition, a, b), all_of(…), any_of(…); only structural fields decide an `if`.",
     )
+
+
+def _left_open(error: RuntimeError) -> LanguageError | None:
+    """Tell what a partial base wants a component to define."""
+    frame = error.__traceback__
+    while frame is not None and frame.tb_next is not None:
+        frame = frame.tb_next
+    # CasADi raises it, too, with a text.
+    if not isinstance(error, NotImplementedError) or error.args or frame is None:
+        return None
+    owner: object = frame.tb_frame.f_locals.get("self")
+    kind = type(owner)
+    base, _, name = frame.tb_frame.f_code.co_qualname.rpartition(".")
+    wanted = inspect.getdoc(getattr(kind, name, None)) or ""
+    decorator = "@property, " if isinstance(getattr(kind, name, None), property) else ""
+    return LanguageError(
+        f"{kind.__name__} does not define {name}, which its base {base} leaves open.",
+        where=_class_source(kind),
+        why=f"{base}.{name}: {wanted.splitlines()[0]}" if wanted else "",
+        advice=f"Write it in {kind.__name__}: {decorator}def {name}(self).",
+    )
+
+
+def _class_source(kind: type) -> Source:
+    try:
+        lines, first = inspect.getsourcelines(kind)
+    except (OSError, TypeError):  # made at a prompt
+        return NOWHERE
+    return Source(inspect.getfile(kind), first, lines[0].strip())
 
 
 def _place(items: object) -> Source:

@@ -12,6 +12,7 @@ import pytest
 
 import modelica_like.errors as errors
 from components import Clutch, ClutchActuator, ConstantSpeed, Fixed, Freewheel, Inertia, TimeFormula, Torque
+from components.sources import TorqueSource
 from modelica_like import Solution, build, simulate, simulation_function
 from modelica_like.errors import ModelicaLikeError
 from modelica_like.flatten import flatten
@@ -46,6 +47,10 @@ class Grip(Twist):
         yield from super().equations()
         yield der(self.phi_rel) == self.w_rel
         yield self.plates.choose(stuck=der(self.w_rel), open=self.tau) == 0  # grip
+
+
+class Unfinished(TorqueSource):  # unfinished
+    pass
 
 
 class WrongUnits(Inertia):
@@ -178,6 +183,16 @@ case(
 Forgetful declares 1 equation for 4 unknowns (phi_rel, tau, flange_a.tau, flange_b.tau).
   in test_component_messages.py:{forgetful} `yield self.tau == 0`
 Its base Twist has equations of its own: is `yield from super().equations()` missing?""",
+)
+case(
+    errors.LanguageError,
+    "a base leaves something open",
+    lambda: flatten(Unfinished()),
+    """\
+Unfinished does not define torque, which its base TorqueSource leaves open.
+  in test_component_messages.py:{unfinished} `class Unfinished(TorqueSource):  # unfinished`
+TorqueSource.torque: Return the torque on the connected part.
+Write it in Unfinished: def torque(self).""",
 )
 case(
     errors.LanguageError,
