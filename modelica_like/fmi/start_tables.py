@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import casadi as ca
 import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.initialize import Point
 from modelica_like.initialize.start import Rows, StartProblem, _StartSystem
+from modelica_like.initialize.steady import moving_states
 
 
 @dataclass(frozen=True)
@@ -82,13 +82,5 @@ def start_tables(model: CompiledDae) -> StartTables:
         zero=tuple(rows.states),
         columns=tuple(columns),
         wanted=(*range(own), *(row for _, _, row in triples[0])) if columns else (),
-        steady=_steady(model) if kind == "steady" else None,
+        steady=tuple(moving_states(model)) if kind == "steady" else None,
     )
-
-
-def _steady(model: CompiledDae) -> tuple[int, ...]:
-    """States that something depends on."""
-    arguments = list(model.arguments.values())
-    equations = ca.vertcat(model.ode(*arguments), model.alg(*arguments))
-    depends = ca.which_depends(equations, model.arguments["x"], 1, False)
-    return tuple(k for k, does in enumerate(depends) if does)

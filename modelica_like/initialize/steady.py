@@ -2,48 +2,78 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import casadi as ca
 import numpy as np
 
-from modelica_like.compile.compiled import CompiledDae
+from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import InitializationError
+from modelica_like.initialize.kept import RANK, Matrix, find_kept, solve_kept
 from modelica_like.initialize.point import Point, call
 
 _MAX_NEWTON = 50
 _STEADY = 1e-6
+_NEAR = (
+    "Give guesses near the motion that is steady, such as guess(100) for a speed; "
+    "an operating point can begin from the end of a run, too."
+)
 
 
 def solve_steady(model: CompiledDae, point: Point) -> None:
     """Find states with zero derivatives near `point`.
 
-    States that nothing depends on (absolute angles) keep their value.
+    States that nothing depends on (absolute angles) keep their value, and so does everything that the motion keeps:
+    the slip of a clutch that sticks, the momentum of a shaft without load.
+
+    Args:
+        model: the compiled model.
+        point: where to begin; it becomes the steady state.
 
     Raises:
         InitializationError: there is no steady state near it.
     """
-    arguments = list(model.arguments.values())
-    x, z = model.arguments["x"], model.arguments["z"]
-    equations = ca.vertcat(model.ode(*arguments), model.alg(*arguments))
     moving = moving_states(model)
-    rows = [*moving, *range(len(model.states), len(model.states) + len(model.implicit))]
-    unknowns = ca.vertcat(*(x[k] for k in moving), z)
-    function = ca.Function("steady", arguments, [equations[rows], ca.jacobian(equations[rows], unknowns)])
+    function = _steady_function(model, moving)
     for _ in range(_MAX_NEWTON):
-        value, jacobian = function(point.t, point.x, point.z, model.p, model.u, point.d)
-        # Least squares: an undetermined split (several equilibria) takes the one nearest to the guess.
-        step = np.linalg.lstsq(np.asarray(jacobian.full()), -np.asarray(value.full()).ravel(), rcond=1e-12)[0]
+        value, jacobian = (np.asarray(part.full()) for part in function(*_arguments(model, point)))
+        if not (np.all(np.isfinite(value)) and np.all(np.isfinite(jacobian))):
+            break
+        step = _step(model, point, moving, -value.ravel(), jacobian)
         point.x[moving] += step[: len(moving)]
         point.z += step[len(moving) :]
         if step.size == 0 or np.max(np.abs(step) / (1.0 + np.abs(step))) < 1e-13:
             break
-    residual = np.asarray(function(point.t, point.x, point.z, model.p, model.u, point.d)[0].full()).ravel()
+    residual = np.asarray(function(*_arguments(model, point))[0].full()).ravel()
     if residual.size and not np.max(np.abs(residual)) <= _STEADY:
         worst = int(np.argmax(np.abs(residual)))
         name = model.states[moving[worst]] if worst < len(moving) else model.implicit[worst - len(moving)]
         raise InitializationError(
             f"No steady state was found at t = {point.t:g} s: {name} keeps changing.",
-            advice="Check that the drive can be in equilibrium there, or give start values instead.",
+            advice=f"Check that the drive has an equilibrium. {_NEAR}",
         )
+
+
+def _step(model: CompiledDae, point: Point, moving: list[int], right: Vector, jacobian: Matrix) -> Any:
+    step, _, rank, _ = np.linalg.lstsq(jacobian, right, rcond=RANK)
+    if rank == len(right):
+        return step
+    kept = find_kept(model, point, moving, jacobian)
+    return solve_kept(kept, jacobian, right, kept.missing)
+
+
+def _arguments(model: CompiledDae, point: Point) -> tuple[Any, ...]:
+    return point.t, point.x, point.z, model.p, model.u, point.d
+
+
+def _steady_function(model: CompiledDae, moving: list[int]) -> ca.Function:
+    """Return a function of what a point has: rates of the moving states and residuals, and their Jacobian."""
+    arguments = list(model.arguments.values())
+    x, z = model.arguments["x"], model.arguments["z"]
+    equations = ca.vertcat(model.ode(*arguments), model.alg(*arguments))
+    rows = [*moving, *range(len(model.states), len(model.states) + len(model.implicit))]
+    unknowns = ca.vertcat(*(x[k] for k in moving), z)
+    return ca.Function("steady", arguments, [equations[rows], ca.jacobian(equations[rows], unknowns)])
 
 
 def moving_states(model: CompiledDae) -> list[int]:
@@ -66,5 +96,5 @@ def check_modes_hold(model: CompiledDae, point: Point) -> None:
             raise InitializationError(
                 f"No steady state was found at t = {point.t:g} s: {mode.path} does not stay {mode.names[present]}.",
                 where=one.source,
-                advice="Give guesses near the motion that is steady, such as guess(100) for a speed.",
+                advice=_NEAR,
             )

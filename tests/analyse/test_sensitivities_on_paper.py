@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from components import Fixed, Inertia, SpringDamper
+from components import Clutch, ConstantTorque, Fixed, Inertia, SpeedDependentLoad, SpringDamper
 from modelica_like import Assembly, Component, load, sensitivities, simulate
 from modelica_like.analyse.sensitivity.derivatives import Sensitivities
-from modelica_like.language import Equations, Events, Mode, Parameter, Variable, der, param, series, var, where
+from modelica_like.language import Equations, Events, Mode, Parameter, Variable, der, guess, param, series, var, where
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -321,3 +321,23 @@ def test_a_reset_of_a_variable_that_follows_from_states() -> None:
         return np.array([v + step + a * (1.5 - t), w + k * step + 0.5 * a * (1.5 - t)])
 
     assert relative_error(result, complex_step(paper, np.array([2.0, 0.5, 3.0]))) < 1e-9
+
+
+class Coupled(Component):
+    """5 N.m against 1 N.m + 1 N.m s/rad w, behind a clutch that sticks: w = T - tau_0."""
+
+    push = ConstantTorque(tau_constant=5.0)
+    rotor = Inertia(J=1.0, w=guess(1.0), phi=0.0)
+    plates = Clutch(capacity=20.0)
+    wheel = Inertia(J=3.0, w=guess(1.0))
+    load = SpeedDependentLoad(a=1.0, b=1.0)
+
+    def equations(self) -> Equations:
+        yield from series(self.push, self.rotor, self.plates, self.wheel, self.load)
+
+
+def test_a_steady_start_with_a_clutch_that_sticks() -> None:
+    result = sensitivities(
+        Coupled(), ["rotor.w", "wheel.w"], ["push.tau_constant", "load.a", "rotor.J"], until="1 s", start="steady"
+    )
+    np.testing.assert_allclose(result.derivatives, [[1.0, -1.0, 0.0]] * 2, atol=1e-9)

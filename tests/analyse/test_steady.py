@@ -5,12 +5,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from components import ConstantTorque, Inertia
+from components import (
+    BearingFriction,
+    Clutch,
+    ConstantTorque,
+    Freewheel,
+    Inertia,
+    SpeedDependentLoad,
+)
 from modelica_like import build, simulate
 from modelica_like.analyse.operating.curves import characteristic
 from modelica_like.analyse.operating.steady import steady
 from modelica_like.errors import InitializationError, UnknownName, ValueOutOfRange
-from modelica_like.language import Component, Equations, series
+from modelica_like.language import Component, Equations, guess, series
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 # Document 002, set A: the measured speed line and the no-load current exactly.
@@ -106,3 +113,71 @@ def test_a_point_without_steady_state_is_named():
     """Without friction, only no torque at all keeps a speed."""
     with pytest.raises(InitializationError, match=r"At torque.tau_constant = 5.0: No steady state"):
         characteristic(Accelerated(), {"torque.tau_constant": [0.0, 5.0]})
+
+
+class TwoFans(Component):
+    """A torque T turns two fans, one behind a clutch: T = 3 N.m w/(100 rad/s) + 5 N.m (w/(100 rad/s))²."""
+
+    motor = ConstantTorque(tau_constant=10.0)
+    rotor = Inertia(J=0.1, w=guess(100.0), phi=0)
+    first = SpeedDependentLoad(b=3.0, p=1.0, w_ref=100.0)
+    coupling = Clutch(capacity=100.0)
+    wheel = Inertia(J=0.2, w=guess(100.0))
+    second = SpeedDependentLoad(b=5.0, p=2.0, w_ref=100.0)
+
+    def equations(self) -> Equations:
+        yield from series(self.motor, self.rotor, self.coupling, self.wheel, self.second)
+        yield from series(self.rotor, self.first)
+
+
+def speed_of_fans(torque):
+    return 10.0 * (np.sqrt(9.0 + 20.0 * torque) - 3.0)
+
+
+@pytest.fixture(scope="module")
+def fans():
+    return build(TwoFans())
+
+
+@pytest.mark.parametrize("torque", [10.0, 20.0, 30.0])
+def test_a_clutch_that_sticks_turns_as_one(fans, torque):
+    near = steady(fans)
+    for begin in (None, near, simulate(fans, "20 s", start="rest")):
+        point = steady(fans, parameters={"motor.tau_constant": torque}, near=begin)
+        assert (point["rotor.w"], point["wheel.w"]) == pytest.approx([speed_of_fans(torque)] * 2, rel=1e-12)
+        assert point.stuck == ("coupling",)
+        assert sum(point.losses.values()) == pytest.approx(torque * point["rotor.w"], rel=1e-12)
+
+
+def test_a_torque_that_holds_a_speed_through_a_clutch(fans):
+    point = steady(fans, {"wheel.w": 150.0}, by="motor.tau_constant")
+    assert point["motor.tau_constant"] == pytest.approx(3.0 * 1.5 + 5.0 * 1.5**2, rel=1e-11)
+
+
+def test_a_freewheel_that_drives_turns_as_one():
+    """5 N.m against 1 N.m + 1 N.m s/rad w: 4 rad/s, before and behind the freewheel."""
+
+    class Driven(Component):
+        motor, rotor, freewheel = ConstantTorque(tau_constant=5.0), Inertia(J=0.1, phi=0), Freewheel()
+        wheel = Inertia(J=0.2, w=guess(1.0))
+        bearing = BearingFriction(tau_pos=((0, 1), (1, 2)))
+
+        def equations(self) -> Equations:
+            yield from series(self.motor, self.rotor, self.freewheel, self.wheel, self.bearing)
+
+    point = steady(Driven())
+    assert (point["rotor.w"], point["wheel.w"]) == pytest.approx((4.0, 4.0), rel=1e-12)
+    assert point["freewheel.tau"] == pytest.approx(-5.0, rel=1e-12)
+
+
+@pytest.mark.parametrize(("name", "value"), [("box.front_ratio", -2.0), ("box.small_ratio", 3.0)])
+def test_other_ratios_keep_clutches_closed(name, value):
+    """The slip of the brake that holds the carrier depends on the ratios, and stays zero: (1 - 1/front)·small."""
+    model = build(EXAMPLES / "lepelletier_gears.toml", free=["box.front_ratio", "box.small_ratio"])
+    near = simulate(model, "2 s")
+    point = steady(model, parameters={name: value}, near=near)
+    ratio = (1 - 1 / point["box.front_ratio"]) * point["box.small_ratio"]
+    assert point["motor.w"] / point["load.w"] == pytest.approx(ratio, rel=1e-12)
+    assert point["box.brake_d.w"] == pytest.approx(0.0, abs=1e-12)
+    held = steady(model, {"load.w": 1.01 * point["load.w"]}, "box.small_ratio", parameters={name: value}, near=point)
+    assert held["box.small_ratio"] == pytest.approx(point["box.small_ratio"] / 1.01, rel=1e-9)

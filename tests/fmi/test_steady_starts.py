@@ -3,7 +3,7 @@
 import pytest
 from fmpy.fmi1 import FMICallException
 
-from components import BearingFriction, ConstantTorque, Inertia
+from components import BearingFriction, Clutch, ConstantTorque, Inertia
 from modelica_like.language import Assembly, guess
 
 
@@ -26,6 +26,31 @@ def test_a_steady_start_follows_the_guess_and_the_parameters(exported):
     assert fmu.getReal([case.ref("rotor.w")]) == pytest.approx([4.0], rel=1e-12)
     faster = case.started("me", **{"push.tau_constant": 7.0})
     assert faster.getReal([case.ref("rotor.w")]) == pytest.approx([6.0], rel=1e-12)
+
+
+def clutched():
+    """The same behind a clutch that sticks."""
+    parts = {
+        "push": ConstantTorque(tau_constant=5.0),
+        "rotor": Inertia(J=1.0, w=guess(1.0)),
+        "clutch": Clutch(capacity=20.0),
+        "wheel": Inertia(J=3.0, w=guess(1.0)),
+        "bearing": BearingFriction(tau_pos=((0, 1), (1, 2))),
+    }
+    drive = Assembly("clutched", parts=parts, series={"shaft": [*parts]})
+    drive.simulate.update(start="steady", until=1.0)
+    return drive
+
+
+@pytest.mark.parametrize("version", ["2.0", "3.0"])
+def test_a_clutch_that_sticks_turns_as_one_in_a_steady_start(exported, version):
+    case = exported(clutched(), version)
+    fmu = case.started("me", **{"push.tau_constant": 7.0})
+    read = fmu.getReal if version == "2.0" else fmu.getFloat64
+    assert read([case.ref("rotor.w"), case.ref("wheel.w")]) == pytest.approx([6.0, 6.0], rel=1e-12)
+    assert read([case.ref("clutch.w_rel")]) == pytest.approx([0.0], abs=1e-14)
+    mode = fmu.getInteger if version == "2.0" else fmu.getInt64
+    assert case.model.flat_discretes[0].names[mode([case.ref("clutch.mode")])[0]] == "stuck"
 
 
 def test_a_steady_start_that_no_mode_allows_is_refused(exported):

@@ -109,7 +109,7 @@ dc_bench_motor: motor.w cannot be held by last_load: in steady state it does not
 Choose a parameter that changes it, such as the torque of a load."""),
     "a point of a curve": (InitializationError, lambda: characteristic(model(), {"torque.tau_constant": [1.0]}), """\
 At torque.tau_constant = 1.0: No steady state was found at t = 0 s: mass.w keeps changing.
-Check that the drive can be in equilibrium there, or give start values instead."""),
+Check that the drive has an equilibrium. Give guesses near the motion that is steady, such as guess(100) for a speed; an operating point can begin from the end of a run, too."""),
     "a curve over two": (ValueOutOfRange, lambda: characteristic(model(), {}), """\
 A characteristic curve goes over one quantity, not 0."""),
     "a curve over nothing": (ValueOutOfRange, lambda: characteristic(model(), {"mass.J": []}), """\

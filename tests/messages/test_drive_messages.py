@@ -305,7 +305,8 @@ case(
     lambda: initialize(build(drive(a="push.flange load.flange_a")), start="steady"),
     """\
 No steady state was found at t = 0 s: load.w keeps changing.
-Check that the drive can be in equilibrium there, or give start values instead.""",
+Check that the drive has an equilibrium. Give guesses near the motion that is steady, such as guess(100) for \
+a speed; an operating point can begin from the end of a run, too.""",
 )
 
 

@@ -15,7 +15,19 @@ from components import (
 )
 from modelica_like import simulate
 from modelica_like.errors import ContradictingStart, InitializationError, MissingStart, UnknownName
-from modelica_like.language import Component, Equations, Parameter, connect, guess, param, series
+from modelica_like.language import (
+    Component,
+    Equations,
+    Parameter,
+    Variable,
+    connect,
+    der,
+    guess,
+    param,
+    series,
+    sqrt,
+    var,
+)
 
 
 class Geared(Component):
@@ -252,6 +264,22 @@ def test_where_there_is_no_steady_state_it_is_told(start):
 
     with pytest.raises(InitializationError, match=r"^No steady state was found at t = 0 s: rotor\.w keeps changing\."):
         start(Pushed(), "steady")
+
+
+def test_a_guess_outside_the_domain_of_the_equations_is_told(start):
+    class Draining(Component):
+        v: Variable = var("1", "level")
+        period: Parameter = param("s", "time constant", default=1.0)
+
+        def build(self) -> None:
+            self.v = guess(-1.0)
+
+        def equations(self) -> Equations:
+            yield self.period * der(self.v) == 1 - sqrt(self.v)
+
+    assert start(Draining(), "steady", v=guess(0.5))["v"] == pytest.approx(1.0, rel=1e-12)
+    with pytest.raises(InitializationError, match=r"^No steady state was found at t = 0 s: v keeps changing\."):
+        start(Draining(), "steady")
 
 
 def test_an_unknown_kind_of_start_is_refused(start):

@@ -14,6 +14,7 @@ from modelica_like.analyse.linear.points import At, Drive, point_of
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import UnknownName, did_you_mean, missing_extra
 from modelica_like.initialize import Point
+from modelica_like.initialize.kept import Kept
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -186,6 +187,12 @@ def slopes_at(
         f = [f[0] + f[1] @ follow[0], f[1], f[2] + f[1] @ follow[1]]
         h = [h[0] + h[1] @ follow[0], h[1], h[2] + h[1] @ follow[1]]
     return f[0], f[2], h[0], h[2]
+
+
+def held_by(model: CompiledDae, point: Point, kept: Kept, names: Sequence[str]) -> Matrix:
+    """Return derivatives of the variables that modes hold by inputs or parameters, at constant states."""
+    held = [model.flat_variables[node].path for node in kept.held]
+    return slopes_at(model, point, names, held)[3] if held else np.zeros((0, len(names)))
 
 
 def _jacobians(model: CompiledDae, columns: Sequence[tuple[str, int]], rows: Sequence[int]) -> ca.Function:

@@ -4,21 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from modelica_like.analyse.linear.linearize import slopes_at
+from modelica_like.analyse.linear.linearize import held_by, slopes_at
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import InitializationError, UnknownName, ValueOutOfRange, did_you_mean
 from modelica_like.initialize import Point, call, initialize
+from modelica_like.initialize.kept import find_kept, solve_kept
 from modelica_like.initialize.steady import check_modes_hold, moving_states, solve_steady
 from modelica_like.simulation import Model, build
 from modelica_like.solve.solution import Solution
 from modelica_like.units import to_si
-
-if TYPE_CHECKING:
-    pass
 
 _MAX_NEWTON = 40
 _HALVINGS = 20
@@ -214,7 +212,9 @@ def steady_slopes(model: CompiledDae, point: Point, paths: Sequence[str], free: 
     """Total derivative of variables of steady states by parameters, shape (variables, parameters)."""
     a, b, c, d = slopes_at(model, point, free, paths)
     moving = moving_states(model)
-    move = np.linalg.lstsq(a[np.ix_(moving, moving)], -b[moving], rcond=1e-12)[0]
+    inner = a[np.ix_(moving, moving)]
+    kept = find_kept(model, point, moving, inner)
+    move = solve_kept(kept, inner, -b[moving], -held_by(model, point, kept, free))
     return c[:, moving] @ move + d
 
 

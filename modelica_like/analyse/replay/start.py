@@ -8,11 +8,14 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from modelica_like.analyse.linear.linearize import held_by
 from modelica_like.analyse.replay.slopes import Sizes
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.initialize import Point, StartKind
+from modelica_like.initialize.kept import find_kept, solve_kept
 from modelica_like.initialize.start import StartProblem, _StartSystem
+from modelica_like.initialize.steady import moving_states
 
 _MAX_NEWTON = 50
 
@@ -122,7 +125,7 @@ class StartSlopes:
         return y
 
     def _steady(self, problem: StartProblem, given: Any) -> Vector:
-        """Implicit function theorem on the steady state; what it leaves open keeps to the guess."""
+        """Implicit function theorem on the steady state; what that leaves open is held, or keeps to the guess."""
         model, size = self.model, self.size
         guess = self._direct(problem)
         for entry in model.starts:
@@ -132,16 +135,19 @@ class StartSlopes:
         x, z = arguments["x"], arguments["z"]
         symbols = list(arguments.values())
         equations = ca.vertcat(model.ode(*symbols), model.alg(*symbols))
-        moving = [k for k, depends in enumerate(ca.which_depends(equations, x, 1, False)) if depends]
+        moving = moving_states(model)
         chosen = equations[[*moving, *range(size.x, size.x + size.z)]]
         fixed = ca.vertcat(arguments["p"], arguments["u"])
         by = ca.vertcat(*(x[k] for k in moving), z), fixed, arguments["d"]
         function = ca.Function("steady", symbols, [ca.jacobian(chosen, one) for one in by])
         unknowns, by_fixed, by_d = (np.asarray(part.full()) for part in function(*given))
-        inverse = np.linalg.pinv(unknowns, rcond=1e-12)
         before = np.concatenate([guess[moving], np.zeros((size.z, len(self.moved)))])
-        solved = before - inverse @ (by_fixed + by_d @ self.starts + unknowns @ before)
-        guess[moving] = solved[: len(moving)]
+        kept = find_kept(model, self.point, moving, unknowns)
+        names = [*model.parameter_position, *(model.flat_variables[k].path for k in model.inputs)]
+        of_held = held_by(model, self.point, kept, names)[:, self.moved]
+        of_held = -of_held - kept.rows[: len(kept.held)] @ guess[moving]
+        right = -(by_fixed + by_d @ self.starts + unknowns @ before)
+        guess[moving] += solve_kept(kept, unknowns, right, of_held)[: len(moving)]
         return guess
 
 

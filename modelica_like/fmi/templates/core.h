@@ -228,6 +228,7 @@ int lu_factor(int n, double *matrix, int *order);
 void lu_solve(int n, const double *matrix, const int *order, double *x);
 void lu_solve_transposed(int n, const double *matrix, const int *order, double *x);
 void least_squares(int rows, int columns, double *a, double *b, double *x);
+void keeping_least_squares(int n, int states, double *a, double *turns, double *b, double *x);
 
 /* point.c */
 void evaluate(Instance *c, const Tape *tape, double t, const double *x, const double *z, double *outputs);

@@ -75,7 +75,7 @@ static size_t lay_out(Work *w, double *memory) {
     size_t qr_v = larger((size_t)pattern_step.n_v, (size_t)pattern_start.n_v),
            qr_r = larger((size_t)pattern_step.n_r, (size_t)pattern_start.n_r);
     size_t rows = larger((size_t)pattern_step.size, (size_t)pattern_start.size);
-    size_t square = larger(START_STEADY ? (size_t)(N_STEADY + N_Z) * (N_STEADY + N_Z) : 0, (size_t)N_RESETS * N_X);
+    size_t square = larger(START_STEADY ? 2 * (size_t)(N_STEADY + N_Z) * (N_STEADY + N_Z) : 0, (size_t)N_RESETS * N_X);
     struct {
         double **array;
         size_t size;

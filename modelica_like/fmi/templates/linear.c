@@ -4,6 +4,8 @@
 #include <string.h>
 #include "core.h"
 
+#define SAYS_NOTHING 1e-24 /* square of the relative size of an equation that is none */
+
 /* Left-looking Householder QR (T. Davis, Direct Methods for Sparse Linear Systems, ch. 5). Returns 0 if singular. */
 int qr_factor(const QrPattern *a, const double *values, Work *work) {
     double *x = work->qr_work, largest = 0;
@@ -115,49 +117,80 @@ void lu_solve_transposed(int n, const double *m, const int *order, double *x) {
     }
 }
 
-/* Shortest x that minimises |A x - b|, by one-sided Jacobi rotations of the rows of A (Hestenes).
- * `a` holds the rows of A one after the other (and is destroyed), `b` is rotated along. */
-void least_squares(int rows, int columns, double *a, double *b, double *x) {
-    double largest = 0;
+static void rotate(int n, double *p, double *q, double c, double s) {
+    for (int k = 0; k < n; k++) {
+        double swap = c * p[k] - s * q[k];
+        q[k] = s * p[k] + c * q[k];
+        p[k] = swap;
+    }
+}
+
+static double dot(int n, const double *p, const double *q) {
+    double sum = 0;
+    for (int k = 0; k < n; k++) sum += p[k] * q[k];
+    return sum;
+}
+
+/* Turns the rows of A until they are orthogonal, by one-sided Jacobi rotations (Hestenes); b is rotated along. `turns`
+ * may be there, too: from the unit matrix it becomes the combinations of rows of A that have come out. */
+static void make_orthogonal(int rows, int columns, double *a, double *turns, double *b) {
     for (int sweep = 0; sweep < 60; sweep++) {
         int rotated = 0;
         for (int i = 0; i < rows; i++)
             for (int j = i + 1; j < rows; j++) {
-                double *p = a + (size_t)i * columns, *q = a + (size_t)j * columns, pp = 0, qq = 0, pq = 0, angle, t, c,
-                       s, swap;
-                for (int k = 0; k < columns; k++) {
-                    pp += p[k] * p[k];
-                    qq += q[k] * q[k];
-                    pq += p[k] * q[k];
-                }
+                double *p = a + (size_t)i * columns, *q = a + (size_t)j * columns;
+                double pp = dot(columns, p, p), qq = dot(columns, q, q), pq = dot(columns, p, q), angle, t, c;
                 if (pq == 0 || fabs(pq) <= DBL_EPSILON * sqrt(pp * qq)) continue;
                 rotated = 1;
                 angle = (qq - pp) / (2 * pq);
                 t = (angle >= 0 ? 1 : -1) / (fabs(angle) + sqrt(1 + angle * angle));
                 c = 1 / sqrt(1 + t * t);
-                s = c * t;
-                for (int k = 0; k < columns; k++) {
-                    swap = c * p[k] - s * q[k];
-                    q[k] = s * p[k] + c * q[k];
-                    p[k] = swap;
-                }
-                swap = c * b[i] - s * b[j];
-                b[j] = s * b[i] + c * b[j];
-                b[i] = swap;
+                rotate(columns, p, q, c, c * t);
+                if (turns != NULL) rotate(rows, turns + (size_t)i * rows, turns + (size_t)j * rows, c, c * t);
+                rotate(1, b + i, b + j, c, c * t);
             }
         if (!rotated) break;
     }
-    memset(x, 0, (size_t)columns * sizeof(double));
-    for (int i = 0; i < rows; i++) {
-        double size = 0;
-        for (int k = 0; k < columns; k++) size += a[(size_t)i * columns + k] * a[(size_t)i * columns + k];
-        if (size > largest) largest = size;
-    }
+}
+
+static double largest_row(int rows, int columns, const double *a) {
+    double largest = 0;
     for (int i = 0; i < rows; i++) {
         const double *p = a + (size_t)i * columns;
-        double size = 0;
-        for (int k = 0; k < columns; k++) size += p[k] * p[k];
-        if (size <= largest * 1e-24) continue; /* singular value below 1e-12 of the largest */
+        largest = fmax(largest, dot(columns, p, p));
+    }
+    return largest;
+}
+
+/* Shortest x that minimises |A x - b|. `a` holds the rows of A one after the other (and is destroyed), `b`, too. */
+void least_squares(int rows, int columns, double *a, double *b, double *x) {
+    double largest;
+    make_orthogonal(rows, columns, a, NULL, b);
+    largest = largest_row(rows, columns, a);
+    memset(x, 0, (size_t)columns * sizeof(double));
+    for (int i = 0; i < rows; i++) {
+        const double *p = a + (size_t)i * columns;
+        double size = dot(columns, p, p);
+        if (size <= largest * SAYS_NOTHING) continue;
         for (int k = 0; k < columns; k++) x[k] += p[k] * b[i] / size;
     }
+}
+
+/* Steps of n unknowns, the first of them states, by equations for their rates. A combination of equations that says
+ * nothing is one of rates that are zero by themselves: the same combination of states keeps its value, such as the slip
+ * of a clutch that sticks. `turns` has room for n*n. */
+void keeping_least_squares(int n, int states, double *a, double *turns, double *b, double *x) {
+    double largest;
+    memset(turns, 0, (size_t)n * (size_t)n * sizeof(double));
+    for (int i = 0; i < n; i++) turns[(size_t)i * n + i] = 1;
+    make_orthogonal(n, n, a, turns, b);
+    largest = largest_row(n, n, a);
+    for (int i = 0; i < n; i++) {
+        double *p = a + (size_t)i * n;
+        if (dot(n, p, p) > largest * SAYS_NOTHING) continue;
+        for (int k = 0; k < n; k++)
+            p[k] = k < states ? (largest > 0 ? sqrt(largest) : 1) * turns[(size_t)i * n + k] : 0;
+        b[i] = 0;
+    }
+    least_squares(n, n, a, b, x);
 }

@@ -6,6 +6,7 @@
 #define MODE_ROUNDS 5
 #define MAX_NEWTON 50
 #define CONSISTENT 1e-8
+#define RESTING 1e-9
 
 void start_defaults(Instance *c) {
     State *s = &c->state;
@@ -111,7 +112,7 @@ static Result solve_states(Instance *c) {
     return check_dependent(c, values);
 }
 
-/* States with zero derivatives, the nearest to the guess; those that nothing depends on keep their value. */
+/* States with zero derivatives, the nearest to the guess; what nothing depends on and what is conserved stay. */
 static Result solve_steady(Instance *c) {
     State *s = &c->state;
     int n = N_STEADY + N_Z;
@@ -136,7 +137,7 @@ static Result solve_steady(Instance *c) {
             residual = fmax(residual, isfinite(c->work.vector[i]) ? fabs(c->work.vector[i]) : INFINITY);
         }
         if (!isfinite(residual)) break;
-        least_squares(n, n, a, c->work.vector, step);
+        keeping_least_squares(n, N_STEADY, a, a + (size_t)n * (size_t)n, c->work.vector, step);
         for (int j = 0; j < n; j++) {
             *(j < N_STEADY ? &s->x[model_steady_states[j]] : &s->z[j - N_STEADY]) -= step[j];
             change = fmax(change, fabs(step[j]) / (1 + fabs(step[j])));
@@ -147,13 +148,39 @@ static Result solve_steady(Instance *c) {
     return report(c, LOG_ERROR, RESULT_ERROR, "No steady state was found at t = %.9g s.", s->t);
 }
 
+/* Notes the modes that hold a motion which is where they got it when they were entered: a slip of rounding errors
+ * releases nothing. */
+static void note_resting(Instance *c, unsigned char *resting) {
+    const State *s = &c->state;
+    double values[AT_LEAST_ONE(N_RESETS)];
+    unsigned char holds[AT_LEAST_ONE(N_D)] = {0}, away[AT_LEAST_ONE(N_D)] = {0};
+    evaluate(c, &tape_resets, s->t, s->x, s->z, values);
+    evaluate(c, &tape_variables, s->t, s->x, s->z, c->work.variables);
+    for (int k = 0; k < N_TRANSITIONS; k++) {
+        const Transition *one = &model_transitions[k];
+        if ((int)s->d[one->mode] != one->target) continue;
+        for (int r = one->first_reset; r < one->first_reset + one->n_resets; r++) {
+            const Reset *reset = &model_resets[r];
+            double value = values[reset->value] / (reset->kind == RESET_STATE ? reset->factor : 1), present;
+            if (reset->kind == RESET_DISCRETE) continue;
+            present =
+                reset->kind == RESET_STATE ? s->x[reset->index] : c->work.variables[model_reset_nodes[reset->target]];
+            holds[one->mode] = 1;
+            if (!(fabs(present - value) <= RESTING * (1 + fabs(value)))) away[one->mode] = 1;
+        }
+    }
+    for (int k = 0; k < N_D; k++)
+        if (holds[k] && !away[k]) resting[k] = 1;
+}
+
 /* Choose modes by their start conditions: the first that holds wins. Tells whether one changed. */
-static int choose_modes(Instance *c) {
+static int choose_modes(Instance *c, int may_rest) {
     State *s = &c->state;
     unsigned char decided[AT_LEAST_ONE(N_D)];
     double *holds = c->work.guards;
     int changed = 0;
     memcpy(decided, s->mode_given, sizeof decided);
+    if (may_rest) note_resting(c, decided);
     evaluate(c, &tape_start_conditions, s->t, s->x, s->z, holds);
     for (int k = 0; k < N_START_MODES; k++) {
         const StartMode *one = &model_start_modes[k];
@@ -208,14 +235,14 @@ Result start_solve(Instance *c) {
     if (START_STEADY) {
         apply_defaults(c, c->work.start_values);
         if (apply_direct(c, c->work.start_values) != RESULT_OK) return RESULT_ERROR;
-        choose_modes(c);
+        choose_modes(c, 0);
     }
     for (round = 0; round < MODE_ROUNDS; round++) {
         if (START_STEADY) {
             apply_defaults(c, c->work.start_values);
             if (apply_direct(c, c->work.start_values) != RESULT_OK || solve_steady(c) != RESULT_OK) return RESULT_ERROR;
         } else if (solve_states(c) != RESULT_OK) return RESULT_ERROR;
-        if (!choose_modes(c)) break;
+        if (!choose_modes(c, START_STEADY)) break;
     }
     if (round == MODE_ROUNDS)
         return report(c, LOG_ERROR, RESULT_ERROR,
