@@ -226,6 +226,11 @@ def _names(key: str, value: Any) -> list[str]:
 
 
 def _ends(key: str, value: Any) -> list[str]:
+    if isinstance(value, list) and any(isinstance(one, list) for one in value):
+        raise NetlistError(
+            f"{key} must be a list of names.",
+            advice="Give every list an entry of its own: each entry joins what it names.",
+        )
     if len(_names(key, value)) < 2:
         raise NetlistError(f"{key} must name at least two ends.")
     return value

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import re
 from collections.abc import Iterable, Mapping
 
 from rich.console import Group, RenderableType
@@ -140,4 +141,8 @@ def _statements(kind: type[Component]) -> RenderableType:
 
 
 def _plain(text: str) -> str:
-    return text.removeprefix("yield from ").removeprefix("yield ").replace("self.", "")
+    text = text.removeprefix("yield from ").removeprefix("yield ").replace("self.", "")
+    if text.startswith("( ") and text.endswith(" )"):
+        text = text[2:-2]
+    # What was broken into lines.
+    return re.sub(r",? \)", ")", text.replace("( ", "("))

@@ -40,6 +40,12 @@ def test_a_description_has_declarations_equations_and_events(run: CliRunner) -> 
     assert "self." not in text
 
 
+def test_equations_of_several_lines_are_told_in_one(run: CliRunner) -> None:
+    text = run.invoke(app, ["describe", "PermanentMagnetDCMachine"]).stdout
+    lines = [line.strip() for line in text.splitlines()]
+    assert "v == resistance(Ra) * ia + brush_voltage(ia) + v_core + series_voltage()" in lines
+
+
 def test_the_schema_is_a_schema(run: CliRunner) -> None:
     result = run.invoke(app, ["schema"])
     assert result.exit_code == 0

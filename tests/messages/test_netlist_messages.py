@@ -61,6 +61,11 @@ MESSAGES = {
         '[parts]\na = { is = "Inertia" }\n[connect]\nw = ["a.flange_a"]\n',
         'connect.w must name at least two ends.\n  in bad.toml:4 `w = ["a.flange_a"]`',
     ),
+    "lists in a list": (
+        '[parts]\na = { is = "Inertia" }\n[connect]\nw = [["a.flange_a", "a.flange_b"]]\n',
+        'connect.w must be a list of names.\n  in bad.toml:4 `w = [["a.flange_a", "a.flange_b"]]`\n'
+        "Give every list an entry of its own: each entry joins what it names.",
+    ),
     "start of a parameter": (
         '[parts]\na = { is = "Inertia", J = 1 }\n[start]\n"a.J" = 1\n',
         'a.J is a parameter, not a variable.\n  in bad.toml:4 `"a.J" = 1`\nGive its value where the part is declared.',
