@@ -181,3 +181,18 @@ def test_other_ratios_keep_clutches_closed(name, value):
     assert point["box.brake_d.w"] == pytest.approx(0.0, abs=1e-12)
     held = steady(model, {"load.w": 1.01 * point["load.w"]}, "box.small_ratio", parameters={name: value}, near=point)
     assert held["box.small_ratio"] == pytest.approx(point["box.small_ratio"] / 1.01, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    "drive",
+    [
+        "dc_bench_motor", "dc_machines/series", "fan", "lepelletier_gears", "machine_tool_startup", "stick_slip",
+        "msl/dcmachines/DCPM_withLosses", "msl/translational/Friction",
+    ],
+)  # fmt: skip
+def test_powers_are_in_balance(drive):
+    model = build(EXAMPLES / f"{drive}.toml")
+    powers = steady(model, near=simulate(model, model.settings.get("until", 1.0))).powers.values()
+    brought = sum(source for source, _ in powers)
+    assert brought > 0.1
+    assert sum(loss for _, loss in powers) == pytest.approx(brought, rel=1e-9)
