@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Literal, get_args
 
 import numpy as np
@@ -60,11 +61,7 @@ def initialize(model: CompiledDae, t0: float = 0.0, start: StartKind = "given") 
             solve_steady(model, point)
         else:
             problem.solve(point, rest=start == "rest")
-        modes = _start_modes(model, point)
-        if start == "steady":
-            # A slip of rounding errors releases nothing.
-            resting = list(resting_modes(model, point))
-            modes[resting] = point.d[resting]
+        modes = _start_modes(model, point, resting_modes(model, point) if start == "steady" else ())
         if np.array_equal(modes, point.d):
             break
         point.d = modes
@@ -87,10 +84,13 @@ def _unsettled(model: CompiledDae, point: Point) -> InitializationError:
     )
 
 
-def _start_modes(model: CompiledDae, point: Point) -> Vector:
-    """Choose modes by their start conditions: the first that holds wins."""
+def _start_modes(model: CompiledDae, point: Point, resting: Collection[int] = ()) -> Vector:
+    """Choose modes by their start conditions: the first that holds wins.
+
+    Modes that rest stay as they are: a slip of rounding errors releases nothing.
+    """
     d = point.d.copy()
-    decided: set[int] = set()
+    decided = set(resting)
     for holds, (mode, target, _) in zip(call(model, model.start_conditions, point), model.start_modes, strict=True):
         if holds and mode not in decided:
             decided.add(mode)
