@@ -34,7 +34,7 @@ def solve_steady(model: CompiledDae, point: Point) -> None:
         InitializationError: there is no steady state near it.
     """
     moving = moving_states(model)
-    function = _steady_function(model, moving)
+    function = _steady_function(model)
     for _ in range(_MAX_NEWTON):
         value, jacobian = (np.asarray(part.full()) for part in function(*_arguments(model, point)))
         if not (np.all(np.isfinite(value)) and np.all(np.isfinite(jacobian))):
@@ -66,21 +66,28 @@ def _arguments(model: CompiledDae, point: Point) -> tuple[Any, ...]:
     return point.t, point.x, point.z, model.p, model.u, point.d
 
 
-def _steady_function(model: CompiledDae, moving: list[int]) -> ca.Function:
+def _steady_function(model: CompiledDae) -> ca.Function:
     """Return a function of what a point has: rates of the moving states and residuals, and their Jacobian."""
-    arguments = list(model.arguments.values())
-    x, z = model.arguments["x"], model.arguments["z"]
-    equations = ca.vertcat(model.ode(*arguments), model.alg(*arguments))
-    rows = [*moving, *range(len(model.states), len(model.states) + len(model.implicit))]
-    unknowns = ca.vertcat(*(x[k] for k in moving), z)
-    return ca.Function("steady", arguments, [equations[rows], ca.jacobian(equations[rows], unknowns)])
+    if "steady" not in model._cache:
+        arguments, moving = list(model.arguments.values()), moving_states(model)
+        rows = [*moving, *range(len(model.states), len(model.states) + len(model.implicit))]
+        equations = _equations(model)[rows]
+        unknowns = ca.vertcat(*(model.arguments["x"][k] for k in moving), model.arguments["z"])
+        model._cache["steady"] = ca.Function("steady", arguments, [equations, ca.jacobian(equations, unknowns)])
+    return model._cache["steady"]
+
+
+def _equations(model: CompiledDae) -> Any:
+    arguments = model.arguments.values()
+    return ca.vertcat(model.ode(*arguments), model.alg(*arguments))
 
 
 def moving_states(model: CompiledDae) -> list[int]:
     """Positions of the states that something depends on; the others, absolute angles, never settle."""
-    arguments = list(model.arguments.values())
-    equations = ca.vertcat(model.ode(*arguments), model.alg(*arguments))
-    return [k for k, depends in enumerate(ca.which_depends(equations, model.arguments["x"], 1, False)) if depends]
+    if "moving" not in model._cache:
+        depends = ca.which_depends(_equations(model), model.arguments["x"], 1, False)
+        model._cache["moving"] = [k for k, does in enumerate(depends) if does]
+    return model._cache["moving"]
 
 
 def check_modes_hold(model: CompiledDae, point: Point) -> None:

@@ -1,10 +1,13 @@
-"""Lines that snapshots of messages name, in the test's own file and in the library."""
+"""What all snapshots of messages share: the check, and the lines they name in the test's own file and the library."""
 
+import pickle
 import re
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+
+from modelica_like.errors import ModelicaLikeError
 
 LIBRARY = Path(__file__).parents[2] / "components"
 
@@ -22,3 +25,19 @@ def expand(request: pytest.FixtureRequest) -> Callable[[str], str]:
         )
 
     return lambda text: re.sub(r"\{([a-z ]+|[a-z_]+\.py:[^{}]+)\}", number, text)
+
+
+@pytest.fixture
+def check_message(expand: Callable[[str], str]) -> Callable[[type[ModelicaLikeError], Callable[[], object], str], None]:
+    """Check the kind and the sentences of the error in which a call ends, and that a worker process can hand it on."""
+
+    def check(kind: type[ModelicaLikeError], make: Callable[[], object], text: str) -> None:
+        with pytest.raises(ModelicaLikeError) as caught:
+            make()
+        assert str(caught.value) == expand(text)
+        assert type(caught.value) is kind
+        twin = pickle.loads(pickle.dumps(caught.value))
+        assert str(twin) == str(caught.value)
+        assert type(twin) is kind
+
+    return check

@@ -169,12 +169,8 @@ For others use the dataset in Python."""),
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_message(name: str) -> None:
-    kind, make, text = CASES[name]
-    with pytest.raises(ModelicaLikeError) as caught:
-        make()
-    assert str(caught.value) == text
-    assert type(caught.value) is kind
+def test_message(check_message, name):
+    check_message(*CASES[name])
 
 
 def test_a_checkpoint_of_another_sweep(tmp_path):

@@ -3,7 +3,6 @@
 Lines of this file are written as {marker}, the line that ends in `# marker`.
 """
 
-import pickle
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -317,19 +316,5 @@ def test_a_high_index_is_a_notice():
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_errors_pickle(name):
-    """A worker process hands its error on."""
-    with pytest.raises(ModelicaLikeError) as caught:
-        CASES[name][1]()
-    twin = pickle.loads(pickle.dumps(caught.value))
-    assert str(twin) == str(caught.value)
-    assert type(twin) is type(caught.value)
-
-
-@pytest.mark.parametrize("name", CASES)
-def test_message(expand, name):
-    kind, make, text = CASES[name]
-    with pytest.raises(ModelicaLikeError) as caught:
-        make()
-    assert str(caught.value) == expand(text)
-    assert type(caught.value) is kind
+def test_message(check_message, name):
+    check_message(*CASES[name])

@@ -18,6 +18,8 @@ from modelica_like.errors import ContradictingStart, InitializationError, Missin
 from modelica_like.language import (
     Component,
     Equations,
+    Events,
+    Mode,
     Parameter,
     Variable,
     connect,
@@ -264,6 +266,26 @@ def test_where_there_is_no_steady_state_it_is_told(start):
 
     with pytest.raises(InitializationError, match=r"^No steady state was found at t = 0 s: rotor\.w keeps changing\."):
         start(Pushed(), "steady")
+
+
+def test_a_speed_that_an_impact_turned_is_no_speed_that_is_held(start):
+    """Between two walls nothing changes the speed of a ball: it keeps its guess."""
+
+    class Ball(Component):
+        wall: Parameter = param("m", "distance of the walls", default=1.0)
+        s: Variable = var("m", "way", default=0.5)
+        v: Variable = var("m/s", "speed")
+        mode = Mode("back", "forth")
+
+        def equations(self) -> Equations:
+            yield der(self.s) == self.v
+            yield der(self.v) == 0
+
+        def events(self) -> Events:
+            yield self.mode.go("forth", "back", when=self.s > self.wall, reset={self.v: -0.7 * self.v})
+            yield self.mode.go("back", "forth", when=self.s < 0, reset={self.v: -0.7 * self.v})
+
+    assert start(Ball(), "steady", v=guess(-3.0))["v"] == -3.0
 
 
 def test_a_guess_outside_the_domain_of_the_equations_is_told(start):
