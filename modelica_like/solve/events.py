@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable
 
 import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, CompiledTransition, Vector
 from modelica_like.compile.soon import TIME_RESOLUTION
-from modelica_like.errors import Chattering, StepFailed
-from modelica_like.initialize import Point, call, check_singular, solve_implicit, variable_slopes
+from modelica_like.errors import StepFailed
+from modelica_like.initialize import Point
 from modelica_like.solve.guards import Guards, Located, candidates, locate
 from modelica_like.solve.idas import Integrator
+from modelica_like.solve.instants import SAME_TIME, Instants, just_after
 from modelica_like.solve.options import Options
-from modelica_like.solve.recorder import Event, Recorder
+from modelica_like.solve.recorder import Recorder
 
 _FIRST_PANEL = 8
 _GROWTH = 4
@@ -24,9 +24,6 @@ _STEPS_PER_CHECK = 6
 """Guards are looked at about as often as the integrator needs steps: what oscillates between results is not missed."""
 _STEPS_TO_START = 30
 _MAX_CHECKS = 2**16
-_CHATTER_EVENTS = 50
-_CHATTER_WINDOW = 1e-6
-_SAME_TIME = 1e-12
 _MAX_HALVINGS = 30
 _MAX_FAILURES = 40
 _ON_GRID = 1e-7
@@ -64,10 +61,7 @@ class EventLoop:
         self.guards = Guards(model)
         self.record = Recorder()
         self.panel = _FIRST_PANEL if self.guards.count else options.points
-        self._recent: deque[Event] = deque(maxlen=_CHATTER_EVENTS)
-        self._round = 0
-        self._timed = [t for t in model.transitions if t.timed]
-        self._numbers = {id(transition): k for k, transition in enumerate(model.transitions)}
+        self.instants = Instants(model, options, self.guards, self.record, end - start.t)
 
     def run(self) -> Recorder:
         """Simulate.
@@ -75,10 +69,10 @@ class EventLoop:
         Raises:
             Chattering, StepFailed, SingularAtStart: the run cannot go on.
         """
-        self._iterate([*self._due(), *self._rising()])
+        self.instants.settle(self.now, self._wanting())
         self.record.begin(self.now)
         while self.now.t < self.end:
-            self._advance(min(self._next_moment(), self.end))
+            self._advance(min(self.instants.next_moment(self.now), self.end))
             if self.progress is not None:
                 self.progress(self.now.t)
         self.record.end(self.now.d)
@@ -99,10 +93,8 @@ class EventLoop:
         longer = self.panel * _GROWTH
         if self.guards.count and len(times) >= self.panel and longer * self.step / self.checks < self._ahead:
             self.panel = longer
-        if times[-1] == stop:
-            due = self._due()
-            if due:
-                self._event([*due, *self._rising()])
+        if times[-1] == stop and self.instants.due(self.now):
+            self._event(self._wanting())
 
     def _keep(self, times: Vector, x: Vector, z: Vector, stop: float = np.inf) -> None:
         """Record the results among the points at which guards were looked at."""
@@ -145,9 +137,9 @@ class EventLoop:
         shorter one ends before.
         """
         while True:
-            goal = min(stop, self._in_sight) if self._in_sight > self._just_after() else stop
+            goal = min(stop, self._in_sight) if self._in_sight > just_after(self.now.t) else stop
             span, outputs = self._next_panel(goal)
-            arrives = self.now.t + span >= goal - _SAME_TIME * max(1.0, abs(goal))
+            arrives = self.now.t + span >= goal - SAME_TIME * max(1.0, abs(goal))
             span = goal - self.now.t if arrives else span
             before = self.integrator.steps
             try:
@@ -260,7 +252,7 @@ class EventLoop:
             if not wanting:
                 return True
             self.record.add(np.array([self.now.t]), self.now.x[:, None], self.now.z[:, None])
-            self._event([*wanting, *self._due()])
+            self._event([*wanting, *self.instants.due(self.now)])
             return True
         self._ahead = _foreseen(values[active, -1], rates[active, -1])
         return False
@@ -279,119 +271,17 @@ class EventLoop:
             point = Point(base.t + span, x[:, 0], z[:, 0], base.d)
         return point, *self.guards.at(point)
 
-    # -- events ------------------------------------------------------------------------------------------------------
-
-    def _next_moment(self) -> float:
-        """Time of the next time event, or infinity."""
-        if not self._timed:
-            return np.inf
-        moments = call(self.model, self.model.moments, self.now)
-        ahead = [moments[t.index] for t in self._timed if self._is_source(t) and moments[t.index] > self._just_after()]
-        return float(min(ahead, default=np.inf))
-
-    def _due(self) -> list[CompiledTransition]:
-        """Time events whose time has come."""
-        if not self._timed:
-            return []
-        moments = call(self.model, self.model.moments, self.now)
-        return [t for t in self._timed if self._is_source(t) and moments[t.index] <= self._just_after()]
-
-    def _just_after(self) -> float:
-        return self.now.t + _SAME_TIME * max(1.0, abs(self.now.t))
-
-    def _is_source(self, transition: CompiledTransition) -> bool:
-        return int(self.now.d[transition.mode]) in transition.sources
-
-    def _rising(self) -> list[CompiledTransition]:
-        """State events that want to fire now: positive, or about to be within the time resolution."""
-        if not self.guards.count:
-            return []
-        wants = self.guards.active(self.now.d) & (self.guards.soon(self.now) > 0)
-        return [self.guards.state_events[k] for k in np.flatnonzero(wants)]
+    def _wanting(self) -> list[CompiledTransition]:
+        return [*self.instants.due(self.now), *self.instants.rising(self.now)]
 
     def _event(self, wanting: list[CompiledTransition]) -> None:
         """Handle an event: close the segment, change modes until nothing fires, begin the next segment."""
         self.record.end(self.now.d)
         self._failures, self._failed_before, self._in_sight = 0, self.now.t, np.inf
         self.now = self.now.copy()
-        self._iterate(wanting)
+        self.instants.settle(self.now, wanting)
         self.record.begin(self.now)
         self.panel = _FIRST_PANEL if self.guards.count else self.options.points
-        if len(self.record.events) > self.options.max_events:
-            raise self._chattering(f"There were more than {self.options.max_events} events")
-
-    def _iterate(self, wanting: list[CompiledTransition]) -> None:
-        for number in range(self.options.iterations):
-            self._round = number
-            if not wanting:
-                return
-            self._fire(wanting)
-            solve_implicit(self.model, self.now)
-            check_singular(self.model, self.now)
-            wanting = [*self._due(), *self._rising()]
-        raise self._chattering(f"Modes still switch after {self.options.iterations} rounds at one instant")
-
-    def _fire(self, wanting: list[CompiledTransition]) -> None:
-        """Carry out transitions together; of one mode only the one declared first."""
-        values = call(self.model, self.model.resets, self.now)
-        chosen: dict[int, CompiledTransition] = {}
-        for transition in sorted(wanting, key=self._number):
-            if self._is_source(transition):
-                chosen.setdefault(transition.mode, transition)
-        targets: list[tuple[int, float]] = []
-        x, d = self.now.x.copy(), self.now.d.copy()
-        for transition in chosen.values():
-            self._note(transition)
-            d[transition.mode] = transition.target
-            for reset in transition.resets:
-                if reset.kind == "state":
-                    x[reset.index] = values[reset.value] / reset.factor
-                elif reset.kind == "discrete":
-                    d[reset.index] = values[reset.value]
-                else:
-                    targets.append((reset.target, values[reset.value]))
-        self.now.x, self.now.d = x, d
-        if targets:
-            self._project(targets)
-
-    def _project(self, targets: list[tuple[int, float]]) -> None:
-        """Move the states as little as possible, so that variables that follow from them take new values."""
-        nodes = [self.model.reset_nodes[k] for k, _ in targets]
-        present = call(self.model, self.model.variables, self.now)[nodes]
-        slopes = variable_slopes(self.model, self.now, nodes)
-        change = np.array([value for _, value in targets]) - present
-        self.now.x = self.now.x + np.linalg.lstsq(slopes, change, rcond=None)[0]
-
-    def _number(self, transition: CompiledTransition) -> int:
-        return self._numbers[id(transition)]
-
-    def _note(self, transition: CompiledTransition) -> None:
-        mode = self.model.flat_discretes[transition.mode]
-        before = mode.names[int(self.now.d[transition.mode])]
-        event = Event(
-            float(self.now.t), mode.path, before, mode.names[transition.target], transition.source,
-            self._number(transition), len(self.record.segments), self._round,
-        )  # fmt: skip
-        self.record.events.append(event)
-        self._recent.append(event)
-        window = _CHATTER_WINDOW * (self.end - self.begin)
-        if len(self._recent) == _CHATTER_EVENTS and self.now.t - self._recent[0].time < window:
-            raise self._chattering("Events follow each other ever faster")
-
-    def _chattering(self, why: str) -> Chattering:
-        recent = list(self._recent)
-        counts: dict[str, list[Event]] = {}
-        for event in recent:
-            counts.setdefault(event.mode, []).append(event)
-        mode, events = max(counts.items(), key=lambda item: len(item[1]))
-        names = " ⇄ ".join(dict.fromkeys(name for event in events for name in (event.before, event.after)))
-        first, last = f"{events[0].time:.9g}", f"{events[-1].time:.9g}"
-        when = f"at t = {last} s" if first == last else f"in t = {first}…{last} s"
-        return Chattering(
-            f"{mode} switched {len(events)} times {when} ({names}).",
-            where=list(dict.fromkeys(event.source for event in events))[:3], why=f"{why}.",
-            advice="Give the switching a hysteresis (a peak above 1 in friction), or smooth what drives it.",
-        )  # fmt: skip
 
 
 def _foreseen(values: Vector, rates: Vector) -> float:

@@ -1,0 +1,156 @@
+"""What happens at one instant: which transitions want to fire, and firing them until nothing does."""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+
+from modelica_like.compile.compiled import CompiledDae, CompiledTransition
+from modelica_like.errors import Chattering
+from modelica_like.initialize import Point, call, check_singular, solve_implicit, variable_slopes
+from modelica_like.solve.guards import Guards
+from modelica_like.solve.options import Options
+from modelica_like.solve.recorder import Event, Recorder
+
+_CHATTER_EVENTS = 50
+_CHATTER_WINDOW = 1e-6
+SAME_TIME = 1e-12
+"""Relative distance of two times that are the same."""
+
+
+def just_after(t: float) -> float:
+    """Return the latest time that is still the same."""
+    return t + SAME_TIME * max(1.0, abs(t))
+
+
+class Instants:
+    """Fires the transitions of a run and notes them as events.
+
+    Args:
+        model: the compiled model.
+        options: how many rounds and events are allowed.
+        guards: the state events.
+        record: where events are noted.
+        span: length of the run in s.
+    """
+
+    def __init__(self, model: CompiledDae, options: Options, guards: Guards, record: Recorder, span: float) -> None:
+        self.model = model
+        self.options = options
+        self.guards = guards
+        self.record = record
+        self.span = span
+        self._recent: deque[Event] = deque(maxlen=_CHATTER_EVENTS)
+        self._round = 0
+        self._timed = [t for t in model.transitions if t.timed]
+        self._numbers = {id(transition): k for k, transition in enumerate(model.transitions)}
+
+    def next_moment(self, now: Point) -> float:
+        """Time of the next time event, or infinity."""
+        if not self._timed:
+            return np.inf
+        moments = call(self.model, self.model.moments, now)
+        here = just_after(now.t)
+        ahead = [moments[t.index] for t in self._timed if _is_source(now, t) and moments[t.index] > here]
+        return float(min(ahead, default=np.inf))
+
+    def due(self, now: Point) -> list[CompiledTransition]:
+        """Time events whose time has come."""
+        if not self._timed:
+            return []
+        moments = call(self.model, self.model.moments, now)
+        return [t for t in self._timed if _is_source(now, t) and moments[t.index] <= just_after(now.t)]
+
+    def rising(self, now: Point) -> list[CompiledTransition]:
+        """State events that want to fire now: positive, or about to be within the time resolution."""
+        if not self.guards.count:
+            return []
+        wants = self.guards.active(now.d) & (self.guards.soon(now) > 0)
+        return [self.guards.state_events[k] for k in np.flatnonzero(wants)]
+
+    def settle(self, now: Point, wanting: list[CompiledTransition]) -> None:
+        """Fire transitions until none wants to fire any more; `now` becomes the point after.
+
+        Raises:
+            Chattering: there is no end of it, or events follow each other ever faster.
+            SingularAtStart: the equations have no unique solution after it.
+        """
+        for number in range(self.options.iterations):
+            self._round = number
+            if not wanting:
+                break
+            self._fire(now, wanting)
+            solve_implicit(self.model, now)
+            check_singular(self.model, now)
+            wanting = [*self.due(now), *self.rising(now)]
+        else:
+            raise self._chattering(f"Modes still switch after {self.options.iterations} rounds at one instant")
+        if len(self.record.events) > self.options.max_events:
+            raise self._chattering(f"There were more than {self.options.max_events} events")
+
+    def _fire(self, now: Point, wanting: list[CompiledTransition]) -> None:
+        """Carry out transitions together; of one mode only the one declared first."""
+        values = call(self.model, self.model.resets, now)
+        chosen: dict[int, CompiledTransition] = {}
+        for transition in sorted(wanting, key=self._number):
+            if _is_source(now, transition):
+                chosen.setdefault(transition.mode, transition)
+        targets: list[tuple[int, float]] = []
+        x, d = now.x.copy(), now.d.copy()
+        for transition in chosen.values():
+            self._note(now, transition)
+            d[transition.mode] = transition.target
+            for reset in transition.resets:
+                if reset.kind == "state":
+                    x[reset.index] = values[reset.value] / reset.factor
+                elif reset.kind == "discrete":
+                    d[reset.index] = values[reset.value]
+                else:
+                    targets.append((reset.target, values[reset.value]))
+        now.x, now.d = x, d
+        if targets:
+            self._project(now, targets)
+
+    def _project(self, now: Point, targets: list[tuple[int, float]]) -> None:
+        """Move the states as little as possible, so that variables that follow from them take new values."""
+        nodes = [self.model.reset_nodes[k] for k, _ in targets]
+        present = call(self.model, self.model.variables, now)[nodes]
+        slopes = variable_slopes(self.model, now, nodes)
+        change = np.array([value for _, value in targets]) - present
+        now.x = now.x + np.linalg.lstsq(slopes, change, rcond=None)[0]
+
+    def _number(self, transition: CompiledTransition) -> int:
+        return self._numbers[id(transition)]
+
+    def _note(self, now: Point, transition: CompiledTransition) -> None:
+        mode = self.model.flat_discretes[transition.mode]
+        before = mode.names[int(now.d[transition.mode])]
+        event = Event(
+            float(now.t), mode.path, before, mode.names[transition.target], transition.source,
+            self._number(transition), len(self.record.segments), self._round,
+        )  # fmt: skip
+        self.record.events.append(event)
+        self._recent.append(event)
+        window = _CHATTER_WINDOW * self.span
+        if len(self._recent) == _CHATTER_EVENTS and now.t - self._recent[0].time < window:
+            raise self._chattering("Events follow each other ever faster")
+
+    def _chattering(self, why: str) -> Chattering:
+        recent = list(self._recent)
+        counts: dict[str, list[Event]] = {}
+        for event in recent:
+            counts.setdefault(event.mode, []).append(event)
+        mode, events = max(counts.items(), key=lambda item: len(item[1]))
+        names = " ⇄ ".join(dict.fromkeys(name for event in events for name in (event.before, event.after)))
+        first, last = f"{events[0].time:.9g}", f"{events[-1].time:.9g}"
+        when = f"at t = {last} s" if first == last else f"in t = {first}…{last} s"
+        return Chattering(
+            f"{mode} switched {len(events)} times {when} ({names}).",
+            where=list(dict.fromkeys(event.source for event in events))[:3], why=f"{why}.",
+            advice="Give the switching a hysteresis (a peak above 1 in friction), or smooth what drives it.",
+        )  # fmt: skip
+
+
+def _is_source(now: Point, transition: CompiledTransition) -> bool:
+    return int(now.d[transition.mode]) in transition.sources
