@@ -10,6 +10,7 @@ from modelica_like.language import (
     Equations,
     Events,
     Expr,
+    Hold,
     Input,
     Mode,
     Parameter,
@@ -29,6 +30,8 @@ from modelica_like.language import (
 
 Rows = tuple[tuple[float, float], ...]
 
+HOLDS = {"stuck": Hold("slip", reaction="friction", capacity="limits")}
+"""What surfaces that stick hold, in whatever unit."""
 _NOW = 1e-9
 """What counts as one instant, in creep_time."""
 
@@ -51,7 +54,9 @@ class Sticking(Lossy, partial=True):
         creep: Parameter
         creep_time: Parameter
         rest: Parameter
-    mode = Mode("stuck", "start_forward", "start_backward", "forward", "backward", description="friction mode")
+    mode = Mode(
+        "stuck", "start_forward", "start_backward", "forward", "backward", description="friction mode", holds=HOLDS
+    )
 
     @property
     def slip(self) -> Expr:
@@ -70,6 +75,10 @@ class Sticking(Lossy, partial=True):
     def holds_backward(self) -> Expr:
         """Return the friction, a negative one, that they can bear against backward sliding."""
         return -self.holds_forward()
+
+    def limits(self) -> tuple[Expr | None, Expr | None]:
+        """Return the largest friction that they can bear against forward and against backward sliding."""
+        return self.holds_forward(), -self.holds_backward()
 
     def carried(self) -> Expr | bool:
         """Return the condition on which a prescribed motion carries the surfaces along, so that they cannot stick."""
@@ -103,10 +112,10 @@ class Sticking(Lossy, partial=True):
         yield mode.go("stuck", "start_backward", when=self.breaks_backward())
         yield mode.go("start_forward", "forward", when=slip > 0)
         yield mode.go("start_backward", "backward", when=slip < 0)
-        yield mode.go("start_forward", "stuck", when=der(slip) < 0, reset={slip: 0})
-        yield mode.go("start_backward", "stuck", when=der(slip) > 0, reset={slip: 0})
-        yield mode.go("forward", "stuck", when=self.stops(1), reset={slip: 0})
-        yield mode.go("backward", "stuck", when=self.stops(-1), reset={slip: 0})
+        yield mode.go("start_forward", "stuck", when=der(slip) < 0)
+        yield mode.go("start_backward", "stuck", when=der(slip) > 0)
+        yield mode.go("forward", "stuck", when=self.stops(1))
+        yield mode.go("backward", "stuck", when=self.stops(-1))
 
     def dissipation(self) -> Expr:
         return self.friction * self.slip
@@ -130,7 +139,10 @@ class DryFriction(Sticking, partial=True):
     """
 
     peak: Parameter = param("1", "static friction over sliding friction at standstill", default=1.0, min=1)
-    mode = Mode("free", "stuck", "start_forward", "start_backward", "forward", "backward", description="friction mode")
+    mode = Mode(
+        "free", "stuck", "start_forward", "start_backward", "forward", "backward",
+        description="friction mode", holds=HOLDS,
+    )  # fmt: skip
 
     def sliding_friction(self, speed: Expr | float) -> Expr:
         """Return the friction while sliding forward at a speed."""

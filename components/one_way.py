@@ -8,6 +8,7 @@ from modelica_like.language import (
     Equations,
     Events,
     Expr,
+    Hold,
     Mode,
     Parameter,
     Variable,
@@ -30,7 +31,15 @@ class Freewheel(CompliantWithRelativeStates):
     # No torque depends on the angle by which a freewheel has overrun.
     phi_rel: Variable = var("rad", "relative angle, flange_b.phi - flange_a.phi", state="prefer", default=0)
     w_rel: Variable = var("rad/s", "overrunning speed", state="always")
-    mode = Mode("overrunning", "locked", description="state of the freewheel")
+    slow: Parameter = param("rad/s", "speed up to which falling behind may be rounding", default=1e-9, min=0)
+    mode = Mode(
+        "overrunning", "locked", description="state of the freewheel",
+        holds={"locked": Hold("w_rel", reaction="tau", capacity="limits")},
+    )  # fmt: skip
+
+    def limits(self) -> tuple[float, None]:
+        """Return the largest torque against overrunning, none, and against falling behind, any."""
+        return 0.0, None
 
     def equations(self) -> Equations:
         yield from super().equations()
@@ -40,8 +49,8 @@ class Freewheel(CompliantWithRelativeStates):
         yield self.mode.initially("locked", when=all_of(self.w_rel <= 0, self.w_rel >= 0))
         yield self.mode.go("locked", "overrunning", when=self.tau > 0)
         # Just after the release the speed is zero but for rounding; whether it falls decides.
-        falling = all_of(self.w_rel < 0, der(self.w_rel) < 0)
-        yield self.mode.go("overrunning", "locked", when=falling, reset={self.w_rel: 0})
+        falling = all_of(self.w_rel < 0, any_of(der(self.w_rel) < 0, self.w_rel < -self.slow))
+        yield self.mode.go("overrunning", "locked", when=falling)
 
 
 class OneWayClutch(Clutch):
@@ -53,6 +62,9 @@ class OneWayClutch(Clutch):
 
     def sliding_friction(self, speed: Expr | float) -> Expr:
         return where(self.f_normalized > 0, super().sliding_friction(speed), self.tau_drag)
+
+    def limits(self) -> tuple[Expr, None]:
+        return self.holds_forward(), None
 
     def carried(self) -> Expr | bool:
         # It holds against falling behind, whatever prescribes that.
@@ -75,8 +87,8 @@ class OneWayClutch(Clutch):
         yield mode.initially("stuck", when=w >= 0)
         yield mode.go("stuck", "start_forward", when=self.breaks_forward())
         yield mode.go("start_forward", "forward", when=w > 0)
-        yield mode.go("start_forward", "stuck", when=der(w) < 0, reset={w: 0})
-        yield mode.go("forward", "stuck", when=w < 0, reset={w: 0})
+        yield mode.go("start_forward", "stuck", when=der(w) < 0)
+        yield mode.go("forward", "stuck", when=w < 0)
 
 
 class TorqueLimiter(ShaftFriction, CompliantWithRelativeStates):

@@ -6,6 +6,7 @@ from components.friction import DryFriction, Rows, Sticking
 from components.interfaces import LinearCompliantWithRelativeStates, LinearFlange, SlideInHousing
 from components.thermal import Lossy
 from modelica_like.language import (
+    UNLIMITED,
     Component,
     Equations,
     Events,
@@ -212,6 +213,10 @@ class MassWithStopAndFriction(SlideSticking, DryFriction):
     def pressed(self) -> Expr:
         return any_of(super().pressed(), negate(self.stop.is_("none")))
 
+    def limits(self) -> tuple[Expr, Expr]:
+        forward, backward = self.holds_forward(), -self.holds_backward()
+        return where(self.stop.is_("right"), UNLIMITED, forward), where(self.stop.is_("left"), UNLIMITED, backward)
+
     def carried(self) -> Expr | bool:
         return where(self.stop.is_("none"), super().carried(), 0)
 
@@ -237,7 +242,7 @@ class MassWithStopAndFriction(SlideSticking, DryFriction):
             yield mode.initially("stuck", when=there)
             yield stop.initially(side, when=there)
             moving = ("free", "start_forward", "start_backward", "forward", "backward")
-            yield mode.go(moving, "stuck", when=beyond, reset={self.s: end, self.v: 0})
+            yield mode.go(moving, "stuck", when=beyond, reset={self.s: end})
             yield stop.go("none", side, when=beyond)
         # While it is held, its velocity is nothing but rounding.
         yield stop.go("left", "none", when=all_of(negate(mode.is_("stuck")), self.v > 0))

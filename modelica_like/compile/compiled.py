@@ -13,6 +13,7 @@ import casadi as ca
 from modelica_like.compile.buffers import Vector as Vector
 from modelica_like.errors import LanguageError, Source, UnknownName, did_you_mean
 from modelica_like.flatten.model import FlatDiscrete, FlatParameter, FlatVariable, Origin
+from modelica_like.structure.holds import Circuit as Circuit
 from modelica_like.units import coherent, to_si
 
 
@@ -60,6 +61,31 @@ class StartEntry:
 
 
 @dataclass(frozen=True)
+class CompiledHold:
+    """A motion that a mode holds at zero.
+
+    Attributes:
+        component: path of the component.
+        mode: position of the mode in d.
+        number: number of the mode that holds.
+        loose: number of a mode that does not, or -1.
+        motion: variable that is held.
+        state: (state, factor) if it is one.
+        reaction: variable that holds it, or -1.
+        approach: position in d of the derivative that the motion is to have; zero but in impacts.
+    """
+
+    component: str
+    mode: int
+    number: int
+    loose: int
+    motion: int
+    state: tuple[int, float] | None
+    reaction: int
+    approach: int
+
+
+@dataclass(frozen=True)
 class CompiledTerminal:
     """An open end of the model: the path of its adaptor, its kind, and pairs of a member and the variable behind it."""
 
@@ -83,12 +109,14 @@ class CompiledDae:
         resets: new values at events.
         reset_nodes: variables that are reset but are neither states nor discrete.
         start_conditions: one per choice of a start mode.
+        hold_terms: gain (zero where nothing is held), capacities forward and backward, and restitution of every held
+            motion, one row each, row by row.
         start_values: as many as `starts`.
         start_system: of (t, x, y, z, p, u, d) with y the variables that start values need: y itself, the Jacobian by
             (x, y, z) and the values
             of [explicit equations for y, implicit equations, variables with start values].
         start_nodes: variables at the end of the start system.
-        discrete_starts: start of d.
+        discrete_starts: start of d: modes and discrete values, then what `holds` and `circuits` need.
         derived: parameters that follow from others, of p only.
         determinants: relative determinants; zero where a block is singular.
         p: parameter values.
@@ -97,6 +125,8 @@ class CompiledDae:
         terminals: open ends with an adaptor.
         singular: names and origins of the blocks of `determinants`.
         implicit_blocks: names and origins of the blocks of `alg`.
+        holds: motions that modes hold.
+        circuits: those that depend on each other.
         motion_sources: paths of the components that prescribe a motion, whatever torque or force it takes.
     """
 
@@ -119,6 +149,7 @@ class CompiledDae:
     resets: ca.Function
     reset_nodes: tuple[int, ...]
     start_conditions: ca.Function
+    hold_terms: ca.Function
     start_values: ca.Function
     start_system: ca.Function
     start_nodes: tuple[int, ...]
@@ -128,6 +159,8 @@ class CompiledDae:
     transitions: tuple[CompiledTransition, ...]
     start_modes: tuple[tuple[int, int, Source], ...]
     starts: tuple[StartEntry, ...]
+    holds: tuple[CompiledHold, ...]
+    circuits: tuple[Circuit, ...]
     singular: tuple[tuple[tuple[str, ...], tuple[Origin, ...]], ...]
     differentiated: tuple[Origin, ...]
     guesses: Vector
@@ -150,6 +183,11 @@ class CompiledDae:
 
     def __repr__(self) -> str:
         return f"<{self}>"
+
+    @property
+    def discrete_size(self) -> int:
+        """Length of d: modes and discrete values, approaches, switches and shares."""
+        return self.ode.size1_in("d")
 
     @cached_property
     def position(self) -> dict[str, int]:

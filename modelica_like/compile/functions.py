@@ -8,7 +8,15 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from modelica_like.compile.compiled import CompiledDae, CompiledTerminal, CompiledTransition, Reset, StartEntry, Vector
+from modelica_like.compile.compiled import (
+    CompiledDae,
+    CompiledHold,
+    CompiledTerminal,
+    CompiledTransition,
+    Reset,
+    StartEntry,
+    Vector,
+)
 from modelica_like.compile.energy import energy_terms
 from modelica_like.compile.soon import guards_soon
 from modelica_like.compile.start_system import start_system
@@ -16,8 +24,11 @@ from modelica_like.errors import Source
 from modelica_like.flatten.model import FlatDiscrete, FlatModel, evaluate
 from modelica_like.flatten.template import TransitionForm
 from modelica_like.language.fields import Input
+from modelica_like.structure.holds import hold_terms
 from modelica_like.structure.reduce import ReducedDae
 
+ROUNDING = 1e-10
+"""Size of a held motion, relative to the largest one of the same unit, that is nothing but rounding."""
 _SOURCE_POWER = 2
 _EFFORTS = ("N", "N.m")
 
@@ -49,15 +60,18 @@ def compile(reduced: ReducedDae) -> CompiledDae:
         resets=build.function("resets", resets),
         reset_nodes=tuple(targets),
         start_conditions=build.function("start_conditions", conditions),
+        hold_terms=build.function("hold_terms", ca.vec(hold_terms(flat, reduced.values).T)),
         start_values=build.function("start_values", ca.vertcat(*(ca.SX(s.value) for s in flat.starts))),
         start_system=start_system(reduced),
         start_nodes=tuple(dict.fromkeys(s.node for s in flat.starts)),
-        discrete_starts=build.function("discrete_starts", ca.vertcat(*(ca.SX(one.start) for one in flat.discretes))),
+        discrete_starts=build.function("discrete_starts", _discrete_starts(flat)),
         derived=ca.Function("derived", [flat.p], [ca.densify(ca.SX(flat.formulas))], ["p"], ["derived"]),
         determinants=build.function("determinants", determinants),
         transitions=transitions,
         start_modes=start_modes,
         starts=tuple(StartEntry(s.node, reduced.node_states[s.node], s.strength) for s in flat.starts),
+        holds=_holds(reduced),
+        circuits=reduced.circuits,
         singular=tuple((names, origins) for names, origins, _ in reduced.determinants),
         differentiated=reduced.differentiated,
         guesses=np.array(reduced.guesses, float),
@@ -74,6 +88,21 @@ def compile(reduced: ReducedDae) -> CompiledDae:
         settings=dict(getattr(flat.components.get(""), "simulate", {})),
         _make_energy=lambda: build.function("energy", energy_terms(reduced)),
     )
+
+
+def _discrete_starts(flat: FlatModel) -> Any:
+    starts = [ca.SX(one.start) for one in flat.discretes]
+    return ca.vertcat(*starts, ca.SX.zeros(flat.d.numel() - len(starts)))
+
+
+def _holds(reduced: ReducedDae) -> tuple[CompiledHold, ...]:
+    return tuple(
+        CompiledHold(
+            one.path, one.mode, one.number, one.loose, one.motion, reduced.node_states[one.motion], one.reaction,
+            one.approach,
+        )
+        for one in reduced.holds
+    )  # fmt: skip
 
 
 def _places(flat: FlatModel) -> dict[str, Source]:
@@ -172,7 +201,7 @@ class _Builder:
 
     def start_modes(self) -> tuple[Any, tuple[tuple[int, int, Source], ...]]:
         flat = self.reduced.flat
-        columns = evaluate(flat, "start_conditions", self.reduced.values)
+        columns = evaluate(flat, "start_conditions", self._without_rounding())
         conditions: list[Any] = []
         modes: list[tuple[int, int, Source]] = []
         for number, instance in enumerate(flat.instances):
@@ -181,3 +210,19 @@ class _Builder:
                 conditions.append(columns[number][row])
                 modes.append((self.place[prefix + mode], target, source))
         return ca.vertcat(*conditions), tuple(modes)
+
+    def _without_rounding(self) -> Any:
+        """Values of all nodes, with held motions that are zero but for rounding at zero.
+
+        What the largest speed of the drive leaves of a slip when it is rounded says nothing about a direction.
+        """
+        flat, values = self.reduced.flat, ca.SX(self.reduced.values)
+        largest: dict[str, Any] = {}
+        for one in self.reduced.holds:
+            unit = str(flat.variables[one.motion].unit)
+            if unit not in largest:
+                same = [k for k, variable in enumerate(flat.variables) if str(variable.unit) == unit]
+                largest[unit] = ca.mmax(ca.fabs(self.reduced.values[same]))
+            motion = self.reduced.values[one.motion]
+            values[one.motion] = ca.if_else(ca.fabs(motion) > ROUNDING * largest[unit], motion, 0)
+        return values

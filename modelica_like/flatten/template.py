@@ -11,6 +11,7 @@ import casadi as ca
 from modelica_like.errors import LanguageError, Source
 from modelica_like.flatten.checks import check_balance, check_units, unit_of_field
 from modelica_like.flatten.conditions import guard_of
+from modelica_like.flatten.holds import HoldForm, hold_forms
 from modelica_like.language.component import Component
 from modelica_like.language.declared import Declared
 from modelica_like.language.equation import (
@@ -19,7 +20,7 @@ from modelica_like.language.equation import (
     FreeEnd,
     as_statement,
 )
-from modelica_like.language.expr import TIME, Symbol, flagged_motion, is_expression, symbols_in
+from modelica_like.language.expr import TIME, Symbol, flagged_motion, is_expression, symbol_of, symbols_in
 from modelica_like.language.fields import Parameter, Variable
 from modelica_like.language.places import located
 from modelica_like.language.transition import StartMode, Transition, as_event
@@ -95,6 +96,8 @@ class Template:
     resets: ca.Function
     start_modes: tuple[tuple[str, int, Source], ...]
     start_conditions: ca.Function
+    holds: tuple[HoldForm, ...]
+    hold_terms: ca.Function
     energy_slots: tuple[Slot, ...]
     energy: ca.Function
     connections: tuple[Connection | FreeEnd, ...] = field(compare=False)
@@ -196,9 +199,13 @@ def _build(component: Component) -> Template:
     guards = [ca.SX(0) if t.when is None else guard_of(t.when, t.source) for t in transitions]
     moments = [ca.SX(0) if t.at is None else t.at for t in transitions]
     resets = [(target, value) for t in transitions for target, value in t.reset.items()]
+    holds, hold_terms = hold_forms(component, residuals)
     names = Names(component)
-    names.add([*residuals, *guards, *moments, *(x for pair in resets for x in pair), *(s.when for s in starts)])
+    names.add(
+        [*residuals, *hold_terms, *guards, *moments, *(x for pair in resets for x in pair), *(s.when for s in starts)]
+    )
     names.add(ca.SX(s.mode.symbol) for s in (*transitions, *starts))
+    names.add(ca.SX(symbol_of(component, name)) for one in holds for name in (one.motion, one.reaction) if name)
     energy, energy_terms = Names(component), _energy_terms(component, wiring)
     energy.parameters, energy.discretes = names.parameters, names.discretes
     energy.add(energy_terms)
@@ -220,6 +227,8 @@ def _build(component: Component) -> Template:
         resets=names.function("resets", [value for _, value in resets]),
         start_modes=tuple((_mode_path(component, s), s.mode.mode.number(s.target), s.source) for s in starts),
         start_conditions=names.function("start_conditions", [s.when for s in starts]),
+        holds=holds,
+        hold_terms=names.function("hold_terms", hold_terms),
         energy_slots=tuple(energy.variables),
         energy=energy.function("energy", energy_terms),
         connections=wiring,

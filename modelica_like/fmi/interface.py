@@ -289,7 +289,7 @@ class _Starts:
         self.model = model
         self.tables: StartTables = start_tables(model)
         arguments = (0.0, model.guesses, model.z_guesses, model.p, model.u)
-        zeros = np.zeros(len(model.flat_discretes))
+        zeros = np.zeros(model.discrete_size)
         self._discrete = model.discrete_starts(*arguments, zeros).full().ravel()
         self._values = model.start_values(*arguments, self._discrete).full().ravel()
         tables = self.tables

@@ -50,7 +50,7 @@ def start_tables(model: CompiledDae) -> StartTables:
     Raises:
         MissingStart, ContradictingStart: they do not determine all states.
     """
-    point = Point(0.0, model.guesses.copy(), model.z_guesses.copy(), np.zeros(len(model.flat_discretes)))
+    point = Point(0.0, model.guesses.copy(), model.z_guesses.copy(), np.zeros(model.discrete_size))
     kind = model.settings.get("start", "given")
     problem = StartProblem(model, point)
     place = {id(entry): k for k, entry in enumerate(model.starts)}

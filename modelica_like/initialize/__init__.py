@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from typing import Literal, get_args
 
 import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import InitializationError, UnknownName, did_you_mean
-from modelica_like.initialize.kept import resting_modes
+from modelica_like.initialize.holds import Impact as Impact
+from modelica_like.initialize.holds import Strike as Strike
+from modelica_like.initialize.holds import holding as holding
+from modelica_like.initialize.holds import rest as rest
+from modelica_like.initialize.holds import share as share
+from modelica_like.initialize.holds import sharing as sharing
 from modelica_like.initialize.point import Point as Point
 from modelica_like.initialize.point import call as call
 from modelica_like.initialize.point import check_singular as check_singular
@@ -48,12 +52,14 @@ def initialize(model: CompiledDae, t0: float = 0.0, start: StartKind = "given") 
             f"There is no start '{start}'{did_you_mean(start, get_args(StartKind)) or '.'}",
             advice="A run can start as given, at rest or in the steady state: given, rest, steady.",
         )
-    point = Point(t0, model.guesses.copy(), model.z_guesses.copy(), np.zeros(len(model.flat_discretes)))
+    point = Point(t0, model.guesses.copy(), model.z_guesses.copy(), np.zeros(model.discrete_size))
     point.d = call(model, model.discrete_starts, point)
+    share(model, point)
     problem = StartProblem(model, point)
     if start == "steady":
         problem.apply(point)
-        point.d = _start_modes(model, point)
+        point.d = chosen_modes(model, point)
+        share(model, point)
     # The modes depend on the states, in the steady state the states also on the modes.
     for _ in range(_MODE_ROUNDS):
         if start == "steady":
@@ -61,12 +67,14 @@ def initialize(model: CompiledDae, t0: float = 0.0, start: StartKind = "given") 
             solve_steady(model, point)
         else:
             problem.solve(point, rest=start == "rest")
-        modes = _start_modes(model, point, resting_modes(model, point) if start == "steady" else ())
+        modes = chosen_modes(model, point)
         if np.array_equal(modes, point.d):
             break
         point.d = modes
+        share(model, point)
     else:
         raise _unsettled(model, point)
+    rest(model, point)
     solve_implicit(model, point)
     check_singular(model, point)
     if start == "steady":
@@ -75,7 +83,7 @@ def initialize(model: CompiledDae, t0: float = 0.0, start: StartKind = "given") 
 
 
 def _unsettled(model: CompiledDae, point: Point) -> InitializationError:
-    pairs = zip(model.flat_discretes, point.d, _start_modes(model, point), strict=True)
+    pairs = zip(model.flat_discretes, point.d, chosen_modes(model, point), strict=False)
     changing = [one.path for one, old, new in pairs if old != new]
     names = changing or [one.path for one in model.flat_discretes if one.names]
     return InitializationError(
@@ -84,13 +92,10 @@ def _unsettled(model: CompiledDae, point: Point) -> InitializationError:
     )
 
 
-def _start_modes(model: CompiledDae, point: Point, resting: Collection[int] = ()) -> Vector:
-    """Choose modes by their start conditions: the first that holds wins.
-
-    Modes that rest stay as they are: a slip of rounding errors releases nothing.
-    """
+def chosen_modes(model: CompiledDae, point: Point) -> Vector:
+    """Choose modes by their start conditions: the first that holds wins."""
     d = point.d.copy()
-    decided = set(resting)
+    decided: set[int] = set()
     for holds, (mode, target, _) in zip(call(model, model.start_conditions, point), model.start_modes, strict=True):
         if holds and mode not in decided:
             decided.add(mode)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, Vector
+from modelica_like.initialize.holds import holding
 from modelica_like.initialize.point import Point, call, variable_slopes
 
 Matrix = np.ndarray[Any, np.dtype[np.float64]]
@@ -48,13 +48,14 @@ def find_kept(model: CompiledDae, point: Point, states: list[int], jacobian: Mat
     held: list[int] = []
     missing: list[float] = []
     rows = np.zeros((0, len(states)))
-    for _, node, value in _entered(model, point) if len(conserved) else ():
+    for k in holding(model, point) if len(conserved) else ():
+        node = model.holds[k].motion
         row = variable_slopes(model, point, [node])[0][states]
         size = float(np.linalg.norm(row))
         inside = size > 0.0 and np.linalg.norm(row - conserved.T @ (conserved @ row)) <= _SAME * size
         if inside and np.linalg.matrix_rank(np.vstack([rows, row]), tol=_SAME * size) > len(rows):
             held.append(node)
-            missing.append(value - float(call(model, model.variables, point)[node]))
+            missing.append(-float(call(model, model.variables, point)[node]))
             rows = np.vstack([rows, row])
     known = _orthonormal(rows)
     rest = _orthonormal(conserved - conserved @ known.T @ known)
@@ -84,29 +85,3 @@ def _orthonormal(rows: Matrix) -> Matrix:
         return np.zeros((0, rows.shape[1]))
     _, sizes, right = np.linalg.svd(rows, full_matrices=False)
     return right[sizes > _SAME]
-
-
-def resting_modes(model: CompiledDae, point: Point) -> set[int]:
-    """Return the modes that hold a motion which is where they got it when they were entered."""
-    variables = call(model, model.variables, point)
-    away: dict[int, bool] = {}
-    for mode, node, value in _entered(model, point):
-        off = not abs(variables[node] - value) <= _SAME * (1.0 + abs(value))
-        away[mode] = off or away.get(mode, False)
-    return {mode for mode, is_away in away.items() if not is_away}
-
-
-def _entered(model: CompiledDae, point: Point) -> Iterator[tuple[int, int, float]]:
-    """Yield mode, variable (node) and value of everything that gets a fixed value when a present mode is entered."""
-    values = call(model, model.resets, point)
-    # A ball that bounces leaves the floor with a speed that depends on its speed: nothing holds that.
-    varying = set(model.resets.jac_sparsity(0, 1).row())
-    for one in model.transitions:
-        for reset in one.resets if int(point.d[one.mode]) == one.target else ():
-            if reset.value in varying:
-                continue
-            if reset.kind == "value":
-                yield one.mode, model.reset_nodes[reset.target], float(values[reset.value])
-            elif reset.kind == "state" and model.states[reset.index] in model.position:
-                node = model.position[model.states[reset.index]]
-                yield one.mode, node, float(values[reset.value]) / reset.factor

@@ -96,4 +96,5 @@ def variable_slopes(model: CompiledDae, point: Point, nodes: list[int]) -> Vecto
     by_x, by_z, alg_x, alg_z = (
         np.asarray(part[nodes, :].full() if k < 2 else part.full()) for k, part in enumerate(parts)
     )
-    return by_x - by_z @ np.linalg.solve(alg_z, alg_x) if model.implicit else by_x
+    # Reactions whose split is undetermined make the equations for z singular; what depends on them is left out.
+    return by_x - by_z @ np.linalg.lstsq(alg_z, alg_x, rcond=None)[0] if np.any(by_z) else by_x

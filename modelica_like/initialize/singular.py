@@ -54,7 +54,7 @@ def implicit_singular(model: CompiledDae, t: float, d: Vector, jacobian: Any) ->
 
 
 def _holds(model: CompiledDae, d: Vector, path: str) -> bool:
-    modes = ((one, value) for one, value in zip(model.flat_discretes, d, strict=True) if one.names)
+    modes = ((one, value) for one, value in zip(model.flat_discretes, d, strict=False) if one.names)
     return any(one.path.rpartition(".")[0] == path and one.names[int(value)] in _HOLDING for one, value in modes)
 
 

@@ -44,6 +44,8 @@ from modelica_like.language.functions import sqrt as sqrt
 from modelica_like.language.functions import tan as tan
 from modelica_like.language.functions import tanh as tanh
 from modelica_like.language.functions import where as where
+from modelica_like.language.hold import UNLIMITED as UNLIMITED
+from modelica_like.language.hold import Hold as Hold
 from modelica_like.language.mode import BoundMode as BoundMode
 from modelica_like.language.mode import Mode as Mode
 from modelica_like.language.terminal import Terminal as Terminal

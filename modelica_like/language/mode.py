@@ -9,6 +9,7 @@ import casadi as ca
 
 from modelica_like.errors import LanguageError, UnknownName, did_you_mean
 from modelica_like.language.expr import Expr, Scalar, Symbol, symbol_of
+from modelica_like.language.hold import Hold
 from modelica_like.language.transition import StartMode, Transition
 
 
@@ -19,15 +20,25 @@ class Mode:
         names: the modes; their position is their number.
         start: the mode at the start, unless `initially` chooses another.
         description: one phrase.
+        holds: what each mode that holds a motion holds; the name of the motion is short for `Hold(motion)`. In such a
+            mode the component's equations say that the derivative of the motion is zero. That the motion itself is
+            zero follows: who enters the mode with a motion stops it by an impact.
     """
 
     name: str = ""
     owner: str = ""
 
-    def __init__(self, *names: str, start: str | None = None, description: str = "") -> None:
+    def __init__(
+        self,
+        *names: str,
+        start: str | None = None,
+        description: str = "",
+        holds: Mapping[str, str | Hold] | None = None,
+    ) -> None:
         self.names = names
         self.start = names[0] if start is None else start
         self.description = description
+        self.holds = {name: Hold(one) if isinstance(one, str) else one for name, one in (holds or {}).items()}
 
     def __set_name__(self, owner: type, name: str) -> None:
         self.owner = owner.__name__
@@ -38,11 +49,12 @@ class Mode:
 
         Raises:
             LanguageError: no names, or one twice.
-            UnknownName: the start is none of them.
+            UnknownName: the start, or a mode that holds something, is none of them.
         """
         if len(set(self.names)) != len(self.names) or not self.names:
             raise LanguageError(f"{self.label} needs distinct names, not {self.names}.")
-        self.number(self.start)
+        for name in (self.start, *self.holds):
+            self.number(name)
 
     @property
     def label(self) -> str:

@@ -6,9 +6,18 @@ from collections import deque
 
 import numpy as np
 
-from modelica_like.compile.compiled import CompiledDae, CompiledTransition
+from modelica_like.compile.compiled import CompiledDae, CompiledTransition, Vector
 from modelica_like.errors import Chattering
-from modelica_like.initialize import Point, call, check_singular, solve_implicit, variable_slopes
+from modelica_like.initialize import (
+    Point,
+    Strike,
+    call,
+    check_singular,
+    chosen_modes,
+    share,
+    solve_implicit,
+    variable_slopes,
+)
 from modelica_like.solve.guards import Guards
 from modelica_like.solve.options import Options
 from modelica_like.solve.recorder import Event, Recorder
@@ -80,8 +89,11 @@ class Instants:
             self._round = number
             if not wanting:
                 break
+            before = now.d
             self._fire(now, wanting)
+            share(self.model, now)
             solve_implicit(self.model, now)
+            self._stop_motions(now, before)
             check_singular(self.model, now)
             wanting = [*self.due(now), *self.rising(now)]
         else:
@@ -99,7 +111,7 @@ class Instants:
         targets: list[tuple[int, float]] = []
         x, d = now.x.copy(), now.d.copy()
         for transition in chosen.values():
-            self._note(now, transition)
+            self._note(now, transition.mode, transition.target, self._number(transition))
             d[transition.mode] = transition.target
             for reset in transition.resets:
                 if reset.kind == "state":
@@ -112,6 +124,30 @@ class Instants:
         if targets:
             self._project(now, targets)
 
+    def _stop_motions(self, now: Point, before: Vector) -> None:
+        """Stop what modes have begun to hold; what the impact knocks loose takes the mode that its start would take."""
+        holds = self.model.holds
+        entering = [
+            k for k, one in enumerate(holds) if now.d[one.mode] == one.number and before[one.mode] != one.number
+        ]
+        if not entering:
+            return
+        strike = Strike(self.model, now, entering)
+        strike.run()
+        self.record.impacts += strike.impacts
+        if not strike.loose:
+            return
+        starts, chosen = call(self.model, self.model.discrete_starts, now), now.copy()
+        modes = list(dict.fromkeys(holds[k].mode for k in strike.loose))
+        chosen.d[modes] = starts[modes]
+        chosen.d = chosen_modes(self.model, chosen)
+        for mode in modes:
+            if chosen.d[mode] != now.d[mode]:
+                self._note(now, mode, int(chosen.d[mode]), -1)
+                now.d[mode] = chosen.d[mode]
+        share(self.model, now)
+        solve_implicit(self.model, now)
+
     def _project(self, now: Point, targets: list[tuple[int, float]]) -> None:
         """Move the states as little as possible, so that variables that follow from them take new values."""
         nodes = [self.model.reset_nodes[k] for k, _ in targets]
@@ -123,12 +159,17 @@ class Instants:
     def _number(self, transition: CompiledTransition) -> int:
         return self._numbers[id(transition)]
 
-    def _note(self, now: Point, transition: CompiledTransition) -> None:
-        mode = self.model.flat_discretes[transition.mode]
-        before = mode.names[int(now.d[transition.mode])]
+    def _note(self, now: Point, number: int, target: int, transition: int) -> None:
+        mode = self.model.flat_discretes[number]
+        # Who is knocked loose goes without a transition; the first one of the mode tells where it stands.
+        known = (
+            transition
+            if transition >= 0
+            else next(k for k, one in enumerate(self.model.transitions) if one.mode == number)
+        )
         event = Event(
-            float(now.t), mode.path, before, mode.names[transition.target], transition.source,
-            self._number(transition), len(self.record.segments), self._round,
+            float(now.t), mode.path, mode.names[int(now.d[number])], mode.names[target],
+            self.model.transitions[known].source, transition, len(self.record.segments), self._round,
         )  # fmt: skip
         self.record.events.append(event)
         self._recent.append(event)

@@ -8,7 +8,7 @@ import numpy as np
 
 from modelica_like.compile.compiled import Vector
 from modelica_like.errors import Source
-from modelica_like.initialize import Point
+from modelica_like.initialize import Impact, Point
 
 
 @dataclass(frozen=True)
@@ -21,7 +21,7 @@ class Event:
         before: name of the mode that was left.
         after: name of the mode that was entered.
         source: the transition's place in its component.
-        transition: position in the model's transitions.
+        transition: position in the model's transitions; -1 if an impact knocked it loose.
         segment: position of the segment that follows.
         round: number of the round at its instant; a round sees what the one before has changed.
     """
@@ -67,10 +67,11 @@ class Segment:
 
 @dataclass
 class Recorder:
-    """Collects points into segments, and events."""
+    """Collects points into segments, events, and what impacts have dissipated."""
 
     segments: list[Segment] = field(default_factory=list)
     events: list[Event] = field(default_factory=list)
+    impacts: list[Impact] = field(default_factory=list)
     _times: list[Vector] = field(default_factory=list)
     _x: list[Vector] = field(default_factory=list)
     _z: list[Vector] = field(default_factory=list)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import casadi as ca
@@ -12,6 +12,7 @@ from modelica_like.flatten.model import FlatModel, Origin
 from modelica_like.structure.alias import find_aliases
 from modelica_like.structure.blocks import Block, BlockSolver, Solved
 from modelica_like.structure.diagnose import check_solvable
+from modelica_like.structure.holds import Circuit, HeldMotion, add_approaches, find_circuits, share_reactions
 from modelica_like.structure.index import Pantelides, prefer_relative_states
 from modelica_like.structure.prescribed import Flags
 from modelica_like.structure.states import select_states
@@ -46,6 +47,8 @@ class ReducedDae:
         explicit: (level, expression) of the explicit unknowns, each in states, z and earlier ones.
         index: structural index of the equations before the reduction.
         differentiated: origins of the differentiated equations.
+        holds: motions that modes hold.
+        circuits: those that depend on each other.
     """
 
     flat: FlatModel
@@ -69,6 +72,8 @@ class ReducedDae:
     implicit_blocks: tuple[tuple[tuple[str, ...], tuple[Origin, ...]], ...] = field(repr=False)
     level_values: Any = field(repr=False)
     explicit: tuple[tuple[int, Any], ...] = field(repr=False)
+    holds: tuple[HeldMotion, ...] = ()
+    circuits: tuple[Circuit, ...] = ()
 
     def rate(self, variable: int) -> Any:
         """Return the time derivative of a flat variable, in x, z, inputs, p, d and t."""
@@ -126,6 +131,7 @@ def reduce(flat: FlatModel) -> ReducedDae:
     """
     aliases = find_aliases(flat)
     system = build_system(flat, aliases)
+    holds = add_approaches(system)
     flags = Flags(system)
     _check_input_rates(system)
     prefer_relative_states(system)
@@ -138,7 +144,13 @@ def reduce(flat: FlatModel) -> ReducedDae:
     if flags.settle(residual, unknowns):
         residual, origins = _differentiate(system, counts)
     solved = BlockSolver(residual, _column(system, unknowns), _volatile(system)).run()
-    return _assemble(system, counts, states, unknowns, origins, solved)
+    order = [(system.symbols[unknowns[k]], expression) for k, expression in solved.order]
+    circuits = find_circuits(system, holds, order, states)
+    if circuits:
+        residual = share_reactions(system, holds, circuits, residual)
+        solved = BlockSolver(residual, _column(system, unknowns), _volatile(system)).run()
+    reduced = _assemble(system, counts, states, unknowns, origins, solved)
+    return replace(reduced, holds=holds, circuits=tuple(circuits))
 
 
 def _check_input_rates(system: System) -> None:
@@ -184,6 +196,7 @@ def _top_slopes(system: System, counts: list[int]) -> list[dict[int, float]]:
     function = ca.Function("slopes", [symbols, model.p, model.d, model.time], [jacobian])
     point = [0.3 + 0.61803398875 * (k % 7 + 1) for k in range(len(system.symbols))]
     starts = [one.start if isinstance(one.start, int | float) else 0.0 for one in model.discretes]
+    starts += [0.0] * (model.d.numel() - len(starts))
     values = function(point, [one.value for one in model.parameters], starts, 0.0)
     for place, column, value in zip(*values.sparsity().get_triplet(), values.nonzeros(), strict=True):
         level = system.levels[column]

@@ -29,7 +29,7 @@ class Sizes:
     @classmethod
     def of(cls, model: CompiledDae) -> Sizes:
         """Read them off a model."""
-        return cls(len(model.states), len(model.implicit), len(model.p), len(model.u), len(model.flat_discretes))
+        return cls(len(model.states), len(model.implicit), len(model.p), len(model.u), model.discrete_size)
 
     @property
     def theta(self) -> int:

@@ -37,7 +37,7 @@ class StepFunctions:
         self.quadratures = quadratures
         self.tableau = radau(stages)
         self.nx, self.nz = len(model.states), len(model.implicit)
-        self.nt = len(model.p) + len(model.u) + len(model.flat_discretes)
+        self.nt = len(model.p) + len(model.u) + model.discrete_size
         self.nq = int(quadratures.numel())
         self.size = stages * (self.nx + self.nz)
 
@@ -48,7 +48,7 @@ class StepFunctions:
     def _names(self) -> list[Any]:
         """MX arguments of all step functions: t, h, x, W, p, u, d."""
         model = self.model
-        sizes = (1, 1, self.nx, self.size, len(model.p), len(model.u), len(model.flat_discretes))
+        sizes = (1, 1, self.nx, self.size, len(model.p), len(model.u), model.discrete_size)
         return [ca.MX.sym(name, size) for name, size in zip("thxWpud", sizes, strict=True)]
 
     @cached_property

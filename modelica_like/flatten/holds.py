@@ -1,0 +1,137 @@
+"""Which motions the modes of a component hold, found in its equations once for all instances."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, cast
+
+import casadi as ca
+
+from modelica_like.errors import LanguageError
+from modelica_like.language.component import Component
+from modelica_like.language.expr import TIME, Symbol, flagged_motion, is_expression, symbol_of, symbols_in
+from modelica_like.language.fields import Variable
+from modelica_like.language.hold import UNLIMITED, Hold
+from modelica_like.language.mode import Mode
+
+TERMS = 4
+"""Rows of the hold terms: gain, capacity forward, capacity backward, restitution."""
+
+
+@dataclass(frozen=True)
+class HoldForm:
+    """A motion that a mode holds, without its expressions.
+
+    Attributes:
+        mode: name of the mode.
+        number: number of the mode that holds.
+        loose: number of one that does not, or -1.
+        motion: path of the variable that is held.
+        reaction: path of the reaction, or nothing.
+        row: position of the equation that holds it.
+        rigid: the equation says nothing but that the derivative of the motion is zero; a creep says more.
+    """
+
+    mode: str
+    number: int
+    loose: int
+    motion: str
+    reaction: str
+    row: int
+    rigid: bool
+
+
+def hold_forms(component: Component, residuals: list[Any]) -> tuple[tuple[HoldForm, ...], list[Any]]:
+    """Find the equation behind every motion that a mode holds.
+
+    Returns:
+        The forms, and `TERMS` expressions for each: the slope of its equation by the derivative of the motion
+        (zero where it holds nothing), the capacities and the restitution.
+
+    Raises:
+        LanguageError: a declaration names no variable, or no equation holds it.
+    """
+    forms: list[HoldForm] = []
+    terms: list[Any] = []
+    for mode in component.modes.values():
+        for name, hold in mode.holds.items():
+            motion = _variable(component, mode, hold.motion, "motion")
+            reaction = _variable(component, mode, hold.reaction, "reaction") if hold.reaction else None
+            row, gain, rigid = _equation(component, mode, name, motion, residuals)
+            loose = next((k for k, other in enumerate(mode.names) if other not in mode.holds), -1)
+            named = "" if reaction is None else reaction.name
+            forms.append(HoldForm(mode.name, mode.number(name), loose, motion.name, named, row, rigid))
+            forward, backward = _capacities(component, hold)
+            restitution = _value(component, hold.restitution) if hold.restitution else 0.0
+            terms += [gain, forward, backward, restitution]
+    return tuple(forms), terms
+
+
+def _value(component: Component, name: str) -> Any:
+    value = getattr(component, name)
+    return cast("Callable[[], Any]", value)() if callable(value) else value
+
+
+def _variable(component: Component, mode: Mode, name: str, role: str) -> Symbol:
+    found = _value(component, name) if hasattr(component, name) else None
+    if isinstance(found, Symbol) and _is_variable(found) and found.owner is component and not found.order:
+        return found
+    raise LanguageError(
+        f"{mode.label} holds the {role} '{name}', which is no variable of {type(component).__name__}.",
+        advice="Name a variable, or a property that returns one.",
+    )
+
+
+def _capacities(component: Component, hold: Hold) -> tuple[Any, Any]:
+    given = _value(component, hold.capacity) if hold.capacity else None
+    pair = given if isinstance(given, tuple) else (given, given)
+    forward, backward = (UNLIMITED if one is None else one for one in cast("tuple[Any, Any]", pair))
+    return forward, backward
+
+
+def _equation(
+    component: Component, mode: Mode, name: str, motion: Symbol, residuals: list[Any]
+) -> tuple[int, Any, bool]:
+    """Return the position of the equation that holds a motion, its slope, and whether it says nothing else."""
+    rate, symbol = symbol_of(component, motion.name, 1), symbol_of(component, mode.name)
+    number = mode.number(name)
+    for row, residual in enumerate(residuals):
+        if not (is_expression(residual) and ca.depends_on(residual, symbol) and ca.depends_on(residual, rate)):
+            continue
+        slope = ca.jacobian(residual, rate)
+        if _number(ca.substitute(slope, symbol, ca.SX(number))) != 0.0:
+            # What another mode does with the derivative of the motion holds nothing.
+            gain = ca.if_else(ca.SX(symbol) == number, slope, 0)
+            return row, gain, _only(ca.substitute(residual, symbol, ca.SX(number)), rate)
+    raise LanguageError(
+        f"{mode.label} holds {motion.name} in '{name}', but no equation says there that der({motion.name}) is zero.",
+        advice=f"Write {mode.name}.choose(…, {name}=der(self.{motion.name})) == 0.",
+    )
+
+
+def _only(residual: Any, rate: Symbol) -> bool:
+    """Whether an equation contains no variable but one, where no motion is prescribed."""
+    others = [s for s in symbols_in(residual) if s is not rate and _is_variable(s)]
+    return all(_number(ca.jacobian(residual, other)) == 0.0 for other in others)
+
+
+def _is_variable(symbol: Symbol) -> bool:
+    return symbol is not TIME and isinstance(symbol.owner.fields.get(symbol.name), Variable)
+
+
+def _number(expression: Any) -> float:
+    """Value of an expression at a point that is not special; no motion is prescribed there."""
+    symbols = symbols_in(expression)
+    if not symbols:
+        return float(ca.SX(expression))
+    values = [0.0 if flagged_motion(s.name) else _generic(s, k) for k, s in enumerate(symbols)]
+    function = ca.Function("value", [ca.vertcat(*map(ca.SX, symbols))], [expression])
+    return float(function(values))
+
+
+def _generic(symbol: Symbol, k: int) -> float:
+    if symbol is TIME or _is_variable(symbol):
+        return 0.3 + 0.61803398875 * (k % 7 + 1)
+    mode = symbol.owner.modes.get(symbol.name) if isinstance(symbol.owner, Component) else None
+    return 1.0 if mode is None else float(mode.number(mode.start))

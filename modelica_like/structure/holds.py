@@ -1,0 +1,182 @@
+"""Motions that modes hold, in the equations of the whole model: approaches, and sharing where several hold the same.
+
+A mode that holds a motion says der(motion) = 0. Two things are added to that equation, as values that only events
+change and that stand behind the modes and discrete values in d:
+
+- an *approach* r: der(motion) = r. It is zero while the model runs. An impact asks for r = -motion/tau; how much the
+  accelerations differ from those with r = 0, times tau, is the jump of the speeds, from which finite forces cancel.
+- a *circuit*: elements whose motions depend on each other, such as clutches side by side. Where all of them hold, some
+  equations say what others say already, and the reactions are undetermined. Such an equation is switched off, and says
+  instead that the reactions are shared: sum(share * reaction) = 0.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from modelica_like.flatten.holds import TERMS
+from modelica_like.flatten.model import FlatModel, evaluate
+from modelica_like.structure.system import System
+
+_DEPENDENT = 1e-9
+
+
+@dataclass(frozen=True)
+class HeldMotion:
+    """A motion that a mode of a component holds.
+
+    Attributes:
+        path: the component.
+        mode: position of the mode in d.
+        number: number of the mode that holds.
+        loose: number of a mode that does not, or -1.
+        motion: variable that is held.
+        reaction: variable that holds it, or -1.
+        row: position of its equation in the residual.
+        rigid: the equation says nothing but der(motion) = 0.
+        approach: position of its approach in d.
+    """
+
+    path: str
+    mode: int
+    number: int
+    loose: int
+    motion: int
+    reaction: int
+    row: int
+    rigid: bool
+    approach: int
+
+
+@dataclass(frozen=True)
+class Circuit:
+    """Held motions that depend on each other.
+
+    Attributes:
+        members: positions of the held motions.
+        first: position in d of the switches, one per member, and the shares behind them, row by row.
+    """
+
+    members: tuple[int, ...]
+    first: int
+
+
+def add_approaches(system: System) -> tuple[HeldMotion, ...]:
+    """Let every equation that holds a motion ask for an approach."""
+    holds = _find(system.model)
+    if holds:
+        approaches = ca.SX.sym("approach", len(holds))
+        for one, gain, approach in zip(holds, gains(system), ca.vertsplit(approaches), strict=True):
+            system.residual[one.row] -= gain * approach
+        system.model = replace(system.model, d=ca.vertcat(system.model.d, approaches))
+    return holds
+
+
+def _find(model: FlatModel) -> tuple[HeldMotion, ...]:
+    row_of = {pair: row for row, pair in enumerate(model.general)}
+    found: list[HeldMotion] = []
+    for number, instance in enumerate(model.instances):
+        template = instance.template
+        if not template.holds:
+            continue
+        node = {slot.path: instance.nodes[k] for k, slot in enumerate(template.slots) if slot.order == 0}
+        discrete = dict(zip(template.discretes, instance.discretes, strict=True))
+        for form in template.holds:
+            found.append(
+                HeldMotion(
+                    instance.path, discrete[form.mode], form.number, form.loose, node[form.motion],
+                    node.get(form.reaction, -1), row_of[number, form.row], form.rigid,
+                    len(model.discretes) + len(found),
+                )
+            )  # fmt: skip
+    return tuple(found)
+
+
+def hold_terms(model: FlatModel, values: Any) -> Any:
+    """Gain, capacities and restitution of every held motion, one row each; shape (holds, TERMS)."""
+    if not any(one.template.holds for one in model.instances):
+        return ca.SX(0, TERMS)
+    columns = evaluate(model, "hold_terms", values)
+    return ca.reshape(ca.vertcat(*(columns[k] for k in sorted(columns))), TERMS, -1).T
+
+
+def gains(system: System) -> list[Any]:
+    """Slope of the equation of every held motion by its derivative; zero where it holds nothing."""
+    return ca.vertsplit(hold_terms(system.model, system.node_values)[:, 0])
+
+
+def find_circuits(
+    system: System, holds: tuple[HeldMotion, ...], order: list[tuple[Any, Any]], states: list[int]
+) -> list[Circuit]:
+    """Find held motions that depend on each other.
+
+    Args:
+        system: the equations.
+        holds: the held motions.
+        order: explicit unknowns (symbols) with the expressions that give them, each in terms of earlier ones.
+        states: levels that are states.
+    """
+    rigid = [k for k, one in enumerate(holds) if one.rigid and one.reaction >= 0]
+    placed = [system.node_level[holds[k].motion] for k in rigid]
+    levels = [pair[0] for pair in placed if pair is not None]
+    if len(rigid) < 2 or (len(levels) == len(rigid) and len(set(levels)) == len(levels) and set(levels) <= set(states)):
+        return []
+    slopes = _slopes(system, [holds[k].motion for k in rigid], order, states)
+    sizes = np.linalg.norm(slopes, axis=1)
+    moving = sizes > 0.0
+    rigid = [k for k, moves in zip(rigid, moving, strict=True) if moves]
+    left, values, _ = np.linalg.svd(slopes[moving] / sizes[moving, None]) if rigid else (np.eye(0), np.zeros(0), None)
+    silent = left[:, np.sum(values > _DEPENDENT) :]
+    together = np.abs(silent @ silent.T) > _DEPENDENT
+    first, circuits = system.model.d.numel(), list[Circuit]()
+    for members in _groups(together):
+        circuits.append(Circuit(tuple(rigid[k] for k in members), first))
+        first += len(members) * (1 + len(members))
+    return circuits
+
+
+def _slopes(system: System, nodes: list[int], order: list[tuple[Any, Any]], states: list[int]) -> Any:
+    """Slopes of variables by the states at a point that is not special, as numbers."""
+    motions = system.node_values[nodes]
+    if order:
+        _, (motions,) = ca.substitute_inplace([s for s, _ in order], [e for _, e in order], [motions], False)
+    x = ca.vertcat(*(system.symbols[n] for n in states)) if states else ca.SX(0, 1)
+    slopes = ca.jacobian(motions, x)
+    others = ca.symvar(slopes)
+    parameters = zip(ca.vertsplit(system.model.p), system.model.parameters, strict=True)
+    given = {leaf.element_hash(): one.value for leaf, one in parameters}
+    values = [given.get(leaf.element_hash(), 0.3 + 0.618 * (k % 7 + 1)) for k, leaf in enumerate(others)]
+    return np.asarray(ca.Function("slopes", [ca.vertcat(*others)], [ca.densify(slopes)])(values).full())
+
+
+def _groups(together: Any) -> list[list[int]]:
+    """Sets of at least two that are joined, directly or by others."""
+    groups: list[list[int]] = []
+    seen: set[int] = set()
+    for k in range(len(together)):
+        if k in seen:
+            continue
+        group = [k]
+        for one in group:
+            group += [int(n) for n in np.flatnonzero(together[one]) if n not in group]
+        seen.update(group)
+        groups += [sorted(group)] if len(group) > 1 else []
+    return groups
+
+
+def share_reactions(system: System, holds: tuple[HeldMotion, ...], circuits: list[Circuit], residual: Any) -> Any:
+    """Let equations of circuits be switched to the sharing of the reactions; returns the new residual."""
+    slope, rows = gains(system), ca.vertsplit(residual)
+    for circuit in circuits:
+        count = len(circuit.members)
+        switches, shares = ca.SX.sym("switch", count), ca.SX.sym("share", count, count)
+        system.model = replace(system.model, d=ca.vertcat(system.model.d, switches, ca.vec(shares.T)))
+        reactions = system.node_values[[holds[k].reaction for k in circuit.members]]
+        for place, k in enumerate(circuit.members):
+            row = holds[k].row
+            rows[row] = (1 - switches[place]) * rows[row] + slope[k] * ca.mtimes(shares[place, :], reactions)
+    return ca.vertcat(*rows)
