@@ -18,6 +18,8 @@ from modelica_like.language.hold import UNLIMITED
 _DEPENDENT = 1e-9
 _INSTANT = 1e-9
 """Duration of an impact in s over which the approach is asked for; finite forces cancel whatever it is."""
+_STIFF = 1e6
+"""Reaction with which a motion that contradicts its being held counts, over the inertia that is held."""
 _LARGE, _SMALL = 1e6, 1e-6
 _SAYS_NOTHING = 1e-12
 
@@ -93,9 +95,32 @@ def _share(
     left, values, _ = np.linalg.svd(slopes / sizes[:, None])
     silent = (left[:, np.sum(values > _DEPENDENT) :] / sizes[:, None]).T
     weighted = silent / _capacities(model, point, members)
-    for row, pivot in enumerate(_eliminate(silent, weighted)):
+    pivots = _eliminate(silent, weighted)
+    for row, pivot in enumerate(pivots):
         switches[places[pivot]] = 1.0
-        shares[places[pivot], places] = weighted[row] / np.abs(weighted[row]).max()
+        shares[places[pivot], places] = weighted[row] / (np.abs(weighted[row]).max() * np.sign(weighted[row, pivot]))
+    _yield_to_contradiction(model, point, circuit, switches, shares)
+
+
+def _yield_to_contradiction(
+    model: CompiledDae, point: Point, circuit: Circuit, switches: Vector, shares: Vector
+) -> None:
+    """Let a motion that cannot be held by all, because it is prescribed, raise the reactions until one gives way.
+
+    A switched equation says sum(share·reaction) = stiff·der(motion). Where all hold, the right side is zero.
+    """
+    trial, count = point.copy(), len(circuit.members)
+    trial.d[circuit.first : circuit.first + count * (1 + count)] = np.concatenate([switches, shares.ravel()])
+    others = [k for place, k in enumerate(circuit.members) if shares[:, place].any() and not switches[place]]
+    nodes = [model.holds[k].reaction for k in others]
+    reactions: list[Vector] = []
+    for asked in (0.0, 1.0):
+        trial.d[[model.holds[k].approach for k in others]] = asked
+        solve_implicit(model, trial)
+        reactions.append(call(model, model.variables, trial)[nodes])
+    inertia = float(np.abs(reactions[1] - reactions[0]).max(initial=0.0))
+    if np.isfinite(inertia):
+        switches[switches == 1.0] += _STIFF * inertia
 
 
 def _capacities(model: CompiledDae, point: Point, members: list[int]) -> Vector:

@@ -17,11 +17,11 @@ from components import (
     Pulse,
     Ramp,
     Sine,
+    Speed,
     Spring,
     Torque,
 )
 from modelica_like import Assembly, Component, Solution, simulate
-from modelica_like.errors import SingularAtStart
 
 TIGHT = {"rtol": 1e-10, "atol": 1e-12}
 
@@ -199,14 +199,41 @@ def test_residual_drag_of_an_open_clutch() -> None:
     assert run.events[-1].time == pytest.approx(10.0, abs=1e-9)
 
 
-def test_two_brakes_on_one_shaft_cannot_both_stick() -> None:
-    for w, when in ((0.0, "t = 0 s"), (5.0, "t = 1.25 s")):
-        with pytest.raises(SingularAtStart) as caught:
-            simulate(shaft(mass=still(w), brake1=Brake(capacity=3.0), brake2=Brake(capacity=1.0)), "3 s")
-        message = str(caught.value)
-        assert when in message
-        assert "brake1 and brake2 stick" in message
-        assert "Give one of them a small creep, put a spring between them, or let one start open." in message
+def test_two_brakes_on_one_shaft_share_the_torque() -> None:
+    """What they hold together follows from the balance; each takes a part in proportion to what it can bear."""
+    for w, rest in ((0.0, 0.0), (5.0, 2.5)):
+        parts = {"mass": still(w), "one": Brake(capacity=3.0), "two": Brake(capacity=1.0)}
+        run = simulate(shaft(**parts, motor=ConstantTorque(tau_constant=2.0)), "4 s")
+        held = run.time > rest + 1e-9
+        np.testing.assert_allclose(run["one.tau"][held], 1.5, rtol=1e-9)
+        np.testing.assert_allclose(run["two.tau"][held], 0.5, rtol=1e-9)
+        assert np.all(run["mass.w"][held] == 0.0)
+        assert run.energy().closure < 1e-12
+
+
+def test_two_brakes_give_way_where_both_can_bear_no_more() -> None:
+    """3 + 1 N.m hold until the ramp 5 t has risen above their sum; then 0.5 kg.m2 are accelerated by the excess."""
+    parts = {
+        "motor": Torque(),
+        "mass": Inertia(J=0.5, phi=0, w=0),
+        "one": Brake(capacity=3.0),
+        "two": Brake(capacity=1.0),
+    }
+    run = simulate(shaft(Ramp(height=10, duration=2), "motor.tau", **parts), "2 s", **TIGHT)
+    assert run.events[0].time == pytest.approx(0.8, abs=1e-9)
+    assert run.final["mass.w"] == pytest.approx(0.5 * 5 * 1.2**2 / 0.5, rel=1e-8)
+
+
+def test_a_brake_and_a_clutch_to_a_shaft_that_is_turned() -> None:
+    """Nobody can hold a motion that is prescribed: the weaker one slides at once."""
+    for clutch, brake, w in ((1.0, 3.0, 0.0), (3.0, 1.0, 1.0)):
+        parts = {
+            "motor": Speed(phi=0), "clutch": Clutch(capacity=clutch), "mass": Inertia(J=0.5, phi=0, w=0),
+            "brake": Brake(capacity=brake),
+        }  # fmt: skip
+        run = simulate(shaft(Ramp(height=1, duration=1), "motor.w_ref", **parts), "1 s")
+        assert run.final["mass.w"] == pytest.approx(w, abs=1e-6)
+        assert run.energy()["clutch" if clutch < brake else "brake"].lost == pytest.approx(0.5, rel=1e-6)
 
 
 def test_friction_under_prescribed_motion() -> None:

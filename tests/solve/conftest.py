@@ -21,8 +21,9 @@ def start() -> Callable[..., dict[str, float]]:
         point: Point = initialize(compiled, 0.0, how)  # type: ignore[arg-type]
         found = np.array(compiled.variables(point.t, point.x, point.z, compiled.p, compiled.u, point.d)).ravel()
         names = {variable.path: float(value) for variable, value in zip(compiled.flat_variables, found, strict=True)}
+        # Behind modes and discrete values stand approaches and shares.
         modes = {
-            one.path: one.names[int(d)] for one, d in zip(compiled.flat_discretes, point.d, strict=True) if one.names
+            one.path: one.names[int(d)] for one, d in zip(compiled.flat_discretes, point.d, strict=False) if one.names
         }
         return {**names, **modes}  # type: ignore[dict-item]
 

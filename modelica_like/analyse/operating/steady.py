@@ -74,7 +74,7 @@ class OperatingPoint(Mapping[str, float]):
     @property
     def stuck(self) -> tuple[str, ...]:
         """Components that stick: friction that is not overcome, or a gear that locks itself."""
-        modes = zip(self.model.flat_discretes, self.point.d, strict=True)
+        modes = zip(self.model.flat_discretes, self.point.d, strict=False)
         return tuple(
             one.path.rpartition(".")[0] for one, number in modes if one.names and one.names[int(number)] == "stuck"
         )
@@ -234,7 +234,7 @@ def _value(model: CompiledDae, name: str) -> float:
 
 def _operating_point(model: CompiledDae, point: Point) -> OperatingPoint:
     values = dict(zip(model.position, map(float, call(model, model.variables, point)), strict=True))
-    values.update(zip(model.discrete_position, map(float, point.d), strict=True))
+    values.update(zip(model.discrete_position, map(float, point.d), strict=False))
     values.update(zip(model.parameter_position, map(float, model.p), strict=True))
     values.update(zip(model.derived_position, map(float, model.derived(model.p).full().ravel()), strict=True))
     return OperatingPoint(model, point, values)
