@@ -18,10 +18,12 @@ from modelica_like.language.hold import UNLIMITED
 _DEPENDENT = 1e-9
 _INSTANT = 1e-9
 """Duration of an impact in s over which the approach is asked for; finite forces cancel whatever it is."""
-_STIFF = 1e6
+_STIFF = 1e5
 """Reaction with which a motion that contradicts its being held counts, over the inertia that is held."""
 _LARGE, _SMALL = 1e6, 1e-6
 _SAYS_NOTHING = 1e-12
+_FELT = 1e-9
+"""Change of a motion, relative to the largest one in an impact, from which on it is no rounding."""
 
 
 @dataclass(frozen=True)
@@ -107,7 +109,7 @@ def _yield_to_contradiction(
 ) -> None:
     """Let a motion that cannot be held by all, because it is prescribed, raise the reactions until one gives way.
 
-    A switched equation says sum(share·reaction) = stiff·der(motion). Where all hold, the right side is zero.
+    A switched equation says sum(share·reaction) = stiff·inertia·der(motion). Where all hold, the right side is zero.
     """
     trial, count = point.copy(), len(circuit.members)
     trial.d[circuit.first : circuit.first + count * (1 + count)] = np.concatenate([switches, shares.ravel()])
@@ -119,8 +121,10 @@ def _yield_to_contradiction(
         solve_implicit(model, trial)
         reactions.append(call(model, model.variables, trial)[nodes])
     inertia = float(np.abs(reactions[1] - reactions[0]).max(initial=0.0))
-    if np.isfinite(inertia):
-        switches[switches == 1.0] += _STIFF * inertia
+    stiff = _STIFF * inertia if np.isfinite(inertia) else 0.0
+    # The larger of the two sides has coefficients of about one.
+    shares /= max(stiff, 1.0)
+    switches[switches == 1.0] += min(stiff, 1.0)
 
 
 def _capacities(model: CompiledDae, point: Point, members: list[int]) -> Vector:
@@ -181,7 +185,10 @@ class Strike:
         self.loose: list[int] = []
 
     def run(self) -> None:
-        """Carry out the impact; `loose` then tells what was knocked loose or bounces, `impacts` what was lost."""
+        """Carry out the impact.
+
+        `loose` then tells what was knocked loose, bounces, or was moved in passing; `impacts` what was lost.
+        """
         model, point = self.model, self.point
         before = self._motions()
         moving = [k for k in sorted(self.entering) if before[k] != 0.0]
@@ -204,7 +211,11 @@ class Strike:
             energy = 0.5 * (before[k] + after[k]) * impulse
             if k in approaches and energy != 0.0:
                 self.impacts.append(Impact(float(point.t), model.holds[k].component, float(energy)))
-        self.loose += [k for k in approaches if restitution[k] > 0.0 and after[k] != 0.0]
+        bouncing = [k for k in approaches if restitution[k] > 0.0 and after[k] != 0.0]
+        change = np.abs(after - before)
+        held = {k for k in holding(model, point) if k not in self.loose}
+        passing = [k for k in np.flatnonzero(change > _FELT * change.max()) if k not in held]
+        self.loose = [int(k) for k in dict.fromkeys([*self.loose, *bouncing, *passing])]
 
     def _motions(self) -> Vector:
         return call(self.model, self.model.variables, self.point)[[one.motion for one in self.model.holds]]

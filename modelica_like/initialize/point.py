@@ -14,7 +14,7 @@ import numpy as np
 from modelica_like.compile.buffers import buffered
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import InitializationError, SingularAtStart
-from modelica_like.initialize.singular import implicit_singular, singular_block
+from modelica_like.initialize.singular import implicit_singular, is_regular, singular_block
 
 _MAX_NEWTON = 50
 
@@ -52,7 +52,7 @@ def solve_implicit(model: CompiledDae, point: Point) -> None:
     for _ in range(_MAX_NEWTON):
         residual = call(model, model.alg, point)
         jacobian = np.asarray(model.alg_jacobian(point.t, point.x, point.z, model.p, model.u, point.d).full())
-        if not np.all(np.isfinite(residual)) or np.linalg.matrix_rank(jacobian) < len(residual):
+        if not np.all(np.isfinite(residual)) or not is_regular(jacobian):
             raise implicit_singular(model, point.t, point.d, jacobian)
         step = np.linalg.solve(jacobian, -residual)
         point.z = point.z + step

@@ -44,13 +44,21 @@ def implicit_singular(model: CompiledDae, t: float, d: Vector, jacobian: Any) ->
     for number, (names, _) in enumerate(model.implicit_blocks):
         end = begin + sum(name in names for name in model.implicit[begin:])
         inner = jacobian[begin:end, begin:end]
-        if not np.all(np.isfinite(inner)) or np.linalg.matrix_rank(inner) < end - begin:
+        if not np.all(np.isfinite(inner)) or not is_regular(inner):
             return singular_block(model, t, d, number, implicit=True)
         begin = end
     return SingularAtStart(
         f"The equations for {', '.join(model.implicit)} have no finite value at t = {t:.9g} s.",
         advice="Look for a mass, inertia or ratio of zero, or a function outside its domain.",
     )
+
+
+def is_regular(matrix: Any) -> bool:
+    """Tell whether a finite square matrix is regular, whatever the units of its rows and columns are."""
+    for axis in (1, 0):
+        sizes = np.abs(matrix).max(axis=axis, keepdims=True, initial=0.0)
+        matrix = matrix / np.where(sizes > 0.0, sizes, 1.0)
+    return int(np.linalg.matrix_rank(matrix)) == len(matrix)
 
 
 def _holds(model: CompiledDae, d: Vector, path: str) -> bool:

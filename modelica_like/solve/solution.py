@@ -10,7 +10,7 @@ import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import UnknownName, ValueOutOfRange, did_you_mean, missing_extra
-from modelica_like.initialize import Point
+from modelica_like.initialize import Impact, Point
 from modelica_like.language.expr import Symbol
 from modelica_like.language.mode import BoundMode
 from modelica_like.solve.energy import EnergyBalance, energy_balance
@@ -92,6 +92,7 @@ class Solution:
         segments: smooth pieces with fixed modes.
         events: mode changes.
         statistics: what the run took.
+        impacts: what impacts have dissipated.
     """
 
     model: CompiledDae
@@ -99,6 +100,7 @@ class Solution:
     segments: tuple[Segment, ...]
     events: tuple[Event, ...]
     statistics: Statistics
+    impacts: tuple[Impact, ...] = ()
     _cache: dict[str, Any] = field(default_factory=dict, repr=False)
 
     @property
