@@ -20,7 +20,7 @@ _INSTANT = 1e-9
 """Duration of an impact in s over which the approach is asked for; finite forces cancel whatever it is."""
 _STIFF = 1e5
 """Reaction with which a motion that contradicts its being held counts, over the inertia that is held."""
-_LARGE, _SMALL = 1e6, 1e-6
+_LARGE, _SMALL = 1e3, 1e-3
 _SAYS_NOTHING = 1e-12
 _FELT = 1e-9
 """Change of a motion, relative to the largest one in an impact, from which on it is no rounding."""
@@ -101,7 +101,15 @@ def _share(
     for row, pivot in enumerate(pivots):
         switches[places[pivot]] = 1.0
         shares[places[pivot], places] = weighted[row] / (np.abs(weighted[row]).max() * np.sign(weighted[row, pivot]))
-    _yield_to_contradiction(model, point, circuit, switches, shares)
+    if _may_contradict(model, members):
+        _yield_to_contradiction(model, point, circuit, switches, shares)
+
+
+def _may_contradict(model: CompiledDae, members: list[int]) -> bool:
+    """Whether something but states, such as a source of motion, moves what is held."""
+    rows = {model.holds[k].motion for k in members}
+    moving = (model.variables.name_in().index(name) for name in ("t", "u", "d"))
+    return any(rows & set(model.variables.jac_sparsity(0, k).row()) for k in moving)
 
 
 def _yield_to_contradiction(
