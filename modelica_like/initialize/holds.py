@@ -204,26 +204,42 @@ class Strike:
             return
         table = terms(model, point)
         restitution = table[:, 3]
+        hard = self._is_hard(before, moving)
         while True:
             approaches = {k: -(1.0 + restitution[k]) * before[k] / _INSTANT for k in moving if k not in self.loose}
             jump, impulses, reactions = self._response(approaches)
-            worst = self._unbearable(table, impulses, reactions)
+            worst = self._unbearable(table, impulses, reactions) if hard else None
             if worst is None:
                 break
             self.loose.append(worst)
         self.point.x = point.x + jump
         self._stop(before, restitution)
         solve_implicit(model, point)
+        if hard:
+            self._book(before, impulses, approaches)
+
+    def _is_hard(self, before: Vector, moving: list[int]) -> bool:
+        """Whether more is stopped than what rounding and the location of events leave."""
+        model, variables = self.model, np.abs(call(self.model, self.model.variables, self.point))
+        for k in moving:
+            own = model.flat_variables[model.holds[k].motion]
+            same = [n for n, one in enumerate(model.flat_variables) if one.unit == own.unit]
+            if abs(before[k]) > ROUNDING * max(float(variables[same].max()), own.nominal):
+                return True
+        return False
+
+    def _book(self, before: Vector, impulses: dict[int, float], approaches: dict[int, float]) -> None:
+        """Note what was lost, and what has got another motion."""
         after = self._motions()
         for k, impulse in impulses.items():
             energy = 0.5 * (before[k] + after[k]) * impulse
             if k in approaches and energy != 0.0:
-                self.impacts.append(Impact(float(point.t), model.holds[k].component, float(energy)))
-        bouncing = [k for k in approaches if restitution[k] > 0.0 and after[k] != 0.0]
+                self.impacts.append(Impact(float(self.point.t), self.model.holds[k].component, float(energy)))
         change = np.abs(after - before)
-        held = {k for k in holding(model, point) if k not in self.loose}
-        passing = [k for k in np.flatnonzero(change > _FELT * change.max()) if k not in held]
-        self.loose = [int(k) for k in dict.fromkeys([*self.loose, *bouncing, *passing])]
+        held = {k for k in holding(self.model, self.point) if k not in self.loose and after[k] == 0.0}
+        bouncing = [k for k in approaches if after[k] != 0.0 and k not in held]
+        passing = [int(k) for k in np.flatnonzero(change > _FELT * change.max()) if k not in held]
+        self.loose = list(dict.fromkeys([*self.loose, *bouncing, *passing]))
 
     def _motions(self) -> Vector:
         return call(self.model, self.model.variables, self.point)[[one.motion for one in self.model.holds]]

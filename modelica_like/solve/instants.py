@@ -23,6 +23,11 @@ from modelica_like.solve.options import Options
 from modelica_like.solve.recorder import Event, Recorder
 
 _CHATTER_EVENTS = 50
+_CHATTER_INSTANTS = 25
+_TOGETHER = 6
+"""Rounds at one instant in which all fire that want to."""
+_ALONE = 6
+"""Further rounds per mode, in which only one fires."""
 _CHATTER_WINDOW = 1e-6
 SAME_TIME = 1e-12
 """Relative distance of two times that are the same."""
@@ -51,6 +56,7 @@ class Instants:
         self.record = record
         self.span = span
         self._recent: deque[Event] = deque(maxlen=_CHATTER_EVENTS)
+        self._instants: deque[float] = deque(maxlen=_CHATTER_INSTANTS)
         self._round = 0
         self._timed = [t for t in model.transitions if t.timed]
         self._numbers = {id(transition): k for k, transition in enumerate(model.transitions)}
@@ -81,23 +87,32 @@ class Instants:
     def settle(self, now: Point, wanting: list[CompiledTransition]) -> None:
         """Fire transitions until none wants to fire any more; `now` becomes the point after.
 
+        All that want to fire do so together. Surfaces that hold each other may go round in a circle then; so after some
+        rounds only the first one does (K. G. Murty's rule of the least index, which ends where the answer is unique).
+
         Raises:
             Chattering: there is no end of it, or events follow each other ever faster.
             SingularAtStart: the equations have no unique solution after it.
         """
-        for number in range(self.options.iterations):
+        if not wanting:
+            return
+        alone = self.options.iterations + _ALONE * len(self.model.flat_discretes)
+        for number in range(alone):
             self._round = number
             if not wanting:
                 break
             before = now.d
-            self._fire(now, wanting)
+            self._fire(now, wanting if number < _TOGETHER else [min(wanting, key=self._number)])
             share(self.model, now)
             solve_implicit(self.model, now)
             self._stop_motions(now, before)
             check_singular(self.model, now)
             wanting = [*self.due(now), *self.rising(now)]
         else:
-            raise self._chattering(f"Modes still switch after {self.options.iterations} rounds at one instant")
+            raise self._chattering(f"Modes still switch after {alone} rounds at one instant")
+        self._instants.append(now.t)
+        if len(self._instants) == _CHATTER_INSTANTS and now.t - self._instants[0] < _CHATTER_WINDOW * self.span:
+            raise self._chattering("Events follow each other ever faster")
         if len(self.record.events) > self.options.max_events:
             raise self._chattering(f"There were more than {self.options.max_events} events")
 
@@ -173,9 +188,6 @@ class Instants:
         )  # fmt: skip
         self.record.events.append(event)
         self._recent.append(event)
-        window = _CHATTER_WINDOW * self.span
-        if len(self._recent) == _CHATTER_EVENTS and now.t - self._recent[0].time < window:
-            raise self._chattering("Events follow each other ever faster")
 
     def _chattering(self, why: str) -> Chattering:
         recent = list(self._recent)
