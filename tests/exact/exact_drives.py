@@ -114,7 +114,9 @@ def solve(A: Matrix, b: Vector) -> Vector:
         for i in range(k + 1, n):
             factor = rows[i][k] / rows[k][k]
             if factor:
-                rows[i] = [ZERO] * (k + 1) + [x - factor * y for x, y in zip(rows[i][k + 1 :], rows[k][k + 1 :])]
+                rows[i] = [ZERO] * (k + 1) + [
+                    x - factor * y for x, y in zip(rows[i][k + 1 :], rows[k][k + 1 :], strict=True)
+                ]
     x: Vector = [ZERO] * n
     for k in reversed(range(n)):
         x[k] = (rows[k][n] - dot(rows[k][k + 1 : n], x[k + 1 :])) / rows[k][k]
@@ -197,7 +199,7 @@ class ExactDrive:
         n = len(self.free)
         columns = list(zip(*self.T, strict=True))
         J = [Fraction(j) for j in drive.J]
-        self.M = [[sum((j * x * y for j, x, y in zip(J, columns[i], columns[k])), ZERO) for k in range(n)]
+        self.M = [[sum((j * x * y for j, x, y in zip(J, columns[i], columns[k], strict=True)), ZERO) for k in range(n)]
                   for i in range(n)]  # fmt: skip
         self.J = J
         # An element that cannot slip at all, e.g. a clutch between shafts of equal speed in one gear train, does

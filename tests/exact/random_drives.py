@@ -148,8 +148,9 @@ def _able_to_slip(elements: list[Element], size: int) -> list[Element]:
             for k, (root, by) in list(ratios.items()):
                 if root == root_b:
                     ratios[k] = (root_a, by * by_a / (e.ratio * by_b))
-        elif e.a is not None and ratios[e.a][0] == ratios[e.b][0]:
-            if abs(e.ratio * ratios[e.b][1] / ratios[e.a][1] - 1) < 1e-9:
+        elif e.a is not None:
+            (root_a, by_a), (root_b, by_b) = ratios[e.a], ratios[e.b]
+            if root_a == root_b and abs(e.ratio * by_b / by_a - 1) < 1e-9:
                 continue
         kept.append(e)
     return [e for e in elements if e in kept]

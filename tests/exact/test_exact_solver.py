@@ -107,13 +107,13 @@ def enumerated(H, r, low, high):
         part = np.array([[float(H[i][j]) for j in free] for i in free]).reshape(len(free), len(free))
         if free and np.linalg.matrix_rank(part) < len(free):
             continue
-        y = [r[k] - sum(h * x for h, x in zip(H[k], lam)) for k in range(len(r))]
+        y = [r[k] - sum(h * x for h, x in zip(H[k], lam, strict=True)) for k in range(len(r))]
         if free:
             right = np.linalg.solve(part, [float(y[k]) for k in free])
-            for k, x in zip(free, right):
+            for k, x in zip(free, right, strict=True):
                 lam[k] = F(float(x))
         lam = [float(x) for x in lam]
-        y = [float(r[k]) - sum(float(h) * x for h, x in zip(H[k], lam)) for k in range(len(r))]
+        y = [float(r[k]) - sum(float(h) * x for h, x in zip(H[k], lam, strict=True)) for k in range(len(r))]
         inside = all((low[k] is None or lam[k] >= low[k] - 1e-9) and lam[k] <= high[k] + 1e-9 for k in free)
         right_way = all(s * y[k] >= -1e-9 for k, s in enumerate(states))
         if inside and right_way:
@@ -128,12 +128,12 @@ def test_the_least_of_the_box_is_the_only_one(seed):
     n, m = int(r.integers(1, 4)), int(r.integers(1, 6))
     G = [[F(int(x)) for x in r.integers(-1, 3, n)] for _ in range(m)]
     mass = [F(int(x)) for x in r.integers(1, 4, n)]
-    H = [[sum((a * b / j for a, b, j in zip(g, h, mass)), F(0)) for h in G] for g in G]
+    H = [[sum((a * b / j for a, b, j in zip(g, h, mass, strict=True)), F(0)) for h in G] for g in G]
     force = [F(int(x)) for x in r.integers(-3, 4, n)]
-    right = [sum((a * b / j for a, b, j in zip(g, force, mass)), F(0)) for g in G]
+    right = [sum((a * b / j for a, b, j in zip(g, force, mass, strict=True)), F(0)) for g in G]
     wheels = r.integers(0, 2, m)
     high = [F(0) if wheel else F(int(r.integers(1, 4))) for wheel in wheels]
-    low = [None if wheel else -bound for wheel, bound in zip(wheels, high)]
+    low = [None if wheel else -bound for wheel, bound in zip(wheels, high, strict=True)]
     _, y = boxed(H, right, low, high)
     assert enumerated(H, right, low, high) == {tuple(round(float(x), 7) + 0.0 for x in y)}
 
@@ -145,7 +145,7 @@ def test_no_other_accelerations_are_better(number):
     model = ExactDrive(drive)
     q = model.impact([F(drive.w[k]) for k in model.free])
     slips = model.slips(q)
-    assert all(s >= 0 for e, s in zip(model.elements, slips) if e.kind == "freewheel")
+    assert all(s >= 0 for e, s in zip(model.elements, slips, strict=True) if e.kind == "freewheel")
     a = model.accelerations(F(0), slips)
     M = np.array(model.M, float)
     G = np.array(model.G, float).reshape(-1, len(a))
@@ -185,7 +185,9 @@ def test_two_starts_never_come_apart(number):
     apart = []
     for which in (0, -1):
         ends = [run_exactly(d).speeds[which] for d in (drive, other)]
-        q = [a - b for k, (a, b) in enumerate(zip(*ends)) if k in model.free]
+        q = [a - b for k, (a, b) in enumerate(zip(*ends, strict=True)) if k in model.free]
         apart.append(model.energy(q))
-    start = model.energy([F(a) - F(b) for k, (a, b) in enumerate(zip(drive.w, other.w)) if k in model.free])
+    start = model.energy(
+        [F(a) - F(b) for k, (a, b) in enumerate(zip(drive.w, other.w, strict=True)) if k in model.free]
+    )
     assert start >= apart[0] >= apart[1]
