@@ -156,14 +156,16 @@ def _able_to_slip(elements: list[Element], size: int) -> list[Element]:
     return [e for e in elements if e in kept]
 
 
-def assembly(drive: Drive) -> Assembly:
-    """Give a drive as a component of the product: one node per shaft, named as its inertia."""
+def assembly(drive: Drive, given: bool = False) -> Assembly:
+    """Give a drive as a component of the product: one node per shaft, named as its inertia.
+
+    Speeds of zero are left to `start = "rest"`, if they are not to be given.
+    """
     parts: dict[str, Component] = {}
     wires: dict[str, list[str]] = {f"shaft{k}": [f"J{k}.flange_b"] for k in range(len(drive.J))}
     follows = _followers(drive)
     for k, (J, w) in enumerate(zip(drive.J, drive.w, strict=True)):
-        # At rest nothing needs to be said.
-        parts[f"J{k}"] = Inertia(J=J) if k in follows or not w else Inertia(J=J, w=w)
+        parts[f"J{k}"] = Inertia(J=J) if k in follows or not (w or given) else Inertia(J=J, w=w)
     for e in drive.elements:
         _add_element(e, parts, wires)
     for n, (inertia, steps) in enumerate(drive.torques):
