@@ -45,6 +45,10 @@ SMALL = {
     "the first brake of three breaks away": drive(
         (1, 1), (0, 0), clutch("c", 0, 1, 0.25), brake("b", 0), brake("d", 1, 4), t0=2.0
     ),
+    # The least torques in measure of the capacities would be 1.035 and 0.065 N.m: too much for the brake of 1 N.m.
+    "held, although the least split exceeds a capacity": drive(
+        (1, 1), (0, 0), clutch("c", 0, 1, 0.25), brake("b", 0), brake("d", 1, 4), t0=1.125
+    ),
     "two brakes on one shaft": drive((1,), (1,), brake("b", 0), brake("d", 0, 2), t0=2.5),
     "ring of three clutches": drive(
         (1, 1, 1), (3, 0, -1), clutch("c", 0, 1), clutch("d", 1, 2), clutch("e", 2, 0), until=8.0
