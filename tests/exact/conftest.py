@@ -1,0 +1,6 @@
+"""The exact solver, the random drives and their comparison are modules beside the tests."""
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))

@@ -1,0 +1,24 @@
+"""Random trees and loops of inertias, gears, clutches, brakes and freewheels: the product is right in every one.
+
+A drive that fails runs alone with `python tests/exact/drive_runs.py --drive NUMBER`, and `--shrink` makes it small.
+"""
+
+import pytest
+from drive_runs import DRIVES, judge, judged, summary
+from random_drives import random_drive
+
+ORDINARY = 150
+BLOCK = 50
+
+
+@pytest.mark.parametrize("number", range(ORDINARY))
+def test_drive(number):
+    outcome = judge(random_drive(number), number)
+    assert not outcome.category, str(outcome)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("first", range(ORDINARY, DRIVES, BLOCK))
+def test_block_of_drives(first):
+    outcomes = list(judged(range(first, min(first + BLOCK, DRIVES))))
+    assert not [outcome.number for outcome in outcomes if outcome.category], summary(outcomes)
