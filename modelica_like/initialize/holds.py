@@ -21,6 +21,8 @@ _INSTANT = 1e-9
 _STIFF = 1e5
 """Reaction with which a motion that contradicts its being held counts, over the inertia that is held."""
 _LARGE, _SMALL = 1e3, 1e-3
+_SPLITS, _SPARED = 20, 0.1
+"""Trials to find a split that all can bear, and the least factor of a weight in one of them."""
 _SAYS_NOTHING = 1e-12
 _FELT = 1e-9
 """Change of a motion, relative to the largest one in an impact, from which on it is no rounding."""
@@ -75,34 +77,74 @@ def share(model: CompiledDae, point: Point) -> None:
     """Let elements that hold the same motion share its reaction in proportion to their capacities.
 
     Which reactions have the least norm, weighted by the inverse of the capacities, is decided anew for the present
-    modes; everything but the split follows from the other equations.
+    modes; everything but the split follows from the other equations. Where that asks more of one than it can bear,
+    the others take more, as far as they can.
     """
-    active = set(holding(model, point)) if model.circuits else set()
+    if not model.circuits:
+        return
+    active = set(holding(model, point))
+    limits = terms(model, point)[:, 1:3]
+    weights = 1.0 / _capacities(limits)
+    best, least = point.d, np.inf
+    for _ in range(_SPLITS):
+        shared = _share_circuits(model, point, active, weights)
+        use = _use(model, point, limits) if shared else 0.0
+        worst = float(np.max(use, initial=0.0))
+        if worst < least:
+            best, least = point.d.copy(), worst
+        if worst <= 1.0 or not np.isfinite(worst):
+            break
+        weights = weights * np.maximum(use, _SPARED)
+    point.d = best
+
+
+def _share_circuits(model: CompiledDae, point: Point, active: set[int], weights: Vector) -> bool:
+    """Write switches and shares of all circuits; tell whether anything is shared."""
+    shared = False
     for circuit in model.circuits:
         count = len(circuit.members)
         switches, shares = np.zeros(count), np.zeros((count, count))
         places = [place for place, k in enumerate(circuit.members) if k in active]
         if len(places) > 1:
-            _share(model, point, circuit, places, switches, shares)
+            _share(model, point, circuit, places, weights, switches, shares)
         point.d[circuit.first : circuit.first + count * (1 + count)] = np.concatenate([switches, shares.ravel()])
+        shared |= bool(switches.any())
+    return shared
 
 
 def _share(
-    model: CompiledDae, point: Point, circuit: Circuit, places: list[int], switches: Vector, shares: Vector
-) -> None:
+    model: CompiledDae, point: Point, circuit: Circuit, places: list[int], weights: Vector, switches: Vector,
+    shares: Vector,
+) -> None:  # fmt: skip
     members = [circuit.members[place] for place in places]
     slopes = variable_slopes(model, point, [model.holds[k].motion for k in members])
     sizes = np.linalg.norm(slopes, axis=1)
     sizes[sizes == 0.0] = 1.0
     left, values, _ = np.linalg.svd(slopes / sizes[:, None])
     silent = (left[:, np.sum(values > _DEPENDENT) :] / sizes[:, None]).T
-    weighted = silent / _capacities(model, point, members)
+    weighted = silent * weights[members]
     pivots = _eliminate(silent, weighted)
     for row, pivot in enumerate(pivots):
         switches[places[pivot]] = 1.0
         shares[places[pivot], places] = weighted[row] / (np.abs(weighted[row]).max() * np.sign(weighted[row, pivot]))
     if _may_contradict(model, members):
         _yield_to_contradiction(model, point, circuit, switches, shares)
+
+
+def _use(model: CompiledDae, point: Point, limits: Any) -> Vector:
+    """Reactions over what can be borne in their direction, of the elements that share; zero where nothing limits."""
+    trial = point.copy()
+    solve_implicit(model, trial)
+    variables, use = call(model, model.variables, trial), np.zeros(len(model.holds))
+    for circuit in model.circuits:
+        count = len(circuit.members)
+        shares = point.d[circuit.first + count : circuit.first + count * (1 + count)].reshape(count, count)
+        for place, k in enumerate(circuit.members):
+            reaction = variables[model.holds[k].reaction]
+            limit = limits[k, 0 if reaction > 0.0 else 1]
+            if shares[:, place].any() and 0.0 < limit < UNLIMITED:
+                use[k] = abs(reaction) / limit
+    return use
 
 
 def _may_contradict(model: CompiledDae, members: list[int]) -> bool:
@@ -135,12 +177,12 @@ def _yield_to_contradiction(
     switches[switches == 1.0] += min(stiff, 1.0)
 
 
-def _capacities(model: CompiledDae, point: Point, members: list[int]) -> Vector:
+def _capacities(limits: Any) -> Vector:
     """Capacities that decide the split: what nothing limits takes nearly all, what bears nothing nearly nothing."""
-    given = terms(model, point)[members, 1:3].max(axis=1)
-    limited = given[np.isfinite(given) & (given < UNLIMITED) & (given > 0.0)]
+    given = np.nan_to_num(limits.max(axis=1))
+    limited = given[(given < UNLIMITED) & (given > 0.0)]
     largest = float(limited.max(initial=0.0)) or 1.0
-    return np.clip(np.nan_to_num(given), _SMALL * largest, _LARGE * largest)
+    return np.clip(given, _SMALL * largest, _LARGE * largest)
 
 
 def _eliminate(silent: Any, weighted: Any) -> list[int]:
@@ -179,9 +221,12 @@ class Strike:
     difference of the accelerations times τ is the jump of the speeds; finite forces are the same in both. What bears
     a limited reaction passes no impulse on, and is knocked loose.
 
+    Several impacts at one instant are solved together, from the speeds before the first one: what has been hit may be
+    hit again, and let go.
+
     Args:
         model: the compiled model.
-        point: the point with the new modes; it becomes the point after the impact.
+        point: the point with the new modes and the speeds before; it becomes the point after the impact.
         entering: positions of the held motions whose modes have just begun.
     """
 
@@ -191,6 +236,8 @@ class Strike:
         self.entering = set(entering)
         self.impacts: list[Impact] = []
         self.loose: list[int] = []
+        before = self._motions()
+        self.hard = self._is_hard(before, [k for k in self.entering if before[k] != 0.0])
 
     def run(self) -> None:
         """Carry out the impact.
@@ -200,22 +247,19 @@ class Strike:
         model, point = self.model, self.point
         before = self._motions()
         moving = [k for k in sorted(self.entering) if before[k] != 0.0]
-        if not moving:
-            return
         table = terms(model, point)
         restitution = table[:, 3]
-        hard = self._is_hard(before, moving)
         while True:
             approaches = {k: -(1.0 + restitution[k]) * before[k] / _INSTANT for k in moving if k not in self.loose}
             jump, impulses, reactions = self._response(approaches)
-            worst = self._unbearable(table, impulses, reactions) if hard else None
-            if worst is None:
+            unbearable = self._unbearable(table, impulses, reactions) if self.hard else []
+            if not unbearable:
                 break
-            self.loose.append(worst)
-        self.point.x = point.x + jump
+            self.loose += unbearable
+        point.x = point.x + jump
         self._stop(before, restitution)
         solve_implicit(model, point)
-        if hard:
+        if self.hard:
             self._book(before, impulses, approaches)
 
     def _is_hard(self, before: Vector, moving: list[int]) -> bool:
@@ -262,22 +306,21 @@ class Strike:
         impulses = dict(zip(held, _INSTANT * (asked_for - finite), strict=True))
         return _INSTANT * (rates - rest), impulses, dict(zip(held, finite, strict=True))
 
-    def _unbearable(self, table: Any, impulses: dict[int, float], reactions: dict[int, float]) -> int | None:
-        """The motion whose reaction exceeds most what its element can bear for an instant; None if there is none."""
+    def _unbearable(self, table: Any, impulses: dict[int, float], reactions: dict[int, float]) -> list[int]:
+        """The motions whose reactions exceed what their elements can bear for an instant."""
         instant = 10.0 * TIME_RESOLUTION * max(1.0, abs(self.point.t))
         scale = max((abs(one) for one in impulses.values()), default=0.0)
-        worst, most = None, 0.0
+        found: list[int] = []
         for k, impulse in impulses.items():
             own = self.model.holds[k]
             forward, backward = table[k, 1:3]
-            capacity = forward if impulse > 0.0 else backward
+            capacity, sign = (forward, 1.0) if impulse > 0.0 else (backward, -1.0)
             if capacity >= UNLIMITED or own.loose < 0 or (k in self.entering and max(forward, backward) < UNLIMITED):
                 continue
-            sign = 1.0 if impulse > 0.0 else -1.0
-            excess = abs(impulse) - max(capacity - sign * reactions[k], 0.0) * instant - _SAYS_NOTHING * scale
-            if excess > most:
-                worst, most = k, excess
-        return worst
+            margin = max(capacity - sign * reactions[k], 0.0) * instant
+            if abs(impulse) > margin + _SAYS_NOTHING * scale:
+                found.append(k)
+        return found
 
     def _stop(self, before: Vector, restitution: Vector) -> None:
         """Put states that are held exactly to where the impact left them."""

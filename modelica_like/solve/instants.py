@@ -14,6 +14,7 @@ from modelica_like.initialize import (
     call,
     check_singular,
     chosen_modes,
+    holding,
     share,
     solve_implicit,
     variable_slopes,
@@ -27,7 +28,7 @@ _CHATTER_INSTANTS = 25
 _TOGETHER = 6
 """Rounds at one instant in which all fire that want to."""
 _ALONE = 6
-"""Further rounds per mode, in which only one fires."""
+"""Further rounds per motion that may be held, in which only one fires."""
 _CHATTER_WINDOW = 1e-6
 SAME_TIME = 1e-12
 """Relative distance of two times that are the same."""
@@ -56,6 +57,9 @@ class Instants:
         self.record = record
         self.span = span
         self._recent: deque[Event] = deque(maxlen=_CHATTER_EVENTS)
+        self._struck: Vector | None = None
+        self._entered: set[int] = set()
+        self._impacts = 0
         self._instants: deque[float] = deque(maxlen=_CHATTER_INSTANTS)
         self._round = 0
         self._timed = [t for t in model.transitions if t.timed]
@@ -96,7 +100,9 @@ class Instants:
         """
         if not wanting:
             return
-        alone = self.options.iterations + _ALONE * len(self.model.flat_discretes)
+        self._struck, self._entered = None, set()
+        wanting = self._share_anew(now, wanting)
+        alone = self.options.iterations + _ALONE * len(self.model.holds)
         for number in range(alone):
             self._round = number
             if not wanting:
@@ -116,6 +122,16 @@ class Instants:
         if len(self.record.events) > self.options.max_events:
             raise self._chattering(f"There were more than {self.options.max_events} events")
 
+    def _share_anew(self, now: Point, wanting: list[CompiledTransition]) -> list[CompiledTransition]:
+        """Before one of several that hold a motion gives way, let the others take more; what still wants to fire."""
+        if not self.model.circuits:
+            return wanting
+        share(self.model, now)
+        solve_implicit(self.model, now)
+        soon = self.guards.soon(now)
+        positions = {self._number(one): k for k, one in enumerate(self.guards.state_events)}
+        return [one for one in wanting if one.timed or soon[positions[self._number(one)]] > 0]
+
     def _fire(self, now: Point, wanting: list[CompiledTransition]) -> None:
         """Carry out transitions together; of one mode only the one declared first."""
         values = call(self.model, self.model.resets, now)
@@ -130,6 +146,7 @@ class Instants:
             d[transition.mode] = transition.target
             for reset in transition.resets:
                 if reset.kind == "state":
+                    self._struck = None
                     x[reset.index] = values[reset.value] / reset.factor
                 elif reset.kind == "discrete":
                     d[reset.index] = values[reset.value]
@@ -141,19 +158,26 @@ class Instants:
 
     def _stop_motions(self, now: Point, before: Vector) -> None:
         """Stop what modes have begun to hold; what the impact knocks loose takes the mode that its start would take."""
-        holds = self.model.holds
-        entering = [
-            k for k, one in enumerate(holds) if now.d[one.mode] == one.number and before[one.mode] != one.number
-        ]
+        holds, held = self.model.holds, holding(self.model, now)
+        entering = [k for k in held if before[holds[k].mode] != holds[k].number]
         if not entering:
             return
         strike = Strike(self.model, now, entering)
+        if strike.hard:
+            # All impacts at this instant are one, from the speeds before the first.
+            self._entered.update(entering)
+            if self._struck is None:
+                self._struck, self._impacts = now.x.copy(), len(self.record.impacts)
+            now.x = self._struck.copy()
+            strike = Strike(self.model, now, [k for k in held if k in self._entered])
         strike.run()
-        self.record.impacts += strike.impacts
-        if not strike.loose:
-            return
+        if strike.impacts:
+            self.record.impacts[self._impacts :] = strike.impacts
+        if strike.loose:
+            self._choose_again(now, list(dict.fromkeys(holds[k].mode for k in strike.loose)))
+
+    def _choose_again(self, now: Point, modes: list[int]) -> None:
         starts, chosen = call(self.model, self.model.discrete_starts, now), now.copy()
-        modes = list(dict.fromkeys(holds[k].mode for k in strike.loose))
         chosen.d[modes] = starts[modes]
         chosen.d = chosen_modes(self.model, chosen)
         for mode in modes:
