@@ -21,8 +21,8 @@ _INSTANT = 1e-9
 _STIFF = 1e5
 """Reaction with which a motion that contradicts its being held counts, over the inertia that is held."""
 _LARGE, _SMALL = 1e3, 1e-3
-_SPLITS, _SPARED = 20, 0.1
-"""Trials to find a split that all can bear, and the least factor of a weight in one of them."""
+_SPLITS, _TURNED = 20, 100.0
+"""Trials to find a split that all can bear, and by how much the weights may change in all of them."""
 _SAYS_NOTHING = 1e-12
 _FELT = 1e-9
 """Change of a motion, relative to the largest one in an impact, from which on it is no rounding."""
@@ -84,7 +84,7 @@ def share(model: CompiledDae, point: Point) -> None:
         return
     active = set(holding(model, point))
     limits = terms(model, point)[:, 1:3]
-    weights = 1.0 / _capacities(limits)
+    weights = base = 1.0 / _capacities(limits)
     best, least = point.d, np.inf
     for _ in range(_SPLITS):
         shared = _share_circuits(model, point, active, weights)
@@ -94,7 +94,7 @@ def share(model: CompiledDae, point: Point) -> None:
             best, least = point.d.copy(), worst
         if worst <= 1.0 or not np.isfinite(worst):
             break
-        weights = weights * np.maximum(use, _SPARED)
+        weights = np.where(use > 0.0, np.clip(weights * use, base / _TURNED, base * _TURNED), base)
     point.d = best
 
 

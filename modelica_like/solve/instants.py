@@ -169,12 +169,23 @@ class Instants:
             if self._struck is None:
                 self._struck, self._impacts = now.x.copy(), len(self.record.impacts)
             now.x = self._struck.copy()
-            strike = Strike(self.model, now, [k for k in held if k in self._entered])
+            self._hold_again(now)
+            strike = Strike(self.model, now, self._entered)
         strike.run()
         if strike.impacts:
             self.record.impacts[self._impacts :] = strike.impacts
         if strike.loose:
             self._choose_again(now, list(dict.fromkeys(holds[k].mode for k in strike.loose)))
+
+    def _hold_again(self, now: Point) -> None:
+        """Close what finite forces have opened since the first impact at this instant: they come after it."""
+        for k in sorted(self._entered):
+            one = self.model.holds[k]
+            if now.d[one.mode] != one.number:
+                self._note(now, one.mode, one.number, -1)
+                now.d[one.mode] = one.number
+        share(self.model, now)
+        solve_implicit(self.model, now)
 
     def _choose_again(self, now: Point, modes: list[int]) -> None:
         starts, chosen = call(self.model, self.model.discrete_starts, now), now.copy()
