@@ -235,7 +235,7 @@ class Component(Declared):
             component = pending.pop()
             yield component
             if component._parts:
-                pending.extend(reversed(component.parts.values()))
+                pending.extend(reversed([*component.parts.values()]))
 
     def find(self, path: str) -> Component:
         """Return the part at a dotted path.
