@@ -134,9 +134,7 @@ class Names:
         inputs = [
             ca.vertcat(ca.SX(0, 1), *group.values()) for group in (self.variables, self.parameters, self.discretes)
         ]
-        return ca.Function(
-            name, [*inputs, TIME], [ca.vertcat(ca.SX(0, 1), *outputs)], ["v", "p", "d", "t"], [name]
-        )
+        return ca.Function(name, [*inputs, TIME], [ca.vertcat(ca.SX(0, 1), *outputs)], ["v", "p", "d", "t"], [name])
 
 
 def relative_path(owner: Declared, root: Component, name: str) -> str:

@@ -146,7 +146,7 @@ class _Elimination:
             self.contradictions.append(self._causes(number))
             return set()
         # Working out the constant takes longer than all the rest; only short equations need it.
-        constant = self._sum(equation.constant, products) if len(terms) <= 2 else None
+        constant = self._sum(equation.constant, products) if len(terms) <= 2 else 0.0
         if len(terms) == 1:
             ((root, coefficient),) = terms.items()
             if coefficient is not None and root not in self.integral and root not in self.inputs:
