@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import gc
 import time
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -42,7 +43,7 @@ def build(drive: Model, free: Iterable[str] = ()) -> CompiledDae:
         from modelica_like.netlist import load
 
         drive = load(drive)
-    model = compile(reduce(flatten(drive)))
+    model = _compiled(drive)
     bound = [name for name in free if name in model.derived_position]
     if not bound:
         return model
@@ -50,7 +51,18 @@ def build(drive: Model, free: Iterable[str] = ()) -> CompiledDae:
     drive = copy.deepcopy(drive)
     for name in bound:
         drive.set(name, float(values[model.derived_position[name]]))
-    return compile(reduce(flatten(drive)))
+    return _compiled(drive)
+
+
+def _compiled(drive: Component) -> CompiledDae:
+    """Compile a component tree without the garbage collector: much is made here, and little of it is in cycles."""
+    collects = gc.isenabled()
+    gc.disable()
+    try:
+        return compile(reduce(flatten(drive)))
+    finally:
+        if collects:
+            gc.enable()
 
 
 def simulate(

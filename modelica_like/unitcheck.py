@@ -59,7 +59,7 @@ class Dimensions:
 
     def unit(self, expression: Expr | float) -> Unit:
         """Return the unit of an expression; zero and what cannot be known fit everything."""
-        root = ca.SX(cast(Any, expression))
+        root: Any = expression if isinstance(expression, ca.SX) else ca.SX(cast(Any, expression))
         pending = [root]
         while pending:
             node = pending[-1]

@@ -3,26 +3,66 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
-from modelica_like.cli.app import app as app
+if TYPE_CHECKING:
+    import typer
 
-# In the order in which the help lists their commands.
-for _group in (
-    "models",
-    "analysis",
-    "sweeps",
-    "sensitivity",
-    "export",
-    "cosimulation",
-    "types",
-    "validation",
-    "design",
-):
-    import_module(f"modelica_like.cli.{_group}")
+    app: typer.Typer
+
+# Modules and their commands, in the order in which the help lists them.
+_GROUPS = {
+    "models": ("check", "simulate"),
+    "analysis": ("modes",),
+    "sweeps": ("steady", "sweep"),
+    "sensitivity": ("sensitivity",),
+    "export": ("export",),
+    "cosimulation": ("split", "cosim"),
+    "types": ("describe", "schema", "library", "docs"),
+    "validation": ("validate", "compare"),
+    "design": ("size", "demo"),
+}
+_HOME = {name: group for group, names in _GROUPS.items() for name in names}
+
+
+def command(name: str) -> Callable[..., None]:
+    """Return the function of a command."""
+    return getattr(import_module(f"modelica_like.cli.{_HOME[name]}"), name)
+
+
+def __getattr__(name: str) -> Any:
+    if name != "app":
+        raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
+    from modelica_like.cli.complete import application
+
+    globals()["app"] = application({one: command(one) for one in _HOME})
+    return globals()["app"]
 
 
 def main() -> None:
     """Run the command line; classes of modules in the working directory can be used in netlists."""
     sys.path.insert(0, "")
-    app()
+    if not _ran(sys.argv[1:]):
+        __getattr__("app")()
+
+
+def _ran(words: list[str]) -> bool:
+    """Run an ordinary call of a command; anything else is left to the complete application, which starts slower."""
+    from modelica_like.cli.declare import WrongUse
+    from modelica_like.cli.quick import read
+
+    if not words or words[0] not in _HOME:
+        return False
+    function = command(words[0])
+    values = read(function, words[1:])
+    if values is None:
+        return False
+    try:
+        function(**values)
+    except WrongUse:
+        return False
+    except KeyboardInterrupt:
+        raise SystemExit(130) from None
+    return True

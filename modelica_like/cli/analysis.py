@@ -5,22 +5,20 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from modelica_like.cli.declare import Option
+from modelica_like.cli.shared import Assignments, Debug, Netlist, load_netlist, out, told
 
-from modelica_like.cli.app import Assignments, Debug, Netlist, app, load_netlist, out, told
 
-
-@app.command()
 def modes(
     netlist: Netlist, assignments: Assignments = None, *,
     at: Annotated[
-        str, typer.Option(metavar="WHEN", help="Time, e.g. 0.5s, or start: given, rest, steady.")
+        str, Option(metavar="WHEN", help="Time, e.g. 0.5s, or start: given, rest, steady.")
     ] = "given",
-    shapes: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw the shapes of the modes.")] = None,
-    show: Annotated[list[str] | None, typer.Option(metavar="NAME", help="Variables along the shapes.")] = None,
-    bode: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw the frequency response.")] = None,
-    inputs: Annotated[list[str] | None, typer.Option("--input", metavar="NAME", help="Input or parameter.")] = None,
-    outputs: Annotated[list[str] | None, typer.Option("--output", metavar="NAME", help="Variable.")] = None,
+    shapes: Annotated[Path | None, Option(metavar="FILE", help="Draw the shapes of the modes.")] = None,
+    show: Annotated[list[str] | None, Option(metavar="NAME", help="Variables along the shapes.")] = None,
+    bode: Annotated[Path | None, Option(metavar="FILE", help="Draw the frequency response.")] = None,
+    inputs: Annotated[list[str] | None, Option("--input", metavar="NAME", help="Input or parameter.")] = None,
+    outputs: Annotated[list[str] | None, Option("--output", metavar="NAME", help="Variable.")] = None,
     debug: Debug = False,
 ) -> None:  # fmt: skip
     """Linearise a netlist at a point: eigenvalues, damping, where the energy of each mode is."""

@@ -6,9 +6,8 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
-from modelica_like.cli.app import Assignments, Debug, Netlist, app, load_netlist, out, told
+from modelica_like.cli.declare import Argument, Option, WrongUse
+from modelica_like.cli.shared import Assignments, Debug, Netlist, load_netlist, out, told
 
 
 class MasterName(StrEnum):
@@ -25,23 +24,22 @@ class InputsName(StrEnum):
     HOLD = "hold"
 
 
-@app.command()
 def split(
     netlist: Netlist, assignments: Assignments = None, *,
     at: Annotated[
         list[str],
-        typer.Option("--at", metavar="PLACE", help="A part (the cut is behind it), an end such as shaft.flange_a, or "
+        Option("--at", metavar="PLACE", help="A part (the cut is behind it), an end such as shaft.flange_a, or "
                      "an entry of [connect]; several are possible.", show_default=False),
     ],
     output: Annotated[
-        Path, typer.Option("-o", "--output", metavar="FOLDER", help="Where to write: a folder, or an SSP (….ssp).")
+        Path, Option("-o", "--output", metavar="FOLDER", help="Where to write: a folder, or an SSP (….ssp).")
     ],
     names: Annotated[
-        list[str] | None, typer.Option("--name", metavar="NAME", help="Name of an FMU, in the order of the netlist.")
+        list[str] | None, Option("--name", metavar="NAME", help="Name of an FMU, in the order of the netlist.")
     ] = None,
-    fmi: Annotated[str, typer.Option(metavar="VERSION", help="FMI version: 2.0 or 3.0.")] = "2.0",
-    ssp: Annotated[str, typer.Option(metavar="VERSION", help="SSP version of an SSP: 1.0 or 2.0.")] = "1.0",
-    check: Annotated[bool, typer.Option(help="Run every FMU against IDAS before it is handed over.")] = True,
+    fmi: Annotated[str, Option(metavar="VERSION", help="FMI version: 2.0 or 3.0.")] = "2.0",
+    ssp: Annotated[str, Option(metavar="VERSION", help="SSP version of an SSP: 1.0 or 2.0.")] = "1.0",
+    check: Annotated[bool, Option(help="Run every FMU against IDAS before it is handed over.")] = True,
     debug: Debug = False,
 ) -> None:  # fmt: skip
     """Cut a drive at shafts into FMUs, with the system file that `cosim` runs."""
@@ -62,26 +60,25 @@ def split(
         out().print(str(done), soft_wrap=True)
 
 
-@app.command()
 def cosim(
     system: Annotated[
-        Path, typer.Argument(metavar="SYSTEM", help="system or netlist with FMUs (TOML), or SSP", show_default=False)
+        Path, Argument(metavar="SYSTEM", help="system or netlist with FMUs (TOML), or SSP", show_default=False)
     ],
     assignments: Annotated[
-        list[str] | None, typer.Option("--set", metavar="FMU.PATH=VALUE", help="Set a value in an FMU, in its units.")
+        list[str] | None, Option("--set", metavar="FMU.PATH=VALUE", help="Set a value in an FMU, in its units.")
     ] = None, *,
-    until: Annotated[str | None, typer.Option(metavar="TIME", help="End time, e.g. 2s; else the system's.")] = None,
-    step: Annotated[str | None, typer.Option(metavar="TIME", help="Communication step, e.g. 0.1ms.")] = None,
+    until: Annotated[str | None, Option(metavar="TIME", help="End time, e.g. 2s; else the system's.")] = None,
+    step: Annotated[str | None, Option(metavar="TIME", help="Communication step, e.g. 0.1ms.")] = None,
     tolerance: Annotated[
-        float | None, typer.Option(metavar="RTOL", help="Relative tolerance of the coupling: the step varies.")
+        float | None, Option(metavar="RTOL", help="Relative tolerance of the coupling: the step varies.")
     ] = None,
-    master: Annotated[MasterName | None, typer.Option(help="All at once, or one after the other.")] = None,
-    inputs: Annotated[InputsName | None, typer.Option(help="Inputs on straight lines, or held.")] = None,
-    csv: Annotated[Path | None, typer.Option(metavar="FILE", help="Write all trajectories as a table.")] = None,
-    units: Annotated[bool, typer.Option("--units", help="Units in a second header line of the table.")] = False,
-    plot: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw the results: .png, .svg or .pdf.")] = None,
-    show: Annotated[list[str] | None, typer.Option(metavar="PATTERN", help="What to draw, e.g. '*.w'.")] = None,
-    timeout: Annotated[float, typer.Option(metavar="SECONDS", help="Time limit.")] = 600.0,
+    master: Annotated[MasterName | None, Option(help="All at once, or one after the other.")] = None,
+    inputs: Annotated[InputsName | None, Option(help="Inputs on straight lines, or held.")] = None,
+    csv: Annotated[Path | None, Option(metavar="FILE", help="Write all trajectories as a table.")] = None,
+    units: Annotated[bool, Option("--units", help="Units in a second header line of the table.")] = False,
+    plot: Annotated[Path | None, Option(metavar="FILE", help="Draw the results: .png, .svg or .pdf.")] = None,
+    show: Annotated[list[str] | None, Option(metavar="PATTERN", help="What to draw, e.g. '*.w'.")] = None,
+    timeout: Annotated[float, Option(metavar="SECONDS", help="Time limit.")] = 600.0,
     debug: Debug = False,
 ) -> None:  # fmt: skip
     """Run a system of FMUs together: mode changes, energies at the couplings, results as table and picture."""
@@ -116,5 +113,5 @@ def _numbers(assignments: list[str] | tuple[str, ...]) -> dict[str, float]:
         try:
             values[path.strip()] = float(text)
         except ValueError:
-            raise typer.BadParameter(f"'{assignment}' is not FMU.PATH=NUMBER.", param_hint="--set") from None
+            raise WrongUse(f"'{assignment}' is not FMU.PATH=NUMBER.", "--set") from None
     return values

@@ -5,15 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from modelica_like.cli.declare import Argument, Option
+from modelica_like.cli.shared import SOLVE_FAILED, Debug, out, told
 
-from modelica_like.cli.app import SOLVE_FAILED, Debug, app, out, told
 
-
-@app.command()
 def size(
     file: Annotated[
-        str, typer.Argument(metavar="FILE", help="sizing file, or a design check to describe; none: list all checks")
+        str, Argument(metavar="FILE", help="sizing file, or a design check to describe; none: list all checks")
     ] = "",
     *, debug: Debug = False,
 ) -> None:  # fmt: skip
@@ -28,12 +26,11 @@ def size(
         sizing = run(file)
         out().print(sizing_report(sizing))
         if sizing.exceeded:
-            raise typer.Exit(SOLVE_FAILED)
+            raise SystemExit(SOLVE_FAILED)
 
 
-@app.command()
 def demo(
-    pictures: Annotated[Path, typer.Option(metavar="FOLDER", help="Where to write the pictures.")] = Path("build/demo"),
+    pictures: Annotated[Path, Option(metavar="FOLDER", help="Where to write the pictures.")] = Path("build/demo"),
     *, debug: Debug = False,
 ) -> None:  # fmt: skip
     """Run the start-ups of the examples against their published values."""

@@ -6,9 +6,8 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
-from modelica_like.cli.app import Assignments, Debug, Netlist, app, load_netlist, out, told
+from modelica_like.cli.declare import Option
+from modelica_like.cli.shared import Assignments, Debug, Netlist, load_netlist, out, told
 
 
 class Takes(StrEnum):
@@ -18,25 +17,24 @@ class Takes(StrEnum):
     POTENTIAL = "potential"
 
 
-@app.command()
 def export(
     netlist: Netlist, assignments: Assignments = None, *,
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", metavar="FILE", help="The FMU; else named after the netlist.")
+        Path | None, Option("-o", "--output", metavar="FILE", help="The FMU; else named after the netlist.")
     ] = None,
-    fmi: Annotated[str, typer.Option(metavar="VERSION", help="FMI version: 2.0 or 3.0.")] = "2.0",
-    kind: Annotated[str, typer.Option(metavar="KINDS", help="me, cs, or both: me,cs.")] = "me,cs",
+    fmi: Annotated[str, Option(metavar="VERSION", help="FMI version: 2.0 or 3.0.")] = "2.0",
+    kind: Annotated[str, Option(metavar="KINDS", help="me, cs, or both: me,cs.")] = "me,cs",
     platforms: Annotated[
-        str, typer.Option(metavar="NAMES", help="native, all, none, or names such as x86_64-windows, with commas.")
+        str, Option(metavar="NAMES", help="native, all, none, or names such as x86_64-windows, with commas.")
     ] = "native",
     outputs: Annotated[
-        list[str] | None, typer.Option("--show", metavar="PATTERN", help="Further outputs, e.g. '*.w'.")
+        list[str] | None, Option("--show", metavar="PATTERN", help="Further outputs, e.g. '*.w'.")
     ] = None,
     ends: Annotated[
-        list[str] | None, typer.Option("--open", metavar="PATH", help="A free connector that is open, e.g. J.flange_b.")
+        list[str] | None, Option("--open", metavar="PATH", help="A free connector that is open, e.g. J.flange_b.")
     ] = None,
-    takes: Annotated[Takes, typer.Option(help="What open ends take: flow (torque) or potential (angle).")] = Takes.FLOW,
-    check: Annotated[bool, typer.Option(help="Run the FMU against IDAS before it is handed over.")] = True,
+    takes: Annotated[Takes, Option(help="What open ends take: flow (torque) or potential (angle).")] = Takes.FLOW,
+    check: Annotated[bool, Option(help="Run the FMU against IDAS before it is handed over.")] = True,
     debug: Debug = False,
 ) -> None:  # fmt: skip
     """Export a netlist as an FMU: compiled C that needs no Python, checked before it is written."""

@@ -6,9 +6,8 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
-from modelica_like.cli.app import Assignments, Debug, Netlist, app, load_netlist, out, told
+from modelica_like.cli.declare import Option
+from modelica_like.cli.shared import Assignments, Debug, Netlist, load_netlist, out, told
 
 
 class Start(StrEnum):
@@ -19,7 +18,6 @@ class Start(StrEnum):
     STEADY = "steady"
 
 
-@app.command()
 def check(netlist: Netlist, assignments: Assignments = None, *, debug: Debug = False) -> None:
     """Check a netlist: equations, unknowns, states, index, blocks, energy terms."""
     with told(debug):
@@ -29,18 +27,17 @@ def check(netlist: Netlist, assignments: Assignments = None, *, debug: Debug = F
         out().print(structure_report(assembly))
 
 
-@app.command()
 def simulate(
     netlist: Netlist, assignments: Assignments = None, *,
-    until: Annotated[str | None, typer.Option(metavar="TIME", help="End time, e.g. 2s; else the netlist's.")] = None,
-    start: Annotated[Start | None, typer.Option(help="Start values: as given, from rest, or the steady state.")] = None,
-    csv: Annotated[Path | None, typer.Option(metavar="FILE", help="Write all trajectories as a table.")] = None,
-    points: Annotated[int | None, typer.Option(metavar="N", help="Number of equal intervals of the results.")] = None,
-    units: Annotated[bool, typer.Option("--units", help="Units in a second header line of the table.")] = False,
-    plot: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw the results: .png, .svg or .pdf.")] = None,
-    show: Annotated[list[str] | None, typer.Option(metavar="PATTERN", help="What to draw, e.g. '*.w'.")] = None,
-    sankey: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw where the energy went.")] = None,
-    energy: Annotated[bool, typer.Option(help="Tell the energy balance; it takes another, more precise run.")] = True,
+    until: Annotated[str | None, Option(metavar="TIME", help="End time, e.g. 2s; else the netlist's.")] = None,
+    start: Annotated[Start | None, Option(help="Start values: as given, from rest, or the steady state.")] = None,
+    csv: Annotated[Path | None, Option(metavar="FILE", help="Write all trajectories as a table.")] = None,
+    points: Annotated[int | None, Option(metavar="N", help="Number of equal intervals of the results.")] = None,
+    units: Annotated[bool, Option("--units", help="Units in a second header line of the table.")] = False,
+    plot: Annotated[Path | None, Option(metavar="FILE", help="Draw the results: .png, .svg or .pdf.")] = None,
+    show: Annotated[list[str] | None, Option(metavar="PATTERN", help="What to draw, e.g. '*.w'.")] = None,
+    sankey: Annotated[Path | None, Option(metavar="FILE", help="Draw where the energy went.")] = None,
+    energy: Annotated[bool, Option(help="Tell the energy balance; it takes another, more precise run.")] = True,
     debug: Debug = False,
 ) -> None:  # fmt: skip
     """Simulate a netlist: events, energy balance, results as table and picture."""

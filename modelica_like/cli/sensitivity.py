@@ -5,21 +5,19 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
-from modelica_like.cli.app import Assignments, Debug, Netlist, app, load_netlist, out, told
+from modelica_like.cli.declare import Option
 from modelica_like.cli.models import Start
+from modelica_like.cli.shared import Assignments, Debug, Netlist, load_netlist, out, told
 
 
-@app.command()
 def sensitivity(
     netlist: Netlist,
-    of: Annotated[list[str], typer.Option(metavar="OUTPUT", help="What to differentiate, e.g. 'max(shaft.tau)'.")],
-    to: Annotated[list[str] | None, typer.Option(metavar="PARAMETER", help="By what; else by all.")] = None,
+    of: Annotated[list[str], Option(metavar="OUTPUT", help="What to differentiate, e.g. 'max(shaft.tau)'.")],
+    to: Annotated[list[str] | None, Option(metavar="PARAMETER", help="By what; else by all.")] = None,
     assignments: Assignments = None, *,
-    until: Annotated[str | None, typer.Option(metavar="TIME", help="End time, e.g. 2s; else the netlist's.")] = None,
-    start: Annotated[Start | None, typer.Option(help="Start values: as given, from rest, or the steady state.")] = None,
-    tornado: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw a tornado plot of the first.")] = None,
+    until: Annotated[str | None, Option(metavar="TIME", help="End time, e.g. 2s; else the netlist's.")] = None,
+    start: Annotated[Start | None, Option(help="Start values: as given, from rest, or the steady state.")] = None,
+    tornado: Annotated[Path | None, Option(metavar="FILE", help="Draw a tornado plot of the first.")] = None,
     debug: Debug = False,
 ) -> None:  # fmt: skip
     """Differentiate a run exactly, through its events: ranking tables, tornado plot."""

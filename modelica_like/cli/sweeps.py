@@ -5,24 +5,22 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from modelica_like.cli.declare import Option
+from modelica_like.cli.shared import Assignments, Debug, Netlist, load_netlist, out, told
 
-from modelica_like.cli.app import Assignments, Debug, Netlist, app, load_netlist, out, told
 
-
-@app.command()
 def steady(
     netlist: Netlist, assignments: Assignments = None, *,
     hold: Annotated[
-        list[str] | None, typer.Option(metavar="NAME=VALUE", help="Hold a variable, e.g. 'motor.w=4000 rpm'.")
+        list[str] | None, Option(metavar="NAME=VALUE", help="Hold a variable, e.g. 'motor.w=4000 rpm'.")
     ] = None,
-    by: Annotated[list[str] | None, typer.Option(metavar="PARAMETER", help="Find it, one for each held one.")] = None,
+    by: Annotated[list[str] | None, Option(metavar="PARAMETER", help="Find it, one for each held one.")] = None,
     over: Annotated[
-        str | None, typer.Option(metavar="NAME=VALUES", help="A curve, e.g. 'load=0:0.25:26' or 'load=0,0.1,0.2'.")
+        str | None, Option(metavar="NAME=VALUES", help="A curve, e.g. 'load=0:0.25:26' or 'load=0,0.1,0.2'.")
     ] = None,
-    after: Annotated[str | None, typer.Option(metavar="TIME", help="Begin from the end of a run, e.g. 2s.")] = None,
-    show: Annotated[list[str] | None, typer.Option(metavar="NAME", help="Variables of the table and the plot.")] = None,
-    plot: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw the curve.")] = None,
+    after: Annotated[str | None, Option(metavar="TIME", help="Begin from the end of a run, e.g. 2s.")] = None,
+    show: Annotated[list[str] | None, Option(metavar="NAME", help="Variables of the table and the plot.")] = None,
+    plot: Annotated[Path | None, Option(metavar="FILE", help="Draw the curve.")] = None,
     debug: Debug = False,
 ) -> None:  # fmt: skip
     """Find operating points of a netlist: powers, losses and efficiency, or a characteristic curve."""
@@ -46,17 +44,16 @@ def steady(
             save_plot(curves.plot(*(show or ("efficiency",))), plot)
 
 
-@app.command()
 def sweep(
     netlist: Netlist,
-    over: Annotated[list[str], typer.Option(metavar="NAME=VALUES", help="E.g. 'gear.ratio=2:4:21' or 'mu=0.1,0.3'.")],
-    of: Annotated[list[str], typer.Option(metavar="OUTPUT", help="What to read off each run, e.g. 'max(shaft.tau)'.")],
+    over: Annotated[list[str], Option(metavar="NAME=VALUES", help="E.g. 'gear.ratio=2:4:21' or 'mu=0.1,0.3'.")],
+    of: Annotated[list[str], Option(metavar="OUTPUT", help="What to read off each run, e.g. 'max(shaft.tau)'.")],
     assignments: Assignments = None, *,
-    until: Annotated[str | None, typer.Option(metavar="TIME", help="End time, e.g. 2s; else the netlist's.")] = None,
-    checkpoint: Annotated[Path | None, typer.Option(metavar="FOLDER", help="Keeps what is done.")] = None,
-    processes: Annotated[int | None, typer.Option(metavar="N", help="Of this machine; else one per core.")] = None,
-    scheduler: Annotated[str | None, typer.Option(metavar="ADDRESS", help="Dask, e.g. tcp://host:8786.")] = None,
-    output: Annotated[Path | None, typer.Option("--output", "-o", metavar="FILE", help="Write a table: .csv.")] = None,
+    until: Annotated[str | None, Option(metavar="TIME", help="End time, e.g. 2s; else the netlist's.")] = None,
+    checkpoint: Annotated[Path | None, Option(metavar="FOLDER", help="Keeps what is done.")] = None,
+    processes: Annotated[int | None, Option(metavar="N", help="Of this machine; else one per core.")] = None,
+    scheduler: Annotated[str | None, Option(metavar="ADDRESS", help="Dask, e.g. tcp://host:8786.")] = None,
+    output: Annotated[Path | None, Option("--output", "-o", metavar="FILE", help="Write a table: .csv.")] = None,
     debug: Debug = False,
 ) -> None:  # fmt: skip
     """Simulate a netlist over a grid of parameter values."""

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from modelica_like.cli.declare import Argument, Option
+from modelica_like.cli.shared import Debug, out, told
 
-from modelica_like.cli.app import Debug, app, out, told
 
-
-@app.command()
 def describe(
-    kind: Annotated[str, typer.Argument(metavar="TYPE", help="type as a netlist names it", show_default=False)],
+    kind: Annotated[str, Argument(metavar="TYPE", help="type as a netlist names it", show_default=False)],
     *, debug: Debug = False,
 ) -> None:  # fmt: skip
     """Describe a component type: parameters, units, connectors, equations."""
@@ -23,7 +22,6 @@ def describe(
         out().print(page(find_type(kind)))
 
 
-@app.command()
 def schema(*, debug: Debug = False) -> None:
     """Print the JSON schema of netlists with all component types, for editors."""
     with told(debug):
@@ -31,10 +29,9 @@ def schema(*, debug: Debug = False) -> None:
 
         from modelica_like.netlist import schema as generate
 
-        typer.echo(json.dumps(generate(), indent=2, ensure_ascii=False))
+        sys.stdout.write(json.dumps(generate(), indent=2, ensure_ascii=False) + "\n")
 
 
-@app.command()
 def library(*, debug: Debug = False) -> None:
     """List all component types of the installed libraries."""
     with told(debug):
@@ -44,15 +41,14 @@ def library(*, debug: Debug = False) -> None:
         out().print(library_table(library_types()))
 
 
-@app.command()
 def docs(
-    output: Annotated[Path, typer.Option("--output", "-o", metavar="FOLDER", help="where the pages go")],
+    output: Annotated[Path, Option("--output", "-o", metavar="FOLDER", help="where the pages go")],
     types: Annotated[
-        list[str] | None, typer.Argument(metavar="TYPE", help="types as netlists name them", show_default=False)
+        list[str] | None, Argument(metavar="TYPE", help="types as netlists name them", show_default=False)
     ] = None,
     *,
     examples: Annotated[
-        Path | None, typer.Option(metavar="FOLDER", help="netlists that the pages name", show_default=False)
+        Path | None, Option(metavar="FOLDER", help="netlists that the pages name", show_default=False)
     ] = None,
     debug: Debug = False,
 ) -> None:

@@ -5,15 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from modelica_like.cli.declare import Argument, Option
+from modelica_like.cli.shared import SOLVE_FAILED, Debug, out, told
 
-from modelica_like.cli.app import SOLVE_FAILED, Debug, app, out, told
 
-
-@app.command()
 def validate(
-    fmu: Annotated[Path, typer.Argument(metavar="FMU", help="FMU of FMI 2.0 or 3.0", show_default=False)],
-    timeout: Annotated[float, typer.Option(metavar="SECONDS", help="Time limit of each run.")] = 60.0,
+    fmu: Annotated[Path, Argument(metavar="FMU", help="FMU of FMI 2.0 or 3.0", show_default=False)],
+    timeout: Annotated[float, Option(metavar="SECONDS", help="Time limit of each run.")] = 60.0,
     *, debug: Debug = False,
 ) -> None:  # fmt: skip
     """Check an FMU against the standard, and run it with several importers; exit code 1 if a check fails."""
@@ -24,20 +22,19 @@ def validate(
         validation = validate_fmu(fmu, timeout=timeout)
         out().print(validation_table(validation))
         if not validation.passed:
-            raise typer.Exit(SOLVE_FAILED)
+            raise SystemExit(SOLVE_FAILED)
 
 
-@app.command()
 def compare(
-    a: Annotated[Path, typer.Argument(metavar="A", help="netlist, FMU, system or CSV file", show_default=False)],
-    b: Annotated[Path, typer.Argument(metavar="B", help="what to compare it with", show_default=False)],
+    a: Annotated[Path, Argument(metavar="A", help="netlist, FMU, system or CSV file", show_default=False)],
+    b: Annotated[Path, Argument(metavar="B", help="what to compare it with", show_default=False)],
     signals: Annotated[
-        list[str] | None, typer.Option(metavar="PATTERN", help="What to compare, e.g. '*.w'; else all.")
+        list[str] | None, Option(metavar="PATTERN", help="What to compare, e.g. '*.w'; else all.")
     ] = None,
-    until: Annotated[float | None, typer.Option(metavar="SECONDS", help="End time of what is run.")] = None,
-    points: Annotated[int, typer.Option(metavar="N", help="Number of equal intervals of what is run.")] = 500,
-    tolerance: Annotated[float | None, typer.Option(metavar="RTOL", help="Relative tolerance of what is run.")] = None,
-    plot: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw the largest deviations.")] = None,
+    until: Annotated[float | None, Option(metavar="SECONDS", help="End time of what is run.")] = None,
+    points: Annotated[int, Option(metavar="N", help="Number of equal intervals of what is run.")] = 500,
+    tolerance: Annotated[float | None, Option(metavar="RTOL", help="Relative tolerance of what is run.")] = None,
+    plot: Annotated[Path | None, Option(metavar="FILE", help="Draw the largest deviations.")] = None,
     *, debug: Debug = False,
 ) -> None:  # fmt: skip
     """Compare two trajectories of one system: the largest deviation of each signal, the times of the events."""

@@ -168,4 +168,4 @@ class Parameters:
 
     def expressions(self) -> Any:
         """Return the vector q."""
-        return ca.vertcat(*map(ca.SX, self._q)) if self._q else ca.SX(0, 1)
+        return ca.vertcat(ca.SX(0, 1), *self._q)

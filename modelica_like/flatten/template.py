@@ -135,11 +135,9 @@ class Names:
     def function(self, name: str, outputs: list[Any]) -> ca.Function:
         """Make a function of all names so far."""
         inputs = [
-            ca.vertcat(*map(ca.SX, group.values())) for group in (self.variables, self.parameters, self.discretes)
+            ca.vertcat(ca.SX(0, 1), *group.values()) for group in (self.variables, self.parameters, self.discretes)
         ]
-        return ca.Function(
-            name, [*inputs, ca.SX(TIME)], [ca.vertcat(*(ca.SX(e) for e in outputs))], ["v", "p", "d", "t"], [name]
-        )
+        return ca.Function(name, [*inputs, TIME], [ca.vertcat(ca.SX(0, 1), *outputs)], ["v", "p", "d", "t"], [name])
 
 
 def relative_path(owner: Declared, root: Component, name: str) -> str:
@@ -284,9 +282,9 @@ def _rows(sparsity: ca.Sparsity) -> tuple[tuple[int, ...], ...]:
 
 def _linear_forms(names: Names, residuals: list[Any]) -> tuple[tuple[LinearForm | None, ...], ca.Function]:
     """Find the equations that are linear in all their slots, with coefficients that only parameters determine."""
-    v = ca.vertcat(*map(ca.SX, names.variables.values()))
-    p = ca.vertcat(*map(ca.SX, names.parameters.values()))
-    others = ca.vertcat(v, *map(ca.SX, names.discretes.values()), ca.SX(TIME))
+    v = ca.vertcat(ca.SX(0, 1), *names.variables.values())
+    p = ca.vertcat(ca.SX(0, 1), *names.parameters.values())
+    others = ca.vertcat(v, *names.discretes.values(), TIME)
     values: list[Any] = []
 
     def entry(expression: Any) -> float | str:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator
+from collections.abc import Generator, Iterator, Mapping
 from contextlib import contextmanager
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar, cast, dataclass_transform
 
 from modelica_like.errors import DuplicateName, LanguageError, ModelicaLikeError, NetlistError, Source
@@ -214,15 +215,18 @@ class Component(Declared):
         return self._class_modes
 
     @property
-    def parts(self) -> dict[str, Component]:
+    def parts(self) -> Mapping[str, Component]:
         """Parts by name; parts of arrays as `name[1]`, `name[2]` and so on."""
-        named: dict[str, Component] = {}
-        for name, part in self._parts.items():
-            if isinstance(part, list):
-                named.update({f"{name}[{k}]": element for k, element in enumerate(part, 1)})
-            else:
-                named[name] = part
-        return named
+        named: dict[str, Component] | None = self.__dict__.get("_named")
+        if named is None:
+            named = {}
+            for name, part in self._parts.items():
+                if isinstance(part, list):
+                    named.update({f"{name}[{k}]": element for k, element in enumerate(part, 1)})
+                else:
+                    named[name] = part
+            self.__dict__["_named"] = named
+        return MappingProxyType(named)
 
     def walk(self) -> Iterator[Component]:
         """Yield this component and all parts below it, owners first."""
@@ -231,7 +235,7 @@ class Component(Declared):
             component = pending.pop()
             yield component
             if component._parts:
-                pending.extend(reversed(component.parts.values()))
+                pending.extend(reversed([*component.parts.values()]))
 
     def find(self, path: str) -> Component:
         """Return the part at a dotted path.
@@ -323,6 +327,7 @@ class Component(Declared):
             adopted = self._owned(name, value)
         self._parts[name] = adopted
         self.__dict__[name] = adopted
+        self.__dict__.pop("_named", None)
 
     def _owned(self, name: str, part: Component) -> Component:
         twin = part.copy()

@@ -49,8 +49,8 @@ class Declared:
         return self.path or self._name or type(self).__name__
 
     def __getstate__(self) -> dict[str, Any]:
-        # Symbols are identities of one process; the values are what counts.
-        return {key: value for key, value in self.__dict__.items() if key != "_symbols"}
+        # Symbols are identities of one process, and the parts by name follow from the parts.
+        return {key: value for key, value in self.__dict__.items() if key not in ("_symbols", "_named")}
 
     def _detached_copy(self) -> Self:
         twin = object.__new__(type(self))

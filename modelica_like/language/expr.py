@@ -86,7 +86,8 @@ def symbol_of(owner: Any, name: str, order: int = 0) -> Symbol:
 
 def symbols_in(expression: Expr) -> list[Symbol]:
     """Return the symbols that occur in an expression."""
-    return [_symbols[leaf_id(leaf)] for leaf in ca.symvar(ca.SX(cast(Any, expression)))]
+    whole: Any = expression if isinstance(expression, ca.SX) else ca.SX(cast(Any, expression))
+    return [_symbols[leaf_id(leaf)] for leaf in ca.symvar(whole)]
 
 
 _FLAG = re.compile(r"prescribed\((\w+)\)")

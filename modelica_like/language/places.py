@@ -123,7 +123,8 @@ def source_of(code: CodeType, instruction: int) -> Source:
     if lines and end_column is not None and column is not None:
         lines[-1] = lines[-1].encode()[:end_column].decode(errors="ignore")
         lines[0] = lines[0].encode()[column:].decode(errors="ignore")
-    text = lines[0] if len(lines) == 1 else _without_comments(lines)
+    # Reading tokens is slow at first, and few statements have comments inside.
+    text = _without_comments(lines) if len(lines) > 1 and any("#" in one for one in lines) else " ".join(lines)
     return Source(code.co_filename, line, " ".join(text.split()))
 
 

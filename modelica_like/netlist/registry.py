@@ -22,24 +22,48 @@ def library_types() -> Mapping[str, type[Component]]:
     Raises:
         NetlistError: a library cannot be imported, or two libraries have a type of one name.
     """
-    types: dict[str, type[Component]] = {}
+    found = {name: kind for name in _libraries() if (kind := _library_type(name)) is not None}
+    return MappingProxyType(dict(sorted(found.items())))
+
+
+@lru_cache(maxsize=1)
+def _libraries() -> Mapping[str, Mapping[str, ModuleType]]:
+    """Return the libraries of each public name; a library need not import what nobody asks for."""
+    libraries: dict[str, dict[str, ModuleType]] = {}
     for entry in sorted(entry_points(group=GROUP), key=lambda entry: entry.name):
-        for name, kind in _types_of(imported(entry.value, f"The library '{entry.name}'")).items():
-            if types.setdefault(name, kind) is not kind:
-                raise NetlistError(
-                    f"Two libraries have a component '{name}': {types[name].__module__} and {kind.__module__}.",
-                    advice=f'Write which one: "{kind.__module__}:{name}".',
-                )
-    return MappingProxyType(dict(sorted(types.items())))
+        module = imported(entry.value, f"The library '{entry.name}'")
+        for name in getattr(module, "__all__", ()):
+            libraries.setdefault(name, {})[entry.name] = module
+    for name, modules in libraries.items():
+        if len(modules) > 1:
+            _type_in(name, modules)
+    return libraries
 
 
-def _types_of(module: ModuleType) -> dict[str, type[Component]]:
-    members = {name: getattr(module, name) for name in getattr(module, "__all__", ())}
-    return {
-        name: member
-        for name, member in members.items()
-        if isinstance(member, type) and issubclass(member, Component) and not member._partial
-    }
+def _library_type(name: str) -> type[Component] | None:
+    """Return the component type of a name in the libraries, None if it has none.
+
+    Raises:
+        NetlistError: two libraries have different ones.
+    """
+    return _type_in(name, _libraries().get(name, {}))
+
+
+def _type_in(name: str, modules: Mapping[str, ModuleType]) -> type[Component] | None:
+    kinds: list[type[Component]] = []
+    for library, module in modules.items():
+        try:
+            kind = getattr(module, name)
+        except (ImportError, SyntaxError) as error:
+            raise _not_imported(f"The library '{library}'", error) from error
+        if isinstance(kind, type) and issubclass(kind, Component) and not kind._partial and kind not in kinds:
+            kinds.append(kind)
+    if len(kinds) > 1:
+        raise NetlistError(
+            f"Two libraries have a component '{name}': {kinds[0].__module__} and {kinds[1].__module__}.",
+            advice=f'Write which one: "{kinds[1].__module__}:{name}".',
+        )
+    return kinds[0] if kinds else None
 
 
 def imported(module: str, what: str) -> ModuleType:
@@ -55,7 +79,11 @@ def imported(module: str, what: str) -> ModuleType:
     try:
         return importlib.import_module(module)
     except (ImportError, SyntaxError) as error:
-        raise NetlistError(f"{what} cannot be imported: {error}.") from error
+        raise _not_imported(what, error) from error
+
+
+def _not_imported(what: str, error: Exception) -> NetlistError:
+    return NetlistError(f"{what} cannot be imported: {error}.")
 
 
 def find_type(name: str) -> type[Component]:
@@ -70,12 +98,13 @@ def find_type(name: str) -> type[Component]:
     """
     if ":" in name:
         return _class_of_module(name)
-    types = library_types()
-    if name not in types:
+    kind = _library_type(name)
+    if kind is None:
+        types = library_types()
         hint = did_you_mean(name, types) or "."
         advice = "`modelica-like library` lists all types." if types else "No component library is installed."
         raise UnknownName(f"There is no component type '{name}'{hint}", advice=advice)
-    return types[name]
+    return kind
 
 
 def _class_of_module(name: str) -> type[Component]:
@@ -100,7 +129,7 @@ def type_name(kind: type[Component]) -> str:
     Raises:
         NetlistError: the class is local to a function, so no file can name it.
     """
-    if library_types().get(kind.__name__) is kind:
+    if _library_type(kind.__name__) is kind:
         return kind.__name__
     if "." in kind.__qualname__:
         raise NetlistError(f"{kind.__qualname__} is not at the top of its module, so a netlist cannot name it.")

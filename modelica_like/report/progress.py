@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import time
 from types import TracebackType
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from modelica_like.errors import ModelicaLikeError
 from modelica_like.units import parse_unit, to_si
+
+if TYPE_CHECKING:
+    from rich.progress import Progress
 
 _PATIENCE = 0.5
 _INTERVAL = 0.1
@@ -34,6 +36,8 @@ class _LateBar:
             return
         self._next = now + _INTERVAL
         if self._progress is None:
+            from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
             columns = (
                 TextColumn("{task.description}"),
                 BarColumn(),

@@ -8,7 +8,11 @@ from typing import Any
 
 from modelica_like.flatten.model import Coefficient, FlatModel, LinearEquation
 
+PREFERENCES = ("avoid", "default", "prefer", "always")
+"""How much a variable wants to be a state, in rising order."""
+
 _ROUNDING = 1e-13
+_NUMBER = (float, int)
 
 
 @dataclass(frozen=True)
@@ -39,11 +43,11 @@ def find_aliases(model: FlatModel) -> Aliases:
 
 def is_number(value: Any) -> bool:
     """Tell whether a coefficient is a number rather than an expression of parameters."""
-    return isinstance(value, float | int)
+    return isinstance(value, _NUMBER)
 
 
 def _is_zero(value: Any) -> bool:
-    return float(value) == 0.0 if is_number(value) else bool(value.is_zero())
+    return value == 0.0 if isinstance(value, _NUMBER) else bool(value.is_zero())
 
 
 class _Elimination:
@@ -64,21 +68,23 @@ class _Elimination:
         self.cause: dict[int, int] = {}
         self.contradictions: list[tuple[int, ...]] = []
         self.inputs = set(model.inputs)
+        preference = [PREFERENCES.index(one.state) * 2 for one in model.variables]
+        self.preference = [preference[variable] + (order == 0) for variable, order in model.nodes]
 
     def run(self) -> Aliases:
-        queued = set(self.queue)
-        while self.queue:
-            number = self.queue.popleft()
+        queue, used = self.queue, self.used
+        queued = set(queue)
+        while queue:
+            number = queue.popleft()
             queued.discard(number)
             for affected in self._consider(number):
-                if affected not in queued and affected not in self.used:
+                if affected not in queued and affected not in used:
                     queued.add(affected)
-                    self.queue.append(affected)
-        nodes = range(len(self.model.nodes))
-        found = [self.find(node) for node in nodes]
+                    queue.append(affected)
+        found = [self.find(node) for node in range(len(self.model.nodes))]
         return Aliases(
             root=[root for root, _ in found], factor=[factor for _, factor in found], known=self.known,
-            derivative={self.find(n)[0]: self._derivative(n) for n in self.derivative if self.find(n)[0] == n},
+            derivative={n: self._derivative(n) for n in self.derivative if self.parent[n] == n},
             remaining=sorted(self.remaining), contradictions=self.contradictions,
         )  # fmt: skip
 
@@ -89,6 +95,9 @@ class _Elimination:
 
     def find(self, node: int) -> tuple[int, float]:
         """Return root and factor of a node, and shorten the way there."""
+        above = self.parent[node]
+        if self.parent[above] == above:
+            return above, self.factor[node]
         trail: list[int] = []
         while self.parent[node] != node:
             trail.append(node)
@@ -99,28 +108,30 @@ class _Elimination:
             self.parent[step], self.factor[step] = node, factor
         return node, factor
 
-    def _reduce(self, equation: LinearEquation) -> tuple[dict[int, float | None], Any]:
-        """Return coefficients by root and the constant; None for a coefficient that is no number."""
+    def _reduce(self, equation: LinearEquation) -> tuple[dict[int, float | None], list[tuple[Any, Any]]]:
+        """Return coefficients by root, None for one that is no number, and coefficients with known values."""
         terms: dict[int, float | None] = {}
         sizes: dict[int, float] = {}
-        constants: list[tuple[Any, Any]] = [(equation.constant, 1.0)]
+        products: list[tuple[Any, Any]] = []
+        find, known = self.find, self.known
         for node, coefficient in equation.terms:
-            root, factor = self.find(node)
-            if root in self.known:
-                constants.append((coefficient, factor * self.known[root]))
+            root, factor = find(node)
+            if root in known:
+                products.append((coefficient, factor * known[root]))
                 continue
             before = terms.get(root, 0.0)
             if before is None or isinstance(coefficient, Coefficient):
                 terms[root] = None
             else:
-                terms[root] = before + coefficient * factor
-                sizes[root] = sizes.get(root, 0.0) + abs(coefficient * factor)
+                term = coefficient * factor
+                terms[root] = before + term
+                sizes[root] = sizes.get(root, 0.0) + abs(term)
         # Terms that cancel but for rounding leave no unknown.
         left = {root: c for root, c in terms.items() if c is None or abs(c) > _ROUNDING * sizes[root]}
-        return left, self._sum(constants)
+        return left, products
 
-    def _sum(self, products: list[tuple[Any, Any]]) -> Any:
-        total: Any = 0.0
+    def _sum(self, constant: Any, products: list[tuple[Any, Any]]) -> Any:
+        total: Any = constant if isinstance(constant, float) else 0.0 + self.model.coefficient(constant)
         for coefficient, value in products:
             if not _is_zero(value) and not (is_number(coefficient) and coefficient == 0.0):
                 total = total + self.model.coefficient(coefficient) * value
@@ -129,21 +140,22 @@ class _Elimination:
     def _consider(self, number: int) -> set[int]:
         """Use an equation if it is simple enough; return the equations that become simpler by it."""
         equation = self.model.linear[number]
-        terms, constant = self._reduce(equation)
+        terms, products = self._reduce(equation)
         self.remaining.discard(number)
         if not terms:
             self.contradictions.append(self._causes(number))
             return set()
-        numbers = {root: c for root, c in terms.items() if c is not None}
-        if len(terms) == len(numbers) == 1:
-            ((root, coefficient),) = numbers.items()
-            if root not in self.integral and root not in self.inputs:
+        # Working out the constant takes longer than all the rest; only short equations need it.
+        constant = self._sum(equation.constant, products) if len(terms) <= 2 else 0.0
+        if len(terms) == 1:
+            ((root, coefficient),) = terms.items()
+            if coefficient is not None and root not in self.integral and root not in self.inputs:
                 self.used.add(number)
                 self.cause[root] = number
                 return self._learn(root, -constant / coefficient if not _is_zero(constant) else 0.0)
-        if len(terms) == len(numbers) == 2 and _is_zero(constant):
-            (first, a), (second, b) = numbers.items()
-            if self._may_merge(first, second):
+        if len(terms) == 2 and _is_zero(constant):
+            (first, a), (second, b) = terms.items()
+            if a is not None and b is not None and self._may_merge(first, second):
                 self.used.add(number)
                 return self._merge(first, second, -b / a)
         self.remaining.add(number)
@@ -216,7 +228,4 @@ class _Elimination:
         return self._merge(first, second, b / a)
 
     def _rank(self, root: int) -> tuple[bool, bool, int]:
-        variable, order = self.model.nodes[root]
-        one = self.model.variables[variable]
-        preference = ("avoid", "default", "prefer", "always").index(one.state)
-        return root in self.inputs, root in self.integral, preference * 2 + (order == 0)
+        return root in self.inputs, root in self.integral, self.preference[root]

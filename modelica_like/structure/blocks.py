@@ -70,13 +70,13 @@ class BlockSolver:
         self.residual = ca.vertsplit(residual) if residual.numel() else []
         self.unknowns = ca.vertsplit(unknowns) if unknowns.numel() else []
         self.jacobian = ca.jacobian(residual, unknowns)
-        self.rows = _entries_by_row(self.jacobian)
+        self.rows = _places_by_row(self.jacobian.sparsity())
         self.safe = self._safe_entries(volatile)
         self.solved = Solved()
 
     def _safe_entries(self, volatile: Any) -> set[tuple[int, int]]:
         """Entries of the Jacobian that depend on parameters only: they cannot vanish on the way."""
-        entries = ca.vertcat(*self.jacobian.nonzeros()) if self.jacobian.nnz() else ca.SX(0, 1)
+        entries = self.jacobian.nz[:]
         moving = ca.which_depends(entries, volatile, 1, True) if entries.numel() else []
         rows, columns = self.jacobian.sparsity().get_triplet()
         return {(r, c) for r, c, moves in zip(rows, columns, moving, strict=True) if not moves}
@@ -116,7 +116,7 @@ class BlockSolver:
         residual, unknown = self.residual[row], self.unknowns[column]
         expression = isolate(residual, unknown)
         if expression is None:
-            slope = self.rows[row][column]
+            slope = self.jacobian.nz[self.rows[row][column]]
             rest = ca.substitute(residual, unknown, ca.SX(0))
             expression = -rest / slope
         return expression
@@ -245,8 +245,9 @@ def _determinant(matrix: Any, rows: list[int], columns: list[int]) -> Any:
     return total
 
 
-def _entries_by_row(matrix: Any) -> list[dict[int, Any]]:
-    rows: list[dict[int, Any]] = [{} for _ in range(matrix.shape[0])]
-    for row, column, entry in zip(*matrix.sparsity().get_triplet(), matrix.nonzeros(), strict=True):
-        rows[row][column] = entry
+def _places_by_row(sparsity: ca.Sparsity) -> list[dict[int, int]]:
+    """Columns in each row, with the place of the entry among all."""
+    rows: list[dict[int, int]] = [{} for _ in range(sparsity.size1())]
+    for place, (row, column) in enumerate(zip(*sparsity.get_triplet(), strict=True)):
+        rows[row][column] = place
     return rows

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from modelica_like.errors import StructureError
-from modelica_like.structure.system import PREFERENCES, System
+from modelica_like.structure.alias import PREFERENCES
+from modelica_like.structure.system import System
 
 _MAX_INDEX = 8
 _PREFERRED = PREFERENCES.index("prefer")

@@ -9,6 +9,10 @@ import casadi as ca
 from modelica_like.language.expr import leaf_id
 
 _MAX_NODES = 60
+_ZERO = ca.SX(0)
+
+# The operators `+ - * /` of casadi.SX try other types first, which takes four times as long as the operation itself.
+_binary = ca.SX.binary
 
 
 def isolate(residual: Any, unknown: Any) -> Any | None:
@@ -21,7 +25,7 @@ def isolate(residual: Any, unknown: Any) -> Any | None:
     trail = _find(residual, leaf_id(unknown))
     if trail is None:
         return None
-    result: Any = ca.SX(0)
+    result: Any = _ZERO
     for node, position in trail:
         result = _undo(node, position, result)
         if result is None:
@@ -39,11 +43,10 @@ def _find(root: Any, target: int) -> list[tuple[Any, int]] | None:
         visited += 1
         if visited > _MAX_NODES:
             return None
-        if node.is_leaf():
-            if node.is_symbolic() and node.element_hash() == target:
-                if found is not None:
-                    return None
-                found = trail
+        if node.element_hash() == target:
+            if found is not None:
+                return None
+            found = trail
             continue
         for position in range(node.n_dep()):
             pending.append((node.dep(position), [*trail, (node, position)]))
@@ -59,11 +62,11 @@ def _undo(node: Any, position: int, value: Any) -> Any | None:
         return value / 2
     other = node.dep(1 - position) if node.n_dep() == 2 else None
     if operation == ca.OP_ADD:
-        return value - other
+        return _binary(ca.OP_SUB, value, other)
     if operation == ca.OP_SUB:
-        return value + other if position == 0 else other - value
+        return _binary(ca.OP_ADD, value, other) if position == 0 else _binary(ca.OP_SUB, other, value)
     if operation == ca.OP_MUL:
-        return value / other
+        return _binary(ca.OP_DIV, value, other)
     if operation == ca.OP_DIV and position == 0:
-        return value * other
+        return _binary(ca.OP_MUL, value, other)
     return None

@@ -166,11 +166,11 @@ def _check_input_rates(system: System) -> None:
 
 
 def _column(system: System, levels: list[int]) -> Any:
-    return ca.vertcat(*(system.symbols[n] for n in levels)) if levels else ca.SX(0, 1)
+    return system.column(levels)
 
 
 def _volatile(system: System) -> Any:
-    return ca.vertcat(*system.symbols, system.model.d, system.model.time)
+    return ca.vertcat(_column(system, list(range(len(system.symbols)))), system.model.d, system.model.time)
 
 
 def _incidence(system: System) -> list[list[int]]:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from itertools import accumulate
 from typing import Any
 
 import casadi as ca
 
 from modelica_like.flatten.model import FlatModel, Origin, evaluate
-from modelica_like.structure.alias import Aliases
-
-PREFERENCES = ("avoid", "default", "prefer", "always")
+from modelica_like.structure.alias import PREFERENCES, Aliases
 
 
 @dataclass(slots=True)
@@ -56,6 +55,16 @@ class System:
     node_values: Any
     inputs: list[int] = field(default_factory=list)
     linear_rows: list[list[int]] = field(default_factory=list)
+    _stacked: Any = None
+
+    def column(self, levels: list[int]) -> Any:
+        """Return the column of symbols of some levels."""
+        if not levels:
+            return ca.SX(0, 1)
+        if self._stacked is None or self._stacked.numel() != len(self.symbols):
+            self._stacked = ca.vertcat(*self.symbols)
+        # A vector of one entry, indexed by a list, gives a row.
+        return ca.vec(self._stacked[levels])
 
     def add_level(self, chain: int) -> int:
         """Extend a chain by one derivative."""
@@ -147,7 +156,7 @@ def _name_levels(model: FlatModel, levels: list[Level], node_level: list[tuple[i
 def _node_values(
     model: FlatModel, aliases: Aliases, node_level: list[tuple[int, float] | None], symbols: list[Any]
 ) -> Any:
-    vector = ca.vertcat(*symbols) if symbols else ca.SX(0, 1)
+    vector = ca.vertcat(ca.SX(0, 1), *symbols)
     placed = [pair or (0, 0.0) for pair in node_level]
     if symbols:
         # A vector of one entry, indexed by a list, gives a row.
@@ -163,23 +172,28 @@ def _node_values(
 
 def _collect_residuals(system: System, aliases: Aliases) -> None:
     model = system.model
-    columns = {k: ca.vertsplit(column) for k, column in evaluate(model, "residual", system.node_values).items()}
-    residuals: list[Any] = []
-    for instance, row in model.general:
-        residuals.append(columns[instance][row])
-        system.origins.append(model.origin(instance, row))
+    columns = evaluate(model, "residual", system.node_values)
+    first = dict(zip(columns, accumulate((one.numel() for one in columns.values()), initial=0), strict=False))
+    sums: list[Any] = []
+    # Positions in all columns one below the other, then the sums; taken at once, which is cheaper than one by one.
+    places = [first[instance] + row for instance, row in model.general]
+    system.origins += [model.origin(instance, row) for instance, row in model.general]
+    count = sum(one.numel() for one in columns.values())
     for number in aliases.remaining:
         equation = model.linear[number]
         system.linear_rows.append(_levels_of(system, equation.terms))
         if equation.row is not None:
-            residuals.append(columns[equation.row[0]][equation.row[1]])
+            places.append(first[equation.row[0]] + equation.row[1])
         else:
             total = model.coefficient(equation.constant)
             for node, coefficient in equation.terms:
                 total = total + model.coefficient(coefficient) * system.node_values[node]
-            residuals.append(total)
+            places.append(count + len(sums))
+            sums.append(total)
         system.origins.append(equation.origin)
-    system.residual = ca.vertcat(*residuals) if residuals else ca.SX(0, 1)
+    stacked = ca.vertcat(ca.SX(0, 1), *columns.values(), *sums)
+    # A vector of one entry, indexed by a list, gives a row.
+    system.residual = ca.vec(stacked[places]) if places else ca.SX(0, 1)
 
 
 def _levels_of(system: System, terms: tuple[tuple[int, Any], ...]) -> list[int]:

@@ -276,7 +276,7 @@ def test_opening_leaves_the_drive_alone() -> None:
 
 
 def test_every_adaptor_is_a_library_type() -> None:
-    kinds = {kind for name, kind in vars(components).items() if name.endswith("Adaptor")}
+    kinds = {getattr(components, name) for name in components.__all__ if name.endswith("Adaptor")}
     assert kinds >= {
         ForceToPositionAdaptor,
         PositionToForceAdaptor,

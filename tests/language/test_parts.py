@@ -118,6 +118,20 @@ def test_a_structural_field_set_later_builds_again():
     flatten(chain)
 
 
+def test_the_parts_by_name_follow_what_replaces_them():
+    chain = Chain()
+    known = chain.parts
+    assert chain.parts["masses[1]"] is chain.masses[0]
+    copies = [chain.copy(), copy.deepcopy(chain), pickle.loads(pickle.dumps(chain))]
+    chain.springs = [Spring(c=5.0)]
+    assert list(chain.parts) == ["masses[1]", "masses[2]", "masses[3]", "springs[1]"]
+    assert chain.find("springs[1]") is chain.springs[0]
+    assert list(known) == ["masses[1]", "masses[2]", "masses[3]", "springs[1]", "springs[2]"]
+    for one in copies:
+        assert list(one.parts) == list(known)
+        assert all(part._owner is one and part is not known[name] for name, part in one.parts.items())
+
+
 def test_an_annotated_part_is_replaceable():
     class HeavyMass(Mass):
         m: Parameter = param("kg", "mass", default=100.0)

@@ -1,4 +1,4 @@
-"""What all commands share: the application, its options, and how errors are told."""
+"""What all commands share: their common options, and how results and errors are told."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Any, NoReturn
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
-import typer
-from rich.console import Console
-from rich.markup import escape
-
+from modelica_like.cli.declare import Argument, Option, WrongUse
 from modelica_like.errors import InitializationError, ModelicaLikeError, SolveError
+
+if TYPE_CHECKING:
+    from rich.console import Console
 
 BAD_INPUT = 2
 SOLVE_FAILED = 1
@@ -20,15 +20,10 @@ SOLVE_FAILED = 1
 # What only a defect of this package raises; everything foreseen is a ModelicaLikeError.
 _DEFECTS = (ArithmeticError, AssertionError, AttributeError, LookupError, RuntimeError, TypeError, ValueError)
 
-app = typer.Typer(
-    help="Drive-trains written once, acausally: check, simulate and describe netlists.",
-    no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False,
-)  # fmt: skip
-
-Netlist = Annotated[Path, typer.Argument(metavar="NETLIST", help="TOML file", show_default=False)]
-Debug = Annotated[bool, typer.Option("--debug", help="Show where in the code an error was raised.")]
+Netlist = Annotated[Path, Argument(metavar="NETLIST", help="TOML file", show_default=False)]
+Debug = Annotated[bool, Option("--debug", help="Show where in the code an error was raised.")]
 Assignments = Annotated[
-    list[str] | None, typer.Option("--set", metavar="PATH=VALUE", help='Set a value, e.g. --set clutch.mu="0.3".')
+    list[str] | None, Option("--set", metavar="PATH=VALUE", help='Set a value, e.g. --set clutch.mu="0.3".')
 ]
 
 
@@ -45,8 +40,6 @@ def told(debug: bool) -> Iterator[None]:
         if debug:
             raise
         _fail(f"{error.filename or 'A file'}: {error.strerror or error}.", BAD_INPUT)
-    except (typer.Exit, typer.Abort, typer.BadParameter):
-        raise
     except _DEFECTS as error:
         if debug:
             raise
@@ -61,16 +54,21 @@ def exit_code(error: ModelicaLikeError) -> int:
 
 
 def _fail(message: str, code: int) -> NoReturn:
+    from rich.console import Console
+    from rich.markup import escape
+
     what, *rest = message.split("\n")
     console = Console(stderr=True, highlight=False, soft_wrap=True, emoji=False)
     console.print(f"[bold red]{escape(what)}[/]")
     for line in rest:
         console.print(escape(line), style="dim" if line.startswith("  ") else None)
-    raise typer.Exit(code)
+    raise SystemExit(code)
 
 
 def out() -> Console:
     """Return the console for results; a pipe gets plain text that is wide enough for tables."""
+    from rich.console import Console
+
     return Console(highlight=False, emoji=False, width=None if sys.stdout.isatty() else 160)
 
 
@@ -82,7 +80,7 @@ def load_netlist(netlist: Path, assignments: list[str] | None) -> Any:
     for assignment in assignments or ():
         path, equals, value = assignment.partition("=")
         if not equals:
-            raise typer.BadParameter(f"'{assignment}' is not PATH=VALUE.", param_hint="--set")
+            raise WrongUse(f"'{assignment}' is not PATH=VALUE.", "--set")
         assembly.set(path.strip(), _value(value.strip()))
     return assembly
 

@@ -1,0 +1,46 @@
+"""How commands declare their arguments and options, as metadata of `Annotated`.
+
+Typer shows help and tells mistakes, but it loads a validation framework for that; an ordinary call is read without it.
+"""
+
+from __future__ import annotations
+
+
+class Argument:
+    """A value by its position.
+
+    Args:
+        metavar: how the help names it.
+        help: what it is.
+        show_default: whether the help tells its default.
+    """
+
+    def __init__(self, *, metavar: str | None = None, help: str | None = None, show_default: bool = True) -> None:
+        self.metavar = metavar
+        self.help = help
+        self.show_default = show_default
+
+
+class Option(Argument):
+    """A value by its name.
+
+    Args:
+        names: with their dashes; by default that of the parameter.
+        metavar: how the help names the value.
+        help: what it is.
+        show_default: whether the help tells its default.
+    """
+
+    def __init__(
+        self, *names: str, metavar: str | None = None, help: str | None = None, show_default: bool = True
+    ) -> None:
+        super().__init__(metavar=metavar, help=help, show_default=show_default)
+        self.names = names
+
+
+class WrongUse(Exception):
+    """An option has a value that cannot be understood; told with the command's usage."""
+
+    def __init__(self, text: str, option: str) -> None:
+        super().__init__(text)
+        self.option = option
