@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -102,17 +103,17 @@ class _Task:
 
     def run(self) -> None:
         """Go through the sections, so that each finds what it refers to."""
-        self._each("parameters", self.document.parameters, self.assembly.add_parameter)
+        self._each("parameters", self.document.parameters, partial(Assembly.add_parameter, self.assembly))
         self._each("parts", self.document.parts, self._add_part)
         if not self.errors:
             self._each("start", self.document.start, self._start)
             self._each("guess", self.document.guess, lambda path, value: self._start(path, guess(value)))
-            self._each("expose", self.document.expose, self.assembly.expose)
+            self._each("expose", self.document.expose, partial(Assembly.expose, self.assembly))
         for section in ("parameters", "connect", "series", "expose"):
             for name in getattr(self.document, section):
-                self.assembly.place(f"{section}.{name}", self.document.lines.source(section, name))
+                Assembly.place(self.assembly, f"{section}.{name}", self.document.lines.source(section, name))
         for end in self.document.free:
-            self.assembly.place(f"free.{end}", self.document.lines.source("free"))
+            Assembly.place(self.assembly, f"free.{end}", self.document.lines.source("free"))
 
     def _each(self, section: str, entries: Mapping[str, Any], action: Callable[[str, Any], None]) -> None:
         for name, entry in entries.items():
@@ -140,7 +141,7 @@ class _Task:
             part = self._part(name, entry)
             part = [part] * entry["count"] if "count" in entry else part
         setattr(self.assembly, name, part)
-        self.assembly.place(f"parts.{name}", self.document.lines.source("parts", name))
+        Assembly.place(self.assembly, f"parts.{name}", self.document.lines.source("parts", name))
 
     def _part(self, name: str, table: Mapping[str, Any]) -> Component:
         values = {key: value for key, value in table.items() if key not in ("is", "count")}

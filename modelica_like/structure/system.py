@@ -87,6 +87,8 @@ def build_system(model: FlatModel, aliases: Aliases) -> System:
     levels, chains, place = _chains(model, aliases)
     node_level = _node_levels(model, aliases, place)
     _name_levels(model, levels, node_level)
+    node_level = _turn_chains(model, levels, node_level)
+    _name_levels(model, levels, node_level)
     symbols = [ca.SX.sym(level.name) for level in levels]
     node_values = _node_values(model, aliases, node_level, symbols)
     system = System(model, levels, chains, symbols, None, [], node_level, node_values)
@@ -132,6 +134,21 @@ def _node_levels(
             level, factor = place[root]
             result.append((level, aliases.factor[node] * factor))
     return result
+
+
+def _turn_chains(
+    model: FlatModel, levels: list[Level], node_level: list[tuple[int, float] | None]
+) -> list[tuple[int, float] | None]:
+    """Give the variable after which a chain is named the factor one: a state is what its name says, sign included."""
+    scale: dict[int, float] = {}
+    for node, placed in enumerate(node_level):
+        if placed is not None and placed[1] != 1.0:
+            level = levels[placed[0]]
+            if level.order == 0 and level.name == model.node_name(node):
+                scale[level.chain] = placed[1]
+    if not scale:
+        return node_level
+    return [pair and (pair[0], pair[1] / scale.get(levels[pair[0]].chain, 1.0)) for pair in node_level]
 
 
 def _name_levels(model: FlatModel, levels: list[Level], node_level: list[tuple[int, float] | None]) -> None:

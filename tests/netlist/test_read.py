@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from components import Clutch, IdealGear, Inertia, Mass
+from modelica_like import simulate
 from modelica_like.errors import CyclicAssembly, NetlistError, UnknownName, WiringErrors
 from modelica_like.language import Assembly
 from modelica_like.netlist import load, loads
@@ -170,3 +171,13 @@ def test_netlists_that_multiply_are_stopped(tmp_path: Path) -> None:
 def test_names_are_suggested() -> None:
     with pytest.raises(UnknownName, match="did you mean 'motor'"):
         loads(DRIVE.replace("motor.phi", "motr.phi"))
+
+
+def test_parts_may_be_called_like_methods(tmp_path: Path) -> None:
+    """Names such as place or wires mean something in Python, not in a netlist."""
+    (tmp_path / "drive.toml").write_text(
+        '[parts]\nplace = { is = "Inertia", J = 1, phi = 0, w = 1 }\nexpose = { is = "Damper", d = 1, phi_rel = 0 }\n'
+        'wires = { is = "Inertia", J = 1, w = 0 }\n[series]\ns = ["place", "expose", "wires"]\n'
+    )
+    run = simulate(tmp_path / "drive.toml", 20.0)
+    assert run.final["wires.w"] == pytest.approx(0.5, rel=1e-6)
