@@ -48,6 +48,20 @@ class Grip(Twist):
         yield self.plates.choose(stuck=der(self.w_rel), open=self.tau) == 0  # grip
 
 
+class Nothing(Grip):
+    plates = Mode("stuck", "open", holds={"stuck": "w_slip"})
+
+
+class Loosely(Twist):
+    w_rel: Variable = var("rad/s", "slip speed")
+    plates = Mode("stuck", "open", holds={"stuck": "w_rel"})
+
+    def equations(self) -> Equations:
+        yield from super().equations()
+        yield der(self.phi_rel) == self.w_rel
+        yield self.plates.choose(stuck=self.phi_rel, open=self.phi_rel) == 0
+
+
 class Unfinished(TorqueSource):  # unfinished
     pass
 
@@ -192,6 +206,22 @@ Unfinished does not define torque, which its base TorqueSource leaves open.
   in test_component_messages.py:{unfinished} `class Unfinished(TorqueSource):  # unfinished`
 TorqueSource.torque: Return the torque on the connected part.
 Write it in Unfinished: def torque(self).""",
+)
+case(
+    errors.LanguageError,
+    "a mode holds what is no variable",
+    lambda: flatten(Nothing()),
+    """\
+Nothing.plates holds the motion 'w_slip', which is no variable of Nothing.
+Name a variable, or a property that returns one.""",
+)
+case(
+    errors.LanguageError,
+    "no equation holds what a mode holds",
+    lambda: flatten(Loosely()),
+    """\
+Loosely.plates holds w_rel in 'stuck', but no equation says there that der(w_rel) is zero.
+Write plates.choose(…, stuck=der(self.w_rel)) == 0.""",
 )
 case(
     errors.LanguageError,
