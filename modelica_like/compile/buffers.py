@@ -39,6 +39,18 @@ class BufferedFunction:
         self._evaluate()
         return [array.copy() for array in self._results]
 
+    def along(self, t: Vector, x: Vector, z: Vector, d: Vector, p: Vector, u: Vector) -> list[Vector]:
+        """Evaluate a mapped function at as many points as there are, and at what was left there in the places behind.
+
+        p and u are the same at all points; the results are valid until the next call.
+        """
+        for k, part in ((0, t), (1, x), (2, z), (5, d)):
+            self._arguments[k][: len(part)] = part
+        for k, part in ((3, p), (4, u)):
+            self._arguments[k].reshape(-1, max(len(part), 1))[:] = part if len(part) else 0.0
+        self._evaluate()
+        return self._results
+
     def statistics(self) -> dict[str, Any]:
         """Return the statistics of the last call, of a function that keeps some."""
         return dict(self._buffer.stats())
@@ -49,4 +61,46 @@ def buffered(cache: dict[Any, Any], key: Any, make: Any, results: tuple[int, ...
     own = "buffer", get_ident(), key
     if own not in cache:
         cache[own] = BufferedFunction(make(), results)
+    return cache[own]
+
+
+_BLOCKS = 4096, 64
+"""Points that are evaluated in one call: many, and the rest."""
+
+
+class Along:
+    """A CasADi function of (t, x, z, p, u, d) at many points, in blocks of bounded size through fixed buffers.
+
+    Args:
+        function: with dense results.
+    """
+
+    def __init__(self, function: ca.Function) -> None:
+        self._function = function
+        self._rows = [function.numel_out(k) for k in range(function.n_out())]
+        self._made: dict[int, BufferedFunction] = {}
+
+    def __call__(self, times: Vector, x: Vector, z: Vector, p: Vector, u: Vector, d: Vector) -> list[Vector]:
+        """Evaluate at n points; shapes (n,), (nx, n), (nz, n), (np,), (nu,), (nd, n), results (rows, n)."""
+        total = len(times)
+        results = [np.empty((rows, total)) for rows in self._rows]
+        first = 0
+        for size in _BLOCKS:
+            while total - first >= (size if size > _BLOCKS[-1] else 1):
+                last = min(first + size, total)
+                if size not in self._made:
+                    self._made[size] = BufferedFunction(self._function.map(size))
+                parts = (part[..., first:last].ravel("F") for part in (times, x, z, d))
+                block = self._made[size].along(*parts, p, u)
+                for whole, part in zip(results, block, strict=True):
+                    whole[:, first:last] = part.reshape(size, -1).T[:, : last - first]
+                first = last
+        return results
+
+
+def along(cache: dict[Any, Any], key: Any, make: Any) -> Along:
+    """Return this thread's function at many points for a key, made from `make()` on first use."""
+    own = "along", get_ident(), key
+    if own not in cache:
+        cache[own] = Along(make())
     return cache[own]

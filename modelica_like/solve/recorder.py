@@ -40,6 +40,21 @@ class Event:
 
 
 @dataclass(frozen=True)
+class Impact:
+    """Energy that a component loses at once, at an event.
+
+    Attributes:
+        component: its path.
+        energy: what is lost, in J.
+        time: when, in s.
+    """
+
+    component: str
+    energy: float
+    time: float
+
+
+@dataclass(frozen=True)
 class Segment:
     """A smooth piece of the solution with fixed modes; both ends included.
 

@@ -17,7 +17,7 @@ from modelica_like.solve.energy import EnergyBalance, energy_balance
 from modelica_like.solve.idas import Integrator
 from modelica_like.solve.options import Options
 from modelica_like.solve.rates import differentiated, rate_along
-from modelica_like.solve.recorder import Event, Segment
+from modelica_like.solve.recorder import Event, Impact, Segment
 
 if TYPE_CHECKING:
     import pandas
@@ -92,6 +92,7 @@ class Solution:
         segments: smooth pieces with fixed modes.
         events: mode changes.
         statistics: what the run took.
+        impacts: what components lost at once, at events.
     """
 
     model: CompiledDae
@@ -99,6 +100,7 @@ class Solution:
     segments: tuple[Segment, ...]
     events: tuple[Event, ...]
     statistics: Statistics
+    impacts: tuple[Impact, ...] = ()
     _cache: dict[str, Any] = field(default_factory=dict, repr=False)
 
     @property
@@ -181,7 +183,7 @@ class Solution:
         if "energy" not in self._cache:
             count = len(self.time)
             flat = np.array(self.model.energy(*self._arguments()))
-            self._cache["energy"] = flat.reshape(len(self.model.components), count, 5).transpose(0, 2, 1)
+            self._cache["energy"] = flat.reshape(len(self.model.components), count, 6).transpose(0, 2, 1)
         return self._cache["energy"]
 
     def _check_within(self, t: float) -> None:
@@ -226,7 +228,9 @@ class Solution:
     def energy(self) -> EnergyBalance:
         """Return the energy balance of every component over the run."""
         if "balance" not in self._cache:
-            self._cache["balance"] = energy_balance(self.model, self.segments)
+            self._cache["balance"] = energy_balance(
+                self.model, self.segments, self.options, self.events, self.impacts
+            )
         return self._cache["balance"]
 
     def plot(self, *patterns: str, title: str = "") -> Figure:

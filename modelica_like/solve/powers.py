@@ -1,0 +1,279 @@
+"""Integrals of the powers along a run, by quadrature over its own results, and in between where that is too coarse."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from modelica_like.compile.buffers import along
+from modelica_like.compile.compiled import CompiledDae, Vector
+from modelica_like.errors import ModelicaLikeError
+from modelica_like.initialize import Point
+from modelica_like.solve.idas import Integrator
+from modelica_like.solve.nodes import LOBATTO, Nodes, Rule, between, rules
+from modelica_like.solve.options import Options
+from modelica_like.solve.recorder import Segment
+
+_COLUMNS = 5
+"""Powers of a component: loss, source, inflow, rate of the stored energy, magnitudes through the connectors."""
+_SHARE = 1.0
+"""Part of the run's relative tolerance that the quadrature may add."""
+_TRUSTED = 100.0
+"""Mismatch of states, in relative tolerances of the run, up to which they are interpolated and not integrated again."""
+_SUSPECT = 1e-3
+"""Mismatch of states, relative to their largest values, from which the energies there are compared."""
+_ENOUGH = 4
+_ROUNDS = 9
+_CLOSE = 0.1
+"""Distance of two results, as part of the next one, up to which one of them is left out."""
+_MOST_POINTS = 200_000
+_MOST_OUTPUTS = 4096
+_POLISHING = 3
+
+
+@dataclass
+class Terms:
+    """Energy terms at some points.
+
+    Attributes:
+        stored: energies, shape (components, n).
+        powers: those that are not zero anyway, shape (kept, n).
+        rates: derivatives of the states, shape (nx, n).
+    """
+
+    stored: Vector
+    powers: Vector
+    rates: Vector
+
+
+class Powers:
+    """Evaluates and integrates the energy terms of a run.
+
+    Args:
+        model: the compiled model.
+        options: of the run.
+        segments: its smooth pieces.
+    """
+
+    def __init__(self, model: CompiledDae, options: Options, segments: tuple[Segment, ...]) -> None:
+        self.model, self.options, self.segments = model, options, segments
+        self._discretes = np.array([segment.d for segment in segments]).T
+        self._kept = _kept(model)
+        self.results = _together([(s.times, s.x, s.z, k) for k, s in enumerate(segments)])
+        self.at_results = self._terms(self.results)
+        self._scales = np.maximum(np.max(np.abs(self.results.x), axis=1, initial=0.0), 1e-300)[:, None]
+        self._stored = float(np.max(np.sum(np.abs(self.at_results.stored), axis=0), initial=0.0))
+        self._points = 0
+
+    def table(self, powers: Vector) -> Vector:
+        """Return powers of all components, shape (5, components, ...): loss, source, inflow, rate, magnitudes."""
+        whole = np.zeros((_COLUMNS * len(self.model.components), *powers.shape[1:]))
+        whole[self._kept] = powers
+        return whole.reshape(_COLUMNS, len(self.model.components), *powers.shape[1:])
+
+    def integrals(self) -> Vector:
+        """Integrate all powers over the run; shape (5, components), in J."""
+        every, terms = self.results, self.at_results
+        kept = _apart(every)
+        first, last = (np.searchsorted(kept, ends[kept]) for ends in (every.first, every.last))
+        nodes = Nodes(every.times[kept], every.x[:, kept], every.z[:, kept], every.segment[kept], first, last)
+        terms = Terms(terms.stored[:, kept], terms.powers[:, kept], terms.rates[:, kept])
+        return self.table(self._integrate(nodes, terms, 0, None))
+
+    # -- terms -------------------------------------------------------------------------------------------------------
+
+    def _terms(self, nodes: Nodes) -> Terms:
+        model = self.model
+        function = along(model._cache, "energy terms", lambda: _terms_function(model))
+        d = self._discretes[:, nodes.segment]
+        return Terms(*function(nodes.times, nodes.x, nodes.z, model.p, model.u, d))
+
+    def _polished(self, nodes: Nodes) -> None:
+        """Let interpolated implicit unknowns meet their equations."""
+        model, size = self.model, len(self.model.implicit)
+        function = along(model._cache, "implicit equations", lambda: _implicit_function(model))
+        d = self._discretes[:, nodes.segment]
+        for _ in range(_POLISHING if size else 0):
+            residual, jacobian = function(nodes.times, nodes.x, nodes.z, model.p, model.u, d)
+            slopes = jacobian.T.reshape(-1, size, size).transpose(0, 2, 1)
+            try:
+                step = np.linalg.solve(slopes, residual.T[:, :, None])[:, :, 0].T
+            except np.linalg.LinAlgError:
+                return
+            if not np.isfinite(step).all():
+                return
+            nodes.z = nodes.z - step
+
+    # -- integration -------------------------------------------------------------------------------------------------
+
+    def _integrate(self, nodes: Nodes, terms: Terms, depth: int, allowed: float | None) -> Vector:
+        """Integrate over the intervals of some points, over those that are too coarse with more points inside."""
+        intervals = nodes.intervals
+        intervals = intervals[nodes.times[intervals + 1] > nodes.times[intervals]]
+        if not len(intervals):
+            return np.zeros(len(terms.powers))
+        self._points += len(nodes.times)
+        order = rules(nodes, intervals)
+        whole = terms.powers @ order[0].totals(len(nodes.times), slice(None))
+        if allowed is None:
+            allowed = _SHARE * self.options.rtol * self._throughput(whole)
+        errors, mismatch = self._errors(nodes, terms, intervals, order)
+        coarse = _largest(errors, allowed)
+        if not coarse.any() or depth >= _ROUNDS or self._points > _MOST_POINTS:
+            return whole
+        # A few results alone say too little about the states between them.
+        enough = nodes.last[intervals] - nodes.first[intervals] >= _ENOUGH
+        again = coarse & enough & (mismatch > _TRUSTED * self.options.rtol)
+        if nodes.made:
+            # What was interpolated in vain is integrated from its beginning.
+            again = np.isin(nodes.first[intervals], nodes.first[intervals[again]])
+        finer, done = self._integrated_again(nodes, intervals, again)
+        inside = coarse & ~done
+        parts = [finer] if finer is not None else []
+        parts += [self._interpolated(nodes, terms, intervals[inside])] if inside.any() else []
+        total = terms.powers @ order[0].totals(len(nodes.times), ~(done | inside))
+        for part in parts:
+            total = total + self._integrate(part, self._terms(part), depth + 1, allowed / len(parts))
+        return total
+
+    def _throughput(self, integrals: Vector) -> float:
+        sums = np.sum(np.abs(self.table(integrals)[:3]), axis=1)
+        return max(self._stored, float(np.nanmax(sums, initial=0.0)))
+
+    def _errors(
+        self, nodes: Nodes, terms: Terms, intervals: Vector, order: tuple[Rule, Rule, Rule]
+    ) -> tuple[Vector, Vector]:
+        """Return for each interval the error of its integrals in J, and how far its states are off, as fractions.
+
+        Powers, and rates of states, are looked at in two sums of all with different weights, lest they cancel.
+        """
+        mixed = np.concatenate([_mixed(terms.powers), _mixed(terms.rates / self._scales)])
+        best, lower, lowest = (rule.apply(mixed) for rule in order)
+        near, far = np.abs(best - lower), np.abs(lower - lowest)
+        # The difference of two orders is the error of the lower one; a difference more tells what an order gains.
+        gained = np.divide(near, far, out=np.ones_like(near), where=far > near)
+        errors = np.max((near * gained)[:2], axis=0)
+        moved = np.diff(_mixed(nodes.x / self._scales), axis=1)[:, intervals]
+        mismatch = np.max(np.abs(moved - best[2:]), axis=0)
+        suspect = np.flatnonzero(mismatch > _SUSPECT)
+        if len(suspect):
+            errors[suspect] = np.maximum(errors[suspect], self._astray(nodes, terms, intervals[suspect], order[0], suspect))
+        return np.where(np.isfinite(errors), errors, np.inf), np.where(np.isfinite(mismatch), mismatch, np.inf)
+
+    def _astray(self, nodes: Nodes, terms: Terms, intervals: Vector, rule: Rule, rows: Vector) -> Vector:
+        """Return how much stored energies differ between what the rates lead to and the state at the end, in J."""
+        ends = intervals + 1
+        reached = nodes.x[:, intervals] + Rule(rule.places[rows], rule.weights[rows]).apply(terms.rates)
+        led = Nodes(nodes.times[ends], reached, nodes.z[:, ends], nodes.segment[ends], ends, ends)
+        return np.max(np.abs(self._terms(led).stored - terms.stored[:, ends]), axis=0, initial=0.0)
+
+    # -- points in between -------------------------------------------------------------------------------------------
+
+    def _interpolated(self, nodes: Nodes, terms: Terms, intervals: Vector) -> Nodes:
+        """Return a block of five points for each interval."""
+        times, x, z = between(nodes, terms.rates, intervals, LOBATTO[1:-1])
+        ends = np.array([intervals, intervals + 1]).T
+
+        def joined(outer: Vector, inner: Vector) -> Vector:
+            return np.concatenate([outer[..., ends[:, :1]], inner, outer[..., ends[:, 1:]]], axis=-1)
+
+        size, count = len(LOBATTO), len(intervals)
+        first = np.repeat(np.arange(count) * size, size)
+        made = Nodes(
+            joined(nodes.times, times).ravel(), joined(nodes.x, x).reshape(len(x), count * size),
+            joined(nodes.z, z).reshape(len(z), count * size), np.repeat(nodes.segment[intervals], size), first, first + size - 1,
+            made=True,
+        )  # fmt: skip
+        self._polished(made)
+        return made
+
+    def _integrated_again(self, nodes: Nodes, intervals: Vector, wanted: Vector) -> tuple[Nodes | None, Vector]:
+        """Integrate the wanted intervals with more results, as far as that succeeds; return which these are."""
+        done = np.zeros(len(intervals), bool)
+        blocks: list[tuple[Vector, Vector, Vector, int]] = []
+        for run in _contiguous(nodes, intervals, wanted):
+            a, b = intervals[run[0]], intervals[run[-1]] + 1
+            outputs = min(max(32, 1 << (4 * len(run) - 1).bit_length()), _MOST_OUTPUTS)
+            span = float(nodes.times[b] - nodes.times[a])
+            d = self._discretes[:, nodes.segment[a]]
+            start = Point(float(nodes.times[a]), nodes.x[:, a].copy(), nodes.z[:, a].copy(), d)
+            try:
+                x, z = Integrator(self.model, self.options).run(start, span, outputs)
+            except ModelicaLikeError:
+                continue
+            times = start.t + span * np.arange(outputs + 1) / outputs
+            x = np.concatenate([start.x[:, None], x], axis=1)
+            z = np.concatenate([start.z[:, None], z], axis=1)
+            blocks.append((times, x, z, int(nodes.segment[a])))
+            done[run] = True
+        return (_together(blocks) if blocks else None), done
+
+
+def _contiguous(nodes: Nodes, intervals: Vector, wanted: Vector) -> list[Vector]:
+    """Return runs of wanted intervals that follow each other in time within a segment."""
+    chosen = np.flatnonzero(wanted)
+    if not len(chosen):
+        return []
+    starts, ends = intervals[chosen], intervals[chosen] + 1
+    apart = (nodes.times[starts[1:]] != nodes.times[ends[:-1]]) | (nodes.segment[starts[1:]] != nodes.segment[ends[:-1]])
+    long = _MOST_OUTPUTS // 4
+    return [part for run in np.split(chosen, np.flatnonzero(apart) + 1) for part in np.split(run, range(long, len(run), long))]
+
+
+def _together(blocks: list[tuple[Vector, Vector, Vector, int]]) -> Nodes:
+    sizes = [len(times) for times, *_ in blocks]
+    ends = np.cumsum(sizes)
+    columns = [np.concatenate([block[k] for block in blocks], axis=-1) for k in range(3)]
+    segment = np.repeat([block[3] for block in blocks], sizes)
+    return Nodes(*columns, segment, np.repeat(ends - sizes, sizes), np.repeat(ends - 1, sizes))
+
+
+def _apart(nodes: Nodes) -> Vector:
+    """Return the ends of segments, and what lies between them well apart from its neighbours.
+
+    The results beside an event may be as near to it as they like; a polynomial through both would follow their errors.
+    """
+    gaps = np.diff(nodes.times)
+    before, after = np.append(0.0, gaps), np.append(gaps, 0.0)
+    places = np.arange(len(nodes.times))
+    inner = (places > nodes.first) & (places < nodes.last)
+    return np.flatnonzero(~inner | (np.minimum(before, after) >= _CLOSE * np.maximum(before, after)))
+
+
+def _largest(errors: Vector, allowed: float) -> Vector:
+    """Mark the largest errors, so that the others together are no more than allowed."""
+    order = np.argsort(errors)
+    marked = np.zeros(len(errors), bool)
+    marked[order[np.cumsum(errors[order]) > allowed]] = True
+    return marked
+
+
+def _mixed(rows: Vector) -> Vector:
+    """Return two sums of rows with different weights, shape (2, n)."""
+    turns = 0.618 * np.arange(len(rows))
+    weights = np.array([1.0 + np.modf(turns)[0], 2.0 - 3.0 * np.modf(1.7 * turns)[0]])
+    return weights @ rows
+
+
+def _kept(model: CompiledDae) -> list[int]:
+    if "energy kept" not in model._cache:
+        every = ca.vec(model.energy(*model.arguments.values())[:, 1:])
+        model._cache["energy kept"] = [k for k in range(every.numel()) if not every[k].is_zero()]
+    return model._cache["energy kept"]
+
+
+def _terms_function(model: CompiledDae) -> ca.Function:
+    """Return stored energies, powers that are not zero anyway, and derivatives of the states, as one function."""
+    arguments = list(model.arguments.values())
+    terms = model.energy(*arguments)
+    powers = ca.vec(terms[:, 1:])[_kept(model)]
+    results = [ca.densify(one) for one in (terms[:, 0], powers, model.ode(*arguments))]
+    return ca.Function("terms", arguments, results, {"cse": True})
+
+
+def _implicit_function(model: CompiledDae) -> ca.Function:
+    arguments = list(model.arguments.values())
+    results = [model.alg(*arguments), ca.densify(model.alg_jacobian(*arguments))]
+    return ca.Function("implicit", arguments, [ca.densify(one) for one in results])
