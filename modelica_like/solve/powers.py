@@ -18,7 +18,7 @@ from modelica_like.solve.recorder import Segment
 
 _COLUMNS = 5
 """Powers of a component: loss, source, inflow, rate of the stored energy, magnitudes through the connectors."""
-_SHARE = 1.0
+_SHARE = 3.0
 """Part of the run's relative tolerance that the quadrature may add."""
 _TRUSTED = 100.0
 """Mismatch of states, in relative tolerances of the run, up to which they are interpolated and not integrated again."""
@@ -29,7 +29,7 @@ _ROUNDS = 9
 _CLOSE = 0.1
 """Distance of two results, as part of the next one, up to which one of them is left out."""
 _MOST_POINTS = 200_000
-_MOST_OUTPUTS = 4096
+_FEWEST_OUTPUTS, _MOST_OUTPUTS = 128, 4096
 _POLISHING = 3
 
 
@@ -131,11 +131,11 @@ class Powers:
             again = np.isin(nodes.first[intervals], nodes.first[intervals[again]])
         finer, done = self._integrated_again(nodes, intervals, again)
         inside = coarse & ~done
-        parts = [finer] if finer is not None else []
+        parts = [(finer, self._terms(finer))] if finer is not None else []
         parts += [self._interpolated(nodes, terms, intervals[inside])] if inside.any() else []
         total = terms.powers @ order[0].totals(len(nodes.times), ~(done | inside))
-        for part in parts:
-            total = total + self._integrate(part, self._terms(part), depth + 1, allowed / len(parts))
+        for part, there in parts:
+            total = total + self._integrate(part, there, depth + 1, allowed / len(parts))
         return total
 
     def _throughput(self, integrals: Vector) -> float:
@@ -171,23 +171,27 @@ class Powers:
 
     # -- points in between -------------------------------------------------------------------------------------------
 
-    def _interpolated(self, nodes: Nodes, terms: Terms, intervals: Vector) -> Nodes:
-        """Return a block of five points for each interval."""
+    def _interpolated(self, nodes: Nodes, terms: Terms, intervals: Vector) -> tuple[Nodes, Terms]:
+        """Return a block of five points for each interval, and the energy terms there."""
         times, x, z = between(nodes, terms.rates, intervals, LOBATTO[1:-1])
-        ends = np.array([intervals, intervals + 1]).T
+        inner = np.repeat(nodes.segment[intervals], times.shape[1])
+        x, z = (values.reshape(len(values), times.size) for values in (x, z))
+        flat = Nodes(times.ravel(), x, z, inner, inner, inner)
+        self._polished(flat)
+        new = self._terms(flat)
 
-        def joined(outer: Vector, inner: Vector) -> Vector:
-            return np.concatenate([outer[..., ends[:, :1]], inner, outer[..., ends[:, 1:]]], axis=-1)
+        def joined(outer: Vector, inside: Vector) -> Vector:
+            middle = inside.reshape(*outer.shape[:-1], *times.shape)
+            block = [outer[..., intervals, None], middle, outer[..., intervals + 1, None]]
+            return np.concatenate(block, axis=-1).reshape(*outer.shape[:-1], len(times) * len(LOBATTO))
 
-        size, count = len(LOBATTO), len(intervals)
-        first = np.repeat(np.arange(count) * size, size)
+        first = np.repeat(np.arange(len(times)) * len(LOBATTO), len(LOBATTO))
         made = Nodes(
-            joined(nodes.times, times).ravel(), joined(nodes.x, x).reshape(len(x), count * size),
-            joined(nodes.z, z).reshape(len(z), count * size), np.repeat(nodes.segment[intervals], size), first, first + size - 1,
-            made=True,
+            joined(nodes.times, flat.times), joined(nodes.x, flat.x), joined(nodes.z, flat.z),
+            np.repeat(nodes.segment[intervals], len(LOBATTO)), first, first + len(LOBATTO) - 1, made=True,
         )  # fmt: skip
-        self._polished(made)
-        return made
+        pairs = ((terms.stored, new.stored), (terms.powers, new.powers), (terms.rates, new.rates))
+        return made, Terms(*(joined(*pair) for pair in pairs))
 
     def _integrated_again(self, nodes: Nodes, intervals: Vector, wanted: Vector) -> tuple[Nodes | None, Vector]:
         """Integrate the wanted intervals with more results, as far as that succeeds; return which these are."""
@@ -195,7 +199,7 @@ class Powers:
         blocks: list[tuple[Vector, Vector, Vector, int]] = []
         for run in _contiguous(nodes, intervals, wanted):
             a, b = intervals[run[0]], intervals[run[-1]] + 1
-            outputs = min(max(32, 1 << (4 * len(run) - 1).bit_length()), _MOST_OUTPUTS)
+            outputs = min(max(_FEWEST_OUTPUTS, 1 << (4 * len(run) - 1).bit_length()), _MOST_OUTPUTS)
             span = float(nodes.times[b] - nodes.times[a])
             d = self._discretes[:, nodes.segment[a]]
             start = Point(float(nodes.times[a]), nodes.x[:, a].copy(), nodes.z[:, a].copy(), d)
