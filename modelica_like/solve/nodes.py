@@ -12,9 +12,11 @@ from modelica_like.compile.compiled import Vector
 
 _WIDTH = 8
 """Points of the widest rule; its order."""
-_UNIFORM = 1e-9
+_UNIFORM, _ROUNDING = 1e-9, 1e-15
 LOBATTO = np.array([0.0, 0.5 - np.sqrt(21.0) / 14.0, 0.5, 0.5 + np.sqrt(21.0) / 14.0, 1.0])
 """Points of the rule of order eight that has both ends among them."""
+LOBATTO_WEIGHTS = np.array([[9, 49, 64, 49, 9], [30, 0, 120, 0, 30], [90, 0, 0, 0, 90]]) / 180.0
+"""Weights of this rule, of Simpson's and of the trapezoid."""
 
 
 @dataclass
@@ -101,7 +103,9 @@ def _rule(nodes: Nodes, intervals: Any, sizes: Any) -> Rule:
     offsets = intervals - starts
     spans = nodes.times[intervals + 1] - nodes.times[intervals]
     steps = np.diff(nodes.times[places], axis=1)
-    uniform = np.abs(steps / spans[:, None] - 1.0) < _UNIFORM
+    # Times are rounded themselves.
+    near = _UNIFORM * spans + _ROUNDING * np.abs(nodes.times[intervals])
+    uniform = np.abs(steps - spans[:, None]) < near[:, None]
     uniform |= np.arange(1, width) >= sizes[:, None]
     regular = uniform.all(axis=1)
     for size in np.flatnonzero(np.bincount(sizes)):

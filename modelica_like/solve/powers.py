@@ -12,12 +12,15 @@ from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import ModelicaLikeError
 from modelica_like.initialize import Point
 from modelica_like.solve.idas import Integrator
-from modelica_like.solve.nodes import LOBATTO, Nodes, Rule, between, rules
+from modelica_like.solve.nodes import LOBATTO, LOBATTO_WEIGHTS, Nodes, Rule, between, rules
 from modelica_like.solve.options import Options
 from modelica_like.solve.recorder import Segment
 
 _COLUMNS = 5
 """Powers of a component: loss, source, inflow, rate of the stored energy, magnitudes through the connectors."""
+_GAIN = 0.1
+"""How much better than the next lower one a rule is believed to be at most."""
+_RATE = 3
 _SHARE = 3.0
 """Part of the run's relative tolerance that the quadrature may add."""
 _TRUSTED = 100.0
@@ -26,10 +29,14 @@ _SUSPECT = 1e-3
 """Mismatch of states, relative to their largest values, from which the energies there are compared."""
 _ENOUGH = 4
 _ROUNDS = 9
+_TRIALS = 40
+"""Calls of the integrator for one piece of a run."""
 _CLOSE = 0.1
 """Distance of two results, as part of the next one, up to which one of them is left out."""
 _MOST_POINTS = 200_000
-_FEWEST_OUTPUTS, _MOST_OUTPUTS = 128, 4096
+_SOME, _MANY, _MOST_OUTPUTS = 32, 128, 4096
+_UNRESOLVED = 1e-2
+"""Mismatch of states, relative to their largest values, from which many points are needed at once."""
 _POLISHING = 3
 
 
@@ -121,15 +128,17 @@ class Powers:
             allowed = _SHARE * self.options.rtol * self._throughput(whole)
         errors, mismatch = self._errors(nodes, terms, intervals, order)
         coarse = _largest(errors, allowed)
+        adrift = self._adrift(nodes, terms, intervals, 2.0 * allowed)
+        coarse |= adrift
         if not coarse.any() or depth >= _ROUNDS or self._points > _MOST_POINTS:
             return whole
         # A few results alone say too little about the states between them.
         enough = nodes.last[intervals] - nodes.first[intervals] >= _ENOUGH
-        again = coarse & enough & (mismatch > _TRUSTED * self.options.rtol)
+        again = adrift | coarse & enough & (mismatch > _TRUSTED * self.options.rtol)
         if nodes.made:
             # What was interpolated in vain is integrated from its beginning.
             again = np.isin(nodes.first[intervals], nodes.first[intervals[again]])
-        finer, done = self._integrated_again(nodes, intervals, again)
+        finer, done = self._integrated_again(nodes, intervals, again, mismatch)
         inside = coarse & ~done
         parts = [(finer, self._terms(finer))] if finer is not None else []
         parts += [self._interpolated(nodes, terms, intervals[inside])] if inside.any() else []
@@ -152,9 +161,9 @@ class Powers:
         mixed = np.concatenate([_mixed(terms.powers), _mixed(terms.rates / self._scales)])
         best, lower, lowest = (rule.apply(mixed) for rule in order)
         near, far = np.abs(best - lower), np.abs(lower - lowest)
-        # The difference of two orders is the error of the lower one; a difference more tells what an order gains.
-        gained = np.divide(near, far, out=np.ones_like(near), where=far > near)
-        errors = np.max((near * gained)[:2], axis=0)
+        errors = np.max(_gaining(near, far)[:2], axis=0)
+        if nodes.made:
+            errors = errors * self._balanced(nodes, mixed[:2], errors)
         moved = np.diff(_mixed(nodes.x / self._scales), axis=1)[:, intervals]
         mismatch = np.max(np.abs(moved - best[2:]), axis=0)
         suspect = np.flatnonzero(mismatch > _SUSPECT)
@@ -162,12 +171,35 @@ class Powers:
             errors[suspect] = np.maximum(errors[suspect], self._astray(nodes, terms, intervals[suspect], order[0], suspect))
         return np.where(np.isfinite(errors), errors, np.inf), np.where(np.isfinite(mismatch), mismatch, np.inf)
 
+    def _balanced(self, nodes: Nodes, mixed: Vector, errors: Vector) -> Vector:
+        """Return by how much errors within a block cancel: Lobatto's rule as a whole is better than its parts."""
+        size = len(LOBATTO)
+        if len(errors) * size != len(nodes.times) * (size - 1):
+            return np.ones(len(errors))
+        spans = nodes.times[size - 1 :: size] - nodes.times[::size]
+        blocks = mixed.reshape(2, -1, size)
+        best, lower, lowest = (blocks @ weights * spans for weights in LOBATTO_WEIGHTS)
+        whole = np.max(_gaining(np.abs(best - lower), np.abs(lower - lowest)), axis=0)
+        parts = np.sum(errors.reshape(-1, size - 1), axis=1)
+        return np.repeat(np.minimum(1.0, whole / np.maximum(parts, 1e-300)), size - 1)
+
     def _astray(self, nodes: Nodes, terms: Terms, intervals: Vector, rule: Rule, rows: Vector) -> Vector:
         """Return how much stored energies differ between what the rates lead to and the state at the end, in J."""
         ends = intervals + 1
         reached = nodes.x[:, intervals] + Rule(rule.places[rows], rule.weights[rows]).apply(terms.rates)
         led = Nodes(nodes.times[ends], reached, nodes.z[:, ends], nodes.segment[ends], ends, ends)
         return np.max(np.abs(self._terms(led).stored - terms.stored[:, ends]), axis=0, initial=0.0)
+
+    def _adrift(self, nodes: Nodes, terms: Terms, intervals: Vector, allowed: float) -> Vector:
+        """Mark intervals of interpolated blocks over which stored energies change otherwise than their rates say."""
+        if not nodes.made:
+            return np.zeros(len(intervals), bool)
+        size = len(LOBATTO)
+        spans = nodes.times[size - 1 :: size] - nodes.times[::size]
+        means = np.einsum("rbk,k->rb", terms.powers.reshape(len(terms.powers), -1, size), LOBATTO_WEIGHTS[0])
+        change = terms.stored[:, size - 1 :: size] - terms.stored[:, ::size]
+        drift = np.max(np.abs(change - self.table(means * spans)[_RATE]), axis=0, initial=0.0)
+        return _largest(np.nan_to_num(drift, nan=np.inf), allowed)[nodes.first[intervals] // size]
 
     # -- points in between -------------------------------------------------------------------------------------------
 
@@ -193,26 +225,48 @@ class Powers:
         pairs = ((terms.stored, new.stored), (terms.powers, new.powers), (terms.rates, new.rates))
         return made, Terms(*(joined(*pair) for pair in pairs))
 
-    def _integrated_again(self, nodes: Nodes, intervals: Vector, wanted: Vector) -> tuple[Nodes | None, Vector]:
+    def _integrated_again(
+        self, nodes: Nodes, intervals: Vector, wanted: Vector, mismatch: Vector
+    ) -> tuple[Nodes | None, Vector]:
         """Integrate the wanted intervals with more results, as far as that succeeds; return which these are."""
         done = np.zeros(len(intervals), bool)
-        blocks: list[tuple[Vector, Vector, Vector, int]] = []
+        blocks: list[_Block] = []
         for run in _contiguous(nodes, intervals, wanted):
             a, b = intervals[run[0]], intervals[run[-1]] + 1
-            outputs = min(max(_FEWEST_OUTPUTS, 1 << (4 * len(run) - 1).bit_length()), _MOST_OUTPUTS)
-            span = float(nodes.times[b] - nodes.times[a])
             d = self._discretes[:, nodes.segment[a]]
             start = Point(float(nodes.times[a]), nodes.x[:, a].copy(), nodes.z[:, a].copy(), d)
+            fewest = _MANY if np.max(mismatch[run]) > _UNRESOLVED else _SOME
+            outputs = min(max(fewest, 1 << (4 * len(run) - 1).bit_length()), _MOST_OUTPUTS)
+            found = self._followed(start, float(nodes.times[b]), outputs, int(nodes.segment[a]))
+            blocks += found
+            done[run] = bool(found)
+        return (_together(blocks) if blocks else None), done
+
+    def _followed(self, start: Point, end: float, outputs: int, segment: int) -> list[_Block]:
+        """Integrate from a point to a time, in pieces where it fails in one; nothing if it fails for good."""
+        blocks: list[_Block] = []
+        span = end - start.t
+        for _ in range(_TRIALS):
+            last = start.t + span >= end - 1e-9 * span
+            span = end - start.t if last else span
             try:
                 x, z = Integrator(self.model, self.options).run(start, span, outputs)
             except ModelicaLikeError:
+                span /= 8
                 continue
             times = start.t + span * np.arange(outputs + 1) / outputs
+            times[-1] = end if last else times[-1]
             x = np.concatenate([start.x[:, None], x], axis=1)
             z = np.concatenate([start.z[:, None], z], axis=1)
-            blocks.append((times, x, z, int(nodes.segment[a])))
-            done[run] = True
-        return (_together(blocks) if blocks else None), done
+            blocks.append((times, x, z, segment))
+            if last:
+                return blocks
+            start = Point(float(times[-1]), x[:, -1].copy(), z[:, -1].copy(), start.d)
+            span *= 2
+        return []
+
+
+_Block = tuple[Vector, Vector, Vector, int]
 
 
 def _contiguous(nodes: Nodes, intervals: Vector, wanted: Vector) -> list[Vector]:
@@ -226,7 +280,7 @@ def _contiguous(nodes: Nodes, intervals: Vector, wanted: Vector) -> list[Vector]
     return [part for run in np.split(chosen, np.flatnonzero(apart) + 1) for part in np.split(run, range(long, len(run), long))]
 
 
-def _together(blocks: list[tuple[Vector, Vector, Vector, int]]) -> Nodes:
+def _together(blocks: list[_Block]) -> Nodes:
     sizes = [len(times) for times, *_ in blocks]
     ends = np.cumsum(sizes)
     columns = [np.concatenate([block[k] for block in blocks], axis=-1) for k in range(3)]
@@ -252,6 +306,14 @@ def _largest(errors: Vector, allowed: float) -> Vector:
     marked = np.zeros(len(errors), bool)
     marked[order[np.cumsum(errors[order]) > allowed]] = True
     return marked
+
+
+def _gaining(near: Vector, far: Vector) -> Vector:
+    """Estimate the error of a rule from how much it differs from one of lower order, and this from one of still lower.
+
+    The difference of two rules is the error of the lower one; a difference more tells what an order gains.
+    """
+    return near * np.divide(near, far, out=np.ones_like(near), where=far > near).clip(_GAIN)
 
 
 def _mixed(rows: Vector) -> Vector:
