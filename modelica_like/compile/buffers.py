@@ -27,6 +27,7 @@ class BufferedFunction:
         self._arguments = [np.zeros(function.nnz_in(k)) for k in range(function.n_in())]
         self._results = [np.zeros(function.nnz_out(k)) for k in wanted]
         self._buffer, self._evaluate = function.buffer()
+        self._everywhere: dict[int, Any] = {}
         for k, array in enumerate(self._arguments):
             self._buffer.set_arg(k, memoryview(cast(Any, array)))
         for k, array in zip(wanted, self._results, strict=True):
@@ -47,7 +48,9 @@ class BufferedFunction:
         for k, part in ((0, t), (1, x), (2, z), (5, d)):
             self._arguments[k][: len(part)] = part
         for k, part in ((3, p), (4, u)):
-            self._arguments[k].reshape(-1, max(len(part), 1))[:] = part if len(part) else 0.0
+            if len(part) and not np.array_equal(self._everywhere.get(k), part):
+                self._arguments[k].reshape(-1, len(part))[:] = part
+                self._everywhere[k] = part.copy()
         self._evaluate()
         return self._results
 
@@ -72,19 +75,25 @@ class Along:
     """A CasADi function of (t, x, z, p, u, d) at many points, in blocks of bounded size through fixed buffers.
 
     Args:
-        function: with dense results.
+        function: with dense results; arguments without entries are left out.
     """
 
     def __init__(self, function: ca.Function) -> None:
         self._function = function
-        self._rows = [function.numel_out(k) for k in range(function.n_out())]
+        self.rows = [function.numel_out(k) for k in range(function.n_out())]
         self._made: dict[int, BufferedFunction] = {}
 
     def __call__(self, times: Vector, x: Vector, z: Vector, p: Vector, u: Vector, d: Vector) -> list[Vector]:
         """Evaluate at n points; shapes (n,), (nx, n), (nz, n), (np,), (nu,), (nd, n), results (rows, n)."""
-        total = len(times)
-        results = [np.empty((rows, total)) for rows in self._rows]
-        first = 0
+        results = [np.empty((rows, len(times))) for rows in self.rows]
+        self.into(results, times, x, z, p, u, d)
+        return results
+
+    def into(
+        self, results: list[Vector], times: Vector, x: Vector, z: Vector, p: Vector, u: Vector, d: Vector
+    ) -> None:
+        """Evaluate as a call does, into given arrays."""
+        total, first = results[0].shape[1], 0
         for size in _BLOCKS:
             while total - first >= (size if size > _BLOCKS[-1] else 1):
                 last = min(first + size, total)
@@ -95,7 +104,6 @@ class Along:
                 for whole, part in zip(results, block, strict=True):
                     whole[:, first:last] = part.reshape(size, -1).T[:, : last - first]
                 first = last
-        return results
 
 
 def along(cache: dict[Any, Any], key: Any, make: Any) -> Along:
