@@ -40,15 +40,15 @@ class BufferedFunction:
         self._evaluate()
         return [array.copy() for array in self._results]
 
-    def along(self, t: Vector, x: Vector, z: Vector, d: Vector, p: Vector, u: Vector) -> list[Vector]:
-        """Evaluate a mapped function at as many points as there are, and at what was left there in the places behind.
+    def along(self, points: list[Vector], p: Vector, u: Vector) -> list[Vector]:
+        """Evaluate a mapped function at as many points (t, x, z, d) as there are; what lies behind is left over.
 
         p and u are the same at all points; the results are valid until the next call.
         """
-        for k, part in ((0, t), (1, x), (2, z), (5, d)):
+        for k, part in zip((0, 1, 2, 5), points, strict=True):
             self._arguments[k][: len(part)] = part
         for k, part in ((3, p), (4, u)):
-            if len(part) and not np.array_equal(self._everywhere.get(k), part):
+            if len(part) and not (k in self._everywhere and np.array_equal(self._everywhere[k], part)):
                 self._arguments[k].reshape(-1, len(part))[:] = part
                 self._everywhere[k] = part.copy()
         self._evaluate()
@@ -89,9 +89,7 @@ class Along:
         self.into(results, times, x, z, p, u, d)
         return results
 
-    def into(
-        self, results: list[Vector], times: Vector, x: Vector, z: Vector, p: Vector, u: Vector, d: Vector
-    ) -> None:
+    def into(self, results: list[Vector], times: Vector, x: Vector, z: Vector, p: Vector, u: Vector, d: Vector) -> None:
         """Evaluate as a call does, into given arrays."""
         total, first = results[0].shape[1], 0
         for size in _BLOCKS:
@@ -99,8 +97,8 @@ class Along:
                 last = min(first + size, total)
                 if size not in self._made:
                     self._made[size] = BufferedFunction(self._function.map(size))
-                parts = (part[..., first:last].ravel("F") for part in (times, x, z, d))
-                block = self._made[size].along(*parts, p, u)
+                now = [part[..., first:last].ravel("F") for part in (times, x, z, d)]
+                block = self._made[size].along(now, p, u)
                 for whole, part in zip(results, block, strict=True):
                     whole[:, first:last] = part.reshape(size, -1).T[:, : last - first]
                 first = last

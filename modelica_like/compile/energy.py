@@ -13,8 +13,8 @@ def energy_terms(reduced: ReducedDae) -> Any:
     """Write out the energy terms of every component.
 
     Returns:
-        One row per component: stored energy, loss, source power, power in, rate of the stored energy, and the sum of the
-        magnitudes of the powers through its connectors, beside which a power in is rounding or is not.
+        One row per component: stored energy, loss, source power, power in, rate of the stored energy, and the sum of
+        the magnitudes of the powers through its connectors, beside which a power in is rounding or is not.
     """
     flat = reduced.flat
     variable = {one.path: k for k, one in enumerate(flat.variables)}

@@ -181,7 +181,11 @@ class EnergyBalance:
     @property
     def impacts(self) -> tuple[str, ...]:
         """What was lost in impacts, as sentences."""
-        return tuple(f"{row.component or 'The model itself'} lost {row.impact:.6g} J in impacts." for row in self.rows if row.impact)
+        return tuple(
+            f"{row.component or 'The model itself'} lost {row.impact:.6g} J in impacts."
+            for row in self.rows
+            if row.impact
+        )
 
 
 def energy_balance(

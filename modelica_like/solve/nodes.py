@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
 from modelica_like.compile.compiled import Vector
 
+Places = np.ndarray[Any, np.dtype[Any]]
+"""Positions of points or intervals, or which of them are meant."""
 _WIDTH = 8
 """Points of the widest rule; its order."""
 _UNIFORM, _ROUNDING = 1e-9, 1e-15
@@ -36,13 +38,13 @@ class Nodes:
     times: Vector
     x: Vector
     z: Vector
-    segment: Any
-    first: Any
-    last: Any
+    segment: Places
+    first: Places
+    last: Places
     made: bool = False
 
     @property
-    def intervals(self) -> Any:
+    def intervals(self) -> Places:
         """Points with another one of the same block behind them."""
         return np.flatnonzero(np.arange(len(self.times)) < self.last)
 
@@ -51,33 +53,35 @@ class Nodes:
 class Rule:
     """Integrals over intervals as weighted sums of values at some points around, shapes (intervals, width)."""
 
-    places: Any
+    places: Places
     weights: Vector
 
     def apply(self, values: Vector) -> Vector:
         """Integrate; shapes (rows, n), (rows, intervals)."""
         return np.einsum("rjw,jw->rj", values[:, self.places], self.weights)
 
-    def totals(self, count: int, wanted: Any) -> Vector:
+    def totals(self, count: int, wanted: Places | slice) -> Vector:
         """Return the weight of each of `count` points in the sum of the integrals over the wanted intervals."""
-        return np.bincount(self.places[wanted].ravel(), self.weights[wanted].ravel(), count)
+        return np.asarray(np.bincount(self.places[wanted].ravel(), self.weights[wanted].ravel(), count), float)
 
 
-def rules(nodes: Nodes, intervals: Any) -> tuple[Rule, Rule, Rule]:
+def rules(nodes: Nodes, intervals: Places) -> tuple[Rule, Rule, Rule]:
     """Return three rules of falling order, as high as the blocks allow."""
     each = len(LOBATTO) - 1
     if nodes.made and len(intervals) == each * (len(nodes.times) // (each + 1)):
         blocks = nodes.first[:: each + 1]
         spans = nodes.times[blocks + each] - nodes.times[blocks]
-        return tuple(  # type: ignore[return-value]
+        found = [
             Rule(
                 (blocks[:, None, None] + rule.places).reshape(len(intervals), -1),
                 (spans[:, None, None] * rule.weights).reshape(len(intervals), -1),
             )
             for rule in _lobatto_rules()
-        )
-    sizes = np.minimum(nodes.last[intervals] - nodes.first[intervals] + 1, _WIDTH)
-    return tuple(_rule(nodes, intervals, np.maximum(sizes - less, 1)) for less in (0, 2, 4))  # type: ignore[return-value]
+        ]
+    else:
+        sizes = np.minimum(nodes.last[intervals] - nodes.first[intervals] + 1, _WIDTH)
+        found = [_rule(nodes, intervals, np.maximum(sizes - less, 1)) for less in (0, 2, 4)]
+    return cast("tuple[Rule, Rule, Rule]", tuple(found))
 
 
 @cache
@@ -88,13 +92,13 @@ def _lobatto_rules() -> tuple[Rule, Rule, Rule]:
     return rules(Nodes(LOBATTO, none, none, ends, ends, ends + count - 1), np.arange(count - 1))
 
 
-def windows(nodes: Nodes, intervals: Any, sizes: Any) -> Any:
+def windows(nodes: Nodes, intervals: Places, sizes: Places) -> Places:
     """Return the first of `sizes` points around each interval, as far in the middle as its block allows."""
     first = intervals - (sizes - 1) // 2
     return np.clip(first, nodes.first[intervals], nodes.last[intervals] + 1 - sizes)
 
 
-def _rule(nodes: Nodes, intervals: Any, sizes: Any) -> Rule:
+def _rule(nodes: Nodes, intervals: Places, sizes: Places) -> Rule:
     starts = windows(nodes, intervals, sizes)
     width = int(sizes.max(initial=1))
     # Narrower windows are filled up with weights of zero.
@@ -134,7 +138,7 @@ def _weights(places: Vector) -> Vector:
     return np.linalg.solve(powers, moments[:, :, None])[:, :, 0]
 
 
-def between(nodes: Nodes, rates: Vector, intervals: Any, shares: Vector) -> tuple[Vector, Vector, Vector]:
+def between(nodes: Nodes, rates: Vector, intervals: Places, shares: Vector) -> tuple[Vector, Vector, Vector]:
     """Interpolate inside of intervals: states by values and rates at up to four points around, the rest by values.
 
     Args:
@@ -165,7 +169,7 @@ def between(nodes: Nodes, rates: Vector, intervals: Any, shares: Vector) -> tupl
 
 
 def _lagrange(known: Vector, times: Vector) -> tuple[Vector, Vector]:
-    """Lagrange polynomials over (m, w) points at (m, k) times, shape (m, k, w), and their slopes at their own points."""
+    """Lagrange polynomials over (m, w) points at (m, k) times, shape (m, k, w), and their slopes at the points."""
     count = known.shape[1]
     values = np.ones((*times.shape, count))
     slopes = np.zeros(known.shape)

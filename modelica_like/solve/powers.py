@@ -12,7 +12,7 @@ from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import ModelicaLikeError
 from modelica_like.initialize import Point
 from modelica_like.solve.idas import Integrator
-from modelica_like.solve.nodes import LOBATTO, LOBATTO_WEIGHTS, Nodes, Rule, between, rules
+from modelica_like.solve.nodes import LOBATTO, LOBATTO_WEIGHTS, Nodes, Places, Rule, between, rules
 from modelica_like.solve.options import Options
 from modelica_like.solve.recorder import Segment
 
@@ -152,7 +152,7 @@ class Powers:
         return max(self._stored, float(np.nanmax(sums, initial=0.0)))
 
     def _errors(
-        self, nodes: Nodes, terms: Terms, intervals: Vector, order: tuple[Rule, Rule, Rule]
+        self, nodes: Nodes, terms: Terms, intervals: Places, order: tuple[Rule, Rule, Rule]
     ) -> tuple[Vector, Vector]:
         """Return for each interval the error of its integrals in J, and how far its states are off, as fractions.
 
@@ -168,7 +168,9 @@ class Powers:
         mismatch = np.max(np.abs(moved - best[2:]), axis=0)
         suspect = np.flatnonzero(mismatch > _SUSPECT)
         if len(suspect):
-            errors[suspect] = np.maximum(errors[suspect], self._astray(nodes, terms, intervals[suspect], order[0], suspect))
+            errors[suspect] = np.maximum(
+                errors[suspect], self._astray(nodes, terms, intervals[suspect], order[0], suspect)
+            )
         return np.where(np.isfinite(errors), errors, np.inf), np.where(np.isfinite(mismatch), mismatch, np.inf)
 
     def _balanced(self, nodes: Nodes, mixed: Vector, errors: Vector) -> Vector:
@@ -183,14 +185,14 @@ class Powers:
         parts = np.sum(errors.reshape(-1, size - 1), axis=1)
         return np.repeat(np.minimum(1.0, whole / np.maximum(parts, 1e-300)), size - 1)
 
-    def _astray(self, nodes: Nodes, terms: Terms, intervals: Vector, rule: Rule, rows: Vector) -> Vector:
+    def _astray(self, nodes: Nodes, terms: Terms, intervals: Places, rule: Rule, rows: Places) -> Vector:
         """Return how much stored energies differ between what the rates lead to and the state at the end, in J."""
         ends = intervals + 1
         reached = nodes.x[:, intervals] + Rule(rule.places[rows], rule.weights[rows]).apply(terms.rates)
         led = Nodes(nodes.times[ends], reached, nodes.z[:, ends], nodes.segment[ends], ends, ends)
         return np.max(np.abs(self._terms(led).stored - terms.stored[:, ends]), axis=0, initial=0.0)
 
-    def _adrift(self, nodes: Nodes, terms: Terms, intervals: Vector, allowed: float) -> Vector:
+    def _adrift(self, nodes: Nodes, terms: Terms, intervals: Places, allowed: float) -> Places:
         """Mark intervals of interpolated blocks over which stored energies change otherwise than their rates say."""
         if not nodes.made:
             return np.zeros(len(intervals), bool)
@@ -203,7 +205,7 @@ class Powers:
 
     # -- points in between -------------------------------------------------------------------------------------------
 
-    def _interpolated(self, nodes: Nodes, terms: Terms, intervals: Vector) -> tuple[Nodes, Terms]:
+    def _interpolated(self, nodes: Nodes, terms: Terms, intervals: Places) -> tuple[Nodes, Terms]:
         """Return a block of five points for each interval, and the energy terms there."""
         times, x, z = between(nodes, terms.rates, intervals, LOBATTO[1:-1])
         inner = np.repeat(nodes.segment[intervals], times.shape[1])
@@ -226,8 +228,8 @@ class Powers:
         return made, Terms(*(joined(*pair) for pair in pairs))
 
     def _integrated_again(
-        self, nodes: Nodes, intervals: Vector, wanted: Vector, mismatch: Vector
-    ) -> tuple[Nodes | None, Vector]:
+        self, nodes: Nodes, intervals: Places, wanted: Places, mismatch: Vector
+    ) -> tuple[Nodes | None, Places]:
         """Integrate the wanted intervals with more results, as far as that succeeds; return which these are."""
         done = np.zeros(len(intervals), bool)
         blocks: list[_Block] = []
@@ -269,26 +271,33 @@ class Powers:
 _Block = tuple[Vector, Vector, Vector, int]
 
 
-def _contiguous(nodes: Nodes, intervals: Vector, wanted: Vector) -> list[Vector]:
+def _contiguous(nodes: Nodes, intervals: Places, wanted: Places) -> list[Places]:
     """Return runs of wanted intervals that follow each other in time within a segment."""
     chosen = np.flatnonzero(wanted)
     if not len(chosen):
         return []
     starts, ends = intervals[chosen], intervals[chosen] + 1
-    apart = (nodes.times[starts[1:]] != nodes.times[ends[:-1]]) | (nodes.segment[starts[1:]] != nodes.segment[ends[:-1]])
+    apart = (nodes.times[starts[1:]] != nodes.times[ends[:-1]]) | (
+        nodes.segment[starts[1:]] != nodes.segment[ends[:-1]]
+    )
     long = _MOST_OUTPUTS // 4
-    return [part for run in np.split(chosen, np.flatnonzero(apart) + 1) for part in np.split(run, range(long, len(run), long))]
+    return [
+        part
+        for run in np.split(chosen, np.flatnonzero(apart) + 1)
+        for part in np.split(run, range(long, len(run), long))
+    ]
 
 
 def _together(blocks: list[_Block]) -> Nodes:
     sizes = [len(times) for times, *_ in blocks]
     ends = np.cumsum(sizes)
-    columns = [np.concatenate([block[k] for block in blocks], axis=-1) for k in range(3)]
+    times = np.concatenate([block[0] for block in blocks])
+    x, z = (np.concatenate([block[k] for block in blocks], axis=1) for k in (1, 2))
     segment = np.repeat([block[3] for block in blocks], sizes)
-    return Nodes(*columns, segment, np.repeat(ends - sizes, sizes), np.repeat(ends - 1, sizes))
+    return Nodes(times, x, z, segment, np.repeat(ends - sizes, sizes), np.repeat(ends - 1, sizes))
 
 
-def _apart(nodes: Nodes) -> Vector:
+def _apart(nodes: Nodes) -> Places:
     """Return the ends of segments, and what lies between them well apart from its neighbours.
 
     The results beside an event may be as near to it as they like; a polynomial through both would follow their errors.
@@ -300,7 +309,7 @@ def _apart(nodes: Nodes) -> Vector:
     return np.flatnonzero(~inner | (np.minimum(before, after) >= _CLOSE * np.maximum(before, after)))
 
 
-def _largest(errors: Vector, allowed: float) -> Vector:
+def _largest(errors: Vector, allowed: float) -> Places:
     """Mark the largest errors, so that the others together are no more than allowed."""
     order = np.argsort(errors)
     marked = np.zeros(len(errors), bool)

@@ -227,9 +227,7 @@ class Solution:
     def energy(self) -> EnergyBalance:
         """Return the energy balance of every component over the run."""
         if "balance" not in self._cache:
-            self._cache["balance"] = energy_balance(
-                self.model, self.segments, self.options, self.events, self.impacts
-            )
+            self._cache["balance"] = energy_balance(self.model, self.segments, self.options, self.events, self.impacts)
         return self._cache["balance"]
 
     def plot(self, *patterns: str, title: str = "") -> Figure:
