@@ -34,6 +34,8 @@ _TRIALS = 40
 _CLOSE = 0.1
 """Distance of two results, as part of the next one, up to which one of them is left out."""
 _MOST_POINTS = 200_000
+_NEAR = 8
+"""Intervals that are integrated again as well rather than to start once more behind them."""
 _SOME, _MANY, _MOST_OUTPUTS = 32, 128, 4096
 _UNRESOLVED = 1e-2
 """Mismatch of states, relative to their largest values, from which many points are needed at once."""
@@ -123,12 +125,14 @@ class Powers:
             return np.zeros(len(terms.powers))
         self._points += len(nodes.times)
         order = rules(nodes, intervals)
-        whole = terms.powers @ order[0].totals(len(nodes.times), slice(None))
+        weights = order[0].totals(len(nodes.times), slice(None))
+        whole = terms.powers @ weights
         if allowed is None:
-            allowed = _SHARE * self.options.rtol * self._throughput(whole)
+            allowed = _SHARE * self.options.rtol * self._moved(np.abs(terms.powers) @ np.abs(weights))
         errors, mismatch = self._errors(nodes, terms, intervals, order)
         coarse = _largest(errors, allowed)
-        adrift = self._adrift(nodes, terms, intervals, 2.0 * allowed)
+        # Further down, it is the integrator's own error that energies drift with.
+        adrift = self._adrift(nodes, terms, intervals, 2.0 * allowed if depth == 1 else np.inf)
         coarse |= adrift
         if not coarse.any() or depth >= _ROUNDS or self._points > _MOST_POINTS:
             return whole
@@ -147,9 +151,12 @@ class Powers:
             total = total + self._integrate(part, there, depth + 1, allowed / len(parts))
         return total
 
-    def _throughput(self, integrals: Vector) -> float:
-        sums = np.sum(np.abs(self.table(integrals)[:3]), axis=1)
-        return max(self._stored, float(np.nanmax(sums, initial=0.0)))
+    def _moved(self, integrals: Vector) -> float:
+        """Return the energy that moves in a run: what it is precise to is a part of that, not of what is left over.
+
+        An oscillation exchanges its energy again and again.
+        """
+        return max(self._stored, float(np.nanmax(integrals, initial=0.0)))
 
     def _errors(
         self, nodes: Nodes, terms: Terms, intervals: Places, order: tuple[Rule, Rule, Rule]
@@ -194,7 +201,7 @@ class Powers:
 
     def _adrift(self, nodes: Nodes, terms: Terms, intervals: Places, allowed: float) -> Places:
         """Mark intervals of interpolated blocks over which stored energies change otherwise than their rates say."""
-        if not nodes.made:
+        if not nodes.made or allowed == np.inf:
             return np.zeros(len(intervals), bool)
         size = len(LOBATTO)
         spans = nodes.times[size - 1 :: size] - nodes.times[::size]
@@ -272,20 +279,18 @@ _Block = tuple[Vector, Vector, Vector, int]
 
 
 def _contiguous(nodes: Nodes, intervals: Places, wanted: Places) -> list[Places]:
-    """Return runs of wanted intervals that follow each other in time within a segment."""
+    """Return runs of wanted intervals that follow each other in time, with what lies between two that are near."""
+    breaks = nodes.times[intervals[1:]] != nodes.times[intervals[:-1] + 1]
+    breaks |= nodes.segment[intervals[1:]] != nodes.segment[intervals[:-1]]
+    piece = np.append(0, np.cumsum(breaks))
     chosen = np.flatnonzero(wanted)
-    if not len(chosen):
-        return []
-    starts, ends = intervals[chosen], intervals[chosen] + 1
-    apart = (nodes.times[starts[1:]] != nodes.times[ends[:-1]]) | (
-        nodes.segment[starts[1:]] != nodes.segment[ends[:-1]]
-    )
+    cuts = (np.diff(chosen) > _NEAR) | (np.diff(piece[chosen]) > 0)
     long = _MOST_OUTPUTS // 4
-    return [
-        part
-        for run in np.split(chosen, np.flatnonzero(apart) + 1)
-        for part in np.split(run, range(long, len(run), long))
-    ]
+    found: list[Places] = []
+    for run in np.split(chosen, np.flatnonzero(cuts) + 1) if len(chosen) else ():
+        whole = np.arange(run[0], run[-1] + 1)
+        found += np.split(whole, range(long, len(whole), long))
+    return found
 
 
 def _together(blocks: list[_Block]) -> Nodes:
