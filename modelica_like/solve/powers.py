@@ -28,7 +28,7 @@ _TRUSTED = 100.0
 _SUSPECT = 1e-3
 """Mismatch of states, relative to their largest values, from which the energies there are compared."""
 _ENOUGH = 4
-_ROUNDS = 9
+_ROUNDS, _EVERYWHERE = 9, 3
 _TRIALS = 40
 """Calls of the integrator for one piece of a run."""
 _CLOSE = 0.1
@@ -72,7 +72,8 @@ class Powers:
         self._kept = _kept(model)
         self.results = _together([(s.times, s.x, s.z, k) for k, s in enumerate(segments)])
         self.at_results = self._terms(self.results)
-        self._scales = np.maximum(np.max(np.abs(self.results.x), axis=1, initial=0.0), 1e-300)[:, None]
+        largest = np.max(np.abs(self.results.x), axis=1, initial=0.0)
+        self._scales = np.maximum(largest, options.atol * model.nominals)[:, None]
         self._stored = float(np.max(np.sum(np.abs(self.at_results.stored), axis=0), initial=0.0))
         self._points = 0
 
@@ -128,12 +129,16 @@ class Powers:
         weights = order[0].totals(len(nodes.times), slice(None))
         whole = terms.powers @ weights
         if allowed is None:
-            allowed = _SHARE * self.options.rtol * self._moved(np.abs(terms.powers) @ np.abs(weights))
+            share = _SHARE if self.model.states else 0.1 * _SHARE
+            allowed = share * self.options.rtol * self._moved(np.abs(terms.powers) @ np.abs(weights))
         errors, mismatch = self._errors(nodes, terms, intervals, order)
         coarse = _largest(errors, allowed)
         # Further down, it is the integrator's own error that energies drift with.
         adrift = self._adrift(nodes, terms, intervals, 2.0 * allowed if depth == 1 else np.inf)
         coarse |= adrift
+        if not self.model.states and (depth == 0 or (depth < _EVERYWHERE and coarse.any())):
+            # No rates of states tell what happens between the results.
+            coarse[:] = True
         if not coarse.any() or depth >= _ROUNDS or self._points > _MOST_POINTS:
             return whole
         # A few results alone say too little about the states between them.

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from components import Damper, Fixed, Inertia, SpringDamper
-from modelica_like import Assembly, Component, load, simulate
+from modelica_like import Assembly, Component, build, load, simulate
 from modelica_like.errors import StepFailed
 from modelica_like.language import Equations, Parameter, Variable, param, sin, var
 from modelica_like.solve.idas import Integrator
@@ -53,22 +53,28 @@ def test_a_loss_by_its_closed_form_from_few_results(points: int) -> None:
 
 @pytest.mark.parametrize("points", [1, 4, 20, 21])
 def test_oscillations_between_results_are_seen(points: int) -> None:
-    """Twenty periods of exactly 0.05 s: with 4 or 20 results the mass stands still at each, as if nothing moved."""
-    balance = simulate(oscillator(0.5 * (40 * np.pi) ** 2, 0.1), 1.0, points=points).energy()
-    decay = 0.1 / (2 * 0.5)
-    stored = 0.5 * 0.5 * (40 * np.pi) ** 2 * 0.09
-    assert balance["spring"].lost == pytest.approx(stored * (1 - np.exp(-2 * decay)), rel=2e-3)
-    assert balance.lost == pytest.approx(-balance.stored, rel=1e-5)
-    assert balance.drift < 1e-6
+    """Twenty periods of exactly 0.05 s: with 4 or 20 results the mass stands still at each, as if nothing moved.
+
+    After whole periods the energy of the oscillation has fallen by exp(-d/J·t).
+    """
+    omega, delta = 40 * np.pi, 0.1
+    run = simulate(oscillator(0.5 * (omega**2 + delta**2), 2 * 0.5 * delta), 1.0, points=points, rtol=1e-10, atol=1e-13)
+    stored = 0.5 * 0.5 * (omega**2 + delta**2) * 0.09
+    assert run.energy()["spring"].lost == pytest.approx(stored * -np.expm1(-2 * delta), rel=1e-6)
 
 
-@pytest.mark.parametrize("points", [1, 5, 50, 500])
 @pytest.mark.parametrize("name", ["msl/rotational/CoupledClutches", "stick_slip", "machine_tool_startup", "two_mass"])
-def test_the_drift_is_that_of_the_run_whatever_its_results(name: str, points: int) -> None:
-    run = simulate(load(EXAMPLES / f"{name}.toml"), points=points)
-    balance = run.energy()
-    assert balance.drift <= 10 * run.options.rtol
-    assert balance.closure <= 1e-12
+def test_the_drift_is_that_of_the_run_whatever_its_results(name: str) -> None:
+    model = build(load(EXAMPLES / f"{name}.toml"))
+    run = simulate(model)
+    fine = run.energy()
+    assert fine.drift <= 10 * run.options.rtol
+    for points in (1, 5, 50):
+        balance = simulate(model, points=points).energy()
+        # Runs with other results differ within their tolerance themselves.
+        assert balance.lost == pytest.approx(fine.lost, abs=20 * run.options.rtol * fine.throughput)
+        assert balance.source == pytest.approx(fine.source, abs=20 * run.options.rtol * fine.throughput)
+        assert balance.closure <= 1e-12
 
 
 def test_a_drive_that_idas_gives_up_at_a_higher_precision_has_a_balance(tmp_path: Path) -> None:
@@ -101,8 +107,9 @@ class Cycle(Component):
         return self.f * self.v
 
 
-@pytest.mark.parametrize("points", [1, 7, 500])
+@pytest.mark.parametrize("points", [1, 7, 13, 500])
 def test_a_model_without_states(points: int) -> None:
+    """With 13 results the power seems to change thirteen times as slowly as it does."""
     balance = simulate(Cycle(), 1.0, points=points).energy()
     assert balance.lost == pytest.approx(3 * (0.5 - np.sin(80.0) / 160), rel=1e-7)
     assert balance.closure < 1e-12
