@@ -7,11 +7,13 @@ reference or a closed form tells.
 
 from collections.abc import Callable
 from dataclasses import replace
+from io import StringIO
 from math import pi
 from typing import Any
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from components import (
     BallScrew,
@@ -39,8 +41,9 @@ from components import (
     TranslationalFixed,
     UniversalJoint,
 )
-from modelica_like import Assembly, simulate
+from modelica_like import Assembly, Solution, simulate
 from modelica_like.language import Component, Equations, Events, Mode, Parameter, Variable, absolute, der, param, var
+from modelica_like.report.run import run_report
 from modelica_like.solve.recorder import Impact
 
 
@@ -348,15 +351,24 @@ class Pump(Damper):
         return -self.d * self.w_rel**2
 
 
+def told(run: Solution) -> str:
+    console = Console(width=200, file=StringIO())
+    console.print(run_report(run))
+    return console.file.getvalue()  # type: ignore[attr-defined]
+
+
 def test_a_negative_loss_is_noticed_with_its_time_and_power() -> None:
     """J·dw/dt = d·w: the speed is exp(d·t/J), the loss -d·w², and largest at the end."""
     parts = {"J": Inertia(J=0.5, phi=0.0, w=1.0), "pump": Pump(d=0.25), "wall": Fixed()}
-    balance = simulate(Assembly("drive", parts=parts, series={"s": list(parts)}), 2.0, rtol=1e-9).energy()
+    run = simulate(Assembly("drive", parts=parts, series={"s": list(parts)}), 2.0, rtol=1e-9)
+    balance = run.energy()
     pump = balance["pump"]
     assert (pump.imbalance, pump.gain_time) == (0.0, 2.0)
     assert pump.gain == pytest.approx(0.25 * np.exp(2.0), rel=1e-7)
     assert balance.notices == ("pump has a negative loss, -1.84726 W at 2 s.",)
     assert str(balance).endswith(balance.notices[0])
+    assert balance.notices[0] in told(run)
+    assert "impacts" not in told(run)
 
 
 # -- what no balance can see -------------------------------------------------------------------------------------------
@@ -439,8 +451,10 @@ def test_energy_that_appears_at_an_event_is_noticed() -> None:
 def test_an_impact_explains_what_vanishes_and_is_lost() -> None:
     run = simulate(Sampled(x=0.0), 2.0)
     impact = Impact("", -8.0, run.events[0].time)
-    balance = replace(run, impacts=(impact,), _cache={}).energy()
+    struck = replace(run, impacts=(impact,), _cache={})
+    balance = struck.energy()
     assert balance.at_events < 1e-12
+    assert "of it in impacts" in told(struck)
     assert (balance[""].impact, balance[""].lost) == (-8.0, -8.0)
     assert balance.notices == ()
     assert "-8 J in impacts" in str(balance)
