@@ -80,7 +80,8 @@ def rules(nodes: Nodes, intervals: Places) -> tuple[Rule, Rule, Rule]:
         ]
     else:
         sizes = np.minimum(nodes.last[intervals] - nodes.first[intervals] + 1, _WIDTH)
-        found = [_rule(nodes, intervals, np.maximum(sizes - less, 1)) for less in (0, 2, 4)]
+        regular = _equidistant(nodes, intervals, sizes)
+        found = [_rule(nodes, intervals, np.maximum(sizes - less, 1), regular) for less in (0, 2, 4)]
     return cast("tuple[Rule, Rule, Rule]", tuple(found))
 
 
@@ -98,7 +99,17 @@ def windows(nodes: Nodes, intervals: Places, sizes: Places) -> Places:
     return np.clip(first, nodes.first[intervals], nodes.last[intervals] + 1 - sizes)
 
 
-def _rule(nodes: Nodes, intervals: Places, sizes: Places) -> Rule:
+def _equidistant(nodes: Nodes, intervals: Places, sizes: Places) -> Places:
+    """Tell which windows of the given sizes have equidistant points."""
+    steps = np.append(np.diff(nodes.times), 0.0)
+    # Times are rounded themselves.
+    uneven = np.abs(np.diff(steps)) > _UNIFORM * steps[:-1] + _ROUNDING * np.abs(nodes.times[:-1])
+    before = np.append(0, np.cumsum(uneven))
+    starts = windows(nodes, intervals, sizes)
+    return before[np.maximum(starts + sizes - 2, starts)] == before[starts]
+
+
+def _rule(nodes: Nodes, intervals: Places, sizes: Places, regular: Places) -> Rule:
     starts = windows(nodes, intervals, sizes)
     width = int(sizes.max(initial=1))
     # Narrower windows are filled up with weights of zero.
@@ -106,16 +117,11 @@ def _rule(nodes: Nodes, intervals: Places, sizes: Places) -> Rule:
     weights = np.zeros(places.shape)
     offsets = intervals - starts
     spans = nodes.times[intervals + 1] - nodes.times[intervals]
-    steps = np.diff(nodes.times[places], axis=1)
-    # Times are rounded themselves.
-    near = _UNIFORM * spans + _ROUNDING * np.abs(nodes.times[intervals])
-    uniform = np.abs(steps - spans[:, None]) < near[:, None]
-    uniform |= np.arange(1, width) >= sizes[:, None]
-    regular = uniform.all(axis=1)
     for size in np.flatnonzero(np.bincount(sizes)):
-        alike = np.flatnonzero((sizes == size) & regular)
+        some = sizes == size
+        alike = np.flatnonzero(some & regular)
         weights[alike, :size] = _regular(int(size))[offsets[alike]]
-        odd = np.flatnonzero((sizes == size) & ~regular)
+        odd = np.flatnonzero(some & ~regular)
         if len(odd):
             now = nodes.times[places[odd, :size]] - nodes.times[intervals[odd]][:, None]
             weights[odd, :size] = _weights(now / spans[odd][:, None])

@@ -39,7 +39,8 @@ _NEAR = 8
 _SOME, _MANY, _MOST_OUTPUTS = 32, 128, 4096
 _UNRESOLVED = 1e-2
 """Mismatch of states, relative to their largest values, from which many points are needed at once."""
-_POLISHING = 3
+_POLISHING, _SMALL_STEP = 6, 1e-8
+"""Newton's steps; behind a small one there is nothing but rounding."""
 
 
 @dataclass
@@ -115,6 +116,8 @@ class Powers:
             if not np.isfinite(step).all():
                 return
             nodes.z = nodes.z - step
+            if np.max(np.abs(step) / (1.0 + np.abs(nodes.z)), initial=0.0) < _SMALL_STEP:
+                return
 
     # -- integration -------------------------------------------------------------------------------------------------
 
