@@ -37,7 +37,7 @@ def simulate(
     plot: Annotated[Path | None, Option(metavar="FILE", help="Draw the results: .png, .svg or .pdf.")] = None,
     show: Annotated[list[str] | None, Option(metavar="PATTERN", help="What to draw, e.g. '*.w'.")] = None,
     sankey: Annotated[Path | None, Option(metavar="FILE", help="Draw where the energy went.")] = None,
-    energy: Annotated[bool, Option(help="Tell the energy balance; it takes another, more precise run.")] = True,
+    energy: Annotated[bool, Option(help="Tell the energy balance.")] = True,
     debug: Debug = False,
 ) -> None:  # fmt: skip
     """Simulate a netlist: events, energy balance, results as table and picture."""

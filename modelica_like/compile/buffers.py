@@ -27,6 +27,7 @@ class BufferedFunction:
         self._arguments = [np.zeros(function.nnz_in(k)) for k in range(function.n_in())]
         self._results = [np.zeros(function.nnz_out(k)) for k in wanted]
         self._buffer, self._evaluate = function.buffer()
+        self._everywhere: dict[int, Any] = {}
         for k, array in enumerate(self._arguments):
             self._buffer.set_arg(k, memoryview(cast(Any, array)))
         for k, array in zip(wanted, self._results, strict=True):
@@ -39,6 +40,20 @@ class BufferedFunction:
         self._evaluate()
         return [array.copy() for array in self._results]
 
+    def along(self, points: list[Vector], p: Vector, u: Vector) -> list[Vector]:
+        """Evaluate a mapped function at as many points (t, x, z, d) as there are; what lies behind is left over.
+
+        p and u are the same at all points; the results are valid until the next call.
+        """
+        for k, part in zip((0, 1, 2, 5), points, strict=True):
+            self._arguments[k][: len(part)] = part
+        for k, part in ((3, p), (4, u)):
+            if len(part) and not (k in self._everywhere and np.array_equal(self._everywhere[k], part)):
+                self._arguments[k].reshape(-1, len(part))[:] = part
+                self._everywhere[k] = part.copy()
+        self._evaluate()
+        return self._results
+
     def statistics(self) -> dict[str, Any]:
         """Return the statistics of the last call, of a function that keeps some."""
         return dict(self._buffer.stats())
@@ -49,4 +64,49 @@ def buffered(cache: dict[Any, Any], key: Any, make: Any, results: tuple[int, ...
     own = "buffer", get_ident(), key
     if own not in cache:
         cache[own] = BufferedFunction(make(), results)
+    return cache[own]
+
+
+_BLOCKS = 4096, 64
+"""Points that are evaluated in one call: many, and the rest."""
+
+
+class Along:
+    """A CasADi function of (t, x, z, p, u, d) at many points, in blocks of bounded size through fixed buffers.
+
+    Args:
+        function: with dense results; arguments without entries are left out.
+    """
+
+    def __init__(self, function: ca.Function) -> None:
+        self._function = function
+        self.rows = [function.numel_out(k) for k in range(function.n_out())]
+        self._made: dict[int, BufferedFunction] = {}
+
+    def __call__(self, times: Vector, x: Vector, z: Vector, p: Vector, u: Vector, d: Vector) -> list[Vector]:
+        """Evaluate at n points; shapes (n,), (nx, n), (nz, n), (np,), (nu,), (nd, n), results (rows, n)."""
+        results = [np.empty((rows, len(times))) for rows in self.rows]
+        self.into(results, times, x, z, p, u, d)
+        return results
+
+    def into(self, results: list[Vector], times: Vector, x: Vector, z: Vector, p: Vector, u: Vector, d: Vector) -> None:
+        """Evaluate as a call does, into given arrays."""
+        total, first = results[0].shape[1], 0
+        for size in _BLOCKS:
+            while total - first >= (size if size > _BLOCKS[-1] else 1):
+                last = min(first + size, total)
+                if size not in self._made:
+                    self._made[size] = BufferedFunction(self._function.map(size))
+                now = [part[..., first:last].ravel("F") for part in (times, x, z, d)]
+                block = self._made[size].along(now, p, u)
+                for whole, part in zip(results, block, strict=True):
+                    whole[:, first:last] = part.reshape(size, -1).T[:, : last - first]
+                first = last
+
+
+def along(cache: dict[Any, Any], key: Any, make: Any) -> Along:
+    """Return this thread's function at many points for a key, made from `make()` on first use."""
+    own = "along", get_ident(), key
+    if own not in cache:
+        cache[own] = Along(make())
     return cache[own]

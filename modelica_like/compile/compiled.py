@@ -213,7 +213,8 @@ class CompiledDae:
     def energy(self) -> ca.Function:
         """Energy terms, one row per component.
 
-        Columns: stored energy, loss, source power, power in, rate of the stored energy.
+        Columns: stored energy, loss, source power, power in, rate of the stored energy, sum of the magnitudes of the
+        powers through its connectors.
         """
         if self._make_energy is None:
             raise LanguageError("The energy terms of this model were not kept.")

@@ -13,7 +13,8 @@ def energy_terms(reduced: ReducedDae) -> Any:
     """Write out the energy terms of every component.
 
     Returns:
-        One row per component: stored energy, loss, source power, power in, rate of the stored energy.
+        One row per component: stored energy, loss, source power, power in, rate of the stored energy, and the sum of
+        the magnitudes of the powers through its connectors, beside which a power in is rounding or is not.
     """
     flat = reduced.flat
     variable = {one.path: k for k, one in enumerate(flat.variables)}
@@ -32,6 +33,7 @@ def energy_terms(reduced: ReducedDae) -> Any:
         terms = template.energy(v, p, d, flat.time)
         powers = terms[3:]
         inflow = ca.sum1(powers) if powers.numel() else ca.SX(0)
-        rows.append(ca.horzcat(terms[0], terms[1], terms[2], inflow))
+        passing = ca.sum1(ca.fabs(powers)) if powers.numel() else ca.SX(0)
+        rows.append(ca.horzcat(terms[0], terms[1], terms[2], inflow, passing))
     table = ca.vertcat(*rows)
-    return ca.horzcat(table, reduced.total_derivative(table[:, 0]))
+    return ca.horzcat(table[:, :4], reduced.total_derivative(table[:, 0]), table[:, 4])

@@ -24,7 +24,7 @@ def write_csv(solution: Solution, path: Path, *, units: bool = False) -> None:
     Raises:
         OSError: the file cannot be written.
     """
-    columns = [solution.time, *(solution[name] for name in solution.names)]
+    columns = [solution.time, *solution.together(*solution.names).values()]
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(["time", *solution.names])

@@ -18,7 +18,7 @@ def run_report(solution: Solution, *, energy: bool = True) -> RenderableType:
 
     Args:
         solution: the run.
-        energy: False: leave out the energy balance, which integrates the run once more.
+        energy: False: leave out the energy balance.
     """
     parts: list[RenderableType] = [f"[bold]{escape(solution.model.name)}[/]  {_span(solution)}"]
     if solution.events:
@@ -26,6 +26,7 @@ def run_report(solution: Solution, *, energy: bool = True) -> RenderableType:
     parts += [f"[bold]{escape(notice)}[/]" for notice in notices(solution)]
     if energy:
         parts += ["", energy_table(solution), f"[dim]{closure_line(solution)}[/]"]
+        parts += [f"[bold]{escape(notice)}[/]" for notice in solution.energy().notices]
     parts += ["", f"[dim]{statistics_line(solution)}[/]"]
     return Group(*parts)
 
@@ -61,8 +62,13 @@ def notices(solution: Solution) -> list[str]:
 def energy_table(solution: Solution) -> Table:
     """Return the energy balance in J; of many components only those that exchanged most."""
     balance = solution.energy()
-    made = table("energy balance in J", "component", "in>", "from outside>", "stored>", "lost>")
-    rows = {row.component: (row.inflow, row.source, row.stored, row.lost) for row in balance}
+    # Where nothing collides there is no column for it.
+    collides = any(row.impact for row in balance)
+    columns = ["component", "in>", "from outside>", "stored>", "lost>", *["of it in impacts>"][: int(collides)]]
+    made = table("energy balance in J", *columns)
+    rows = {
+        row.component: (row.inflow, row.source, row.stored, row.lost, *[row.impact][: int(collides)]) for row in balance
+    }
     active = [name for name, values in rows.items() if any(values)]
     largest = set(sorted(active, key=lambda name: max(map(abs, rows[name])), reverse=True)[:_SHOWN])
     for name in (name for name in active if name in largest):
@@ -70,7 +76,9 @@ def energy_table(solution: Solution) -> Table:
     if len(active) > _SHOWN:
         made.add_row(f"… {len(active) - _SHOWN} more")
     made.add_section()
-    made.add_row("total", "", *map(_energy, (balance.source, balance.stored, balance.lost)), style="bold")
+    totals = [balance.source, balance.stored, balance.lost]
+    totals += [sum(row.impact for row in balance)] if collides else []
+    made.add_row("total", "", *map(_energy, totals), style="bold")
     return made
 
 

@@ -2,28 +2,44 @@
 
 from __future__ import annotations
 
-import io
-from collections.abc import Iterator
-from contextlib import redirect_stderr
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
-import casadi as ca
 import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, Vector
-from modelica_like.errors import StepFailed
-from modelica_like.initialize import Point
-from modelica_like.solve.idas import scaled_problem
-from modelica_like.solve.recorder import Segment
+from modelica_like.solve.options import Options
+from modelica_like.solve.powers import Powers
+from modelica_like.solve.recorder import Event, Segment
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_RTOL = 1e-9
-_ATOL = 1e-11
-_POWERS = 4
-"""Columns of the energy terms that are integrated: loss, source, inflow, rate of the stored energy."""
+_ROUNDING = 1e-9
+"""Part of a component's largest power below which a difference of powers is rounding."""
+_NOTHING = 1e-12
+"""Part of the model's largest power below which a power is rounding."""
+_SAME_TIME = 1e-12
+
+
+class Loss(Protocol):
+    """Energy in J that a component loses at once, at a time in s: an impact."""
+
+    @property
+    def component(self) -> str:
+        """Path of the component."""
+        ...
+
+    @property
+    def energy(self) -> float:
+        """Lost energy in J."""
+        ...
+
+    @property
+    def time(self) -> float:
+        """When, in s."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -40,6 +56,12 @@ class EnergyRow:
         residual: integral of power in + source power - loss - rate of the stored energy; zero if the component's
             equations keep the balance, whatever the precision of the integration.
         drift: what the stored energy changed in excess of the integral of its rate: the integration error.
+        impact: part of `lost` that was lost at once, in impacts.
+        imbalance: largest |power in + source power - loss - rate of the stored energy| at any result, both sides of
+            events included, as a fraction of the component's largest power; zero if it is rounding.
+        imbalance_time: when that was, in s.
+        gain: largest power that a negative loss gave, in W; zero if it is rounding.
+        gain_time: when that was, in s.
     """
 
     component: str
@@ -50,6 +72,11 @@ class EnergyRow:
     at_events: float
     residual: float
     drift: float
+    impact: float = 0.0
+    imbalance: float = 0.0
+    imbalance_time: float = 0.0
+    gain: float = 0.0
+    gain_time: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -59,10 +86,13 @@ class EnergyBalance:
     Attributes:
         rows: one per component.
         throughput: largest of: energy exchanged, brought in, dissipated, stored.
+        at_events: largest change of all stored energies together at an event, in J, that neither an impact nor a reset
+            explains.
     """
 
     rows: tuple[EnergyRow, ...]
     throughput: float
+    at_events: float = 0.0
 
     def __getitem__(self, component: str) -> EnergyRow:
         return next(row for row in self.rows if row.component == component)
@@ -110,6 +140,28 @@ class EnergyBalance:
         return max([*residuals, exchanged], default=0.0) / (self.throughput or 1.0)
 
     @property
+    def imbalance(self) -> float:
+        """Largest imbalance of a component at any result, as a fraction of its largest power."""
+        return max((row.imbalance for row in self.rows), default=0.0)
+
+    @property
+    def notices(self) -> tuple[str, ...]:
+        """What is wrong with the equations of components, as sentences: powers that do not balance, negative losses."""
+        told: list[str] = []
+        for row in self.rows:
+            name = row.component or "The model itself"
+            if row.imbalance:
+                told.append(
+                    f"{name} does not balance at {row.imbalance_time:.9g} s: power in, source, loss and rate of the "
+                    f"stored energy differ by {row.imbalance:.2g} of its largest power."
+                )
+            if row.gain:
+                told.append(f"{name} has a negative loss, {-row.gain:.6g} W at {row.gain_time:.9g} s.")
+        if self.at_events > _ROUNDING * self.throughput:
+            told.append(f"At an event {self.at_events:.6g} J appear or vanish that no impact and no reset explains.")
+        return tuple(told)
+
+    @property
     def drift(self) -> float:
         """Largest integration error of a stored energy, relative to the throughput."""
         return max((abs(row.drift) for row in self.rows), default=0.0) / (self.throughput or 1.0)
@@ -123,110 +175,96 @@ class EnergyBalance:
             if any((row.inflow, row.source, row.stored, row.lost))
         ]
         total = f"{'total':{width}}  {'':12}  {self.source:12.6g}  {self.stored:12.6g}  {self.lost:12.6g}"
-        return "\n".join(
-            [
-                head,
-                *lines,
-                total,
-                f"closes to {self.closure:.1e} of {self.throughput:.6g} J (integration error {self.drift:.1e})",
-            ]
+        closes = f"closes to {self.closure:.1e} of {self.throughput:.6g} J (integration error {self.drift:.1e})"
+        return "\n".join([head, *lines, total, *self.impacts, closes, *self.notices])
+
+    @property
+    def impacts(self) -> tuple[str, ...]:
+        """What was lost in impacts, as sentences."""
+        return tuple(
+            f"{row.component or 'The model itself'} lost {row.impact:.6g} J in impacts."
+            for row in self.rows
+            if row.impact
         )
 
 
-def energy_balance(model: CompiledDae, segments: tuple[Segment, ...]) -> EnergyBalance:
+def energy_balance(
+    model: CompiledDae,
+    segments: tuple[Segment, ...],
+    options: Options | None = None,
+    events: Sequence[Event] = (),
+    impacts: Sequence[Loss] = (),
+) -> EnergyBalance:
     """Integrate the energy terms of every component along a run.
 
-    Each segment is integrated again from its beginning, with the powers as quadratures.
+    It is a quadrature over the results of the run; where they are too coarse, states in between are interpolated or, if
+    that is too coarse, too, integrated once more. Where even this fails, the coarser value stands: there is always a
+    balance.
+
+    Args:
+        model: the compiled model.
+        segments: smooth pieces of the run.
+        options: of the run; the integrals are as precise as its relative tolerance.
+        events: mode changes; what their resets do to stored energies needs no explanation.
+        impacts: what components lost at once, at events.
     """
-    count = len(model.components)
-    lost, source, inflow, rate, moved, jumps = (np.zeros(count) for _ in range(6))
-    largest, last = 0.0, None
-    for segment in segments:
-        before = _stored(model, segment.start)
-        largest = max(largest, float(np.sum(np.abs(before))))
-        if last is not None:
-            jumps += before - last
-        powers, end = _integrate(model, segment)
-        for total, part in zip((lost, source, inflow, rate), powers, strict=True):
-            total += part
-        moved += _stored(model, end) - before
-        # The next segment begins where the run went on, not where this integration ended.
-        last = _stored(model, segment.point(-1))
-    residual = inflow + source - lost - rate
-    columns = inflow, source, moved + jumps, lost, jumps, residual, moved - rate
+    powers = Powers(model, options or Options(), segments)
+    lost, source, inflow, rate, _ = powers.integrals()
+    impact = np.zeros(len(model.components))
+    for one in impacts:
+        impact[model.components.index(one.component)] += one.energy
+    jumps, unexplained = _jumps(model, powers, segments, events, impacts)
+    stored = powers.at_results.stored
+    change = stored[:, -1] - stored[:, 0]
+    at_once = np.sum(jumps, axis=1)
+    columns = (
+        inflow, source, change, lost + impact, at_once, inflow + source - lost - rate, change - at_once - rate, impact,
+        *_audit(powers),
+    )  # fmt: skip
     rows = tuple(EnergyRow(path, *map(float, values)) for path, *values in zip(model.components, *columns, strict=True))
-    throughput = max(largest, *(float(np.sum(np.abs(part))) for part in (inflow, source, lost)))
-    return EnergyBalance(rows, throughput)
+    largest = float(np.max(np.sum(np.abs(stored), axis=0), initial=0.0))
+    throughput = max([largest, *(float(np.sum(np.abs(part))) for part in (inflow, source, lost + impact))])
+    return EnergyBalance(rows, throughput, unexplained)
 
 
-def _stored(model: CompiledDae, point: Point) -> Vector:
-    return np.array(model.energy(point.t, point.x, point.z, model.p, model.u, point.d))[:, 0]
+def _audit(powers: Powers) -> tuple[Vector, Vector, Vector, Vector]:
+    """Return the largest imbalance of each component with its time, and its largest negative loss with its time."""
+    times = powers.results.times
+    table = powers.table(powers.at_results.powers)
+    lost, source, inflow, rate, _ = table
+    differences = np.abs(inflow + source - lost - rate)
+    largest = np.max(np.abs(table), axis=(0, 2), initial=0.0)
+    floor = _NOTHING * np.max(largest, initial=0.0)
+    rounding = np.maximum(_ROUNDING * largest, floor)
+
+    def worst(values: Vector) -> tuple[Vector, Vector]:
+        places = np.argmax(values, axis=1)
+        found = np.max(values, axis=1)
+        real = found > rounding
+        return np.where(real, found, 0.0), np.where(real, times[places], 0.0)
+
+    imbalance, when = worst(differences)
+    return imbalance / np.maximum(largest, 1e-300), when, *worst(-lost)
 
 
-def _integrate(model: CompiledDae, segment: Segment) -> tuple[Vector, Point]:
-    """Return the integrals of loss, source power, inflow and rate of all components, and the end.
-
-    Raises:
-        StepFailed: IDAS gave up.
-    """
-    span = float(segment.times[-1] - segment.times[0])
-    start, end = segment.start, segment.point(-1)
-    if span <= 0.0:
-        return np.zeros((_POWERS, len(model.components))), end
-    if not model.states:
-        return _trapezoids(model, segment), end
-    p = np.concatenate([[start.t, span], model.p, model.u, segment.d])
-    try:
-        # IDAS also prints what went wrong; the error says it.
-        with redirect_stderr(io.StringIO()):
-            integrator, kept = _integrator(model)
-            result = integrator(x0=np.append(start.x, 0.0), z0=start.z, p=p)
-    except RuntimeError:
-        raise StepFailed(
-            f"The powers cannot be integrated from t = {start.t:g} s to {start.t + span:g} s.",
-            why="Energies ask for more precision than the run itself.",
-            advice="Leave the energy balance out (--no-energy), or look at a shorter time.",
-        ) from None
-    end.x, end.z = np.array(result["xf"]).ravel()[:-1], np.array(result["zf"]).ravel()
-    powers = np.zeros(_POWERS * len(model.components))
-    powers[kept] = np.array(result["qf"]).ravel()
-    return powers.reshape(_POWERS, -1), end
-
-
-def _trapezoids(model: CompiledDae, segment: Segment) -> Vector:
-    """A model without states: integrate over the results."""
-    count = len(segment.times)
-    terms = np.array(model.energy(segment.times[None, :], segment.x, segment.z, model.p, model.u, segment.d))
-    terms = terms.reshape(len(model.components), count, 1 + _POWERS)
-    return np.array([np.trapezoid(terms[:, :, 1 + k], segment.times, axis=1) for k in range(_POWERS)])
-
-
-def _integrator(model: CompiledDae) -> tuple[ca.Function, list[int]]:
-    """Return an integrator with the powers as quadratures, and which they are: those that are not zero anyway.
-
-    IDAS chooses its order for the states alone: at constant acceleration it would integrate powers at order one, with
-    a hundred thousand steps. So one more state follows all powers, with different weights lest they cancel.
-    """
-    if "energy" not in model._cache:
-        problem = dict(scaled_problem(model))
-        inner, span = problem.pop("inner"), problem.pop("span")
-        terms = model.energy(*inner)
-        every = ca.vertsplit(ca.vec(terms[:, 1:]))
-        kept = [k for k, power in enumerate(every) if not power.is_zero()]
-        powers = ca.vertcat(*(every[k] for k in kept)) if kept else ca.SX(0, 1)
-        weights = 1.0 + np.modf(0.618 * np.arange(powers.numel()))[0]
-        problem["x"] = ca.vertcat(problem["x"], ca.SX.sym("companion"))
-        problem["ode"] = ca.vertcat(problem["ode"], span * ca.dot(powers, ca.DM(weights)))
-        problem["quad"] = span * powers
-        # Where an unknown without derivative begins to change, IDAS would give up its first step for it.
-        settings = {
-            "reltol": _RTOL,
-            "abstol": _ATOL,
-            "max_num_steps": 1_000_000,
-            "quad_err_con": True,
-            "suppress_algebraic": True,
-            # The companion depends on everything: a QR factorisation would fill up.
-            "linear_solver": "csparse",
-        }
-        model._cache["energy"] = ca.integrator("energy", "idas", problem, 0, 1, settings), kept
-    return model._cache["energy"]
+def _jumps(
+    model: CompiledDae,
+    powers: Powers,
+    segments: tuple[Segment, ...],
+    events: Sequence[Event],
+    impacts: Sequence[Loss],
+) -> tuple[Vector, float]:
+    """Return the changes of stored energies between segments, and the largest in all that nothing explains, in J."""
+    starts = np.cumsum([len(segment.times) for segment in segments])[:-1]
+    stored = powers.at_results.stored
+    jumps = stored[:, starts] - stored[:, starts - 1]
+    reset = [event.time for event in events if event.transition >= 0 and model.transitions[event.transition].resets]
+    largest = 0.0
+    times = powers.results.times[starts]
+    for time in np.unique(times):
+        near = _SAME_TIME * max(1.0, abs(time))
+        if any(abs(other - time) <= near for other in reset):
+            continue
+        lost = sum(one.energy for one in impacts if abs(one.time - time) <= near)
+        largest = max(largest, abs(float(np.sum(jumps[:, times == time])) + lost))
+    return jumps, largest

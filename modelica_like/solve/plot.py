@@ -89,11 +89,11 @@ def _usual(solution: Solution) -> list[str]:
     names: list[str] = []
     for unit in _USUAL:
         curves: dict[bytes, str] = {}
-        for variable in solution.model.flat_variables:
-            values = solution[variable.path]
-            if variable.kind in ("local", "output") and str(variable.unit) == unit and np.any(values):
+        shown = (v for v in solution.model.flat_variables if v.kind in ("local", "output") and str(v.unit) == unit)
+        for path, values in solution.together(*(variable.path for variable in shown)).items():
+            if np.any(values):
                 scale = float(np.abs(values).max())
-                curves.setdefault(np.round(values / scale, 6).tobytes() + f"{scale:.6g}".encode(), variable.path)
+                curves.setdefault(np.round(values / scale, 6).tobytes() + f"{scale:.6g}".encode(), path)
         names += list(curves.values())[:_MOST]
     return names
 
@@ -114,9 +114,9 @@ def _by_unit(solution: Solution, names: Sequence[str]) -> dict[str, list[str]]:
 
 
 def _draw(axes: Axes, solution: Solution, unit: str, names: Sequence[str]) -> None:
-    for k, name in enumerate(names):
+    for k, (name, values) in enumerate(solution.together(*names).items()):
         style = "-" if k < len(COLOURS) else "--"
-        axes.plot(solution.time, solution[name], style, label=name, color=COLOURS[k % len(COLOURS)])
+        axes.plot(solution.time, values, style, label=name, color=COLOURS[k % len(COLOURS)])
     axes.set_ylabel(with_unit(_QUANTITIES.get(unit, "value"), unit))
     axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
 

@@ -105,6 +105,10 @@ class RecordedSolution(Solution):
         known = [*self.names, *model.parameters]
         raise UnknownName(f"{model.name} has no variable '{path}'{did_you_mean(path, known) or '.'}")
 
+    def together(self, *keys: str | Any) -> dict[str, Vector]:
+        """Return several columns by path."""
+        return {self.path(key): self[key] for key in keys}
+
     def __contains__(self, key: object) -> bool:
         path = self.path(key)
         model = self.recorded

@@ -17,6 +17,7 @@ from modelica_like.solve.energy import EnergyBalance, energy_balance
 from modelica_like.solve.idas import Integrator
 from modelica_like.solve.options import Options
 from modelica_like.solve.rates import differentiated, rate_along
+from modelica_like.solve.reading import TOGETHER, blocks, energy_term, variables
 from modelica_like.solve.recorder import Event, Segment
 
 if TYPE_CHECKING:
@@ -135,19 +136,20 @@ class Solution:
             return self.time
         model = self.model
         if path in model.position:
-            return self._variables()[model.position[path]]
+            row = model.position[path]
+            return self._all()[row] if self._small else variables(model, self.segments, [row])[0]
         if path in model.discrete_position:
             row = model.discrete_position[path]
-            return np.concatenate([np.full(len(s.times), s.d[row]) for s in self.segments])
+            return np.repeat([s.d[row] for s in self.segments], [len(s.times) for s in self.segments])
         if path in model.parameter_position:
             return np.full(len(self.time), model.p[model.parameter_position[path]])
         if path in model.derived_position:
             return np.full(len(self.time), float(model.derived(model.p)[model.derived_position[path]]))
         if name := differentiated(path):
-            return rate_along(model, name, *self._states())
+            return np.concatenate([rate_along(model, name, *block) for block in blocks(self.segments)])
         owner, _, term = path.rpartition(".")
         if term in ENERGY_TERMS and owner in model.components:
-            return self._energy_terms()[model.components.index(owner), ENERGY_TERMS.index(term)]
+            return energy_term(model, self.segments, model.components.index(owner), ENERGY_TERMS.index(term))
         known = [*model.position, *model.discrete_position, *model.parameter_position, *model.derived_position]
         raise UnknownName(f"{model.name} has no variable '{path}'{did_you_mean(path, known) or '.'}")
 
@@ -162,29 +164,26 @@ class Solution:
         """Paths of all variables, modes and discrete values."""
         return (*self.model.position, *self.model.discrete_position)
 
-    def _states(self) -> tuple[Vector, Vector, Vector, Vector]:
-        """Times, states, implicit unknowns and discrete values of all results."""
-        x = np.concatenate([s.x for s in self.segments], axis=1)
-        z = np.concatenate([s.z for s in self.segments], axis=1)
-        d = np.concatenate([np.repeat(s.d[:, None], len(s.times), axis=1) for s in self.segments], axis=1)
-        return self.time, x, z, d
+    @property
+    def _small(self) -> bool:
+        return len(self.time) * len(self.model.flat_variables) <= TOGETHER
 
-    def _arguments(self) -> tuple[Any, ...]:
-        times, x, z, d = self._states()
-        return times[None, :], x, z, self.model.p, self.model.u, d
-
-    def _variables(self) -> Vector:
+    def _all(self) -> Vector:
         if "variables" not in self._cache:
-            self._cache["variables"] = np.array(self.model.variables(*self._arguments()))
+            self._cache["variables"] = variables(self.model, self.segments, None)
         return self._cache["variables"]
 
-    def _energy_terms(self) -> Vector:
-        """Energy terms, shape (components, terms, times)."""
-        if "energy" not in self._cache:
-            count = len(self.time)
-            flat = np.array(self.model.energy(*self._arguments()))
-            self._cache["energy"] = flat.reshape(len(self.model.components), count, 5).transpose(0, 2, 1)
-        return self._cache["energy"]
+    def together(self, *keys: str | Any) -> dict[str, Vector]:
+        """Return several trajectories by path; variables are evaluated together, which is faster than one by one.
+
+        Raises:
+            UnknownName: there is no such variable.
+        """
+        paths = [self.path(key) for key in keys]
+        found = list(dict.fromkeys(path for path in paths if path in self.model.position and not self._small))
+        rows = [self.model.position[path] for path in found]
+        known = dict(zip(found, variables(self.model, self.segments, rows), strict=True)) if found else {}
+        return {path: known[path] if path in known else self[path] for path in paths}
 
     def _check_within(self, t: float) -> None:
         first, last = float(self.time[0]), float(self.time[-1])
@@ -228,7 +227,7 @@ class Solution:
     def energy(self) -> EnergyBalance:
         """Return the energy balance of every component over the run."""
         if "balance" not in self._cache:
-            self._cache["balance"] = energy_balance(self.model, self.segments)
+            self._cache["balance"] = energy_balance(self.model, self.segments, self.options, self.events, self.impacts)
         return self._cache["balance"]
 
     def plot(self, *patterns: str, title: str = "") -> Figure:
@@ -255,7 +254,7 @@ class Solution:
             import pandas
         except ImportError:
             raise missing_extra("pandas", "data") from None
-        columns = {name: self[name] for name in self.names}
+        columns = self.together(*self.names)
         return pandas.DataFrame(columns, index=pandas.Index(self.time, name="time"))
 
     def to_xarray(self) -> xarray.Dataset:
@@ -272,7 +271,7 @@ class Solution:
             v.path: {"units": str(v.unit), "long_name": v.description}
             for v in (*self.model.flat_variables, *self.model.flat_discretes)
         }
-        arrays = {name: ("time", self[name], info[name]) for name in self.names}
+        arrays = {name: ("time", values, info[name]) for name, values in self.together(*self.names).items()}
         return xarray.Dataset(arrays, coords={"time": ("time", self.time, {"units": "s"})})
 
     def __getstate__(self) -> dict[str, Any]:

@@ -5,14 +5,13 @@ Lines of this file are written as {marker}, the line that ends in `# marker`.
 
 import sys
 from collections.abc import Callable
-from dataclasses import replace
 
 import pytest
 
 import modelica_like.errors as errors
 from components import Clutch, ClutchActuator, ConstantSpeed, Fixed, Freewheel, Inertia, TimeFormula, Torque
 from components.sources import TorqueSource
-from modelica_like import Solution, build, simulate, simulation_function
+from modelica_like import build, simulate, simulation_function
 from modelica_like.errors import ModelicaLikeError
 from modelica_like.flatten import flatten
 from modelica_like.initialize import initialize
@@ -169,13 +168,6 @@ def overrun() -> Assembly:
     """A freewheel between a shaft that a source holds still and the housing."""
     parts: dict[str, Component] = {"engine": ConstantSpeed(w_fixed=0.0), "wheel": Freewheel(), "wall": Fixed()}
     return Assembly("drive", parts=parts, series={"shaft": list(parts)})
-
-
-def spoiled() -> Solution:
-    """A run with states that are no numbers."""
-    run = simulate(Inertia(J=1.0), 1.0, start="rest")
-    segment = replace(run.segments[0], x=run.segments[0].x * float("nan"))
-    return replace(run, segments=(segment,))
 
 
 CASES: dict[str, tuple[type[ModelicaLikeError], Callable[[], object], str]] = {}
@@ -337,15 +329,6 @@ case(
 IDAS gave up at about t = 0.999998 s: it took too many steps (IDA_TOO_MUCH_WORK).
 x changes fastest relative to its tolerance.
 Look for a stiff spring, a vanishing mass or a speed without bound; then try other tolerances.""",
-)
-case(
-    errors.StepFailed,
-    "energies cannot be integrated",
-    lambda: spoiled().energy(),
-    """\
-The powers cannot be integrated from t = 0 s to 1 s.
-Energies ask for more precision than the run itself.
-Leave the energy balance out (--no-energy), or look at a shorter time.""",
 )
 case(
     errors.NoGradient,

@@ -51,7 +51,7 @@ class OperatingPoint(Mapping[str, float]):
     @property
     def powers(self) -> dict[str, tuple[float, float]]:
         """Power of every component in W: what it brings in from outside (negative: takes away), and what it loses."""
-        terms = call(self.model, self.model.energy, self.point).reshape(5, -1)
+        terms = call(self.model, self.model.energy, self.point).reshape(-1, len(self.model.components))
         rows = zip(self.model.components, terms[_ENERGY_SOURCE], terms[_ENERGY_LOSS], strict=True)
         return {path: (float(source), float(loss)) for path, source, loss in rows}
 

@@ -1,0 +1,109 @@
+"""Reads variables along a run: only what is asked for, in blocks of bounded size."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from threading import get_ident
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from modelica_like.compile.buffers import Along, along
+from modelica_like.compile.compiled import CompiledDae, Vector
+from modelica_like.solve.recorder import Segment
+
+_BLOCK = 65_536
+"""Results in a block."""
+TOGETHER = 2**20
+"""Numbers up to which all variables of a run are read together."""
+
+Block = tuple[Vector, Vector, Vector, Vector]
+"""Times (n,), states (nx, n), implicit unknowns (nz, n), modes and discrete values (nd, n)."""
+
+
+def blocks(segments: Sequence[Segment]) -> Iterator[Block]:
+    """Go through the results of a run."""
+    held: list[tuple[Segment, slice]] = []
+    count = 0
+    for segment in segments:
+        for first in range(0, len(segment.times), _BLOCK):
+            part = slice(first, min(first + _BLOCK, len(segment.times)))
+            if held and count + part.stop - first > _BLOCK:
+                yield _merged(held)
+                held, count = [], 0
+            held.append((segment, part))
+            count += part.stop - first
+    yield _merged(held)
+
+
+def _merged(held: list[tuple[Segment, slice]]) -> Block:
+    if len(held) == 1:
+        segment, part = held[0]
+        d = np.broadcast_to(segment.d[:, None], (len(segment.d), part.stop - part.start))
+        return segment.times[part], segment.x[:, part], segment.z[:, part], d
+    sizes = [part.stop - part.start for _, part in held]
+    return (
+        np.concatenate([segment.times[part] for segment, part in held]),
+        np.concatenate([segment.x[:, part] for segment, part in held], axis=1),
+        np.concatenate([segment.z[:, part] for segment, part in held], axis=1),
+        np.repeat(np.array([segment.d for segment, _ in held]).T, sizes, axis=1),
+    )
+
+
+def variables(model: CompiledDae, segments: Sequence[Segment], rows: Sequence[int] | None) -> Vector:
+    """Evaluate variables at all results, shape (rows, n).
+
+    Args:
+        model: the compiled model.
+        segments: of a run.
+        rows: which variables; all if None.
+    """
+    if rows is None:
+        function = along(model._cache, "variables", lambda: model.variables)
+        parts = [function(t, x, z, model.p, model.u, d)[0] for t, x, z, d in blocks(segments)]
+        return np.concatenate(parts, axis=1)
+    return _Expressions.of(model, "variables", model.variables, tuple(rows)).read(model, segments)
+
+
+def energy_term(model: CompiledDae, segments: Sequence[Segment], component: int, column: int) -> Vector:
+    """Evaluate one energy term of one component at all results, shape (n,)."""
+    row = component + column * len(model.components)
+    return _Expressions.of(model, "energy", model.energy, (row,)).read(model, segments)[0]
+
+
+class _Expressions:
+    """Some results of a function of the model, as a function of nothing but what they need."""
+
+    def __init__(self, model: CompiledDae, results: Any) -> None:
+        symbols = {one.element_hash() for one in ca.symvar(results)}
+        self._needed: list[Any] = []
+        arguments: list[Any] = []
+        for argument in model.arguments.values():
+            rows = [k for k in range(argument.numel()) if argument[k].element_hash() in symbols]
+            self._needed.append(rows)
+            arguments.append(argument[rows] if rows else ca.SX(0, 1))
+        self._function = Along(ca.Function("read", arguments, [ca.densify(results)], {"cse": True}))
+
+    @staticmethod
+    def of(model: CompiledDae, name: str, function: ca.Function, rows: tuple[int, ...]) -> _Expressions:
+        key = "read", get_ident(), name, rows
+        if key not in model._cache:
+            whole = "read", name
+            if whole not in model._cache:
+                model._cache[whole] = ca.vec(function(*model.arguments.values()))
+            model._cache[key] = _Expressions(model, model._cache[whole][list(rows)])
+        return model._cache[key]
+
+    def read(self, model: CompiledDae, segments: Sequence[Segment]) -> Vector:
+        t, x, z, p, u, d = self._needed
+        values = np.empty((self._function.rows[0], sum(len(segment.times) for segment in segments)))
+        first = 0
+        for times, states, unknowns, discretes in blocks(segments):
+            last = first + len(times)
+            now = times if t else times[:0]
+            self._function.into(
+                [values[:, first:last]], now, states[x], unknowns[z], model.p[p], model.u[u], discretes[d]
+            )
+            first = last
+        return values

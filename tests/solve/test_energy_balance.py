@@ -1,0 +1,133 @@
+"""Energies are integrated along the run's own results: how precisely, and from how few."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from components import Damper, Fixed, Inertia, SpringDamper
+from modelica_like import Assembly, Component, build, load, simulate
+from modelica_like.errors import StepFailed
+from modelica_like.language import Equations, Parameter, Variable, param, sin, var
+from modelica_like.solve.idas import Integrator
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+LOSSY_GEAR = """
+[parts]
+sine = { is = "Sine", f = 5, amplitude = 20 }
+torque = { is = "Torque" }
+inertia3 = { is = "Inertia", J = 2, phi = 0, w = 0 }
+spring3 = { is = "Spring", c = 1e4 }
+inertia4 = { is = "Inertia", J = 2 }
+gear = { is = "LossyGear", ratio = 2, loss_table = [[0, 0.8, 0.8, 1, 1]] }
+inertia5 = { is = "Inertia", J = 2, phi = 0, w = 0 }
+[series]
+shaft = ["torque", "inertia3", "spring3", "inertia4", "gear", "inertia5"]
+[connect]
+drive = ["sine.y", "torque.tau"]
+[simulate]
+until = "1 s"
+"""
+
+
+def braked() -> Assembly:
+    """A flywheel that a damper stops: w = 3·exp(-0.4·t/0.5)."""
+    parts = {"J": Inertia(J=0.5, phi=0.0, w=3.0), "oil": Damper(d=0.4), "wall": Fixed()}
+    return Assembly("drive", parts=parts, series={"s": list(parts)})
+
+
+def oscillator(c: float, d: float) -> Assembly:
+    parts = {"J": Inertia(J=0.5, phi=0.3, w=0.0), "spring": SpringDamper(c=c, d=d), "wall": Fixed()}
+    return Assembly("drive", parts=parts, series={"s": list(parts)})
+
+
+@pytest.mark.parametrize("points", [1, 2, 5, 50, 500])
+def test_a_loss_by_its_closed_form_from_few_results(points: int) -> None:
+    balance = simulate(braked(), 2.0, points=points, rtol=1e-9, atol=1e-11).energy()
+    assert balance["oil"].lost == pytest.approx(0.25 * 9 * (1 - np.exp(-3.2)), rel=1e-8)
+    assert balance.drift < 1e-8
+
+
+@pytest.mark.parametrize("points", [1, 4, 20, 21])
+def test_oscillations_between_results_are_seen(points: int) -> None:
+    """Twenty periods of exactly 0.05 s: with 4 or 20 results the mass stands still at each, as if nothing moved.
+
+    After whole periods the energy of the oscillation has fallen by exp(-d/J·t).
+    """
+    omega, delta = 40 * np.pi, 0.1
+    run = simulate(oscillator(0.5 * (omega**2 + delta**2), 2 * 0.5 * delta), 1.0, points=points, rtol=1e-10, atol=1e-13)
+    stored = 0.5 * 0.5 * (omega**2 + delta**2) * 0.09
+    assert run.energy()["spring"].lost == pytest.approx(stored * -np.expm1(-2 * delta), rel=1e-6)
+
+
+@pytest.mark.parametrize("name", ["msl/rotational/CoupledClutches", "stick_slip", "machine_tool_startup", "two_mass"])
+def test_the_drift_is_that_of_the_run_whatever_its_results(name: str) -> None:
+    model = build(load(EXAMPLES / f"{name}.toml"))
+    run = simulate(model)
+    fine = run.energy()
+    assert fine.drift <= 10 * run.options.rtol
+    for points in (1, 5, 50):
+        balance = simulate(model, points=points).energy()
+        # Runs with other results differ within their tolerance themselves.
+        assert balance.lost == pytest.approx(fine.lost, abs=20 * run.options.rtol * fine.throughput)
+        assert balance.source == pytest.approx(fine.source, abs=20 * run.options.rtol * fine.throughput)
+        assert balance.closure <= 1e-12
+
+
+def test_a_drive_that_idas_gives_up_at_a_higher_precision_has_a_balance(tmp_path: Path) -> None:
+    """Of a stiff train with a lossy gear; the loss is that of a run of a hundredth of the tolerance."""
+    file = tmp_path / "lossy.toml"
+    file.write_text(LOSSY_GEAR)
+    for points in (1, 500):
+        balance = simulate(load(file), points=points).energy()
+        assert balance["gear"].lost == pytest.approx(0.1545424, rel=1e-5)
+        assert balance.notices == ()
+
+
+class Cycle(Component):
+    """A power without states: P·sin²(omega·t) through friction."""
+
+    omega: Parameter = param("rad/s", "angular frequency", default=40.0)
+    v: Variable = var("m/s", "speed")
+    f: Variable = var("N", "force")
+    amplitude: Parameter = param("m/s", "largest speed", default=1.0)
+    d: Parameter = param("N.s/m", "damping coefficient", default=3.0)
+
+    def equations(self) -> Equations:
+        yield self.v == self.amplitude * sin(self.omega * self.time)
+        yield self.f == self.d * self.v
+
+    def loss_power(self) -> Any:
+        return self.f * self.v
+
+    def source_power(self) -> Any:
+        return self.f * self.v
+
+
+@pytest.mark.parametrize("points", [1, 7, 13, 500])
+def test_a_model_without_states(points: int) -> None:
+    """With 13 results the power seems to change thirteen times as slowly as it does."""
+    balance = simulate(Cycle(), 1.0, points=points).energy()
+    assert balance.lost == pytest.approx(3 * (0.5 - np.sin(80.0) / 160), rel=1e-7)
+    assert balance.closure < 1e-12
+
+
+def test_where_nothing_can_be_integrated_again_the_results_count(monkeypatch: pytest.MonkeyPatch) -> None:
+    run = simulate(oscillator(200.0, 0.1), 1.0, points=40)
+
+    def refuse(*_: Any, **__: Any) -> Any:
+        raise StepFailed("no")
+
+    expected = run.energy()
+    monkeypatch.setattr(Integrator, "run", refuse)
+    balance = replace(run, _cache={}).energy()
+    assert balance["spring"].lost == pytest.approx(expected["spring"].lost, rel=1e-4)
+
+
+def test_states_that_are_no_numbers_have_a_balance_of_none() -> None:
+    run = simulate(Inertia(J=1.0), 1.0, start="rest", points=5)
+    segment = replace(run.segments[0], x=run.segments[0].x * float("nan"))
+    assert np.isnan(replace(run, segments=(segment,), _cache={}).energy().stored)
