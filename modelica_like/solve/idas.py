@@ -34,7 +34,8 @@ _FLAGS = {
 _FIRST_STEP = 1e-4
 _SHORTENED = 1e-6
 """IDAS shortens its first step at most so much before it gives up."""
-_POLISHING = 2
+_POLISHING = 8
+_POLISHED = 1e-8
 _RELAXATION = 10.0
 _PANEL_STEPS = 5000
 """Steps between two results of a panel; a panel that needs more has probably run past an event, and is divided."""
@@ -86,8 +87,9 @@ class Integrator:
         return self.options.rtol * self._relaxed
 
     def weights(self, x: Vector) -> Vector:
-        """What errors of states are measured by: relative and absolute tolerance; shape (nx,)."""
-        return self.rtol * np.abs(x) + self.options.atol * self._relaxed * self.model.nominals
+        """What errors of states are measured by, relative and absolute tolerance; shape as x, (nx,) or (nx, n)."""
+        absolute = self.options.atol * self._relaxed * self.model.nominals
+        return self.rtol * np.abs(x) + (absolute if x.ndim == 1 else absolute[:, None])
 
     def relax(self) -> bool:
         """Relax the tolerances by ten, once; False if they are already."""
@@ -167,7 +169,8 @@ class Integrator:
         x, z = said[0].reshape(outputs, -1).T, said[1].reshape(outputs, -1).T
         if not np.all(np.isfinite(x[:, -1])):
             raise self._failed(start, span, "IDA_REP_RES_ERR", gentle)
-        return x, self._polish(start, span, x, z)
+        times = start.t + span * np.arange(1, outputs + 1) / outputs
+        return x, self.polished(times, x, z, start.d)
 
     def _call(self, start: Point, p: Vector, outputs: int, steps: int, gentle: bool) -> list[Vector] | str:
         """Return what IDAS computes, or what it says where it gives up: that belongs into the error, not onto the screen.
@@ -186,25 +189,34 @@ class Integrator:
         self._count(instance.statistics())
         return found
 
-    def _polish(self, start: Point, span: float, x: Vector, z: Vector) -> Vector:
+    def polished(self, times: Vector, x: Vector, z: Vector, d: Vector) -> Vector:
         """Solve for the implicit unknowns by Newton's method: IDAS gives them within its tolerance only.
 
         Guards on them would be located no better, and constraints would be met no better.
+
+        Args:
+            times: shape (n,), in s.
+            x: states, shape (nx, n).
+            z: guesses, shape (nz, n).
+            d: modes and discrete values.
         """
         if not self.model.implicit:
             return z
         model, outputs = self.model, x.shape[1]
-        times = start.t + span * np.arange(1, outputs + 1) / outputs
-        p, u, d = (np.tile(vector, outputs) for vector in (model.p, model.u, start.d))
+        p, u, d = (np.tile(vector, outputs) for vector in (model.p, model.u, d))
         fast = buffered(model._cache, ("residual", outputs), lambda: _residual_along(model, outputs))
         for _ in range(_POLISHING):
             residual, jacobian = (
                 v.reshape(outputs, len(z), -1) for v in fast(times, x.ravel("F"), z.ravel("F"), p, u, d)
             )
             try:
-                z = z - np.linalg.solve(jacobian.transpose(0, 2, 1), residual)[:, :, 0].T
+                step = np.linalg.solve(jacobian.transpose(0, 2, 1), residual)[:, :, 0].T
             except np.linalg.LinAlgError:
                 return z
+            z = z - step
+            # What is left after a step of Newton's method is about its square.
+            if not np.max(np.abs(step) - _POLISHED * np.abs(z)) > _POLISHED:
+                break
         return z
 
     def _count(self, statistics: dict[str, Any]) -> None:

@@ -67,10 +67,11 @@ class Segment:
 
 @dataclass
 class Recorder:
-    """Collects points into segments, and events."""
+    """Collects points into segments, and events; `notices` are sentences for the report."""
 
     segments: list[Segment] = field(default_factory=list)
     events: list[Event] = field(default_factory=list)
+    notices: list[str] = field(default_factory=list)
     _times: list[Vector] = field(default_factory=list)
     _x: list[Vector] = field(default_factory=list)
     _z: list[Vector] = field(default_factory=list)
@@ -87,9 +88,12 @@ class Recorder:
         self._z.append(z)
 
     def end(self, d: Vector) -> None:
-        """Close the segment."""
+        """Close the segment, if one is open."""
+        if not self._times:
+            return
         self.segments.append(
             Segment(
                 np.concatenate(self._times), np.concatenate(self._x, axis=1), np.concatenate(self._z, axis=1), d.copy()
             )
         )
+        self._times = []

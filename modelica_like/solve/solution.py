@@ -92,6 +92,7 @@ class Solution:
         segments: smooth pieces with fixed modes.
         events: mode changes.
         statistics: what the run took.
+        notices: what should be known about the run, as sentences.
     """
 
     model: CompiledDae
@@ -99,6 +100,7 @@ class Solution:
     segments: tuple[Segment, ...]
     events: tuple[Event, ...]
     statistics: Statistics
+    notices: tuple[str, ...] = ()
     _cache: dict[str, Any] = field(default_factory=dict, repr=False)
 
     @property
