@@ -57,7 +57,8 @@ class EventLoop:
         self.integrator = Integrator(model, options)
         self.guards = Guards(model)
         self.record = Recorder()
-        self.pace = Pace(start.t, end, options, eventful=bool(model.transitions))
+        timed = len(model.transitions) > self.guards.count
+        self.pace = Pace(start.t, end, options, guarded=bool(self.guards.count), timed=timed)
         self.instants = Instants(model, options, self.guards, self.record, end - start.t)
 
     def run(self) -> Recorder:
@@ -67,12 +68,13 @@ class EventLoop:
             Chattering, StepFailed, SingularAtStart: the run cannot go on; `record` of the error is what came before.
         """
         try:
-            self.instants.settle(self.now, self._wanting())
-            self.record.begin(self.now)
-            while self.now.t < self.end:
-                self._advance(min(self.instants.next_moment(self.now), self.end))
-                if self.progress is not None:
-                    self.progress(self.now.t)
+            with self.integrator.interrupts:
+                self.instants.settle(self.now, self._wanting())
+                self.record.begin(self.now)
+                while self.now.t < self.end:
+                    self._advance(min(self.instants.next_moment(self.now), self.end))
+                    if self.progress is not None:
+                        self.progress(self.now.t)
         except SolveError as error:
             error.record = self.record
             raise
@@ -90,7 +92,7 @@ class EventLoop:
         self._keep(looks, float(looks.times[-1]), looks.count)
         self._arrive(looks)
         if self.now.t == stop:
-            if not self.pace.is_result(stop):
+            if self.record.last != stop:
                 self.record.add(np.array([stop]), self.now.x[:, None], self.now.z[:, None])
             if self.instants.due(self.now):
                 self._event(self._wanting())
@@ -115,11 +117,10 @@ class EventLoop:
 
     def _between(self, looks: Looks, times: Vector, last: int, depth: int = 0) -> tuple[Vector, Vector]:
         """Return states and implicit unknowns between looks, from closer looks where interpolation is not precise."""
-        x, z, precise = looks.along(times, last)
+        x, z, unknown = looks.along(times, last)
         if depth < _DEEPEST:
-            intervals = np.array([looks.interval(float(t)) for t in times])
-            for k in np.unique(intervals[~precise]):
-                those = intervals == k
+            for k in unknown:
+                those = looks.intervals(times) == k
                 x[:, those], z[:, those] = self._between(self._closer(looks, int(k)), times[those], _CLOSER, depth + 1)
         return x, z
 
@@ -131,7 +132,7 @@ class EventLoop:
         x, z = self.integrator.run(start, span, looks, patient=patient)
         times = start.t + span * np.arange(looks + 1) / looks
         x, z = np.concatenate([start.x[:, None], x], axis=1), np.concatenate([start.z[:, None], z], axis=1)
-        return Looks(self.integrator, times, x, z, start.d)
+        return Looks(self.integrator, self.guards, times, x, z, start.d)
 
     def _panel(self, stop: float) -> Looks:
         """Integrate one panel.
@@ -167,7 +168,7 @@ class EventLoop:
         """
         if not self.pace.laborious(steps, looks.count):
             return False
-        values, _ = self.guards.along(looks.times, looks.x, looks.z, looks.d)
+        values = looks.seen[0]
         risen = np.flatnonzero((values[self.guards.active(looks.d), 1:] > 0).any(axis=0))
         if not len(risen) or 2 * (risen[0] + 1) > looks.count:
             return False
@@ -213,7 +214,7 @@ class EventLoop:
             depth: how often the looks became closer already.
             begins: whether it begins where the last event, or the search before, has ended.
         """
-        values, rates = self.guards.along(looks.times, looks.x, looks.z, looks.d)
+        values, rates, _ = looks.seen
         if begins:
             # What the last event left positive did not want to fire: it is on its way down.
             values[:, 0] = np.minimum(values[:, 0], 0.0)

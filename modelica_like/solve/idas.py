@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import re
-from contextlib import redirect_stderr
+import sys
 from typing import Any
 
 import casadi as ca
@@ -14,7 +14,7 @@ from modelica_like.compile.buffers import BufferedFunction, buffered
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import StepFailed
 from modelica_like.initialize import Point, call
-from modelica_like.solve.interrupts import interruptible
+from modelica_like.solve.interrupts import Interrupts
 from modelica_like.solve.options import Options
 
 _FLAGS = {
@@ -58,9 +58,10 @@ def scaled_problem(model: CompiledDae, *, gentle: bool = False) -> dict[str, Any
         x, z, p, u, d = (arguments[name] for name in ("x", "z", "p", "u", "d"))
         passed, speed = (s * s * span, 2 * s * span) if gentle else (s * span, span)
         inner = [t0 + passed, x, z, p, u, d]
+        ode, alg = ca.cse([speed * model.ode(*inner), model.alg(*inner)])
         model._cache[key] = {
-            "t": s, "x": x, "z": z, "p": ca.vertcat(t0, span, p, u, d),
-            "ode": speed * model.ode(*inner), "alg": model.alg(*inner), "inner": inner, "span": speed,
+            "t": s, "x": x, "z": z, "p": ca.vertcat(t0, span, p, u, d), "ode": ode, "alg": alg, "inner": inner,
+            "span": speed,
         }  # fmt: skip
     return model._cache[key]
 
@@ -77,6 +78,7 @@ class Integrator:
         self.calls = 0
         self.steps = 0
         self.evaluations = 0
+        self.interrupts = Interrupts()
         self._relaxed = 1.0
         self._gentle_from = np.inf
         self._tail = np.concatenate([model.p, model.u])
@@ -180,12 +182,14 @@ class Integrator:
         """
         first = self._first_step(start, p[1]) if gentle else _FIRST_STEP
         instance = self._instance(outputs, steps, gentle, first)
-        said = io.StringIO()
+        screen, sys.stderr = sys.stderr, io.StringIO()
         try:
-            with redirect_stderr(said), interruptible():
-                found = instance(start.x, start.z, p)
+            found = instance(start.x, start.z, p)
         except RuntimeError as error:
-            return f"{said.getvalue()} {error}"
+            self.interrupts.check()
+            return f"{sys.stderr.getvalue()} {error}"
+        finally:
+            sys.stderr = screen
         self._count(instance.statistics())
         return found
 
@@ -203,11 +207,10 @@ class Integrator:
         if not self.model.implicit:
             return z
         model, outputs = self.model, x.shape[1]
-        p, u, d = (np.tile(vector, outputs) for vector in (model.p, model.u, d))
         fast = buffered(model._cache, ("residual", outputs), lambda: _residual_along(model, outputs))
         for _ in range(_POLISHING):
             residual, jacobian = (
-                v.reshape(outputs, len(z), -1) for v in fast(times, x.ravel("F"), z.ravel("F"), p, u, d)
+                v.reshape(outputs, len(z), -1) for v in fast(times, x.ravel("F"), z.ravel("F"), model.p, model.u, d)
             )
             try:
                 step = np.linalg.solve(jacobian.transpose(0, 2, 1), residual)[:, :, 0].T
@@ -262,5 +265,10 @@ def _at_the_start(text: str) -> bool:
 def _residual_along(model: CompiledDae, count: int) -> ca.Function:
     """Return residuals of the implicit equations and their Jacobian at `count` times, as one function."""
     arguments = list(model.arguments.values())
-    both = [model.alg(*arguments), ca.densify(model.alg_jacobian(*arguments))]
-    return ca.Function("residual", arguments, both).map(count)
+    both = ca.cse([model.alg(*arguments), ca.densify(model.alg_jacobian(*arguments))])
+    return along(ca.Function("residual", arguments, both), count)
+
+
+def along(function: ca.Function, count: int) -> ca.Function:
+    """Return a function of (t, x, z, p, u, d) at `count` times with the same parameters, inputs and modes."""
+    return function.map(f"{function.name()}_along", "serial", count, [3, 4, 5], []) if count > 1 else function

@@ -4,42 +4,46 @@ from __future__ import annotations
 
 import signal
 import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
+from types import FrameType, TracebackType
 from typing import Any
 
 
-@contextmanager
-def interruptible() -> Iterator[None]:
-    """Let an interrupt inside leave as what it is.
+class Interrupts:
+    """Keeps what a handler of SIGINT raised; a context around everything that may be interrupted.
 
     CasADi looks for signals while it evaluates equations, but an integrator takes the exception for a failure of the
-    equations. What a handler of Python raised is kept here and raised again outside. In other threads than the main
-    one there are no signals.
-
-    Raises:
-        KeyboardInterrupt: or what else the program's own handler raises.
+    equations. In other threads than the main one there are no signals.
     """
-    previous = signal.getsignal(signal.SIGINT)
-    if not callable(previous) or threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    raised: list[BaseException] = []
 
-    def note(number: int, frame: Any) -> None:
+    def __init__(self) -> None:
+        self._previous: Any = None
+        self._raised: BaseException | None = None
+
+    def __enter__(self) -> Interrupts:
+        if threading.current_thread() is threading.main_thread():
+            previous = signal.getsignal(signal.SIGINT)
+            if callable(previous):
+                self._previous = previous
+                signal.signal(signal.SIGINT, self._note)
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        if self._previous is not None:
+            signal.signal(signal.SIGINT, self._previous)
+            self._previous = None
+
+    def _note(self, number: int, frame: FrameType | None) -> None:
         try:
-            previous(number, frame)
+            self._previous(number, frame)
         except BaseException as error:
-            raised.append(error)
+            self._raised = error
             raise
 
-    signal.signal(signal.SIGINT, note)
-    try:
-        yield
-    except BaseException:
-        if not raised:
-            raise
-    finally:
-        signal.signal(signal.SIGINT, previous)
-    if raised:
-        raise raised[0] from None
+    def check(self) -> None:
+        """Raise what the handler raised, after something else came of it.
+
+        Raises:
+            KeyboardInterrupt: or what else the program's own handler raises.
+        """
+        if self._raised is not None:
+            raise self._raised from None

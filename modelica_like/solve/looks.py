@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from modelica_like.compile.buffers import buffered
 from modelica_like.compile.compiled import Vector
 from modelica_like.initialize import Point
+from modelica_like.solve.guards import Guards
 from modelica_like.solve.idas import Integrator
 
 _NODES = 4
 """Looks around an interval that its polynomial passes through, with their slopes: degree seven."""
 PRECISE = 1.0
 """Difference of two degrees, in tolerances, up to which a polynomial counts as the solution."""
-_BLOCK = 8
-"""Slopes are evaluated for so many looks at a time."""
 
 
 def _basis(nodes: list[int]) -> Vector:
@@ -76,27 +75,32 @@ class Looks:
 
     Args:
         integrator: what computed them.
+        guards: evaluates guards, their rates and slopes of states there.
         times: shape (n + 1,) in s, beginning included.
         x: states, shape (nx, n + 1).
         z: implicit unknowns, shape (nz, n + 1).
         d: modes and discrete values.
     """
 
-    def __init__(self, integrator: Integrator, times: Vector, x: Vector, z: Vector, d: Vector) -> None:
-        self.integrator, self.times, self.x, self.z, self.d = integrator, times, x, z, d
+    def __init__(
+        self, integrator: Integrator, guards: Guards, times: Vector, x: Vector, z: Vector, d: Vector
+    ) -> None:
+        self.integrator, self.guards, self.times, self.x, self.z, self.d = integrator, guards, times, x, z, d
         self.count = len(times) - 1
         self.width = float(times[-1] - times[0]) / self.count
-        self._slopes = np.zeros((len(x), self.count + 1))
-        self._known = np.zeros(self.count + 1, bool)
-        self._cells: dict[int, Cell] = {}
+
+    @cached_property
+    def seen(self) -> tuple[Vector, Vector, Vector]:
+        """Guards, their rates and derivatives of the states at the looks; shapes (guards, n + 1), …, (nx, n + 1)."""
+        return self.guards.along(self.times, self.x, self.z, self.d)
 
     def point(self, k: int) -> Point:
         """Return one look."""
         return Point(float(self.times[k]), self.x[:, k].copy(), self.z[:, k].copy(), self.d)
 
-    def interval(self, t: float) -> int:
-        """Return the number of the interval in which a time lies."""
-        return min(max(int(np.searchsorted(self.times, t)) - 1, 0), self.count - 1)
+    def intervals(self, times: Vector) -> Any:
+        """Return the numbers of the intervals in which times lie."""
+        return np.clip(np.searchsorted(self.times, times) - 1, 0, self.count - 1)
 
     def cell(self, k: int, last: int | None = None) -> Cell | None:
         """Return the interval from look k to the next, nothing if there are too few looks.
@@ -107,23 +111,23 @@ class Looks:
         """
         if self.count < _NODES - 1:
             return None
-        if k not in self._cells:
-            first = max(min(k - 1, (self.count if last is None else last) - _NODES + 1, self.count - _NODES + 1), 0)
-            nodes = slice(first, first + _NODES)
-            base = self.x[:, k].copy()
-            data = np.concatenate([(self.x[:, nodes] - base[:, None]).T, self.width * self._slopes_at(nodes).T])
-            weights = self.integrator.weights(base)
-            self._cells[k] = Cell(float(self.times[k]), self.width, k - first, base, data, weights)
-        return self._cells[k]
+        first = max(min(k - 1, (self.count if last is None else last) - _NODES + 1, self.count - _NODES + 1), 0)
+        nodes = slice(first, first + _NODES)
+        base = self.x[:, k].copy()
+        data = np.concatenate([(self.x[:, nodes] - base[:, None]).T, self.width * self.seen[2][:, nodes].T])
+        weights = self.integrator.weights(base)
+        return Cell(float(self.times[k]), self.width, k - first, base, data, weights)
 
     def at(self, t: float, cell: Cell, *, coarse: bool = False) -> Point:
         """Return the point at a time in an interval; the implicit unknowns follow from its states."""
         times, x = np.array([t]), cell.states(t, coarse=coarse)
-        z = self._implicit(times, np.array([self.interval(t)]), x[:, None])
+        z = self._implicit(times, self.intervals(times), x[:, None])
         return Point(t, x, z[:, 0], self.d)
 
     def along(self, times: Vector, last: int) -> tuple[Vector, Vector, Any]:
-        """Return states and implicit unknowns at times, and where they are precise; shapes (nx, n), (nz, n), (n,).
+        """Return states and implicit unknowns at times, and the intervals in which they are not precise.
+
+        Shapes (nx, n), (nz, n), (intervals,).
 
         Args:
             times: between the looks, shape (n,).
@@ -131,19 +135,18 @@ class Looks:
         """
         if self.count < _NODES - 1:
             nothing = np.zeros((len(self.x), len(times)))
-            return nothing, np.zeros((len(self.z), len(times))), np.zeros(len(times), bool)
-        k = np.clip(np.searchsorted(self.times, times) - 1, 0, self.count - 1)
+            return nothing, np.zeros((len(self.z), len(times))), self.intervals(times)
+        k = self.intervals(times)
         first = np.clip(np.minimum(k - 1, max(last, _NODES - 1) - _NODES + 1), 0, self.count - _NODES + 1)
-        self._slopes_at(slice(int(first.min()), int(first.max()) + _NODES))
         nodes = first[:, None] + np.arange(_NODES)
         base = self.x[:, k]
-        data = np.concatenate([self.x[:, nodes] - base[:, :, None], self.width * self._slopes[:, nodes]], axis=2)
+        data = np.concatenate([self.x[:, nodes] - base[:, :, None], self.width * self.seen[2][:, nodes]], axis=2)
         powers = ((times - self.times[k]) / self.width + (k - first) - 0.5 * (_NODES - 1))[:, None] ** _POWERS
         precise = powers @ _PRECISE
         coarse = np.einsum("np,npk->nk", powers, _COARSE[k - first])
         x = base + np.einsum("ink,nk->in", data, precise)
         error = np.abs(np.einsum("ink,nk->in", data, precise - coarse)) / self.integrator.weights(base)
-        return x, self._implicit(times, k, x), np.all(error <= PRECISE, axis=0)
+        return x, self._implicit(times, k, x), np.unique(k[~np.all(error <= PRECISE, axis=0)])
 
     def _implicit(self, times: Vector, k: Any, x: Vector) -> Vector:
         if not len(self.z):
@@ -151,20 +154,3 @@ class Looks:
         share = (times - self.times[k]) / self.width
         guess = self.z[:, k] + share * (self.z[:, k + 1] - self.z[:, k])
         return self.integrator.polished(times, x, guess, self.d)
-
-    def _slopes_at(self, nodes: slice) -> Vector:
-        """Derivatives of the states at looks, in s⁻¹."""
-        for first in range(nodes.start - nodes.start % _BLOCK, nodes.stop, _BLOCK):
-            if not self._known[first]:
-                block = np.minimum(np.arange(first, first + _BLOCK), self.count)
-                self._slopes[:, block] = _rates(self.integrator, self.times[block], self.x[:, block], self.z[:, block], self.d)
-                self._known[first] = True
-        return self._slopes[:, nodes]
-
-
-def _rates(integrator: Integrator, times: Vector, x: Vector, z: Vector, d: Vector) -> Vector:
-    """Derivatives of the states at a block of points, shape (nx, block)."""
-    model = integrator.model
-    fast = buffered(model._cache, ("rates", _BLOCK), lambda: model.ode.map(_BLOCK))
-    p, u, d = (np.tile(vector, _BLOCK) for vector in (model.p, model.u, d))
-    return fast(times, x.ravel("F"), z.ravel("F"), p, u, d)[0].reshape(_BLOCK, -1).T

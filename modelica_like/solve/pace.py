@@ -8,7 +8,7 @@ from modelica_like.compile.compiled import Vector
 from modelica_like.solve.instants import SAME_TIME
 from modelica_like.solve.options import Options
 
-_SIZES = (8, 32, 128, 512)
+_SIZES = (8, 32, 128, 512, 2048)
 """Looks of one call: few different numbers, for each is an instance of IDAS."""
 _LARGEST = 4096
 """Results of one call without events: memory, not time, bounds them."""
@@ -27,15 +27,17 @@ class Pace:
         begin: start of the run in s.
         end: its end.
         options: number of results.
-        eventful: whether there may be events.
+        guarded: whether there may be state events: then panels are as long as segments are expected to be.
+        timed: whether there may be time events.
     """
 
-    def __init__(self, begin: float, end: float, options: Options, *, eventful: bool) -> None:
+    def __init__(self, begin: float, end: float, options: Options, *, guarded: bool, timed: bool) -> None:
         self.begin, self.end, self.points = begin, end, options.points
         self.step = (end - begin) / options.points
         self.checks = 1
-        self.eventful = eventful
-        self.size = _SIZES[1] if eventful else -(-options.points // -(-options.points // _LARGEST))
+        self.guarded, self.eventful = guarded, guarded or timed
+        even = -(-options.points // -(-options.points // _LARGEST))
+        self.size = _SIZES[1] if guarded else _SIZES[-1] if timed else even
 
     @property
     def look(self) -> float:
@@ -75,11 +77,6 @@ class Pace:
         """Return the latest time of results that lie before an event."""
         return t - 2 * _ON_GRID * self.step
 
-    def is_result(self, t: float) -> bool:
-        """Whether a result lies at a time."""
-        position = (t - self.begin) / self.step
-        return abs(position - np.rint(position)) < _ON_GRID
-
     def refine(self, steps: int, looks: int) -> bool:
         """Adapt the number of looks per result to the integrator's steps; True if it was too small."""
         each = max(steps - _STEPS_TO_START, 0) / looks
@@ -100,12 +97,12 @@ class Pace:
 
     def longer(self, looks: int, ahead: float) -> None:
         """Let the next panel be longer than one of so many looks, but not much longer than what is ahead, in s."""
-        if self.eventful and looks >= self.size:
+        if self.guarded and looks >= self.size:
             self.size = min(_at_least(looks + 1), max(_at_least(_ROOM * ahead / self.look), _SIZES[1]))
 
     def anew(self, span: float) -> None:
         """Begin a segment; the one before took so long, in s, and this one is expected to."""
-        if self.eventful:
+        if self.guarded:
             self.size = _at_least(_ROOM * span / self.look)
 
 

@@ -82,10 +82,15 @@ class Recorder:
         self.add(np.array([point.t]), point.x[:, None], point.z[:, None])
 
     def add(self, times: Vector, x: Vector, z: Vector) -> None:
-        """Append points; shapes (n,), (nx, n), (nz, n)."""
+        """Append at least one point; shapes (n,), (nx, n), (nz, n)."""
         self._times.append(times)
         self._x.append(x)
         self._z.append(z)
+
+    @property
+    def last(self) -> float:
+        """Time of the latest point of the open segment in s."""
+        return float(self._times[-1][-1])
 
     def end(self, d: Vector) -> None:
         """Close the segment, if one is open."""
