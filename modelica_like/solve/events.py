@@ -253,7 +253,10 @@ class EventLoop:
         With `sure`, the looks cannot be closer.
         """
         k = group[0].interval
-        cell = looks.cell(k, k + 1)
+        watched = [one.guard for one in group]
+        sizes = np.abs(values[watched, k]) + np.abs(values[watched, k + 1])
+        cells = looks.cells(k, k + 1)
+        cell = next((one for one in cells if sure or self._is_sharp(looks, one, watched, sizes)), None)
         if cell is None:
             return None, None
 
@@ -262,10 +265,6 @@ class EventLoop:
             return point, *self.guards.at(point)
 
         first, last = (values[:, k], rates[:, k]), (values[:, k + 1], rates[:, k + 1])
-        watched = [one.guard for one in group]
-        sizes = np.abs(values[watched, k]) + np.abs(values[watched, k + 1])
-        if not sure and not self._is_sharp(looks, cell, watched, sizes):
-            return None, None
         return cell, locate(trial, cell.width, first, last, group, cell.t)
 
     def _is_sharp(self, looks: Looks, cell: Cell, guards: list[int], sizes: Vector) -> bool:
@@ -274,7 +273,7 @@ class EventLoop:
         A state may be small compared with its tolerance, and a guard live on such values all the same.
         """
         t = cell.t + 0.5 * cell.width
-        if not cell.precise(t):
+        if not cell.precise(t, self.integrator.weights(cell.states(cell.t))):
             return False
         precise, coarse = (self.guards.at(looks.at(t, cell, coarse=which))[0][guards] for which in (False, True))
         return bool(np.all(np.abs(precise - coarse) <= _SHARP * sizes))

@@ -34,6 +34,8 @@ _FLAGS = {
 _FIRST_STEP = 1e-4
 _SHORTENED = 1e-6
 """IDAS shortens its first step at most so much before it gives up."""
+_SPARSE_FROM = 50
+"""Unknowns from which CSparse is quicker."""
 _POLISHING = 8
 _POLISHED = 1e-8
 _RELAXATION = 10.0
@@ -64,6 +66,14 @@ def scaled_problem(model: CompiledDae, *, gentle: bool = False) -> dict[str, Any
             "span": speed,
         }  # fmt: skip
     return model._cache[key]
+
+
+def linear_solver(unknowns: int) -> str:
+    """Return what factorises the Jacobian of a step.
+
+    CasADi's QR is compact and quick for few unknowns; the LU of CSparse keeps sparse what is sparse.
+    """
+    return "csparse" if unknowns >= _SPARSE_FROM else "qr"
 
 
 class Integrator:
@@ -135,6 +145,7 @@ class Integrator:
             # anew.
             "step0": first,
             "calc_ic": not gentle,
+            "linear_solver": linear_solver(len(self.model.states) + len(self.model.implicit)),
         }
 
     def run(self, start: Point, span: float, outputs: int = 1, *, patient: bool = True) -> tuple[Vector, Vector]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import cached_property
 from typing import Any
 
@@ -12,62 +13,77 @@ from modelica_like.initialize import Point
 from modelica_like.solve.guards import Guards
 from modelica_like.solve.idas import Integrator
 
-_NODES = 4
-"""Looks around an interval that its polynomial passes through, with their slopes: degree seven."""
 PRECISE = 1.0
 """Difference of two degrees, in tolerances, up to which a polynomial counts as the solution."""
+_TERMS = 8
 
 
-def _basis(nodes: list[int]) -> Vector:
-    """Coefficients in powers of u = θ - 1.5 of the polynomials for values and slopes at nodes among 0 … 3.
+class _Scheme:
+    """A polynomial of degree seven through looks around an interval, and one of degree five that tells its precision.
 
-    Shape (8 powers, 8 data): first the four values, then the four slopes; zero for nodes that are not used.
+    Args:
+        nodes: number of looks.
+        slopes: whether it takes slopes there, too. They make it much more precise, unless the equations are stiff:
+            then slopes are what errors of the states make of them.
     """
-    u = np.array(nodes) - 0.5 * (_NODES - 1)
-    powers = np.arange(2 * len(nodes))
-    values = u[:, None] ** powers
-    slopes = powers * u[:, None] ** np.maximum(powers - 1, 0)
-    inverse = np.linalg.inv(np.concatenate([values, slopes]))
-    basis = np.zeros((2 * _NODES, 2 * _NODES))
-    columns = [*nodes, *(node + _NODES for node in nodes)]
-    basis[: len(powers), columns] = inverse
-    return basis
+
+    def __init__(self, nodes: int, *, slopes: bool) -> None:
+        self.nodes, self.slopes = nodes, slopes
+        fewer = nodes - (1 if slopes else 2)
+        self.precise = self._basis(0, nodes)
+        starts = [min(max(cell - (fewer - 1) // 2, 0), nodes - fewer) for cell in range(nodes - 1)]
+        self.coarse = np.array([self._basis(start, fewer) for start in starts])
+
+    def _basis(self, first: int, count: int) -> Vector:
+        """Coefficients in powers of u = θ - (nodes - 1)/2, θ in looks, of what each datum contributes; (powers, data)."""
+        nodes = np.arange(first, first + count)
+        u, powers = (nodes - 0.5 * (self.nodes - 1))[:, None], np.arange(count * (2 if self.slopes else 1))
+        columns, rows = [*nodes], [u**powers]
+        if self.slopes:
+            columns += [*(nodes + self.nodes)]
+            rows += [powers * u ** np.maximum(powers - 1, 0)]
+        basis = np.zeros((_TERMS, _TERMS))
+        basis[: len(powers), columns] = np.linalg.inv(np.concatenate(rows))
+        return basis
+
+    def first(self, k: Any, last: int) -> Any:
+        """Return the first look of the polynomials for intervals k, if possible none behind look `last`."""
+        return np.maximum(np.minimum(k - (self.nodes // 2 - 1), last - self.nodes + 1), 0)
+
+    def powers(self, theta: Any) -> Vector:
+        """Powers of u, shape (…, 8)."""
+        return np.asarray(theta - 0.5 * (self.nodes - 1))[..., None] ** np.arange(_TERMS)
 
 
-_PRECISE = _basis([0, 1, 2, 3])
-_COARSE = np.array([_basis([0, 1, 2]), _basis([0, 1, 2]), _basis([1, 2, 3])])
-"""Degree five, through the three nodes nearest to each of the three intervals: tells how precise degree seven is."""
-_POWERS = np.arange(2 * _NODES)
+_SCHEMES = _Scheme(4, slopes=True), _Scheme(8, slopes=False)
 
 
 class Cell:
     """The interval between two looks.
 
     Args:
+        scheme: how it is interpolated.
         t: time of its beginning in s.
         width: its length in s.
-        number: its place among the three intervals of the polynomial.
+        number: its place among the intervals of the polynomial.
         base: states at its beginning, shape (nx,).
-        data: values relative to `base` and slopes times `width` at the four nodes, shape (8, nx).
-        weights: tolerances of the states, shape (nx,).
+        data: values relative to `base`, and perhaps slopes times `width`, shape (8, nx).
     """
 
-    def __init__(self, t: float, width: float, number: int, base: Vector, data: Vector, weights: Vector) -> None:
-        self.t, self.width, self._base = t, width, base
-        self._offset = number - 0.5 * (_NODES - 1)
-        self._polynomials = _PRECISE @ data, _COARSE[number] @ data
-        self._weights = weights
+    def __init__(self, scheme: _Scheme, t: float, width: float, number: int, base: Vector, data: Vector) -> None:
+        self.t, self.width, self._scheme, self._number, self._base = t, width, scheme, number, base
+        self._polynomials = scheme.precise @ data, scheme.coarse[number] @ data
 
     def states(self, t: float, *, coarse: bool = False) -> Vector:
         """Return the states at a time in it, by the polynomial of degree seven or the coarser one; shape (nx,)."""
         if t <= self.t:
             return self._base.copy()
-        return self._base + ((t - self.t) / self.width + self._offset) ** _POWERS @ self._polynomials[coarse]
+        return self._base + self._scheme.powers((t - self.t) / self.width + self._number) @ self._polynomials[coarse]
 
-    def precise(self, t: float) -> bool:
-        """Whether the polynomials of both degrees agree within the tolerances."""
+    def precise(self, t: float, weights: Vector) -> bool:
+        """Whether the polynomials of both degrees agree within tolerances of the states."""
         difference = np.abs(self.states(t) - self.states(t, coarse=True))
-        return bool(np.all(difference <= PRECISE * self._weights))
+        return bool(np.all(difference <= PRECISE * weights))
 
 
 class Looks:
@@ -102,21 +118,23 @@ class Looks:
         """Return the numbers of the intervals in which times lie."""
         return np.clip(np.searchsorted(self.times, times) - 1, 0, self.count - 1)
 
-    def cell(self, k: int, last: int | None = None) -> Cell | None:
-        """Return the interval from look k to the next, nothing if there are too few looks.
+    def cells(self, k: int, last: int) -> Iterator[Cell]:
+        """Give the interval from look k to the next, interpolated in several ways; nothing if there are too few looks.
 
         Args:
             k: number.
             last: the last look that means something, because of an event before the next.
         """
-        if self.count < _NODES - 1:
-            return None
-        first = max(min(k - 1, (self.count if last is None else last) - _NODES + 1, self.count - _NODES + 1), 0)
-        nodes = slice(first, first + _NODES)
         base = self.x[:, k].copy()
-        data = np.concatenate([(self.x[:, nodes] - base[:, None]).T, self.width * self.seen[2][:, nodes].T])
-        weights = self.integrator.weights(base)
-        return Cell(float(self.times[k]), self.width, k - first, base, data, weights)
+        for scheme in _SCHEMES:
+            if scheme.nodes > self.count + 1:
+                continue
+            first = int(scheme.first(k, max(last, scheme.nodes - 1)))
+            nodes = slice(first, first + scheme.nodes)
+            data = (self.x[:, nodes] - base[:, None]).T
+            if scheme.slopes:
+                data = np.concatenate([data, self.width * self.seen[2][:, nodes].T])
+            yield Cell(scheme, float(self.times[k]), self.width, k - first, base, data)
 
     def at(self, t: float, cell: Cell, *, coarse: bool = False) -> Point:
         """Return the point at a time in an interval; the implicit unknowns follow from its states."""
@@ -133,20 +151,28 @@ class Looks:
             times: between the looks, shape (n,).
             last: the last look that means something.
         """
-        if self.count < _NODES - 1:
-            nothing = np.zeros((len(self.x), len(times)))
-            return nothing, np.zeros((len(self.z), len(times))), self.intervals(times)
         k = self.intervals(times)
-        first = np.clip(np.minimum(k - 1, max(last, _NODES - 1) - _NODES + 1), 0, self.count - _NODES + 1)
-        nodes = first[:, None] + np.arange(_NODES)
+        x, left = np.zeros((len(self.x), len(times))), np.ones(len(times), bool)
+        for scheme in _SCHEMES:
+            if left.any() and scheme.nodes <= self.count + 1:
+                those = np.flatnonzero(left)
+                x[:, those], left[those] = self._by(scheme, times[those], k[those], last)
+        return x, self._implicit(times, k, x), np.unique(k[left])
+
+    def _by(self, scheme: _Scheme, times: Vector, k: Any, last: int) -> tuple[Vector, Any]:
+        """Return states at times in intervals k, and where they are not precise."""
+        first = scheme.first(k, max(last, scheme.nodes - 1))
+        nodes = first[:, None] + np.arange(scheme.nodes)
         base = self.x[:, k]
-        data = np.concatenate([self.x[:, nodes] - base[:, :, None], self.width * self.seen[2][:, nodes]], axis=2)
-        powers = ((times - self.times[k]) / self.width + (k - first) - 0.5 * (_NODES - 1))[:, None] ** _POWERS
-        precise = powers @ _PRECISE
-        coarse = np.einsum("np,npk->nk", powers, _COARSE[k - first])
+        data = self.x[:, nodes] - base[:, :, None]
+        if scheme.slopes:
+            data = np.concatenate([data, self.width * self.seen[2][:, nodes]], axis=2)
+        powers = scheme.powers((times - self.times[k]) / self.width + (k - first))
+        precise = powers @ scheme.precise
+        coarse = np.einsum("np,npk->nk", powers, scheme.coarse[k - first])
+        error = np.abs(np.einsum("ink,nk->in", data, precise - coarse))
         x = base + np.einsum("ink,nk->in", data, precise)
-        error = np.abs(np.einsum("ink,nk->in", data, precise - coarse)) / self.integrator.weights(base)
-        return x, self._implicit(times, k, x), np.unique(k[~np.all(error <= PRECISE, axis=0)])
+        return x, ~np.all(error <= PRECISE * self.integrator.weights(base), axis=0)
 
     def _implicit(self, times: Vector, k: Any, x: Vector) -> Vector:
         if not len(self.z):
