@@ -23,8 +23,6 @@ _NEVER = 1e-12
 _CLOSER = 8
 """Looks into an interval between two looks."""
 _DEEPEST = 10
-_SHARP = 1e-4
-"""Difference of a guard by two interpolations, relative to its values at both looks, up to which it is located."""
 _MAX_HALVINGS = 30
 _MAX_FAILURES = 40
 
@@ -256,7 +254,7 @@ class EventLoop:
         watched = [one.guard for one in group]
         sizes = np.abs(values[watched, k]) + np.abs(values[watched, k + 1])
         cells = looks.cells(k, k + 1)
-        cell = next((one for one in cells if sure or self._is_sharp(looks, one, watched, sizes)), None)
+        cell = next((one for one in cells if sure or looks.is_sharp(one, watched, sizes)), None)
         if cell is None:
             return None, None
 
@@ -266,17 +264,6 @@ class EventLoop:
 
         first, last = (values[:, k], rates[:, k]), (values[:, k + 1], rates[:, k + 1])
         return cell, locate(trial, cell.width, first, last, group, cell.t)
-
-    def _is_sharp(self, looks: Looks, cell: Cell, guards: list[int], sizes: Vector) -> bool:
-        """Whether interpolated states are precise, and precise enough for guards of given sizes, in the middle.
-
-        A state may be small compared with its tolerance, and a guard live on such values all the same.
-        """
-        t = cell.t + 0.5 * cell.width
-        if not cell.precise(t, self.integrator.weights(cell.states(cell.t))):
-            return False
-        precise, coarse = (self.guards.at(looks.at(t, cell, coarse=which))[0][guards] for which in (False, True))
-        return bool(np.all(np.abs(precise - coarse) <= _SHARP * sizes))
 
     def _search_closer(self, looks: Looks, k: int, depth: int, *, begins: bool) -> bool:
         """Search between two looks again, with closer ones; whatever is found, the run goes on from there."""

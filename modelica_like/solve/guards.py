@@ -82,8 +82,10 @@ def _finite(rates: Vector) -> Vector:
 
 def _numbers(guards: Vector) -> Vector:
     """Let a guard that is not a number be false, and what is nothing but rounding zero."""
-    guards = guards if np.isfinite(guards).all() else np.nan_to_num(guards, nan=-1.0)
     sizes = np.abs(guards)
+    if not sizes.size or _NOISE <= sizes.min() <= sizes.max() < np.inf:
+        return guards
+    guards = np.nan_to_num(guards, nan=-1.0)
     return np.where((sizes < _NOISE) & (sizes > JUST_TRUE), 0.0, guards)
 
 
@@ -111,8 +113,8 @@ def candidates(values: Vector, rates: Vector, active: Any, step: float) -> list[
     below = before <= 0
     crossing = below & (after > 0)
     humps = below & ~crossing & (rates[:, :-1] * step > _NOISE) & (rates[:, 1:] * step < -_NOISE)
-    places = np.nonzero(humps)
-    if places[0].size:
+    if humps.any():
+        places = np.nonzero(humps)
         ends = before[places], after[places]
         top = _peak(*ends, rates[:, :-1][places] * step, rates[:, 1:][places] * step)
         humps[places] = top > -_NEAR * (np.abs(ends[0]) + np.abs(ends[1]))

@@ -15,7 +15,11 @@ from modelica_like.solve.idas import Integrator
 
 PRECISE = 1.0
 """Difference of two degrees, in tolerances, up to which a polynomial counts as the solution."""
+_SHARP = 1e-4
+"""Difference of a guard by two degrees, relative to its values at both looks, up to which it is located."""
 _TERMS = 8
+_ROUNDING = 1e-12
+_EXPONENTS = np.arange(float(_TERMS))
 
 
 class _Scheme:
@@ -30,29 +34,29 @@ class _Scheme:
     def __init__(self, nodes: int, *, slopes: bool) -> None:
         self.nodes, self.slopes = nodes, slopes
         fewer = nodes - (1 if slopes else 2)
-        self.precise = self._basis(0, nodes)
-        starts = [min(max(cell - (fewer - 1) // 2, 0), nodes - fewer) for cell in range(nodes - 1)]
-        self.coarse = np.array([self._basis(start, fewer) for start in starts])
+        cells = range(nodes - 1)
+        starts = [min(max(cell - (fewer - 1) // 2, 0), nodes - fewer) for cell in cells]
+        self.precise = np.array([self._basis(0, nodes, cell) for cell in cells])
+        self.coarse = np.array([self._basis(start, fewer, cell) for start, cell in zip(starts, cells, strict=True)])
 
-    def _basis(self, first: int, count: int) -> Vector:
-        """Coefficients in powers of u = θ - (nodes - 1)/2, θ in looks, of what each datum contributes; (powers, data)."""
+    def _basis(self, first: int, count: int, cell: int) -> Vector:
+        """Coefficients, in powers of the share of a cell that has passed, of what each datum adds; (powers, data).
+
+        In these powers, states near the beginning of the cell are as precise as their slopes there.
+        """
         nodes = np.arange(first, first + count)
-        u, powers = (nodes - 0.5 * (self.nodes - 1))[:, None], np.arange(count * (2 if self.slopes else 1))
+        u, powers = (nodes - float(cell))[:, None], np.arange(count * (2 if self.slopes else 1))
         columns, rows = [*nodes], [u**powers]
         if self.slopes:
             columns += [*(nodes + self.nodes)]
             rows += [powers * u ** np.maximum(powers - 1, 0)]
         basis = np.zeros((_TERMS, _TERMS))
         basis[: len(powers), columns] = np.linalg.inv(np.concatenate(rows))
-        return basis
+        return np.where(np.abs(basis) < _ROUNDING, 0.0, basis)
 
     def first(self, k: Any, last: int) -> Any:
         """Return the first look of the polynomials for intervals k, if possible none behind look `last`."""
         return np.maximum(np.minimum(k - (self.nodes // 2 - 1), last - self.nodes + 1), 0)
-
-    def powers(self, theta: Any) -> Vector:
-        """Powers of u, shape (…, 8)."""
-        return np.asarray(theta - 0.5 * (self.nodes - 1))[..., None] ** np.arange(_TERMS)
 
 
 _SCHEMES = _Scheme(4, slopes=True), _Scheme(8, slopes=False)
@@ -65,25 +69,29 @@ class Cell:
         scheme: how it is interpolated.
         t: time of its beginning in s.
         width: its length in s.
+        k: its number among the looks.
         number: its place among the intervals of the polynomial.
         base: states at its beginning, shape (nx,).
         data: values relative to `base`, and perhaps slopes times `width`, shape (8, nx).
     """
 
-    def __init__(self, scheme: _Scheme, t: float, width: float, number: int, base: Vector, data: Vector) -> None:
-        self.t, self.width, self._scheme, self._number, self._base = t, width, scheme, number, base
-        self._polynomials = scheme.precise @ data, scheme.coarse[number] @ data
+    def __init__(
+        self, scheme: _Scheme, t: float, width: float, k: int, number: int, base: Vector, data: Vector
+    ) -> None:
+        self.t, self.width, self.k, self._base = t, width, k, base
+        self._precise, self._coarse = scheme.precise[number] @ data, scheme.coarse[number] @ data
 
-    def states(self, t: float, *, coarse: bool = False) -> Vector:
-        """Return the states at a time in it, by the polynomial of degree seven or the coarser one; shape (nx,)."""
-        if t <= self.t:
-            return self._base.copy()
-        return self._base + self._scheme.powers((t - self.t) / self.width + self._number) @ self._polynomials[coarse]
+    def _powers(self, t: float) -> Vector:
+        return ((t - self.t) / self.width) ** _EXPONENTS
 
-    def precise(self, t: float, weights: Vector) -> bool:
-        """Whether the polynomials of both degrees agree within tolerances of the states."""
-        difference = np.abs(self.states(t) - self.states(t, coarse=True))
-        return bool(np.all(difference <= PRECISE * weights))
+    def states(self, t: float) -> Vector:
+        """Return the states at a time in it, by the polynomial of degree seven; shape (nx,)."""
+        return self._base + self._powers(t) @ self._precise if t > self.t else self._base.copy()
+
+    def both(self, t: float) -> Vector:
+        """Return the states at a time in it by the polynomials of both degrees, shape (nx, 2)."""
+        powers = self._powers(t)
+        return np.array([self._base + powers @ self._precise, self._base + powers @ self._coarse]).T
 
 
 class Looks:
@@ -134,13 +142,26 @@ class Looks:
             data = (self.x[:, nodes] - base[:, None]).T
             if scheme.slopes:
                 data = np.concatenate([data, self.width * self.seen[2][:, nodes].T])
-            yield Cell(scheme, float(self.times[k]), self.width, k - first, base, data)
+            yield Cell(scheme, float(self.times[k]), self.width, k, k - first, base, data)
 
-    def at(self, t: float, cell: Cell, *, coarse: bool = False) -> Point:
+    def at(self, t: float, cell: Cell) -> Point:
         """Return the point at a time in an interval; the implicit unknowns follow from its states."""
-        times, x = np.array([t]), cell.states(t, coarse=coarse)
-        z = self._implicit(times, self.intervals(times), x[:, None])
-        return Point(t, x, z[:, 0], self.d)
+        x = cell.states(t)
+        if not len(self.z):
+            return Point(t, x, self.z[:, 0], self.d)
+        return Point(t, x, self._implicit(np.array([t]), np.array([cell.k]), x[:, None])[:, 0], self.d)
+
+    def is_sharp(self, cell: Cell, guards: list[int], sizes: Vector) -> bool:
+        """Whether interpolated states are precise, and precise enough for guards of given sizes, in the middle.
+
+        A state may be small compared with its tolerance, and a guard live on such values all the same.
+        """
+        times = np.full(2, cell.t + 0.5 * cell.width)
+        x = cell.both(float(times[0]))
+        if not (np.abs(x[:, 0] - x[:, 1]) <= PRECISE * self.integrator.weights(x[:, 0])).all():
+            return False
+        values = self.guards.along(times, x, self._implicit(times, np.full(2, cell.k), x), self.d)[0][guards]
+        return bool((np.abs(values[:, 0] - values[:, 1]) <= _SHARP * sizes).all())
 
     def along(self, times: Vector, last: int) -> tuple[Vector, Vector, Any]:
         """Return states and implicit unknowns at times, and the intervals in which they are not precise.
@@ -167,8 +188,8 @@ class Looks:
         data = self.x[:, nodes] - base[:, :, None]
         if scheme.slopes:
             data = np.concatenate([data, self.width * self.seen[2][:, nodes]], axis=2)
-        powers = scheme.powers((times - self.times[k]) / self.width + (k - first))
-        precise = powers @ scheme.precise
+        powers = ((times - self.times[k]) / self.width)[:, None] ** _EXPONENTS
+        precise = np.einsum("np,npk->nk", powers, scheme.precise[k - first])
         coarse = np.einsum("np,npk->nk", powers, scheme.coarse[k - first])
         error = np.abs(np.einsum("ink,nk->in", data, precise - coarse))
         x = base + np.einsum("ink,nk->in", data, precise)
