@@ -25,6 +25,7 @@ _CLOSER = 8
 _DEEPEST = 10
 _MAX_HALVINGS = 30
 _MAX_FAILURES = 40
+_FEW_FAILURES = 6
 
 Progress = Callable[[float], None]
 
@@ -87,6 +88,8 @@ class EventLoop:
         looks = self._panel(stop)
         if self.guards.count and self._search(looks):
             return
+        if not self.guards.count:
+            self.pace.longer(looks.count)
         self._keep(looks, float(looks.times[-1]), looks.count)
         self._arrive(looks)
         if self.now.t == stop:
@@ -176,11 +179,11 @@ class EventLoop:
     def _go_on(self, end: float) -> bool:
         """Count failures on the way to one place: behind it is an event, or nothing; True if another try makes sense.
 
-        The last resort is a relaxed tolerance.
+        Shorter panels begin anew nearer to it. The last resort is a relaxed tolerance.
         """
         self._failures += 1
         self._failed_before = max(self._failed_before, end)
-        if self.guards.count and self._failures <= _MAX_FAILURES:
+        if self._failures <= (_MAX_FAILURES if self.guards.count else _FEW_FAILURES):
             return True
         if not self.integrator.relax():
             return False
@@ -196,7 +199,7 @@ class EventLoop:
         for halvings in range(1, _MAX_HALVINGS):
             piece = span / 2**halvings
             try:
-                return self._integrate(self.now, piece, 1, patient=False)
+                return self._integrate(self.now, piece, 1, patient=not self.guards.count)
             except StepFailed:
                 if not self._go_on(self.now.t + piece) or halvings + 1 == _MAX_HALVINGS:
                     raise

@@ -186,7 +186,7 @@ class Integrator:
         return x, self.polished(times, x, z, start.d)
 
     def _call(self, start: Point, p: Vector, outputs: int, steps: int, gentle: bool) -> list[Vector] | str:
-        """Return what IDAS computes, or what it says where it gives up: that belongs into the error, not onto the screen.
+        """Return what IDAS computes, or what it says where it gives up: that belongs into the error, not on the screen.
 
         Raises:
             KeyboardInterrupt: it was interrupted; IDAS takes that for an error in the equations.

@@ -1,4 +1,4 @@
-"""Between the looks of one IDAS call: states by interpolation through values and slopes, as precise as the call itself."""
+"""Between the looks of one IDAS call: states by interpolation, as precise as the call itself."""
 
 from __future__ import annotations
 
@@ -106,9 +106,7 @@ class Looks:
         d: modes and discrete values.
     """
 
-    def __init__(
-        self, integrator: Integrator, guards: Guards, times: Vector, x: Vector, z: Vector, d: Vector
-    ) -> None:
+    def __init__(self, integrator: Integrator, guards: Guards, times: Vector, x: Vector, z: Vector, d: Vector) -> None:
         self.integrator, self.guards, self.times, self.x, self.z, self.d = integrator, guards, times, x, z, d
         self.count = len(times) - 1
         self.width = float(times[-1] - times[0]) / self.count

@@ -37,7 +37,8 @@ class Pace:
         self.checks = 1
         self.guarded, self.eventful = guarded, guarded or timed
         even = -(-options.points // -(-options.points // _LARGEST))
-        self.size = _SIZES[1] if guarded else _SIZES[-1] if timed else even
+        self.longest = _SIZES[-1] if guarded or timed else even
+        self.size = _SIZES[1] if guarded else self.longest
 
     @property
     def look(self) -> float:
@@ -95,10 +96,11 @@ class Pace:
         """Let the next panel be shorter than one of so many looks."""
         self.size = max([size for size in _SIZES if size < looks], default=1)
 
-    def longer(self, looks: int, ahead: float) -> None:
+    def longer(self, looks: int, ahead: float = np.inf) -> None:
         """Let the next panel be longer than one of so many looks, but not much longer than what is ahead, in s."""
-        if self.guarded and looks >= self.size:
-            self.size = min(_at_least(looks + 1), max(_at_least(_ROOM * ahead / self.look), _SIZES[1]))
+        if looks >= self.size:
+            expected = max(_at_least(_ROOM * ahead / self.look), _SIZES[1])
+            self.size = min(_at_least(looks + 1), expected, self.longest)
 
     def anew(self, span: float) -> None:
         """Begin a segment; the one before took so long, in s, and this one is expected to."""
