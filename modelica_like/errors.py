@@ -6,6 +6,7 @@ import difflib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 _SHOWN = 160
 
@@ -161,7 +162,13 @@ class ContradictingStart(InitializationError):
 
 
 class SolveError(ModelicaLikeError):
-    """The simulation cannot go on."""
+    """The simulation cannot go on.
+
+    Attributes:
+        record: segments and events up to there, a `Recorder`, if there are any.
+    """
+
+    record: Any = None
 
 
 class SingularAtStart(SolveError):

@@ -102,7 +102,10 @@ def simulate(
     elapsed = time.perf_counter() - begin
     counts = loop.integrator
     statistics = Statistics(counts.steps, counts.evaluations, counts.calls, len(record.events), elapsed)
-    return Solution(model, chosen, tuple(record.segments), tuple(record.events), statistics, tuple(record.impacts))
+    return Solution(
+        model, chosen, tuple(record.segments), tuple(record.events), statistics, tuple(record.impacts),
+        tuple(record.notices),
+    )  # fmt: skip
 
 
 def seconds(until: float | str | None, name: str = "until") -> float:

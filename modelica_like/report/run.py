@@ -49,14 +49,14 @@ def events_table(solution: Solution) -> Table:
 
 
 def notices(solution: Solution) -> list[str]:
-    """Return what the events of a run have to say: one sentence for each kind of event, with the time of the first."""
+    """Return what a run and its events have to say: one sentence for each kind of event, with the time of the first."""
     told: dict[tuple[str, str], str] = {}
     for event in solution.events:
         notice, (component, dot, _) = solution.model.transitions[event.transition].notice, event.mode.rpartition(".")
         if notice and (component, notice) not in told:
             values = NAME_IN_NOTICE.sub(lambda name, owner=component + dot: f"{solution[owner + name[1]][0]:g}", notice)
             told[component, notice] = f"At {event.time:.9g} s {component or solution.model.name} {values}."
-    return list(told.values())
+    return [*solution.notices, *told.values()]
 
 
 def energy_table(solution: Solution) -> Table:

@@ -6,12 +6,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+import casadi as ca
 import numpy as np
 
-from modelica_like.compile.buffers import buffered
+from modelica_like.compile.buffers import BufferedFunction, buffered
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.flatten.conditions import JUST_TRUE
 from modelica_like.initialize import Point, call
+from modelica_like.solve.idas import along
 
 _LOCATED = 1e-13
 _NOISE = 1e-30
@@ -35,7 +37,6 @@ class Guards:
         for k, transition in enumerate(self.state_events):
             self._sources[k, list(transition.sources)] = True
         self._rows = np.arange(self.count)
-        self._constants: dict[int, tuple[Vector, Vector]] = {}
 
     def active(self, d: Vector) -> Any:
         """Which guards may fire, by the modes."""
@@ -45,30 +46,46 @@ class Guards:
 
     def at(self, point: Point) -> tuple[Vector, Vector]:
         """Guards and rates at a point."""
-        times = np.array([point.t])
-        values, rates = self.along(times, point.x[:, None], point.z[:, None], point.d)
-        return values[:, 0], rates[:, 0]
+        values, rates, _ = self._seen(1)(point.t, point.x, point.z, self.model.p, self.model.u, point.d)
+        return _numbers(values), _finite(rates)
 
-    def along(self, times: Vector, x: Vector, z: Vector, d: Vector) -> tuple[Vector, Vector]:
-        """Guards and rates at many times with the same modes; shapes (guards, times)."""
-        model, count = self.model, len(times)
-        fast = buffered(model._cache, ("guards", count), lambda: model.guards_along(count))
-        if count not in self._constants:
-            self._constants[count] = np.tile(model.p, count), np.tile(model.u, count)
-        modes = d if count == 1 else np.tile(d, count)
-        results = fast(times, x.ravel("F"), z.ravel("F"), *self._constants[count], modes)
-        values, rates = (v.reshape(count, -1).T for v in results)
-        return _numbers(values), rates if np.isfinite(rates).all() else np.where(np.isfinite(rates), rates, 0.0)
+    def along(self, times: Vector, x: Vector, z: Vector, d: Vector) -> tuple[Vector, Vector, Vector]:
+        """Guards, rates and derivatives of the states at many times with the same modes.
+
+        Shapes (guards, times), (guards, times), (nx, times).
+        """
+        count = len(times)
+        results = self._seen(count)(times, x.ravel("F"), z.ravel("F"), self.model.p, self.model.u, d)
+        values, rates, slopes = (v.reshape(count, -1).T for v in results)
+        return _numbers(values), _finite(rates), slopes
+
+    def _seen(self, count: int) -> BufferedFunction:
+        return buffered(self.model._cache, ("seen", count), lambda: along(_seen(self.model), count))
 
     def soon(self, point: Point) -> Vector:
         """Guards as they will be one time resolution later."""
         return _numbers(call(self.model, self.model.guards_soon, point))
 
 
+def _seen(model: CompiledDae) -> ca.Function:
+    """Guards, their rates and the states' in one function: they share most of what they compute."""
+    if "seen" not in model._cache:
+        arguments = list(model.arguments.values())
+        results = [model.guards(*arguments), model.guard_rates(*arguments), model.ode(*arguments)]
+        model._cache["seen"] = ca.Function("seen", arguments, ca.cse(results))
+    return model._cache["seen"]
+
+
+def _finite(rates: Vector) -> Vector:
+    return rates if np.isfinite(rates).all() else np.where(np.isfinite(rates), rates, 0.0)
+
+
 def _numbers(guards: Vector) -> Vector:
     """Let a guard that is not a number be false, and what is nothing but rounding zero."""
-    guards = guards if np.isfinite(guards).all() else np.nan_to_num(guards, nan=-1.0)
     sizes = np.abs(guards)
+    if not sizes.size or _NOISE <= sizes.min() <= sizes.max() < np.inf:
+        return guards
+    guards = np.nan_to_num(guards, nan=-1.0)
     return np.where((sizes < _NOISE) & (sizes > JUST_TRUE), 0.0, guards)
 
 
@@ -96,8 +113,8 @@ def candidates(values: Vector, rates: Vector, active: Any, step: float) -> list[
     below = before <= 0
     crossing = below & (after > 0)
     humps = below & ~crossing & (rates[:, :-1] * step > _NOISE) & (rates[:, 1:] * step < -_NOISE)
-    places = np.nonzero(humps)
-    if places[0].size:
+    if humps.any():
+        places = np.nonzero(humps)
         ends = before[places], after[places]
         top = _peak(*ends, rates[:, :-1][places] * step, rates[:, 1:][places] * step)
         humps[places] = top > -_NEAR * (np.abs(ends[0]) + np.abs(ends[1]))

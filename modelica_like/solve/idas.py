@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import re
-from contextlib import redirect_stderr
+import sys
 from typing import Any
 
 import casadi as ca
@@ -14,6 +14,7 @@ from modelica_like.compile.buffers import BufferedFunction, buffered
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import StepFailed
 from modelica_like.initialize import Point, call
+from modelica_like.solve.interrupts import Interrupts
 from modelica_like.solve.options import Options
 
 _FLAGS = {
@@ -31,26 +32,48 @@ _FLAGS = {
 }
 
 _FIRST_STEP = 1e-4
-_POLISHING = 2
+_SHORTENED = 1e-6
+"""IDAS shortens its first step at most so much before it gives up."""
+_SPARSE_FROM = 50
+"""Unknowns from which CSparse is quicker."""
+_POLISHING = 8
+_POLISHED = 1e-8
+_RELAXATION = 10.0
 _PANEL_STEPS = 5000
 """Steps between two results of a panel; a panel that needs more has probably run past an event, and is divided."""
 
 
-def scaled_problem(model: CompiledDae) -> dict[str, Any]:
-    """Return the equations in scaled time s in [0, 1], t = t0 + s*span, with parameters (t0, span, p, u, d).
+def scaled_problem(model: CompiledDae, *, gentle: bool = False) -> dict[str, Any]:
+    """Return the equations in scaled time s in [0, 1], with parameters (t0, span, p, u, d).
 
-    Besides what `casadi.integrator` takes: `inner`, the arguments of the model's functions, and `span`.
+    Besides what `casadi.integrator` takes: `inner`, the arguments of the model's functions, and `span`, dt/ds.
+
+    Args:
+        model: the compiled model.
+        gentle: t = t0 + s²·span instead of t = t0 + s·span. Time then begins to pass with a speed of zero, so slopes
+            of zero at s = 0 are exact, and first steps are short whatever the span is.
     """
-    if "scaled" not in model._cache:
+    key = "scaled", gentle
+    if key not in model._cache:
         arguments = model.arguments
         s, t0, span = ca.SX.sym("s"), ca.SX.sym("t0"), ca.SX.sym("span")
         x, z, p, u, d = (arguments[name] for name in ("x", "z", "p", "u", "d"))
-        inner = [t0 + s * span, x, z, p, u, d]
-        model._cache["scaled"] = {
-            "t": s, "x": x, "z": z, "p": ca.vertcat(t0, span, p, u, d),
-            "ode": span * model.ode(*inner), "alg": model.alg(*inner), "inner": inner, "span": span,
+        passed, speed = (s * s * span, 2 * s * span) if gentle else (s * span, span)
+        inner = [t0 + passed, x, z, p, u, d]
+        ode, alg = ca.cse([speed * model.ode(*inner), model.alg(*inner)])
+        model._cache[key] = {
+            "t": s, "x": x, "z": z, "p": ca.vertcat(t0, span, p, u, d), "ode": ode, "alg": alg, "inner": inner,
+            "span": speed,
         }  # fmt: skip
-    return model._cache["scaled"]
+    return model._cache[key]
+
+
+def linear_solver(unknowns: int) -> str:
+    """Return what factorises the Jacobian of a step.
+
+    CasADi's QR is compact and quick for few unknowns; the LU of CSparse keeps sparse what is sparse.
+    """
+    return "csparse" if unknowns >= _SPARSE_FROM else "qr"
 
 
 class Integrator:
@@ -65,29 +88,64 @@ class Integrator:
         self.calls = 0
         self.steps = 0
         self.evaluations = 0
+        self.interrupts = Interrupts()
+        self._relaxed = 1.0
+        self._gentle_from = np.inf
         self._tail = np.concatenate([model.p, model.u])
 
-    def _instance(self, outputs: int, steps: int) -> BufferedFunction:
-        key = "idas", outputs, self.options.rtol, self.options.atol, steps
-        return buffered(self.model._cache, key, lambda: self._make(outputs, steps), results=(0, 1))
+    @property
+    def rtol(self) -> float:
+        """Relative tolerance now."""
+        return self.options.rtol * self._relaxed
 
-    def _make(self, outputs: int, steps: int) -> ca.Function:
-        problem = {name: value for name, value in scaled_problem(self.model).items() if name not in ("inner", "span")}
-        grid = [k / outputs for k in range(1, outputs + 1)]
-        return ca.integrator("segment", "idas", problem, 0, grid, self._settings(steps))
+    def weights(self, x: Vector) -> Vector:
+        """What errors of states are measured by, relative and absolute tolerance; shape as x, (nx,) or (nx, n)."""
+        absolute = self.options.atol * self._relaxed * self.model.nominals
+        return self.rtol * np.abs(x) + (absolute if x.ndim == 1 else absolute[:, None])
 
-    def _settings(self, steps: int) -> dict[str, Any]:
+    def relax(self) -> bool:
+        """Relax the tolerances by ten, once; False if they are already."""
+        first = self._relaxed == 1.0
+        self._relaxed = _RELAXATION
+        return first
+
+    def _instance(self, outputs: int, steps: int, gentle: bool, first: float) -> BufferedFunction:
+        key = "idas", outputs, self.rtol, self.options.atol, steps, gentle, first
+        return buffered(self.model._cache, key, lambda: self._make(outputs, steps, gentle, first), results=(0, 1))
+
+    def _first_step(self, start: Point, span: float) -> float:
+        """Return a first step in scaled time that may move states by their tolerances, as IDAS can find it from there.
+
+        Gently, a step s moves them by s² times rates times the span.
+        """
+        rates = np.abs(call(self.model, self.model.ode, start)) * span
+        fastest = float(np.max(rates / self.weights(start.x)))
+        step = _FIRST_STEP
+        while np.isfinite(fastest) and (step * _SHORTENED) ** 2 * fastest > 1.0:
+            step *= _FIRST_STEP
+        return step
+
+    def _make(self, outputs: int, steps: int, gentle: bool, first: float) -> ca.Function:
+        problem = dict(scaled_problem(self.model, gentle=gentle))
+        del problem["inner"], problem["span"]
+        grid = np.arange(1, outputs + 1) / outputs
+        grid = (np.sqrt(grid) if gentle else grid).tolist()
+        return ca.integrator("segment", "idas", problem, 0, grid, self._settings(steps, gentle, first))
+
+    def _settings(self, steps: int, gentle: bool, first: float) -> dict[str, Any]:
         nominal = self.model.nominals
         return {
-            "reltol": self.options.rtol,
-            "abstol": self.options.atol * (float(np.min(nominal)) if nominal.size else 1.0),
+            "reltol": self.rtol,
+            "abstol": self.options.atol * self._relaxed * (float(np.min(nominal)) if nominal.size else 1.0),
             "max_num_steps": steps,
             # The implicit unknowns follow from the states and are polished; their part of the error test only costs
             # steps, and fails at tight tolerances.
             "suppress_algebraic": True,
             # Left alone, IDAS begins with a step of 1e-10 and takes thirty more to reach its stride, at every event
             # anew.
-            "step0": _FIRST_STEP,
+            "step0": first,
+            "calc_ic": not gentle,
+            "linear_solver": linear_solver(len(self.model.states) + len(self.model.implicit)),
         }
 
     def run(self, start: Point, span: float, outputs: int = 1, *, patient: bool = True) -> tuple[Vector, Vector]:
@@ -112,39 +170,67 @@ class Integrator:
             return self._algebraic(start, span, outputs)
         p = np.concatenate([[start.t, span], self._tail, start.d])
         steps = self.options.max_steps if patient else min(self.options.max_steps, _PANEL_STEPS)
-        instance = self._instance(outputs, steps)
-        # IDAS tells what went wrong on stderr; it belongs into the error, not onto the screen.
-        said = io.StringIO()
-        try:
-            with redirect_stderr(said):
-                x, z = instance(start.x, start.z, p)
-        except RuntimeError as error:
-            raise self._failed(start, span, f"{said.getvalue()} {error}") from None
-        self._count(instance.statistics())
-        x, z = x.reshape(outputs, -1).T, z.reshape(outputs, -1).T
+        gentle = span >= self._gentle_from
+        said = self._call(start, p, outputs, steps, gentle)
+        if isinstance(said, str) and not gentle and _at_the_start(said):
+            # IDAS looks for consistent slopes at the start, and may not find them; gently there is nothing to find.
+            self._gentle_from = min(span, self._gentle_from)
+            gentle = True
+            said = self._call(start, p, outputs, steps, gentle)
+        if isinstance(said, str):
+            raise self._failed(start, span, said, gentle)
+        x, z = said[0].reshape(outputs, -1).T, said[1].reshape(outputs, -1).T
         if not np.all(np.isfinite(x[:, -1])):
-            raise self._failed(start, span, "IDA_REP_RES_ERR")
-        return x, self._polish(start, span, x, z)
+            raise self._failed(start, span, "IDA_REP_RES_ERR", gentle)
+        times = start.t + span * np.arange(1, outputs + 1) / outputs
+        return x, self.polished(times, x, z, start.d)
 
-    def _polish(self, start: Point, span: float, x: Vector, z: Vector) -> Vector:
+    def _call(self, start: Point, p: Vector, outputs: int, steps: int, gentle: bool) -> list[Vector] | str:
+        """Return what IDAS computes, or what it says where it gives up: that belongs into the error, not on the screen.
+
+        Raises:
+            KeyboardInterrupt: it was interrupted; IDAS takes that for an error in the equations.
+        """
+        first = self._first_step(start, p[1]) if gentle else _FIRST_STEP
+        instance = self._instance(outputs, steps, gentle, first)
+        screen, sys.stderr = sys.stderr, io.StringIO()
+        try:
+            found = instance(start.x, start.z, p)
+        except RuntimeError as error:
+            self.interrupts.check()
+            return f"{sys.stderr.getvalue()} {error}"
+        finally:
+            sys.stderr = screen
+        self._count(instance.statistics())
+        return found
+
+    def polished(self, times: Vector, x: Vector, z: Vector, d: Vector) -> Vector:
         """Solve for the implicit unknowns by Newton's method: IDAS gives them within its tolerance only.
 
         Guards on them would be located no better, and constraints would be met no better.
+
+        Args:
+            times: shape (n,), in s.
+            x: states, shape (nx, n).
+            z: guesses, shape (nz, n).
+            d: modes and discrete values.
         """
         if not self.model.implicit:
             return z
         model, outputs = self.model, x.shape[1]
-        times = start.t + span * np.arange(1, outputs + 1) / outputs
-        p, u, d = (np.tile(vector, outputs) for vector in (model.p, model.u, start.d))
         fast = buffered(model._cache, ("residual", outputs), lambda: _residual_along(model, outputs))
         for _ in range(_POLISHING):
             residual, jacobian = (
-                v.reshape(outputs, len(z), -1) for v in fast(times, x.ravel("F"), z.ravel("F"), p, u, d)
+                v.reshape(outputs, len(z), -1) for v in fast(times, x.ravel("F"), z.ravel("F"), model.p, model.u, d)
             )
             try:
-                z = z - np.linalg.solve(jacobian.transpose(0, 2, 1), residual)[:, :, 0].T
+                step = np.linalg.solve(jacobian.transpose(0, 2, 1), residual)[:, :, 0].T
             except np.linalg.LinAlgError:
                 return z
+            z = z - step
+            # What is left after a step of Newton's method is about its square.
+            if not np.max(np.abs(step) - _POLISHED * np.abs(z)) > _POLISHED:
+                break
         return z
 
     def _count(self, statistics: dict[str, Any]) -> None:
@@ -164,14 +250,11 @@ class Integrator:
         z = np.array(columns).T if self.model.implicit else np.zeros((0, outputs))
         return np.zeros((0, outputs)), z
 
-    def _failed(self, start: Point, span: float, text: str) -> StepFailed:
+    def _failed(self, start: Point, span: float, text: str, gentle: bool) -> StepFailed:
         flag = next((name for name in _FLAGS if name in text), "")
         reason = _FLAGS.get(flag, "it stopped without a known reason")
-        at = re.search(r"At t = ([0-9.eE+-]+)", text)
-        moment = start.t + span * float(at.group(1)) if at else start.t
-        rates = call(self.model, self.model.ode, start)
-        weights = self.options.rtol * np.abs(start.x) + self.options.atol * self.model.nominals
-        speed = np.abs(rates) / weights
+        moment = start.t + span * _reached(text) ** (2 if gentle else 1)
+        speed = np.abs(call(self.model, self.model.ode, start)) / self.weights(start.x)
         worst = self.model.states[int(np.nanargmax(speed))] if np.any(np.isfinite(speed)) else self.model.states[0]
         return StepFailed(
             f"IDAS gave up at about t = {moment:.9g} s: {reason}{f' ({flag})' if flag else ''}.",
@@ -180,8 +263,23 @@ class Integrator:
         )
 
 
+def _reached(text: str) -> float:
+    """Scaled time at which IDAS gave up, by what it said."""
+    at = re.search(r"At t = ([0-9.]+(?:[eE][+-]?[0-9]+)?)", text)
+    return float(at.group(1)) if at else 0.0
+
+
+def _at_the_start(text: str) -> bool:
+    return _reached(text) == 0.0 and "IDA_TOO_MUCH_WORK" not in text
+
+
 def _residual_along(model: CompiledDae, count: int) -> ca.Function:
     """Return residuals of the implicit equations and their Jacobian at `count` times, as one function."""
     arguments = list(model.arguments.values())
-    both = [model.alg(*arguments), ca.densify(model.alg_jacobian(*arguments))]
-    return ca.Function("residual", arguments, both).map(count)
+    both = ca.cse([model.alg(*arguments), ca.densify(model.alg_jacobian(*arguments))])
+    return along(ca.Function("residual", arguments, both), count)
+
+
+def along(function: ca.Function, count: int) -> ca.Function:
+    """Return a function of (t, x, z, p, u, d) at `count` times with the same parameters, inputs and modes."""
+    return function.map(f"{function.name()}_along", "serial", count, [3, 4, 5], []) if count > 1 else function

@@ -16,6 +16,7 @@ from modelica_like.initialize import (
     chosen_modes,
     holding,
     share,
+    sharing,
     solve_implicit,
     variable_slopes,
 )
@@ -116,11 +117,22 @@ class Instants:
             wanting = [*self.due(now), *self.rising(now)]
         else:
             raise self._chattering(f"Modes still switch after {alone} rounds at one instant")
+        self.note_sharing(now)
         self._instants.append(now.t)
         if len(self._instants) == _CHATTER_INSTANTS and now.t - self._instants[0] < _CHATTER_WINDOW * self.span:
             raise self._chattering("Events follow each other ever faster")
         if len(self.record.events) > self.options.max_events:
             raise self._chattering(f"There were more than {self.options.max_events} events")
+
+    def note_sharing(self, now: Point) -> None:
+        """Tell once who shares what the balance leaves undetermined."""
+        for parts in sharing(self.model, now):
+            text = (
+                f"{', '.join(parts[:-1])} and {parts[-1]} hold the same motion: they share the reaction in proportion "
+                "to what they can bear, because nothing else determines the split."
+            )
+            if text not in self.record.notices:
+                self.record.notices.append(text)
 
     def _share_anew(self, now: Point, wanting: list[CompiledTransition]) -> list[CompiledTransition]:
         """Before one of several that hold a motion gives way, let the others take more; what still wants to fire."""

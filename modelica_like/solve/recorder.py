@@ -67,11 +67,12 @@ class Segment:
 
 @dataclass
 class Recorder:
-    """Collects points into segments, events, and what impacts have dissipated."""
+    """Collects points into segments, events, and what impacts dissipate; `notices` are sentences for the report."""
 
     segments: list[Segment] = field(default_factory=list)
     events: list[Event] = field(default_factory=list)
     impacts: list[Impact] = field(default_factory=list)
+    notices: list[str] = field(default_factory=list)
     _times: list[Vector] = field(default_factory=list)
     _x: list[Vector] = field(default_factory=list)
     _z: list[Vector] = field(default_factory=list)
@@ -82,15 +83,23 @@ class Recorder:
         self.add(np.array([point.t]), point.x[:, None], point.z[:, None])
 
     def add(self, times: Vector, x: Vector, z: Vector) -> None:
-        """Append points; shapes (n,), (nx, n), (nz, n)."""
+        """Append at least one point; shapes (n,), (nx, n), (nz, n)."""
         self._times.append(times)
         self._x.append(x)
         self._z.append(z)
 
+    @property
+    def last(self) -> float:
+        """Time of the latest point of the open segment in s."""
+        return float(self._times[-1][-1])
+
     def end(self, d: Vector) -> None:
-        """Close the segment."""
+        """Close the segment, if one is open."""
+        if not self._times:
+            return
         self.segments.append(
             Segment(
                 np.concatenate(self._times), np.concatenate(self._x, axis=1), np.concatenate(self._z, axis=1), d.copy()
             )
         )
+        self._times = []

@@ -94,6 +94,7 @@ class Solution:
         events: mode changes.
         statistics: what the run took.
         impacts: what impacts have dissipated.
+        notices: what should be known about the run, as sentences.
     """
 
     model: CompiledDae
@@ -102,6 +103,7 @@ class Solution:
     events: tuple[Event, ...]
     statistics: Statistics
     impacts: tuple[Impact, ...] = ()
+    notices: tuple[str, ...] = ()
     _cache: dict[str, Any] = field(default_factory=dict, repr=False)
 
     @property

@@ -1,0 +1,225 @@
+"""Runs that must not fail: extreme ratios, stiffness, times and angles, against closed forms."""
+
+import math
+import os
+import signal
+import threading
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from components import ConstantTorque, Damper, Fixed, Inertia, Spring, SpringDamper
+from modelica_like import build, simulate
+from modelica_like.errors import StepFailed
+from modelica_like.language import (
+    Component,
+    Equations,
+    Events,
+    Mode,
+    Parameter,
+    Variable,
+    connect,
+    der,
+    param,
+    series,
+    var,
+)
+from modelica_like.report.run import notices
+from modelica_like.solve.options import Options
+from modelica_like.solve.pace import Pace
+
+TOLERANCES = [1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10]
+
+
+def pair(small: float, c: float, d: float) -> Component:
+    """Two inertias, 1 and `small` times as large, joined by a spring and damper."""
+
+    class Pair(Component):
+        a, shaft, b = Inertia(J=1.0, phi=0.0, w=1.0), SpringDamper(c=c, d=d, phi_rel=0.0), Inertia(J=small, w=0.0)
+
+        def equations(self) -> Equations:
+            yield from series(self.a, self.shaft, self.b)
+
+    return Pair()
+
+
+@pytest.mark.parametrize("rtol", TOLERANCES)
+@pytest.mark.parametrize("small", [1e-12, 1.0, 1e12])
+@pytest.mark.parametrize("until", [1e-3, 1.0, 3600.0, 86400.0])
+def test_a_pair_of_inertias_ends_at_common_speed(small: float, until: float, rtol: float) -> None:
+    """Momentum stays; both turn at w = 1/(1 + small) when the spring, aperiodically damped, has come to rest."""
+    reduced = small / (1 + small)
+    c = 1e8 * reduced
+    run = simulate(pair(small, c, 2 * math.sqrt(c * reduced)), until, points=50, rtol=rtol, atol=rtol / 100)
+    common = 1 / (1 + small)
+    # w_b - w_a = -(1 - ω t)·exp(-ω t) for aperiodic damping, ω = 1e4/s.
+    decay = 1e4 * run.time
+    slip = (1 - decay) * np.exp(-decay)
+    np.testing.assert_allclose(run["a.w"], common + reduced * slip, rtol=0, atol=1000 * rtol)
+    np.testing.assert_allclose(run["b.w"], common * (1 - slip), rtol=0, atol=1000 * rtol)
+
+
+@pytest.mark.parametrize("rtol", TOLERANCES)
+@pytest.mark.parametrize("c", [1.0, 1e6, 1e12])
+def test_stiff_springs_carry_a_steady_torque(c: float, rtol: float) -> None:
+    """A load of 1 N·m on a spring and damper of stiffness c: phi = (1 - exp(-t c/d))/c but for a small inertia."""
+
+    class Held(Component):
+        wall, spring, damper, rotor = Fixed(), Spring(c=c), Damper(d=c * 0.1), Inertia(J=1e-3, phi=0.0, w=0.0)
+        torque = ConstantTorque(tau_constant=1.0)
+
+        def equations(self) -> Equations:
+            yield connect(self.wall.flange, self.spring.flange_a, self.damper.flange_a)
+            yield connect(self.spring.flange_b, self.damper.flange_b, self.rotor.flange_a)
+            yield connect(self.torque.flange, self.rotor.flange_b)
+
+    run = simulate(Held(), 5.0, points=20, rtol=rtol, atol=max(rtol / 100 / c, 1e-20))
+    assert c * abs(run.final["rotor.phi"]) == pytest.approx(1.0, abs=1e3 * rtol)
+
+
+@pytest.mark.parametrize("until", [1e-3, 1.0, 86400.0])
+@pytest.mark.parametrize("rtol", [1e-5, 1e-10])
+def test_an_event_far_from_zero(until: float, rtol: float) -> None:
+    """Angles of 1e9 rad: a mode that changes at half of the time, by an angle."""
+
+    class Far(Component):
+        phi: Variable = var("rad", "angle")
+        w: Parameter = param("rad/s", "speed", default=1.0)
+        limit: Parameter = param("rad", "where the mode changes", default=1.0)
+        mode = Mode("below", "above")
+
+        def equations(self) -> Equations:
+            yield der(self.phi) == self.w
+
+        def events(self) -> Events:
+            yield self.mode.go("below", "above", when=self.phi > self.limit)
+
+    run = simulate(Far(phi=0.0, w=1e9 / until, limit=0.5e9), until, rtol=rtol, atol=rtol / 100)
+    assert [event.time for event in run.events] == pytest.approx([0.5 * until], rel=1e-12)
+    assert run.final["phi"] == pytest.approx(1e9, rel=1e-12)
+
+
+# -- starts of segments ----------------------------------------------------------------------------------------------
+
+
+class Lag(Component):
+    """x' = (1 - x)/T: x = 1 - exp(-t/T)."""
+
+    x: Variable = var("1", "value")
+    T: Parameter = param("s", "time constant", default=1.0)
+
+    def equations(self) -> Equations:
+        yield self.T * der(self.x) == 1 - self.x
+
+
+@pytest.mark.parametrize("rtol", TOLERANCES)
+def test_first_steps_do_not_follow_from_the_end_time(rtol: float) -> None:
+    model = build(Lag(x=0.0, T=1e-6))
+    steps = []
+    for until in (1e-3, 1.0, 86400.0, 1e9):
+        run = simulate(model, until, points=1, rtol=rtol, atol=rtol / 100)
+        assert run.final["x"] == pytest.approx(1.0, abs=100 * rtol)
+        steps.append(run.statistics.steps)
+    assert max(steps) < 4 * min(steps)
+
+
+# -- results and memory ----------------------------------------------------------------------------------------------
+
+
+def test_no_call_has_more_than_some_thousand_results() -> None:
+    pace = Pace(0.0, 1.0, Options(points=1_000_000), guarded=False, timed=False)
+    sizes, t = [], 0.0
+    while t < 1.0:
+        span, count = pace.panel(t, 1.0)
+        sizes.append(count)
+        t += span
+    assert sum(sizes) == 1_000_000
+    assert max(sizes) <= 4096
+    assert len(set(sizes)) <= 2  # few instances of the integrator
+
+
+def test_results_behind_an_event_are_on_the_grid_and_on_the_solution() -> None:
+    """A lag that turns at x = 0.3, at ln(1/0.7): results are interpolated there, as precisely as the run."""
+
+    class Turning(Lag):
+        way = Mode("up", "down")
+
+        def equations(self) -> Equations:
+            yield self.T * der(self.x) == self.way.choose(up=1 - self.x, down=-self.x)
+
+        def events(self) -> Events:
+            yield self.way.go("up", "down", when=self.x > 0.3)
+
+    for rtol in (1e-6, 1e-8, 1e-10):
+        run = simulate(Turning(x=0.0), 3.0, points=60, rtol=rtol, atol=rtol / 100)
+        turn = math.log(1 / 0.7)
+        assert [event.time for event in run.events] == pytest.approx([turn], abs=10 * rtol)
+        np.testing.assert_allclose(np.delete(run.time, np.flatnonzero(run.time == run.events[0].time)),
+                                   np.linspace(0, 3, 61), rtol=1e-15)  # fmt: skip
+        exact = np.where(run.time <= turn, 1 - np.exp(-run.time), 0.3 * np.exp(turn - run.time))
+        np.testing.assert_allclose(run["x"], exact, rtol=0, atol=20 * rtol)
+
+
+# -- giving up -------------------------------------------------------------------------------------------------------
+
+
+def test_what_was_computed_before_a_failure_stays() -> None:
+    class Blow(Component):
+        x: Variable = var("1", "grows")
+        T: Parameter = param("s", "time", default=1.0)
+        mode = Mode("small", "large")
+
+        def equations(self) -> Equations:
+            yield self.T * der(self.x) == self.x**2  # x = 1/(1 - t)
+
+        def events(self) -> Events:
+            yield self.mode.go("small", "large", when=self.x > 2)
+
+    with pytest.raises(StepFailed) as caught:
+        simulate(Blow(x=1.0), 2.0)
+    record = caught.value.record
+    assert [event.time for event in record.events] == pytest.approx([0.5], abs=1e-6)
+    assert record.segments[-1].times[-1] == pytest.approx(1.0, abs=1e-2)
+    assert len(record.notices) == 1
+
+
+def test_ctrl_c_is_an_interrupt() -> None:
+    class Swing(Component):
+        wall, spring, rotor = Fixed(), Spring(c=1e6), Inertia(J=1.0, phi=1.0, w=0.0)
+
+        def equations(self) -> Equations:
+            yield from series(self.wall, self.spring, self.rotor)
+
+    model = build(Swing())
+    simulate(model, 0.1)
+    before = signal.getsignal(signal.SIGINT)
+    timer = threading.Timer(0.5, lambda: os.kill(os.getpid(), signal.SIGINT))
+    timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        simulate(model, 36000.0, rtol=1e-10, options=Options(max_steps=100_000_000))
+    timer.join()
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_a_model_without_events_keeps_what_was_computed_too() -> None:
+    class Blow(Component):
+        x: Variable = var("1", "grows")
+        T: Parameter = param("s", "time", default=1.0)
+
+        def equations(self) -> Equations:
+            yield self.T * der(self.x) == self.x**2  # x = 1/(1 - t)
+
+    with pytest.raises(StepFailed) as caught:
+        simulate(Blow(x=1.0), 2.0)
+    (segment,) = caught.value.record.segments
+    assert segment.times[-1] == pytest.approx(1.0, abs=0.05)
+    np.testing.assert_allclose(1 / segment.x[0], 1 - segment.times, rtol=0, atol=1e-5)
+    (notice,) = caught.value.record.notices
+    assert notice.endswith("the integrator gave up; from there its tolerance is 1e-06 instead of 1e-07.")
+
+
+def test_what_should_be_known_about_a_run_is_in_its_report() -> None:
+    run = simulate(Lag(x=0.0), 1.0)
+    assert run.notices == ()
+    assert notices(replace(run, notices=("Something to know.",))) == ["Something to know."]
