@@ -1,0 +1,132 @@
+"""Impacts: momentum is conserved, and what is lost stands where it was lost."""
+
+import numpy as np
+import pytest
+
+from components import (
+    Brake,
+    Clutch,
+    Fixed,
+    Freewheel,
+    IdealGear,
+    Inertia,
+    Mass,
+    MassWithStopAndFriction,
+    OneWayClutch,
+    SpringDamper,
+    TranslationalSpring,
+)
+from components.interfaces import LinearCompliantWithRelativeStates
+from modelica_like import Assembly, Component, Solution, simulate
+from modelica_like.language import Equations, Events, Hold, Mode, Parameter, Variable, all_of, der, param, var
+
+
+def run(parts: dict[str, Component], until: float, series: tuple[str, ...] = (), **options: float) -> Solution:
+    return simulate(Assembly("drive", parts=parts, series={"s": series or tuple(parts)}), until, **options)
+
+
+@pytest.mark.parametrize("coupling", [Freewheel(), OneWayClutch(capacity=1.0)])
+def test_a_lagging_output_is_taken_along(coupling: Component) -> None:
+    """2·5 + 3·0 = 5·2 kg.m2/s; lost are 2·25/2 - 5·4/2 = 15 J, in the coupling."""
+    drive = run({"a": Inertia(J=2.0, phi=0, w=5.0), "coupling": coupling, "b": Inertia(J=3.0, w=0.0)}, 1.0)
+    assert drive.final["a.w"] == pytest.approx(2.0, rel=1e-12)
+    assert drive.final["b.w"] == pytest.approx(2.0, rel=1e-12)
+    assert [one.component for one in drive.impacts] == ["coupling"]
+    balance = drive.energy()
+    assert balance["coupling"].impact == pytest.approx(15.0, rel=1e-12)
+    assert balance.lost == pytest.approx(15.0, rel=1e-12)
+
+
+def test_an_impact_goes_through_gears_but_not_through_friction() -> None:
+    """The wheel behind the gear takes part, 2² times as heavy; the one behind the clutch slips after it."""
+    parts = {
+        "a": Inertia(J=1.0, phi=0, w=6.0), "freewheel": Freewheel(), "b": Inertia(J=1.0, w=0.0),
+        "gear": IdealGear(ratio=0.5), "c": Inertia(J=1.0), "clutch": Clutch(capacity=1e-3), "d": Inertia(J=1.0, w=0.0),
+    }  # fmt: skip
+    drive = run(parts, 1e-3)
+    common = 6.0 / (1.0 + 1.0 + 4.0)
+    assert drive.final["a.w"] == pytest.approx(common, rel=1e-5)
+    assert drive.final["c.w"] == pytest.approx(2.0 * common, rel=1e-5)
+    assert drive.final["d.w"] == pytest.approx(1e-6, rel=1e-5)
+    assert [event.after for event in drive.events if event.mode == "clutch.mode"] == ["backward"]
+
+
+def test_what_slides_is_turned_by_an_impact() -> None:
+    """A brake that slides forward slides backward after it: its torque of 1 N.m now drives the other way."""
+    parts = {
+        "brake": Brake(capacity=1.0),
+        "a": Inertia(J=1.0, phi=0, w=1.0),
+        "f": Freewheel(),
+        "b": Inertia(J=1.0, w=-5.0),
+    }
+    drive = run(parts, 1.0)
+    assert drive.final["a.w"] == pytest.approx(-2.0 + 0.5, rel=1e-9)
+    assert drive.energy()["f"].impact == pytest.approx(0.25 * 6.0**2, rel=1e-12)
+
+
+def test_the_mass_behind_a_spring_keeps_its_speed() -> None:
+    """2 kg meet a stop at 3 m/s; the 1 kg behind a soft spring does not feel it at that instant."""
+    parts = {
+        "other": Mass(m=1.0, v=3.0), "spring": TranslationalSpring(c=1.0, s_rel=0.0),
+        "mass": MassWithStopAndFriction(m=2.0, smin=-9.0, smax=1.0, s=0.7, v=3.0, F_Coulomb=0.0),
+    }  # fmt: skip
+    drive = run(parts, 0.1 + 1e-6)
+    assert drive.impacts[0].time == pytest.approx(0.1, abs=1e-9)
+    assert drive.impacts[0].energy == pytest.approx(0.5 * 2.0 * 9.0, rel=1e-9)
+    assert abs(drive.final["mass.v"]) <= 1e-30
+    assert drive.final["other.v"] == pytest.approx(3.0, rel=1e-6)
+    assert drive.energy().unexplained <= 1e-12
+
+
+class Buffer(LinearCompliantWithRelativeStates):
+    """Two bodies that meet and part again with e times the speed."""
+
+    e: Parameter = param("1", "restitution", min=0, max=1)
+    s_rel: Variable = var("m", "distance", state="always")
+    v_rel: Variable = var("m/s", "speed of the distance", state="always")
+    mode = Mode(
+        "apart", "together", holds={"together": Hold("v_rel", reaction="f", capacity="limits", restitution="e")}
+    )
+
+    def limits(self) -> tuple[float, None]:
+        return 0.0, None
+
+    def equations(self) -> Equations:
+        yield from super().equations()
+        yield self.mode.choose(apart=self.f, together=der(self.v_rel)) == 0
+
+    def events(self) -> Events:
+        yield self.mode.initially("apart", when=self.v_rel > 0)
+        yield self.mode.go("apart", "together", when=all_of(self.s_rel < 0, self.v_rel < 0))
+
+
+@pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
+def test_bodies_part_with_what_restitution_leaves(e: float) -> None:
+    """1 kg at 4 m/s meets 3 kg: the centre of mass goes on at 1 m/s, the difference is turned and shrinks by e."""
+    parts = {"a": Mass(m=1.0, s=0.0, v=4.0), "gap": Buffer(e=e), "b": Mass(m=3.0, s=1.0, v=0.0)}
+    drive = run(parts, 0.5)
+    assert drive.final["a.v"] == pytest.approx(1.0 - 3.0 * e, abs=1e-9)
+    assert drive.final["b.v"] == pytest.approx(1.0 + e, abs=1e-9)
+    assert drive.energy().lost == pytest.approx(0.5 * 0.75 * 16.0 * (1.0 - e**2), abs=1e-9)
+
+
+def test_three_that_meet_at_once() -> None:
+    """a and c drive b, which stands still: a takes b to 5 rad/s, and c, at 1 rad/s, is overrun."""
+    parts = {
+        "a": Inertia(J=1.0, phi=0, w=10.0), "c": Inertia(J=1.0, phi=0, w=1.0), "b": Inertia(J=1.0, w=0.0),
+        "fa": Freewheel(), "fc": Freewheel(),
+    }  # fmt: skip
+    drive = simulate(Assembly("drive", parts=parts, series={"s": ("a", "fa", "b"), "t": ("c", "fc", "b")}), 0.1)
+    np.testing.assert_allclose([drive.final[f"{name}.w"] for name in "abc"], [5.0, 5.0, 1.0], rtol=1e-12)
+
+
+def test_a_stop_on_an_elastic_shaft() -> None:
+    """A freewheel to a wall stops the hub at once; the flywheel behind the shaft swings on at its frequency."""
+    parts = {
+        "wall": Fixed(), "stop": Freewheel(), "hub": Inertia(J=1.0, w=-1.0),
+        "shaft": SpringDamper(c=100.0, d=0.0, phi_rel=0.0, w_rel=0.0), "flywheel": Inertia(J=4.0),
+    }  # fmt: skip
+    drive = run(parts, np.pi / 10, rtol=1e-9)
+    assert drive["hub.w"][0] == 0.0
+    assert drive["flywheel.w"][0] == pytest.approx(-1.0, rel=1e-12)
+    assert drive.final["flywheel.w"] == pytest.approx(0.0, abs=1e-6)
