@@ -9,7 +9,7 @@ import sys
 import time
 from pathlib import Path
 
-from modelica_like import Solution, build, load, simulate
+from modelica_like import build, load, simulate
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 DRIVES = [
@@ -24,14 +24,16 @@ def measure(netlist: Path) -> str:
     model = build(load(netlist))
     runs: list[float] = []
     balances: list[float] = []
+    drift = 0.0
     for _ in range(ROUNDS):
         begin = time.process_time()
-        run: Solution = simulate(model)
+        run = simulate(model)
         ran = time.process_time()
         balance = run.energy()
         runs.append(ran - begin)
         balances.append(time.process_time() - ran)
-    share, drift = min(balances) / min(runs), balance.drift / run.options.rtol
+        drift = balance.drift / run.options.rtol
+    share = min(balances) / min(runs)
     return (
         f"{netlist.stem:22} simulation {min(runs) * 1e3:6.1f} ms, energies {min(balances) * 1e3:6.1f} ms = {share:.2f} "
         f"of it, first {balances[0] * 1e3:6.1f} ms; drift {drift:.2g} x rtol"
