@@ -10,7 +10,7 @@ import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.solve.options import Options
-from modelica_like.solve.powers import Powers
+from modelica_like.solve.powers import POWERS, Powers, pieces, stored_at_ends
 from modelica_like.solve.recorder import Event, Segment
 
 if TYPE_CHECKING:
@@ -208,63 +208,75 @@ def energy_balance(
         events: mode changes; what their resets do to stored energies needs no explanation.
         impacts: what components lost at once, at events.
     """
-    powers = Powers(model, options or Options(), segments)
-    lost, source, inflow, rate, _ = powers.integrals()
-    impact = np.zeros(len(model.components))
+    count = len(model.components)
+    audit, totals = _Audit(count), np.zeros((POWERS, count))
+    for piece in pieces(segments):
+        powers = Powers(model, options or Options(), piece)
+        totals += powers.integrals()
+        audit.see(powers)
+    lost, source, inflow, rate, _ = totals
+    impact = np.zeros(count)
     for one in impacts:
         impact[model.components.index(one.component)] += one.energy
-    jumps, unexplained = _jumps(model, powers, segments, events, impacts)
-    stored = powers.at_results.stored
-    change = stored[:, -1] - stored[:, 0]
-    at_once = np.sum(jumps, axis=1)
+    starts, ends = stored_at_ends(model, segments)
+    jumps = starts[:, 1:] - ends[:, :-1]
+    change, at_once = ends[:, -1] - starts[:, 0], np.sum(jumps, axis=1)
     columns = (
         inflow, source, change, lost + impact, at_once, inflow + source - lost - rate, change - at_once - rate, impact,
-        *_audit(powers),
+        *audit.found(),
     )  # fmt: skip
     rows = tuple(EnergyRow(path, *map(float, values)) for path, *values in zip(model.components, *columns, strict=True))
-    largest = float(np.max(np.sum(np.abs(stored), axis=0), initial=0.0))
-    throughput = max([largest, *(float(np.sum(np.abs(part))) for part in (inflow, source, lost + impact))])
-    return EnergyBalance(rows, throughput, unexplained)
-
-
-def _audit(powers: Powers) -> tuple[Vector, Vector, Vector, Vector]:
-    """Return the largest imbalance of each component with its time, and its largest negative loss with its time."""
-    times = powers.results.times
-    table = powers.table(powers.at_results.powers)
-    lost, source, inflow, rate, _ = table
-    differences = np.abs(inflow + source - lost - rate)
-    largest = np.max(np.abs(table), axis=(0, 2), initial=0.0)
-    floor = _NOTHING * np.max(largest, initial=0.0)
-    rounding = np.maximum(_ROUNDING * largest, floor)
-
-    def worst(values: Vector) -> tuple[Vector, Vector]:
-        places = np.argmax(values, axis=1)
-        found = np.max(values, axis=1)
-        real = found > rounding
-        return np.where(real, found, 0.0), np.where(real, times[places], 0.0)
-
-    imbalance, when = worst(differences)
-    return imbalance / np.maximum(largest, 1e-300), when, *worst(-lost)
-
-
-def _jumps(
-    model: CompiledDae,
-    powers: Powers,
-    segments: tuple[Segment, ...],
-    events: Sequence[Event],
-    impacts: Sequence[Loss],
-) -> tuple[Vector, float]:
-    """Return the changes of stored energies between segments, and the largest in all that nothing explains, in J."""
-    starts = np.cumsum([len(segment.times) for segment in segments])[:-1]
-    stored = powers.at_results.stored
-    jumps = stored[:, starts] - stored[:, starts - 1]
+    throughput = max([audit.stored, *(float(np.sum(np.abs(part))) for part in (inflow, source, lost + impact))])
     reset = [event.time for event in events if event.transition >= 0 and model.transitions[event.transition].resets]
-    largest = 0.0
-    times = powers.results.times[starts]
-    for time in np.unique(times):
+    times = np.array([segment.times[0] for segment in segments[1:]])
+    return EnergyBalance(rows, throughput, _unexplained(times, np.sum(jumps, axis=0), reset, impacts))
+
+
+class _Audit:
+    """The largest imbalance of each component with its time, and its largest negative loss with its time."""
+
+    def __init__(self, count: int) -> None:
+        self.stored = 0.0
+        self._largest = np.zeros(count)
+        self._worst = np.zeros((2, count))
+        self._times = np.zeros((2, count))
+
+    def see(self, powers: Powers) -> None:
+        """Look at all results of a piece of the run."""
+        table = powers.table(powers.at_results.powers)
+        lost, source, inflow, rate, _ = table
+        self.stored = max(self.stored, powers.stored)
+        self._largest = np.maximum(self._largest, np.max(np.abs(table), axis=(0, 2), initial=0.0))
+        for k, values in enumerate((np.abs(inflow + source - lost - rate), -lost)):
+            worst = np.max(values, axis=1)
+            later = worst > self._worst[k]
+            self._times[k, later] = powers.results.times[np.argmax(values[later], axis=1)]
+            self._worst[k, later] = worst[later]
+
+    def found(self) -> tuple[Vector, Vector, Vector, Vector]:
+        """Return imbalances, as fractions of the largest powers, and negative losses, without what is rounding."""
+        floor = _NOTHING * np.max(self._largest, initial=0.0)
+        real = self._worst > np.maximum(_ROUNDING * self._largest, floor)
+        (imbalance, gain), (when, then) = np.where(real, self._worst, 0.0), np.where(real, self._times, 0.0)
+        return imbalance / np.maximum(self._largest, 1e-300), when, gain, then
+
+
+def _unexplained(times: Vector, jumps: Vector, reset: Sequence[float], impacts: Sequence[Loss]) -> float:
+    """Return the largest change of all stored energies together at an instant that nothing explains, in J."""
+    instants, place = np.unique(times, return_inverse=True)
+    if not len(instants):
+        return 0.0
+    left = np.bincount(place, jumps)
+
+    def at(time: float) -> int | None:
         near = _SAME_TIME * max(1.0, abs(time))
-        if any(abs(other - time) <= near for other in reset):
-            continue
-        lost = sum(one.energy for one in impacts if abs(one.time - time) <= near)
-        largest = max(largest, abs(float(np.sum(jumps[:, times == time])) + lost))
-    return jumps, largest
+        k = int(np.searchsorted(instants, time - near))
+        return k if k < len(instants) and instants[k] <= time + near else None
+
+    for one in impacts:
+        if (k := at(one.time)) is not None:
+            left[k] += one.energy
+    for time in reset:
+        if (k := at(time)) is not None:
+            left[k] = 0.0
+    return float(np.max(np.abs(left)))

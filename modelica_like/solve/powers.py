@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import casadi as ca
@@ -16,7 +17,7 @@ from modelica_like.solve.nodes import LOBATTO, LOBATTO_WEIGHTS, Nodes, Places, R
 from modelica_like.solve.options import Options
 from modelica_like.solve.recorder import Segment
 
-_COLUMNS = 5
+POWERS = 5
 """Powers of a component: loss, source, inflow, rate of the stored energy, magnitudes through the connectors."""
 _GAIN = 0.1
 """How much better than the next lower one a rule is believed to be at most."""
@@ -34,6 +35,8 @@ _TRIALS = 40
 _CLOSE = 0.1
 """Distance of two results, as part of the next one, up to which one of them is left out."""
 _MOST_POINTS = 200_000
+_PIECE = 20_000
+"""Results that are looked at together."""
 _NEAR = 8
 """Intervals that are integrated again as well rather than to start once more behind them."""
 _SOME, _MANY, _MOST_OUTPUTS = 32, 128, 4096
@@ -58,13 +61,47 @@ class Terms:
     rates: Vector
 
 
+def pieces(segments: tuple[Segment, ...]) -> Iterator[tuple[Segment, ...]]:
+    """Go through a run in pieces of bounded size; a long segment is cut into some that share a result."""
+    held: list[Segment] = []
+    count = 0
+    for segment in segments:
+        for first in range(0, max(len(segment.times) - 1, 1), _PIECE):
+            part = slice(first, first + _PIECE + 1)
+            held.append(Segment(segment.times[part], segment.x[:, part], segment.z[:, part], segment.d))
+            count += len(held[-1].times)
+            if count > _PIECE:
+                yield tuple(held)
+                held, count = [], 0
+    if held:
+        yield tuple(held)
+
+
+def stored_at_ends(model: CompiledDae, segments: tuple[Segment, ...]) -> tuple[Vector, Vector]:
+    """Return stored energies at the beginnings and at the ends of segments, shapes (components, segments), in J."""
+    function = along(model._cache, "energy terms", lambda: _terms_function(model))
+    d = np.array([segment.d for segment in segments]).T
+
+    def at(k: int) -> Vector:
+        times = np.array([segment.times[k] for segment in segments])
+        x, z = (np.array([getattr(segment, name)[:, k] for segment in segments]).T for name in "xz")
+        return function(times, x, z, model.p, model.u, d)[0]
+
+    return at(0), at(-1)
+
+
 class Powers:
     """Evaluates and integrates the energy terms of a run.
 
     Args:
         model: the compiled model.
         options: of the run.
-        segments: its smooth pieces.
+        segments: smooth pieces of it.
+
+    Attributes:
+        results: all of them.
+        at_results: the energy terms there.
+        stored: largest energy that is stored at one time, in J.
     """
 
     def __init__(self, model: CompiledDae, options: Options, segments: tuple[Segment, ...]) -> None:
@@ -75,14 +112,14 @@ class Powers:
         self.at_results = self._terms(self.results)
         largest = np.max(np.abs(self.results.x), axis=1, initial=0.0)
         self._scales = np.maximum(largest, options.atol * model.nominals)[:, None]
-        self._stored = float(np.max(np.sum(np.abs(self.at_results.stored), axis=0), initial=0.0))
+        self.stored = float(np.max(np.sum(np.abs(self.at_results.stored), axis=0), initial=0.0))
         self._points = 0
 
     def table(self, powers: Vector) -> Vector:
         """Return powers of all components, shape (5, components, ...): loss, source, inflow, rate, magnitudes."""
-        whole = np.zeros((_COLUMNS * len(self.model.components), *powers.shape[1:]))
+        whole = np.zeros((POWERS * len(self.model.components), *powers.shape[1:]))
         whole[self._kept] = powers
-        return whole.reshape(_COLUMNS, len(self.model.components), *powers.shape[1:])
+        return whole.reshape(POWERS, len(self.model.components), *powers.shape[1:])
 
     def integrals(self) -> Vector:
         """Integrate all powers over the run; shape (5, components), in J."""
@@ -112,7 +149,8 @@ class Powers:
             try:
                 step = np.linalg.solve(slopes, residual.T[:, :, None])[:, :, 0].T
             except np.linalg.LinAlgError:
-                return
+                # What is not determined stays as near to the interpolation as it can.
+                step = (np.linalg.pinv(slopes) @ residual.T[:, :, None])[:, :, 0].T
             if not np.isfinite(step).all():
                 return
             nodes.z = nodes.z - step
@@ -164,7 +202,7 @@ class Powers:
 
         An oscillation exchanges its energy again and again.
         """
-        return max(self._stored, float(np.nanmax(integrals, initial=0.0)))
+        return max(self.stored, float(np.nanmax(integrals, initial=0.0)))
 
     def _errors(
         self, nodes: Nodes, terms: Terms, intervals: Places, order: tuple[Rule, Rule, Rule]

@@ -11,6 +11,7 @@ from components import Damper, Fixed, Inertia, SpringDamper
 from modelica_like import Assembly, Component, build, load, simulate
 from modelica_like.errors import StepFailed
 from modelica_like.language import Equations, Parameter, Variable, param, sin, var
+from modelica_like.solve import powers
 from modelica_like.solve.idas import Integrator
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -113,6 +114,19 @@ def test_a_model_without_states(points: int) -> None:
     balance = simulate(Cycle(), 1.0, points=points).energy()
     assert balance.lost == pytest.approx(3 * (0.5 - np.sin(80.0) / 160), rel=1e-7)
     assert balance.closure < 1e-12
+
+
+def test_a_long_run_is_looked_at_in_pieces(monkeypatch: pytest.MonkeyPatch) -> None:
+    run = simulate(load(EXAMPLES / "msl/rotational/CoupledClutches.toml"))
+    whole = run.energy()
+    monkeypatch.setattr(powers, "_PIECE", 40)
+    parts = replace(run, _cache={}).energy()
+    for row in whole:
+        other = parts[row.component]
+        for name in ("inflow", "source", "stored", "lost", "at_events"):
+            expected = pytest.approx(getattr(row, name), abs=1e-6 * whole.throughput)
+            assert getattr(other, name) == expected, (row.component, name)
+    assert parts.drift <= 10 * run.options.rtol
 
 
 def test_where_nothing_can_be_integrated_again_the_results_count(monkeypatch: pytest.MonkeyPatch) -> None:
