@@ -112,8 +112,8 @@ class Instants:
             self._fire(now, wanting if number < _TOGETHER else [min(wanting, key=self._number)])
             share(self.model, now)
             solve_implicit(self.model, now)
-            self._stop_motions(now, before)
             check_singular(self.model, now)
+            self._stop_motions(now, before)
             wanting = [*self.due(now), *self.rising(now)]
         else:
             raise self._chattering(f"Modes still switch after {alone} rounds at one instant")
@@ -209,6 +209,7 @@ class Instants:
                 now.d[mode] = chosen.d[mode]
         share(self.model, now)
         solve_implicit(self.model, now)
+        check_singular(self.model, now)
 
     def _project(self, now: Point, targets: list[tuple[int, float]]) -> None:
         """Move the states as little as possible, so that variables that follow from them take new values."""

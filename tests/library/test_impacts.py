@@ -75,7 +75,7 @@ def test_the_mass_behind_a_spring_keeps_its_speed() -> None:
     assert drive.impacts[0].energy == pytest.approx(0.5 * 2.0 * 9.0, rel=1e-9)
     assert abs(drive.final["mass.v"]) <= 1e-30
     assert drive.final["other.v"] == pytest.approx(3.0, rel=1e-6)
-    assert drive.energy().unexplained <= 1e-12
+    assert drive.energy().at_events <= 1e-12
 
 
 class Buffer(LinearCompliantWithRelativeStates):
