@@ -52,6 +52,7 @@ class EventLoop:
         self._failed_before = start.t
         self._in_sight = np.inf
         self._since = start.t
+        self._lasted: dict[bytes, float] = {}
         self.progress = progress
         self.integrator = Integrator(model, options)
         self.guards = Guards(model)
@@ -147,7 +148,7 @@ class EventLoop:
             span, count = self.pace.panel(self.now.t, goal)
             before = self.integrator.steps
             try:
-                looks = self._integrate(self.now, span, count, patient=not self.guards.count)
+                looks = self._integrate(self.now, span, count, patient=not (self.guards.count or self._failures))
             except StepFailed:
                 if not self._go_on(self.now.t + span):
                     raise
@@ -200,7 +201,7 @@ class EventLoop:
         for halvings in range(1, _MAX_HALVINGS):
             piece = span / 2**halvings
             try:
-                return self._integrate(self.now, piece, 1, patient=not self.guards.count)
+                return self._integrate(self.now, piece, 1, patient=False)
             except StepFailed:
                 if not self._go_on(self.now.t + piece) or halvings + 1 == _MAX_HALVINGS:
                     raise
@@ -301,10 +302,11 @@ class EventLoop:
         """Handle an event: close the segment, change modes until nothing fires, begin the next segment."""
         self.record.end(self.now.d)
         self._failures, self._failed_before, self._in_sight = 0, self.now.t, np.inf
-        self.pace.anew(self.now.t - self._since)
+        lasted = self._lasted[self.now.d.tobytes()] = self.now.t - self._since
         self._since = self.now.t
         self.now = self.now.copy()
         self.instants.settle(self.now, wanting)
+        self.pace.anew(self._lasted.get(self.now.d.tobytes(), lasted))
         self.record.begin(self.now)
 
 

@@ -85,8 +85,9 @@ def _numbers(guards: Vector) -> Vector:
     sizes = np.abs(guards)
     if not sizes.size or _NOISE <= sizes.min() <= sizes.max() < np.inf:
         return guards
-    guards = np.nan_to_num(guards, nan=-1.0)
-    return np.where((sizes < _NOISE) & (sizes > JUST_TRUE), 0.0, guards)
+    rounding = (sizes < _NOISE) & (sizes > JUST_TRUE)
+    guards = np.where(rounding, 0.0, guards) if rounding.any() else guards
+    return guards if sizes.max() < np.inf else np.nan_to_num(guards, nan=-1.0)
 
 
 @dataclass

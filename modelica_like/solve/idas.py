@@ -257,7 +257,7 @@ class Integrator:
         speed = np.abs(call(self.model, self.model.ode, start)) / self.weights(start.x)
         worst = self.model.states[int(np.nanargmax(speed))] if np.any(np.isfinite(speed)) else self.model.states[0]
         return StepFailed(
-            f"IDAS gave up at about t = {moment:.9g} s: {reason}{f' ({flag})' if flag else ''}.",
+            f"IDAS gave up at about t = {moment:.6g} s: {reason}{f' ({flag})' if flag else ''}.",
             why=f"{worst} changes fastest relative to its tolerance.",
             advice="Look for a stiff spring, a vanishing mass or a speed without bound; then try other tolerances.",
         )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from modelica_like.compile.compiled import Vector
@@ -15,6 +17,9 @@ _LARGEST = 4096
 _ROOM = 1.5
 _STEPS_PER_CHECK = 6
 """Guards are looked at about as often as the integrator needs steps: what oscillates between results is not missed."""
+_DENSE = 1.5
+"""Steps between two looks from which results beside the looks ask for more of them."""
+_FINER = 4
 _STEPS_TO_START = 30
 _MAX_CHECKS = 2**16
 _ON_GRID = 1e-7
@@ -35,6 +40,7 @@ class Pace:
         self.begin, self.end, self.points = begin, end, options.points
         self.step = (end - begin) / options.points
         self.checks = 1
+        self.finer = 1
         self.guarded, self.eventful = guarded, guarded or timed
         even = -(-options.points // -(-options.points // _LARGEST))
         self.longest = _SIZES[-1] if guarded or timed else even
@@ -51,13 +57,14 @@ class Pace:
         It ends on the grid of looks or at `stop`. Behind an event its looks lie beside the results, which are
         interpolated.
         """
-        position = (t - self.begin) / self.look
-        whole = np.floor(position + _ON_GRID)
+        position = float(t - self.begin) / self.look
+        whole = math.floor(position + _ON_GRID)
         span = self.begin + (whole + self.size) * self.look - t
+        beside = abs(position - round(position)) > _ON_GRID
         if t + span < stop - SAME_TIME * max(1.0, abs(stop)):
-            return span, self.size
-        left = max(int(np.ceil((stop - t) / self.look - _ON_GRID)), 1)
-        return stop - t, left if not self.eventful else _at_least(left)
+            return span, _at_least(self.size * self.finer) if beside and self.eventful else self.size
+        left = max(math.ceil(float(stop - t) / self.look - _ON_GRID), 1)
+        return stop - t, left if not self.eventful else _at_least(left * self.finer)
 
     def snap(self, times: Vector) -> None:
         """Put times exactly on the regular grid, so that they do not collect rounding errors."""
@@ -70,8 +77,8 @@ class Pace:
 
     def results(self, first: float, last: float) -> Vector:
         """Return the times of results after `first` up to `last`, both with a little room."""
-        low = np.floor((first - self.begin) / self.step + _ON_GRID) + 1
-        high = np.floor((last - self.begin) / self.step + _ON_GRID)
+        low = math.floor(float(first - self.begin) / self.step + _ON_GRID) + 1
+        high = math.floor(float(last - self.begin) / self.step + _ON_GRID)
         return self._at(np.arange(low, high + 1), self.points)
 
     def before(self, t: float) -> float:
@@ -81,6 +88,7 @@ class Pace:
     def refine(self, steps: int, looks: int) -> bool:
         """Adapt the number of looks per result to the integrator's steps; True if it was too small."""
         each = max(steps - _STEPS_TO_START, 0) / looks
+        self.finer = _FINER if each * self.finer > _DENSE else 1
         if each > _STEPS_PER_CHECK and self.checks < _MAX_CHECKS:
             self.checks = min(self.checks << int(np.ceil(np.log2(each / _STEPS_PER_CHECK))), _MAX_CHECKS)
             return True
@@ -103,7 +111,7 @@ class Pace:
             self.size = min(_at_least(looks + 1), expected, self.longest)
 
     def anew(self, span: float) -> None:
-        """Begin a segment; the one before took so long, in s, and this one is expected to."""
+        """Begin a segment that is expected to last so long, in s: as the last one with the same modes."""
         if self.guarded:
             self.size = _at_least(_ROOM * span / self.look)
 

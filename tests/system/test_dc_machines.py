@@ -141,7 +141,7 @@ def speed_without_load(elapsed: float, w: float) -> float:
 
 
 def test_series_machine_runs_away_without_load() -> None:
-    run = simulate(MACHINES / "series_runaway.toml")
+    run = simulate(MACHINES / "series_runaway.toml", rtol=1e-8)
     loaded = U / sqrt(C * 0.2) - R_SERIES / C
     assert run.at(0.0)["machine.w"] == pytest.approx(loaded, rel=1e-9)
     exceeded = next(event.time for event in run.events if event.mode == "overspeed.limit")
