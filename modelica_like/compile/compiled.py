@@ -11,6 +11,7 @@ from typing import Any
 import casadi as ca
 
 from modelica_like.compile.buffers import Vector as Vector
+from modelica_like.compile.start_system import StartSystem as StartSystem
 from modelica_like.errors import LanguageError, Source, UnknownName, did_you_mean
 from modelica_like.flatten.model import FlatDiscrete, FlatParameter, FlatVariable, Origin
 from modelica_like.structure.holds import Circuit as Circuit
@@ -112,10 +113,6 @@ class CompiledDae:
         hold_terms: gain (zero where nothing is held), capacities forward and backward, and restitution of every held
             motion, one row each, row by row.
         start_values: as many as `starts`.
-        start_system: of (t, x, y, z, p, u, d) with y the variables that start values need: y itself, the Jacobian by
-            (x, y, z) and the values
-            of [explicit equations for y, implicit equations, variables with start values].
-        start_nodes: variables at the end of the start system.
         discrete_starts: start of d: modes and discrete values, then what `holds` and `circuits` need.
         derived: parameters that follow from others, of p only.
         determinants: relative determinants; zero where a block is singular.
@@ -151,8 +148,6 @@ class CompiledDae:
     start_conditions: ca.Function
     hold_terms: ca.Function
     start_values: ca.Function
-    start_system: ca.Function
-    start_nodes: tuple[int, ...]
     discrete_starts: ca.Function
     derived: ca.Function
     determinants: ca.Function
@@ -176,6 +171,7 @@ class CompiledDae:
     motion_sources: tuple[str, ...] = ()
     settings: dict[str, Any] = field(default_factory=dict)
     _make_energy: Callable[[], ca.Function] | None = field(default=None, repr=False)
+    _make_start: Callable[[bool], StartSystem] | None = field(default=None, repr=False)
     _cache: dict[Any, Any] = field(default_factory=dict, repr=False)
 
     def __str__(self) -> str:
@@ -219,6 +215,21 @@ class CompiledDae:
         if self._make_energy is None:
             raise LanguageError("The energy terms of this model were not kept.")
         return self._make_energy()
+
+    @cached_property
+    def start_system(self) -> StartSystem:
+        """Equations between start values and states."""
+        return self._start_system(rest=False)
+
+    @cached_property
+    def rest_system(self) -> StartSystem:
+        """The same with what may come to rest."""
+        return self._start_system(rest=True)
+
+    def _start_system(self, rest: bool) -> StartSystem:
+        if self._make_start is None:
+            raise LanguageError("The start system of this model was not kept.")
+        return self._make_start(rest)
 
     @cached_property
     def arguments(self) -> dict[str, Any]:
@@ -280,6 +291,6 @@ class CompiledDae:
 
     def __getstate__(self) -> dict[str, Any]:
         if self._make_energy is not None:
-            _ = self.energy  # symbols do not pickle, functions do
+            _ = self.energy, self.start_system, self.rest_system  # symbols do not pickle, functions do
         state = {key: value for key, value in self.__dict__.items() if key != "arguments"}
-        return {**state, "_make_energy": None, "_cache": {}}
+        return {**state, "_make_energy": None, "_make_start": None, "_cache": {}}

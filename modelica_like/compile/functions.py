@@ -62,8 +62,6 @@ def compile(reduced: ReducedDae) -> CompiledDae:
         start_conditions=build.function("start_conditions", conditions),
         hold_terms=build.function("hold_terms", ca.vec(hold_terms(flat, reduced.values).T)),
         start_values=build.function("start_values", ca.vertcat(*(ca.SX(s.value) for s in flat.starts))),
-        start_system=start_system(reduced),
-        start_nodes=tuple(dict.fromkeys(s.node for s in flat.starts)),
         discrete_starts=build.function("discrete_starts", _discrete_starts(flat)),
         derived=ca.Function("derived", [flat.p], [ca.densify(ca.SX(flat.formulas))], ["p"], ["derived"]),
         determinants=build.function("determinants", determinants),
@@ -87,6 +85,7 @@ def compile(reduced: ReducedDae) -> CompiledDae:
         summary=str(reduced),
         settings=dict(getattr(flat.components.get(""), "simulate", {})),
         _make_energy=lambda: build.function("energy", energy_terms(reduced)),
+        _make_start=lambda rest: start_system(reduced, rest),
     )
 
 

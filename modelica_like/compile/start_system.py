@@ -2,44 +2,106 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
 
 from modelica_like.structure.reduce import ReducedDae
 
+_STORED = 0
 
-def start_system(reduced: ReducedDae) -> ca.Function:
+
+@dataclass(frozen=True)
+class StartSystem:
+    """Equations between start values and states.
+
+    Attributes:
+        function: of (t, x, y, z, p, u, d) with y the variables that start values need: y itself, the Jacobian of the
+            values by (x, y, z), and the values of [y - expression, alg, variables of `nodes`].
+        nodes: variables (nodes) at its end.
+        rest: what comes to rest where nothing is given, the first first: node, and the state if it is one.
+    """
+
+    function: ca.Function
+    nodes: tuple[int, ...]
+    rest: tuple[tuple[int, int | None], ...] = ()
+
+
+def start_system(reduced: ReducedDae, rest: bool = False) -> StartSystem:
     """Build the start system.
 
     A variable such as the speed of the last mass of a chain is the sum of all relative speeds. Written out, N such
     variables are N^2 terms; with the
     variables in between as unknowns y of their own, the system stays as sparse as the chain.
 
-    Returns:
-        Function of (t, x, y, z, p, u, d) with the results y, the Jacobian of the values by (x, y, z), and the values of
-        [y - expression, alg, variables with start values].
+    Args:
+        reduced: the reduced system.
+        rest: take in what may come to rest, too.
     """
     flat, system = reduced.flat, reduced.system
-    nodes = list(dict.fromkeys(s.node for s in flat.starts))
+    order = tuple((node, _state(reduced, node)) for node in rest_order(reduced)) if rest else ()
+    resting = [node for node, state in order if state is None]
+    nodes = tuple(dict.fromkeys([*(s.node for s in flat.starts), *resting]))
     needed = _needed(reduced, nodes)
     y = ca.vertcat(*(system.symbols[level] for level, _ in needed)) if needed else ca.SX(0, 1)
     explicit = ca.vertcat(*(system.symbols[level] - expression for level, expression in needed))
-    wanted = ca.vertcat(*(_node_value(reduced, node) for node in nodes))
+    wanted = ca.vertcat(*(system.node_values[node] for node in nodes))
     values = ca.densify(ca.vertcat(explicit, reduced.alg, wanted))
     unknowns = ca.vertcat(reduced.x, y, reduced.z)
     arguments = [flat.time, reduced.x, y, reduced.z, flat.p, reduced.u, flat.d]
     results = [y, ca.jacobian(values, unknowns), values]
-    return ca.Function(
-        "start_system", arguments, results, ["t", "x", "y", "z", "p", "u", "d"], ["variables", "jacobian", "values"]
-    )
+    names = ["t", "x", "y", "z", "p", "u", "d"]
+    function = ca.Function("start_system", arguments, results, names, ["variables", "jacobian", "values"])
+    return StartSystem(function, nodes, order)
 
 
-def _node_value(reduced: ReducedDae, node: int) -> Any:
-    return reduced.system.node_values[node]
+def rest_order(reduced: ReducedDae) -> list[int]:
+    """Variables (nodes) that are zero at rest as long as they are open, in an order that no order of lines changes.
+
+    What a component stores energy in comes to rest first: speeds of inertias and masses before currents, pressures and
+    twists of springs. Relative speeds follow, then positions. Variables that are equal are one; of those that have the
+    same rank the first by name counts.
+    """
+    system = reduced.system
+    stores = {placed[0] for node in _storing(reduced) if (placed := system.node_level[node]) is not None}
+    first: dict[int, tuple[str, int]] = {}
+    for node, placed in enumerate(system.node_level):
+        if placed is not None and (placed[0] in stores or system.derivative(placed[0]) is not None):
+            one = reduced.flat.node_name(node), node
+            first[placed[0]] = min(one, first.get(placed[0], one))
+
+    def rank(level: int) -> tuple[Any, ...]:
+        one = system.levels[level]
+        # Relative motions are those that prefer to be states.
+        relative = -one.preference if one.order == 0 else one.preference
+        return level not in stores, one.order == 0, relative, first[level][0]
+
+    return [first[level][1] for level in sorted(first, key=rank) if level not in system.inputs]
 
 
-def _needed(reduced: ReducedDae, nodes: list[int]) -> list[tuple[int, Any]]:
+def _storing(reduced: ReducedDae) -> list[int]:
+    """Variables that occur in the stored energy of a component."""
+    variable = {one.path: k for k, one in enumerate(reduced.flat.variables)}
+    found: list[int] = []
+    for instance in reduced.flat.instances:
+        template = instance.template
+        prefix = f"{instance.path}." if instance.path else ""
+        if not template.energy_slots:
+            continue
+        used = zip(*template.energy.sparsity_jac(0, 0).get_triplet(), strict=True)
+        slots = (template.energy_slots[column] for row, column in used if row == _STORED)
+        found += [variable[prefix + slot.path] for slot in slots if slot.order == 0]
+    return found
+
+
+def _state(reduced: ReducedDae, node: int) -> int | None:
+    state = reduced.node_states[node]
+    return None if state is None else state[0]
+
+
+def _needed(reduced: ReducedDae, nodes: Iterable[int]) -> list[tuple[int, Any]]:
     """The explicit unknowns that the start nodes need, directly or by others."""
     system = reduced.system
     pending = {placed[0] for node in nodes if (placed := system.node_level[node]) is not None}

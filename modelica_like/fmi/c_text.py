@@ -91,7 +91,7 @@ def header(tables: Tables, variables: Sequence[FmuVariable], tolerance: float) -
         "N_START_DEPENDENT": len(start.dependent),
         "N_START_ZERO": len(start.zero),
         "N_START_UNKNOWNS": len(start.columns),
-        "N_START_VALUES": model.start_system.numel_out(2),
+        "N_START_VALUES": start.system.numel_out(2),
         "N_START_JACOBIAN": len(tables.tapes["start_jacobian"].outputs),
         "START_STEADY": int(start.steady is not None),
         "N_STEADY": len(start.steady or ()),

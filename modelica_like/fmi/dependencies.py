@@ -12,7 +12,7 @@ import casadi as ca
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.fmi.interface import FmuVariable, Interface
 from modelica_like.fmi.reach import Reach
-from modelica_like.fmi.start_tables import StartTables, start_tables
+from modelica_like.fmi.start_tables import AT_REST, StartTables, start_tables
 
 Known = tuple[str, int]
 """An argument of the model's functions: its name (t, x, p, u, start) and a position."""
@@ -133,10 +133,10 @@ class Dependencies:
         """What the unknowns of the start system depend on, by its block triangular form."""
         place = {column: k for k, column in enumerate(tables.columns)}
         nx = len(self.model.states)
-        ny = self.model.start_system.size1_out(0)
+        ny = tables.system.size1_out(0)
         offsets = {"x": 0, "y": nx, "z": nx + ny}
-        given = {row: position for position, _, row in tables.rows}
-        every = sparsity_rows(self.model.start_system, output=2) if tables.columns else []
+        given = {row: position for position, _, row in tables.rows if position != AT_REST}
+        every = sparsity_rows(tables.system, output=2) if tables.columns else []
         own: list[set[int]] = []
         outer: Rows = []
         for row in tables.wanted:

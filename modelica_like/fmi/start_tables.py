@@ -7,12 +7,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import casadi as ca
 import numpy as np
 
-from modelica_like.compile.compiled import CompiledDae
-from modelica_like.initialize import Point
-from modelica_like.initialize.start import Rows, StartProblem, _StartSystem
+from modelica_like.compile.compiled import CompiledDae, StartEntry
+from modelica_like.initialize import Point, call, share, start_plan
+from modelica_like.initialize.plan import start_name
+from modelica_like.initialize.start import StartProblem
 from modelica_like.initialize.steady import moving_states
+
+AT_REST = -1
 
 
 @dataclass(frozen=True)
@@ -24,8 +28,10 @@ class StartTables:
         defaults: the same for defaults of states; only the steady start uses them.
         x_guesses: (state, start value, factor) of guesses.
         z_guesses: (implicit unknown, start value, factor) of guesses.
-        rows: (start value, variable, row of the start system) of start values that are equations.
+        rows: (start value, variable, row of the start system) of start values that are equations; for a variable at
+            rest the start value is `AT_REST`.
         dependent: the same for start values that must follow from the others.
+        system: the start system.
         zero: states that begin at zero because nothing else is said.
         columns: unknowns of the start system among (x, y, z).
         wanted: its rows.
@@ -38,6 +44,7 @@ class StartTables:
     z_guesses: tuple[tuple[int, int, float], ...]
     rows: tuple[tuple[int, int, int], ...]
     dependent: tuple[tuple[int, int, int], ...]
+    system: ca.Function
     zero: tuple[int, ...]
     columns: tuple[int, ...]
     wanted: tuple[int, ...]
@@ -51,36 +58,39 @@ def start_tables(model: CompiledDae) -> StartTables:
         MissingStart, ContradictingStart: they do not determine all states.
     """
     point = Point(0.0, model.guesses.copy(), model.z_guesses.copy(), np.zeros(model.discrete_size))
-    kind = model.settings.get("start", "given")
+    point.d = call(model, model.discrete_starts, point)
+    share(model, point)
     problem = StartProblem(model, point)
-    place = {id(entry): k for k, entry in enumerate(model.starts)}
-    free = [k for k in range(len(model.states)) if k not in problem.direct]
-    rows, dependent, columns = Rows(), [], []
-    if kind != "steady" and (free or problem.general):
-        system = _StartSystem(model, point, free)
-        rows, dependent = problem._choose(system, free, kind == "rest")
-        columns = [column for column in system.columns if column not in set(rows.states)]
-    own = model.start_system.size1_out(0) + len(model.implicit)
-    node_row = {node: own + k for k, node in enumerate(model.start_nodes)}
+    for position, entry in problem.direct.items():
+        point.x[position] = problem.state_value(entry)
+    plan = start_plan(model, model.settings.get("start", "given"), point)
+    own = plan.system.function.size1_out(0) + len(model.implicit)
+    row_of = {node: own + k for k, node in enumerate(plan.system.nodes)}
 
     def of_states(strength: str) -> tuple[tuple[int, int, float], ...]:
         chosen = [(e.state, k) for k, e in enumerate(model.starts) if e.strength == strength and e.state is not None]
         return tuple((state[0], k, state[1]) for state, k in chosen)
 
+    def as_rows(numbers: tuple[int, ...]) -> list[tuple[int, int, int]]:
+        return [(k, model.starts[k].node, row_of[model.starts[k].node]) for k in numbers]
+
     names = {name: k for k, name in enumerate(model.implicit)}
-    guessed = [
-        (names.get(problem.name(e)), k) for k, e in enumerate(model.starts) if e.strength == "guess" and e.state is None
-    ]
-    triples = [tuple((place[id(e)], e.node, node_row[e.node]) for e in some) for some in (rows.entries, dependent)]
+    near = [(names.get(start_name(model, e)), k) for k, e in enumerate(model.starts) if _is_near(e)]
     return StartTables(
         direct=of_states("fixed"),
         defaults=of_states("default"),
         x_guesses=of_states("guess"),
-        z_guesses=tuple((position, k, 1.0) for position, k in guessed if position is not None),
-        rows=triples[0],
-        dependent=triples[1],
-        zero=tuple(rows.states),
-        columns=tuple(columns),
-        wanted=(*range(own), *(row for _, _, row in triples[0])) if columns else (),
-        steady=tuple(moving_states(model)) if kind == "steady" else None,
+        z_guesses=tuple((position, k, 1.0) for position, k in near if position is not None),
+        rows=(*as_rows(plan.rows), *((AT_REST, node, row_of[node]) for node in plan.resting)),
+        dependent=tuple(as_rows(plan.dependent)),
+        system=plan.system.function,
+        zero=plan.zero,
+        columns=plan.columns,
+        wanted=plan.wanted,
+        steady=tuple(moving_states(model)) if plan.kind == "steady" else None,
     )
+
+
+def _is_near(entry: StartEntry) -> bool:
+    """Whether an implicit unknown begins there: where it is guessed, or given."""
+    return entry.strength != "default" and entry.state is None

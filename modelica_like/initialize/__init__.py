@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal, get_args
+from typing import get_args
 
 import numpy as np
 
@@ -14,6 +14,9 @@ from modelica_like.initialize.holds import holding as holding
 from modelica_like.initialize.holds import rest as rest
 from modelica_like.initialize.holds import share as share
 from modelica_like.initialize.holds import sharing as sharing
+from modelica_like.initialize.plan import StartKind as StartKind
+from modelica_like.initialize.plan import StartPlan as StartPlan
+from modelica_like.initialize.plan import start_plan as start_plan
 from modelica_like.initialize.point import Point as Point
 from modelica_like.initialize.point import call as call
 from modelica_like.initialize.point import check_singular as check_singular
@@ -21,8 +24,6 @@ from modelica_like.initialize.point import solve_implicit as solve_implicit
 from modelica_like.initialize.point import variable_slopes as variable_slopes
 from modelica_like.initialize.start import StartProblem
 from modelica_like.initialize.steady import check_modes_hold, solve_steady
-
-StartKind = Literal["given", "rest", "steady"]
 
 _MODE_ROUNDS = 5
 
@@ -66,7 +67,7 @@ def initialize(model: CompiledDae, t0: float = 0.0, start: StartKind = "given") 
             problem.apply(point)
             solve_steady(model, point)
         else:
-            problem.solve(point, rest=start == "rest")
+            problem.solve(point, start)
         modes = chosen_modes(model, point)
         if np.array_equal(modes, point.d):
             break

@@ -12,9 +12,9 @@ from modelica_like.analyse.linear.linearize import held_by
 from modelica_like.analyse.replay.slopes import Sizes
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae
-from modelica_like.initialize import Point, StartKind
+from modelica_like.initialize import Point, StartKind, start_plan
 from modelica_like.initialize.kept import find_kept, solve_kept
-from modelica_like.initialize.start import StartProblem, _StartSystem
+from modelica_like.initialize.start import StartProblem
 from modelica_like.initialize.steady import moving_states
 
 _MAX_NEWTON = 50
@@ -39,6 +39,7 @@ class StartSlopes:
         self.size = Sizes.of(model)
         given = point.t, point.x, point.z, model.p, model.u, point.d
         jacobians = [self._of_parameters(name, given) for name in ("discrete_starts", "start_values")]
+        self.plan = start_plan(model, start, point)
         jacobians += [] if start == "steady" else [self._start_system()[1]]
         # Of many parameters few have a part in the start: only their columns are followed.
         moved = range(self.size.fixed) if start == "steady" else sorted({c for one in jacobians for c in _columns(one)})
@@ -47,7 +48,7 @@ class StartSlopes:
         self.starts, self.values = starts, values
         problem = StartProblem(model, point.copy())
         self.rows = {id(entry): k for k, entry in enumerate(model.starts)}
-        states = self._steady(problem, given) if start == "steady" else self._given(problem, start == "rest")
+        states = self._steady(problem, given) if start == "steady" else self._given(problem)
         self.x, self.d = np.zeros((self.size.x, self.size.fixed)), np.zeros((self.size.d, self.size.fixed))
         self.x[:, self.moved], self.d[:, self.moved] = states, starts
 
@@ -70,24 +71,17 @@ class StartSlopes:
             slopes[position] = self.values[self.rows[id(entry)]] / entry.state[1]
         return slopes
 
-    def _given(self, problem: StartProblem, rest: bool) -> Vector:
+    def _given(self, problem: StartProblem) -> Vector:
         """Implicit function theorem on the start system."""
-        model, size = self.model, self.size
+        size, plan = self.size, self.plan
         slopes = self._direct(problem)
-        free = [k for k in range(size.x) if k not in problem.direct]
-        if not free or not self.moved:
+        if not plan.columns or not self.moved:
             return slopes
-        system = _StartSystem(model, self.point, free)
-        rows, _ = problem._choose(system, free, rest)
-        wanted = [*range(system.own), *(system.own + system.nodes[e.node] for e in rows.entries)]
-        columns = [column for column in system.columns if column not in set(rows.states)]
+        wanted, columns = list(plan.wanted), list(plan.columns)
         by_unknowns, by_fixed, by_d = self._start_system()
         fixed = np.asarray(by_fixed[wanted, self.moved].full()) + np.asarray(by_d[wanted, :].full()) @ self.starts
         known = ca.mtimes(by_unknowns[wanted, : size.x], ca.DM(slopes))
-        right = -fixed - np.asarray(known.full())
-        right[system.own :] += np.array([self.values[self.rows[id(e)]] for e in rows.entries]).reshape(
-            -1, len(self.moved)
-        )
+        right = plan.targets(self.values) - fixed - np.asarray(known.full())
         if right.size:
             solved = np.asarray(ca.solve(by_unknowns[wanted, columns], ca.DM(right)).full())
             for row, column in enumerate(columns):
@@ -97,27 +91,28 @@ class StartSlopes:
 
     def _start_system(self) -> tuple[Any, Any, Any]:
         """Jacobians of the start system by its unknowns (x, y, z), by (p, u) and by d, sparse."""
-        model, point = self.model, self.point
-        if "start slopes" not in model._cache:
-            names = model.start_system.name_in()
-            arguments = [ca.SX.sym(name, model.start_system.size1_in(k)) for k, name in enumerate(names)]
-            _, jacobian, values = model.start_system(*arguments)
+        model, point, system = self.model, self.point, self.plan.system.function
+        key = "start slopes", self.plan.kind
+        if key not in model._cache:
+            names = system.name_in()
+            arguments = [ca.SX.sym(name, system.size1_in(k)) for k, name in enumerate(names)]
+            _, jacobian, values = system(*arguments)
             by_d = ca.jacobian(values, arguments[6])
             fixed = ca.jacobian(values, ca.vertcat(arguments[4], arguments[5]))
-            model._cache["start slopes"] = ca.Function("start_slopes", arguments, [jacobian, fixed, by_d])
+            model._cache[key] = ca.Function("start_slopes", arguments, [jacobian, fixed, by_d])
         given = point.t, point.x, self._start_variables(), point.z, model.p, model.u, point.d
-        return model._cache["start slopes"](*given)
+        return model._cache[key](*given)
 
     def _start_variables(self) -> Vector:
         """The variables y of the start system: its first equations, solved."""
-        model, point = self.model, self.point
-        count = model.start_system.size1_out(0)
+        model, point, system = self.model, self.point, self.plan.system.function
+        count = system.size1_out(0)
         y = np.zeros(count)
         if not count:
             return y
         own, places = list(range(count)), list(range(self.size.x, self.size.x + count))
         for _ in range(_MAX_NEWTON):
-            _, jacobian, values = model.start_system(point.t, point.x, y, point.z, model.p, model.u, point.d)
+            _, jacobian, values = system(point.t, point.x, y, point.z, model.p, model.u, point.d)
             step = np.array(ca.solve(jacobian[own, places], -values[own])).ravel()
             y = y + step
             if np.max(np.abs(step) / (1.0 + np.abs(y))) < 1e-13:

@@ -7,6 +7,7 @@
 #define MAX_NEWTON 50
 #define CONSISTENT 1e-8
 #define RESTING 1e-9
+#define AT_REST (-1) /* in place of a start value: the variable is zero */
 
 void start_defaults(Instance *c) {
     State *s = &c->state;
@@ -66,8 +67,9 @@ static Result solve_start_system(Instance *c, const double *values) {
         tape_run(&tape_start_jacobian, c->work.slots, c->work.jacobian);
         error = 0;
         for (int k = 0; k < N_START_UNKNOWNS; k++) {
-            double target = k < N_Y + N_Z ? 0 : values[model_start_rows[k - N_Y - N_Z].start];
-            int row = k < N_Y + N_Z ? k : model_start_rows[k - N_Y - N_Z].row;
+            int own = k < N_Y + N_Z, given = own ? AT_REST : model_start_rows[k - N_Y - N_Z].start;
+            int row = own ? k : model_start_rows[k - N_Y - N_Z].row;
+            double target = given == AT_REST ? 0 : values[given];
             step[k] = residual[row] - target;
             error = fmax(error, isfinite(step[k]) ? fabs(step[k]) / (1 + fabs(target)) : INFINITY);
         }

@@ -1,0 +1,224 @@
+"""Which start values determine what: chosen once, for simulation, export and derivatives."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import casadi as ca
+import numpy as np
+
+from modelica_like.compile.compiled import CompiledDae, StartEntry, StartSystem, Vector
+from modelica_like.errors import MissingStart
+from modelica_like.initialize.matching import Elimination, Matching
+from modelica_like.initialize.point import Point
+
+StartKind = Literal["given", "rest", "steady"]
+_DENSE = 100
+_WELL_CONDITIONED = 1e9
+
+
+@dataclass(frozen=True)
+class StartPlan:
+    """Which start values determine what.
+
+    Attributes:
+        kind: what stands for start values that are not given.
+        system: the start system.
+        direct: (state, start value) of states that are given; the first of several counts.
+        rows: start values that are equations for the other states.
+        dependent: fixed start values that must follow from the others.
+        resting: variables (nodes) that are zero because nothing else is said.
+        zero: states that are.
+        columns: unknowns of the start system among (x, y, z); none where nothing is to be solved.
+        wanted: its rows: those of y and z, of `rows`, of `resting`.
+    """
+
+    kind: StartKind
+    system: StartSystem
+    direct: tuple[tuple[int, int], ...]
+    rows: tuple[int, ...] = ()
+    dependent: tuple[int, ...] = ()
+    resting: tuple[int, ...] = ()
+    zero: tuple[int, ...] = ()
+    columns: tuple[int, ...] = ()
+    wanted: tuple[int, ...] = ()
+
+    @property
+    def own(self) -> int:
+        """Number of explicit and implicit equations at the beginning of the start system."""
+        return len(self.wanted) - len(self.rows) - len(self.resting)
+
+    def targets(self, values: Vector) -> Vector:
+        """Values that the wanted rows must have.
+
+        Args:
+            values: one value, or one row, for every start value.
+        """
+        shape = values.shape[1:]
+        parts = [np.zeros((self.own, *shape)), values[list(self.rows)], np.zeros((len(self.resting), *shape))]
+        return np.concatenate(parts)
+
+
+def start_plan(model: CompiledDae, kind: StartKind, point: Point) -> StartPlan:
+    """Choose among the start values of a model.
+
+    Structure decides. Where numbers say that rows chosen by structure depend on each other (several clutches between
+    the same shafts), numbers decide: defaults and zeros that say nothing new are left out, start values that are given
+    must follow.
+
+    Args:
+        model: the compiled model.
+        kind: what stands for start values that are not given.
+        point: a point with the modes that count.
+
+    Raises:
+        MissingStart: the start values do not determine all states.
+    """
+    key = "start plan", kind
+    if key not in model._cache:
+        model._cache[key] = _Choice(model, kind).plan(None)
+    plan: StartPlan = model._cache[key]
+    if plan.columns and not _regular(_matrix(model, plan, point)):
+        matrix = _generic_matrix(model, plan.system, point)
+        if matrix is not None:
+            return _Choice(model, kind).plan(matrix)
+    return plan
+
+
+def matrix_and_values(model: CompiledDae, system: StartSystem, point: Point, y: Vector) -> tuple[Any, Vector]:
+    """Jacobian of the whole start system by (x, y, z), sparse, and its values."""
+    _, jacobian, values = system.function(point.t, point.x, y, point.z, model.p, model.u, point.d)
+    return jacobian, np.asarray(values.full()).ravel()
+
+
+def _matrix(model: CompiledDae, plan: StartPlan, point: Point) -> Any:
+    whole, _ = matrix_and_values(model, plan.system, point, np.zeros(plan.system.function.size1_out(0)))
+    return whole[list(plan.wanted), list(plan.columns)]
+
+
+def _regular(matrix: Any) -> bool:
+    """Tell whether a square matrix is far from singular."""
+    entries = np.array(matrix.nonzeros())
+    if not np.all(np.isfinite(entries)):
+        return False
+    sizes = np.zeros(matrix.size1())
+    np.maximum.at(sizes, matrix.sparsity().row(), np.abs(entries))
+    if not np.all(sizes > 0.0):
+        return False
+    scaled = ca.mtimes(ca.diag(ca.DM(1.0 / sizes)), matrix)
+    if matrix.size1() <= _DENSE:
+        return bool(np.linalg.cond(scaled.full()) < _WELL_CONDITIONED)
+    factor = np.abs(np.array(ca.diag(ca.qr_sparse(scaled)[1])).ravel())
+    return bool(factor.max() < _WELL_CONDITIONED * factor.min())
+
+
+def _generic_matrix(model: CompiledDae, system: StartSystem, point: Point) -> Any:
+    """Jacobian of the start system near a point where nothing vanishes by chance; None where it is not finite."""
+    chance = np.random.default_rng(1)
+    moved = point.copy()
+    for part in (moved.x, moved.z):
+        part += 0.1 * (1.0 + np.abs(part)) * chance.uniform(0.5, 1.0, part.shape)
+    y = chance.uniform(0.5, 1.0, system.function.size1_out(0))
+    matrix, _ = matrix_and_values(model, system, moved, y)
+    return matrix if np.all(np.isfinite(matrix.nonzeros())) else None
+
+
+class _Choice:
+    """Start values are taken as long as they say something new: fixed ones, defaults, zeros."""
+
+    def __init__(self, model: CompiledDae, kind: StartKind) -> None:
+        self.model = model
+        self.kind: StartKind = kind
+        self.system = model.rest_system if kind == "rest" else model.start_system
+        self.direct: dict[int, int] = {}
+        for number, entry in enumerate(model.starts):
+            if entry.strength == "fixed" and entry.state is not None:
+                self.direct.setdefault(entry.state[0], number)
+        nx, ny, nz = len(model.states), self.system.function.size1_out(0), len(model.implicit)
+        self.free = [k for k in range(nx) if k not in self.direct]
+        self.columns = [*self.free, *range(nx, nx + ny + nz)]
+        self.place = {column: k for k, column in enumerate(self.columns)}
+        self.own = ny + nz
+        self.row_of = {node: self.own + k for k, node in enumerate(self.system.nodes)}
+
+    def plan(self, matrix: Any) -> StartPlan:
+        """Choose by structure, or by the numbers of a Jacobian."""
+        direct = tuple(self.direct.items())
+        general = [k for k, e in enumerate(self.model.starts) if e.strength == "fixed" and e.state is None]
+        if self.kind == "steady" or not (self.free or general):
+            return StartPlan(self.kind, self.system, direct)
+        if not self._begin(matrix):
+            return self.plan(None)  # the model itself is singular there, which is told when it is solved
+        rows = [k for k in general if self._accept(self.model.starts[k].node)]
+        dependent = [k for k in general if k not in set(rows)]
+        rows += [k for k in self._defaults() if self._accept(self.model.starts[k].node)]
+        resting, zero = self._rest()
+        if self.choice.size < len(self.columns):
+            raise self._missing()
+        columns = [column for column in self.columns if column not in set(zero)]
+        nodes = [*(self.model.starts[k].node for k in rows), *resting]
+        wanted = [*range(self.own), *(self.row_of[node] for node in nodes)]
+        lists = (rows, dependent, resting, zero, columns, wanted)
+        return StartPlan(self.kind, self.system, direct, *map(tuple, lists))
+
+    def _begin(self, matrix: Any) -> bool:
+        """Begin with the explicit equations, which determine y, and the implicit ones, which determine z."""
+        pattern = self.system.function.sparsity_out(1)
+        numbers = [1.0] * pattern.nnz() if matrix is None else matrix.nonzeros()
+        self.entries: list[dict[int, float]] = [{} for _ in range(pattern.size1())]
+        for row, column, number in zip(*pattern.get_triplet(), numbers, strict=True):
+            if column in self.place:
+                self.entries[row][self.place[column]] = number
+        self.choice: Matching | Elimination = (Matching if matrix is None else Elimination)(len(self.columns))
+        own = [self._add({len(self.free) + row: 1.0, **self.entries[row]}) for row in range(self.own)]
+        return matrix is None or all(own)
+
+    def _add(self, row: Mapping[int, float]) -> bool:
+        return self.choice.add(row)
+
+    def _accept(self, node: int) -> bool:
+        return self._add(self.entries[self.row_of[node]])
+
+    def _defaults(self) -> list[int]:
+        """Defaults in an order that no order of lines changes."""
+        chosen = [k for k, e in enumerate(self.model.starts) if e.strength == "default"]
+        return sorted(chosen, key=lambda k: start_name(self.model, self.model.starts[k]))
+
+    def _rest(self) -> tuple[list[int], list[int]]:
+        """Variables and states that come to rest."""
+        resting: list[int] = []
+        zero: list[int] = []
+        for node, state in self.system.rest:
+            if state is None and self._accept(node):
+                resting.append(node)
+            elif state is not None and state in self.place and self._add({self.place[state]: 1.0}):
+                zero.append(state)
+        return resting, zero
+
+    def _missing(self) -> MissingStart:
+        states = [self.free[k] for k in self.choice.undetermined() if k < len(self.free)]
+        return _missing(self.model, states, len(self.columns) - self.choice.size)
+
+
+def start_name(model: CompiledDae, entry: StartEntry) -> str:
+    """Path of the variable of a start value."""
+    return model.flat_variables[entry.node].path
+
+
+def _missing(model: CompiledDae, states: Collection[int], count: int) -> MissingStart:
+    names = [model.states[k] for k in states]
+    if count == 1:
+        shown = " or ".join(names[:4]) + (" …" if len(names) > 4 else "")
+        what = f"one equation: give {shown} a start value"
+    else:
+        shown = ", ".join(names[:8]) + (", …" if len(names) > 8 else "")
+        which = "" if count == len(names) else f"{count} of "
+        what = f"{count} equations: give {which}{shown} start values"
+    parts = dict.fromkeys(name.removeprefix("der(").rstrip(")").rpartition(".")[0] for name in names)
+    return MissingStart(
+        f"Initialisation (not the model) lacks {what}.",
+        where=[model.places[part] for part in parts if part in model.places][:3],
+        advice='Or start from rest (start = "rest") or in the steady state (start = "steady").',
+    )
