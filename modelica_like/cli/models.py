@@ -18,13 +18,22 @@ class Start(StrEnum):
     STEADY = "steady"
 
 
-def check(netlist: Netlist, assignments: Assignments = None, *, debug: Debug = False) -> None:
+def check(
+    netlist: Netlist, assignments: Assignments = None, *,
+    start: Annotated[bool, Option("--start", help="Tell the start values, and where each comes from.")] = False,
+    debug: Debug = False,
+) -> None:  # fmt: skip
     """Check a netlist: equations, unknowns, states, index, blocks, energy terms."""
     with told(debug):
         assembly = load_netlist(netlist, assignments)
         from modelica_like.report.structure import structure_report
 
         out().print(structure_report(assembly))
+        if start:
+            from modelica_like.report.start import start_report
+            from modelica_like.simulation import build
+
+            out().print("", start_report(assembly, build(assembly)))
 
 
 def simulate(

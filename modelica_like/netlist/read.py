@@ -109,7 +109,7 @@ class _Task:
             self._each("start", self.document.start, self._start)
             self._each("guess", self.document.guess, lambda path, value: self._start(path, guess(value)))
             self._each("expose", self.document.expose, partial(Assembly.expose, self.assembly))
-        for section in ("parameters", "connect", "series", "expose"):
+        for section in ("parameters", "start", "connect", "series", "expose"):
             for name in getattr(self.document, section):
                 Assembly.place(self.assembly, f"{section}.{name}", self.document.lines.source(section, name))
         for end in self.document.free:
@@ -142,6 +142,10 @@ class _Task:
             part = [part] * entry["count"] if "count" in entry else part
         setattr(self.assembly, name, part)
         Assembly.place(self.assembly, f"parts.{name}", self.document.lines.source("parts", name))
+        if isinstance(entry, dict):
+            first = part[0] if isinstance(part, list) else part
+            for key in first._starts.keys() & entry.keys():
+                Assembly.place(self.assembly, f"parts.{name}.{key}", self.document.lines.source("parts", name, key))
 
     def _part(self, name: str, table: Mapping[str, Any]) -> Component:
         values = {key: value for key, value in table.items() if key not in ("is", "count")}

@@ -1,6 +1,7 @@
 """The commands check and simulate: what they print and write, and their exit codes."""
 
 import csv
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -51,6 +52,49 @@ def test_check_tells_the_structure(run: CliRunner) -> None:
     assert rows["stored"][1:] == ["hub,", "spindle,", "table"]
     assert rows["dissipated"][1:] == ["clutch"]
     assert "states kept: motor.phi, clutch.phi_rel, clutch.w_rel" in result.stdout.replace("\n", " ")
+
+
+STARTS = """
+[parts]
+a = { is = "Inertia", J = 1, w = "300 rpm" }
+spring = { is = "SpringDamper", c = 200, d = 1 }
+b = { is = "Inertia", J = 2 }
+brake = { is = "Clutch", capacity = 3 }
+[parts.c]
+is = "Inertia"
+J = 3
+w = 2
+[series]
+shaft = ["a", "spring", "b", "brake", "c"]
+[start]
+"a.phi" = "180 deg"
+[simulate]
+until = 1
+start = "rest"
+"""
+
+
+def test_check_tells_where_start_values_come_from(run: CliRunner, tmp_path: Path) -> None:
+    (tmp_path / "drive.toml").write_text(STARTS)
+    result = run.invoke(app, ["check", "--start", str(tmp_path / "drive.toml")])
+    lines = result.stdout.partition("start values (rest)")[2].splitlines()[2:]
+    assert [re.split(r"  +", line.strip()) for line in lines if line.strip()] == [
+        ["a.phi", "3.14159265", "rad", "given in drive.toml:14"],
+        ["a.w", "31.4159265", "rad/s", "given in drive.toml:3"],
+        ["brake.phi_rel", "0", "rad", "default"],
+        ["c.w", "2", "rad/s", "given in drive.toml:10"],
+        ["b.w", "0", "rad/s", "rest"],
+        ["spring.phi_rel", "0", "rad", "rest"],
+        ["spring.w_rel", "-31.4159265", "rad/s", "follows from b.w, a.w"],
+        ["brake.w_rel", "2", "rad/s", "follows from c.w, b.w"],
+    ]
+
+
+def test_check_tells_starts_that_are_missing(run: CliRunner, tmp_path: Path) -> None:
+    (tmp_path / "drive.toml").write_text(STARTS.replace('start = "rest"', ""))
+    result = run.invoke(app, ["check", "--start", str(tmp_path / "drive.toml")])
+    assert result.exit_code == 2
+    assert "Initialisation (not the model) lacks" in result.output
 
 
 def test_simulate_tells_events_and_energy(run: CliRunner) -> None:

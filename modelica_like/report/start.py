@@ -1,0 +1,134 @@
+"""What `check --start` tells: the start values, and where each comes from."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import casadi as ca
+import numpy as np
+from rich.console import RenderableType
+from rich.markup import escape
+
+from modelica_like.compile import CompiledDae
+from modelica_like.initialize import Point, StartKind, StartPlan, call, initialize, start_plan
+from modelica_like.initialize.plan import matrix_and_values, start_name
+from modelica_like.language import Component
+from modelica_like.report.types import table
+
+_AT_ONCE = 64
+_NOTHING = 1e-9
+_SHOWN = 4
+
+
+@dataclass(frozen=True)
+class StartValueRow:
+    """A start value.
+
+    Attributes:
+        path: of the variable.
+        value: in SI units.
+        unit: the coherent unit.
+        origin: where it comes from: `given in FILE:LINE`, `default`, `rest`, `follows from …`, `steady state`.
+    """
+
+    path: str
+    value: float
+    unit: str
+    origin: str
+
+
+def start_report(drive: Component, model: CompiledDae) -> RenderableType:
+    """Return the start values of a model as a table.
+
+    Raises:
+        MissingStart, ContradictingStart, InitializationError: there is no start.
+    """
+    kind: StartKind = model.settings.get("start", "given")
+    made = table(f"start values ({kind})", "variable", "value>", "unit", "where from")
+    for row in start_values(drive, model, kind):
+        made.add_row(row.path, f"{row.value:.9g}", escape(row.unit), escape(row.origin))
+    return made
+
+
+def start_values(drive: Component, model: CompiledDae, kind: StartKind = "given") -> list[StartValueRow]:
+    """Return what is given, what is assumed and what follows for the states, in this order.
+
+    Args:
+        drive: the drive, to tell where values were given.
+        model: the drive, compiled.
+        kind: what stands for start values that are not given.
+
+    Raises:
+        MissingStart, ContradictingStart, InitializationError: there is no start.
+    """
+    point = initialize(model, start=kind)
+    plan = start_plan(model, kind, point)
+    variables = call(model, model.variables, point)
+    origins: dict[str, str] = {}
+    for k, entry in enumerate(model.starts):
+        path = start_name(model, entry)
+        if entry.strength == "fixed":
+            origins[path] = _given(drive, path)
+        elif entry.strength == "default" and (k in plan.rows or kind == "steady"):
+            origins.setdefault(path, "default")
+    for node in plan.resting:
+        if node < len(model.flat_variables):
+            origins.setdefault(model.flat_variables[node].path, "rest")
+    for state in plan.zero:
+        origins.setdefault(model.states[state], "rest")
+    known = {*origins, *(model.states[state] for state, _ in plan.direct)}
+    follows = [k for k, name in enumerate(model.states) if name not in known]
+    origins |= dict(zip((model.states[k] for k in follows), _follows(model, plan, point, follows), strict=True))
+    return [StartValueRow(path, *_value(model, point, variables, path), origin) for path, origin in origins.items()]
+
+
+def _value(model: CompiledDae, point: Point, variables: np.ndarray, path: str) -> tuple[float, str]:
+    if path in model.position:
+        node = model.position[path]
+        return float(variables[node]), str(model.flat_variables[node].unit)
+    inner = path.removeprefix("der(").removesuffix(")")
+    unit = f"{model.flat_variables[model.position[inner]].unit}/s" if inner in model.position else ""
+    return float(point.x[model.states.index(path)]), unit
+
+
+def _given(drive: Component, path: str) -> str:
+    """Tell where a value stands: in the outermost netlist that gives it."""
+    component, rest = drive, path
+    while rest:
+        first, _, inner = rest.partition(".")
+        for key in (f"start.{rest}", f"parts.{first.partition('[')[0]}{'.' if inner else ''}{inner}"):
+            source = component.source_of(key)
+            if source.file.endswith(".toml"):
+                return f"given in {Path(source.file).name}:{source.line}"
+        if not inner:
+            break
+        component, rest = component.find(first), inner
+    return "given"
+
+
+def _follows(model: CompiledDae, plan: StartPlan, point: Point, states: list[int]) -> Iterator[str]:
+    """Tell from which variables states follow."""
+    if not plan.columns:
+        yield from ("steady state" for _ in states)
+        return
+    y = np.zeros(plan.system.function.size1_out(0))
+    whole, _ = matrix_and_values(model, plan.system, point, y)
+    wanted, columns = list(plan.wanted), list(plan.columns)
+    given = [start_name(model, model.starts[k]) for k in plan.rows]
+    given += [model.flat_variables[k].path if k < len(model.flat_variables) else "" for k in plan.resting]
+    given += [start_name(model, model.starts[k]) for _, k in plan.direct]
+    matrix = whole[wanted, columns].T
+    direct = whole[wanted, [state for state, _ in plan.direct]]
+    for begin in range(0, len(states), _AT_ONCE):
+        some = states[begin : begin + _AT_ONCE]
+        unit = ca.DM(len(columns), len(some))
+        for k, state in enumerate(some):
+            unit[columns.index(state), k] = 1.0
+        by_rows = ca.solve(matrix, unit).T
+        slopes = np.hstack([by_rows[:, plan.own :].full(), ca.mtimes(by_rows, direct).full()])
+        for row in np.abs(slopes):
+            names = [name for name, size in zip(given, row, strict=True) if name and size > _NOTHING]
+            more = " …" if len(names) > _SHOWN else ""
+            yield f"follows from {', '.join(names[:_SHOWN])}{more}" if names else "follows"
