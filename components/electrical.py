@@ -14,6 +14,7 @@ from modelica_like.language import (
     Output,
     Parameter,
     Variable,
+    all_of,
     der,
     flow,
     param,
@@ -168,8 +169,10 @@ class CurrentSink(ElectricalSource):
         yield self.load.choose(sinking=sinking, empty=empty, reversed=self.i) == 0
 
     def events(self) -> Events:
-        load, fails = self.load, self.v < self.R_min * self.i_ref
-        yield load.initially("reversed", when=self.v < 0)
+        # Where nothing is to be drawn, no voltage is too low.
+        load, drawn = self.load, self.i_ref > 0
+        fails = all_of(drawn, self.v < self.R_min * self.i_ref)
+        yield load.initially("reversed", when=all_of(drawn, self.v < 0))
         yield load.initially("empty", when=fails)
         yield load.go("sinking", "empty", when=fails)
         yield load.go("empty", "sinking", when=self.i > self.i_ref)

@@ -213,15 +213,17 @@ class _Builder:
     def _without_rounding(self) -> Any:
         """Values of all nodes, with held motions that are zero but for rounding at zero.
 
-        What the largest speed of the drive leaves of a slip when it is rounded says nothing about a direction.
+        What the largest speed of the drive leaves of a slip when it is rounded says nothing about a direction; nor does
+        rounding in a drive where everything stands still.
         """
         flat, values = self.reduced.flat, ca.SX(self.reduced.values)
         largest: dict[str, Any] = {}
         for one in self.reduced.holds:
             unit = str(flat.variables[one.motion].unit)
             if unit not in largest:
+                nominal = flat.variables[one.motion].nominal
                 same = [k for k, variable in enumerate(flat.variables) if str(variable.unit) == unit]
-                largest[unit] = ca.mmax(ca.fabs(self.reduced.values[same]))
+                largest[unit] = ca.fmax(nominal, ca.mmax(ca.fabs(self.reduced.values[same])))
             motion = self.reduced.values[one.motion]
             values[one.motion] = ca.if_else(ca.fabs(motion) > ROUNDING * largest[unit], motion, 0)
         return values

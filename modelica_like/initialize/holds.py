@@ -56,9 +56,9 @@ def rest(model: CompiledDae, point: Point) -> None:
         return
     variables = np.abs(call(model, model.variables, point))
     for one in states:
-        unit = model.flat_variables[one.motion].unit
+        unit, nominal = model.flat_variables[one.motion].unit, model.flat_variables[one.motion].nominal
         same = [k for k, variable in enumerate(model.flat_variables) if variable.unit == unit]
-        if one.state is not None and variables[one.motion] <= ROUNDING * variables[same].max():
+        if one.state is not None and variables[one.motion] <= ROUNDING * max(nominal, variables[same].max()):
             point.x[one.state[0]] = 0.0
 
 
