@@ -23,7 +23,7 @@ from modelica_like.initialize.point import check_singular as check_singular
 from modelica_like.initialize.point import solve_implicit as solve_implicit
 from modelica_like.initialize.point import variable_slopes as variable_slopes
 from modelica_like.initialize.start import StartProblem
-from modelica_like.initialize.steady import check_modes_hold, solve_steady
+from modelica_like.initialize.steady import check_modes_hold, modes_between, solve_steady
 
 _MODE_ROUNDS = 5
 
@@ -65,10 +65,12 @@ def initialize(model: CompiledDae, t0: float = 0.0, start: StartKind = "given") 
     for _ in range(_MODE_ROUNDS):
         if start == "steady":
             problem.apply(point)
+            before = point.copy()
             solve_steady(model, point)
+            modes = modes_between(model, before, point, chosen_modes(model, point))
         else:
             problem.solve(point, start)
-        modes = chosen_modes(model, point)
+            modes = chosen_modes(model, point)
         if np.array_equal(modes, point.d):
             break
         point.d = modes

@@ -90,6 +90,24 @@ def moving_states(model: CompiledDae) -> list[int]:
     return model._cache["moving"]
 
 
+def modes_between(model: CompiledDae, before: Point, point: Point, modes: Vector) -> Vector:
+    """Hold what slides one way where it began the other way: equilibrium lies in between, where it stands still.
+
+    Args:
+        model: the compiled model.
+        before: where the search began.
+        point: where it ended with the modes of `before`.
+        modes: modes chosen for `point`.
+    """
+    chosen = modes.copy()
+    nodes = [one.motion for one in model.holds]
+    turned = call(model, model.variables, before)[nodes] * call(model, model.variables, point)[nodes] < 0.0
+    for one, turns in zip(model.holds, turned, strict=True):
+        if turns and modes[one.mode] not in (point.d[one.mode], one.number):
+            chosen[one.mode] = one.number
+    return chosen
+
+
 def check_modes_hold(model: CompiledDae, point: Point) -> None:
     """Check that no mode changes at once: surfaces that stick against too large a torque are not in equilibrium.
 
