@@ -152,12 +152,14 @@ class _Choice:
         if not self._begin(matrix):
             return self.plan(None)  # the model itself is singular there, which is told when it is solved
         rows = [k for k in general if self._accept(self.model.starts[k].node)]
-        dependent = [k for k in general if k not in set(rows)]
+        taken = set(rows)
+        dependent = [k for k in general if k not in taken]
         rows += [k for k in self._defaults() if self._accept(self.model.starts[k].node)]
         resting, zero = self._rest()
         if self.choice.size < len(self.columns):
             raise self._missing()
-        columns = [column for column in self.columns if column not in set(zero)]
+        known = set(zero)
+        columns = [column for column in self.columns if column not in known]
         nodes = [*(self.model.starts[k].node for k in rows), *resting]
         wanted = [*range(self.own), *(self.row_of[node] for node in nodes)]
         lists = (rows, dependent, resting, zero, columns, wanted)

@@ -27,6 +27,7 @@ from modelica_like.structure import reduce
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 NEEDS = {"Prescott": "pni", "Haswell": "avx2", "Zen": "avx2", "SkylakeX": "avx512f"}
+SLOW = pytest.mark.slow
 SECTIONS = ("parts", "series", "connect", "start", "guess")
 # PreLoad begins with four contacts that just touch; how they tremble is below the tolerance of a run (72, 46, 40 events
 # at rtol = 1e-6, 1e-8, 1e-10).
@@ -112,7 +113,9 @@ def test_the_examples_have_modes_and_events(plain: dict[str, Told]) -> None:
     assert plain["steady"]["modes"] == ["box.clutch_a", "box.brake_d"]
 
 
-@pytest.mark.parametrize("kernel", list(NEEDS))
+@pytest.mark.parametrize(
+    "kernel", ["Haswell", "SkylakeX", *(pytest.param(one, marks=SLOW) for one in ("Prescott", "Zen"))]
+)
 def test_every_blas_kernel_gives_the_same_modes_and_events(plain: dict[str, Told], kernel: str) -> None:
     flags = Path("/proc/cpuinfo")
     if not flags.exists() or NEEDS[kernel] not in flags.read_text().split():
@@ -123,7 +126,7 @@ def test_every_blas_kernel_gives_the_same_modes_and_events(plain: dict[str, Told
     assert_same(json.loads(run.stdout), plain)
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=SLOW)])
 def test_the_order_of_lines_counts_nowhere(plain: dict[str, Told], seed: int) -> None:
     assert_same(json.loads(json.dumps(everything(seed=seed))), plain)
 
