@@ -8,6 +8,7 @@ import pytest
 
 from modelica_like import CompiledDae, Options, build, load, sensitivities, simulate, simulation_function
 from modelica_like.analyse.sensitivity.derivatives import Sensitivities
+from modelica_like.netlist import loads
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 EXACT = 1e-6
@@ -120,6 +121,26 @@ def test_a_start_value_carries_its_parameter() -> None:
     result = sensitivities(drive, ["at(J1.w, 0 s)", "at(shaft1.phi_rel, 0 s)"], ["motor_speed", "drag", "h0", "k1"])
     expected = [[1.0, -1 / 156, 2.5 / 156**2, 0.0], [0.0, -1 / 6120, 0.0, 2.5 / 6120**2]]
     assert result.derivatives == pytest.approx(np.array(expected), rel=1e-9, abs=1e-15)
+
+
+def test_what_comes_to_rest_depends_on_no_parameter() -> None:
+    """b stands, so that w_rel = -w_0; the twist of the spring is zero, so that b.phi = phi_0."""
+    drive = loads("""
+        [parameters]
+        w_0 = "3 rad/s"
+        phi_0 = "2 rad"
+        [parts]
+        a = { is = "Inertia", J = 1, w = "w_0", phi = "phi_0" }
+        e = { is = "SpringDamper", c = 200, d = 1 }
+        b = { is = "Inertia", J = 2 }
+        [series]
+        shaft = ["a", "e", "b"]
+        [simulate]
+        start = "rest"
+        until = "1 s"
+        """)
+    result = sensitivities(drive, ["at(b.w, 0 s)", "at(e.w_rel, 0 s)", "at(b.phi, 0 s)"], ["w_0", "phi_0"])
+    assert result.derivatives == pytest.approx(np.array([[0.0, 0.0], [-1.0, 0.0], [0.0, 1.0]]), abs=1e-15)
 
 
 def test_all_parameters_are_the_default_and_the_adjoint_is_chosen() -> None:

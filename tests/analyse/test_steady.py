@@ -93,6 +93,13 @@ def test_a_gearbox_begins_from_a_run_that_has_closed_its_clutches():
     assert point.stuck == ("box.clutch_a", "box.brake_d")
 
 
+def test_a_gearbox_finds_what_sticks_without_a_run():
+    """Sliding either way, the brake would pull the carrier through standstill; in between it holds it."""
+    point = steady(EXAMPLES / "lepelletier_gears.toml")
+    assert point["motor.w"] / point["load.w"] == pytest.approx((1 + 1 / 1.917) * 2.74, rel=1e-9)
+    assert point.stuck == ("box.clutch_a", "box.brake_d")
+
+
 def test_a_gear_that_locks_itself_is_told():
     """A worm of efficiency 0.4 is not turned by its load."""
     point = steady(EXAMPLES / "components" / "self_locking_worm.toml")

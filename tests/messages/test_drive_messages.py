@@ -26,7 +26,21 @@ from modelica_like import build
 from modelica_like.errors import ModelicaLikeError
 from modelica_like.flatten import flatten
 from modelica_like.initialize import initialize
-from modelica_like.language import Assembly, Component, Equations, Input, Variable, connect, series, signal_in, var
+from modelica_like.language import (
+    Assembly,
+    Component,
+    Equations,
+    Expr,
+    Input,
+    Parameter,
+    Variable,
+    connect,
+    der,
+    param,
+    series,
+    signal_in,
+    var,
+)
 from modelica_like.structure import reduce
 
 
@@ -53,6 +67,20 @@ class Geared(Component):
 
     def equations(self) -> Equations:
         yield from series(self.a, self.gear, self.b)
+
+
+class Parabola(Component):
+    x: Variable = var("1", "x")
+    y: Variable = var("1", "never below one")
+    T: Parameter = param("s", "time", default=1.0)
+    E: Parameter = param("J", "energy", default=1.0)
+
+    def equations(self) -> Equations:
+        yield self.T * der(self.x) == -self.x
+        yield self.y == self.x**2 + 1
+
+    def stored_energy(self) -> Expr:
+        return self.E * self.y**2
 
 
 class Wires(Component):
@@ -297,6 +325,22 @@ a.w = 1 and b.w = 1 contradict each other: b.w follows to be 0.5.
   in gears.py:{gears.py:yield a.phi - self.phi_support == self.ratio * (b.phi - self.phi_support)} \
 `yield a.phi - self.phi_support == self.ratio * (b.phi - self.phi_support)`
 Remove one of the start values, or make one a guess.""",
+)
+case(
+    errors.InitializationError,
+    "no start",
+    lambda: start(Parabola(), y=0.5),
+    """\
+No start was found at which y has the value asked for.
+Give guesses near the solution, or start values of states.""",
+)
+case(
+    errors.InitializationError,
+    "nothing comes to rest",
+    lambda: initialize(build(Parabola()), start="rest"),
+    """\
+No start was found at which y is at rest.
+Give guesses near the solution, or start values of states.""",
 )
 case(
     errors.InitializationError,
