@@ -20,6 +20,7 @@ RUNTIME = (
     "linear.c",
     "point.c",
     "start.c",
+    "holds.c",
     "events.c",
     "rosenbrock.c",
     "integrate.c",

@@ -79,12 +79,13 @@ static void project(Instance *c, const int *targets, const double *values, int c
     for (int k = 0; k < N_X; k++) s->x[k] += step[k];
 }
 
-static void log_transition(Instance *c, const Transition *one) {
-    const char *const *names = model_mode_names[one->mode];
-    int before = (int)c->state.d[one->mode];
-    if (names != NULL && before >= 0 && before < model_mode_counts[one->mode])
-        report(c, LOG_EVENTS, RESULT_OK, "t = %.12g s: %s: %s -> %s", c->state.t, one->name, names[before],
-            names[one->target]);
+/* Tells that a mode changes. */
+void note_change(Instance *c, const char *name, int mode, int target) {
+    const char *const *names = model_mode_names[mode];
+    int before = (int)c->state.d[mode];
+    c->state.n_events++;
+    if (names != NULL && before >= 0 && before < model_mode_counts[mode])
+        report(c, LOG_EVENTS, RESULT_OK, "t = %.12g s: %s: %s -> %s", c->state.t, name, names[before], names[target]);
 }
 
 /* Carry out transitions together; of one mode only the one declared first. */
@@ -99,9 +100,8 @@ static void fire(Instance *c, const unsigned char *wanting) {
         const Transition *one = &model_transitions[k];
         if (!wanting[k] || changed[one->mode]) continue;
         changed[one->mode] = 1;
-        log_transition(c, one);
+        note_change(c, one->name, one->mode, one->target);
         if (*one->notice) report(c, LOG_WARNING, RESULT_OK, "t = %.9g s: %s", s->t, one->notice);
-        s->n_events++;
         d[one->mode] = one->target;
         for (int r = one->first_reset; r < one->first_reset + one->n_resets; r++) {
             const Reset *reset = &model_resets[r];
@@ -133,12 +133,17 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
     State *s = &c->state;
     if (find_wanting(c, wanting, !located) && crowded(c) != RESULT_OK) return RESULT_ERROR;
     for (int round = 0; round < ROUNDS; round++) {
+        double before[AT_LEAST_ONE(N_D)];
         int any = 0;
         for (int k = 0; k < N_TRANSITIONS; k++) any |= wanting[k];
         if (!any) return RESULT_OK;
+        memcpy(before, s->d, sizeof before);
         fire(c, wanting);
+        share(c);
         c->variables_valid = 0;
-        if (solve_implicit(c, s->t, s->x, s->z, 0) != RESULT_OK || check_singular(c) != RESULT_OK) return RESULT_ERROR;
+        if (solve_implicit(c, s->t, s->x, s->z, 0) != RESULT_OK || stop_motions(c, before) != RESULT_OK ||
+            check_singular(c) != RESULT_OK)
+            return RESULT_ERROR;
         memset(wanting, 0, N_TRANSITIONS);
         find_wanting(c, wanting, 1);
         drop_balanced(c, wanting);
