@@ -236,10 +236,8 @@ static Result carry_out(Instance *c, Strike *strike) {
     if (solve_implicit(c, s->t, s->x, s->z, 0) != RESULT_OK) return RESULT_ERROR;
     after = motions(c);
     for (int k = 0; k < N_HOLDS; k++) {
-        double now = after[model_holds[k].motion], lost = 0.5 * (strike->before[k] + now) * strike->impulse[k];
-        if (strike->approach[k] == 0) continue;
-        report(c, LOG_EVENTS, RESULT_OK, "t = %.12g s: %s: an impact loses %.6g J", s->t, model_holds[k].name, lost);
-        if (terms[k].restitution > 0 && now != 0) strike->loose[k] = 1;
+        int bounces = strike->approach[k] != 0 && terms[k].restitution > 0 && after[model_holds[k].motion] != 0;
+        if (bounces) strike->loose[k] = 1;
     }
     return RESULT_OK;
 }
