@@ -73,7 +73,7 @@ def side_by_side():
         "a": Inertia(J=1.0, w=1.0, phi=0.0),
         "c": Clutch(capacity=1.0),
         "d": Clutch(capacity=3.0),
-        "b": Inertia(J=2.0),
+        "b": Inertia(J=2.0, w=0.0),
     }
     lines = {"shaft": ["push", "a", "c", "b"]}
     joints = {"l": ["a.flange_b", "d.flange_a"], "r": ["b.flange_a", "d.flange_b"]}
