@@ -232,7 +232,7 @@ def _value(model: CompiledDae, name: str) -> float:
 
 def _operating_point(model: CompiledDae, point: Point) -> OperatingPoint:
     values = dict(zip(model.position, map(float, call(model, model.variables, point)), strict=True))
-    values.update(zip(model.discrete_position, map(float, point.d), strict=True))
+    values.update(zip(model.discrete_position, map(float, point.d), strict=False))
     values.update(zip(model.parameter_position, map(float, model.p), strict=True))
     values.update(zip(model.derived_position, map(float, model.derived(model.p).full().ravel()), strict=True))
     return OperatingPoint(model, point, values)
