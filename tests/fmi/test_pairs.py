@@ -10,6 +10,7 @@ import pytest
 from components import (
     Brake,
     Clutch,
+    ConstantForce,
     ConstantTorque,
     Fixed,
     Freewheel,
@@ -19,9 +20,10 @@ from components import (
     MassWithStopAndFriction,
     TranslationalSpring,
 )
+from components.interfaces import LinearCompliantWithRelativeStates
 from modelica_like import simulate
 from modelica_like.initialize import call, initialize
-from modelica_like.language import Assembly
+from modelica_like.language import Assembly, Equations, Events, Hold, Mode, Parameter, all_of, der, param
 
 ROOT = Path(__file__).parents[2]
 
@@ -117,7 +119,34 @@ def at_the_stop():
     return drive
 
 
-DRIVES = (overtaken, caught, side_by_side, closed_loop, at_the_stop)
+class Buffer(LinearCompliantWithRelativeStates):
+    """Two bodies that part again with some of the speed at which they meet."""
+
+    e: Parameter = param("1", "restitution", default=0.6)
+    contact = Mode("apart", "meeting", holds={"meeting": Hold("v_rel", reaction="f", restitution="e")})
+
+    def equations(self) -> Equations:
+        yield from super().equations()
+        yield self.contact.choose(apart=self.f, meeting=der(self.v_rel)) == 0
+
+    def events(self) -> Events:
+        yield self.contact.go("apart", "meeting", when=all_of(self.s_rel < 0, self.v_rel < 0))
+
+
+def bouncing():
+    """A force drives a mass against another one, which it strikes three times."""
+    parts = {
+        "push": ConstantForce(f_constant=4.0),
+        "a": Mass(m=1.0, v=1.0, s=0.0),
+        "buffer": Buffer(),
+        "b": Mass(m=2.0, v=0.0, s=0.5),
+    }
+    drive = Assembly("bouncing", parts=parts, series={"line": [*parts]})
+    drive.simulate.update(until=1.5)
+    return drive
+
+
+DRIVES = (overtaken, caught, side_by_side, closed_loop, at_the_stop, bouncing)
 
 
 @pytest.mark.parametrize("version", ["2.0", "3.0"])

@@ -129,4 +129,4 @@ def _parts(
     if not np.any(turned):
         return np.zeros((len(free), turned.shape[1]))
     rows = variable_slopes(model, point, [nodes[n] for n in free])
-    return -np.linalg.lstsq(rows.T, turned, rcond=None)[0]
+    return np.asarray(-np.linalg.lstsq(rows.T, turned, rcond=None)[0], np.float64)
