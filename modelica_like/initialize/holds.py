@@ -154,7 +154,7 @@ class Strike:
         self.entering = set(entering)
         self.impacts: list[Impact] = []
         self.loose: list[int] = []
-        self.struck: list[int] = []
+        self.knocked: list[int] = []
 
     def run(self) -> None:
         """Carry out the impact; `loose` then tells what was knocked loose or bounces, `impacts` what was lost."""
@@ -172,7 +172,7 @@ class Strike:
             if worst is None:
                 break
             self.loose.append(worst)
-        self.struck = list(approaches)
+        self.knocked = list(self.loose)
         self.point.x = point.x + jump
         self._stop(before, restitution)
         solve_implicit(model, point)

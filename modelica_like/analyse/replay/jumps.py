@@ -289,12 +289,11 @@ class Work:
         strike = Strike(model, point.copy(), entering)
         strike.run()
         trial = point.copy()
-        loose = [k for k in strike.loose if k not in strike.struck]
-        for k in loose:
+        for k in strike.knocked:
             trial.d[model.holds[k].mode] = model.holds[k].loose
         share(model, trial)
         solve_implicit(model, trial)
-        struck = [k for k in entering if k not in loose]
+        struck = [k for k in entering if k not in strike.knocked]
         if struck:
             self.x = self.x + impact(model, trial, struck, partial(self._total, at=trial))
         self.point = strike.point
