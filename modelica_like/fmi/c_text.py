@@ -181,11 +181,13 @@ def _events(model: CompiledDae) -> list[str]:
 
 def _holds(model: CompiledDae) -> list[str]:
     holds: list[str] = []
+    moved = _moved_from_outside(model)
     for one in model.holds:
         state, factor = one.state or (-1, 1.0)
         numbers = f"{one.mode}, {one.number}, {one.loose}, {one.motion}, {state}, {number(factor)}"
         path = model.flat_discretes[one.mode].path
-        holds.append(f"{{{numbers}, {one.reaction}, {one.approach}, {text(path)}}}")
+        about = f"{int(one.motion in moved)}, {number(abs(model.flat_variables[one.motion].nominal))}, {text(path)}"
+        holds.append(f"{{{numbers}, {one.reaction}, {one.approach}, {about}}}")
     members = [k for circuit in model.circuits for k in circuit.members]
     first = [sum(len(one.members) for one in model.circuits[:k]) for k in range(len(model.circuits))]
     circuits = (f"{{{k}, {len(one.members)}, {one.first}}}" for k, one in zip(first, model.circuits, strict=True))
@@ -196,6 +198,14 @@ def _holds(model: CompiledDae) -> list[str]:
         _integers("model_members", members),
         _integers("model_units", (units[str(one.unit)] for one in model.flat_variables) if holds else ()),
     ]
+
+
+def _moved_from_outside(model: CompiledDae) -> set[int]:
+    """Variables that something but states moves, such as a source of motion."""
+    if not model.circuits:
+        return set()
+    moving = (model.variables.name_in().index(name) for name in ("t", "u", "d"))
+    return {row for k in moving for row in model.variables.jac_sparsity(0, k).row()}
 
 
 def _notice(path: str, notice: str) -> str:

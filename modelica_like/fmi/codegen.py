@@ -21,6 +21,7 @@ RUNTIME = (
     "point.c",
     "start.c",
     "holds.c",
+    "impacts.c",
     "events.c",
     "rosenbrock.c",
     "integrate.c",

@@ -120,9 +120,10 @@ typedef struct {
 typedef struct {
     int mode, number, loose, motion, state;
     double factor;
-    int reaction, approach;
+    int reaction, approach, moved;
+    double nominal;
     const char *name;
-} Held; /* see CompiledHold in compiled.py; state -1: the motion is none */
+} Held; /* see CompiledHold in compiled.py; state -1: the motion is none; moved: something but states moves it */
 typedef struct {
     int first_member, n_members, first;
 } Circuit;
@@ -259,9 +260,24 @@ Result start_solve(Instance *c);
 int choose_modes(Instance *c, unsigned char *decided);
 
 /* holds.c */
+#define UNLIMITED 1e30
+#define ROUNDING 1e-10 /* relative size of a motion that is nothing but rounding */
+typedef struct {
+    double gain, forward, backward, restitution;
+} Terms;
+void hold_terms(Instance *c, Terms *terms);
+void mark_held(Instance *c, const Terms *terms, unsigned char *held);
+double largest_like(const double *values, int node);
 void share(Instance *c);
 void rest(Instance *c);
-Result stop_motions(Instance *c, const double *before);
+
+/* impacts.c */
+typedef struct { /* at one instant: what has been stopped, and the states before the first impact */
+    int struck;
+    double x[AT_LEAST_ONE(N_X)];
+    unsigned char entered[AT_LEAST_ONE(N_HOLDS)];
+} Impacts;
+Result stop_motions(Instance *c, const double *before, Impacts *impacts);
 
 /* events.c */
 int guard_active(const State *s, int guard);

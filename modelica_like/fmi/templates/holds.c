@@ -1,36 +1,32 @@
-/* Motions that modes hold, as in initialize/holds.py: how elements share what they hold together, and impacts. */
+/* Motions that modes hold, as in initialize/holds.py: which they are, and how elements share what they hold together.
+ */
 #include <math.h>
 #include <string.h>
 #include "core.h"
 
-#define TERMS 4 /* gain, capacity forward, capacity backward, restitution */
-#define UNLIMITED 1e30
 #define DEPENDENT 1e-9
-#define ROUNDING 1e-10
-#define INSTANT 1e-9 /* duration of an impact; finite forces cancel whatever it is */
-#define WEIGHS_NOTHING 1e-12
-#define LARGE 1e6
+#define STIFF 1e5 /* reaction with which a motion that contradicts its being held counts, over the inertia */
+#define LARGE 1e3
+#define SPLITS 20 /* trials to find a split that all can bear */
+#define TURNED 100.0
 
-typedef struct {
-    double gain, forward, backward, restitution;
-} Terms;
-
-typedef struct { /* of all motions that modes hold */
-    double before[AT_LEAST_ONE(N_HOLDS)], approach[AT_LEAST_ONE(N_HOLDS)];
-    double impulse[AT_LEAST_ONE(N_HOLDS)], reaction[AT_LEAST_ONE(N_HOLDS)];
-    unsigned char entering[AT_LEAST_ONE(N_HOLDS)], loose[AT_LEAST_ONE(N_HOLDS)], held[AT_LEAST_ONE(N_HOLDS)];
-    double jump[AT_LEAST_ONE(N_X)];
-} Strike;
-
-static void hold_terms(Instance *c, Terms *terms) {
+void hold_terms(Instance *c, Terms *terms) {
     State *s = &c->state;
     evaluate(c, &tape_hold_terms, s->t, s->x, s->z, (double *)terms);
 }
 
 /* Marks the motions that are held. */
-static void mark_held(Instance *c, const Terms *terms, unsigned char *held) {
+void mark_held(Instance *c, const Terms *terms, unsigned char *held) {
     for (int k = 0; k < N_HOLDS; k++)
         held[k] = c->state.d[model_holds[k].mode] == model_holds[k].number && terms[k].gain != 0;
+}
+
+/* The largest variable with the unit of a node. */
+double largest_like(const double *values, int node) {
+    double largest = 0;
+    for (int n = 0; n < N_NODES; n++)
+        if (model_units[n] == model_units[node]) largest = fmax(largest, fabs(values[n]));
+    return largest;
 }
 
 /* Put held motions that are zero but for rounding at zero, where they are states. */
@@ -45,11 +41,8 @@ void rest(Instance *c) {
     evaluate(c, &tape_variables, s->t, s->x, s->z, c->work.variables);
     for (int k = 0; k < N_HOLDS; k++) {
         const Held *one = &model_holds[k];
-        double largest = 0;
         if (!held[k] || one->state < 0) continue;
-        for (int n = 0; n < N_NODES; n++)
-            if (model_units[n] == model_units[one->motion]) largest = fmax(largest, fabs(values[n]));
-        if (fabs(values[one->motion]) <= ROUNDING * largest) s->x[one->state] = 0;
+        if (fabs(values[one->motion]) <= ROUNDING * largest_like(values, one->motion)) s->x[one->state] = 0;
     }
 }
 
@@ -80,19 +73,20 @@ static void eliminate(
         double largest = 0;
         for (int k = 0; k < n; k++) largest = fmax(largest, fabs(own[k]));
         switches[place[pivots[row]]] = 1;
+        largest = copysign(largest, own[pivots[row]]);
         for (int k = 0; k < n; k++) shares[place[pivots[row]] * members + place[k]] = own[k] / largest;
     }
 }
 
-/* Capacities that decide the split: what nothing limits takes nearly all, what bears nothing nearly nothing. */
-static void capacities(const Terms *terms, const int *member, int n, double *found) {
+/* Weights that decide the split: what nothing limits takes nearly all, what bears nothing nearly nothing. */
+static void weigh(const Terms *terms, double *weights) {
     double largest = 0;
-    for (int k = 0; k < n; k++) {
-        found[k] = fmax(terms[member[k]].forward, terms[member[k]].backward);
-        if (found[k] < UNLIMITED) largest = fmax(largest, found[k]);
+    for (int k = 0; k < N_HOLDS; k++) {
+        weights[k] = fmax(terms[k].forward, terms[k].backward);
+        if (weights[k] < UNLIMITED) largest = fmax(largest, weights[k]);
     }
     if (largest == 0) largest = 1;
-    for (int k = 0; k < n; k++) found[k] = fmin(fmax(found[k], largest / LARGE), largest * LARGE);
+    for (int k = 0; k < N_HOLDS; k++) weights[k] = 1 / fmin(fmax(weights[k], largest / LARGE), largest * LARGE);
 }
 
 /* Dependences among n held motions of a circuit become the rows of `silent`; returns their number. */
@@ -120,175 +114,109 @@ static int dependences(Instance *c, const int *member, int n, double *silent) {
     return rows;
 }
 
+/* Whether a member has a part in what a circuit shares. */
+static int shares_in(const State *s, const Circuit *one, int place) {
+    const double *shares = s->d + one->first + one->n_members;
+    for (int row = 0; row < one->n_members; row++)
+        if (shares[row * one->n_members + place] != 0) return 1;
+    return 0;
+}
+
+/* Let a motion that cannot be held by all, because it is prescribed, raise the reactions until one gives way: a
+ * switched equation says sum(share * reaction) = stiff * inertia * der(motion). */
+static void yield_to_contradiction(Instance *c, const Circuit *one) {
+    State *s = &c->state;
+    const int *member = model_members + one->first_member;
+    double z[AT_LEAST_ONE(N_Z)], reaction[AT_LEAST_ONE(MOST_MEMBERS)] = {0}, inertia = 0, stiff;
+    unsigned char other[AT_LEAST_ONE(MOST_MEMBERS)];
+    int solved = 1;
+    memcpy(z, s->z, sizeof z);
+    for (int k = 0; k < one->n_members; k++) other[k] = s->d[one->first + k] == 0 && shares_in(s, one, k);
+    for (int asked = 0; asked < 2; asked++) {
+        for (int k = 0; k < one->n_members; k++)
+            if (other[k]) s->d[model_holds[member[k]].approach] = asked;
+        solved = solved && solve_implicit(c, s->t, s->x, s->z, 1) == RESULT_OK;
+        evaluate(c, &tape_variables, s->t, s->x, s->z, c->work.variables);
+        for (int k = 0; k < one->n_members; k++) {
+            double now = c->work.variables[model_holds[member[k]].reaction];
+            if (asked && other[k]) inertia = fmax(inertia, fabs(now - reaction[k]));
+            reaction[k] = now;
+        }
+    }
+    for (int k = 0; k < one->n_members; k++) s->d[model_holds[member[k]].approach] = 0;
+    memcpy(s->z, z, sizeof z);
+    stiff = solved && isfinite(inertia) ? STIFF * inertia : 0;
+    /* The larger of the two sides has coefficients of about one. */
+    for (int k = 0; k < one->n_members * one->n_members; k++) s->d[one->first + one->n_members + k] /= fmax(stiff, 1);
+    for (int k = 0; k < one->n_members; k++)
+        if (s->d[one->first + k] == 1) s->d[one->first + k] += fmin(stiff, 1);
+}
+
+/* Writes switches and shares of a circuit; tells whether anything is shared. */
+static int share_circuit(Instance *c, const Circuit *one, const unsigned char *held, const double *weights) {
+    State *s = &c->state;
+    int place[AT_LEAST_ONE(MOST_MEMBERS)], member[AT_LEAST_ONE(MOST_MEMBERS)], n = 0, rows = 0, moved = 0;
+    double *silent = c->work.square + (size_t)MOST_MEMBERS * (N_X + MOST_MEMBERS);
+    double *weighted = silent + (size_t)MOST_MEMBERS * MOST_MEMBERS;
+    for (int k = 0; k < one->n_members; k++) {
+        member[n] = model_members[one->first_member + k];
+        place[n] = k;
+        n += held[member[n]];
+    }
+    if (n > 1) rows = dependences(c, member, n, silent);
+    for (int k = 0; k < rows * n; k++) weighted[k] = silent[k] * weights[member[k % n]];
+    memset(s->d + one->first, 0, (size_t)one->n_members * (size_t)(1 + one->n_members) * sizeof(double));
+    eliminate(rows, n, silent, weighted, place, one->n_members, s->d + one->first);
+    for (int k = 0; k < n; k++) moved |= model_holds[member[k]].moved;
+    if (rows > 0 && moved) yield_to_contradiction(c, one);
+    return rows > 0;
+}
+
+/* Reactions over what can be borne, of the elements that share; returns the largest. */
+static double use_of(Instance *c, const Terms *terms, double *use) {
+    State *s = &c->state;
+    double z[AT_LEAST_ONE(N_Z)], worst = 0;
+    memset(use, 0, N_HOLDS * sizeof(double));
+    memcpy(z, s->z, sizeof z);
+    if (solve_implicit(c, s->t, s->x, s->z, 1) != RESULT_OK) worst = INFINITY;
+    evaluate(c, &tape_variables, s->t, s->x, s->z, c->work.variables);
+    for (int i = 0; i < N_CIRCUITS; i++)
+        for (int place = 0; place < model_circuits[i].n_members; place++) {
+            int k = model_members[model_circuits[i].first_member + place];
+            double reaction = c->work.variables[model_holds[k].reaction];
+            double limit = reaction > 0 ? terms[k].forward : terms[k].backward;
+            if (!shares_in(s, &model_circuits[i], place) || !(limit > 0) || limit >= UNLIMITED) continue;
+            use[k] = fabs(reaction) / limit;
+            worst = fmax(worst, use[k]);
+        }
+    memcpy(s->z, z, sizeof z);
+    return worst;
+}
+
 /* Let elements that hold the same motion share its reaction in proportion to their capacities: the reactions of the
- * least norm, weighted by the inverse of the capacities. */
+ * least norm, weighted by the inverse of the capacities. Where that asks more of one than it can bear, the others take
+ * more, as far as they can. */
 void share(Instance *c) {
     State *s = &c->state;
     Terms terms[AT_LEAST_ONE(N_HOLDS)];
     unsigned char held[AT_LEAST_ONE(N_HOLDS)];
+    double weights[AT_LEAST_ONE(N_HOLDS)], base[AT_LEAST_ONE(N_HOLDS)], use[AT_LEAST_ONE(N_HOLDS)];
+    double best[AT_LEAST_ONE(N_D)], least = INFINITY;
     if (N_CIRCUITS == 0) return;
     hold_terms(c, terms);
     mark_held(c, terms, held);
-    for (int i = 0; i < N_CIRCUITS; i++) {
-        const Circuit *one = &model_circuits[i];
-        int place[AT_LEAST_ONE(MOST_MEMBERS)], member[AT_LEAST_ONE(MOST_MEMBERS)], n = 0, rows = 0;
-        double *silent = c->work.square + (size_t)MOST_MEMBERS * (N_X + MOST_MEMBERS);
-        double *weighted = silent + (size_t)MOST_MEMBERS * MOST_MEMBERS;
-        double capacity[AT_LEAST_ONE(MOST_MEMBERS)];
-        for (int k = 0; k < one->n_members; k++) {
-            member[n] = model_members[one->first_member + k];
-            place[n] = k;
-            n += held[member[n]];
-        }
-        if (n > 1) rows = dependences(c, member, n, silent);
-        if (n > 1) capacities(terms, member, n, capacity);
-        for (int k = 0; k < rows * n; k++) weighted[k] = silent[k] / capacity[k % n];
-        memset(s->d + one->first, 0, (size_t)one->n_members * (size_t)(1 + one->n_members) * sizeof(double));
-        eliminate(rows, n, silent, weighted, place, one->n_members, s->d + one->first);
-    }
-}
-
-/* ---- impacts ---------------------------------------------------------------------------------------------------- */
-
-static const double *motions(Instance *c) {
-    State *s = &c->state;
-    evaluate(c, &tape_variables, s->t, s->x, s->z, c->work.variables);
-    return c->work.variables;
-}
-
-/* Rates and reactions at the present point, with or without the approaches. */
-static Result ask(Instance *c, const Strike *strike, int approaching, double *rates, double *reactions) {
-    State *s = &c->state;
-    const double *values;
-    for (int k = 0; k < N_HOLDS; k++) s->d[model_holds[k].approach] = approaching ? strike->approach[k] : 0;
-    if (solve_implicit(c, s->t, s->x, s->z, 0) != RESULT_OK) return RESULT_ERROR;
-    evaluate(c, &tape_rates, s->t, s->x, s->z, c->work.rhs);
-    memcpy(rates, c->work.rhs, N_X * sizeof(double));
-    values = motions(c);
-    for (int k = 0; k < N_HOLDS; k++) reactions[k] = strike->held[k] ? values[model_holds[k].reaction] : 0;
-    return RESULT_OK;
-}
-
-/* Jump of the states, impulses and finite reactions of all that holds, with what is loose let go. */
-static Result respond(Instance *c, Strike *strike) {
-    State *s = &c->state;
-    Terms terms[AT_LEAST_ONE(N_HOLDS)];
-    double d[AT_LEAST_ONE(N_D)], z[AT_LEAST_ONE(N_Z)], rates[AT_LEAST_ONE(N_X)];
-    Result result;
-    memcpy(d, s->d, sizeof d);
-    memcpy(z, s->z, sizeof z);
-    for (int k = 0; k < N_HOLDS; k++)
-        if (strike->loose[k]) s->d[model_holds[k].mode] = model_holds[k].loose;
-    share(c);
-    hold_terms(c, terms);
-    mark_held(c, terms, strike->held);
-    for (int k = 0; k < N_HOLDS; k++) strike->held[k] &= !strike->loose[k] && model_holds[k].reaction >= 0;
-    result = ask(c, strike, 0, rates, strike->reaction);
-    if (result == RESULT_OK) result = ask(c, strike, 1, strike->jump, strike->impulse);
-    for (int k = 0; k < N_X; k++) strike->jump[k] = INSTANT * (strike->jump[k] - rates[k]);
-    for (int k = 0; k < N_HOLDS; k++) strike->impulse[k] = INSTANT * (strike->impulse[k] - strike->reaction[k]);
-    memcpy(s->d, d, sizeof d);
-    memcpy(s->z, z, sizeof z);
-    return result;
-}
-
-/* The motion whose reaction exceeds most what its element can bear for an instant, or -1. */
-static int unbearable(const Instance *c, const Strike *strike, const Terms *terms) {
-    double instant = 10 * TIME_RESOLUTION * fmax(1, fabs(c->state.t)), scale = 0, most = 0;
-    int worst = -1;
-    for (int k = 0; k < N_HOLDS; k++) scale = fmax(scale, fabs(strike->impulse[k]));
-    for (int k = 0; k < N_HOLDS; k++) {
-        double sign = strike->impulse[k] > 0 ? 1 : -1, excess;
-        double capacity = sign > 0 ? terms[k].forward : terms[k].backward;
-        if (!strike->held[k] || capacity >= UNLIMITED || model_holds[k].loose < 0) continue;
-        if (strike->entering[k] && fmax(terms[k].forward, terms[k].backward) < UNLIMITED) continue;
-        excess = fabs(strike->impulse[k]) - fmax(capacity - sign * strike->reaction[k], 0) * instant;
-        if (excess - WEIGHS_NOTHING * scale > most) {
-            most = excess - WEIGHS_NOTHING * scale;
-            worst = k;
-        }
-    }
-    return worst;
-}
-
-/* Carries out the impact; `loose` then tells what was knocked loose or bounces. */
-static Result carry_out(Instance *c, Strike *strike) {
-    State *s = &c->state;
-    Terms terms[AT_LEAST_ONE(N_HOLDS)];
-    const double *after;
-    int worst;
-    hold_terms(c, terms);
-    do {
+    weigh(terms, base);
+    memcpy(weights, base, sizeof base);
+    for (int trial = 0; trial < SPLITS; trial++) {
+        int shared = 0;
+        double worst;
+        for (int i = 0; i < N_CIRCUITS; i++) shared |= share_circuit(c, &model_circuits[i], held, weights);
+        worst = shared ? use_of(c, terms, use) : 0;
+        if (worst < least || trial == 0) memcpy(best, s->d, sizeof best);
+        if (worst < least) least = worst;
+        if (worst <= 1 || !isfinite(worst)) break;
         for (int k = 0; k < N_HOLDS; k++)
-            strike->approach[k] = strike->entering[k] && !strike->loose[k]
-                                      ? -(1 + terms[k].restitution) * strike->before[k] / INSTANT
-                                      : 0;
-        if (respond(c, strike) != RESULT_OK) return RESULT_ERROR;
-        worst = unbearable(c, strike, terms);
-        if (worst >= 0) strike->loose[worst] = 1;
-    } while (worst >= 0);
-    for (int k = 0; k < N_X; k++) s->x[k] += strike->jump[k];
-    for (int k = 0; k < N_HOLDS; k++) {
-        const Held *one = &model_holds[k];
-        if (strike->entering[k] && !strike->loose[k] && one->state >= 0)
-            s->x[one->state] = -terms[k].restitution * strike->before[k] / one->factor;
+            weights[k] = use[k] > 0 ? fmin(fmax(weights[k] * use[k], base[k] / TURNED), base[k] * TURNED) : base[k];
     }
-    if (solve_implicit(c, s->t, s->x, s->z, 0) != RESULT_OK) return RESULT_ERROR;
-    after = motions(c);
-    for (int k = 0; k < N_HOLDS; k++) {
-        int bounces = strike->approach[k] != 0 && terms[k].restitution > 0 && after[model_holds[k].motion] != 0;
-        if (bounces) strike->loose[k] = 1;
-    }
-    return RESULT_OK;
-}
-
-/* What the impact knocks loose takes the mode that its start would take. */
-static void let_go(Instance *c, const Strike *strike) {
-    State *s = &c->state;
-    double d[AT_LEAST_ONE(N_D)];
-    unsigned char decided[AT_LEAST_ONE(N_D)];
-    memcpy(d, s->d, sizeof d);
-    memset(decided, 1, sizeof decided);
-    evaluate(c, &tape_discrete_starts, s->t, s->x, s->z, c->work.guards);
-    for (int k = 0; k < N_HOLDS; k++) {
-        int mode = model_holds[k].mode;
-        if (!strike->loose[k]) continue;
-        s->d[mode] = c->work.guards[mode];
-        decided[mode] = 0;
-    }
-    choose_modes(c, decided);
-    for (int k = 0; k < N_HOLDS; k++) {
-        int mode = model_holds[k].mode, chosen = (int)s->d[mode];
-        if (chosen == (int)d[mode]) continue;
-        s->d[mode] = d[mode];
-        note_change(c, model_holds[k].name, mode, chosen);
-        s->d[mode] = d[mode] = chosen;
-    }
-}
-
-/* Stop what modes have begun to hold since `before`, by an impulse that all other components pass on. */
-Result stop_motions(Instance *c, const double *before) {
-    State *s = &c->state;
-    Strike strike = {{0}, {0}, {0}, {0}, {0}, {0}, {0}, {0}};
-    const double *values;
-    int moving = 0, loose = 0;
-    for (int k = 0; k < N_HOLDS; k++) {
-        const Held *one = &model_holds[k];
-        strike.entering[k] = s->d[one->mode] == one->number && before[one->mode] != one->number;
-        moving |= strike.entering[k];
-    }
-    if (!moving) return RESULT_OK;
-    values = motions(c);
-    moving = 0;
-    for (int k = 0; k < N_HOLDS; k++) {
-        strike.before[k] = values[model_holds[k].motion];
-        moving |= strike.entering[k] && strike.before[k] != 0;
-    }
-    if (!moving) return RESULT_OK;
-    if (carry_out(c, &strike) != RESULT_OK) return RESULT_ERROR;
-    for (int k = 0; k < N_HOLDS; k++) loose |= strike.loose[k];
-    if (!loose) return RESULT_OK;
-    let_go(c, &strike);
-    share(c);
-    return solve_implicit(c, s->t, s->x, s->z, 0);
+    memcpy(s->d, best, sizeof best);
 }
