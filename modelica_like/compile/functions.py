@@ -29,6 +29,8 @@ from modelica_like.structure.reduce import ReducedDae
 
 ROUNDING = 1e-10
 """Size of a held motion, relative to the largest one of the same unit, that is nothing but rounding."""
+_SMALLEST = 1e-20
+"""What the solution of a start leaves of zeros is far below it; a drive at rest has nothing larger to compare with."""
 _SOURCE_POWER = 2
 _EFFORTS = ("N", "N.m")
 
@@ -225,5 +227,5 @@ class _Builder:
                 same = [k for k, variable in enumerate(flat.variables) if str(variable.unit) == unit]
                 largest[unit] = ca.fmax(nominal, ca.mmax(ca.fabs(self.reduced.values[same])))
             motion = self.reduced.values[one.motion]
-            values[one.motion] = ca.if_else(ca.fabs(motion) > ROUNDING * largest[unit], motion, 0)
+            values[one.motion] = ca.if_else(ca.fabs(motion) > ROUNDING * ca.fmax(largest[unit], _SMALLEST), motion, 0)
         return values

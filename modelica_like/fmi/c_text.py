@@ -79,6 +79,9 @@ def header(tables: Tables, variables: Sequence[FmuVariable], tolerance: float) -
         "N_MOMENTS": model.moments.numel_out(0),
         "N_TRANSITIONS": len(model.transitions),
         "N_RESETS": model.resets.numel_out(0),
+        "N_HOLDS": len(model.holds),
+        "N_CIRCUITS": len(model.circuits),
+        "MOST_MEMBERS": max((len(one.members) for one in model.circuits), default=0),
         "N_DETERMINANTS": model.determinants.numel_out(0),
         "N_JACOBIAN": len(tables.to_step),
         "N_STARTS": len(model.starts),
@@ -133,6 +136,7 @@ def source(tables: Tables, variables: Sequence[FmuVariable], token: str) -> str:
         _names("model_implicit_names", model.implicit),
         _names("model_singular_names", (", ".join(names[:6]) for names, _ in model.singular)),
         *_events(model),
+        *_holds(model),
         *_starts(tables.start, model),
         _array("Variable", "model_variables", (_variable(one) for one in sorted(variables, key=lambda v: v.reference))),
         _integers("jacobian_to_step", tables.to_step),
@@ -173,6 +177,35 @@ def _events(model: CompiledDae) -> list[str]:
         _integers("model_mode_counts", (len(one.names) for one in modes)),
         _array("StartMode", "model_start_modes", (f"{{{mode}, {target}}}" for mode, target, _ in model.start_modes)),
     ]  # fmt: skip
+
+
+def _holds(model: CompiledDae) -> list[str]:
+    holds: list[str] = []
+    moved = _moved_from_outside(model)
+    for one in model.holds:
+        state, factor = one.state or (-1, 1.0)
+        numbers = f"{one.mode}, {one.number}, {one.loose}, {one.motion}, {state}, {number(factor)}"
+        path = model.flat_discretes[one.mode].path
+        about = f"{int(one.motion in moved)}, {number(abs(model.flat_variables[one.motion].nominal))}, {text(path)}"
+        holds.append(f"{{{numbers}, {one.reaction}, {one.approach}, {about}}}")
+    members = [k for circuit in model.circuits for k in circuit.members]
+    first = [sum(len(one.members) for one in model.circuits[:k]) for k in range(len(model.circuits))]
+    circuits = (f"{{{k}, {len(one.members)}, {one.first}}}" for k, one in zip(first, model.circuits, strict=True))
+    units = {str(one.unit): k for k, one in enumerate(model.flat_variables)}
+    return [
+        _array("Held", "model_holds", holds),
+        _array("Circuit", "model_circuits", circuits),
+        _integers("model_members", members),
+        _integers("model_units", (units[str(one.unit)] for one in model.flat_variables) if holds else ()),
+    ]
+
+
+def _moved_from_outside(model: CompiledDae) -> set[int]:
+    """Variables that something but states moves, such as a source of motion."""
+    if not model.circuits:
+        return set()
+    moving = (model.variables.name_in().index(name) for name in ("t", "u", "d"))
+    return {row for k in moving for row in model.variables.jac_sparsity(0, k).row()}
 
 
 def _notice(path: str, notice: str) -> str:

@@ -20,6 +20,8 @@ RUNTIME = (
     "linear.c",
     "point.c",
     "start.c",
+    "holds.c",
+    "impacts.c",
     "events.c",
     "rosenbrock.c",
     "integrate.c",

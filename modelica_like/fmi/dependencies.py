@@ -98,8 +98,11 @@ class Dependencies:
 
     @cached_property
     def _initial_modes(self) -> Rows:
-        """Modes by their start conditions, discrete values by their start."""
-        rows: Rows = [set() for _ in self.model.flat_discretes]
+        """Modes by their start conditions, discrete values by their start; shares by all that decides modes."""
+        rows: Rows = [set() for _ in range(self.model.discrete_size)]
+        for circuit in self.model.circuits:
+            count = len(circuit.members)
+            rows[circuit.first : circuit.first + count * (1 + count)] = [self._everything] * (count * (1 + count))
         starts = self._rows("discrete_starts")
         for k, one in enumerate(self.model.flat_discretes):
             rows[k] = {("discrete", k)} if not one.names else {d for d in starts[k] if d[0] in "tpu"}

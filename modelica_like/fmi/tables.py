@@ -88,6 +88,7 @@ def _functions(model: CompiledDae, start: StartTables) -> tuple[dict[str, Any], 
         "start_values",
         "discrete_starts",
         "determinants",
+        "hold_terms",
     )
     functions |= {name: getattr(model, name) for name in (*plain, "derived")}
     y = ca.SX.sym("y", start.system.size1_out(0))

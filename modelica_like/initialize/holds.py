@@ -238,6 +238,7 @@ class Strike:
         self.loose: list[int] = []
         before = self._motions()
         self.hard = self._is_hard(before, [k for k in self.entering if before[k] != 0.0])
+        self.knocked: list[int] = []
 
     def run(self) -> None:
         """Carry out the impact.
@@ -256,6 +257,7 @@ class Strike:
             if not unbearable:
                 break
             self.loose += unbearable
+        self.knocked = list(self.loose)
         point.x = point.x + jump
         self._stop(before, restitution)
         solve_implicit(model, point)

@@ -9,9 +9,6 @@ import numpy as np
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import SingularAtStart
 
-_HOLDING = ("stuck", "locked")
-"""Modes in which an element holds a motion, with whatever torque or force it takes."""
-
 
 def singular_block(model: CompiledDae, t: float, d: Vector, number: int, *, implicit: bool = False) -> SingularAtStart:
     """Return the error for one block.
@@ -62,8 +59,7 @@ def is_regular(matrix: Any) -> bool:
 
 
 def _holds(model: CompiledDae, d: Vector, path: str) -> bool:
-    modes = ((one, value) for one, value in zip(model.flat_discretes, d, strict=False) if one.names)
-    return any(one.path.rpartition(".")[0] == path and one.names[int(value)] in _HOLDING for one, value in modes)
+    return any(one.component == path and d[one.mode] == one.number for one in model.holds)
 
 
 def _reason(model: CompiledDae, holding: list[str], held: list[str], *, alone: bool) -> tuple[str, str]:

@@ -60,7 +60,8 @@ class Inside:
         modes = [random.integers(len(one.names)) if one.names else 0.0 for one in model.flat_discretes]
         sizes = self.tables.slots.sizes
         free = {name: random.normal(size=sizes[name]) for name in ("x", "z", "y")}
-        return {"t": random.uniform(0, 1, 1), **free, **near, "d": np.array(modes, float)}
+        hidden = random.uniform(size=model.discrete_size - len(modes))
+        return {"t": random.uniform(0, 1, 1), **free, **near, "d": np.concatenate([modes, hidden])}
 
 
 @pytest.fixture(scope="module")

@@ -147,16 +147,17 @@ def exact_jacobian(case, fmu, known, unknown):
 
 
 def values_at(case, fmu):
-    from modelica_like.initialize import Point, solve_implicit
+    from modelica_like.initialize import Point, share, solve_implicit
 
     model = case.model
     x = vector(fmu.fmi2GetContinuousStates, fmu, len(model.states))
     references = [one.reference for one in case.face.variables if one.slot[0] == "discrete"]
-    d = np.zeros(len(model.flat_discretes))
+    d = np.zeros(model.discrete_size)
     for k in references:
         one = case.face.variables[k]
         d[one.slot[1]] = (fmu.getInteger if one.modes else fmu.getReal)([k])[0]
     point = Point(0.0, x, model.z_guesses.copy(), d)
+    share(model, point)
     solve_implicit(model, point)
     return [0.0, point.x, point.z, model.p, model.u, point.d]
 

@@ -411,7 +411,9 @@ CONSISTENT: dict[type[Component], Callable[[], Assembly]] = {
 @pytest.mark.parametrize("kind", CONSISTENT, ids=lambda kind: kind.__name__)
 def test_a_consistent_law_balances_whether_it_is_right_or_not(kind: type[Component]) -> None:
     balance = simulate(CONSISTENT[kind](), 0.7).energy()
-    assert (balance.imbalance, balance.at_events, balance.notices) == (0.0, 0.0, ())
+    assert balance.imbalance <= 1e-12
+    assert balance.at_events <= 1e-12
+    assert balance.notices == ()
     assert "balance" not in str(balance)
 
 

@@ -38,7 +38,7 @@ class Forgetful(Twist):
 
 
 class Grip(Twist):
-    plates = Mode("stuck", "open")
+    plates = Mode("stuck", "open", holds={"stuck": "w_rel"})
     w_rel: Variable = var("rad/s", "slip speed")
 
     def equations(self) -> Equations:

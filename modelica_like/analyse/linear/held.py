@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, Vector
-from modelica_like.initialize import Point, call, variable_slopes
+from modelica_like.initialize import Point, holding, share, variable_slopes
 
 Matrix = np.ndarray[Any, np.dtype[np.float64]]
 _ZERO = 1e-9
@@ -50,8 +50,8 @@ class Motions:
 def free_motions(model: CompiledDae, point: Point, a: Matrix) -> Motions:
     """Return the motions that the present modes leave free.
 
-    A mode holds what stands still in it whatever states, inputs, parameters and time are, but would move in another
-    mode of the same component: the slip speed of a clutch that is stuck, and with the speed the slip angle.
+    A mode declares the motion that it holds, such as the slip speed of a clutch that is stuck; with the speed the slip
+    angle stands still.
 
     Args:
         model: the compiled model.
@@ -69,29 +69,17 @@ def free_motions(model: CompiledDae, point: Point, a: Matrix) -> Motions:
 
 
 def _held_speeds(model: CompiledDae, point: Point) -> Iterator[Vector]:
-    """Slopes (by the states) of variables that are zero and stay so because of a mode of their component."""
-    values = call(model, model.variables, point)
-    for mode, one in enumerate(model.flat_discretes):
-        owner = one.path.rpartition(".")[0]
-        own = [
-            k
-            for k, variable in enumerate(model.flat_variables)
-            if one.names and variable.path.rpartition(".")[0] == owner and abs(values[k]) <= _ZERO * variable.nominal
-        ]
-        for slope in variable_slopes(model, point, own) if own else ():
-            if np.any(slope) and _is_held(model, point, slope / np.linalg.norm(slope), mode):
-                yield slope / np.linalg.norm(slope)
-
-
-def _is_held(model: CompiledDae, point: Point, combination: Vector, mode: int) -> bool:
-    """Whether the rate of a combination of states depends on nothing now, but on something in another mode."""
-    others: list[float] = []
-    for number in range(len(model.flat_discretes[mode].names)):
-        other = replace(point, d=point.d.copy())
-        other.d[mode] = number
-        others.append(float(np.abs(_rate_slopes(model, other, combination)).max()))
-    present = float(np.abs(_rate_slopes(model, point, combination)).max())
-    return present <= _ZERO * max((one for one in others if np.isfinite(one)), default=0.0)
+    """Slopes (by the states) of the motions that the present modes hold."""
+    held = [model.holds[k] for k in holding(model, point)]
+    free = point.copy()
+    for one in held:
+        free.d[one.mode] = free.d[one.mode] if one.loose < 0 else one.loose
+    share(model, free)
+    for slope in variable_slopes(model, point, [one.motion for one in held]) if held else ():
+        # What creeps follows its torque: its rate depends on something, here compared with that of what is let go.
+        present, let_go = (np.abs(_rate_slopes(model, here, slope)).max() for here in (point, free))
+        if np.any(slope) and not present > _ZERO * let_go:
+            yield slope / np.linalg.norm(slope)
 
 
 def _held_angles(model: CompiledDae, point: Point, a: Matrix, motions: Motions) -> Matrix:

@@ -11,7 +11,7 @@ import numpy as np
 from modelica_like.analyse.linear.linearize import held_by, slopes_at
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import InitializationError, UnknownName, ValueOutOfRange, did_you_mean
-from modelica_like.initialize import Point, call, initialize
+from modelica_like.initialize import Point, call, holding, initialize
 from modelica_like.initialize.kept import find_kept, solve_kept
 from modelica_like.initialize.steady import check_modes_hold, moving_states, solve_steady
 from modelica_like.simulation import Model, build
@@ -73,11 +73,9 @@ class OperatingPoint(Mapping[str, float]):
 
     @property
     def stuck(self) -> tuple[str, ...]:
-        """Components that stick: friction that is not overcome, or a gear that locks itself."""
-        modes = zip(self.model.flat_discretes, self.point.d, strict=False)
-        return tuple(
-            one.path.rpartition(".")[0] for one, number in modes if one.names and one.names[int(number)] == "stuck"
-        )
+        """Components that hold a motion: friction that is not overcome, or a gear that locks itself."""
+        held = (self.model.holds[k].component for k in holding(self.model, self.point))
+        return tuple(dict.fromkeys(held))
 
     def __str__(self) -> str:
         lines = [f"Operating point of {self.model.name}"]

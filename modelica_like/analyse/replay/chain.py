@@ -15,7 +15,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from modelica_like.analyse.replay.jumps import Jump, event_time, make_jump
+from modelica_like.analyse.replay.jumps import Jump, Work, event_time, make_jump
 from modelica_like.analyse.replay.kinks import Kinks
 from modelica_like.analyse.replay.slopes import Sizes
 from modelica_like.analyse.replay.start import StartSlopes
@@ -179,10 +179,13 @@ class _Maker:
         t0 = float(self.solution.segments[0].times[0])
         point = initialize(self.model, t0, kind) if self.events[0] else self.solution.segments[0].start
         begin = StartSlopes(self.model, point, kind)
-        self.start_x, self.start_d = begin.x, begin.d
+        whole = np.concatenate([begin.x, np.eye(size.fixed), begin.d])
+        work = Work.at(self.model, point)
+        work.share()
+        self.start_x, self.start_d = begin.x, work.d @ whole
         if self.events[0]:
             jump = make_jump(self.model, point, tuple(self.events[0]), point, self.functions.integrands, first=True)
-            whole = np.concatenate([begin.x, np.eye(size.fixed), begin.d])
+            whole = np.concatenate([begin.x, np.eye(size.fixed), self.start_d])
             self.start_x, self.start_d = jump.x @ whole, jump.d @ whole
             point = jump.after
         self.nodes.append(point)

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
+from modelica_like.analyse.replay.holds import impact, share_slopes
 from modelica_like.analyse.replay.slopes import _NONE, Sizes, slopes
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae, CompiledTransition
 from modelica_like.errors import NoGradient
-from modelica_like.initialize import Point, call, solve_implicit
+from modelica_like.initialize import Point, Strike, call, share, solve_implicit
 from modelica_like.solve.recorder import Event
 
 _GRAZING = 1e-6
@@ -96,7 +98,7 @@ def make_jump(
     """
     size = Sizes.of(model)
     columns = size.x + size.theta
-    work = _Work(model, before.copy(), np.eye(size.x, columns), np.eye(size.d, columns, size.x + size.fixed))
+    work = Work.at(model, before)
     rate_before = slopes(model, before, "ode").value
     when = When(None) if first else event_time(model, before, events, begin)
     trigger = when.trigger
@@ -106,7 +108,7 @@ def make_jump(
         work.point.x = before.x + rate_before * trigger.shift
         work.time = time
     for number in sorted({event.round for event in events}):
-        work.fire([event.transition for event in events if event.round == number])
+        work.fire([event for event in events if event.round == number])
     rate_after = slopes(model, work.point, "ode").value
     gain = integrands(before) - integrands(work.point)
     disputed = None
@@ -143,7 +145,7 @@ def event_time(model: CompiledDae, before: Point, events: tuple[Event, ...], beg
     """Find out what decides when the event happens: what fires in the first round."""
     found: list[tuple[Event, Trigger]] = []
     for event in events:
-        if event.round:
+        if event.round or event.transition < 0:
             continue
         one = model.transitions[event.transition]
         trigger = _moment(model, before, one) if one.timed else _crossing(model, before, one, begin)
@@ -205,7 +207,7 @@ def _coincidence(one: Event, other: Event) -> NoGradient:
 
 
 @dataclass
-class _Work:
+class Work:
     """States and discrete values in the course of an event, with their derivatives by (x, theta) before it."""
 
     model: CompiledDae
@@ -214,9 +216,18 @@ class _Work:
     d: Vector
     time: Vector | None = None
 
-    def _total(self, name: str, expression: Any, constants: Vector = _NONE) -> tuple[Vector, Vector]:
+    @classmethod
+    def at(cls, model: CompiledDae, point: Point) -> Work:
+        """Begin with a point itself."""
+        size = Sizes.of(model)
+        columns = size.x + size.theta
+        return cls(model, point.copy(), np.eye(size.x, columns), np.eye(size.d, columns, size.x + size.fixed))
+
+    def _total(
+        self, name: str, expression: Any = None, constants: Vector = _NONE, *, at: Point | None = None
+    ) -> tuple[Vector, Vector]:
         """Value of a function and its derivatives by (x, theta) before the event."""
-        part = slopes(self.model, self.point, name, expression, constants)
+        part = slopes(self.model, at or self.point, name, expression, constants)
         fixed = self.x.shape[1] - self.x.shape[0] - self.d.shape[0]
         total = part.x @ self.x + part.theta[:, fixed:] @ self.d
         nx = self.x.shape[0]
@@ -225,10 +236,10 @@ class _Work:
             total += np.outer(part.t, self.time)
         return part.value, total
 
-    def fire(self, numbers: list[int]) -> None:
-        """Carry out transitions together."""
-        model = self.model
-        transitions = [model.transitions[k] for k in numbers]
+    def fire(self, events: list[Event]) -> None:
+        """Carry out the transitions of a round together, and the impact that follows; see solve.instants."""
+        model, before = self.model, self.point.d
+        transitions = [model.transitions[event.transition] for event in events if event.transition >= 0]
         x, d, dx, dd = self.point.x.copy(), self.point.d.copy(), self.x.copy(), self.d.copy()
         projected: list[tuple[int, int]] = []
         for transition in transitions:
@@ -244,9 +255,48 @@ class _Work:
         values = [self._reset(number) for _, number in projected]
         self.point = replace(self.point, x=x, d=d)
         self.x, self.d = dx, dd
+        self.share()
         if projected:
             self._project([node for node, _ in projected], values)
+            solve_implicit(model, self.point)
+        self._stop_motions(before)
+        knocked = [event for event in events if event.transition < 0]
+        for event in knocked:
+            mode = model.discrete_position[event.mode]
+            self.point.d[mode] = model.flat_discretes[mode].names.index(event.after)
+        if knocked:
+            self.share()
+
+    def share(self) -> None:
+        """Let elements share what they hold together, and solve the implicit equations."""
+        model, columns = self.model, self.x.shape[1]
+        share(model, self.point)
         solve_implicit(model, self.point)
+        for circuit in model.circuits:
+            count = len(circuit.members)
+            own = slice(circuit.first, circuit.first + count * (1 + count))
+            self.d[own] = 0.0
+            self.d[own] = share_slopes(model, self.point, circuit, columns, self._total)
+
+    def _stop_motions(self, before: Vector) -> None:
+        """Stop what modes have begun to hold since `before`, also where it stands still already."""
+        model, point = self.model, self.point
+        entering = [
+            k for k, one in enumerate(model.holds) if point.d[one.mode] == one.number and before[one.mode] != one.number
+        ]
+        if not entering:
+            return
+        strike = Strike(model, point.copy(), entering)
+        strike.run()
+        trial = point.copy()
+        for k in strike.knocked:
+            trial.d[model.holds[k].mode] = model.holds[k].loose
+        share(model, trial)
+        solve_implicit(model, trial)
+        struck = [k for k in entering if k not in strike.knocked]
+        if struck:
+            self.x = self.x + impact(model, trial, struck, partial(self._total, at=trial))
+        self.point = strike.point
 
     def _reset(self, number: int) -> tuple[float, Vector]:
         make = lambda: self.model.resets(*self.model.arguments.values())[number]  # noqa: E731

@@ -26,7 +26,6 @@ _CHANGE = re.compile(
 )
 _ENERGY = {"loss_energy": 1, "source_energy": 2}
 _POWERS = {"stored_energy": 0, "loss_power": 1, "source_power": 2}
-_HELD = ("stuck", "locked")
 _SECOND, _JOULE, _WATT = parse_unit("s"), parse_unit("J"), parse_unit("W")
 
 
@@ -97,11 +96,11 @@ def _plain(model: CompiledDae, name: str) -> Output:
 
 
 def _holding_mode(model: CompiledDae, owner: str) -> tuple[str, str] | None:
-    """The mode of a component in which it holds, and the name of that."""
-    for one in model.flat_discretes:
-        held = next((name for name in _HELD if name in one.names), None)
-        if held and one.path.rpartition(".")[0] == owner:
-            return one.path, held
+    """The mode of a component in which it holds a motion, and the name of that."""
+    for one in model.holds:
+        if one.component == owner:
+            mode = model.flat_discretes[one.mode]
+            return mode.path, mode.names[one.number]
     return None
 
 

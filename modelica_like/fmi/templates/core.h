@@ -28,6 +28,7 @@ OLD(hypot);
 OLD(fmod);
 #endif
 
+#define TIME_RESOLUTION 1e-10 /* as in guards_soon */
 #define AT_LEAST_ONE(n) ((n) > 0 ? (n) : 1)
 #define N_UNKNOWNS (N_X + N_Z)
 #define SLOT_T 0
@@ -117,6 +118,16 @@ typedef struct {
     int mode, target;
 } StartMode;
 typedef struct {
+    int mode, number, loose, motion, state;
+    double factor;
+    int reaction, approach, moved;
+    double nominal;
+    const char *name;
+} Held; /* see CompiledHold in compiled.py; state -1: the motion is none; moved: something but states moves it */
+typedef struct {
+    int first_member, n_members, first;
+} Circuit;
+typedef struct {
     int position, start;
     double factor;
 } StartOf;
@@ -137,6 +148,11 @@ extern const char *const *const model_mode_names[]; /* by position in d; NULL fo
 extern const int model_mode_counts[];
 extern const char *const model_state_names[], *const model_implicit_names[], *const model_singular_names[];
 
+extern const Held model_holds[];
+extern const Circuit model_circuits[]; /* those that depend on each other; in d from `first`: switches, then shares */
+extern const int model_members[];
+extern const int model_units[]; /* by node: which have the same unit; empty where nothing is held */
+
 extern const StartMode model_start_modes[];
 extern const StartOf model_start_direct[], model_start_x_guess[], model_start_z_guess[], model_start_default[];
 extern const StartRow model_start_rows[], model_start_dependent[];
@@ -144,7 +160,7 @@ extern const int model_start_zero[], model_start_columns[], model_steady_states[
 
 extern const Tape tape_rates, tape_jacobian, tape_alg, tape_alg_jacobian, tape_variables, tape_guards, tape_guards_soon;
 extern const Tape tape_moments, tape_resets, tape_start_conditions, tape_start_values, tape_discrete_starts;
-extern const Tape tape_determinants, tape_start_system, tape_start_jacobian, tape_derived;
+extern const Tape tape_hold_terms, tape_determinants, tape_start_system, tape_start_jacobian, tape_derived;
 extern const QrPattern pattern_step, pattern_start;
 extern const int jacobian_to_step[]; /* nonzero of the Jacobian -> nonzero of the step matrix */
 extern const int step_diagonal[];    /* nonzero of the step matrix on the diagonal of state k */
@@ -227,6 +243,7 @@ void qr_solve(const QrPattern *pattern, const Work *work, double *x);
 int lu_factor(int n, double *matrix, int *order);
 void lu_solve(int n, const double *matrix, const int *order, double *x);
 void lu_solve_transposed(int n, const double *matrix, const int *order, double *x);
+void make_orthogonal(int rows, int columns, double *a, double *turns, double *b);
 void least_squares(int rows, int columns, double *a, double *b, double *x);
 void keeping_least_squares(int n, int states, double *a, double *turns, double *b, double *x);
 
@@ -240,6 +257,27 @@ double input_at(const State *s, int k, double t);
 /* start.c */
 void start_defaults(Instance *c);
 Result start_solve(Instance *c);
+int choose_modes(Instance *c, unsigned char *decided);
+
+/* holds.c */
+#define UNLIMITED 1e30
+#define ROUNDING 1e-10 /* relative size of a motion that is nothing but rounding */
+typedef struct {
+    double gain, forward, backward, restitution;
+} Terms;
+void hold_terms(Instance *c, Terms *terms);
+void mark_held(Instance *c, const Terms *terms, unsigned char *held);
+double largest_like(const double *values, int node);
+void share(Instance *c);
+void rest(Instance *c);
+
+/* impacts.c */
+typedef struct { /* at one instant: what has been stopped, and the states before the first impact */
+    int struck;
+    double x[AT_LEAST_ONE(N_X)];
+    unsigned char entered[AT_LEAST_ONE(N_HOLDS)];
+} Impacts;
+Result stop_motions(Instance *c, const double *before, Impacts *impacts);
 
 /* events.c */
 int guard_active(const State *s, int guard);
@@ -247,6 +285,7 @@ double next_moment(Instance *c);
 int find_wanting(Instance *c, unsigned char *wanting, int guards_too);
 Result iterate_events(Instance *c, unsigned char *wanting, int located);
 double number_or_false(double guard);
+void note_change(Instance *c, const char *name, int mode, int target);
 
 /* rosenbrock.c */
 int rosenbrock_step(

@@ -92,14 +92,19 @@ Result directional(Instance *c, const uint32_t *unknowns, size_t n_unknowns, con
     return RESULT_OK;
 }
 
-/* From bars of z to bars of the arguments, through the implicit equations. */
+/* From bars of z to bars of the arguments, through the implicit equations; order NULL: they are singular. */
 static void adjoint_of_implicit(Instance *c, const int *order) {
     Work *w = &c->work;
     State *s = &c->state;
     double residual[AT_LEAST_ONE(N_Z)];
     if (N_Z == 0) return;
     for (int k = 0; k < N_Z; k++) w->vector[k] = -w->dots[SLOT_Z + k];
-    lu_solve_transposed(N_Z, w->dense_matrix, order, w->vector);
+    if (order != NULL) lu_solve_transposed(N_Z, w->dense_matrix, order, w->vector);
+    else {
+        memcpy(residual, w->vector, N_Z * sizeof(double));
+        evaluate(c, &tape_alg_jacobian, s->t, s->x, s->z, w->dense_matrix);
+        least_squares(N_Z, N_Z, w->dense_matrix, residual, w->vector);
+    }
     memset(w->dots + SLOT_Z, 0, N_Z * sizeof(double));
     evaluate(c, &tape_alg, s->t, s->x, s->z, residual);
     tape_adjoint(&tape_alg, w->slots, w->dots, w->vector);
@@ -145,23 +150,23 @@ Result adjoint(Instance *c, const uint32_t *unknowns, size_t n_unknowns, const u
     return RESULT_OK;
 }
 
-/* Total derivative of a variable by the states, z following them. */
+/* Total derivative of a variable by the states, z following them. Reactions whose split is undetermined make the
+ * equations for z singular; what depends on them is left out. */
 void adjoint_of_node(Instance *c, int node, double *by_state) {
     Work *w = &c->work;
     State *s = &c->state;
-    int order[AT_LEAST_ONE(N_Z)];
-    evaluate(c, &tape_alg_jacobian, s->t, s->x, s->z, w->dense_matrix);
-    if (!lu_factor(N_Z, w->dense_matrix, order)) {
-        memset(by_state, 0, N_X * sizeof(double));
-        return;
-    }
+    int order[AT_LEAST_ONE(N_Z)], follows = 0;
     memset(w->dots, 0, SLOT_RESULTS * sizeof(double));
     c->variables_valid = 0;
     evaluate(c, &tape_variables, s->t, s->x, s->z, w->variables);
     memset(w->variables, 0, N_NODES * sizeof(double));
     w->variables[node] = 1;
     tape_adjoint(&tape_variables, w->slots, w->dots, w->variables);
-    adjoint_of_implicit(c, order);
+    for (int k = 0; k < N_Z; k++) follows |= w->dots[SLOT_Z + k] != 0;
+    if (follows) {
+        evaluate(c, &tape_alg_jacobian, s->t, s->x, s->z, w->dense_matrix);
+        adjoint_of_implicit(c, lu_factor(N_Z, w->dense_matrix, order) ? order : NULL);
+    }
     memcpy(by_state, w->dots + SLOT_X, N_X * sizeof(double));
 }
 

@@ -4,6 +4,8 @@
 #include "core.h"
 
 #define ROUNDS 20
+#define TOGETHER 6 /* rounds in which all fire that want to */
+#define ALONE 6    /* further rounds per motion that may be held, in which only one fires */
 #define BALANCED 1e-3
 #define SAME_TIME 1e-12
 #define CROWD 200
@@ -79,16 +81,17 @@ static void project(Instance *c, const int *targets, const double *values, int c
     for (int k = 0; k < N_X; k++) s->x[k] += step[k];
 }
 
-static void log_transition(Instance *c, const Transition *one) {
-    const char *const *names = model_mode_names[one->mode];
-    int before = (int)c->state.d[one->mode];
-    if (names != NULL && before >= 0 && before < model_mode_counts[one->mode])
-        report(c, LOG_EVENTS, RESULT_OK, "t = %.12g s: %s: %s -> %s", c->state.t, one->name, names[before],
-            names[one->target]);
+/* Tells that a mode changes. */
+void note_change(Instance *c, const char *name, int mode, int target) {
+    const char *const *names = model_mode_names[mode];
+    int before = (int)c->state.d[mode];
+    c->state.n_events++;
+    if (names != NULL && before >= 0 && before < model_mode_counts[mode])
+        report(c, LOG_EVENTS, RESULT_OK, "t = %.12g s: %s: %s -> %s", c->state.t, name, names[before], names[target]);
 }
 
 /* Carry out transitions together; of one mode only the one declared first. */
-static void fire(Instance *c, const unsigned char *wanting) {
+static void fire(Instance *c, const unsigned char *wanting, Impacts *impacts) {
     State *s = &c->state;
     double values[AT_LEAST_ONE(N_RESETS)], targets_value[AT_LEAST_ONE(N_RESETS)], d[AT_LEAST_ONE(N_D)];
     int targets[AT_LEAST_ONE(N_RESETS)], count = 0;
@@ -99,14 +102,15 @@ static void fire(Instance *c, const unsigned char *wanting) {
         const Transition *one = &model_transitions[k];
         if (!wanting[k] || changed[one->mode]) continue;
         changed[one->mode] = 1;
-        log_transition(c, one);
+        note_change(c, one->name, one->mode, one->target);
         if (*one->notice) report(c, LOG_WARNING, RESULT_OK, "t = %.9g s: %s", s->t, one->notice);
-        s->n_events++;
         d[one->mode] = one->target;
         for (int r = one->first_reset; r < one->first_reset + one->n_resets; r++) {
             const Reset *reset = &model_resets[r];
-            if (reset->kind == RESET_STATE) s->x[reset->index] = values[reset->value] / reset->factor;
-            else if (reset->kind == RESET_DISCRETE) d[reset->index] = values[reset->value];
+            if (reset->kind == RESET_STATE) {
+                impacts->struck = 0;
+                s->x[reset->index] = values[reset->value] / reset->factor;
+            } else if (reset->kind == RESET_DISCRETE) d[reset->index] = values[reset->value];
             else {
                 targets[count] = reset->target;
                 targets_value[count++] = values[reset->value];
@@ -128,22 +132,47 @@ static Result crowded(Instance *c) {
         "Events follow each other ever faster at t = %.12g s. Give the switching a hysteresis, or smooth it.", s->t);
 }
 
+/* Before one of several that hold a motion gives way, let the others take more. */
+static Result share_anew(Instance *c, unsigned char *wanting) {
+    State *s = &c->state;
+    double *soon = c->work.guards;
+    if (N_CIRCUITS == 0) return RESULT_OK;
+    share(c);
+    c->variables_valid = 0;
+    if (solve_implicit(c, s->t, s->x, s->z, 0) != RESULT_OK) return RESULT_ERROR;
+    evaluate(c, &tape_guards_soon, s->t, s->x, s->z, soon);
+    for (int k = 0; k < N_GUARDS; k++)
+        if (!(number_or_false(soon[k]) > 0)) wanting[model_guard_transition[k]] = 0;
+    return RESULT_OK;
+}
+
 /* Fire what wants to fire until nothing does. `wanting` holds the state events that were located, if `located`. */
 Result iterate_events(Instance *c, unsigned char *wanting, int located) {
     State *s = &c->state;
-    if (find_wanting(c, wanting, !located) && crowded(c) != RESULT_OK) return RESULT_ERROR;
-    for (int round = 0; round < ROUNDS; round++) {
+    Impacts impacts = {0, {0}, {0}};
+    if (find_wanting(c, wanting, !located)) {
+        if (crowded(c) != RESULT_OK || share_anew(c, wanting) != RESULT_OK) return RESULT_ERROR;
+    }
+    for (int round = 0; round < ROUNDS + ALONE * N_HOLDS; round++) {
+        double before[AT_LEAST_ONE(N_D)];
         int any = 0;
-        for (int k = 0; k < N_TRANSITIONS; k++) any |= wanting[k];
+        for (int k = 0; k < N_TRANSITIONS; k++) {
+            if (any && round >= TOGETHER) wanting[k] = 0;
+            any |= wanting[k];
+        }
         if (!any) return RESULT_OK;
-        fire(c, wanting);
+        memcpy(before, s->d, sizeof before);
+        fire(c, wanting, &impacts);
+        share(c);
         c->variables_valid = 0;
-        if (solve_implicit(c, s->t, s->x, s->z, 0) != RESULT_OK || check_singular(c) != RESULT_OK) return RESULT_ERROR;
+        if (solve_implicit(c, s->t, s->x, s->z, 0) != RESULT_OK || stop_motions(c, before, &impacts) != RESULT_OK ||
+            check_singular(c) != RESULT_OK)
+            return RESULT_ERROR;
         memset(wanting, 0, N_TRANSITIONS);
         find_wanting(c, wanting, 1);
         drop_balanced(c, wanting);
     }
     return report(c, LOG_ERROR, RESULT_ERROR,
         "Modes still switch after %d rounds at t = %.12g s. Give the switching a hysteresis, or smooth what drives it.",
-        ROUNDS, s->t);
+        ROUNDS + ALONE * N_HOLDS, s->t);
 }

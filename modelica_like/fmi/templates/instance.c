@@ -76,6 +76,7 @@ static size_t lay_out(Work *w, double *memory) {
            qr_r = larger((size_t)pattern_step.n_r, (size_t)pattern_start.n_r);
     size_t rows = larger((size_t)pattern_step.size, (size_t)pattern_start.size);
     size_t square = larger(START_STEADY ? 2 * (size_t)(N_STEADY + N_Z) * (N_STEADY + N_Z) : 0, (size_t)N_RESETS * N_X);
+    size_t sharing = (size_t)MOST_MEMBERS * (N_X + 3 * MOST_MEMBERS);
     struct {
         double **array;
         size_t size;
@@ -95,7 +96,7 @@ static size_t lay_out(Work *w, double *memory) {
         {&w->guards_before, 9 * (size_t)N_GUARDS},
         {&w->rhs, larger(N_UNKNOWNS, N_DETERMINANTS)},
         {&w->dense_matrix, (size_t)N_Z * N_Z},
-        {&w->square, square},
+        {&w->square, larger(square, sharing)},
         {&w->vector, N_UNKNOWNS + (size_t)N_Z},
         {&w->start_unknowns, N_START_UNKNOWNS},
         {&w->start_values, N_STARTS},

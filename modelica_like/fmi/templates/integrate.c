@@ -11,7 +11,6 @@
 #define LOCATED 1e-13
 #define MAX_TRIALS 60
 #define MAX_REJECTIONS 60
-#define TIME_RESOLUTION 1e-10 /* as in guards_soon */
 #define NEAR 0.1
 #define SAME_POINT 1e-9 /* rounding of the importer's communication points */
 #define LEAST_LOOKS 500 /* steps per run, where guards could hide between longer ones */

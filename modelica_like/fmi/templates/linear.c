@@ -133,7 +133,7 @@ static double dot(int n, const double *p, const double *q) {
 
 /* Turns the rows of A until they are orthogonal, by one-sided Jacobi rotations (Hestenes); b is rotated along. `turns`
  * may be there, too: from the unit matrix it becomes the combinations of rows of A that have come out. */
-static void make_orthogonal(int rows, int columns, double *a, double *turns, double *b) {
+void make_orthogonal(int rows, int columns, double *a, double *turns, double *b) {
     for (int sweep = 0; sweep < 60; sweep++) {
         int rotated = 0;
         for (int i = 0; i < rows; i++)

@@ -6,7 +6,6 @@
 #define MODE_ROUNDS 5
 #define MAX_NEWTON 50
 #define CONSISTENT 1e-8
-#define RESTING 1e-9
 #define AT_REST (-1) /* in place of a start value: the variable is zero */
 
 void start_defaults(Instance *c) {
@@ -150,39 +149,11 @@ static Result solve_steady(Instance *c) {
     return report(c, LOG_ERROR, RESULT_ERROR, "No steady state was found at t = %.9g s.", s->t);
 }
 
-/* Notes the modes that hold a motion which is where they got it when they were entered: a slip of rounding errors
- * releases nothing. */
-static void note_resting(Instance *c, unsigned char *resting) {
-    const State *s = &c->state;
-    double values[AT_LEAST_ONE(N_RESETS)];
-    unsigned char holds[AT_LEAST_ONE(N_D)] = {0}, away[AT_LEAST_ONE(N_D)] = {0};
-    evaluate(c, &tape_resets, s->t, s->x, s->z, values);
-    evaluate(c, &tape_variables, s->t, s->x, s->z, c->work.variables);
-    for (int k = 0; k < N_TRANSITIONS; k++) {
-        const Transition *one = &model_transitions[k];
-        if ((int)s->d[one->mode] != one->target) continue;
-        for (int r = one->first_reset; r < one->first_reset + one->n_resets; r++) {
-            const Reset *reset = &model_resets[r];
-            double value = values[reset->value] / (reset->kind == RESET_STATE ? reset->factor : 1), present;
-            if (reset->kind == RESET_DISCRETE) continue;
-            present =
-                reset->kind == RESET_STATE ? s->x[reset->index] : c->work.variables[model_reset_nodes[reset->target]];
-            holds[one->mode] = 1;
-            if (!(fabs(present - value) <= RESTING * (1 + fabs(value)))) away[one->mode] = 1;
-        }
-    }
-    for (int k = 0; k < N_D; k++)
-        if (holds[k] && !away[k]) resting[k] = 1;
-}
-
-/* Choose modes by their start conditions: the first that holds wins. Tells whether one changed. */
-static int choose_modes(Instance *c, int may_rest) {
+/* Choose modes that are not decided by their start conditions: the first that holds wins. Tells whether one changed. */
+int choose_modes(Instance *c, unsigned char *decided) {
     State *s = &c->state;
-    unsigned char decided[AT_LEAST_ONE(N_D)];
     double *holds = c->work.guards;
     int changed = 0;
-    memcpy(decided, s->mode_given, sizeof decided);
-    if (may_rest) note_resting(c, decided);
     evaluate(c, &tape_start_conditions, s->t, s->x, s->z, holds);
     for (int k = 0; k < N_START_MODES; k++) {
         const StartMode *one = &model_start_modes[k];
@@ -194,7 +165,13 @@ static int choose_modes(Instance *c, int may_rest) {
     return changed;
 }
 
-static void discrete_starts(Instance *c) {
+static int choose_start_modes(Instance *c) {
+    unsigned char decided[AT_LEAST_ONE(N_D)];
+    memcpy(decided, c->state.mode_given, sizeof decided);
+    return choose_modes(c, decided);
+}
+
+static void start_discretes(Instance *c) {
     State *s = &c->state;
     double *values = c->work.guards;
     evaluate(c, &tape_discrete_starts, s->t, s->x, s->z, values);
@@ -231,24 +208,28 @@ Result start_solve(Instance *c) {
     memcpy(s->x, model_guesses, N_X * sizeof(double));
     memcpy(s->z, model_z_guesses, N_Z * sizeof(double));
     memset(s->d, 0, N_D * sizeof(double));
-    discrete_starts(c);
+    start_discretes(c);
+    share(c);
     start_values(c);
     apply_guesses(c, c->work.start_values);
     if (START_STEADY) {
         apply_defaults(c, c->work.start_values);
         if (apply_direct(c, c->work.start_values) != RESULT_OK) return RESULT_ERROR;
-        choose_modes(c, 0);
+        choose_start_modes(c);
+        share(c);
     }
     for (round = 0; round < MODE_ROUNDS; round++) {
         if (START_STEADY) {
             apply_defaults(c, c->work.start_values);
             if (apply_direct(c, c->work.start_values) != RESULT_OK || solve_steady(c) != RESULT_OK) return RESULT_ERROR;
         } else if (solve_states(c) != RESULT_OK) return RESULT_ERROR;
-        if (!choose_modes(c, START_STEADY)) break;
+        if (!choose_start_modes(c)) break;
+        share(c);
     }
     if (round == MODE_ROUNDS)
         return report(c, LOG_ERROR, RESULT_ERROR,
             "The modes at the start do not settle: they and the start values change each other in a circle.");
+    rest(c);
     if (solve_implicit(c, s->t, s->x, s->z, 0) != RESULT_OK || check_singular(c) != RESULT_OK) return RESULT_ERROR;
     if (START_STEADY && check_modes_hold(c) != RESULT_OK) return RESULT_ERROR;
     s->z_valid = s->solved = 1;
