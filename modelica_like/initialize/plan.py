@@ -149,8 +149,9 @@ class _Choice:
         general = [k for k, e in enumerate(self.model.starts) if e.strength == "fixed" and e.state is None]
         if self.kind == "steady" or not (self.free or general):
             return StartPlan(self.kind, self.system, direct)
-        if not self._begin(matrix):
-            return self.plan(None)  # the model itself is singular there, which is told when it is solved
+        # Where modes leave reactions open, implicit equations that say nothing new and as many reactions stay out.
+        own = self._begin(matrix)
+        kept = self._keep(len(own) < self.own)
         rows = [k for k in general if self._accept(self.model.starts[k].node)]
         taken = set(rows)
         dependent = [k for k in general if k not in taken]
@@ -158,14 +159,14 @@ class _Choice:
         resting, zero = self._rest()
         if self.choice.size < len(self.columns):
             raise self._missing()
-        known = set(zero)
+        known = {*zero, *kept}
         columns = [column for column in self.columns if column not in known]
         nodes = [*(self.model.starts[k].node for k in rows), *resting]
-        wanted = [*range(self.own), *(self.row_of[node] for node in nodes)]
+        wanted = [*own, *(self.row_of[node] for node in nodes)]
         lists = (rows, dependent, resting, zero, columns, wanted)
         return StartPlan(self.kind, self.system, direct, *map(tuple, lists))
 
-    def _begin(self, matrix: Any) -> bool:
+    def _begin(self, matrix: Any) -> list[int]:
         """Begin with the explicit equations, which determine y, and the implicit ones, which determine z."""
         pattern = self.system.function.sparsity_out(1)
         numbers = [1.0] * pattern.nnz() if matrix is None else matrix.nonzeros()
@@ -174,8 +175,13 @@ class _Choice:
             if column in self.place:
                 self.entries[row][self.place[column]] = number
         self.choice: Matching | Elimination = (Matching if matrix is None else Elimination)(len(self.columns))
-        own = [self._add({len(self.free) + row: 1.0, **self.entries[row]}) for row in range(self.own)]
-        return matrix is None or all(own)
+        added = [self._add({len(self.free) + row: 1.0, **self.entries[row]}) for row in range(self.own)]
+        return [row for row, new in enumerate(added) if new or matrix is None]
+
+    def _keep(self, some: bool) -> list[int]:
+        """Implicit unknowns that stay as they are."""
+        implicit = self.columns[len(self.columns) - len(self.model.implicit) :] if some else []
+        return [column for column in implicit if self._add({self.place[column]: 1.0})]
 
     def _add(self, row: Mapping[int, float]) -> bool:
         return self.choice.add(row)
