@@ -34,7 +34,7 @@ benchmark: .venv/installed-dev
 	$(BIN)/python benchmarks/import_time.py
 	$(BIN)/python benchmarks/bad_input.py
 	$(BIN)/python benchmarks/energy.py
-	$(BIN)/python benchmarks/coupled_clutches.py
+	$(BIN)/python benchmarks/segments.py
 	$(BIN)/python benchmarks/chain.py 10 100 1000 5000
 	$(BIN)/python benchmarks/fmu_export.py 10 100 1000
 	$(BIN)/python benchmarks/gradient.py

@@ -88,12 +88,11 @@ class EventLoop:
     def _advance(self, stop: float) -> None:
         """Integrate up to `stop` at most, ending earlier at an event or at the end of a panel."""
         looks = self._panel(stop)
-        if self.guards.count and self._search(looks):
-            return
         if not self.guards.count:
             self.pace.longer(looks.count)
-        self._keep(looks, float(looks.times[-1]), looks.count)
-        self._arrive(looks)
+        if not self.guards.count or not self._search(looks):
+            self._keep(looks, float(looks.times[-1]), looks.count)
+            self._arrive(looks)
         if self.now.t == stop:
             if self.record.last != stop:
                 self.record.add(np.array([stop]), self.now.x[:, None], self.now.z[:, None])

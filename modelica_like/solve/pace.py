@@ -79,7 +79,7 @@ class Pace:
         """Return the times of results after `first` up to `last`, both with a little room."""
         low = math.floor(float(first - self.begin) / self.step + _ON_GRID) + 1
         high = math.floor(float(last - self.begin) / self.step + _ON_GRID)
-        return self._at(np.arange(low, high + 1), self.points)
+        return self._at(np.arange(low, high + 1, dtype=float), self.points)
 
     def before(self, t: float) -> float:
         """Return the latest time of results that lie before an event."""
@@ -108,7 +108,7 @@ class Pace:
         """Let the next panel be longer than one of so many looks, but not much longer than what is ahead, in s."""
         if looks >= self.size:
             expected = max(_at_least(_ROOM * ahead / self.look), _SIZES[1])
-            self.size = min(_at_least(looks + 1), expected, self.longest)
+            self.size = min(_at_least(self.size + 1), expected, self.longest)
 
     def anew(self, span: float) -> None:
         """Begin a segment that is expected to last so long, in s: as the last one with the same modes."""

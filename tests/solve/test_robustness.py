@@ -21,6 +21,7 @@ from modelica_like.language import (
     Variable,
     connect,
     der,
+    exp,
     param,
     series,
     var,
@@ -223,3 +224,28 @@ def test_what_should_be_known_about_a_run_is_in_its_report() -> None:
     run = simulate(Lag(x=0.0), 1.0)
     assert run.notices == ()
     assert notices(replace(run, notices=("Something to know.",))) == ["Something to know."]
+
+
+def test_a_time_event_is_not_lost_where_looks_became_closer_just_before_it() -> None:
+    """A pulse nearly reaches a guard in the last interval before the event, which is looked into again."""
+
+    class Pulse(Component):
+        x: Variable = var("1", "pulse of height 1 at 0.45 s")
+        width: Parameter = param("s", "of the pulse", default=0.01)
+        centre: Parameter = param("s", "of the pulse", default=0.45)
+        at: Parameter = param("s", "time of the event", default=0.5)
+        high = Mode("below", "above")
+        clock = Mode("before", "after")
+
+        def equations(self) -> Equations:
+            u = (self.time - self.centre) / self.width
+            yield self.width * der(self.x) == -2 * u * exp(-u * u)
+
+        def events(self) -> Events:
+            yield self.high.go("below", "above", when=self.x > 1.001)
+            yield self.clock.go("before", "after", at=self.at)
+
+    model = build(Pulse(x=0.0))
+    for at in np.linspace(0.452, 0.49, 40):
+        run = simulate(model, 1.0, points=10, parameters={"at": at})
+        assert [event.time for event in run.events] == pytest.approx([at], rel=1e-12)
