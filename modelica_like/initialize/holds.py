@@ -155,6 +155,7 @@ class Strike:
         self.impacts: list[Impact] = []
         self.loose: list[int] = []
         self.knocked: list[int] = []
+        self.hard = False
 
     def run(self) -> None:
         """Carry out the impact; `loose` then tells what was knocked loose or bounces, `impacts` what was lost."""
