@@ -19,6 +19,7 @@ Total = Callable[..., tuple[Vector, Vector]]
 """Value of a function at a point, and its derivatives by (x, theta) before an event."""
 
 _RESTITUTION = 3
+_ROUNDING = 1e-9
 
 
 def impact(model: CompiledDae, point: Point, struck: Sequence[int], total: Total) -> Vector:
@@ -85,7 +86,7 @@ def share_slopes(model: CompiledDae, point: Point, circuit: Circuit, columns: in
         shares = entries[first : first + count]
         places = [k for k in range(count) if shares[k] or k in pivots]
         members = [circuit.members[k] for k in places]
-        free = [n for n, k in enumerate(places) if k not in pivots and shares[k]]
+        free = [n for n, k in enumerate(places) if k not in pivots and abs(shares[k]) > _ROUNDING]
         by_capacity = _relative(model, point, members, total)
         slopes = -shares[places, None] * by_capacity
         slopes[free] += shares[[places[n] for n in free], None] * _turned(

@@ -161,14 +161,25 @@ def event_time(model: CompiledDae, before: Point, events: tuple[Event, ...], beg
     for other, second in found[1:]:
         weights = np.maximum(np.abs(before.x), model.nominals), np.maximum(np.abs(theta), 1.0)
         apart = [
-            np.flatnonzero(np.abs(a - b) * weight > _SAME * max(before.t - begin.t, abs(before.t)))
-            for a, b, weight in zip((trigger.x, trigger.theta), (second.x, second.theta), weights, strict=True)
+            np.flatnonzero(np.abs(part) * weight > _SAME * max(before.t - begin.t, abs(before.t)))
+            for part, weight in zip(_difference(model, before, trigger, second), weights, strict=True)
         ]
         if apart[0].size:
             return When(None, _coincidence(first, other))
         if apart[1].size:
             return When(trigger, _coincidence(first, other), tuple(map(int, apart[1])))
     return When(trigger)
+
+
+def _difference(model: CompiledDae, before: Point, one: Trigger, other: Trigger) -> tuple[Vector, Vector]:
+    """By what two triggers differ, but for motions that modes hold: nothing moves those."""
+    x, theta = one.x - other.x, one.theta - other.theta
+    nodes = [model.holds[k].motion for k in holding(model, before)]
+    if not nodes or not np.any(x):
+        return x, theta
+    held = slopes(model, before, f"held {nodes}", lambda: model.variables(*model.arguments.values())[nodes])
+    parts = np.linalg.lstsq(held.x.T, x, rcond=None)[0]
+    return x - held.x.T @ parts, theta - held.theta.T @ parts
 
 
 def _moment(model: CompiledDae, before: Point, transition: CompiledTransition) -> Trigger:
