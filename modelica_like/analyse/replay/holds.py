@@ -80,7 +80,7 @@ def share_slopes(model: CompiledDae, point: Point, circuit: Circuit, columns: in
     count = len(circuit.members)
     found = np.zeros((count * (1 + count), columns))
     entries = point.d[circuit.first : circuit.first + count * (1 + count)]
-    pivots = np.flatnonzero(entries[:count])
+    pivots = [k for k in range(count) if entries[k]]
     for pivot in pivots:
         first = count + pivot * count
         shares = entries[first : first + count]
