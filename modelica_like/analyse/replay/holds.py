@@ -12,13 +12,14 @@ from modelica_like.compile.buffers import Vector, buffered
 from modelica_like.compile.compiled import Circuit, CompiledDae
 from modelica_like.flatten.holds import TERMS
 from modelica_like.initialize import Point, variable_slopes
-from modelica_like.initialize.holds import _capacities, terms
+from modelica_like.initialize.holds import terms
 from modelica_like.language.hold import UNLIMITED
 
 Total = Callable[..., tuple[Vector, Vector]]
 """Value of a function at a point, and its derivatives by (x, theta) before an event."""
 
 _RESTITUTION = 3
+_ROUNDING = 1e-9
 
 
 def impact(model: CompiledDae, point: Point, struck: Sequence[int], total: Total) -> Vector:
@@ -79,17 +80,18 @@ def share_slopes(model: CompiledDae, point: Point, circuit: Circuit, columns: in
     count = len(circuit.members)
     found = np.zeros((count * (1 + count), columns))
     entries = point.d[circuit.first : circuit.first + count * (1 + count)]
-    pivots = np.flatnonzero(entries[:count])
+    pivots = [k for k in range(count) if entries[k]]
     for pivot in pivots:
         first = count + pivot * count
         shares = entries[first : first + count]
         places = [k for k in range(count) if shares[k] or k in pivots]
         members = [circuit.members[k] for k in places]
-        capacities = _capacities(model, point, members)
-        parts = shares[places] * capacities
-        free = [n for n, k in enumerate(places) if k not in pivots]
-        slopes = -shares[places, None] * _relative(model, point, members, total)
-        slopes[free] += _parts(model, point, members, parts, free, total) / capacities[free, None]
+        free = [n for n, k in enumerate(places) if k not in pivots and abs(shares[k]) > _ROUNDING]
+        by_capacity = _relative(model, point, members, total)
+        slopes = -shares[places, None] * by_capacity
+        slopes[free] += shares[[places[n] for n in free], None] * _turned(
+            model, point, members, places.index(pivot), free, total
+        )
         found[[first + k for k in places]] = slopes
     return found
 
@@ -105,12 +107,13 @@ def _relative(model: CompiledDae, point: Point, members: list[int], total: Total
     return found
 
 
-def _parts(
-    model: CompiledDae, point: Point, members: list[int], parts: Vector, free: list[int], total: Total
-) -> Vector:
-    """Derivatives of a dependence of motions; the parts that are not `free` stay as they are."""
+def _turned(model: CompiledDae, point: Point, members: list[int], own: int, free: list[int], total: Total) -> Vector:
+    """Derivatives of a dependence of motions over its parts; one part is 1, and others than the `free` ones are 0."""
     nodes = [model.holds[k].motion for k in members]
     nx, nz, name = len(model.states), len(model.implicit), f"dependence {members}"
+    motions, parts = variable_slopes(model, point, nodes), np.zeros(len(nodes))
+    parts[own] = 1.0
+    parts[free] = -np.linalg.lstsq(motions[free].T, motions[own], rcond=None)[0]
     weights = np.concatenate([parts, np.zeros(nz)])
 
     def make(given: Any) -> Any:
@@ -126,7 +129,5 @@ def _parts(
         turned = slope[:nx] - alg_x.T @ np.linalg.solve(alg_z.T, slope[nx:])
     else:
         turned = total(name, make, weights)[1]
-    if not np.any(turned):
-        return np.zeros((len(free), turned.shape[1]))
-    rows = variable_slopes(model, point, [nodes[n] for n in free])
-    return np.asarray(-np.linalg.lstsq(rows.T, turned, rcond=None)[0], np.float64)
+    change = np.linalg.lstsq(motions[free].T, turned, rcond=None)[0]
+    return np.asarray(-change / parts[free, None], np.float64)

@@ -14,7 +14,7 @@ from modelica_like.analyse.replay.slopes import _NONE, Sizes, slopes
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae, CompiledTransition
 from modelica_like.errors import NoGradient
-from modelica_like.initialize import Point, Strike, call, share, solve_implicit
+from modelica_like.initialize import Point, Strike, call, holding, share, solve_implicit
 from modelica_like.solve.recorder import Event
 
 _GRAZING = 1e-6
@@ -107,6 +107,7 @@ def make_jump(
         work.x += np.outer(rate_before, time)
         work.point.x = before.x + rate_before * trigger.shift
         work.time = time
+    work.share()
     for number in sorted({event.round for event in events}):
         work.fire([event for event in events if event.round == number])
     rate_after = slopes(model, work.point, "ode").value
@@ -143,6 +144,9 @@ class When:
 
 def event_time(model: CompiledDae, before: Point, events: tuple[Event, ...], begin: Point) -> When:
     """Find out what decides when the event happens: what fires in the first round."""
+    if not events:
+        # Elements that hold the same motion share it anew, and nothing else happens.
+        return When(None)
     found: list[tuple[Event, Trigger]] = []
     for event in events:
         if event.round or event.transition < 0:
@@ -157,14 +161,25 @@ def event_time(model: CompiledDae, before: Point, events: tuple[Event, ...], beg
     for other, second in found[1:]:
         weights = np.maximum(np.abs(before.x), model.nominals), np.maximum(np.abs(theta), 1.0)
         apart = [
-            np.flatnonzero(np.abs(a - b) * weight > _SAME * max(before.t - begin.t, abs(before.t)))
-            for a, b, weight in zip((trigger.x, trigger.theta), (second.x, second.theta), weights, strict=True)
+            np.flatnonzero(np.abs(part) * weight > _SAME * max(before.t - begin.t, abs(before.t)))
+            for part, weight in zip(_difference(model, before, trigger, second), weights, strict=True)
         ]
         if apart[0].size:
             return When(None, _coincidence(first, other))
         if apart[1].size:
             return When(trigger, _coincidence(first, other), tuple(map(int, apart[1])))
     return When(trigger)
+
+
+def _difference(model: CompiledDae, before: Point, one: Trigger, other: Trigger) -> tuple[Vector, Vector]:
+    """By what two triggers differ, but for motions that modes hold: nothing moves those."""
+    x, theta = one.x - other.x, one.theta - other.theta
+    nodes = [model.holds[k].motion for k in holding(model, before)]
+    if not nodes or not np.any(x):
+        return x, theta
+    held = slopes(model, before, f"held {nodes}", lambda: model.variables(*model.arguments.values())[nodes])
+    parts = np.linalg.lstsq(held.x.T, x, rcond=None)[0]
+    return x - held.x.T @ parts, theta - held.theta.T @ parts
 
 
 def _moment(model: CompiledDae, before: Point, transition: CompiledTransition) -> Trigger:
@@ -215,6 +230,8 @@ class Work:
     x: Vector
     d: Vector
     time: Vector | None = None
+    struck: tuple[Vector, Vector] | None = None
+    entered: set[int] = field(default_factory=set)
 
     @classmethod
     def at(cls, model: CompiledDae, point: Point) -> Work:
@@ -247,6 +264,7 @@ class Work:
             for reset in transition.resets:
                 value, slope = self._reset(reset.value)
                 if reset.kind == "state":
+                    self.struck = None
                     x[reset.index], dx[reset.index] = value / reset.factor, slope / reset.factor
                 elif reset.kind == "discrete":
                     d[reset.index], dd[reset.index] = value, slope
@@ -281,12 +299,16 @@ class Work:
     def _stop_motions(self, before: Vector) -> None:
         """Stop what modes have begun to hold since `before`, also where it stands still already."""
         model, point = self.model, self.point
-        entering = [
-            k for k, one in enumerate(model.holds) if point.d[one.mode] == one.number and before[one.mode] != one.number
-        ]
+        held = holding(model, point)
+        entering = [k for k in held if before[model.holds[k].mode] != model.holds[k].number]
         if not entering:
             return
         strike = Strike(model, point.copy(), entering)
+        if strike.hard:
+            # All impacts at this instant are one, from the speeds before the first.
+            entering = self._begin_again(entering)
+            point = self.point
+            strike = Strike(model, point.copy(), entering)
         strike.run()
         trial = point.copy()
         for k in strike.knocked:
@@ -297,6 +319,19 @@ class Work:
         if struck:
             self.x = self.x + impact(model, trial, struck, partial(self._total, at=trial))
         self.point = strike.point
+
+    def _begin_again(self, entering: list[int]) -> list[int]:
+        """Go back to the states before the first impact, and hold all that has been hit; return what that is."""
+        self.entered.update(entering)
+        if self.struck is None:
+            self.struck = self.point.x, self.x
+        x, self.x = self.struck
+        d = self.point.d.copy()
+        for k in self.entered:
+            d[self.model.holds[k].mode] = self.model.holds[k].number
+        self.point = replace(self.point, x=x.copy(), d=d)
+        self.share()
+        return sorted(self.entered)
 
     def _reset(self, number: int) -> tuple[float, Vector]:
         make = lambda: self.model.resets(*self.model.arguments.values())[number]  # noqa: E731
