@@ -239,7 +239,6 @@ class Strike:
         before = self._motions()
         self.hard = self._is_hard(before, [k for k in self.entering if before[k] != 0.0])
         self.knocked: list[int] = []
-        self.hard = False
 
     def run(self) -> None:
         """Carry out the impact.
