@@ -17,6 +17,7 @@ from modelica_like.errors import InitializationError, SingularAtStart
 from modelica_like.initialize.singular import implicit_singular, is_regular, singular_block
 
 _MAX_NEWTON = 50
+_ROUNDING = 1e-14
 
 
 @dataclass
@@ -57,7 +58,8 @@ def solve_implicit(model: CompiledDae, point: Point) -> None:
         step = np.linalg.solve(jacobian, -residual)
         point.z = point.z + step
         change = float(np.max(np.abs(step) / (1.0 + np.abs(point.z))))
-        if change < 1e-13:
+        # What the largest unknown leaves of a small one when it is rounded does not get smaller.
+        if change < 1e-13 or np.max(np.abs(step)) <= _ROUNDING * np.max(np.abs(point.z)):
             return
     if not change <= 1e-9:
         raise InitializationError(

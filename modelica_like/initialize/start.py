@@ -102,7 +102,7 @@ class StartProblem:
         y = np.zeros(plan.system.function.size1_out(0))
         nx, ny = len(model.states), len(y)
         state = np.concatenate([point.x, y, point.z])
-        error = np.zeros(len(target))
+        error, sizes = np.zeros(len(target)), np.zeros(len(target))
         system = _Evaluation(model, plan)
         for _ in range(_MAX_NEWTON):
             matrix, values = system(
@@ -111,9 +111,10 @@ class StartProblem:
             error = values - target
             step = _solve(matrix, -error)
             state[columns] += step
+            sizes = _sizes(matrix, state[columns])
             if step.size == 0 or np.max(np.abs(step) / (1.0 + np.abs(state[columns]))) < 1e-13:
                 break
-        if not np.all(np.isfinite(state)) or np.max(np.abs(error) / (1.0 + np.abs(target)), initial=0.0) > _CONSISTENT:
+        if not np.all(np.isfinite(state)) or np.max(np.abs(error) / (1.0 + sizes), initial=0.0) > _CONSISTENT:
             raise self._not_found(plan, point)
         point.x, point.z = state[:nx], state[nx + ny :]
 
@@ -177,6 +178,13 @@ def _dense_values(system: ca.Function) -> ca.Function:
     arguments = system.mx_in()
     own, jacobian, values = system(*arguments)
     return ca.Function("start", arguments, [own, jacobian, ca.densify(values)])
+
+
+def _sizes(matrix: Any, state: Vector) -> Vector:
+    """Sizes of the terms of every row: what rounding is measured by."""
+    if isinstance(matrix, ca.DM):
+        return np.array(ca.mtimes(ca.fabs(matrix), ca.DM(np.abs(state)))).ravel()
+    return np.asarray(np.abs(matrix) @ np.abs(state))
 
 
 def _solve(matrix: Any, right: Vector) -> Vector:
