@@ -32,6 +32,7 @@ class Freewheel(CompliantWithRelativeStates):
     phi_rel: Variable = var("rad", "relative angle, flange_b.phi - flange_a.phi", state="prefer", default=0)
     w_rel: Variable = var("rad/s", "overrunning speed", state="always")
     slow: Parameter = param("rad/s", "speed up to which falling behind may be rounding", default=1e-9, min=0)
+    soon: Parameter = param("s", "time in which it must reach that speed to count as falling", default=1.0, min=0)
     faint: Parameter = param("N.m", "torque up to which what releases it may be rounding", default=1e-9, min=0)
     mode = Mode(
         "overrunning", "locked", description="state of the freewheel",
@@ -50,7 +51,7 @@ class Freewheel(CompliantWithRelativeStates):
         yield self.mode.initially("locked", when=all_of(self.w_rel <= 0, self.w_rel >= 0))
         yield self.mode.go("locked", "overrunning", when=self.tau > self.faint)
         # Just after the release the speed is zero but for rounding; whether it falls decides.
-        falling = all_of(self.w_rel < 0, any_of(der(self.w_rel) < 0, self.w_rel < -self.slow))
+        falling = all_of(self.w_rel < 0, any_of(self.soon * der(self.w_rel) < -self.slow, self.w_rel < -self.slow))
         yield self.mode.go("overrunning", "locked", when=falling)
 
 

@@ -237,7 +237,8 @@ class Strike:
         self.impacts: list[Impact] = []
         self.loose: list[int] = []
         before = self._motions()
-        self.hard = self._is_hard(before, [k for k in self.entering if before[k] != 0.0])
+        self.stopping = self._stopping(before, [k for k in self.entering if before[k] != 0.0])
+        self.hard = bool(self.stopping)
         self.knocked: list[int] = []
 
     def run(self) -> None:
@@ -264,15 +265,16 @@ class Strike:
         if self.hard:
             self._book(before, impulses, approaches)
 
-    def _is_hard(self, before: Vector, moving: list[int]) -> bool:
-        """Whether more is stopped than what rounding and the location of events leave."""
+    def _stopping(self, before: Vector, moving: list[int]) -> set[int]:
+        """Motions of which more is stopped than what rounding and the location of events leave."""
         model, variables = self.model, np.abs(call(self.model, self.model.variables, self.point))
+        found: set[int] = set()
         for k in moving:
             own = model.flat_variables[model.holds[k].motion]
             same = [n for n, one in enumerate(model.flat_variables) if one.unit == own.unit]
             if abs(before[k]) > ROUNDING * max(float(variables[same].max()), own.nominal):
-                return True
-        return False
+                found.add(k)
+        return found
 
     def _book(self, before: Vector, impulses: dict[int, float], approaches: dict[int, float]) -> None:
         """Note what was lost, and what has got another motion."""
@@ -317,7 +319,7 @@ class Strike:
             own = self.model.holds[k]
             forward, backward = table[k, 1:3]
             capacity, sign = (forward, 1.0) if impulse > 0.0 else (backward, -1.0)
-            if capacity >= UNLIMITED or own.loose < 0 or (k in self.entering and max(forward, backward) < UNLIMITED):
+            if capacity >= UNLIMITED or own.loose < 0 or (k in self.stopping and max(forward, backward) < UNLIMITED):
                 continue
             margin = max(capacity - sign * reactions[k], 0.0) * instant
             if abs(impulse) > margin + _SAYS_NOTHING * scale:

@@ -36,7 +36,7 @@ CLOSURE = 1e-12
 """Largest part of the throughput that the product's own balance may miss."""
 LOSS = 1e-8
 """Largest error of the dissipated energy, relative to the throughput."""
-NOTHING = 1e-20
+NOTHING = 1e-18
 """Energy in J that is nothing but rounding."""
 RTOL = 1e-9
 """Relative tolerance of the runs: tighter than what is demanded of them."""
