@@ -21,6 +21,8 @@ _INSTANT = 1e-9
 _STIFF = 1e5
 """Reaction with which a motion that contradicts its being held counts, over the inertia that is held."""
 _LARGE, _SMALL = 1e3, 1e-3
+_BEARABLE = 0.99
+"""Part of its capacity that an element may bear in a split: just below, lest rounding lets it go."""
 _SPLITS, _TURNED = 20, 100.0
 """Trials to find a split that all can bear, and by how much the weights may change in all of them."""
 _SAYS_NOTHING = 1e-12
@@ -92,7 +94,7 @@ def share(model: CompiledDae, point: Point) -> None:
         worst = float(np.max(use, initial=0.0))
         if worst < least:
             best, least = point.d.copy(), worst
-        if worst <= 1.0 or not np.isfinite(worst):
+        if worst <= _BEARABLE or not np.isfinite(worst):
             break
         weights = np.where(use > 0.0, np.clip(weights * use, base / _TURNED, base * _TURNED), base)
     point.d = best

@@ -93,7 +93,8 @@ class EventLoop:
         if not self.guards.count or not self._search(looks):
             self._keep(looks, float(looks.times[-1]), looks.count)
             self._arrive(looks)
-        if self.now.t == stop:
+        if just_after(self.now.t) >= stop:
+            self.now.t = stop
             if self.record.last != stop:
                 self.record.add(np.array([stop]), self.now.x[:, None], self.now.z[:, None])
             if self.instants.due(self.now):
