@@ -37,7 +37,7 @@ SMALL = {
     # The same motion is held more than once.
     "parallel clutches": drive((1, 1), (1, 0), clutch("c", 0, 1), clutch("d", 0, 1)),
     "parallel clutches at rest": drive((1, 1), (0, 0), clutch("c", 0, 1), clutch("d", 0, 1), t0=1.0),
-    "parallel clutches that break away": drive((1, 1), (0, 0), clutch("c", 0, 1), clutch("d", 0, 2), t0=7.0),
+    "parallel clutches that break away": drive((1, 1), (0, 0), clutch("c", 0, 1), clutch("d", 0, 1, 2), t0=7.0),
     "clutch between braked shafts": drive((1, 1), (0, 0), clutch("c", 0, 1), brake("b", 0), brake("d", 1)),
     "clutch between braked shafts, driven": drive(
         (1, 1), (0, 0), clutch("c", 0, 1), brake("b", 0), brake("d", 1), t0=1.5

@@ -51,7 +51,7 @@ def test_coefficient_from_a_table(kind: type[Component]) -> None:
 def test_smooth_table_meets_its_rows_without_overshoot() -> None:
     for speed, mu in MU:
         run = simulate(
-            shaft(motor=ConstantSpeed(w_fixed=speed + 1e-12), brake=Brake(fn_max=1.0, mu_pos=MU, smooth=True)), "1 ms"
+            shaft(motor=ConstantSpeed(w_fixed=speed + 1e-9), brake=Brake(fn_max=1.0, mu_pos=MU, smooth=True)), "1 ms"
         )
         assert run["brake.tau"][0] == pytest.approx(mu, abs=1e-9)
     between = simulate(shaft(motor=ConstantSpeed(w_fixed=4.0), brake=Brake(fn_max=1.0, mu_pos=MU, smooth=True)), "1 ms")
