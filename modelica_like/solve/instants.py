@@ -101,6 +101,7 @@ class Instants:
         """
         if not wanting:
             return
+        noted = len(self.record.events)
         self._struck, self._entered = None, set()
         wanting = self._share_anew(now, wanting)
         alone = self.options.iterations + _ALONE * len(self.model.holds)
@@ -118,7 +119,8 @@ class Instants:
         else:
             raise self._chattering(f"Modes still switch after {alone} rounds at one instant")
         self.note_sharing(now)
-        self._instants.append(now.t)
+        if len(self.record.events) > noted:
+            self._instants.append(now.t)
         if len(self._instants) == _CHATTER_INSTANTS and now.t - self._instants[0] < _CHATTER_WINDOW * self.span:
             raise self._chattering("Events follow each other ever faster")
         if len(self.record.events) > self.options.max_events:
@@ -184,6 +186,7 @@ class Instants:
             self._hold_again(now)
             strike = Strike(self.model, now, self._entered)
         strike.run()
+        self._entered.difference_update(strike.knocked)
         if strike.impacts:
             self.record.impacts[self._impacts :] = strike.impacts
         if strike.loose:
