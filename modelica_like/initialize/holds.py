@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -26,6 +26,7 @@ _BEARABLE = 0.99
 _SPLITS, _TURNED = 20, 100.0
 """Trials to find a split that all can bear, and by how much the weights may change in all of them."""
 _SAYS_NOTHING = 1e-12
+_TRIALS = 50
 _FELT = 1e-9
 """Change of a motion, relative to the largest one in an impact, from which on it is no rounding."""
 
@@ -253,13 +254,14 @@ class Strike:
         moving = [k for k in sorted(self.entering) if before[k] != 0.0]
         table = terms(model, point)
         restitution = table[:, 3]
-        while True:
+        for _ in range(_TRIALS):
             approaches = {k: -(1.0 + restitution[k]) * before[k] / _INSTANT for k in moving if k not in self.loose}
             jump, impulses, reactions = self._response(approaches)
             unbearable = self._unbearable(table, impulses, reactions) if self.hard else []
-            if not unbearable:
+            again = [] if unbearable else self._approaching(table, jump)
+            if not (unbearable or again):
                 break
-            self.loose += unbearable
+            self.loose = [k for k in (*self.loose, *unbearable) if k not in again]
         self.knocked = list(self.loose)
         point.x = point.x + jump
         self._stop(before, restitution)
@@ -325,6 +327,21 @@ class Strike:
                 continue
             margin = max(capacity - sign * reactions[k], 0.0) * instant
             if abs(impulse) > margin + _SAYS_NOTHING * scale:
+                found.append(k)
+        return found
+
+    def _approaching(self, table: Any, jump: Vector) -> list[int]:
+        """What was let go and would now move on against what nothing limits."""
+        if not self.loose:
+            return []
+        after = replace(self.point, x=self.point.x + jump)
+        motions = call(self.model, self.model.variables, after)
+        found: list[int] = []
+        for k in self.loose:
+            motion, (forward, backward) = motions[self.model.holds[k].motion], table[k, 1:3]
+            nominal = self.model.flat_variables[self.model.holds[k].motion].nominal
+            against = forward if motion > 0.0 else backward
+            if against >= UNLIMITED and abs(motion) > ROUNDING * nominal and k in self.entering:
                 found.append(k)
         return found
 
