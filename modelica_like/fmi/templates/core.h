@@ -274,6 +274,7 @@ void mark_held(Instance *c, const Terms *terms, unsigned char *held);
 double largest_like(const double *values, int node);
 void share(Instance *c);
 void rest(Instance *c);
+void rest_rates(Instance *c, double *rates);
 
 /* impacts.c */
 typedef struct { /* at one instant: what has been stopped, and the states before the first impact */
