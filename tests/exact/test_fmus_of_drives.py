@@ -1,7 +1,5 @@
 """FMUs of drives with loops against the exact solver."""
 
-from pathlib import Path
-
 import pytest
 from exact_drives import run_exactly
 from random_drives import assembly, random_drive
@@ -18,7 +16,7 @@ STILL = 1e-9
 
 
 @pytest.mark.parametrize("name", DRIVES)
-def test_both_kinds_end_at_the_exact_speeds(name: str, tmp_path: Path) -> None:
+def test_both_kinds_end_at_the_exact_speeds(name, tmp_path):
     drive = DRIVES[name]
     exact, product = run_exactly(drive), assembly(drive)
     product.simulate.update(start="rest", until=drive.until)

@@ -1,7 +1,5 @@
 """FMUs at the edges of what holds and what turns: agreement with the simulation, and no detours."""
 
-from pathlib import Path
-
 import pytest
 
 from components import Constant, FirstOrder, Force, Inertia, MassWithStopAndFriction, Step, Torque
@@ -11,7 +9,7 @@ from modelica_like.fmi.run import run_fmu
 
 
 @pytest.mark.parametrize("kind", ["me", "cs"])
-def test_a_state_named_after_a_variable_with_the_other_sign(tmp_path: Path, kind: str) -> None:
+def test_a_state_named_after_a_variable_with_the_other_sign(tmp_path, kind):
     """The torque on the flange is minus the signal: w = t - T (1 - exp(-t/T)) for J = 1 kg.m2 and 1 N.m."""
     parts = {"one": Constant(k="1 N.m"), "lag": FirstOrder(T="0.1 s"), "torque": Torque(), "rotor": Inertia(J=1.0)}
     wires = {
@@ -31,7 +29,7 @@ def test_a_state_named_after_a_variable_with_the_other_sign(tmp_path: Path, kind
 
 @pytest.mark.parametrize(("side", "sign"), [("left", 1.0), ("right", -1.0)])
 @pytest.mark.parametrize("kind", ["me", "cs"])
-def test_a_mass_leaves_its_stop_at_once(tmp_path: Path, side: str, sign: float, kind: str) -> None:
+def test_a_mass_leaves_its_stop_at_once(tmp_path, side, sign, kind):
     """It stops at a position that binary numbers do not have; a rounding beyond, it is not caught again."""
     parts = {
         "step": Step(height=9.0 * sign, start_time=3.3, offset=-3.0 * sign),

@@ -6,7 +6,7 @@
 
 #define DEPENDENT 1e-9
 #define CANCELLED 1e-14 /* what is left of the largest numbers where they cancel */
-#define STIFF 1e5 /* reaction with which a motion that contradicts its being held counts, over the inertia */
+#define STIFF 1e5       /* reaction with which a motion that contradicts its being held counts, over the inertia */
 #define LARGE 1e3
 #define SPLITS 20 /* trials to find a split that all can bear */
 #define TURNED 100.0
