@@ -237,7 +237,8 @@ class MassWithStopAndFriction(SlideSticking, DryFriction):
     def events(self) -> Events:
         mode, stop = self.mode, self.stop
         for side, end in (("left", self.smin + 0.5 * self.L), ("right", self.smax - 0.5 * self.L)):
-            beyond = self.s < end if side == "left" else self.s > end
+            # Where it leaves, it may still be a rounding beyond.
+            beyond = all_of(self.s < end, self.v < 0) if side == "left" else all_of(self.s > end, self.v > 0)
             there = all_of(self.s <= end, self.v <= 0) if side == "left" else all_of(self.s >= end, self.v >= 0)
             yield mode.initially("stuck", when=there)
             yield stop.initially(side, when=there)

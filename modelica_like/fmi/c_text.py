@@ -90,7 +90,6 @@ def header(tables: Tables, variables: Sequence[FmuVariable], tolerance: float) -
         "N_START_DEFAULT": len(start.defaults),
         "N_START_X_GUESS": len(start.x_guesses),
         "N_START_Z_GUESS": len(start.z_guesses),
-        "N_START_ROWS": len(start.rows),
         "N_START_DEPENDENT": len(start.dependent),
         "N_START_ZERO": len(start.zero),
         "N_START_UNKNOWNS": len(start.columns),

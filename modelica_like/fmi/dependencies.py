@@ -139,6 +139,8 @@ class Dependencies:
         ny = tables.system.size1_out(0)
         offsets = {"x": 0, "y": nx, "z": nx + ny}
         given = {row: position for position, _, row in tables.rows if position != AT_REST}
+        # Reactions that modes leave open stay at their guesses.
+        guessed = {nx + ny + z: self._start_value(position) for z, position, _ in tables.z_guesses}
         every = sparsity_rows(tables.system, output=2) if tables.columns else []
         own: list[set[int]] = []
         outer: Rows = []
@@ -146,7 +148,8 @@ class Dependencies:
             columns = {offsets[name] + k for name, k in every[row] if name in offsets}
             own.append({place[column] for column in columns if column in place})
             known = {one for one in every[row] if one[0] in "tpu"}
-            known = known.union(*(direct[column] for column in columns if column not in place))
+            outside = columns.difference(place)
+            known = known.union(*(direct[k] if k < nx else guessed.get(k, set()) for k in outside))
             outer.append(known | (self._start_value(given[row]) if row in given else set()))
         return solved_rows(own, outer, len(tables.columns))
 

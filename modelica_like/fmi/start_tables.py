@@ -28,8 +28,8 @@ class StartTables:
         defaults: the same for defaults of states; only the steady start uses them.
         x_guesses: (state, start value, factor) of guesses.
         z_guesses: (implicit unknown, start value, factor) of guesses.
-        rows: (start value, variable, row of the start system) of start values that are equations; for a variable at
-            rest the start value is `AT_REST`.
+        rows: (start value, variable, row of the start system) of all equations between the unknowns; of explicit and
+            implicit ones, and of variables at rest, the start value is `AT_REST`.
         dependent: the same for start values that must follow from the others.
         system: the start system.
         zero: states that begin at zero because nothing else is said.
@@ -74,6 +74,7 @@ def start_tables(model: CompiledDae) -> StartTables:
     def as_rows(numbers: tuple[int, ...]) -> list[tuple[int, int, int]]:
         return [(k, model.starts[k].node, row_of[model.starts[k].node]) for k in numbers]
 
+    resting = ((AT_REST, node, row_of[node]) for node in plan.resting)
     names = {name: k for k, name in enumerate(model.implicit)}
     near = [(names.get(start_name(model, e)), k) for k, e in enumerate(model.starts) if _is_near(e)]
     return StartTables(
@@ -81,7 +82,7 @@ def start_tables(model: CompiledDae) -> StartTables:
         defaults=of_states("default"),
         x_guesses=of_states("guess"),
         z_guesses=tuple((position, k, 1.0) for position, k in near if position is not None),
-        rows=(*as_rows(plan.rows), *((AT_REST, node, row_of[node]) for node in plan.resting)),
+        rows=(*((AT_REST, 0, row) for row in plan.wanted[: plan.own]), *as_rows(plan.rows), *resting),
         dependent=tuple(as_rows(plan.dependent)),
         system=plan.system.function,
         zero=plan.zero,

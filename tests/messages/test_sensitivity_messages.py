@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from modelica_like import build, load, sensitivities, simulate, simulation_function
+from components import Freewheel, Inertia
+from modelica_like import Assembly, build, load, sensitivities, simulate, simulation_function
 from modelica_like.analyse.replay.chain import replay
 from modelica_like.errors import LanguageError, ModelicaLikeError, NoGradient, StepFailed, UnknownName, ValueOutOfRange
 from modelica_like.language import Component, Equations, Events, Mode, Parameter, Variable, der, param, sin, var
@@ -32,6 +33,14 @@ class Touch(Component):
 
     def events(self) -> Events:
         yield self.mode.go("below", "above", when=self.x > self.level)  # touch
+
+
+def lagging() -> Assembly:
+    """5 rad/s fall into a freewheel that drives 2 kg.m2: 25/2 J become 25/6 J."""
+    parts = {"front": Inertia(J=1.0, w=5.0), "freewheel": Freewheel(), "back": Inertia(J=2.0, w=0.0)}
+    drive = Assembly("lagging", parts=parts, series={"shaft": [*parts]})
+    drive.simulate.update(start="rest", until=1.0)
+    return drive
 
 
 class Race(Component):
@@ -151,6 +160,10 @@ clutch.mode has no mode 'stack'; did you mean 'stuck'? It has free, stuck, start
     "a mode change that is not written as one": (UnknownName, lambda: table("time(clutch.mode)"), """\
 'time(clutch.mode)' does not say which mode change.
 Write time(clutch.mode: forward -> stuck), and a number if it happens again: time(clutch.mode -> stuck, 2)."""),
+    "an energy with an impact": (NoGradient, lambda: sensitivities(lagging(), ["freewheel.loss_energy"], ["front.J"]), """\
+No gradient of freewheel.loss_energy: freewheel loses 8.33333 J in an impact at t = 0 s.
+Only the loss of power over time is differentiated, not what an impact takes at once.
+Ask for integral(freewheel.loss_power), which leaves impacts out, or for speeds after the impact."""),
     "a mode change that does not happen": (UnknownName, lambda: table("time(clutch.mode -> stuck, 2)"), """\
 'time(clutch.mode -> stuck, 2)' does not happen after the start of the run.
 clutch.mode changes: backward → stuck at 0.2 s."""),

@@ -15,7 +15,7 @@ from modelica_like.analyse.replay.slopes import slopes
 from modelica_like.analyse.replay.sweeps import Reading
 from modelica_like.analyse.sensitivity.peaks import peak
 from modelica_like.compile.compiled import CompiledDae
-from modelica_like.errors import UnknownName, ValueOutOfRange, did_you_mean
+from modelica_like.errors import NoGradient, UnknownName, ValueOutOfRange, did_you_mean
 from modelica_like.solve.recorder import Event
 from modelica_like.solve.solution import Solution
 from modelica_like.units import Unit, coherent, parse_unit, to_si
@@ -168,6 +168,7 @@ def read_off(solution: Solution, replay: Replay, outputs: Sequence[Output]) -> l
         NoGradient: it has no derivative.
     """
     integrals = [one for one in outputs if one.kind == "integral"]
+    _check_impacts(solution, integrals)
     return [
         _integral(replay, integrals.index(one), len(integrals)) if one.kind == "integral"
         else _event_time(solution, replay, one) if one.kind == "time"
@@ -176,6 +177,21 @@ def read_off(solution: Solution, replay: Replay, outputs: Sequence[Output]) -> l
         else value_at(replay, one.path, len(replay.nodes) - 1)
         for one in outputs
     ]  # fmt: skip
+
+
+def _check_impacts(solution: Solution, integrals: Sequence[Output]) -> None:
+    """Refuse energies of which an impact takes a part at once: an integral knows nothing of it."""
+    for output in integrals:
+        owner, _, last = output.path.rpartition(".")
+        found = [one for one in solution.impacts if owner in ("", one.component)] if last == "loss_energy" else []
+        if found:
+            raise NoGradient(
+                f"No gradient of {output.name}: {found[0].component} loses {found[0].energy:.6g} J in an impact at "
+                f"t = {found[0].time:.9g} s.",
+                why="Only the loss of power over time is differentiated, not what an impact takes at once.",
+                advice=f"Ask for integral({output.path.removesuffix('energy')}power), which leaves impacts out, or for "
+                "speeds after the impact.",
+            )
 
 
 def value_at(replay: Replay, path: str, node: int, probe: Step | None = None, jump: int | None = None) -> Reading:

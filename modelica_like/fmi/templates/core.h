@@ -29,6 +29,9 @@ OLD(fmod);
 #endif
 
 #define TIME_RESOLUTION 1e-10 /* as in guards_soon */
+#define JUST_TRUE 1e-300      /* as in conditions.py */
+#define NOISE 1e-30           /* a decaying signal ends by swinging around zero with such values; that is no event */
+#define CROWD 24              /* further instants in a short time follow each other ever faster */
 #define AT_LEAST_ONE(n) ((n) > 0 ? (n) : 1)
 #define N_UNKNOWNS (N_X + N_Z)
 #define SLOT_T 0
@@ -195,8 +198,9 @@ typedef struct {
     double tolerance, start_time, stop_time;
     int stop_time_defined;
     Piece piece;
-    double step; /* next step size, 0: choose one */
-    double last_event, events_since;
+    double step;            /* next step size, 0: choose one */
+    double instants[CROWD]; /* of the last events, in a circle */
+    int n_instants;
     double n_steps, n_rejected, n_events;
 } State;
 
@@ -270,6 +274,7 @@ void mark_held(Instance *c, const Terms *terms, unsigned char *held);
 double largest_like(const double *values, int node);
 void share(Instance *c);
 void rest(Instance *c);
+void rest_rates(Instance *c, double *rates);
 
 /* impacts.c */
 typedef struct { /* at one instant: what has been stopped, and the states before the first impact */

@@ -8,10 +8,13 @@
 #define ALONE 6    /* further rounds per motion that may be held, in which only one fires */
 #define BALANCED 1e-3
 #define SAME_TIME 1e-12
-#define CROWD 200
-#define CROWDED_TIME 1e-9
+#define CROWDED 1e-6 /* of the run: in less time, CROWD further instants follow each other ever faster */
 
-double number_or_false(double guard) { return isnan(guard) ? -1 : guard; }
+/* A guard that is not a number is false; what is nothing but rounding is zero. */
+double number_or_false(double guard) {
+    if (isnan(guard)) return -1;
+    return fabs(guard) < NOISE && fabs(guard) > JUST_TRUE ? 0 : guard;
+}
 
 static int is_source(const State *s, const Transition *one) {
     double mode = s->d[one->mode];
@@ -121,13 +124,13 @@ static void fire(Instance *c, const unsigned char *wanting, Impacts *impacts) {
     if (count > 0) project(c, targets, targets_value, count);
 }
 
+/* Notes an instant; an error where the last ones came ever faster. */
 static Result crowded(Instance *c) {
     State *s = &c->state;
-    if (s->t - s->last_event > CROWDED_TIME * fmax(1, fabs(s->t))) {
-        s->last_event = s->t;
-        s->events_since = 0;
-    }
-    if (++s->events_since <= CROWD) return RESULT_OK;
+    double span = s->stop_time_defined ? s->stop_time - s->start_time : 1;
+    double first = s->instants[s->n_instants % CROWD]; /* CROWD instants ago, once there were so many */
+    s->instants[s->n_instants % CROWD] = s->t;
+    if (++s->n_instants <= CROWD || s->t - first >= CROWDED * span) return RESULT_OK;
     return report(c, LOG_ERROR, RESULT_ERROR,
         "Events follow each other ever faster at t = %.12g s. Give the switching a hysteresis, or smooth it.", s->t);
 }

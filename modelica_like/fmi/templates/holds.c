@@ -5,7 +5,8 @@
 #include "core.h"
 
 #define DEPENDENT 1e-9
-#define STIFF 1e5 /* reaction with which a motion that contradicts its being held counts, over the inertia */
+#define CANCELLED 1e-14 /* what is left of the largest numbers where they cancel */
+#define STIFF 1e5       /* reaction with which a motion that contradicts its being held counts, over the inertia */
 #define LARGE 1e3
 #define SPLITS 20 /* trials to find a split that all can bear */
 #define TURNED 100.0
@@ -43,6 +44,24 @@ void rest(Instance *c) {
         const Held *one = &model_holds[k];
         if (!held[k] || one->state < 0) continue;
         if (fabs(values[one->motion]) <= ROUNDING * largest_like(values, one->motion)) s->x[one->state] = 0;
+    }
+}
+
+/* Put rates of held motions that are zero but for rounding at zero: an importer's solver takes differences of rates for
+ * a Jacobian, and what is nothing but rounding then counts as very stiff. */
+void rest_rates(Instance *c, double *rates) {
+    const State *s = &c->state;
+    Terms terms[AT_LEAST_ONE(N_HOLDS)];
+    unsigned char held[AT_LEAST_ONE(N_HOLDS)];
+    double largest = 0;
+    if (N_HOLDS == 0) return;
+    hold_terms(c, terms);
+    mark_held(c, terms, held);
+    for (int k = 0; k < N_X; k++) largest = fmax(largest, fabs(rates[k]));
+    for (int k = 0; k < N_Z; k++) largest = fmax(largest, fabs(s->z[k]));
+    for (int k = 0; k < N_HOLDS; k++) {
+        int state = model_holds[k].state;
+        if (held[k] && state >= 0 && fabs(rates[state]) <= CANCELLED * largest) rates[state] = 0;
     }
 }
 

@@ -49,7 +49,7 @@ static double cubic(double s, double g0, double r0, double g1, double r1) {
 /* Does the cubic through both ends come near zero from below in between? */
 static int is_hump(double g0, double r0, double g1, double r1) {
     double top = -INFINITY;
-    if (!(g0 <= 0 && g1 <= 0 && r0 > 0 && r1 < 0)) return 0;
+    if (!(g0 <= 0 && g1 <= 0 && r0 > NOISE && r1 < -NOISE)) return 0;
     for (int k = 1; k < 20; k++) top = fmax(top, cubic(k / 20.0, g0, r0, g1, r1));
     return top > -NEAR * (fabs(g0) + fabs(g1));
 }

@@ -138,7 +138,8 @@ void piece_at(const Piece *piece, double t, double *point) {
                    s * (piece->last[k] + r * (piece->dense[0][k] + s * (piece->dense[1][k] + s * piece->dense[2][k])));
 }
 
-/* A first step at which states change by a hundredth (Hairer, Norsett & Wanner I, II.4). */
+/* A first step at which states change by a hundredth (Hairer, Norsett & Wanner I, II.4); states that are nothing but
+ * rounding tell nothing about it. */
 double first_step(Instance *c) {
     const State *s = &c->state;
     double size, speed, *rates = c->work.rhs;
@@ -146,5 +147,6 @@ double first_step(Instance *c) {
     size = error_norm(c, s->x, s->x, s->x);
     speed = error_norm(c, s->x, s->x, rates);
     if (!isfinite(speed) || N_X == 0) return 1e-3;
-    return size < 1e-5 || speed < 1e-5 ? 1e-6 : 0.01 * size / speed;
+    if (size < 1e-5 || speed < 1e-5) return 1e-6;
+    return fmax(0.01 * size / speed, TIME_RESOLUTION * fmax(1, fabs(s->t)));
 }

@@ -66,10 +66,9 @@ static Result solve_start_system(Instance *c, const double *values) {
         tape_run(&tape_start_jacobian, c->work.slots, c->work.jacobian);
         error = 0;
         for (int k = 0; k < N_START_UNKNOWNS; k++) {
-            int own = k < N_Y + N_Z, given = own ? AT_REST : model_start_rows[k - N_Y - N_Z].start;
-            int row = own ? k : model_start_rows[k - N_Y - N_Z].row;
+            int given = model_start_rows[k].start;
             double target = given == AT_REST ? 0 : values[given];
-            step[k] = residual[row] - target;
+            step[k] = residual[model_start_rows[k].row] - target;
             error = fmax(error, isfinite(step[k]) ? fabs(step[k]) / (1 + fabs(target)) : INFINITY);
         }
         if (!isfinite(error) || !qr_factor(&pattern_start, c->work.jacobian, &c->work)) {
@@ -107,8 +106,7 @@ static Result solve_states(Instance *c) {
     State *s = &c->state;
     const double *values = c->work.start_values;
     if (apply_direct(c, values) != RESULT_OK) return RESULT_ERROR;
-    if (N_START_UNKNOWNS > N_Y + N_Z || N_START_ROWS > 0 || N_START_ZERO > 0)
-        if (solve_start_system(c, values) != RESULT_OK) return RESULT_ERROR;
+    if (N_START_UNKNOWNS > 0 && solve_start_system(c, values) != RESULT_OK) return RESULT_ERROR;
     if (solve_implicit(c, s->t, s->x, s->z, 0) != RESULT_OK) return RESULT_ERROR;
     return check_dependent(c, values);
 }

@@ -86,6 +86,7 @@ void get_derivatives(Instance *c, double *derivatives) {
     State *s = &c->state;
     evaluate(c, &tape_rates, s->t, s->x, s->z, c->work.rhs);
     memcpy(derivatives, c->work.rhs, N_X * sizeof(double));
+    rest_rates(c, derivatives);
 }
 
 /* Guards of active modes, as event iteration judges them: an indicator above zero is an event that wants to fire, so
