@@ -20,17 +20,15 @@ _EPS = float(np.finfo(float).eps)
 
 
 class _Places:
-    """Start values of states, and where they go."""
+    """Start values, and where they go: (number, position, factor) of each."""
 
-    def __init__(self, chosen: list[StartEntry], numbers: dict[int, int]) -> None:
-        states = [entry.state for entry in chosen if entry.state is not None]
-        self._numbers = np.array([numbers[id(entry)] for entry in chosen], int)
-        self._states = np.array([position for position, _ in states], int)
-        self._factors = np.array([factor for _, factor in states], float)
+    def __init__(self, places: list[tuple[int, int, float]]) -> None:
+        self._numbers, self._positions = (np.array([place[k] for place in places], int) for k in (0, 1))
+        self._factors = np.array([factor for *_, factor in places], float)
 
-    def put(self, x: Vector, given: Vector) -> None:
-        """Write them into the states; of several for one the last counts."""
-        x[self._states] = given[self._numbers] / self._factors
+    def put(self, unknowns: Vector, given: Vector) -> None:
+        """Write them into the states, or implicit unknowns; of several for one the last counts."""
+        unknowns[self._positions] = given[self._numbers] / self._factors
 
 
 class _Entries:
@@ -40,7 +38,7 @@ class _Entries:
         numbers: position of every one, by its identity.
         direct: by state, the first fixed one.
         fixed, guesses, defaults: of states.
-        implicit: guesses and fixed ones of variables that are no states.
+        implicit: guesses and fixed ones of implicit unknowns, which begin where they are to be.
         again: fixed ones of states that another has fixed before.
     """
 
@@ -53,10 +51,16 @@ class _Entries:
                 self.direct.setdefault(entry.state[0], entry)
         first = {id(entry) for entry in self.direct.values()}
         self.again = [entry for entry in of_states if entry.strength == "fixed" and id(entry) not in first]
-        self.implicit = [e for e in model.starts if e.state is None and e.strength in ("guess", "fixed")]
-        self.fixed = _Places(list(self.direct.values()), self.numbers)
-        self.guesses = _Places([e for e in of_states if e.strength == "guess"], self.numbers)
-        self.defaults = _Places([e for e in of_states if e.strength == "default"], self.numbers)
+        self.fixed = self._of_states(list(self.direct.values()))
+        self.guesses = self._of_states([e for e in of_states if e.strength == "guess"])
+        self.defaults = self._of_states([e for e in of_states if e.strength == "default"])
+        position = {name: k for k, name in enumerate(model.implicit)}
+        begins = [e for e in model.starts if e.state is None and e.strength in ("guess", "fixed")]
+        named = [(self.numbers[id(e)], start_name(model, e)) for e in begins]
+        self.implicit = _Places([(number, position[name], 1.0) for number, name in named if name in position])
+
+    def _of_states(self, chosen: list[StartEntry]) -> _Places:
+        return _Places([(self.numbers[id(entry)], *entry.state) for entry in chosen if entry.state is not None])
 
 
 class StartProblem:
@@ -76,8 +80,7 @@ class StartProblem:
         self._entries: _Entries = model._cache["start entries"]
         self.direct = self._entries.direct
         self._entries.guesses.put(point.x, self.given)
-        for entry in self._entries.implicit:
-            self._guess(point, entry)
+        self._entries.implicit.put(point.z, self.given)
         for entry in self._entries.again:
             self._compare(entry)
 
@@ -92,11 +95,6 @@ class StartProblem:
         """Value of the state that the variable is up to a factor."""
         assert entry.state is not None
         return self.value(entry) / entry.state[1]
-
-    def _guess(self, point: Point, entry: StartEntry) -> None:
-        """Let an implicit unknown begin at its guess, or where it is to be."""
-        if self._name(entry) in self.model.implicit:
-            point.z[self.model.implicit.index(self._name(entry))] = self.value(entry)
 
     def _compare(self, entry: StartEntry) -> None:
         """Compare a start value with the earlier one of the same motion."""
