@@ -25,6 +25,7 @@ class BufferedFunction:
         self.function = function
         wanted = range(function.n_out()) if results is None else results
         self._arguments = [np.zeros(function.nnz_in(k)) for k in range(function.n_in())]
+        self._filled = [(k, array) for k, array in enumerate(self._arguments) if array.size]
         self._results = [np.zeros(function.nnz_out(k)) for k in wanted]
         self._buffer, self._evaluate = function.buffer()
         self._everywhere: dict[int, Any] = {}
@@ -35,8 +36,8 @@ class BufferedFunction:
 
     def __call__(self, *arguments: Any) -> list[Vector]:
         """Evaluate; arguments and results are flat (columns one after the other)."""
-        for array, value in zip(self._arguments, arguments, strict=False):
-            array[:] = value
+        for k, array in self._filled:
+            array[:] = arguments[k]
         self._evaluate()
         return [array.copy() for array in self._results]
 

@@ -9,6 +9,7 @@ from typing import Any, Literal
 import casadi as ca
 import numpy as np
 
+from modelica_like.compile.buffers import buffered
 from modelica_like.compile.compiled import CompiledDae, StartEntry, StartSystem, Vector
 from modelica_like.errors import MissingStart
 from modelica_like.initialize.matching import Elimination, Matching
@@ -80,11 +81,23 @@ def start_plan(model: CompiledDae, kind: StartKind, point: Point) -> StartPlan:
     if key not in model._cache:
         model._cache[key] = _Choice(model, kind).plan(None)
     plan: StartPlan = model._cache[key]
-    if plan.columns and not _regular(_matrix(model, plan, point)):
+    if plan.columns and not _is_regular(model, plan, point):
         matrix = _generic_matrix(model, plan.system, point)
         if matrix is not None:
             return _Choice(model, kind).plan(matrix)
     return plan
+
+
+def _is_regular(model: CompiledDae, plan: StartPlan, point: Point) -> bool:
+    """Tell whether the plan's matrix is far from singular; one that was found to be is not looked at again."""
+    matrix, key = _matrix(model, plan, point), ("regular start", plan.kind)
+    entries = np.array(matrix.nonzeros())
+    if np.array_equal(model._cache.get(key, ()), entries):
+        return True
+    regular = _regular(matrix, entries)
+    if regular:
+        model._cache[key] = entries
+    return regular
 
 
 def matrix_and_values(model: CompiledDae, system: StartSystem, point: Point, y: Vector) -> tuple[Any, Vector]:
@@ -94,24 +107,28 @@ def matrix_and_values(model: CompiledDae, system: StartSystem, point: Point, y: 
 
 
 def _matrix(model: CompiledDae, plan: StartPlan, point: Point) -> Any:
-    whole, _ = matrix_and_values(model, plan.system, point, np.zeros(plan.system.function.size1_out(0)))
-    return whole[list(plan.wanted), list(plan.columns)]
+    function = plan.system.function
+    fast = buffered(model._cache, ("start matrix", plan.kind), lambda: function, (1,))
+    y = np.zeros(function.size1_out(0))
+    entries = fast(point.t, point.x, y, point.z, model.p, model.u, point.d)[0]
+    return ca.DM(function.sparsity_out(1), entries)[list(plan.wanted), list(plan.columns)]
 
 
-def _regular(matrix: Any) -> bool:
-    """Tell whether a square matrix is far from singular."""
-    entries = np.array(matrix.nonzeros())
+def _regular(matrix: Any, entries: Vector) -> bool:
+    """Tell whether a square matrix with these entries is far from singular."""
     if not np.all(np.isfinite(entries)):
         return False
-    sizes = np.zeros(matrix.size1())
-    np.maximum.at(sizes, matrix.sparsity().row(), np.abs(entries))
+    sizes, rows = np.zeros(matrix.size1()), np.array(matrix.sparsity().row(), int)
+    np.maximum.at(sizes, rows, np.abs(entries))
     if not np.all(sizes > 0.0):
         return False
-    scaled = ca.mtimes(ca.diag(ca.DM(1.0 / sizes)), matrix)
+    scaled = ca.DM(matrix.sparsity(), entries / sizes[rows])
     if matrix.size1() <= _DENSE:
         return bool(np.linalg.cond(scaled.full()) < _WELL_CONDITIONED)
-    factor = np.abs(np.array(ca.diag(ca.qr_sparse(scaled)[1])).ravel())
-    return bool(factor.max() < _WELL_CONDITIONED * factor.min())
+    upper = ca.qr_sparse(scaled)[1]
+    on_diagonal = np.equal(*upper.sparsity().get_triplet())
+    factor = np.abs(np.array(upper.nonzeros())[on_diagonal])
+    return len(factor) == len(sizes) and bool(factor.max() < _WELL_CONDITIONED * factor.min())
 
 
 def _generic_matrix(model: CompiledDae, system: StartSystem, point: Point) -> Any:

@@ -18,6 +18,8 @@ from modelica_like.initialize.singular import implicit_singular, is_regular, sin
 
 _MAX_NEWTON = 50
 _ROUNDING = 1e-14
+_WELL_CONDITIONED = 1e10
+"""Bound of the condition of a matrix that is regular whatever its units are."""
 
 
 @dataclass
@@ -36,7 +38,8 @@ class Point:
 
 def call(model: CompiledDae, function: Any, point: Point) -> Vector:
     """Evaluate a function of the model at a point; the result is flat."""
-    fast = buffered(model._cache, function.name(), lambda: function)
+    # By identity: asking a CasADi function for its name costs as much as evaluating a small one.
+    fast = buffered(model._cache, id(function), lambda: function)
     return fast(point.t, point.x, point.z, model.p, model.u, point.d)[0]
 
 
@@ -49,23 +52,51 @@ def solve_implicit(model: CompiledDae, point: Point) -> None:
     """
     if not model.implicit:
         return
-    change = np.inf
+    fast = buffered(model._cache, "residual at", lambda: implicit_at(model))
+    change, size = np.inf, len(model.implicit)
     for _ in range(_MAX_NEWTON):
-        residual = call(model, model.alg, point)
-        jacobian = np.asarray(model.alg_jacobian(point.t, point.x, point.z, model.p, model.u, point.d).full())
-        if not np.all(np.isfinite(residual)) or not is_regular(jacobian):
+        residual, entries = fast(point.t, point.x, point.z, model.p, model.u, point.d)
+        jacobian = entries.reshape(size, size).T
+        step = _newton_step(jacobian, residual)
+        if step is None:
             raise implicit_singular(model, point.t, point.d, jacobian)
-        step = np.linalg.solve(jacobian, -residual)
         point.z = point.z + step
-        change = float(np.max(np.abs(step) / (1.0 + np.abs(point.z))))
+        sizes = np.abs(step)
+        change = float((sizes / (1.0 + np.abs(point.z))).max())
         # What the largest unknown leaves of a small one when it is rounded does not get smaller.
-        if change < 1e-13 or np.max(np.abs(step)) <= _ROUNDING * np.max(np.abs(point.z)):
+        if change < 1e-13 or sizes.max() <= _ROUNDING * np.abs(point.z).max():
             return
     if not change <= 1e-9:
         raise InitializationError(
             f"The equations for {', '.join(model.implicit)} were not solved at t = {point.t:.9g} s.",
             advice="Give guesses near the solution.",
         )
+
+
+def implicit_at(model: CompiledDae) -> ca.Function:
+    """Return residuals of the implicit equations and their dense Jacobian, columns one after the other."""
+    arguments = list(model.arguments.values())
+    both = ca.cse([model.alg(*arguments), ca.densify(model.alg_jacobian(*arguments))])
+    return ca.Function("residual", arguments, both)
+
+
+def _newton_step(jacobian: Any, residual: Vector) -> Vector | None:
+    """Solve a step of Newton's method; None where its matrix is singular or something is not finite.
+
+    The inverse, which comes along, shows that most matrices are far from singular; only the others are scaled and
+    looked at closely.
+    """
+    size = len(residual)
+    try:
+        solved = np.linalg.solve(jacobian, np.column_stack([-residual, np.eye(size)]))
+    except np.linalg.LinAlgError:
+        return None
+    condition = size * np.abs(jacobian).max() * np.abs(solved[:, 1:]).max()
+    if not (condition < _WELL_CONDITIONED and np.isfinite(solved).all()) and (
+        not np.isfinite(residual).all() or not np.isfinite(jacobian).all() or not is_regular(jacobian)
+    ):
+        return None
+    return solved[:, 0]
 
 
 def check_singular(model: CompiledDae, point: Point) -> None:
@@ -75,9 +106,10 @@ def check_singular(model: CompiledDae, point: Point) -> None:
         SingularAtStart: one has not.
     """
     determinants = call(model, model.determinants, point)
-    regular = np.isfinite(determinants) & (np.abs(determinants) >= 1e-12)
-    if not regular.all():
-        raise singular_block(model, point.t, point.d, int(np.argmin(regular)))
+    if len(determinants):
+        regular = np.isfinite(determinants) & (np.abs(determinants) >= 1e-12)
+        if not regular.all():
+            raise singular_block(model, point.t, point.d, int(np.argmin(regular)))
     finite = np.isfinite(call(model, model.ode, point))
     if not finite.all():
         raise SingularAtStart(
@@ -88,15 +120,18 @@ def check_singular(model: CompiledDae, point: Point) -> None:
 
 def variable_slopes(model: CompiledDae, point: Point, nodes: list[int]) -> Vector:
     """Total derivative of variables by the states at a point, z following the states; shape (nodes, states)."""
-    if "slopes" not in model._cache:
-        call_arguments = list(model.arguments.values())
-        x, z = model.arguments["x"], model.arguments["z"]
-        variables, alg = model.variables(*call_arguments), model.alg(*call_arguments)
-        outputs = [ca.jacobian(variables, x), ca.jacobian(variables, z), ca.jacobian(alg, x), ca.jacobian(alg, z)]
-        model._cache["slopes"] = ca.Function("slopes", call_arguments, outputs)
-    parts = model._cache["slopes"](point.t, point.x, point.z, model.p, model.u, point.d)
-    by_x, by_z, alg_x, alg_z = (
-        np.asarray(part[nodes, :].full() if k < 2 else part.full()) for k, part in enumerate(parts)
-    )
+    fast = buffered(model._cache, ("slopes", tuple(nodes)), lambda: _slopes(model, nodes))
+    results = fast(point.t, point.x, point.z, model.p, model.u, point.d)
+    shapes = [(rows, columns) for rows in (len(nodes), len(point.z)) for columns in (len(point.x), len(point.z))]
+    by_x, by_z, alg_x, alg_z = (v.reshape(shape, order="F") for v, shape in zip(results, shapes, strict=True))
     # Reactions whose split is undetermined make the equations for z singular; what depends on them is left out.
-    return by_x - by_z @ np.linalg.lstsq(alg_z, alg_x, rcond=None)[0] if np.any(by_z) else by_x
+    return by_x - by_z @ np.linalg.lstsq(alg_z, alg_x, rcond=None)[0] if by_z.any() else by_x
+
+
+def _slopes(model: CompiledDae, nodes: list[int]) -> ca.Function:
+    """Partial derivatives of variables, and of the implicit equations, by the states and by z; all dense."""
+    arguments = list(model.arguments.values())
+    x, z = model.arguments["x"], model.arguments["z"]
+    variables, alg = model.variables(*arguments)[nodes], model.alg(*arguments)
+    parts = [ca.jacobian(variables, x), ca.jacobian(variables, z), ca.jacobian(alg, x), ca.jacobian(alg, z)]
+    return ca.Function("slopes", arguments, ca.cse([ca.densify(part) for part in parts]))

@@ -16,6 +16,51 @@ from modelica_like.initialize.point import Point, call, solve_implicit
 _CONSISTENT = 1e-8
 _MAX_NEWTON = 50
 _DENSE = 100
+_EPS = float(np.finfo(float).eps)
+
+
+class _Places:
+    """Start values, and where they go: (number, position, factor) of each."""
+
+    def __init__(self, places: list[tuple[int, int, float]]) -> None:
+        self._numbers, self._positions = (np.array([place[k] for place in places], int) for k in (0, 1))
+        self._factors = np.array([factor for *_, factor in places], float)
+
+    def put(self, unknowns: Vector, given: Vector) -> None:
+        """Write them into the states, or implicit unknowns; of several for one the last counts."""
+        unknowns[self._positions] = given[self._numbers] / self._factors
+
+
+class _Entries:
+    """Start values of a model, sorted by what they do.
+
+    Attributes:
+        numbers: position of every one, by its identity.
+        direct: by state, the first fixed one.
+        fixed, guesses, defaults: of states.
+        implicit: guesses and fixed ones of implicit unknowns, which begin where they are to be.
+        again: fixed ones of states that another has fixed before.
+    """
+
+    def __init__(self, model: CompiledDae) -> None:
+        self.numbers = {id(entry): k for k, entry in enumerate(model.starts)}
+        of_states = [entry for entry in model.starts if entry.state is not None]
+        self.direct: dict[int, StartEntry] = {}
+        for entry in of_states:
+            if entry.strength == "fixed" and entry.state is not None:
+                self.direct.setdefault(entry.state[0], entry)
+        first = {id(entry) for entry in self.direct.values()}
+        self.again = [entry for entry in of_states if entry.strength == "fixed" and id(entry) not in first]
+        self.fixed = self._of_states(list(self.direct.values()))
+        self.guesses = self._of_states([e for e in of_states if e.strength == "guess"])
+        self.defaults = self._of_states([e for e in of_states if e.strength == "default"])
+        position = {name: k for k, name in enumerate(model.implicit)}
+        begins = [e for e in model.starts if e.state is None and e.strength in ("guess", "fixed")]
+        named = [(self.numbers[id(e)], start_name(model, e)) for e in begins]
+        self.implicit = _Places([(number, position[name], 1.0) for number, name in named if name in position])
+
+    def _of_states(self, chosen: list[StartEntry]) -> _Places:
+        return _Places([(self.numbers[id(entry)], *entry.state) for entry in chosen if entry.state is not None])
 
 
 class StartProblem:
@@ -30,19 +75,18 @@ class StartProblem:
     def __init__(self, model: CompiledDae, point: Point) -> None:
         self.model = model
         self.given = call(model, model.start_values, point)
-        self.values = {id(entry): float(value) for entry, value in zip(model.starts, self.given, strict=True)}
-        self.direct: dict[int, StartEntry] = {}
-        for entry in model.starts:
-            if entry.strength == "guess":
-                self._guess(point, entry)
-            elif entry.strength == "fixed" and entry.state is not None:
-                self._direct(entry)
-            elif entry.strength == "fixed":
-                self._guess(point, entry)  # an implicit unknown begins where it is to be
+        if "start entries" not in model._cache:
+            model._cache["start entries"] = _Entries(model)
+        self._entries: _Entries = model._cache["start entries"]
+        self.direct = self._entries.direct
+        self._entries.guesses.put(point.x, self.given)
+        self._entries.implicit.put(point.z, self.given)
+        for entry in self._entries.again:
+            self._compare(entry)
 
     def value(self, entry: StartEntry) -> float:
         """Start value in SI units."""
-        return self.values[id(entry)]
+        return float(self.given[self._entries.numbers[id(entry)]])
 
     def _name(self, entry: StartEntry) -> str:
         return start_name(self.model, entry)
@@ -52,16 +96,10 @@ class StartProblem:
         assert entry.state is not None
         return self.value(entry) / entry.state[1]
 
-    def _guess(self, point: Point, entry: StartEntry) -> None:
-        if entry.state is not None:
-            point.x[entry.state[0]] = self.state_value(entry)
-        elif self._name(entry) in self.model.implicit:
-            point.z[self.model.implicit.index(self._name(entry))] = self.value(entry)
-
-    def _direct(self, entry: StartEntry) -> None:
+    def _compare(self, entry: StartEntry) -> None:
+        """Compare a start value with the earlier one of the same motion."""
         assert entry.state is not None
-        position = entry.state[0]
-        earlier = self.direct.setdefault(position, entry)
+        earlier = self.direct[entry.state[0]]
         number, other = self.state_value(entry), self.state_value(earlier)
         if abs(number - other) > _CONSISTENT * (1.0 + abs(other)):
             raise ContradictingStart(
@@ -72,11 +110,8 @@ class StartProblem:
 
     def apply(self, point: Point) -> None:
         """Give states their own start values, or defaults."""
-        for entry in self.model.starts:
-            if entry.strength == "default" and entry.state is not None:
-                point.x[entry.state[0]] = self.state_value(entry)
-        for position, entry in self.direct.items():
-            point.x[position] = self.state_value(entry)
+        self._entries.defaults.put(point.x, self.given)
+        self._entries.fixed.put(point.x, self.given)
 
     def solve(self, point: Point, kind: StartKind) -> None:
         """Determine all states.
@@ -84,8 +119,7 @@ class StartProblem:
         Raises:
             MissingStart, ContradictingStart, InitializationError: the start values do not determine them.
         """
-        for position, entry in self.direct.items():
-            point.x[position] = self.state_value(entry)
+        self._entries.fixed.put(point.x, self.given)
         plan = start_plan(self.model, kind, point)
         if plan.columns:
             self._solve(plan, point)
@@ -102,13 +136,15 @@ class StartProblem:
         y = np.zeros(plan.system.function.size1_out(0))
         nx, ny = len(model.states), len(y)
         state = np.concatenate([point.x, y, point.z])
-        error, sizes = np.zeros(len(target)), np.zeros(len(target))
+        error, sizes = np.zeros(len(target)), np.full(len(target), -1.0)
         system = _Evaluation(model, plan)
         for _ in range(_MAX_NEWTON):
             matrix, values = system(
                 point.t, state[:nx], state[nx : nx + ny], state[nx + ny :], model.p, model.u, point.d
             )
             error = values - target
+            if np.all(np.abs(error) <= _EPS * sizes):
+                break  # only rounding is left
             step = _solve(matrix, -error)
             state[columns] += step
             sizes = _sizes(matrix, state[columns])
@@ -192,7 +228,10 @@ def _solve(matrix: Any, right: Vector) -> Vector:
     if not right.size:
         return right
     if isinstance(matrix, ca.DM):
-        return np.array(ca.solve(matrix, ca.DM(right))).ravel()
+        try:
+            return np.array(ca.solve(matrix, ca.DM(right), "csparse")).ravel()
+        except RuntimeError:  # so CSparse says that it is singular
+            return np.full(right.shape, np.nan)
     try:
         return np.linalg.solve(matrix, right)
     except np.linalg.LinAlgError:

@@ -31,6 +31,7 @@ class Guards:
         self.model = model
         self.state_events = [t for t in model.transitions if not t.timed]
         self.count = len(self.state_events)
+        self.positions = {id(one): k for k, one in enumerate(self.state_events)}
         self._mode = np.array([t.mode for t in self.state_events], int)
         largest = max((len(one.names) for one in model.flat_discretes), default=1)
         self._sources = np.zeros((self.count, max(largest, 1)), bool)
@@ -83,7 +84,7 @@ def _finite(rates: Vector) -> Vector:
 def _numbers(guards: Vector) -> Vector:
     """Let a guard that is not a number be false, and what is nothing but rounding zero."""
     sizes = np.abs(guards)
-    if not sizes.size or _NOISE <= sizes.min() <= sizes.max() < np.inf:
+    if not sizes.size or _NOISE <= np.minimum.reduce(sizes, None) <= np.maximum.reduce(sizes, None) < np.inf:
         return guards
     rounding = (sizes < _NOISE) & (sizes > JUST_TRUE)
     guards = np.where(rounding, 0.0, guards) if rounding.any() else guards
@@ -108,21 +109,22 @@ def candidates(values: Vector, rates: Vector, active: Any, step: float) -> list[
         active: which guards count.
         step: longest distance of two times in s.
     """
-    rows = np.flatnonzero(active)
+    rows = active.nonzero()[0]
     values, rates = values[rows], rates[rows]
-    before, after = values[:, :-1], values[:, 1:]
-    below = before <= 0
-    crossing = below & (after > 0)
-    humps = below & ~crossing & (rates[:, :-1] * step > _NOISE) & (rates[:, 1:] * step < -_NOISE)
+    above = values > 0
+    crossing = above[:, 1:] > above[:, :-1]
+    slow = _NOISE / step
+    humps = (rates > slow)[:, :-1] & (rates < -slow)[:, 1:]
     if humps.any():
+        humps &= ~(above[:, :-1] | crossing)
         places = np.nonzero(humps)
-        ends = before[places], after[places]
+        ends = values[:, :-1][places], values[:, 1:][places]
         top = _peak(*ends, rates[:, :-1][places] * step, rates[:, 1:][places] * step)
         humps[places] = top > -_NEAR * (np.abs(ends[0]) + np.abs(ends[1]))
     found: list[Candidate] = []
-    for k in np.flatnonzero(np.any(crossing | humps, axis=0)):
-        found += [Candidate(int(rows[g]), int(k), False) for g in np.flatnonzero(crossing[:, k])]
-        found += [Candidate(int(rows[g]), int(k), True) for g in np.flatnonzero(humps[:, k])]
+    for k in (crossing | humps).any(axis=0).nonzero()[0]:
+        found += [Candidate(int(rows[g]), int(k), False) for g in crossing[:, k].nonzero()[0]]
+        found += [Candidate(int(rows[g]), int(k), True) for g in humps[:, k].nonzero()[0]]
     return found
 
 

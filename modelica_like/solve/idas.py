@@ -13,7 +13,7 @@ import numpy as np
 from modelica_like.compile.buffers import BufferedFunction, buffered
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import StepFailed
-from modelica_like.initialize import Point, call
+from modelica_like.initialize import Point, call, implicit_at
 from modelica_like.solve.interrupts import Interrupts
 from modelica_like.solve.options import Options
 
@@ -218,7 +218,7 @@ class Integrator:
         if not self.model.implicit:
             return z
         model, outputs = self.model, x.shape[1]
-        fast = buffered(model._cache, ("residual", outputs), lambda: _residual_along(model, outputs))
+        fast = buffered(model._cache, ("residual", outputs), lambda: along(implicit_at(model), outputs))
         for _ in range(_POLISHING):
             residual, jacobian = (
                 v.reshape(outputs, len(z), -1) for v in fast(times, x.ravel("F"), z.ravel("F"), model.p, model.u, d)
@@ -271,13 +271,6 @@ def _reached(text: str) -> float:
 
 def _at_the_start(text: str) -> bool:
     return _reached(text) == 0.0 and "IDA_TOO_MUCH_WORK" not in text
-
-
-def _residual_along(model: CompiledDae, count: int) -> ca.Function:
-    """Return residuals of the implicit equations and their Jacobian at `count` times, as one function."""
-    arguments = list(model.arguments.values())
-    both = ca.cse([model.alg(*arguments), ca.densify(model.alg_jacobian(*arguments))])
-    return along(ca.Function("residual", arguments, both), count)
 
 
 def along(function: ca.Function, count: int) -> ca.Function:

@@ -87,7 +87,7 @@ class Instants:
         if not self.guards.count:
             return []
         wants = self.guards.active(now.d) & (self.guards.soon(now) > 0)
-        return [self.guards.state_events[k] for k in np.flatnonzero(wants)]
+        return [self.guards.state_events[k] for k in wants.nonzero()[0]]
 
     def settle(self, now: Point, wanting: list[CompiledTransition]) -> None:
         """Fire transitions until none wants to fire any more; `now` becomes the point after.
@@ -143,8 +143,8 @@ class Instants:
         share(self.model, now)
         solve_implicit(self.model, now)
         soon = self.guards.soon(now)
-        positions = {self._number(one): k for k, one in enumerate(self.guards.state_events)}
-        return [one for one in wanting if one.timed or soon[positions[self._number(one)]] > 0]
+        positions = self.guards.positions
+        return [one for one in wanting if one.timed or soon[positions[id(one)]] > 0]
 
     def _fire(self, now: Point, wanting: list[CompiledTransition]) -> None:
         """Carry out transitions together; of one mode only the one declared first."""
@@ -172,8 +172,9 @@ class Instants:
 
     def _stop_motions(self, now: Point, before: Vector) -> None:
         """Stop what modes have begun to hold; what the impact knocks loose takes the mode that its start would take."""
-        holds, held = self.model.holds, holding(self.model, now)
-        entering = [k for k in held if before[holds[k].mode] != holds[k].number]
+        holds = self.model.holds
+        begun = {k for k, one in enumerate(holds) if now.d[one.mode] == one.number != before[one.mode]}
+        entering = [k for k in holding(self.model, now) if k in begun] if begun else []
         if not entering:
             return
         strike = Strike(self.model, now, entering)
