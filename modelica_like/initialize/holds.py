@@ -254,12 +254,14 @@ class Strike:
         moving = [k for k in sorted(self.entering) if before[k] != 0.0]
         table = terms(model, point)
         restitution = table[:, 3]
-        for _ in range(_TRIALS):
+        trials = 0
+        while True:
             approaches = {k: -(1.0 + restitution[k]) * before[k] / _INSTANT for k in moving if k not in self.loose}
             jump, impulses, reactions = self._response(approaches)
             unbearable = self._unbearable(table, impulses, reactions) if self.hard else []
             again = [] if unbearable else self._approaching(table, jump)
-            if not (unbearable or again):
+            trials += 1
+            if trials == _TRIALS or not (unbearable or again):
                 break
             self.loose = [k for k in (*self.loose, *unbearable) if k not in again]
         self.knocked = list(self.loose)

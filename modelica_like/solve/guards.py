@@ -122,7 +122,7 @@ def candidates(values: Vector, rates: Vector, active: Any, step: float) -> list[
         top = _peak(*ends, rates[:, :-1][places] * step, rates[:, 1:][places] * step)
         humps[places] = top > -_NEAR * (np.abs(ends[0]) + np.abs(ends[1]))
     found: list[Candidate] = []
-    for k in (crossing | humps).any(axis=0).nonzero()[0]:
+    for k in np.flatnonzero(np.any(crossing | humps, axis=0)):
         found += [Candidate(int(rows[g]), int(k), False) for g in crossing[:, k].nonzero()[0]]
         found += [Candidate(int(rows[g]), int(k), True) for g in humps[:, k].nonzero()[0]]
     return found

@@ -5,14 +5,17 @@
 
 #define INSTANT 1e-9 /* duration of an impact; finite forces cancel whatever it is */
 #define WEIGHS_NOTHING 1e-12
+#define TRIALS 50
 #define FELT 1e-9 /* change of a motion, relative to the largest one, from which on it is no rounding */
 
 typedef struct { /* of all motions that modes hold */
     double before[AT_LEAST_ONE(N_HOLDS)], approach[AT_LEAST_ONE(N_HOLDS)];
     double impulse[AT_LEAST_ONE(N_HOLDS)], reaction[AT_LEAST_ONE(N_HOLDS)];
     unsigned char entering[AT_LEAST_ONE(N_HOLDS)], loose[AT_LEAST_ONE(N_HOLDS)], held[AT_LEAST_ONE(N_HOLDS)];
+    unsigned char stopping[AT_LEAST_ONE(N_HOLDS)]; /* of which more is stopped than what rounding leaves */
+    unsigned char knocked[AT_LEAST_ONE(N_HOLDS)];  /* let go in the impact itself */
     double jump[AT_LEAST_ONE(N_X)];
-    int hard; /* more is stopped than what rounding leaves */
+    int hard; /* some are stopping */
 } Strike;
 
 static const double *motions(Instance *c) {
@@ -67,10 +70,31 @@ static int let_go_unbearable(const Instance *c, Strike *strike, const Terms *ter
         double sign = strike->impulse[k] > 0 ? 1 : -1, margin;
         double capacity = sign > 0 ? terms[k].forward : terms[k].backward;
         if (!strike->held[k] || capacity >= UNLIMITED || model_holds[k].loose < 0) continue;
-        if (strike->entering[k] && fmax(terms[k].forward, terms[k].backward) < UNLIMITED) continue;
+        if (strike->stopping[k] && fmax(terms[k].forward, terms[k].backward) < UNLIMITED) continue;
         margin = fmax(capacity - sign * strike->reaction[k], 0) * instant;
         if (fabs(strike->impulse[k]) > margin + WEIGHS_NOTHING * scale) any = strike->loose[k] = 1;
     }
+    return any;
+}
+
+/* Puts back what was let go and would now move on against what nothing limits; tells whether anything would. */
+static int put_back_approaching(Instance *c, Strike *strike, const Terms *terms) {
+    State *s = &c->state;
+    double x[AT_LEAST_ONE(N_X)];
+    const double *after;
+    int any = 0;
+    memcpy(x, s->x, sizeof x);
+    for (int k = 0; k < N_X; k++) s->x[k] += strike->jump[k];
+    after = motions(c);
+    for (int k = 0; k < N_HOLDS; k++) {
+        double motion = after[model_holds[k].motion];
+        double against = motion > 0 ? terms[k].forward : terms[k].backward;
+        if (!strike->loose[k] || !strike->entering[k] || against < UNLIMITED) continue;
+        if (fabs(motion) <= ROUNDING * model_holds[k].nominal) continue;
+        strike->loose[k] = 0;
+        any = 1;
+    }
+    memcpy(s->x, x, sizeof x);
     return any;
 }
 
@@ -95,13 +119,16 @@ static Result carry_out(Instance *c, Strike *strike) {
     State *s = &c->state;
     Terms terms[AT_LEAST_ONE(N_HOLDS)];
     hold_terms(c, terms);
-    do {
+    for (int trial = 0; trial < TRIALS; trial++) {
         for (int k = 0; k < N_HOLDS; k++)
             strike->approach[k] = strike->entering[k] && !strike->loose[k]
                                       ? -(1 + terms[k].restitution) * strike->before[k] / INSTANT
                                       : 0;
         if (respond(c, strike) != RESULT_OK) return RESULT_ERROR;
-    } while (strike->hard && let_go_unbearable(c, strike, terms));
+        if (strike->hard && let_go_unbearable(c, strike, terms)) continue;
+        if (!put_back_approaching(c, strike, terms)) break;
+    }
+    memcpy(strike->knocked, strike->loose, sizeof strike->knocked);
     for (int k = 0; k < N_X; k++) s->x[k] += strike->jump[k];
     for (int k = 0; k < N_HOLDS; k++) {
         const Held *one = &model_holds[k];
@@ -157,8 +184,9 @@ static void begin_strike(Instance *c, Strike *strike) {
     for (int k = 0; k < N_HOLDS; k++) {
         const Held *one = &model_holds[k];
         double size = fabs(strike->before[k] = values[one->motion]);
-        if (strike->entering[k] && size != 0 && size > ROUNDING * fmax(largest_like(values, one->motion), one->nominal))
-            strike->hard = 1;
+        double rounding = ROUNDING * fmax(largest_like(values, one->motion), one->nominal);
+        strike->stopping[k] = strike->entering[k] && size > rounding;
+        strike->hard |= strike->stopping[k];
     }
 }
 
@@ -188,6 +216,7 @@ Result stop_motions(Instance *c, const double *before, Impacts *impacts) {
         begin_strike(c, &strike);
     }
     if (carry_out(c, &strike) != RESULT_OK) return RESULT_ERROR;
+    for (int k = 0; k < N_HOLDS; k++) impacts->entered[k] &= !strike.knocked[k];
     any = 0;
     for (int k = 0; k < N_HOLDS; k++) any |= strike.loose[k];
     if (!any) return RESULT_OK;

@@ -41,12 +41,16 @@ Result solve_implicit(Instance *c, double t, const double *x, double *z, int qui
             if (!isfinite(step[k])) return quiet ? RESULT_ERROR : singular(c, t, model_implicit_names[k]);
         if (!lu_factor(N_Z, matrix, order)) return quiet ? RESULT_ERROR : singular(c, t, model_implicit_names[0]);
         lu_solve(N_Z, matrix, order, step);
+        double moved = 0, largest = 0;
         change = 0;
         for (int k = 0; k < N_Z; k++) {
             z[k] -= step[k];
             change = fmax(change, fabs(step[k]) / (1 + fabs(z[k])));
+            moved = fmax(moved, fabs(step[k]));
+            largest = fmax(largest, fabs(z[k]));
         }
-        if (change < 1e-13) return RESULT_OK;
+        /* What the largest unknown leaves of a small one when it is rounded does not get smaller. */
+        if (change < 1e-13 || moved <= 1e-14 * largest) return RESULT_OK;
     }
     if (change <= 1e-9) return RESULT_OK;
     return quiet ? RESULT_ERROR
