@@ -240,8 +240,10 @@ class Strike:
         self.impacts: list[Impact] = []
         self.loose: list[int] = []
         before = self._motions()
-        self.stopping = self._stopping(before, [k for k in self.entering if before[k] != 0.0])
-        self.hard = bool(self.stopping)
+        # Friction stops nothing at once; where an importer lets it overrun standstill, that is no impact.
+        limits = terms(model, point)[:, 1:3].max(axis=1)
+        moving = [k for k in self.entering if before[k] != 0.0 and limits[k] >= UNLIMITED]
+        self.hard = self._stops(before, moving)
         self.knocked: list[int] = []
 
     def run(self) -> None:
@@ -271,16 +273,15 @@ class Strike:
         if self.hard:
             self._book(before, impulses, approaches)
 
-    def _stopping(self, before: Vector, moving: list[int]) -> set[int]:
-        """Motions of which more is stopped than what rounding and the location of events leave."""
+    def _stops(self, before: Vector, moving: list[int]) -> bool:
+        """Whether more is stopped than what rounding and the location of events leave."""
         model, variables = self.model, np.abs(call(self.model, self.model.variables, self.point))
-        found: set[int] = set()
         for k in moving:
             own = model.flat_variables[model.holds[k].motion]
             same = [n for n, one in enumerate(model.flat_variables) if one.unit == own.unit]
             if abs(before[k]) > ROUNDING * max(float(variables[same].max()), own.nominal):
-                found.add(k)
-        return found
+                return True
+        return False
 
     def _book(self, before: Vector, impulses: dict[int, float], approaches: dict[int, float]) -> None:
         """Note what was lost, and what has got another motion."""
@@ -325,7 +326,7 @@ class Strike:
             own = self.model.holds[k]
             forward, backward = table[k, 1:3]
             capacity, sign = (forward, 1.0) if impulse > 0.0 else (backward, -1.0)
-            if capacity >= UNLIMITED or own.loose < 0 or (k in self.stopping and max(forward, backward) < UNLIMITED):
+            if capacity >= UNLIMITED or own.loose < 0:
                 continue
             margin = max(capacity - sign * reactions[k], 0.0) * instant
             if abs(impulse) > margin + _SAYS_NOTHING * scale:

@@ -12,10 +12,9 @@ typedef struct { /* of all motions that modes hold */
     double before[AT_LEAST_ONE(N_HOLDS)], approach[AT_LEAST_ONE(N_HOLDS)];
     double impulse[AT_LEAST_ONE(N_HOLDS)], reaction[AT_LEAST_ONE(N_HOLDS)];
     unsigned char entering[AT_LEAST_ONE(N_HOLDS)], loose[AT_LEAST_ONE(N_HOLDS)], held[AT_LEAST_ONE(N_HOLDS)];
-    unsigned char stopping[AT_LEAST_ONE(N_HOLDS)]; /* of which more is stopped than what rounding leaves */
-    unsigned char knocked[AT_LEAST_ONE(N_HOLDS)];  /* let go in the impact itself */
+    unsigned char knocked[AT_LEAST_ONE(N_HOLDS)]; /* let go in the impact itself */
     double jump[AT_LEAST_ONE(N_X)];
-    int hard; /* some are stopping */
+    int hard; /* what nothing limits stops more than what rounding leaves */
 } Strike;
 
 static const double *motions(Instance *c) {
@@ -70,7 +69,6 @@ static int let_go_unbearable(const Instance *c, Strike *strike, const Terms *ter
         double sign = strike->impulse[k] > 0 ? 1 : -1, margin;
         double capacity = sign > 0 ? terms[k].forward : terms[k].backward;
         if (!strike->held[k] || capacity >= UNLIMITED || model_holds[k].loose < 0) continue;
-        if (strike->stopping[k] && fmax(terms[k].forward, terms[k].backward) < UNLIMITED) continue;
         margin = fmax(capacity - sign * strike->reaction[k], 0) * instant;
         if (fabs(strike->impulse[k]) > margin + WEIGHS_NOTHING * scale) any = strike->loose[k] = 1;
     }
@@ -177,16 +175,17 @@ static Result hold_again(Instance *c, const unsigned char *entered) {
     return solve_implicit(c, s->t, s->x, s->z, 0);
 }
 
-/* Speeds before an impact, and whether it is one. */
-static void begin_strike(Instance *c, Strike *strike) {
+/* Speeds before an impact, and whether it is one. Friction stops nothing at once; where an importer lets it overrun
+ * standstill, that is none. */
+static void begin_strike(Instance *c, Strike *strike, const Terms *terms) {
     const double *values = motions(c);
     strike->hard = 0;
     for (int k = 0; k < N_HOLDS; k++) {
         const Held *one = &model_holds[k];
         double size = fabs(strike->before[k] = values[one->motion]);
-        double rounding = ROUNDING * fmax(largest_like(values, one->motion), one->nominal);
-        strike->stopping[k] = strike->entering[k] && size > rounding;
-        strike->hard |= strike->stopping[k];
+        int limited = fmax(terms[k].forward, terms[k].backward) < UNLIMITED;
+        if (strike->entering[k] && !limited && size > ROUNDING * fmax(largest_like(values, one->motion), one->nominal))
+            strike->hard = 1;
     }
 }
 
@@ -206,14 +205,14 @@ Result stop_motions(Instance *c, const double *before, Impacts *impacts) {
         any |= strike.entering[k];
     }
     if (!any) return RESULT_OK;
-    begin_strike(c, &strike);
+    begin_strike(c, &strike, terms);
     if (strike.hard) {
         for (int k = 0; k < N_HOLDS; k++) strike.entering[k] = impacts->entered[k] |= strike.entering[k];
         if (!impacts->struck) memcpy(impacts->x, s->x, sizeof impacts->x);
         impacts->struck = 1;
         memcpy(s->x, impacts->x, sizeof impacts->x);
         if (hold_again(c, impacts->entered) != RESULT_OK) return RESULT_ERROR;
-        begin_strike(c, &strike);
+        begin_strike(c, &strike, terms);
     }
     if (carry_out(c, &strike) != RESULT_OK) return RESULT_ERROR;
     for (int k = 0; k < N_HOLDS; k++) impacts->entered[k] &= !strike.knocked[k];
