@@ -236,13 +236,6 @@ class CompiledDae:
         """Fresh symbols for the arguments of the functions."""
         return {name: ca.SX.sym(name, self.ode.size1_in(k)) for k, name in enumerate(self.ode.name_in())}
 
-    def guards_along(self, count: int) -> ca.Function:
-        """Guards and guard rates at `count` times, as one function."""
-        both = ca.Function(
-            "guards_and_rates", (a := list(self.arguments.values())), [self.guards(*a), self.guard_rates(*a)]
-        )
-        return both.map(count)
-
     def with_parameters(self, values: dict[str, Any]) -> CompiledDae:
         """Return the same model with other parameter values; nothing is compiled again.
 
