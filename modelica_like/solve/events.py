@@ -148,7 +148,7 @@ class EventLoop:
             span, count = self.pace.panel(self.now.t, goal)
             before = self.integrator.steps
             try:
-                looks = self._integrate(self.now, span, count, patient=not (self.guards.count or self._failures))
+                looks = self._integrate(self.now, span, count, patient=not self.guards.count)
             except StepFailed:
                 if not self._go_on(self.now.t + span):
                     raise
@@ -201,7 +201,7 @@ class EventLoop:
         for halvings in range(1, _MAX_HALVINGS):
             piece = span / 2**halvings
             try:
-                return self._integrate(self.now, piece, 1, patient=False)
+                return self._integrate(self.now, piece, 1, patient=not self.guards.count)
             except StepFailed:
                 if not self._go_on(self.now.t + piece) or halvings + 1 == _MAX_HALVINGS:
                     raise
