@@ -76,7 +76,7 @@ def simulate(
         drive: a component, a netlist file, or a compiled model.
         until: end time, a number in s or a quantity; by default what the netlist says.
         parameters: other values of parameters and inputs by path; nothing is compiled again.
-        start: `given`, `rest` (what has no start value begins at zero) or `steady`.
+        start: `given`, `rest` (what has no start value stands still) or `steady`.
         t0: start time in s.
         rtol: relative tolerance.
         atol: absolute tolerance, in nominal values.

@@ -35,9 +35,9 @@ def initialize(model: CompiledDae, t0: float = 0.0, start: StartKind = "given") 
     Args:
         model: the compiled model.
         t0: start time in s.
-        start: `given`: the start values of the model determine everything; `rest`: states without a start value begin
-            at zero;
-            `steady`: all derivatives are zero, except of states that nothing depends on.
+        start: `given`: the start values of the model determine everything; `rest`: what has no start value stands
+            still, absolute speeds before relative ones; `steady`: all derivatives are zero, except of states that
+            nothing depends on.
 
     Returns:
         The start; events at t0 have not happened yet.
@@ -62,7 +62,17 @@ def initialize(model: CompiledDae, t0: float = 0.0, start: StartKind = "given") 
         problem.apply(point)
         point.d = chosen_modes(model, point)
         share(model, point)
-    # The modes depend on the states, in the steady state the states also on the modes.
+    _settle(model, point, problem, start)
+    rest(model, point)
+    solve_implicit(model, point)
+    check_singular(model, point)
+    if start == "steady":
+        check_modes_hold(model, point)
+    return point
+
+
+def _settle(model: CompiledDae, point: Point, problem: StartProblem, start: StartKind) -> None:
+    """Find states and modes: the modes depend on the states, in the steady state the states also on the modes."""
     for _ in range(_MODE_ROUNDS):
         if start == "steady":
             problem.apply(point)
@@ -73,17 +83,10 @@ def initialize(model: CompiledDae, t0: float = 0.0, start: StartKind = "given") 
             problem.solve(point, start)
             modes = chosen_modes(model, point)
         if np.array_equal(modes, point.d):
-            break
+            return
         point.d = modes
         share(model, point)
-    else:
-        raise _unsettled(model, point)
-    rest(model, point)
-    solve_implicit(model, point)
-    check_singular(model, point)
-    if start == "steady":
-        check_modes_hold(model, point)
-    return point
+    raise _unsettled(model, point)
 
 
 def _unsettled(model: CompiledDae, point: Point) -> InitializationError:

@@ -11,7 +11,7 @@ import numpy as np
 from modelica_like.compile.buffers import along
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import ModelicaLikeError
-from modelica_like.initialize import Point
+from modelica_like.initialize import Point, implicit_at
 from modelica_like.solve.idas import Integrator
 from modelica_like.solve.nodes import LOBATTO, LOBATTO_WEIGHTS, Nodes, Places, Rule, between, rules
 from modelica_like.solve.options import Options
@@ -141,7 +141,7 @@ class Powers:
     def _polished(self, nodes: Nodes) -> None:
         """Let interpolated implicit unknowns meet their equations."""
         model, size = self.model, len(self.model.implicit)
-        function = along(model._cache, "implicit equations", lambda: _implicit_function(model))
+        function = along(model._cache, "implicit equations", lambda: implicit_at(model))
         d = self._discretes[:, nodes.segment]
         for _ in range(_POLISHING if size else 0):
             residual, jacobian = function(nodes.times, nodes.x, nodes.z, model.p, model.u, d)
@@ -397,9 +397,3 @@ def _terms_function(model: CompiledDae) -> ca.Function:
     powers = ca.vec(terms[:, 1:])[_kept(model)]
     results = [ca.densify(one) for one in (terms[:, 0], powers, model.ode(*arguments))]
     return ca.Function("terms", arguments, results, {"cse": True})
-
-
-def _implicit_function(model: CompiledDae) -> ca.Function:
-    arguments = list(model.arguments.values())
-    results = [model.alg(*arguments), ca.densify(model.alg_jacobian(*arguments))]
-    return ca.Function("implicit", arguments, [ca.densify(one) for one in results])
