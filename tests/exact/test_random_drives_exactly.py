@@ -14,7 +14,6 @@ OPEN = {
     1883: "no start from rest is found in its loops",
     1546: "an impact of 24 kg.m2 rad/s leaves a speed of 3e-11 rad/s to a shaft at rest",
     1862: "the end speeds are off by 7e-8 of their size",
-    1932: "freewheels and clutches that share in a loop: one lets go too late",
     1991: "events come so close together that the run takes too long",
 }
 """Drives that are not right yet, and why; everything else must be."""
