@@ -261,7 +261,7 @@ double input_at(const State *s, int k, double t);
 /* start.c */
 void start_defaults(Instance *c);
 Result start_solve(Instance *c);
-int choose_modes(Instance *c, unsigned char *decided);
+void choose_modes(Instance *c, unsigned char *decided);
 
 /* holds.c */
 #define UNLIMITED 1e30
@@ -290,6 +290,7 @@ double next_moment(Instance *c);
 int find_wanting(Instance *c, unsigned char *wanting, int guards_too);
 Result iterate_events(Instance *c, unsigned char *wanting, int located);
 double number_or_false(double guard);
+void move_states(Instance *c, const int *nodes, const double *values, int count);
 void note_change(Instance *c, const char *name, int mode, int target);
 
 /* rosenbrock.c */

@@ -74,12 +74,12 @@ static void drop_balanced(Instance *c, unsigned char *wanting) {
 }
 
 /* Move the states as little as possible, so that variables that follow from them take new values. */
-static void project(Instance *c, const int *targets, const double *values, int count) {
+void move_states(Instance *c, const int *nodes, const double *values, int count) {
     State *s = &c->state;
     double *slopes = c->work.square, *change = c->work.start_residual, *step = c->work.point;
     evaluate(c, &tape_variables, s->t, s->x, s->z, c->work.variables);
-    for (int k = 0; k < count; k++) change[k] = values[k] - c->work.variables[model_reset_nodes[targets[k]]];
-    for (int k = 0; k < count; k++) adjoint_of_node(c, model_reset_nodes[targets[k]], slopes + (size_t)k * N_X);
+    for (int k = 0; k < count; k++) change[k] = values[k] - c->work.variables[nodes[k]];
+    for (int k = 0; k < count; k++) adjoint_of_node(c, nodes[k], slopes + (size_t)k * N_X);
     least_squares(count, N_X, slopes, change, step);
     for (int k = 0; k < N_X; k++) s->x[k] += step[k];
 }
@@ -96,8 +96,8 @@ void note_change(Instance *c, const char *name, int mode, int target) {
 /* Carry out transitions together; of one mode only the one declared first. */
 static void fire(Instance *c, const unsigned char *wanting, Impacts *impacts) {
     State *s = &c->state;
-    double values[AT_LEAST_ONE(N_RESETS)], targets_value[AT_LEAST_ONE(N_RESETS)], d[AT_LEAST_ONE(N_D)];
-    int targets[AT_LEAST_ONE(N_RESETS)], count = 0;
+    double values[AT_LEAST_ONE(N_RESETS)], node_value[AT_LEAST_ONE(N_RESETS)], d[AT_LEAST_ONE(N_D)];
+    int nodes[AT_LEAST_ONE(N_RESETS)], count = 0;
     unsigned char changed[AT_LEAST_ONE(N_D)] = {0};
     evaluate(c, &tape_resets, s->t, s->x, s->z, values);
     memcpy(d, s->d, sizeof d);
@@ -115,13 +115,13 @@ static void fire(Instance *c, const unsigned char *wanting, Impacts *impacts) {
                 s->x[reset->index] = values[reset->value] / reset->factor;
             } else if (reset->kind == RESET_DISCRETE) d[reset->index] = values[reset->value];
             else {
-                targets[count] = reset->target;
-                targets_value[count++] = values[reset->value];
+                nodes[count] = model_reset_nodes[reset->target];
+                node_value[count++] = values[reset->value];
             }
         }
     }
     memcpy(s->d, d, sizeof d);
-    if (count > 0) project(c, targets, targets_value, count);
+    if (count > 0) move_states(c, nodes, node_value, count);
 }
 
 /* Notes an instant; an error where the last ones came ever faster. */

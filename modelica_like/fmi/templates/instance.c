@@ -75,7 +75,8 @@ static size_t lay_out(Work *w, double *memory) {
     size_t qr_v = larger((size_t)pattern_step.n_v, (size_t)pattern_start.n_v),
            qr_r = larger((size_t)pattern_step.n_r, (size_t)pattern_start.n_r);
     size_t rows = larger((size_t)pattern_step.size, (size_t)pattern_start.size);
-    size_t square = larger(START_STEADY ? 2 * (size_t)(N_STEADY + N_Z) * (N_STEADY + N_Z) : 0, (size_t)N_RESETS * N_X);
+    size_t square =
+        larger(START_STEADY ? 2 * (size_t)(N_STEADY + N_Z) * (N_STEADY + N_Z) : 0, larger(N_RESETS, N_HOLDS) * N_X);
     size_t sharing = (size_t)MOST_MEMBERS * (N_X + 3 * MOST_MEMBERS);
     struct {
         double **array;
@@ -100,7 +101,7 @@ static size_t lay_out(Work *w, double *memory) {
         {&w->vector, N_UNKNOWNS + (size_t)N_Z},
         {&w->start_unknowns, N_START_UNKNOWNS},
         {&w->start_values, N_STARTS},
-        {&w->start_residual, larger(N_START_VALUES, N_RESETS)},
+        {&w->start_residual, larger(N_START_VALUES, larger(N_RESETS, N_HOLDS))},
     };
     for (size_t k = 0; k < sizeof arrays / sizeof arrays[0]; k++) {
         if (memory != NULL) *arrays[k].array = memory + used;

@@ -147,26 +147,35 @@ static Result solve_steady(Instance *c) {
     return report(c, LOG_ERROR, RESULT_ERROR, "No steady state was found at t = %.9g s.", s->t);
 }
 
-/* Choose modes that are not decided by their start conditions: the first that holds wins. Tells whether one changed. */
-int choose_modes(Instance *c, unsigned char *decided) {
+/* Choose modes that are not decided by their start conditions: the first that holds wins. */
+void choose_modes(Instance *c, unsigned char *decided) {
     State *s = &c->state;
     double *holds = c->work.guards;
-    int changed = 0;
     evaluate(c, &tape_start_conditions, s->t, s->x, s->z, holds);
     for (int k = 0; k < N_START_MODES; k++) {
         const StartMode *one = &model_start_modes[k];
         if (holds[k] == 0 || decided[one->mode]) continue;
         decided[one->mode] = 1;
-        changed |= s->d[one->mode] != one->target;
         s->d[one->mode] = one->target;
     }
-    return changed;
 }
 
-static int choose_start_modes(Instance *c) {
+/* What slides one way where it began the other way (`begun`, if there is a steady state before) is held: equilibrium
+ * lies in between, where it stands still. Tells whether a mode changed. */
+static int choose_start_modes(Instance *c, const double *begun) {
+    State *s = &c->state;
     unsigned char decided[AT_LEAST_ONE(N_D)];
-    memcpy(decided, c->state.mode_given, sizeof decided);
-    return choose_modes(c, decided);
+    double d[AT_LEAST_ONE(N_D)];
+    memcpy(decided, s->mode_given, sizeof decided);
+    memcpy(d, s->d, sizeof d);
+    choose_modes(c, decided);
+    if (begun) evaluate(c, &tape_variables, s->t, s->x, s->z, c->work.variables);
+    for (int k = 0; k < N_HOLDS && begun; k++) {
+        const Held *one = &model_holds[k];
+        if (begun[k] * c->work.variables[one->motion] < 0 && s->d[one->mode] != d[one->mode])
+            s->d[one->mode] = one->number;
+    }
+    return memcmp(d, s->d, sizeof d) != 0;
 }
 
 static void start_discretes(Instance *c) {
@@ -182,6 +191,26 @@ static void apply_defaults(Instance *c, const double *values) {
         const StartOf *one = &model_start_default[k];
         c->state.x[one->position] = values[one->start] / one->factor;
     }
+}
+
+/* The steady state of the present modes, in which what they hold stands still; held motions become what they were. */
+static Result find_steady(Instance *c, double *begun) {
+    State *s = &c->state;
+    Terms terms[AT_LEAST_ONE(N_HOLDS)];
+    unsigned char held[AT_LEAST_ONE(N_HOLDS)];
+    double zero[AT_LEAST_ONE(N_HOLDS)] = {0};
+    int nodes[AT_LEAST_ONE(N_HOLDS)], count = 0;
+    apply_defaults(c, c->work.start_values);
+    if (apply_direct(c, c->work.start_values) != RESULT_OK) return RESULT_ERROR;
+    if (N_HOLDS > 0) hold_terms(c, terms);
+    mark_held(c, terms, held);
+    evaluate(c, &tape_variables, s->t, s->x, s->z, c->work.variables);
+    for (int k = 0; k < N_HOLDS; k++) {
+        begun[k] = c->work.variables[model_holds[k].motion];
+        if (held[k]) nodes[count++] = model_holds[k].motion;
+    }
+    if (count > 0) move_states(c, nodes, zero, count);
+    return solve_steady(c);
 }
 
 /* Surfaces that stick against too large a torque are not in equilibrium. */
@@ -202,6 +231,7 @@ static Result check_modes_hold(Instance *c) {
 /* States from parameters and start values; events at the start have not happened yet. */
 Result start_solve(Instance *c) {
     State *s = &c->state;
+    double begun[AT_LEAST_ONE(N_HOLDS)];
     int round;
     memcpy(s->x, model_guesses, N_X * sizeof(double));
     memcpy(s->z, model_z_guesses, N_Z * sizeof(double));
@@ -213,15 +243,12 @@ Result start_solve(Instance *c) {
     if (START_STEADY) {
         apply_defaults(c, c->work.start_values);
         if (apply_direct(c, c->work.start_values) != RESULT_OK) return RESULT_ERROR;
-        choose_start_modes(c);
+        choose_start_modes(c, NULL);
         share(c);
     }
     for (round = 0; round < MODE_ROUNDS; round++) {
-        if (START_STEADY) {
-            apply_defaults(c, c->work.start_values);
-            if (apply_direct(c, c->work.start_values) != RESULT_OK || solve_steady(c) != RESULT_OK) return RESULT_ERROR;
-        } else if (solve_states(c) != RESULT_OK) return RESULT_ERROR;
-        if (!choose_start_modes(c)) break;
+        if ((START_STEADY ? find_steady(c, begun) : solve_states(c)) != RESULT_OK) return RESULT_ERROR;
+        if (!choose_start_modes(c, START_STEADY ? begun : NULL)) break;
         share(c);
     }
     if (round == MODE_ROUNDS)
