@@ -34,6 +34,9 @@ def export(
         list[str] | None, Option("--open", metavar="PATH", help="A free connector that is open, e.g. J.flange_b.")
     ] = None,
     takes: Annotated[Takes, Option(help="What open ends take: flow (torque) or potential (angle).")] = Takes.FLOW,
+    embed: Annotated[
+        bool, Option("--embed", help="Compile the model into the binary, for importers that do not name resources.")
+    ] = False,
     check: Annotated[bool, Option(help="Run the FMU against IDAS before it is handed over.")] = True,
     debug: Debug = False,
 ) -> None:  # fmt: skip
@@ -47,7 +50,8 @@ def export(
         with Console(stderr=True).status("loading") as status:
             done = export_fmu(
                 assembly, output or Path(f"{netlist.stem}.fmu"), fmi, _listed(kind), _listed(platforms),
-                outputs=outputs or (), ends=ends or (), takes=takes.value, check=check, report=status.update,
+                outputs=outputs or (), ends=ends or (), takes=takes.value, embed=embed, check=check,
+                report=status.update,
             )  # fmt: skip
         out().print(str(done), soft_wrap=True)
 
