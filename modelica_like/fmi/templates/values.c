@@ -3,6 +3,8 @@
 #include <string.h>
 #include "core.h"
 
+#define OFFSET 1e-12
+
 const Variable *find_variable(uint32_t reference) {
     int low = 0, high = N_VARIABLES - 1;
     while (low <= high) {
@@ -90,12 +92,18 @@ void get_derivatives(Instance *c, double *derivatives) {
 }
 
 /* Guards of active modes, as event iteration judges them: an indicator above zero is an event that wants to fire, so
- * that after every event all are at or below zero. The others are constant, so that nobody looks for their zeros. */
+ * that after every event all are below zero. The others are constant, so that nobody looks for their zeros. A root
+ * finder would take an indicator of exactly zero for a root at its first instant: what wants to stay is below zero by
+ * an offset. It shifts no event, as it is gone above zero; its size is that of rounding, and products of it do not
+ * underflow, by whose sign root finders judge. */
 void get_indicators(Instance *c, double *indicators) {
     State *s = &c->state;
     double *values = c->work.guards_before;
     evaluate(c, &tape_guards_soon, s->t, s->x, s->z, values);
-    for (int k = 0; k < N_GUARDS; k++) indicators[k] = guard_active(s, k) ? number_or_false(values[k]) : -1;
+    for (int k = 0; k < N_GUARDS; k++) {
+        double value = guard_active(s, k) ? number_or_false(values[k]) : -1;
+        indicators[k] = value > 0 ? value : value - OFFSET;
+    }
 }
 
 Result get_mode(Instance *c, uint32_t reference, int *value) {
