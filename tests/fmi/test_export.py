@@ -83,6 +83,23 @@ def test_parameters_starts_and_inputs_count(exported: Callable[[str], Export], v
     np.testing.assert_allclose(run["shaft_end.a"], 0.8, rtol=1e-9)
 
 
+@pytest.mark.parametrize("version", VERSIONS)
+@pytest.mark.parametrize("kind", ["me", "cs"])
+@pytest.mark.parametrize("step", [0.4, 0.01])
+def test_ramps_and_jumps_of_inputs_are_met(
+    exported: Callable[[str], Export], version: str, kind: Any, step: float
+) -> None:
+    """J der(w) = 4 t until 1 s, then -2, whatever the steps are."""
+    torque = [(0.0, 0.0), (1.0, 4.0), (1.0, -2.0), (2.0, -2.0)]
+    run = run_fmu(exported(version).path, {"shaft_end.tau": torque}, kind=kind, step=step, tolerance=1e-9)
+    t, late = run.time, run.time - 1.0
+    before = t < 1.0
+    np.testing.assert_allclose(run["J.w"], np.where(before, 3 + t**2, 4 - late), rtol=1e-6)
+    angle = np.where(before, 3 * t + t**3 / 3, 10 / 3 + 4 * late - late**2 / 2)
+    np.testing.assert_allclose(run["J.phi"], angle, rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(run["shaft_end.tau"][before], 4 * t[before], rtol=1e-12, atol=1e-12)
+
+
 def test_start_values_that_are_equations_count(tmp_path: Path) -> None:
     """The speed of an inertia behind a gear and a spring is no state; the states follow from it."""
     netlist = EXAMPLES / "msl/rotational/First.toml"

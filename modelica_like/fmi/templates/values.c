@@ -164,11 +164,10 @@ Result set_float(Instance *c, uint32_t reference, double value) {
     if (!isfinite(value)) return refuse_value(c, v, "the value is not a finite number.");
     if (v->kind == KIND_PARAMETER) return set_parameter(c, v, value);
     if (v->kind != KIND_INPUT) return set_start(c, v, value);
-    if (input_at(s, v->index, s->t) == value && s->u_rate[v->index] == 0) return RESULT_OK;
+    if (input_at(s, v->index, s->t) == value) return RESULT_OK;
     for (int k = 0; k < N_U; k++) s->u[k] = input_at(s, k, s->t);
     s->u_time = s->t;
-    s->u[v->index] = value;
-    s->u_rate[v->index] = 0;
+    s->u[v->index] = value; /* its rate stays, in whatever order an importer gives the two */
     touch(c);
     return RESULT_OK;
 }
