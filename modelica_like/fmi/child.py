@@ -15,12 +15,13 @@ from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import Any, Literal
 
 import fmpy
 import numpy as np
 from fmpy.simulation import Recorder
 
+Side = Literal["left", "right"]
 KINDS = {"me": "ModelExchange", "cs": "CoSimulation"}
 NUMBERS = ("Real", "Float32", "Float64")
 DISCRETE = (
@@ -164,7 +165,7 @@ def check_names(job: dict[str, Any], found: list[dict[str, Any]]) -> None:
             raise Refusal(kind="no input", name=name, causality=causality[name], known=known)
 
 
-def interpolate(series: Any, times: Any, side: str) -> Any:
+def interpolate(series: Any, times: Any, side: Side) -> Any:
     """Return a series of (time, value) at times: straight lines; where it jumps, its `left` or `right` value."""
     known, values = np.transpose(series)
     if len(known) == 1:
@@ -182,7 +183,8 @@ def input_table(inputs: dict[str, Any]) -> Any:
     times = np.unique(np.concatenate([s[:, 0] for s in inputs.values()]))
     jumps = np.unique(np.concatenate([s[1:, 0][np.diff(s[:, 0]) == 0] for s in inputs.values()]))
     rows: list[tuple[float, ...]] = []
-    for side, instants in (("left", times), ("right", jumps)):
+    sides: tuple[tuple[Side, Any], ...] = (("left", times), ("right", jumps))
+    for side, instants in sides:
         rows += zip(instants, *(interpolate(s, instants, side) for s in inputs.values()), strict=True)
     rows.sort(key=lambda row: row[0])
     return np.array(rows, dtype=[("time", float), *((n, float) for n in inputs)])
@@ -258,7 +260,7 @@ class Ramps:
             grid += [*np.linspace(low, high, max(count, 1) + 1)[1:]]
         return grid
 
-    def _values(self, time: float, side: str) -> Any:
+    def _values(self, time: float, side: Side) -> Any:
         return np.array([float(interpolate(series, time, side)) for series in self._series])
 
     def _set(self, values: Any) -> None:
