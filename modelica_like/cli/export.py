@@ -35,9 +35,10 @@ def export(
     ] = None,
     takes: Annotated[Takes, Option(help="What open ends take: flow (torque) or potential (angle).")] = Takes.FLOW,
     check: Annotated[bool, Option(help="Run the FMU against IDAS before it is handed over.")] = True,
+    strict: Annotated[bool, Option("--strict", help="Do not write an FMU that differs from IDAS.")] = False,
     debug: Debug = False,
 ) -> None:  # fmt: skip
-    """Export a netlist as an FMU: compiled C that needs no Python, checked before it is written."""
+    """Export a netlist as an FMU: compiled C that needs no Python, and check it."""
     with told(debug):
         assembly = load_netlist(netlist, assignments)
         from rich.console import Console
@@ -47,7 +48,8 @@ def export(
         with Console(stderr=True).status("loading") as status:
             done = export_fmu(
                 assembly, output or Path(f"{netlist.stem}.fmu"), fmi, _listed(kind), _listed(platforms),
-                outputs=outputs or (), ends=ends or (), takes=takes.value, check=check, report=status.update,
+                outputs=outputs or (), ends=ends or (), takes=takes.value, check=check, strict=strict,
+                report=status.update,
             )  # fmt: skip
         out().print(str(done), soft_wrap=True)
 

@@ -6,7 +6,7 @@ import hashlib
 import tempfile
 import time
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import get_args
@@ -17,7 +17,7 @@ from modelica_like.errors import ExportError, UnknownName, did_you_mean
 from modelica_like.flatten import flatten
 from modelica_like.flatten.model import FlatModel
 from modelica_like.fmi.build import PLATFORMS, build, native_platform
-from modelica_like.fmi.check import compare_with_idas, problems
+from modelica_like.fmi.check import Check, compare_with_idas, problems
 from modelica_like.fmi.codegen import LOG_CATEGORIES, generate, licenses, source_files
 from modelica_like.fmi.description import About, Kind, Version, build_description, identifier, model_description
 from modelica_like.fmi.documentation import Listing, index_page
@@ -45,6 +45,7 @@ class Export:
         platforms: names of the platforms it has binaries for.
         size: of the file in bytes.
         seconds: how long it took.
+        check: how it compares with IDAS.
     """
 
     path: Path
@@ -53,17 +54,20 @@ class Export:
     platforms: tuple[str, ...]
     size: int
     seconds: float
+    check: Check
 
     def __str__(self) -> str:
         kinds = " and ".join({"me": "Model Exchange", "cs": "Co-Simulation"}[kind] for kind in self.kinds)
         where = ", ".join(self.platforms) or "sources only"
-        return f"{self.path}: FMI {self.version}, {kinds}, {self.size / 1000:.0f} kB, {where}, {self.seconds:.1f} s"
+        line = f"{self.path}: FMI {self.version}, {kinds}, {self.size / 1000:.0f} kB, {where}, {self.seconds:.1f} s"
+        picture = f"See {self.check.picture}." if self.check.picture else ""
+        return " ".join(filter(None, (f"{line}\n{self.check.sentence}".rstrip(), picture)))
 
 
 def export_fmu(
     drive: Model, path: str | Path, version: Version | str = "2.0", kind: Collection[Kind | str] = ("me", "cs"),
     platforms: Sequence[str] | str = "native", *, outputs: Sequence[str] = (), ends: Sequence[str] = (),
-    takes: Takes = "flow", check: bool = True, report: Report | None = None,
+    takes: Takes = "flow", check: bool = True, strict: bool = False, report: Report | None = None,
 ) -> Export:  # fmt: skip
     """Export a drive as an FMU: compiled C that needs no Python.
 
@@ -79,14 +83,16 @@ def export_fmu(
         outputs: patterns of further variables that are to be outputs, such as `*.w`.
         ends: free connectors of parts that are to be open, such as `load.flange_b`.
         takes: what open ends take from outside: the `flow` (torque, force, current, heat flow) or the `potential`.
-        check: whether to run the FMU against IDAS, where it has a binary for this machine.
+        check: whether to run the FMU against IDAS, where it has a binary for this machine. What it shows is told by the
+            `check` of what is returned; where they differ, a picture `…_check.png` is drawn next to the FMU.
+        strict: whether not to write an FMU that differs from IDAS.
         report: called with what is being done.
 
     Returns:
         What was exported.
 
     Raises:
-        ExportError: it cannot be exported or compiled, or does not pass its checks; nothing is written then.
+        ExportError: it cannot be exported or compiled, or has a fault; nothing is written then.
         UnknownName: there is no such version, kind, platform, connector or variable.
         MissingExtra: binaries for other platforms need zig.
         ModelicaLikeError: something is wrong with the model.
@@ -110,9 +116,13 @@ def export_fmu(
         draft = Path(folder) / "draft.fmu"
         write_archive(draft, files)
         tell("checking")
-        _check(draft, model, kinds, names, check)
+        _check_parts(draft)
+        checked = compare_with_idas(draft, model, kinds[-1]) if check and native_platform() in names else Check()
+        if strict and checked.differs:
+            raise ExportError(checked.sentence, advice="Without `strict` it is written all the same, with a picture.")
         target.write_bytes(draft.read_bytes())
-    return Export(target, chosen, kinds, names, target.stat().st_size, time.perf_counter() - begin)
+    checked = _draw(checked, target)
+    return Export(target, chosen, kinds, names, target.stat().st_size, time.perf_counter() - begin, checked)
 
 
 def _silent(_: str) -> None:
@@ -243,11 +253,18 @@ def _token(texts: dict[str, str]) -> str:
     return f"{{{digest[:8]}-{digest[8:12]}-{digest[12:16]}-{digest[16:20]}-{digest[20:32]}}}"
 
 
-def _check(draft: Path, model: CompiledDae, kinds: tuple[Kind, ...], names: tuple[str, ...], run: bool) -> None:
+def _check_parts(draft: Path) -> None:
     found = problems(draft)
     if found:
         raise ExportError(
             f"The FMU does not pass its checks: {'; '.join(found[:3])}.", why="This is a fault of the export."
         )
-    if run and native_platform() in names:
-        compare_with_idas(draft, model, kinds[-1])
+
+
+def _draw(check: Check, target: Path) -> Check:
+    """Draw curves that differ next to the FMU."""
+    if not check.differs or check.curves is None:
+        return check
+    picture = target.with_name(f"{target.stem}_check.png")
+    check.curves.plot().savefig(picture)
+    return replace(check, picture=picture)
