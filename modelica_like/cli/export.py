@@ -17,6 +17,14 @@ class Takes(StrEnum):
     POTENTIAL = "potential"
 
 
+class Modes(StrEnum):
+    """What modes are in an FMU."""
+
+    OUTPUT = "output"
+    LOCAL = "local"
+    INTEGER = "integer"
+
+
 def export(
     netlist: Netlist, assignments: Assignments = None, *,
     output: Annotated[
@@ -34,6 +42,9 @@ def export(
         list[str] | None, Option("--open", metavar="PATH", help="A free connector that is open, e.g. J.flange_b.")
     ] = None,
     takes: Annotated[Takes, Option(help="What open ends take: flow (torque) or potential (angle).")] = Takes.FLOW,
+    modes: Annotated[Modes, Option(help="Modes as enumeration outputs, as local ones, or as integer outputs.")] = (
+        Modes.OUTPUT
+    ),
     check: Annotated[bool, Option(help="Run the FMU against IDAS before it is handed over.")] = True,
     strict: Annotated[bool, Option("--strict", help="Do not write an FMU that differs from IDAS.")] = False,
     debug: Debug = False,
@@ -48,8 +59,8 @@ def export(
         with Console(stderr=True).status("loading") as status:
             done = export_fmu(
                 assembly, output or Path(f"{netlist.stem}.fmu"), fmi, _listed(kind), _listed(platforms),
-                outputs=outputs or (), ends=ends or (), takes=takes.value, check=check, strict=strict,
-                report=status.update,
+                outputs=outputs or (), ends=ends or (), takes=takes.value, modes=modes.value,
+                check=check, strict=strict, report=status.update,
             )  # fmt: skip
         out().print(str(done), soft_wrap=True)
 

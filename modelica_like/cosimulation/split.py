@@ -100,7 +100,7 @@ def split(
     system = System(assembly._name, tuple(units), links, bonds, settings, own_names=True)
     path = target / "system.toml"
     write_system(system, path)
-    taken = {end.path: end.takes for cut, takes in chosen.items() for end in ends_of(cut, takes)}
+    taken: dict[str, Takes] = {end.path: end.takes for cut, takes in chosen.items() for end in ends_of(cut, takes)}
     return Split(system, path, taken, tuple(notes))
 
 

@@ -22,7 +22,7 @@ _KINDS = {
     "parameter": "KIND_PARAMETER", "derived": "KIND_DERIVED", "input": "KIND_INPUT", "discrete": "KIND_DISCRETE",
     "guard": "KIND_GUARD",
 }  # fmt: skip
-_TYPES = {"Float64": "TYPE_FLOAT64", "Enumeration": "TYPE_ENUMERATION"}
+_TYPES = {"Float64": "TYPE_FLOAT64", "Enumeration": "TYPE_ENUMERATION", "Int64": "TYPE_ENUMERATION"}
 _RESETS = {"state": "RESET_STATE", "discrete": "RESET_DISCRETE", "value": "RESET_VALUE"}
 
 

@@ -22,7 +22,7 @@ from modelica_like.fmi.codegen import LOG_CATEGORIES, generate, licenses, source
 from modelica_like.fmi.description import About, Kind, Version, build_description, identifier, model_description
 from modelica_like.fmi.documentation import Listing, index_page
 from modelica_like.fmi.icons import drive_icon, icon_name, terminal_icon
-from modelica_like.fmi.interface import Interface, interface
+from modelica_like.fmi.interface import Interface, ModesAs, interface
 from modelica_like.fmi.package import write_archive
 from modelica_like.fmi.terminals import Takes, terminals_and_icons, with_open_ends
 from modelica_like.simulation import Model, seconds
@@ -67,7 +67,8 @@ class Export:
 def export_fmu(
     drive: Model, path: str | Path, version: Version | str = "2.0", kind: Collection[Kind | str] = ("me", "cs"),
     platforms: Sequence[str] | str = "native", *, outputs: Sequence[str] = (), ends: Sequence[str] = (),
-    takes: Takes = "flow", check: bool = True, strict: bool = False, report: Report | None = None,
+    takes: Takes = "flow", modes: ModesAs | str = "output", check: bool = True, strict: bool = False,
+    report: Report | None = None,
 ) -> Export:  # fmt: skip
     """Export a drive as an FMU: compiled C that needs no Python.
 
@@ -83,6 +84,8 @@ def export_fmu(
         outputs: patterns of further variables that are to be outputs, such as `*.w`.
         ends: free connectors of parts that are to be open, such as `load.flange_b`.
         takes: what open ends take from outside: the `flow` (torque, force, current, heat flow) or the `potential`.
+        modes: `output` (enumerations), `local` (enumerations that are no outputs), or `integer` (outputs): some
+            importers know no enumerations.
         check: whether to run the FMU against IDAS, where it has a binary for this machine. What it shows is told by the
             `check` of what is returned; where they differ, a picture `…_check.png` is drawn next to the FMU.
         strict: whether not to write an FMU that differs from IDAS.
@@ -93,7 +96,7 @@ def export_fmu(
 
     Raises:
         ExportError: it cannot be exported or compiled, or has a fault; nothing is written then.
-        UnknownName: there is no such version, kind, platform, connector or variable.
+        UnknownName: there is no such version, kind, platform, connector, variable or way of modes.
         MissingExtra: binaries for other platforms need zig.
         ModelicaLikeError: something is wrong with the model.
     """
@@ -103,7 +106,7 @@ def export_fmu(
     chosen, kinds, names = _version(version), _kinds(kind), _platforms(platforms)
     tell("compiling the model")
     model, description, equations = _compiled(drive, ends, takes)
-    variables = interface(model, outputs)
+    variables = interface(model, outputs, _modes(modes))
     tell("writing C")
     files, sources = _contents(model, variables, _about(model, chosen, kinds, description), equations)
     title = identifier(model.name)
@@ -146,6 +149,13 @@ def _version(asked: str) -> Version:
         if asked == one:
             return one
     raise UnknownName(f"FMI {asked} is not supported.", advice="There are 2.0 and 3.0.")
+
+
+def _modes(asked: str) -> ModesAs:
+    for one in get_args(ModesAs):
+        if asked == one:
+            return one
+    raise UnknownName(f"Modes cannot be exported as '{asked}'.", advice=f"There are {', '.join(get_args(ModesAs))}.")
 
 
 def _kinds(kind: Collection[str]) -> tuple[Kind, ...]:

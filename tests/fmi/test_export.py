@@ -33,6 +33,7 @@ from components import (
     VoltageToCurrentAdaptor,
 )
 from modelica_like import build, export_fmu, load, simulate
+from modelica_like.errors import UnknownName
 from modelica_like.fmi.build import PLATFORMS, native_platform
 from modelica_like.fmi.check import problems
 from modelica_like.fmi.export import Export
@@ -207,6 +208,32 @@ def test_further_outputs(tmp_path: Path) -> None:
     export_fmu(flywheel(), tmp_path / "one.fmu", platforms=(), outputs=["J.w"])
     description: Any = fmpy.read_model_description(str(tmp_path / "one.fmu"))
     assert "J.w" in {one.variable.name for one in description.outputs}
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+@pytest.mark.parametrize(
+    ("modes", "kind", "causality"), [("local", "Enumeration", "local"), ("integer", "Integer", "output")]
+)
+def test_modes_for_importers_that_know_no_enumerations(
+    version: str, modes: str, kind: str, causality: str, tmp_path: Path
+) -> None:
+    path = export_fmu(
+        EXAMPLES / "machine_table_direct.toml", tmp_path / "m.fmu", version, modes=modes, check=False
+    ).path
+    assert validate_fmu(str(path)) == []
+    description: Any = fmpy.read_model_description(str(path))
+    (mode,) = (one for one in description.modelVariables if one.name == "clutch.mode")
+    assert (mode.type.replace("Int64", "Integer"), mode.causality) == (kind, causality)
+    assert ("clutch.mode" in {one.variable.name for one in description.outputs}) == (causality == "output")
+    run = run_fmu(path, outputs=["clutch.mode"])
+    truth = simulate(EXAMPLES / "machine_table_direct.toml")
+    assert [e.time for e in run.events] == pytest.approx([e.time for e in truth.events if e.mode == "clutch.mode"])
+    assert run.final["clutch.mode"] == truth.final["clutch.mode"]
+
+
+def test_another_way_of_modes_is_told(tmp_path: Path) -> None:
+    with pytest.raises(UnknownName, match="There are output, local, integer"):
+        export_fmu(flywheel(), tmp_path / "x.fmu", platforms=(), modes="real")
 
 
 def test_a_compiled_model_can_be_exported(tmp_path: Path) -> None:
