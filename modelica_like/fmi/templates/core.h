@@ -361,6 +361,7 @@ typedef enum { REACHED, AT_EVENT, FAILED } Arrival;
 Arrival integrate_to(Instance *c, double target, int stop_at_events);
 void leave_piece(Instance *c);
 Result handle_event(Instance *c);
+Result update_discrete(Instance *c, int *restart, double *next);
 Result check_step(Instance *c, double point, double size, double *target);
 
 /* values.c */
