@@ -165,10 +165,10 @@ class SolveError(ModelicaLikeError):
     """The simulation cannot go on.
 
     Attributes:
-        record: segments and events up to there, a `Recorder`, if there are any.
+        run: the `Solution` up to there, if there is any. The `KeyboardInterrupt` that ends a simulation has it, too.
     """
 
-    record: Any = None
+    run: Any = None
 
 
 class SingularAtStart(SolveError):

@@ -28,6 +28,7 @@ from modelica_like.fmi.terminals import Takes, terminals_and_icons, with_open_en
 from modelica_like.simulation import Model, seconds
 from modelica_like.solve.options import Options
 from modelica_like.structure import reduce
+from modelica_like.writing import check_writable, write_bytes
 
 _TOKEN = "{00000000-0000-0000-0000-000000000000}"
 
@@ -111,7 +112,7 @@ def export_fmu(
         write_archive(draft, files)
         tell("checking")
         _check(draft, model, kinds, names, check)
-        target.write_bytes(draft.read_bytes())
+        write_bytes(target, draft.read_bytes())
     return Export(target, chosen, kinds, names, target.stat().st_size, time.perf_counter() - begin)
 
 
@@ -128,6 +129,7 @@ def _target(path: str | Path) -> Path:
         raise ExportError(f"An FMU is a file with the ending .fmu, not '{target.name}'.")
     if not target.absolute().parent.is_dir():
         raise ExportError(f"There is no folder '{target.parent}' for {target.name}.", advice="Make it first.")
+    check_writable(target)
     return target
 
 

@@ -17,12 +17,12 @@ from modelica_like.language.formula import Formula
 from modelica_like.netlist.convert import as_assembly
 from modelica_like.netlist.read import load, new_component
 from modelica_like.netlist.registry import type_name
+from modelica_like.writing import write_text
 
 
 def save(component: Component, path: str | Path) -> None:
     """Write a component as a netlist file; see `dumps`."""
-    path = Path(path)
-    path.write_text(dumps(component, folder=path.parent), encoding="utf-8")
+    write_text(path, dumps(component, folder=Path(path).parent))
 
 
 def dumps(component: Component, *, folder: str | Path = ".") -> str:
