@@ -75,7 +75,8 @@ def check_writable(path: str | Path) -> None:
         raise _refused(path, errno.EACCES)
     if target.exists() and not target.is_file():
         return
-    folder = next(one for one in target.parents if one.exists())
+    given = target if Path(path).is_symlink() else Path(path)
+    folder = next(one for one in given.parents if one.exists())
     if not folder.is_dir():
         raise _refused(folder, errno.ENOTDIR)
     try:

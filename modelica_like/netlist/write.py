@@ -81,7 +81,7 @@ class _Writer:
         """Return the table of one part: its type, and what differs from a new one of that type."""
         if isinstance(part, Assembly):
             return {"is": self.file_of(part), **self.changes(path, part, load(part.__dict__["origin"]))}
-        structural = {key: plain(part.__dict__[key]) for key in part._structural}
+        structural = {key: plain(part._given_tables.get(key, part.__dict__[key])) for key in part._structural}
         reference = new_component(type(part), dict(structural))
         different = {key: value for key, value in structural.items() if _frozen(value) != part._structural[key]}
         return {"is": type_name(type(part)), **different, **self.changes(path, part, reference)}
