@@ -31,6 +31,7 @@ from modelica_like.fmi.terminals import Takes, terminals_and_icons, with_open_en
 from modelica_like.simulation import Model, seconds
 from modelica_like.solve.options import Options
 from modelica_like.structure import reduce
+from modelica_like.writing import check_writable, write_bytes
 
 _TOKEN = "{00000000-0000-0000-0000-000000000000}"
 
@@ -126,7 +127,7 @@ def export_fmu(
         checked = compare_with_idas(draft, model, kinds[-1]) if check and native_platform() in names else Check()
         if strict and checked.differs:
             raise ExportError(checked.sentence, advice="Without `strict` it is written all the same, with a picture.")
-        target.write_bytes(draft.read_bytes())
+        write_bytes(target, draft.read_bytes())
     checked = _draw(checked, target)
     return Export(target, chosen, kinds, names, target.stat().st_size, time.perf_counter() - begin, checked)
 
@@ -144,6 +145,7 @@ def _target(path: str | Path) -> Path:
         raise ExportError(f"An FMU is a file with the ending .fmu, not '{target.name}'.")
     if not target.absolute().parent.is_dir():
         raise ExportError(f"There is no folder '{target.parent}' for {target.name}.", advice="Make it first.")
+    check_writable(target)
     return target
 
 
