@@ -225,7 +225,7 @@ def energy_balance(
         *audit.found(),
     )  # fmt: skip
     rows = tuple(EnergyRow(path, *map(float, values)) for path, *values in zip(model.components, *columns, strict=True))
-    throughput = max([audit.stored, *(float(np.sum(np.abs(part))) for part in (inflow, source, lost + impact))])
+    throughput = max([powers.stored, *(float(np.sum(np.abs(part))) for part in (inflow, source, lost + impact))])
     reset = [event.time for event in events if event.transition >= 0 and model.transitions[event.transition].resets]
     times = np.concatenate(audit.times)[1:]
     return EnergyBalance(rows, throughput, _unexplained(times, np.sum(jumps, axis=0), reset, impacts))
@@ -238,7 +238,6 @@ class _Audit:
     """
 
     def __init__(self, count: int) -> None:
-        self.stored = 0.0
         self.times: list[Vector] = []
         self.starts: list[Vector] = []
         self.ends: list[Vector] = []
@@ -253,7 +252,6 @@ class _Audit:
         self.times.append(some.times[starts])
         self.starts.append(stored[:, starts])
         self.ends.append(stored[:, np.unique(some.last)])
-        self.stored = max(self.stored, float(np.max(np.sum(np.abs(stored), axis=0), initial=0.0)))
         self._largest = np.maximum(self._largest, np.max(np.abs(some.terms[1:]), axis=(0, 2), initial=0.0))
         for k, values in enumerate((np.abs(inflow + source - lost - rate), -lost)):
             worst = np.max(values, axis=1)
