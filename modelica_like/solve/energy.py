@@ -221,7 +221,7 @@ def energy_balance(
     count = len(model.components)
     audit, totals = _Audit(count), np.zeros((POWERS, count))
     options = options or Options()
-    powers = Powers(model, options)
+    powers = Powers(model, options, sum(len(segment.times) for segment in segments))
     for some in results(model, segments):
         totals += powers.integrals(some)
         audit.see(some)

@@ -23,10 +23,10 @@ _RATE = 4
 """Column of the rate of the stored energy among the energy terms."""
 _PIECE = 20_000
 """Results that are looked at together."""
-_SHARE = 0.1
-"""Error of one interval, in relative tolerances of the energy that moves, from which it is integrated again."""
+_SHARE, _ALL = 0.1, 50.0
+"""Errors of one interval and of all, in relative tolerances of the energy that moves, that are left as they are."""
 _ASTRAY = 3.0
-"""The same for stored energies that change otherwise than their rates say, however smooth these look."""
+"""The same of one interval for stored energies that change otherwise than their rates say, however smooth these look."""
 _FINER = 0.1
 _FINEST = 1e-12
 """What is integrated again is so much more precise than the run, but no more than this."""
@@ -103,6 +103,7 @@ class Powers:
     Args:
         model: the compiled model.
         options: of the run.
+        count: number of its results.
 
     Attributes:
         stored: the largest energy that all components stored at one time so far, in J.
@@ -110,8 +111,9 @@ class Powers:
             what is left over: an oscillation exchanges its energy again and again.
     """
 
-    def __init__(self, model: CompiledDae, options: Options) -> None:
+    def __init__(self, model: CompiledDae, options: Options, count: int) -> None:
         self.model, self.options = model, options
+        self._share = min(_SHARE, _ALL / count)
         self.stored, self.moved = 0.0, 0.0
 
     def integrals(self, every: Results) -> Vector:
@@ -154,7 +156,7 @@ class Powers:
         gain = np.maximum(_ratio(near[:2], far[:2]), _ratio(known, smooth))
         errors = np.maximum(np.maximum(*(near[:2] * gain)), np.minimum(known, smooth))
         allowed = self.options.rtol * self.moved
-        return ~((errors <= _SHARE * allowed) & (known <= _ASTRAY * allowed))
+        return ~((errors <= self._share * allowed) & (known <= _ASTRAY * allowed))
 
     def _again(self, every: Results, ends: Places, stretches: list[Places]) -> tuple[Places, Vector]:
         """Integrate stretches of intervals again, divided where that fails; return which were, and their integrals."""
