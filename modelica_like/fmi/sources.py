@@ -65,13 +65,14 @@ def runtime_sources(versions: Iterable[Version]) -> dict[str, str]:
     Raises:
         ExportError: FMPy, which has the headers of the standard, is not installed.
     """
-    names = ["core.h", "model_data.c", *RUNTIME]
-    headers: list[str] = []
-    for version in versions:
-        names += _FACES[version]
-        headers += _HEADERS[version]
-    texts = {name: (_TEMPLATES / name).read_text(encoding="utf-8") for name in names}
-    return texts | {name: _header(name) for name in headers}
+    wanted = tuple(versions)
+    return own_sources(wanted) | {name: _header(name) for version in wanted for name in _HEADERS[version]}
+
+
+def own_sources(versions: Iterable[Version]) -> dict[str, str]:
+    """Read the same without the headers of the standard."""
+    names = ("core.h", "model_data.c", *RUNTIME, *(name for version in versions for name in _FACES[version]))
+    return {name: (_TEMPLATES / name).read_text(encoding="utf-8") for name in names}
 
 
 def licenses(version: Version) -> str:
