@@ -26,7 +26,7 @@ _PIECE = 20_000
 _SHARE, _ALL = 0.1, 50.0
 """Errors of one interval and of all, in relative tolerances of the energy that moves, that are left as they are."""
 _ASTRAY = 3.0
-"""The same of one interval for stored energies that change otherwise than their rates say, however smooth these look."""
+"""The same of one interval for stored energies that change otherwise than their rates say, smooth as these look."""
 _FINER = 0.1
 _FINEST = 1e-12
 """What is integrated again is so much more precise than the run, but no more than this."""
