@@ -15,6 +15,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from modelica_like.errors import ExportError, MissingExtra, UnknownName, did_you_mean
+from modelica_like.writing import replacing
 
 
 @dataclass(frozen=True)
@@ -119,7 +120,6 @@ def build(sources: Mapping[str, str], platform: str, output_dir: Path, identifie
     chosen = PLATFORMS[platform]
     library = Path(output_dir) / f"{identifier}{chosen.suffix}"
     command = compiler_command(platform)
-    library.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix="modelica_like_") as folder:
         for name, content in sources.items():
             (Path(folder) / name).write_text(content, encoding="utf-8")
@@ -131,7 +131,8 @@ def build(sources: Mapping[str, str], platform: str, output_dir: Path, identifie
         libraries = [] if chosen.suffix == ".dll" else ["-lm"]
         built = Path(folder) / f"{identifier}{chosen.suffix}"
         _run([*command, *FLAGS, *position, "-o", str(built), *wholes, *libraries], folder, platform)
-        shutil.copyfile(built, library)
+        with replacing(library) as draft:
+            shutil.copyfile(built, draft)
     return library
 
 

@@ -84,7 +84,7 @@ SECTIONS: dict[str, Any] = {
 """Sections in the order of the file, with the type of their records."""
 
 _KINDS = ("time", "state", "der", "variable", "parameter", "derived", "input", "discrete", "guard")
-_TYPES = ("Float64", "Enumeration")
+_TYPES = {"Float64": 0, "Enumeration": 1, "Int64": 1}
 _RESETS = ("state", "discrete", "value")
 _CODES = {name: code for code, name in enumerate(OPERATIONS)}
 
@@ -258,7 +258,7 @@ def _variable(one: FmuVariable, text: _Text) -> tuple[int, ...]:
     kind, index = one.slot
     start = -1 if one.start_entry is None else one.start_entry
     tunable = int(kind == "parameter" and one.variability == "tunable")
-    return (one.reference, _TYPES.index(one.type), _KINDS.index(kind), index, start, tunable, text(one.name))
+    return (one.reference, _TYPES[one.type], _KINDS.index(kind), index, start, tunable, text(one.name))
 
 
 def _pattern(name: str, one: QrPattern) -> dict[str, Any]:

@@ -109,6 +109,8 @@ typedef struct {
     Strike strike;
     Impacts impacts;
     double *respond_d, *respond_z, *rates, *x_kept;
+    double *begun; /* motions that may be held, where the search for a steady state began */
+    int *standing;
 } Work;
 
 typedef struct Instance {
@@ -162,7 +164,7 @@ double input_at(const Instance *c, int k, double t);
 /* start.c */
 void start_defaults(Instance *c);
 Result start_solve(Instance *c);
-int choose_modes(Instance *c, unsigned char *decided);
+void choose_modes(Instance *c, unsigned char *decided);
 
 /* holds.c */
 #define UNLIMITED 1e30
@@ -183,6 +185,7 @@ double next_moment(Instance *c);
 int find_wanting(Instance *c, unsigned char *wanting, int guards_too);
 Result iterate_events(Instance *c, unsigned char *wanting, int located);
 double number_or_false(double guard);
+void move_states(Instance *c, const int *nodes, const double *values, int count);
 void note_change(Instance *c, int name, int mode, int target);
 unsigned char *nothing_wanting(Instance *c);
 
@@ -199,6 +202,7 @@ typedef enum { REACHED, AT_EVENT, FAILED } Arrival;
 Arrival integrate_to(Instance *c, double target, int stop_at_events);
 void leave_piece(Instance *c);
 Result handle_event(Instance *c);
+Result update_discrete(Instance *c, int *restart, double *next);
 Result check_step(Instance *c, double point, double size, double *target);
 
 /* values.c */

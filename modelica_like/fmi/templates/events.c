@@ -82,14 +82,13 @@ static void drop_balanced(Instance *c, unsigned char *wanting) {
             wanting[m->guard_transition[k]] = 0;
 }
 
-/* Move the states as little as possible, so that variables that follow from them take new values. */
-static void project(Instance *c, const int *targets, const double *values, int count) {
+/* Move the states as little as possible, so that variables that follow from them take new values, or vanish. */
+void move_states(Instance *c, const int *nodes, const double *values, int count) {
     const Model *m = c->model;
-    State *s = &c->state;
     double *slopes = c->work.square, *change = c->work.start_residual, *step = c->work.point;
-    evaluate(c, &m->tapes.variables, s->t, c->x, c->z, c->work.variables);
-    for (int k = 0; k < count; k++) change[k] = values[k] - c->work.variables[m->reset_nodes[targets[k]]];
-    for (int k = 0; k < count; k++) adjoint_of_node(c, m->reset_nodes[targets[k]], slopes + (size_t)k * m->n_x);
+    evaluate(c, &m->tapes.variables, c->state.t, c->x, c->z, c->work.variables);
+    for (int k = 0; k < count; k++) change[k] = (values ? values[k] : 0) - c->work.variables[nodes[k]];
+    for (int k = 0; k < count; k++) adjoint_of_node(c, nodes[k], slopes + (size_t)k * m->n_x);
     least_squares(count, m->n_x, slopes, change, step);
     for (int k = 0; k < m->n_x; k++) c->x[k] += step[k];
 }
@@ -131,13 +130,13 @@ static void fire(Instance *c, const unsigned char *wanting, Impacts *impacts) {
                 c->x[reset->index] = values[reset->value] / reset->factor;
             } else if (reset->kind == RESET_DISCRETE) d[reset->index] = values[reset->value];
             else {
-                w->targets[count] = reset->target;
+                w->targets[count] = m->reset_nodes[reset->target];
                 w->target_values[count++] = values[reset->value];
             }
         }
     }
     memcpy(c->d, d, (size_t)m->n_d * sizeof(double));
-    if (count > 0) project(c, w->targets, w->target_values, count);
+    if (count > 0) move_states(c, w->targets, w->target_values, count);
 }
 
 /* Notes an instant; an error where the last ones came ever faster. */

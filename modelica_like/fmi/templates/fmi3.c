@@ -138,8 +138,8 @@ fmi3Status fmi3EvaluateDiscreteStates(fmi3Instance instance) {
 fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discreteStatesNeedUpdate,
     fmi3Boolean *terminateSimulation, fmi3Boolean *nominalsOfContinuousStatesChanged,
     fmi3Boolean *valuesOfContinuousStatesChanged, fmi3Boolean *nextEventTimeDefined, fmi3Float64 *nextEventTime) {
-    double *before, next;
-    size_t size;
+    double next;
+    int restart;
     ENTER(fmi3UpdateDiscreteStates, PHASE_EVENT);
     NEED(discreteStatesNeedUpdate, 1);
     NEED(terminateSimulation, 1);
@@ -147,13 +147,9 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discrete
     NEED(valuesOfContinuousStatesChanged, 1);
     NEED(nextEventTimeDefined, 1);
     NEED(nextEventTime, 1);
-    before = c->work.x_before;
-    size = (size_t)c->model->n_x * sizeof(double);
-    memcpy(before, c->x, size);
-    if (handle_event(c) != RESULT_OK) return failed(c);
-    next = next_moment(c);
+    if (update_discrete(c, &restart, &next) != RESULT_OK) return failed(c);
     *discreteStatesNeedUpdate = *terminateSimulation = *nominalsOfContinuousStatesChanged = fmi3False;
-    *valuesOfContinuousStatesChanged = memcmp(before, c->x, size) != 0;
+    *valuesOfContinuousStatesChanged = restart != 0;
     *nextEventTimeDefined = isfinite(next);
     *nextEventTime = isfinite(next) ? next : 0;
     return fmi3OK;

@@ -107,7 +107,7 @@ static uint64_t place_state(Instance *c, double *memory) {
 static uint64_t place_work(const Model *m, Work *w, double *memory) {
     uint64_t n = (uint64_t)m->n_unknowns, n_z = (uint64_t)m->n_z, steady = (uint64_t)m->n_steady + n_z;
     uint64_t members = (uint64_t)m->most_members, n_guards = (uint64_t)m->n_guards, n_x = (uint64_t)m->n_x;
-    uint64_t resets = larger((uint64_t)m->n_resets, (uint64_t)m->n_reset_values);
+    uint64_t resets = larger(larger((uint64_t)m->n_resets, (uint64_t)m->n_reset_values), (uint64_t)m->n_holds);
     uint64_t small = larger(larger(n_guards, (uint64_t)m->n_moments),
         larger(larger((uint64_t)m->n_start_modes, (uint64_t)m->n_d), (uint64_t)m->n_derived));
     uint64_t square =
@@ -152,7 +152,8 @@ static uint64_t place_events(const Model *m, Work *w, double *memory) {
         {(uint64_t)m->n_transitions, 1, {&w->wanting}},
         {n_holds, sizeof(Terms), {&w->terms, &w->strike_terms}},
         {n_holds, 8, {&w->weights, &w->base_weights, &w->use, &w->strike.before, &w->strike.approach}},
-        {n_holds, 8, {&w->strike.impulse, &w->strike.reaction}},
+        {n_holds, 8, {&w->strike.impulse, &w->strike.reaction, &w->begun}},
+        {n_holds, sizeof(int), {&w->standing}},
         {n_holds, 1, {&w->held, &w->impacts.entered}},
         {n_holds, 1, {&w->strike.entering, &w->strike.loose, &w->strike.held, &w->strike.knocked}},
         {members, 8, {&w->reactions, &w->sizes, &w->zeros}},

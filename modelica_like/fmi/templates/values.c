@@ -3,6 +3,8 @@
 #include <string.h>
 #include "core.h"
 
+#define OFFSET 1e-12
+
 const Variable *find_variable(const Model *m, uint32_t reference) {
     int low = 0, high = m->n_variables - 1;
     while (low <= high) {
@@ -92,13 +94,18 @@ void get_derivatives(Instance *c, double *derivatives) {
 }
 
 /* Guards of active modes, as event iteration judges them: an indicator above zero is an event that wants to fire, so
- * that after every event all are at or below zero. The others are constant, so that nobody looks for their zeros. */
+ * that after every event all are below zero. The others are constant, so that nobody looks for their zeros. A root
+ * finder would take an indicator of exactly zero for a root at its first instant: what wants to stay is below zero by
+ * an offset. It shifts no event, as it is gone above zero; its size is that of rounding, and products of it do not
+ * underflow, by whose sign root finders judge. */
 void get_indicators(Instance *c, double *indicators) {
     const Model *m = c->model;
-    State *s = &c->state;
     double *values = c->work.guards_before;
-    evaluate(c, &m->tapes.guards_soon, s->t, c->x, c->z, values);
-    for (int k = 0; k < m->n_guards; k++) indicators[k] = guard_active(c, k) ? number_or_false(values[k]) : -1;
+    evaluate(c, &m->tapes.guards_soon, c->state.t, c->x, c->z, values);
+    for (int k = 0; k < m->n_guards; k++) {
+        double value = guard_active(c, k) ? number_or_false(values[k]) : -1;
+        indicators[k] = value > 0 ? value : value - OFFSET;
+    }
 }
 
 Result get_mode(Instance *c, uint32_t reference, int *value) {
@@ -160,11 +167,10 @@ Result set_float(Instance *c, uint32_t reference, double value) {
     if (!isfinite(value)) return refuse_value(c, v, "the value is not a finite number.");
     if (v->kind == KIND_PARAMETER) return set_parameter(c, v, value);
     if (v->kind != KIND_INPUT) return set_start(c, v, value);
-    if (input_at(c, v->index, s->t) == value && c->u_rate[v->index] == 0) return RESULT_OK;
+    if (input_at(c, v->index, s->t) == value) return RESULT_OK;
     for (int k = 0; k < c->model->n_u; k++) c->u[k] = input_at(c, k, s->t);
     s->u_time = s->t;
-    c->u[v->index] = value;
-    c->u_rate[v->index] = 0;
+    c->u[v->index] = value; /* its rate stays, in whatever order an importer gives the two */
     touch(c);
     return RESULT_OK;
 }
