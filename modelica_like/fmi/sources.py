@@ -71,7 +71,7 @@ def runtime_sources(versions: Iterable[Version]) -> dict[str, str]:
 
 def own_sources(versions: Iterable[Version]) -> dict[str, str]:
     """Read the same without the headers of the standard."""
-    names = ("core.h", "model_data.c", *RUNTIME, *(name for version in versions for name in _FACES[version]))
+    names = ("core.h", "model.h", "model_data.c", *RUNTIME, *(name for version in versions for name in _FACES[version]))
     return {name: (_TEMPLATES / name).read_text(encoding="utf-8") for name in names}
 
 

@@ -28,18 +28,18 @@ static Result check_knowns(Instance *c, const uint32_t *knowns, size_t n) {
 }
 
 static Result check_unknowns(Instance *c, const uint32_t *unknowns, size_t n) {
-    const Model *m = c->model;
     for (size_t k = 0; k < n; k++) {
         const Variable *v = known_variable(c, unknowns[k], TYPE_FLOAT64);
         if (v == NULL) return RESULT_ERROR;
         if (v->kind == KIND_DISCRETE)
-            return report(
-                c, LOG_ERROR, RESULT_ERROR, "%s changes at events only: it has no derivatives.", text_of(m, v->name));
+            return report(c, LOG_ERROR, RESULT_ERROR, "%s changes at events only: it has no derivatives.",
+                text_of(c->model, v->name));
     }
     return RESULT_OK;
 }
 
-/* Factorises the Jacobian of the implicit equations at the present point, with the slots of m->tapes.rates filled. */
+/* Factorises the Jacobian of the implicit equations at the present point, with the slots of c->model->tapes.rates
+ * filled. */
 static Result factor_implicit(Instance *c, int *order) {
     const Model *m = c->model;
     State *s = &c->state;

@@ -81,10 +81,9 @@ static double cubic_guess(double g0, double r0, double g1, double r1) {
 enum { QUIET, CROSSING, HUMP };
 
 static int find_candidates(const Instance *c, const Look *before, const Look *after, unsigned char *kinds) {
-    const Model *m = c->model;
     double h = after->t - before->t;
     int any = 0;
-    for (int g = 0; g < m->n_guards; g++) {
+    for (int g = 0; g < c->model->n_guards; g++) {
         double g0 = before->values[g], g1 = after->values[g];
         kinds[g] = QUIET;
         if (!guard_active(c, g) || g0 > 0) continue;
@@ -329,11 +328,10 @@ static Result take_changes(Instance *c, int *event) {
 
 /* Fires what was located at the present point, or what wants to fire. */
 Result handle_event(Instance *c) {
-    const Model *m = c->model;
     State *s = &c->state;
     unsigned char *wanting = nothing_wanting(c);
     int located = s->event_pending;
-    if (located) memcpy(wanting, c->wanting, m->n_transitions);
+    if (located) memcpy(wanting, c->wanting, c->model->n_transitions);
     leave_piece(c);
     s->at_event = 0;
     s->step = 0;
@@ -355,10 +353,7 @@ Result update_discrete(Instance *c, int *restart, double *next) {
     return RESULT_OK;
 }
 
-static int is_due(Instance *c) {
-    const Model *m = c->model;
-    return m->n_moments > 0 && find_wanting(c, nothing_wanting(c), 0);
-}
+static int is_due(Instance *c) { return c->model->n_moments > 0 && find_wanting(c, nothing_wanting(c), 0); }
 
 /* Checks what the importer asks for and says where the step ends. */
 Result check_step(Instance *c, double point, double size, double *target) {
