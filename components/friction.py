@@ -36,6 +36,8 @@ HOLDS = {"stuck": Hold("slip", reaction="friction", capacity="limits")}
 """What surfaces that stick hold, in whatever unit."""
 _NOW = 1e-9
 """What counts as one instant, in creep_time."""
+_FAINT = 1e-10
+"""Part of what surfaces can bear up to which more than that may be rounding: they do not break away in a tie."""
 
 
 class Sticking(Lossy, partial=True):
@@ -93,11 +95,13 @@ class Sticking(Lossy, partial=True):
 
     def breaks_forward(self) -> Expr:
         """Return the condition on which surfaces that stick begin to slide forward."""
-        return where(self.carried(), self._soon() - self.rest, self.friction - self.holds_forward()) > 0
+        bearable = self.holds_forward()
+        return where(self.carried(), self._soon() - self.rest, self.friction - bearable - _FAINT * bearable) > 0
 
     def breaks_backward(self) -> Expr:
         """Return the condition on which surfaces that stick begin to slide backward."""
-        return where(self.carried(), self._soon() + self.rest, self.friction - self.holds_backward()) < 0
+        bearable = self.holds_backward()
+        return where(self.carried(), self._soon() + self.rest, self.friction - bearable - _FAINT * bearable) < 0
 
     def _soon(self) -> Expr:
         return self.slip + self.creep_time * der(self.slip)

@@ -9,7 +9,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
@@ -50,8 +50,7 @@ PLATFORMS = {
 
 # -O1 runs as fast as -O2 here and compiles in two thirds of the time. Changed flags make zig compile its C runtime
 # again, which takes minutes for Windows.
-_FLAGS = ("-std=c99", "-O1", "-ffp-contract=off", "-fvisibility=hidden", "-shared", "-Wall", "-Wextra", "-DOLD_GLIBC")
-_WHOLE = "whole.c"
+FLAGS = ("-std=c99", "-O1", "-ffp-contract=off", "-fvisibility=hidden", "-shared", "-Wall", "-Wextra", "-DOLD_GLIBC")
 _COMPILERS = ("cc", "gcc", "clang")
 _SYSTEMS = {"Linux": "linux", "Windows": "windows", "Darwin": "darwin"}
 _MACHINES = {"x86_64": "x86_64", "AMD64": "x86_64", "aarch64": "aarch64", "arm64": "aarch64", "ARM64": "aarch64"}
@@ -102,17 +101,26 @@ def build(sources: Mapping[str, str], platform: str, output_dir: Path, identifie
     with tempfile.TemporaryDirectory(prefix="modelica_like_") as folder:
         for name, content in sources.items():
             (Path(folder) / name).write_text(content, encoding="utf-8")
-        # As one file: what all of them include is read once, which saves a third of the time.
-        whole = "".join(f'#include "{name}"\n' for name in sources if name.endswith(".c"))
-        (Path(folder) / _WHOLE).write_text(whole, encoding="utf-8")
+        wholes = _wholes(name for name in sources if name.endswith(".c"))
+        for name, content in wholes.items():
+            (Path(folder) / name).write_text(content, encoding="utf-8")
         position = [] if chosen.suffix == ".dll" else ["-fPIC"]
         # Windows has the mathematical functions in its C runtime.
         libraries = [] if chosen.suffix == ".dll" else ["-lm"]
         built = Path(folder) / f"{identifier}{chosen.suffix}"
-        _run([*command, *_FLAGS, *position, "-o", str(built), _WHOLE, *libraries], folder, platform)
+        _run([*command, *FLAGS, *position, "-o", str(built), *wholes, *libraries], folder, platform)
         with replacing(library) as draft:
             shutil.copyfile(built, draft)
     return library
+
+
+def _wholes(names: Iterable[str]) -> dict[str, str]:
+    """Join C files, as what all of them include is then read once; those of FMI 2 and 3 stay apart."""
+    wholes: dict[str, str] = {}
+    for name in names:
+        group = name[:4] if name.startswith(("fmi2", "fmi3")) else ""
+        wholes[f"whole{group}.c"] = wholes.get(f"whole{group}.c", "") + f'#include "{name}"\n'
+    return wholes
 
 
 def compiler_command(platform: str) -> list[str]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.solve.options import Options
-from modelica_like.solve.powers import POWERS, Powers, pieces, stored_at_ends
+from modelica_like.solve.powers import POWERS, Powers, Results, results
 from modelica_like.solve.recorder import Event, Segment
 
 if TYPE_CHECKING:
@@ -197,9 +197,8 @@ def energy_balance(
 ) -> EnergyBalance:
     """Integrate the energy terms of every component along a run.
 
-    It is a quadrature over the results of the run; where they are too coarse, states in between are interpolated or, if
-    that is too coarse, too, integrated once more. Where even this fails, the coarser value stands: there is always a
-    balance.
+    It is a quadrature over the results of the run; where they are too coarse, IDAS integrates powers and states once
+    more from there. Where this fails, the coarser value stands: there is always a balance.
 
     Args:
         model: the compiled model.
@@ -210,15 +209,15 @@ def energy_balance(
     """
     count = len(model.components)
     audit, totals = _Audit(count), np.zeros((POWERS, count))
-    for piece in pieces(segments):
-        powers = Powers(model, options or Options(), piece)
-        totals += powers.integrals()
-        audit.see(powers)
-    lost, source, inflow, rate, _ = totals
+    powers = Powers(model, options or Options())
+    for some in results(model, segments):
+        totals += powers.integrals(some)
+        audit.see(some)
+    lost, source, inflow, rate = totals
     impact = np.zeros(count)
     for one in impacts:
         impact[model.components.index(one.component)] += one.energy
-    starts, ends = stored_at_ends(model, segments)
+    starts, ends = (np.concatenate(parts, axis=1) for parts in (audit.starts, audit.ends))
     jumps = starts[:, 1:] - ends[:, :-1]
     change, at_once = ends[:, -1] - starts[:, 0], np.sum(jumps, axis=1)
     columns = (
@@ -228,36 +227,45 @@ def energy_balance(
     rows = tuple(EnergyRow(path, *map(float, values)) for path, *values in zip(model.components, *columns, strict=True))
     throughput = max([audit.stored, *(float(np.sum(np.abs(part))) for part in (inflow, source, lost + impact))])
     reset = [event.time for event in events if event.transition >= 0 and model.transitions[event.transition].resets]
-    times = np.array([segment.times[0] for segment in segments[1:]])
+    times = np.concatenate(audit.times)[1:]
     return EnergyBalance(rows, throughput, _unexplained(times, np.sum(jumps, axis=0), reset, impacts))
 
 
 class _Audit:
-    """The largest imbalance of each component with its time, and its largest negative loss with its time."""
+    """The largest imbalance of each component and its largest negative loss, with their times.
+
+    Besides, stored energies at both ends of smooth pieces, and when these begin.
+    """
 
     def __init__(self, count: int) -> None:
         self.stored = 0.0
+        self.times: list[Vector] = []
+        self.starts: list[Vector] = []
+        self.ends: list[Vector] = []
         self._largest = np.zeros(count)
         self._worst = np.zeros((2, count))
-        self._times = np.zeros((2, count))
+        self._when = np.zeros((2, count))
 
-    def see(self, powers: Powers) -> None:
-        """Look at all results of a piece of the run."""
-        table = powers.table(powers.at_results.powers)
-        lost, source, inflow, rate, _ = table
-        self.stored = max(self.stored, powers.stored)
-        self._largest = np.maximum(self._largest, np.max(np.abs(table), axis=(0, 2), initial=0.0))
+    def see(self, some: Results) -> None:
+        """Look at some results of the run."""
+        stored, lost, source, inflow, rate, _ = some.terms
+        starts = np.unique(some.first)
+        self.times.append(some.times[starts])
+        self.starts.append(stored[:, starts])
+        self.ends.append(stored[:, np.unique(some.last)])
+        self.stored = max(self.stored, float(np.max(np.sum(np.abs(stored), axis=0), initial=0.0)))
+        self._largest = np.maximum(self._largest, np.max(np.abs(some.terms[1:]), axis=(0, 2), initial=0.0))
         for k, values in enumerate((np.abs(inflow + source - lost - rate), -lost)):
             worst = np.max(values, axis=1)
             later = worst > self._worst[k]
-            self._times[k, later] = powers.results.times[np.argmax(values[later], axis=1)]
+            self._when[k, later] = some.times[np.argmax(values[later], axis=1)]
             self._worst[k, later] = worst[later]
 
     def found(self) -> tuple[Vector, Vector, Vector, Vector]:
         """Return imbalances, as fractions of the largest powers, and negative losses, without what is rounding."""
         floor = _NOTHING * np.max(self._largest, initial=0.0)
         real = self._worst > np.maximum(_ROUNDING * self._largest, floor)
-        (imbalance, gain), (when, then) = np.where(real, self._worst, 0.0), np.where(real, self._times, 0.0)
+        (imbalance, gain), (when, then) = np.where(real, self._worst, 0.0), np.where(real, self._when, 0.0)
         return imbalance / np.maximum(self._largest, 1e-300), when, gain, then
 
 

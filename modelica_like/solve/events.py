@@ -107,9 +107,8 @@ class EventLoop:
         times = self.pace.results(float(looks.times[0]), end)
         if not len(times):
             return
-        place = (times - looks.times[0]) / looks.width
-        numbers = np.rint(place).astype(int)
-        if np.all(np.abs(place - numbers) < 1e-7 * np.maximum(1.0, place)):
+        numbers = np.minimum(np.rint((times - looks.times[0]) / looks.width).astype(int), looks.count)
+        if np.all(np.abs(times - looks.times[numbers]) <= SAME_TIME * np.maximum(1.0, np.abs(times))):
             self.record.add(times, looks.x[:, numbers], looks.z[:, numbers])
         else:
             self.record.add(times, *self._between(looks, times, last))

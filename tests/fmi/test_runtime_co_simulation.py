@@ -232,13 +232,17 @@ class Driven(Component):
 DRIVEN = Driven()
 
 
-def test_inputs_on_straight_lines_are_exact(exported):
+@pytest.mark.parametrize("slope_first", [False, True])
+def test_inputs_on_straight_lines_are_exact(exported, slope_first):
     case = exported(DRIVEN)
     fmu = case.started(until=1.0, tau=0.0)
     torque, speed, angle = case.ref("tau"), case.ref("rotor.w"), case.ref("rotor.phi")
     for k in range(10):
+        if slope_first:
+            fmu.setRealInputDerivatives([torque], [1], [3.0])
         fmu.setReal([torque], [0.3 * k])
-        fmu.setRealInputDerivatives([torque], [1], [3.0])
+        if not slope_first:
+            fmu.setRealInputDerivatives([torque], [1], [3.0])
         fmu.doStep(k / 10, 0.1)
     # 2 w' = 3 t
     assert fmu.getReal([speed, angle]) == pytest.approx([0.75, 0.25], rel=1e-9)

@@ -1,8 +1,8 @@
 /* The run-time of all models: types and functions behind the FMI functions.
  *
- * A model is data: sizes in model.h, tables and tapes in model.c. All that changes lives in `State`, which holds no
- * pointers, so that a copy of its bytes is a copy of the instance's state. Work memory holds only what can be computed
- * again. Nothing is static and mutable, so instances are independent of each other.
+ * A model is data: tables and tapes, read from a file (model.c). All that changes lives in `State` and in the numbers
+ * behind it, none of which are pointers, so that a copy of these bytes is a copy of the instance's state. Work memory
+ * holds only what can be computed again. Nothing is static and mutable, so instances are independent of each other.
  *
  * The files are compiled one by one or all as one: names of static functions are not used twice.
  */
@@ -11,7 +11,6 @@
 
 #include <stddef.h>
 #include <stdint.h>
-#include "model.h"
 
 /* Compiled on a new Linux, the FMU is to run on an old one: these functions have got new versions since glibc 2.17.
    Versions can only be told to a linker that is given libm. */
@@ -32,22 +31,10 @@ OLD(fmod);
 #define JUST_TRUE 1e-300      /* as in conditions.py */
 #define NOISE 1e-30           /* a decaying signal ends by swinging around zero with such values; that is no event */
 #define CROWD 24              /* further instants in a short time follow each other ever faster */
-#define AT_LEAST_ONE(n) ((n) > 0 ? (n) : 1)
-#define N_UNKNOWNS (N_X + N_Z)
-#define SLOT_T 0
-#define SLOT_X 1
-#define SLOT_Z (SLOT_X + N_X)
-#define SLOT_P (SLOT_Z + N_Z)
-#define SLOT_U (SLOT_P + N_P)
-#define SLOT_D (SLOT_U + N_U)
-#define SLOT_Y (SLOT_D + N_D)
-#define SLOT_CONSTANTS (SLOT_Y + N_Y)
-#define SLOT_RESULTS (SLOT_CONSTANTS + N_CONSTANTS)
-#define N_SLOTS (SLOT_RESULTS + N_OPERATIONS)
 
 typedef enum { RESULT_OK, RESULT_DISCARD, RESULT_ERROR } Result;
 
-/* ---- tables of the model (model.c) ------------------------------------------------------------------------------ */
+/* ---- tables of the model ---------------------------------------------------------------------------------------- */
 
 /* clang-format off */
 /* The order is that of OPERATIONS in tape.py. */
@@ -58,10 +45,12 @@ typedef enum {
     OPERATION_NE, OPERATION_NOT, OPERATION_AND, OPERATION_OR, OPERATION_FLOOR, OPERATION_CEIL, OPERATION_FMOD,
     OPERATION_REMAINDER, OPERATION_FABS, OPERATION_SIGN, OPERATION_COPYSIGN, OPERATION_IF_ELSE_ZERO, OPERATION_ERF,
     OPERATION_FMIN, OPERATION_FMAX, OPERATION_INV, OPERATION_SINH, OPERATION_COSH, OPERATION_TANH, OPERATION_ASINH,
-    OPERATION_ACOSH, OPERATION_ATANH, OPERATION_ATAN2, OPERATION_HYPOT, OPERATION_LOG1P, OPERATION_EXPM1
+    OPERATION_ACOSH, OPERATION_ATANH, OPERATION_ATAN2, OPERATION_HYPOT, OPERATION_LOG1P, OPERATION_EXPM1,
+    N_OPERATION_CODES
 } OperationCode;
 /* clang-format on */
 
+/* Records lie in the file as they lie in memory: numbers of 4 and 8 bytes, without gaps. */
 typedef struct {
     int operation, count;
 } Run;
@@ -70,14 +59,14 @@ typedef struct {
 } Operands; /* slots */
 
 typedef struct { /* see tape.py */
-    int n_operations, n_runs, n_outputs;
+    int n_operations, n_runs, n_outputs, first_result;
     const Run *runs;          /* equal operations that follow each other */
-    const Operands *operands; /* of all operations; operation k writes slot SLOT_RESULTS + k */
+    const Operands *operands; /* of all operations; operation k writes slot first_result + k */
     const int *outputs;       /* slots */
 } Tape;
 
 typedef struct { /* pattern of a square matrix and of its QR factors, see sparse.py */
-    int size, n_nonzeros, n_v, n_r;
+    int size, n_ends, n_nonzeros, n_v, n_r;
     const int *colind, *row, *v_colind, *v_row, *r_colind, *r_row, *row_place, *column_order;
 } QrPattern;
 
@@ -90,42 +79,37 @@ typedef enum {
     KIND_DERIVED,
     KIND_INPUT,
     KIND_DISCRETE,
-    KIND_GUARD
+    KIND_GUARD,
+    N_KINDS
 } Kind;
-typedef enum { TYPE_FLOAT64, TYPE_ENUMERATION } ValueType;
+typedef enum { TYPE_FLOAT64, TYPE_ENUMERATION, N_TYPES } ValueType;
 
 typedef struct {
     uint32_t reference;
-    ValueType type;
-    Kind kind;
-    int index;
+    int type, kind, index;
     int start;   /* start value that determines it, or -1 */
     int tunable; /* a parameter that may change during a run */
-    const char *name;
+    int name;
 } Variable; /* sorted by reference */
 
-typedef enum { RESET_STATE, RESET_DISCRETE, RESET_VALUE } ResetKind;
+typedef enum { RESET_STATE, RESET_DISCRETE, RESET_VALUE, N_RESET_KINDS } ResetKind;
 typedef struct {
-    ResetKind kind;
-    int index;
+    int kind, index, value, target;
     double factor;
-    int value, target;
 } Reset;
 typedef struct {
-    int mode;
+    int mode, target, timed, index, first_reset, n_resets, name, notice;
     uint64_t sources;
-    int target, timed, index, first_reset, n_resets;
-    const char *name, *notice;
 } Transition;
+typedef struct {
+    int first_name, n_names; /* none: a discrete value */
+} Mode;
 typedef struct {
     int mode, target;
 } StartMode;
 typedef struct {
-    int mode, number, loose, motion, state;
-    double factor;
-    int reaction, approach, moved;
-    double nominal;
-    const char *name;
+    int mode, number, loose, motion, state, reaction, approach, moved, name, unused;
+    double factor, nominal;
 } Held; /* see CompiledHold in compiled.py; state -1: the motion is none; moved: something but states moves it */
 typedef struct {
     int first_member, n_members, first;
@@ -137,36 +121,76 @@ typedef struct {
 typedef struct {
     int start, node, row;
 } StartRow;
+typedef struct {
+    int n_d, n_y, steady, rates_depend_on_time;
+    double absolute_to_relative, default_tolerance;
+} Settings;
 
-extern const char *const model_token;
-extern const double model_constants[], model_parameters[], model_inputs[], model_guesses[], model_z_guesses[],
-    model_nominals[];
-extern const double model_parameter_min[], model_parameter_max[];
-extern const Variable model_variables[];
-extern const Transition model_transitions[]; /* in the order in which they are declared */
-extern const int model_guard_transition[];   /* transition of every guard */
-extern const Reset model_resets[];
-extern const int model_reset_nodes[];
-extern const char *const *const model_mode_names[]; /* by position in d; NULL for discrete values */
-extern const int model_mode_counts[];
-extern const char *const model_state_names[], *const model_implicit_names[], *const model_singular_names[];
+typedef struct Model { /* tables lie in the bytes of the file; texts are offsets in `text` */
+    const Settings *settings;
+    const char *text, *token;
+    int n_settings, n_text, n_token, n_x, n_z, n_p, n_u, n_constants, n_variables;
+    const double *constants, *parameters, *parameter_min, *parameter_max, *inputs, *guesses, *z_guesses, *nominals;
+    const int *state_names, *implicit_names, *singular_names;
+    const Variable *variables;
 
-extern const Held model_holds[];
-extern const Circuit model_circuits[]; /* those that depend on each other; in d from `first`: switches, then shares */
-extern const int model_members[];
-extern const int model_units[]; /* by node: which have the same unit; empty where nothing is held */
+    int n_transitions, n_guards, n_resets, n_reset_nodes, n_modes, n_mode_names;
+    const Transition *transitions; /* in the order in which they are declared */
+    const int *guard_transition;   /* transition of every guard */
+    const Reset *resets;
+    const int *reset_nodes;
+    const Mode *modes; /* by position in d */
+    const int *mode_names;
 
-extern const StartMode model_start_modes[];
-extern const StartOf model_start_direct[], model_start_x_guess[], model_start_z_guess[], model_start_default[];
-extern const StartRow model_start_rows[], model_start_dependent[];
-extern const int model_start_zero[], model_start_columns[], model_steady_states[];
+    int n_holds, n_circuits, n_members, n_units;
+    const Held *holds;
+    const Circuit *circuits; /* those that depend on each other; in d from `first`: switches, then shares */
+    const int *members;
+    const int *units; /* by node: which have the same unit; empty where nothing is held */
 
-extern const Tape tape_rates, tape_jacobian, tape_alg, tape_alg_jacobian, tape_variables, tape_guards, tape_guards_soon;
-extern const Tape tape_moments, tape_resets, tape_start_conditions, tape_start_values, tape_discrete_starts;
-extern const Tape tape_hold_terms, tape_determinants, tape_start_system, tape_start_jacobian, tape_derived;
-extern const QrPattern pattern_step, pattern_start;
-extern const int jacobian_to_step[]; /* nonzero of the Jacobian -> nonzero of the step matrix */
-extern const int step_diagonal[];    /* nonzero of the step matrix on the diagonal of state k */
+    int n_start_modes, n_start_direct, n_start_default, n_start_x_guess, n_start_z_guess, n_start_dependent;
+    int n_start_zero, n_start_unknowns, n_steady;
+    const StartMode *start_modes;
+    const StartOf *start_direct, *start_default, *start_x_guess, *start_z_guess;
+    const StartRow *start_rows, *start_dependent;
+    const int *start_zero, *start_columns, *steady_states;
+
+    int n_jacobian;
+    const int *jacobian_to_step; /* nonzero of the Jacobian -> nonzero of the step matrix */
+    const int *step_diagonal;    /* nonzero of the step matrix on the diagonal of state k */
+    QrPattern step, start;
+    struct {
+        Tape rates, jacobian, alg, alg_jacobian, variables, guards, guards_soon, moments, resets, start_conditions,
+            start_values, discrete_starts, hold_terms, determinants, start_system, start_jacobian, derived;
+    } tapes;
+
+    /* What follows from the sizes of the tables. */
+    int n_unknowns, n_d, n_y, n_nodes, n_derived, n_moments, n_determinants, n_starts, n_start_values;
+    int n_start_jacobian, n_reset_values, most_members;
+    int slot_x, slot_z, slot_p, slot_u, slot_d, slot_y, slot_constants, slot_results, n_slots;
+    unsigned char *own; /* bytes that belong to the model, or NULL */
+    void (*release)(void *memory);
+} Model;
+enum { N_TAPES = sizeof((Model *)0)->tapes / sizeof(Tape) };
+
+/* model.c */
+#define MESSAGE_LENGTH 512
+typedef void *(*Allocate)(size_t count, size_t size);
+typedef void (*Release)(void *memory);
+Model *model_read(const unsigned char *bytes, size_t size, Allocate allocate, Release release, char *message);
+void model_free(Model *m);
+static inline const char *text_of(const Model *m, int place) { return m->text + place; }
+
+/* model_check.c */
+int damaged(char *message, const char *what);
+int check_model(const Model *m, char *message);
+
+/* model_file.c */
+Model *model_open(const char *location, Allocate allocate, Release release, char *message);
+
+/* model_data.c: the bytes of the file where they are compiled in, of size 0 where they are read */
+extern const uint64_t model_data[];
+extern const size_t model_data_size;
 
 /* ---- state and instance ----------------------------------------------------------------------------------------- */
 
@@ -181,23 +205,15 @@ typedef enum {
     PHASE_FAILED = 128
 } Phase;
 
-typedef struct { /* an accepted integrator step with its dense output */
-    double begin, end;
-    double first[AT_LEAST_ONE(N_UNKNOWNS)], last[AT_LEAST_ONE(N_UNKNOWNS)];
-    double dense[3][AT_LEAST_ONE(N_UNKNOWNS)];
+typedef struct { /* an accepted integrator step: its first and last point, and three for dense output */
+    double begin, end, points[];
 } Piece;
 
-typedef struct {
-    double t, x[AT_LEAST_ONE(N_X)], z[AT_LEAST_ONE(N_Z)], p[AT_LEAST_ONE(N_P)], u[AT_LEAST_ONE(N_U)],
-        d[AT_LEAST_ONE(N_D)];
-    double u_rate[AT_LEAST_ONE(N_U)], u_time; /* inputs are u + u_rate * (t - u_time) */
-    double start_value[AT_LEAST_ONE(N_STARTS)];
-    unsigned char start_given[AT_LEAST_ONE(N_STARTS)], mode_given[AT_LEAST_ONE(N_D)];
-    unsigned char wanting[AT_LEAST_ONE(N_TRANSITIONS)]; /* transitions that fire at the end of the piece */
+typedef struct { /* what changes; arrays of the model's sizes stand behind it, see `Instance` */
+    double t, u_time;
     int phase, solved, z_valid, inputs_changed, piece_valid, event_pending, at_event;
     double tolerance, start_time, stop_time;
     int stop_time_defined;
-    Piece piece;
     double step;            /* next step size, 0: choose one */
     double instants[CROWD]; /* of the last events, in a circle */
     int n_instants;
@@ -212,17 +228,63 @@ typedef void (*LogFunction)(const struct Instance *c, int status, const char *ca
 typedef enum { LOG_ERROR = 1, LOG_WARNING = 2, LOG_EVENTS = 4, LOG_INTEGRATOR = 8, LOG_ALL = 15 } LogCategory;
 
 typedef struct {
+    double gain, forward, backward, restitution;
+} Terms; /* of a motion that modes hold */
+
+typedef struct { /* an impact: of all motions that modes hold */
+    double *before, *approach, *impulse, *reaction;
+    unsigned char *entering, *loose, *held;
+    unsigned char *knocked; /* let go in the impact itself */
+    double *jump;           /* of the states */
+    int hard;               /* what nothing limits stops more than what rounding leaves */
+} Strike;
+
+typedef struct { /* at one instant: what has been stopped, and the states before the first impact */
+    int struck;
+    double *x;
+    unsigned char *entered;
+} Impacts;
+
+/* Arrays of the model's sizes. Those of single functions are named after them; a function that calls another one does
+ * not share with it. */
+typedef struct {
     double *slots, *dots; /* values, and derivatives in either direction, of tape slots */
     double *jacobian, *matrix, *qr_v, *qr_r, *qr_beta, *qr_work;
     double *stages, *point; /* of the integrator: 8 stages, a point */
-    double *variables, *guards, *guards_before, *rhs, *dense_matrix, *square, *vector;
+    double *variables, *guards, *guards_before, *rhs, *dense_matrix, *square, *vector, *residual;
     double *start_unknowns, *start_values, *start_residual;
+    int *order; /* pivots of the implicit equations */
+    unsigned char *known, *decided, *wanting;
+    double *d_before, *x_before, *d_fired, *reset_values, *target_values;
+    int *targets;
+    unsigned char *changed;
+    double *first; /* point before a step */
+    Piece *whole;
+    unsigned char *kinds;
+    Terms *terms, *strike_terms;
+    unsigned char *held, *other;
+    double *weights, *base_weights, *use, *best, *kept_z, *reactions, *sizes, *zeros;
+    int *places, *member, *pivots;
+    Strike strike;
+    Impacts impacts;
+    double *respond_d, *respond_z, *rates, *x_kept;
+    double *begun; /* motions that may be held, where the search for a steady state began */
+    int *standing;
 } Work;
 
 typedef struct Instance {
+    const Model *model;
+    Model *own_model; /* to be freed with the instance, or NULL */
     State state;
+    double *numbers; /* the rest of the state: the arrays that follow */
+    size_t n_numbers;
+    double *x, *z, *p, *u, *d;
+    double *u_rate; /* inputs are u + u_rate * (t - u_time) */
+    double *start_value;
+    unsigned char *start_given, *mode_given;
+    unsigned char *wanting; /* transitions that fire at the end of the piece */
+    Piece *piece;
     Work work;
-    double *memory;
     char *name;
     void *environment;
     AnyFunction logger, intermediate_update;
@@ -230,8 +292,8 @@ typedef struct Instance {
     double (*step_finished)(struct Instance *c); /* tells until when to go on; or NULL */
     unsigned log_enabled;
     int co_simulation, event_mode_used, early_return_allowed;
-    void *(*allocate)(size_t count, size_t size);
-    void (*release)(void *memory);
+    Allocate allocate;
+    Release release;
     int variables_valid; /* work.variables belong to the present point */
 } Instance;
 
@@ -256,46 +318,42 @@ void evaluate(Instance *c, const Tape *tape, double t, const double *x, const do
 Result solve_implicit(Instance *c, double t, const double *x, double *z, int quiet);
 Result check_singular(Instance *c);
 Result settle(Instance *c);
-double input_at(const State *s, int k, double t);
+double input_at(const Instance *c, int k, double t);
 
 /* start.c */
 void start_defaults(Instance *c);
 Result start_solve(Instance *c);
-int choose_modes(Instance *c, unsigned char *decided);
+void choose_modes(Instance *c, unsigned char *decided);
 
 /* holds.c */
 #define UNLIMITED 1e30
 #define ROUNDING 1e-10 /* relative size of a motion that is nothing but rounding */
-typedef struct {
-    double gain, forward, backward, restitution;
-} Terms;
 void hold_terms(Instance *c, Terms *terms);
 void mark_held(Instance *c, const Terms *terms, unsigned char *held);
-double largest_like(const double *values, int node);
+double largest_like(const Model *m, const double *values, int node);
 void share(Instance *c);
 void rest(Instance *c);
 void rest_rates(Instance *c, double *rates);
 
 /* impacts.c */
-typedef struct { /* at one instant: what has been stopped, and the states before the first impact */
-    int struck;
-    double x[AT_LEAST_ONE(N_X)];
-    unsigned char entered[AT_LEAST_ONE(N_HOLDS)];
-} Impacts;
 Result stop_motions(Instance *c, const double *before, Impacts *impacts);
 
 /* events.c */
-int guard_active(const State *s, int guard);
+int guard_active(const Instance *c, int guard);
 double next_moment(Instance *c);
 int find_wanting(Instance *c, unsigned char *wanting, int guards_too);
 Result iterate_events(Instance *c, unsigned char *wanting, int located);
 double number_or_false(double guard);
-void note_change(Instance *c, const char *name, int mode, int target);
+void move_states(Instance *c, const int *nodes, const double *values, int count);
+void note_change(Instance *c, int name, int mode, int target);
+unsigned char *nothing_wanting(Instance *c);
 
 /* rosenbrock.c */
 int rosenbrock_step(
     Instance *c, double t, const double *first, double h, int keep_jacobian, Piece *piece, double *error);
-void piece_at(const Piece *piece, double t, double *point);
+double *last_of(const Model *m, Piece *piece);
+size_t piece_size(const Model *m);
+void piece_at(const Model *m, const Piece *piece, double t, double *point);
 double first_step(Instance *c);
 
 /* integrate.c */
@@ -303,10 +361,11 @@ typedef enum { REACHED, AT_EVENT, FAILED } Arrival;
 Arrival integrate_to(Instance *c, double target, int stop_at_events);
 void leave_piece(Instance *c);
 Result handle_event(Instance *c);
+Result update_discrete(Instance *c, int *restart, double *next);
 Result check_step(Instance *c, double point, double size, double *target);
 
 /* values.c */
-const Variable *find_variable(uint32_t reference);
+const Variable *find_variable(const Model *m, uint32_t reference);
 const Variable *known_variable(Instance *c, uint32_t reference, ValueType type);
 Result get_float(Instance *c, uint32_t reference, double *value);
 Result get_mode(Instance *c, uint32_t reference, int *value);
@@ -329,7 +388,9 @@ Result output_rate(Instance *c, uint32_t reference, double *value);
 size_t dependencies(Instance *c, uint32_t unknown, uint32_t *knowns, size_t capacity, Result *result);
 
 /* instance.c */
-Instance *instance_new(const char *name, const char *token, void *(*allocate)(size_t, size_t), void (*release)(void *),
+Instance *instance_new(const Model *model, const char *name, const char *token, Allocate allocate, Release release,
+    LogFunction log, AnyFunction logger, void *environment, int logging);
+Instance *instance_open(const char *location, const char *name, const char *token, Allocate allocate, Release release,
     LogFunction log, AnyFunction logger, void *environment, int logging);
 void instance_free(Instance *c);
 void instance_reset(Instance *c);
@@ -338,7 +399,7 @@ Result set_experiment(
 Result state_copy_out(Instance *c, void **copy);
 Result state_copy_in(Instance *c, const void *copy);
 void state_release(Instance *c, void **copy);
-size_t state_size(void);
+size_t state_size(const Instance *c);
 Result state_write(Instance *c, const void *copy, unsigned char *bytes, size_t size);
 Result state_read(Instance *c, const unsigned char *bytes, size_t size, void **copy);
 Result report(Instance *c, LogCategory category, Result result, const char *format, ...);
