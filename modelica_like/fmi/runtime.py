@@ -15,6 +15,8 @@ from tempfile import TemporaryDirectory
 from modelica_like.fmi.build import FLAGS, PLATFORMS, build
 from modelica_like.fmi.sources import runtime_sources
 
+FACES = ("2.0", "3.0", "native")
+"""What the library can be called by: importers of both versions, and Python."""
 SHIPPED = Path(__file__).parent / "runtimes"
 """Libraries of the package, one folder per platform."""
 
@@ -33,7 +35,7 @@ def runtime_library(platform: str, report: Callable[[str], None] = lambda _: Non
         UnknownName: there is no such platform.
         MissingExtra, ExportError: it must be built, and there is no compiler, or the compiler failed.
     """
-    sources = runtime_sources(("2.0", "3.0"))
+    sources = runtime_sources(FACES)
     name = library_name(platform, sources)
     homes = [folder / platform for folder in (SHIPPED, cache_folder())]
     for home in homes:
@@ -46,7 +48,7 @@ def runtime_library(platform: str, report: Callable[[str], None] = lambda _: Non
 
 def build_runtime(platform: str, folder: Path, sources: dict[str, str] | None = None) -> Path:
     """Compile the run-time for a platform into a folder; a library that others may be reading is replaced at once."""
-    sources = sources or runtime_sources(("2.0", "3.0"))
+    sources = sources or runtime_sources(FACES)
     folder.mkdir(parents=True, exist_ok=True)
     with TemporaryDirectory(dir=folder) as place:
         built = build(sources, platform, Path(place), "runtime")

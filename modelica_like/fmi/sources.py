@@ -44,10 +44,12 @@ LOG_CATEGORIES = {
 _FACES = {
     "2.0": ("fmi2.h", "fmi2.c", "fmi2_values.c"),
     "3.0": ("fmi3.h", "fmi3.c", "fmi3_values.c", "fmi3_unused.c"),
+    "native": ("native.c",),
 }
 _HEADERS = {
     "2.0": ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h"),
     "3.0": ("fmi3Functions.h", "fmi3FunctionTypes.h", "fmi3PlatformTypes.h"),
+    "native": (),
 }
 
 
@@ -56,8 +58,10 @@ def source_files(version: Version) -> tuple[str, ...]:
     return ("model_data.c", *RUNTIME, *(name for name in _FACES[version] if name.endswith(".c")))
 
 
-def runtime_sources(versions: Iterable[Version]) -> dict[str, str]:
-    """Read the C sources of the run-time, with the functions of some FMI versions; no model is compiled in.
+def runtime_sources(faces: Iterable[Version | Literal["native"]]) -> dict[str, str]:
+    """Read the C sources of the run-time, with the functions of some FMI versions or of `native.c`.
+
+    No model is compiled in.
 
     Returns:
         File name to text; besides C files the headers that they include.
@@ -67,9 +71,9 @@ def runtime_sources(versions: Iterable[Version]) -> dict[str, str]:
     """
     names = ["core.h", "model_data.c", *RUNTIME]
     headers: list[str] = []
-    for version in versions:
-        names += _FACES[version]
-        headers += _HEADERS[version]
+    for face in faces:
+        names += _FACES[face]
+        headers += _HEADERS[face]
     texts = {name: (_TEMPLATES / name).read_text(encoding="utf-8") for name in names}
     return texts | {name: _header(name) for name in headers}
 
