@@ -11,7 +11,7 @@ from typing import Any
 
 from modelica_like.compile import compile
 from modelica_like.compile.compiled import CompiledDae
-from modelica_like.errors import UnitError, ValueOutOfRange
+from modelica_like.errors import SolveError, UnitError, ValueOutOfRange
 from modelica_like.flatten import flatten
 from modelica_like.initialize import StartKind, initialize
 from modelica_like.language import Component
@@ -86,6 +86,7 @@ def simulate(
 
     Raises:
         ModelicaLikeError: the model or a value is wrong, or the simulation cannot go on.
+        KeyboardInterrupt: it was interrupted. `run` of this and of a `SolveError` is the solution up to there.
     """
     model = build(drive)
     if parameters:
@@ -98,12 +99,21 @@ def simulate(
     begin = time.perf_counter()
     first = initialize(model, t0, start or settings.get("start", "given"))
     loop = EventLoop(model, chosen, first, end, progress)
-    record = loop.run()
+    try:
+        loop.run()
+    except (SolveError, KeyboardInterrupt) as error:
+        vars(error)["run"] = _solution(loop, begin) if loop.record.segments else None
+        raise
+    return _solution(loop, begin)
+
+
+def _solution(loop: EventLoop, begin: float) -> Solution:
+    """Return what a loop has computed since it began."""
+    record, counts = loop.record, loop.integrator
     elapsed = time.perf_counter() - begin
-    counts = loop.integrator
     statistics = Statistics(counts.steps, counts.evaluations, counts.calls, len(record.events), elapsed)
     return Solution(
-        model, chosen, tuple(record.segments), tuple(record.events), statistics, tuple(record.impacts),
+        loop.model, loop.options, tuple(record.segments), tuple(record.events), statistics, tuple(record.impacts),
         tuple(record.notices),
     )  # fmt: skip
 

@@ -13,10 +13,10 @@ from typing import get_args
 
 from modelica_like.compile import compile
 from modelica_like.compile.compiled import CompiledDae
-from modelica_like.errors import ExportError, UnknownName, did_you_mean
+from modelica_like.errors import ExportError, UnknownName
 from modelica_like.flatten import flatten
 from modelica_like.flatten.model import FlatModel
-from modelica_like.fmi.build import PLATFORMS, build, native_platform
+from modelica_like.fmi.build import PLATFORMS, build, chosen_platforms, native_platform
 from modelica_like.fmi.check import Check, compare_with_idas, problems
 from modelica_like.fmi.description import About, Kind, Version, build_description, identifier, model_description
 from modelica_like.fmi.documentation import Listing, index_page
@@ -31,6 +31,7 @@ from modelica_like.fmi.terminals import Takes, terminals_and_icons, with_open_en
 from modelica_like.simulation import Model, seconds
 from modelica_like.solve.options import Options
 from modelica_like.structure import reduce
+from modelica_like.writing import check_writable, write_bytes
 
 _TOKEN = "{00000000-0000-0000-0000-000000000000}"
 
@@ -108,7 +109,7 @@ def export_fmu(
     begin = time.perf_counter()
     tell = report or _silent
     target = _target(path)
-    chosen, kinds, names = _version(version), _kinds(kind), _platforms(platforms)
+    chosen, kinds, names = _version(version), _kinds(kind), chosen_platforms(platforms)
     tell("compiling the model")
     model, description, equations = _compiled(drive, ends, takes)
     variables = interface(model, outputs, _modes(modes))
@@ -126,7 +127,7 @@ def export_fmu(
         checked = compare_with_idas(draft, model, kinds[-1]) if check and native_platform() in names else Check()
         if strict and checked.differs:
             raise ExportError(checked.sentence, advice="Without `strict` it is written all the same, with a picture.")
-        target.write_bytes(draft.read_bytes())
+        write_bytes(target, draft.read_bytes())
     checked = _draw(checked, target)
     return Export(target, chosen, kinds, names, target.stat().st_size, time.perf_counter() - begin, checked)
 
@@ -144,6 +145,7 @@ def _target(path: str | Path) -> Path:
         raise ExportError(f"An FMU is a file with the ending .fmu, not '{target.name}'.")
     if not target.absolute().parent.is_dir():
         raise ExportError(f"There is no folder '{target.parent}' for {target.name}.", advice="Make it first.")
+    check_writable(target)
     return target
 
 
@@ -170,20 +172,6 @@ def _kinds(kind: Collection[str]) -> tuple[Kind, ...]:
     if not asked:
         raise ExportError("An FMU needs a kind.", advice="Ask for me (Model Exchange), cs (Co-Simulation) or both.")
     return tuple(one for one in get_args(Kind) if one in asked)
-
-
-def _platforms(platforms: Sequence[str] | str) -> tuple[str, ...]:
-    asked = (platforms,) if isinstance(platforms, str) else tuple(platforms)
-    found: list[str] = []
-    for one in asked:
-        if one not in ("native", "all", *PLATFORMS):
-            known = ["native", "all", *PLATFORMS]
-            raise UnknownName(
-                f"There is no platform '{one}'{did_you_mean(one, known) or '.'}",
-                advice=f"There are {', '.join(known)}.",
-            )
-        found += PLATFORMS if one == "all" else [native_platform() if one == "native" else one]
-    return tuple(dict.fromkeys(found))
 
 
 # -- the model ---------------------------------------------------------------------------------------------------------

@@ -13,6 +13,7 @@ from typing import Literal
 from modelica_like.errors import ExportError
 
 Version = Literal["2.0", "3.0"]
+Face = Literal["2.0", "3.0", "native"]
 
 _TEMPLATES = Path(__file__).parent / "templates"
 
@@ -58,10 +59,8 @@ def source_files(version: Version) -> tuple[str, ...]:
     return ("model_data.c", *RUNTIME, *(name for name in _FACES[version] if name.endswith(".c")))
 
 
-def runtime_sources(faces: Iterable[Version | Literal["native"]]) -> dict[str, str]:
-    """Read the C sources of the run-time, with the functions of some FMI versions or of `native.c`.
-
-    No model is compiled in.
+def runtime_sources(faces: Iterable[Face]) -> dict[str, str]:
+    """Read the C sources of the run-time, with the functions by which it is called; no model is compiled in.
 
     Returns:
         File name to text; besides C files the headers that they include.
@@ -69,13 +68,14 @@ def runtime_sources(faces: Iterable[Version | Literal["native"]]) -> dict[str, s
     Raises:
         ExportError: FMPy, which has the headers of the standard, is not installed.
     """
-    names = ["core.h", "model_data.c", *RUNTIME]
-    headers: list[str] = []
-    for face in faces:
-        names += _FACES[face]
-        headers += _HEADERS[face]
-    texts = {name: (_TEMPLATES / name).read_text(encoding="utf-8") for name in names}
-    return texts | {name: _header(name) for name in headers}
+    wanted = tuple(faces)
+    return own_sources(wanted) | {name: _header(name) for face in wanted for name in _HEADERS[face]}
+
+
+def own_sources(faces: Iterable[Face]) -> dict[str, str]:
+    """Read the same without the headers of the standard."""
+    names = ("core.h", "model_data.c", *RUNTIME, *(name for face in faces for name in _FACES[face]))
+    return {name: (_TEMPLATES / name).read_text(encoding="utf-8") for name in names}
 
 
 def licenses(version: Version) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, CompiledTransition, Vector
 from modelica_like.compile.soon import TIME_RESOLUTION
-from modelica_like.errors import SolveError, StepFailed
+from modelica_like.errors import StepFailed
 from modelica_like.initialize import Point
 from modelica_like.solve.guards import Candidate, Guards, Located, candidates, locate
 from modelica_like.solve.idas import Integrator
@@ -65,20 +65,16 @@ class EventLoop:
         """Simulate.
 
         Raises:
-            Chattering, StepFailed, SingularAtStart: the run cannot go on; `record` of the error is what came before.
+            Chattering, StepFailed, SingularAtStart: the run cannot go on; `record` is what came before.
         """
         try:
-            with self.integrator.interrupts:
-                self.instants.settle(self.now, self._wanting())
-                self.instants.note_sharing(self.now)
-                self.record.begin(self.now)
-                while self.now.t < self.end:
-                    self._advance(min(self.instants.next_moment(self.now), self.end))
-                    if self.progress is not None:
-                        self.progress(self.now.t)
-        except SolveError as error:
-            error.record = self.record
-            raise
+            self.instants.settle(self.now, self._wanting())
+            self.instants.note_sharing(self.now)
+            self.record.begin(self.now)
+            while self.now.t < self.end:
+                self._advance(min(self.instants.next_moment(self.now), self.end))
+                if self.progress is not None:
+                    self.progress(self.now.t)
         finally:
             self.record.end(self.now.d)
         return self.record
