@@ -53,12 +53,12 @@ typedef struct { /* an accepted integrator step: its first and last point, and t
 typedef struct { /* what changes; arrays of the model's sizes stand behind it, see `Instance` */
     double t, u_time;
     int phase, solved, z_valid, inputs_changed, piece_valid, event_pending, at_event;
-    double tolerance, start_time, stop_time;
+    double tolerance, absolute, start_time, stop_time; /* absolute: in nominal values */
     int stop_time_defined;
     double step;            /* next step size, 0: choose one */
     double instants[CROWD]; /* of the last events, in a circle */
     int n_instants;
-    double n_steps, n_rejected, n_events;
+    double n_steps, n_rejected, n_evaluations, n_events;
 } State;
 
 typedef void (*AnyFunction)(void); /* a callback of the importer, cast back before it is called */
@@ -131,6 +131,11 @@ typedef struct Instance {
     AnyFunction logger, intermediate_update;
     LogFunction log;
     double (*step_finished)(struct Instance *c); /* tells until when to go on; or NULL */
+    /* Told of mode changes (transition -1: an impact's), and what impacts cost (held -1: forget what was told); or NULL
+     */
+    void (*noted)(struct Instance *c, int transition, int mode, int target);
+    void (*struck)(struct Instance *c, int held, double energy, int first);
+    int round; /* of the events at the present instant */
     unsigned log_enabled;
     int co_simulation, event_mode_used, early_return_allowed;
     Allocate allocate;
@@ -186,7 +191,7 @@ int find_wanting(Instance *c, unsigned char *wanting, int guards_too);
 Result iterate_events(Instance *c, unsigned char *wanting, int located);
 double number_or_false(double guard);
 void move_states(Instance *c, const int *nodes, const double *values, int count);
-void note_change(Instance *c, int name, int mode, int target);
+void note_change(Instance *c, int name, int transition, int mode, int target);
 unsigned char *nothing_wanting(Instance *c);
 
 /* rosenbrock.c */

@@ -171,12 +171,17 @@ static uint64_t lay_out(Instance *c, double *memory) {
     return used + place_events(c->model, &c->work, memory == NULL ? NULL : memory + used);
 }
 
+static void set_tolerance(State *s, const Model *m, double relative) {
+    s->tolerance = relative;
+    s->absolute = relative * m->settings->absolute_to_relative;
+}
+
 void instance_reset(Instance *c) {
     State *s = &c->state;
     memset(s, 0, sizeof *s);
     memset(c->numbers, 0, c->n_numbers * sizeof(double));
     s->phase = PHASE_INSTANTIATED;
-    s->tolerance = c->model->settings->default_tolerance;
+    set_tolerance(s, c->model, c->model->settings->default_tolerance);
     c->variables_valid = 0;
     start_defaults(c);
 }
@@ -266,7 +271,7 @@ Result set_experiment(
             "The start time %g s must be finite and not after the stop time %g s.", start, stop);
     if (tolerance_defined && !(tolerance > 0 && tolerance < 1))
         return report(c, LOG_ERROR, RESULT_ERROR, "The tolerance must be between 0 and 1, not %g.", tolerance);
-    if (tolerance_defined) s->tolerance = tolerance;
+    if (tolerance_defined) set_tolerance(s, c->model, tolerance);
     s->t = s->start_time = s->u_time = start;
     s->stop_time_defined = stop_defined && isfinite(stop);
     s->stop_time = s->stop_time_defined ? stop : 0;
