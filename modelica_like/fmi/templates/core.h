@@ -212,7 +212,7 @@ typedef void (*LogFunction)(const struct Instance *c, int status, const char *ca
 typedef enum { LOG_ERROR = 1, LOG_WARNING = 2, LOG_EVENTS = 4, LOG_INTEGRATOR = 8, LOG_ALL = 15 } LogCategory;
 
 typedef struct {
-    double *slots, *dots; /* values, and derivatives in either direction, of tape slots */
+    double *slots, *dots; /* values, and derivatives in either direction or three Taylor coefficients, of tape slots */
     double *jacobian, *matrix, *qr_v, *qr_r, *qr_beta, *qr_work;
     double *stages, *point; /* of the integrator: 8 stages, a point */
     double *variables, *guards, *guards_before, *rhs, *dense_matrix, *square, *vector;
@@ -326,8 +326,11 @@ Result directional(Instance *c, const uint32_t *unknowns, size_t n_unknowns, con
 Result adjoint(Instance *c, const uint32_t *unknowns, size_t n_unknowns, const uint32_t *knowns, size_t n_knowns,
     const double *seed, double *result);
 void adjoint_of_node(Instance *c, int node, double *by_state);
-Result output_rate(Instance *c, uint32_t reference, double *value);
+Result factor_implicit(Instance *c, int *order);
 size_t dependencies(Instance *c, uint32_t unknown, uint32_t *knowns, size_t capacity, Result *result);
+
+/* taylor.c */
+Result output_rate(Instance *c, uint32_t reference, int order, double *value);
 
 /* instance.c */
 Instance *instance_new(const char *name, const char *token, void *(*allocate)(size_t, size_t), void (*release)(void *),

@@ -37,7 +37,7 @@ static Result check_unknowns(Instance *c, const uint32_t *unknowns, size_t n) {
 }
 
 /* Factorises the Jacobian of the implicit equations at the present point, with the slots of tape_rates filled. */
-static Result factor_implicit(Instance *c, int *order) {
+Result factor_implicit(Instance *c, int *order) {
     State *s = &c->state;
     if (settle(c) != RESULT_OK) return RESULT_ERROR;
     evaluate(c, &tape_alg_jacobian, s->t, s->x, s->z, c->work.dense_matrix);
@@ -168,33 +168,6 @@ void adjoint_of_node(Instance *c, int node, double *by_state) {
         adjoint_of_implicit(c, lu_factor(N_Z, w->dense_matrix, order) ? order : NULL);
     }
     memcpy(by_state, w->dots + SLOT_X, N_X * sizeof(double));
-}
-
-/* Time derivative of a variable along the solution, with inputs on their straight lines. */
-Result output_rate(Instance *c, uint32_t reference, double *value) {
-    const Variable *v = known_variable(c, reference, TYPE_FLOAT64);
-    Work *w = &c->work;
-    State *s = &c->state;
-    int order[AT_LEAST_ONE(N_Z)];
-    if (v == NULL) return RESULT_ERROR;
-    if (v->kind != KIND_VARIABLE && v->kind != KIND_STATE)
-        return report(c, LOG_ERROR, RESULT_ERROR, "%s has no time derivative: it is not a variable.", v->name);
-    if (factor_implicit(c, order) != RESULT_OK) return RESULT_ERROR;
-    evaluate(c, &tape_rates, s->t, s->x, s->z, w->rhs);
-    if (v->kind == KIND_STATE) {
-        *value = w->rhs[v->index];
-        return RESULT_OK;
-    }
-    memset(w->dots, 0, SLOT_RESULTS * sizeof(double));
-    w->dots[SLOT_T] = 1;
-    memcpy(w->dots + SLOT_X, w->rhs, N_X * sizeof(double));
-    memcpy(w->dots + SLOT_U, s->u_rate, N_U * sizeof(double));
-    tangent_of_implicit(c, order);
-    c->variables_valid = 0;
-    evaluate(c, &tape_variables, s->t, s->x, s->z, w->variables);
-    tape_tangent(&tape_variables, w->slots, w->dots, w->variables);
-    *value = w->variables[v->index];
-    return RESULT_OK;
 }
 
 /* States and inputs on which an unknown depends; returns their number, writes as many as there is room for. */

@@ -82,7 +82,7 @@ static size_t lay_out(Work *w, double *memory) {
         size_t size;
     } arrays[] = {
         {&w->slots, N_SLOTS},
-        {&w->dots, N_SLOTS},
+        {&w->dots, 3 * (size_t)N_SLOTS},
         {&w->jacobian, larger(N_JACOBIAN, N_START_JACOBIAN)},
         {&w->matrix, (size_t)pattern_step.n_nonzeros},
         {&w->qr_v, qr_v},
