@@ -15,13 +15,18 @@ static int known_slot(const Variable *v) {
     }
 }
 
+/* Before the end of the initialization start values are known instead of states. */
+static int is_start(const Instance *c, const Variable *v) {
+    return c->state.phase == PHASE_INITIALIZATION && (v->kind == KIND_STATE || v->kind == KIND_VARIABLE);
+}
+
 static Result check_knowns(Instance *c, const uint32_t *knowns, size_t n) {
     for (size_t k = 0; k < n; k++) {
         const Variable *v = known_variable(c, knowns[k], TYPE_FLOAT64);
         if (v == NULL) return RESULT_ERROR;
-        if (known_slot(v) < 0)
-            return report(c, LOG_ERROR, RESULT_ERROR,
-                "Derivatives by %s are not available: it is neither state, input nor parameter.", v->name);
+        if (is_start(c, v) ? v->start < 0 || v->start >= N_STARTS : known_slot(v) < 0)
+            return report(c, LOG_ERROR, RESULT_ERROR, "Derivatives by %s are not available: it is neither %s.", v->name,
+                is_start(c, v) ? "a start value, input nor parameter" : "state, input nor parameter");
     }
     return RESULT_OK;
 }
@@ -59,6 +64,65 @@ static void tangent_of_implicit(Instance *c, const int *order) {
     for (int k = 0; k < N_Z; k++) dots[SLOT_Z + k] = -w->vector[k];
 }
 
+static void seed_knowns(Instance *c, const uint32_t *knowns, size_t n, const double *seed) {
+    for (size_t k = 0; k < n; k++) {
+        const Variable *v = find_variable(knowns[k]);
+        if (!is_start(c, v)) c->work.dots[known_slot(v)] += seed[k];
+    }
+}
+
+/* Newton's last step once more, with what the start equations change by instead of what they lack. */
+static Result start_system_tangent(Instance *c, const double *start_dots) {
+    Work *w = &c->work;
+    State *s = &c->state;
+    double *step = w->start_unknowns;
+    evaluate(c, &tape_start_system, s->t, s->x, s->z, w->start_residual);
+    tape_run(&tape_start_jacobian, w->slots, w->jacobian);
+    if (!qr_factor(&pattern_start, w->jacobian, w))
+        return report(c, LOG_ERROR, RESULT_ERROR, "The start equations are singular at t = %.9g s.", s->t);
+    evaluate(c, &tape_start_system, s->t, s->x, s->z, w->start_residual);
+    tape_tangent(&tape_start_system, w->slots, w->dots, w->start_residual);
+    for (int k = 0; k < N_START_UNKNOWNS; k++) {
+        int start = model_start_rows[k].start;
+        step[k] = (start < 0 ? 0 : start_dots[start]) - w->start_residual[model_start_rows[k].row];
+    }
+    qr_solve(&pattern_start, w, step);
+    for (int k = 0; k < N_START_UNKNOWNS; k++)
+        if (model_start_columns[k] < N_X) w->dots[SLOT_X + model_start_columns[k]] = step[k];
+    return RESULT_OK;
+}
+
+/* What states change by with parameters, inputs and start values: through the start equations, in the modes found. */
+static Result start_tangent(Instance *c, const uint32_t *knowns, size_t n, const double *seed) {
+    Work *w = &c->work;
+    State *s = &c->state;
+    double *dots = w->dots, *starts = w->start_values;
+    int shared = START_STEADY;
+    s->solved = 0;
+    if (start_solve(c) != RESULT_OK) return RESULT_ERROR;
+    for (int i = 0; i < N_CIRCUITS; i++)
+        for (int k = 0; k < model_circuits[i].n_members; k++) shared |= s->d[model_circuits[i].first + k] != 0;
+    if (shared)
+        return report(c, LOG_ERROR, RESULT_ERROR,
+            "A steady start, and one at which parts share a load, have derivatives after the initialization only.");
+    memset(dots, 0, SLOT_RESULTS * sizeof(double));
+    seed_knowns(c, knowns, n, seed);
+    evaluate(c, &tape_discrete_starts, s->t, s->x, s->z, w->guards);
+    tape_tangent(&tape_discrete_starts, w->slots, dots, w->guards);
+    for (int k = 0; k < N_D; k++) dots[SLOT_D + k] = s->mode_given[k] ? 0 : w->guards[k];
+    evaluate(c, &tape_start_values, s->t, s->x, s->z, starts);
+    tape_tangent(&tape_start_values, w->slots, dots, starts);
+    for (int k = 0; k < N_STARTS; k++) starts[k] = s->start_given[k] ? 0 : starts[k];
+    for (size_t k = 0; k < n; k++) {
+        const Variable *v = find_variable(knowns[k]);
+        if (is_start(c, v)) starts[v->start] += seed[k];
+    }
+    for (int k = N_START_DIRECT; k-- > 0;) /* the first counts */
+        dots[SLOT_X + model_start_direct[k].position] =
+            starts[model_start_direct[k].start] / model_start_direct[k].factor;
+    return N_START_UNKNOWNS > 0 ? start_system_tangent(c, starts) : RESULT_OK;
+}
+
 Result directional(Instance *c, const uint32_t *unknowns, size_t n_unknowns, const uint32_t *knowns, size_t n_knowns,
     const double *seed, double *result) {
     Work *w = &c->work;
@@ -66,9 +130,11 @@ Result directional(Instance *c, const uint32_t *unknowns, size_t n_unknowns, con
     int order[AT_LEAST_ONE(N_Z)];
     if (check_unknowns(c, unknowns, n_unknowns) != RESULT_OK || check_knowns(c, knowns, n_knowns) != RESULT_OK)
         return RESULT_ERROR;
+    if (s->phase != PHASE_INITIALIZATION) {
+        memset(w->dots, 0, SLOT_RESULTS * sizeof(double));
+        seed_knowns(c, knowns, n_knowns, seed);
+    } else if (start_tangent(c, knowns, n_knowns, seed) != RESULT_OK) return RESULT_ERROR;
     if (factor_implicit(c, order) != RESULT_OK) return RESULT_ERROR;
-    memset(w->dots, 0, SLOT_RESULTS * sizeof(double));
-    for (size_t k = 0; k < n_knowns; k++) w->dots[known_slot(find_variable(knowns[k]))] += seed[k];
     tangent_of_implicit(c, order);
     evaluate(c, &tape_rates, s->t, s->x, s->z, w->rhs);
     tape_tangent(&tape_rates, w->slots, w->dots, w->rhs);
