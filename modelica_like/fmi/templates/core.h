@@ -229,7 +229,7 @@ typedef struct Instance {
     LogFunction log;
     double (*step_finished)(struct Instance *c); /* tells until when to go on; or NULL */
     unsigned log_enabled;
-    int co_simulation, event_mode_used, early_return_allowed;
+    int co_simulation, event_mode_used, early_return_allowed, inputs_move;
     void *(*allocate)(size_t count, size_t size);
     void (*release)(void *memory);
     int variables_valid; /* work.variables belong to the present point */
