@@ -32,6 +32,7 @@ RUNTIME = (
     "integrate.c",
     "values.c",
     "derivatives.c",
+    "taylor.c",
     "instance.c",
 )
 LOG_CATEGORIES = {

@@ -89,7 +89,7 @@ typedef struct { /* at one instant: what has been stopped, and the states before
 /* Arrays of the model's sizes. Those of single functions are named after them; a function that calls another one does
  * not share with it. */
 typedef struct {
-    double *slots, *dots; /* values, and derivatives in either direction, of tape slots */
+    double *slots, *dots; /* values, and derivatives in either direction or three Taylor coefficients, of tape slots */
     double *jacobian, *matrix, *qr_v, *qr_r, *qr_beta, *qr_work;
     double *stages, *point; /* of the integrator: 8 stages, a point */
     double *variables, *guards, *guards_before, *rhs, *dense_matrix, *square, *vector, *residual;
@@ -137,7 +137,7 @@ typedef struct Instance {
     void (*struck)(struct Instance *c, int held, double energy, int first);
     int round; /* of the events at the present instant */
     unsigned log_enabled;
-    int co_simulation, event_mode_used, early_return_allowed;
+    int co_simulation, event_mode_used, early_return_allowed, inputs_move;
     Allocate allocate;
     Release release;
     int variables_valid; /* work.variables belong to the present point */
@@ -230,8 +230,11 @@ Result directional(Instance *c, const uint32_t *unknowns, size_t n_unknowns, con
 Result adjoint(Instance *c, const uint32_t *unknowns, size_t n_unknowns, const uint32_t *knowns, size_t n_knowns,
     const double *seed, double *result);
 void adjoint_of_node(Instance *c, int node, double *by_state);
-Result output_rate(Instance *c, uint32_t reference, double *value);
+Result factor_implicit(Instance *c, int *order);
 size_t dependencies(Instance *c, uint32_t unknown, uint32_t *knowns, size_t capacity, Result *result);
+
+/* taylor.c */
+Result output_rate(Instance *c, uint32_t reference, int order, double *value);
 
 /* instance.c */
 Instance *instance_new(const Model *model, const char *name, const char *token, Allocate allocate, Release release,

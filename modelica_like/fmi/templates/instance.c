@@ -113,7 +113,8 @@ static uint64_t place_work(const Model *m, Work *w, double *memory) {
     uint64_t square =
         larger(larger(m->settings->steady ? 2 * steady * steady : 0, resets * n_x), members * (n_x + 3 * members));
     const Room rooms[] = {
-        {(uint64_t)m->n_slots, 8, {&w->slots, &w->dots}},
+        {(uint64_t)m->n_slots, 8, {&w->slots}},
+        {3 * (uint64_t)m->n_slots, 8, {&w->dots}},
         {larger((uint64_t)m->n_jacobian, (uint64_t)m->n_start_jacobian), 8, {&w->jacobian}},
         {(uint64_t)m->step.n_nonzeros, 8, {&w->matrix}},
         {larger((uint64_t)m->step.n_v, (uint64_t)m->start.n_v), 8, {&w->qr_v}},
