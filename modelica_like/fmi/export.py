@@ -30,6 +30,7 @@ from modelica_like.fmi.tables import make_tables
 from modelica_like.fmi.terminals import Takes, terminals_and_icons, with_open_ends
 from modelica_like.simulation import Model, seconds
 from modelica_like.solve.options import Options
+from modelica_like.solve.plot import save_plot
 from modelica_like.structure import reduce
 from modelica_like.writing import check_writable, write_bytes
 
@@ -279,5 +280,5 @@ def _draw(check: Check, target: Path) -> Check:
     if not check.differs or check.curves is None:
         return check
     picture = target.with_name(f"{target.stem}_check.png")
-    check.curves.plot().savefig(picture)
+    save_plot(check.curves.plot(), picture)
     return replace(check, picture=picture)

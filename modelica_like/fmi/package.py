@@ -21,10 +21,7 @@ def write_archive(path: Path, files: Mapping[str, bytes]) -> None:
         path: the archive; it is replaced.
         files: content by name.
     """
-    with (
-        replacing(path) as draft,
-        zipfile.ZipFile(draft, "w", zipfile.ZIP_DEFLATED, compresslevel=_LEVEL) as archive,
-    ):
+    with replacing(path) as draft, zipfile.ZipFile(draft, "w", zipfile.ZIP_DEFLATED) as archive:
         for name in sorted(files, key=lambda name: (name != "modelDescription.xml", name)):
             entry = zipfile.ZipInfo(name, _EPOCH)
             entry.create_system = 3  # Unix, wherever it is written

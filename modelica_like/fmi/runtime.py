@@ -13,9 +13,10 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from modelica_like.fmi.build import FLAGS, PLATFORMS, build
-from modelica_like.fmi.sources import Version, own_sources, runtime_sources
+from modelica_like.fmi.sources import Face, own_sources, runtime_sources
+from modelica_like.writing import write_bytes
 
-_VERSIONS: tuple[Version, ...] = ("2.0", "3.0")
+_FACES: tuple[Face, ...] = ("2.0", "3.0", "native")
 SHIPPED = Path(__file__).parent / "runtimes"
 """Libraries of the package, one folder per platform."""
 
@@ -50,14 +51,14 @@ def found_runtime(platform: str) -> Path | None:
 
 def build_runtime(platform: str, folder: Path) -> Path:
     """Compile the run-time for a platform into a folder; a library that others may be reading is replaced at once."""
-    folder.mkdir(parents=True, exist_ok=True)
-    with TemporaryDirectory(dir=folder) as place:
-        built = build(runtime_sources(_VERSIONS), platform, Path(place), "runtime")
-        return built.replace(folder / _library_name(platform))
+    library = folder / _library_name(platform)
+    with TemporaryDirectory(prefix="modelica_like_") as place:
+        write_bytes(library, build(runtime_sources(_FACES), platform, Path(place)).read_bytes())
+    return library
 
 
 def _library_name(platform: str) -> str:
-    total = hashlib.sha256(repr((own_sources(_VERSIONS), FLAGS)).encode()).hexdigest()
+    total = hashlib.sha256(repr((own_sources(_FACES), FLAGS)).encode()).hexdigest()
     return f"runtime-{total[:16]}{PLATFORMS[platform].suffix}"
 
 

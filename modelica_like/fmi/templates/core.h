@@ -53,12 +53,12 @@ typedef struct { /* an accepted integrator step: its first and last point, and t
 typedef struct { /* what changes; arrays of the model's sizes stand behind it, see `Instance` */
     double t, u_time;
     int phase, solved, z_valid, inputs_changed, piece_valid, event_pending, at_event;
-    double tolerance, start_time, stop_time;
+    double tolerance, absolute, start_time, stop_time; /* absolute: in nominal values */
     int stop_time_defined;
     double step;            /* next step size, 0: choose one */
     double instants[CROWD]; /* of the last events, in a circle */
     int n_instants;
-    double n_steps, n_rejected, n_events;
+    double n_steps, n_rejected, n_evaluations, n_events;
 } State;
 
 typedef void (*AnyFunction)(void); /* a callback of the importer, cast back before it is called */
@@ -89,7 +89,7 @@ typedef struct { /* at one instant: what has been stopped, and the states before
 /* Arrays of the model's sizes. Those of single functions are named after them; a function that calls another one does
  * not share with it. */
 typedef struct {
-    double *slots, *dots; /* values, and derivatives in either direction, of tape slots */
+    double *slots, *dots; /* values, and derivatives in either direction or three Taylor coefficients, of tape slots */
     double *jacobian, *matrix, *qr_v, *qr_r, *qr_beta, *qr_work;
     double *stages, *point; /* of the integrator: 8 stages, a point */
     double *variables, *guards, *guards_before, *rhs, *dense_matrix, *square, *vector, *residual;
@@ -131,8 +131,13 @@ typedef struct Instance {
     AnyFunction logger, intermediate_update;
     LogFunction log;
     double (*step_finished)(struct Instance *c); /* tells until when to go on; or NULL */
+    /* Told of mode changes (transition -1: an impact's), and what impacts cost (held -1: forget what was told); or NULL
+     */
+    void (*noted)(struct Instance *c, int transition, int mode, int target);
+    void (*struck)(struct Instance *c, int held, double energy, int first);
+    int round; /* of the events at the present instant */
     unsigned log_enabled;
-    int co_simulation, event_mode_used, early_return_allowed;
+    int co_simulation, event_mode_used, early_return_allowed, inputs_move;
     Allocate allocate;
     Release release;
     int variables_valid; /* work.variables belong to the present point */
@@ -186,7 +191,7 @@ int find_wanting(Instance *c, unsigned char *wanting, int guards_too);
 Result iterate_events(Instance *c, unsigned char *wanting, int located);
 double number_or_false(double guard);
 void move_states(Instance *c, const int *nodes, const double *values, int count);
-void note_change(Instance *c, int name, int mode, int target);
+void note_change(Instance *c, int name, int transition, int mode, int target);
 unsigned char *nothing_wanting(Instance *c);
 
 /* rosenbrock.c */
@@ -225,8 +230,11 @@ Result directional(Instance *c, const uint32_t *unknowns, size_t n_unknowns, con
 Result adjoint(Instance *c, const uint32_t *unknowns, size_t n_unknowns, const uint32_t *knowns, size_t n_knowns,
     const double *seed, double *result);
 void adjoint_of_node(Instance *c, int node, double *by_state);
-Result output_rate(Instance *c, uint32_t reference, double *value);
+Result factor_implicit(Instance *c, int *order);
 size_t dependencies(Instance *c, uint32_t unknown, uint32_t *knowns, size_t capacity, Result *result);
+
+/* taylor.c */
+Result output_rate(Instance *c, uint32_t reference, int order, double *value);
 
 /* instance.c */
 Instance *instance_new(const Model *model, const char *name, const char *token, Allocate allocate, Release release,

@@ -87,79 +87,49 @@ static uint64_t place(const Room *rooms, size_t count, double *memory) {
 
 static uint64_t place_state(Instance *c, double *memory) {
     const Model *m = c->model;
-    uint64_t n_d = (uint64_t)m->n_d, n_starts = (uint64_t)m->n_starts;
-    const Room rooms[] = {
-        {(uint64_t)m->n_x, 8, {&c->x}},
-        {(uint64_t)m->n_z, 8, {&c->z}},
-        {(uint64_t)m->n_p, 8, {&c->p}},
-        {(uint64_t)m->n_u, 8, {&c->u, &c->u_rate}},
-        {n_d, 8, {&c->d}},
-        {n_d, 1, {&c->mode_given}},
-        {n_starts, 8, {&c->start_value}},
-        {n_starts, 1, {&c->start_given}},
-        {2 + 5 * (uint64_t)m->n_unknowns, 8, {&c->piece}},
-        {(uint64_t)m->n_transitions, 1, {&c->wanting}},
-    };
+    uint64_t n = m->n_unknowns, n_d = m->n_d, n_starts = m->n_starts;
+    const Room rooms[] = {{m->n_x, 8, {&c->x}}, {m->n_z, 8, {&c->z}}, {m->n_p, 8, {&c->p}},
+        {m->n_u, 8, {&c->u, &c->u_rate}}, {n_d, 8, {&c->d}}, {n_d, 1, {&c->mode_given}},
+        {n_starts, 8, {&c->start_value}}, {n_starts, 1, {&c->start_given}}, {2 + 5 * n, 8, {&c->piece}},
+        {m->n_transitions, 1, {&c->wanting}}};
     return PLACE(rooms, memory);
 }
 
 /* Tapes, equations and the integrator. */
 static uint64_t place_work(const Model *m, Work *w, double *memory) {
-    uint64_t n = (uint64_t)m->n_unknowns, n_z = (uint64_t)m->n_z, steady = (uint64_t)m->n_steady + n_z;
-    uint64_t members = (uint64_t)m->most_members, n_guards = (uint64_t)m->n_guards, n_x = (uint64_t)m->n_x;
-    uint64_t resets = larger(larger((uint64_t)m->n_resets, (uint64_t)m->n_reset_values), (uint64_t)m->n_holds);
-    uint64_t small = larger(larger(n_guards, (uint64_t)m->n_moments),
-        larger(larger((uint64_t)m->n_start_modes, (uint64_t)m->n_d), (uint64_t)m->n_derived));
+    uint64_t n = m->n_unknowns, n_z = m->n_z, steady = m->n_steady + n_z;
+    uint64_t members = m->most_members, n_guards = m->n_guards, n_x = m->n_x;
+    uint64_t resets = larger(larger(m->n_resets, m->n_reset_values), m->n_holds);
+    uint64_t small = larger(larger(n_guards, m->n_moments), larger(larger(m->n_start_modes, m->n_d), m->n_derived));
     uint64_t square =
         larger(larger(m->settings->steady ? 2 * steady * steady : 0, resets * n_x), members * (n_x + 3 * members));
-    const Room rooms[] = {
-        {(uint64_t)m->n_slots, 8, {&w->slots, &w->dots}},
-        {larger((uint64_t)m->n_jacobian, (uint64_t)m->n_start_jacobian), 8, {&w->jacobian}},
-        {(uint64_t)m->step.n_nonzeros, 8, {&w->matrix}},
-        {larger((uint64_t)m->step.n_v, (uint64_t)m->start.n_v), 8, {&w->qr_v}},
-        {larger((uint64_t)m->step.n_r, (uint64_t)m->start.n_r), 8, {&w->qr_r}},
-        {larger(n, (uint64_t)m->start.size), 8, {&w->qr_beta, &w->qr_work, &w->start_unknowns}},
-        {9 * n, 8, {&w->stages}},
-        {2 + 5 * n, 8, {&w->whole}},
-        {n, 8, {&w->point, &w->first}},
-        {n + n_z, 8, {&w->vector}},
-        {larger(n, (uint64_t)m->n_determinants), 8, {&w->rhs}},
-        {(uint64_t)m->n_nodes, 8, {&w->variables}},
-        {small, 8, {&w->guards}},
-        {9 * n_guards, 8, {&w->guards_before}},
-        {n_guards, 1, {&w->kinds}},
-        {n_z * n_z, 8, {&w->dense_matrix}},
-        {n_z, 8, {&w->residual, &w->kept_z, &w->respond_z}},
-        {n_z, sizeof(int), {&w->order}},
-        {square, 8, {&w->square}},
-        {(uint64_t)m->n_starts, 8, {&w->start_values}},
-        {larger((uint64_t)m->n_start_values, resets), 8, {&w->start_residual}},
-        {resets, 8, {&w->reset_values, &w->target_values}},
-        {resets, sizeof(int), {&w->targets}},
-    };
+    const Room rooms[] = {{m->n_slots, 8, {&w->slots}}, {3 * (uint64_t)m->n_slots, 8, {&w->dots}},
+        {larger(m->n_jacobian, m->n_start_jacobian), 8, {&w->jacobian}}, {m->step.n_nonzeros, 8, {&w->matrix}},
+        {larger(m->step.n_v, m->start.n_v), 8, {&w->qr_v}}, {larger(m->step.n_r, m->start.n_r), 8, {&w->qr_r}},
+        {larger(n, m->start.size), 8, {&w->qr_beta, &w->qr_work, &w->start_unknowns}}, {9 * n, 8, {&w->stages}},
+        {2 + 5 * n, 8, {&w->whole}}, {n, 8, {&w->point, &w->first}}, {n + n_z, 8, {&w->vector}},
+        {larger(n, m->n_determinants), 8, {&w->rhs}}, {m->n_nodes, 8, {&w->variables}}, {small, 8, {&w->guards}},
+        {9 * n_guards, 8, {&w->guards_before}}, {n_guards, 1, {&w->kinds}}, {n_z * n_z, 8, {&w->dense_matrix}},
+        {n_z, 8, {&w->residual, &w->kept_z, &w->respond_z}}, {n_z, sizeof(int), {&w->order}}, {square, 8, {&w->square}},
+        {m->n_starts, 8, {&w->start_values}}, {larger(m->n_start_values, resets), 8, {&w->start_residual}},
+        {resets, 8, {&w->reset_values, &w->target_values}}, {resets, sizeof(int), {&w->targets}}};
     return PLACE(rooms, memory);
 }
 
 /* Events, and what modes hold. */
 static uint64_t place_events(const Model *m, Work *w, double *memory) {
-    uint64_t n_x = (uint64_t)m->n_x, n_d = (uint64_t)m->n_d, n_holds = (uint64_t)m->n_holds;
-    uint64_t members = (uint64_t)m->most_members + 1;
-    const Room rooms[] = {
-        {n_x, 8, {&w->x_before, &w->strike.jump, &w->impacts.x, &w->rates, &w->x_kept}},
-        {n_x, 1, {&w->known}},
-        {n_d, 8, {&w->d_before, &w->d_fired, &w->best, &w->respond_d}},
-        {n_d, 1, {&w->decided, &w->changed}},
-        {(uint64_t)m->n_transitions, 1, {&w->wanting}},
+    uint64_t n_x = m->n_x, n_d = m->n_d, n_holds = m->n_holds;
+    uint64_t members = m->most_members + 1;
+    const Room rooms[] = {{n_x, 8, {&w->x_before, &w->strike.jump, &w->impacts.x, &w->rates, &w->x_kept}},
+        {n_x, 1, {&w->known}}, {n_d, 8, {&w->d_before, &w->d_fired, &w->best, &w->respond_d}},
+        {n_d, 1, {&w->decided, &w->changed}}, {m->n_transitions, 1, {&w->wanting}},
         {n_holds, sizeof(Terms), {&w->terms, &w->strike_terms}},
         {n_holds, 8, {&w->weights, &w->base_weights, &w->use, &w->strike.before, &w->strike.approach}},
-        {n_holds, 8, {&w->strike.impulse, &w->strike.reaction, &w->begun}},
-        {n_holds, sizeof(int), {&w->standing}},
+        {n_holds, 8, {&w->strike.impulse, &w->strike.reaction, &w->begun}}, {n_holds, sizeof(int), {&w->standing}},
         {n_holds, 1, {&w->held, &w->impacts.entered}},
         {n_holds, 1, {&w->strike.entering, &w->strike.loose, &w->strike.held, &w->strike.knocked}},
         {members, 8, {&w->reactions, &w->sizes, &w->zeros}},
-        {members, sizeof(int), {&w->places, &w->member, &w->pivots}},
-        {members, 1, {&w->other}},
-    };
+        {members, sizeof(int), {&w->places, &w->member, &w->pivots}}, {members, 1, {&w->other}}};
     return PLACE(rooms, memory);
 }
 
@@ -171,12 +141,17 @@ static uint64_t lay_out(Instance *c, double *memory) {
     return used + place_events(c->model, &c->work, memory == NULL ? NULL : memory + used);
 }
 
+static void set_tolerance(State *s, const Model *m, double relative) {
+    s->tolerance = relative;
+    s->absolute = relative * m->settings->absolute_to_relative;
+}
+
 void instance_reset(Instance *c) {
     State *s = &c->state;
     memset(s, 0, sizeof *s);
     memset(c->numbers, 0, c->n_numbers * sizeof(double));
     s->phase = PHASE_INSTANTIATED;
-    s->tolerance = c->model->settings->default_tolerance;
+    set_tolerance(s, c->model, c->model->settings->default_tolerance);
     c->variables_valid = 0;
     start_defaults(c);
 }
@@ -266,7 +241,7 @@ Result set_experiment(
             "The start time %g s must be finite and not after the stop time %g s.", start, stop);
     if (tolerance_defined && !(tolerance > 0 && tolerance < 1))
         return report(c, LOG_ERROR, RESULT_ERROR, "The tolerance must be between 0 and 1, not %g.", tolerance);
-    if (tolerance_defined) s->tolerance = tolerance;
+    if (tolerance_defined) set_tolerance(s, c->model, tolerance);
     s->t = s->start_time = s->u_time = start;
     s->stop_time_defined = stop_defined && isfinite(stop);
     s->stop_time = s->stop_time_defined ? stop : 0;

@@ -373,22 +373,24 @@ Result check_step(Instance *c, double point, double size, double *target) {
     return RESULT_OK;
 }
 
-/* Goes to `target`, or to the first event before it. */
+/* Goes to `target`, or to the first event before it; inputs may also move where an internal step has ended. */
 Arrival integrate_to(Instance *c, double target, int stop_at_events) {
     State *s = &c->state;
-    int held = s->inputs_changed, event;
+    int held = 0, event;
     if (s->at_event && handle_event(c) != RESULT_OK) return FAILED;
-    if (take_changes(c, &event) != RESULT_OK) return FAILED;
-    if (event) {
-        s->at_event = 1;
-        if (stop_at_events) return AT_EVENT;
-        if (handle_event(c) != RESULT_OK) return FAILED;
-    }
-    while (s->t < target) {
+    for (;;) {
+        held |= s->inputs_changed;
+        if (take_changes(c, &event) != RESULT_OK) return FAILED;
+        if (event) {
+            s->at_event = 1;
+            if (stop_at_events) return AT_EVENT;
+            if (handle_event(c) != RESULT_OK) return FAILED;
+        }
+        if (!(s->t < target)) return REACHED;
         if (!s->piece_valid && target - s->t < least_step(s)) {
             /* An event was located a rounding error before the target. */
             s->t = target;
-            break;
+            return REACHED;
         }
         if (!s->piece_valid) {
             double limit = s->stop_time_defined && s->stop_time >= target ? s->stop_time : INFINITY;
@@ -406,5 +408,4 @@ Arrival integrate_to(Instance *c, double target, int stop_at_events) {
         }
         if (c->step_finished != NULL) target = fmin(target, fmax(c->step_finished(c), s->t));
     }
-    return REACHED;
 }
