@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 _SHOWN = 160
+_ENDLESS = re.compile(r"\S{500,}")
+"""What somebody wrote without a space, at such a length, is not repeated."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +45,7 @@ class ModelicaLikeError(Exception):
     """
 
     def __init__(self, what: str, *, where: Source | Iterable[Source] = (), why: str = "", advice: str = "") -> None:
+        what = _ENDLESS.sub(lambda word: f"{word[0][:_SHOWN]}…", what)
         super().__init__(what)
         self.what = what
         places = (where,) if isinstance(where, Source) else tuple(where)
@@ -165,10 +169,10 @@ class SolveError(ModelicaLikeError):
     """The simulation cannot go on.
 
     Attributes:
-        record: segments and events up to there, a `Recorder`, if there are any.
+        run: the `Solution` up to there, if there is any. The `KeyboardInterrupt` that ends a simulation has it, too.
     """
 
-    record: Any = None
+    run: Any = None
 
 
 class SingularAtStart(SolveError):

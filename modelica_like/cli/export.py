@@ -1,4 +1,4 @@
-"""Commands that write models for other tools: export."""
+"""Commands that write models for other tools: export, and what it needs."""
 
 from __future__ import annotations
 
@@ -42,6 +42,9 @@ def export(
         list[str] | None, Option("--open", metavar="PATH", help="A free connector that is open, e.g. J.flange_b.")
     ] = None,
     takes: Annotated[Takes, Option(help="What open ends take: flow (torque) or potential (angle).")] = Takes.FLOW,
+    embed: Annotated[
+        bool, Option("--embed", help="Compile the model into the binary, for importers that do not name resources.")
+    ] = False,
     modes: Annotated[Modes, Option(help="Modes as enumeration outputs, as local ones, or as integer outputs.")] = (
         Modes.OUTPUT
     ),
@@ -59,10 +62,31 @@ def export(
         with Console(stderr=True).status("loading") as status:
             done = export_fmu(
                 assembly, output or Path(f"{netlist.stem}.fmu"), fmi, _listed(kind), _listed(platforms),
-                outputs=outputs or (), ends=ends or (), takes=takes.value, modes=modes.value,
+                outputs=outputs or (), ends=ends or (), takes=takes.value, embed=embed, modes=modes.value,
                 check=check, strict=strict, report=status.update,
             )  # fmt: skip
         out().print(str(done), soft_wrap=True)
+
+
+def runtimes(
+    *, platforms: Annotated[
+        str, Option(metavar="NAMES", help="Platforms to compile for: native, all, or names with commas.")
+    ] = "none",
+    debug: Debug = False,
+) -> None:  # fmt: skip
+    """Tell for which platforms the run-time of FMUs is there; compile it for others."""
+    with told(debug):
+        from rich.console import Console
+
+        from modelica_like.fmi.build import PLATFORMS, chosen_platforms
+        from modelica_like.fmi.runtime import found_runtime, runtime_library
+
+        with Console(stderr=True).status("loading") as status:
+            for name in chosen_platforms(_listed(platforms)):
+                runtime_library(name, status.update)
+        for name in PLATFORMS:
+            library = found_runtime(name)
+            out().print(f"{name:16}{library or 'not compiled'}", soft_wrap=True)
 
 
 def _listed(text: str) -> tuple[str, ...]:

@@ -304,5 +304,5 @@ class _Fmi3(_Writer):
         for tag, unknowns, initial in lists:
             for one in unknowns:
                 known = self.known(one, initial)
-                kinds = None if known is None else ["dependent"] * len(known)
+                kinds = None if known is None else " ".join(["dependent"] * len(known))
                 element(structure, tag, valueReference=one.reference, dependencies=known, dependenciesKind=kinds)

@@ -21,6 +21,7 @@ from modelica_like.errors import (
 from modelica_like.netlist.locate import Lines, locate
 from modelica_like.units import parse_unit, to_si
 
+_ENDLESS = re.compile(r"[0-9]{4301}")
 MAX_BYTES = 2_000_000
 START_KINDS = ("given", "rest", "steady")
 
@@ -125,6 +126,9 @@ def parse_toml(text: str, lines: Lines) -> dict[str, Any]:
         return tomllib.loads(text)
     except (tomllib.TOMLDecodeError, RecursionError) as error:
         raise _not_toml(str(error), lines) from None
+    except ValueError:
+        number = next((k for k, line in enumerate(lines.text, 1) if _ENDLESS.search(line.replace("_", ""))), 0)
+        raise NetlistError("A number has more than 4300 digits.", where=lines.line(number)) from None
 
 
 def _not_toml(message: str, lines: Lines) -> ModelicaLikeError:

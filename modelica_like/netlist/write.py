@@ -17,12 +17,12 @@ from modelica_like.language.formula import Formula
 from modelica_like.netlist.convert import as_assembly
 from modelica_like.netlist.read import load, new_component
 from modelica_like.netlist.registry import type_name
+from modelica_like.writing import write_text
 
 
 def save(component: Component, path: str | Path) -> None:
     """Write a component as a netlist file; see `dumps`."""
-    path = Path(path)
-    path.write_text(dumps(component, folder=path.parent), encoding="utf-8")
+    write_text(path, dumps(component, folder=Path(path).parent))
 
 
 def dumps(component: Component, *, folder: str | Path = ".") -> str:
@@ -81,7 +81,7 @@ class _Writer:
         """Return the table of one part: its type, and what differs from a new one of that type."""
         if isinstance(part, Assembly):
             return {"is": self.file_of(part), **self.changes(path, part, load(part.__dict__["origin"]))}
-        structural = {key: plain(part.__dict__[key]) for key in part._structural}
+        structural = {key: plain(part._given_tables.get(key, part.__dict__[key])) for key in part._structural}
         reference = new_component(type(part), dict(structural))
         different = {key: value for key, value in structural.items() if _frozen(value) != part._structural[key]}
         return {"is": type_name(type(part)), **different, **self.changes(path, part, reference)}

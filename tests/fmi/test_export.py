@@ -170,7 +170,9 @@ def test_same_model_same_bytes(version: str, tmp_path: Path) -> None:
 def test_token_is_the_same_in_description_and_code(exported: Callable[[str], Export]) -> None:
     path = exported("3.0").path
     token = fmpy.read_model_description(str(path)).guid
-    assert token.encode() in member(path, "sources/model.c")
+    assert token.encode() in member(path, "resources/model.bin")
+    words = re.findall(r"0x(\w+)u", member(path, "sources/model_data.c").decode())
+    assert b"".join(int(word, 16).to_bytes(8, "little") for word in words) == member(path, "resources/model.bin")
 
 
 def test_a_single_component(tmp_path: Path) -> None:

@@ -105,7 +105,7 @@ fmi2Status fmi2SerializedFMUstateSize(fmi2Component component, fmi2FMUstate FMUs
     ENTER(fmi2SerializedFMUstateSize, ANY_PHASE);
     NEED(FMUstate, 1);
     NEED(size, 1);
-    *size = state_size();
+    *size = state_size(c);
     return fmi2OK;
 }
 

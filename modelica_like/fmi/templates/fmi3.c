@@ -20,8 +20,8 @@ const char *fmi3GetVersion(void) { return fmi3Version; }
 fmi3Instance fmi3InstantiateModelExchange(fmi3String instanceName, fmi3String instantiationToken,
     fmi3String resourcePath, fmi3Boolean visible, fmi3Boolean loggingOn, fmi3InstanceEnvironment instanceEnvironment,
     fmi3LogMessageCallback logMessage) {
-    (void)resourcePath, (void)visible;
-    return instance_new(instanceName, instantiationToken, calloc, free, logMessage ? log_fmi3 : NULL,
+    (void)visible;
+    return instance_open(resourcePath, instanceName, instantiationToken, calloc, free, logMessage ? log_fmi3 : NULL,
         (AnyFunction)logMessage, instanceEnvironment, loggingOn);
 }
 
@@ -43,7 +43,7 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String ins
         instanceName, instantiationToken, resourcePath, visible, loggingOn, instanceEnvironment, logMessage);
     if (c == NULL) return NULL;
     for (size_t k = 0; requiredIntermediateVariables != NULL && k < nRequiredIntermediateVariables; k++) {
-        const Variable *v = find_variable(requiredIntermediateVariables[k]);
+        const Variable *v = find_variable(c->model, requiredIntermediateVariables[k]);
         c->inputs_move |= v != NULL && v->kind == KIND_INPUT;
     }
     c->co_simulation = 1;
@@ -169,13 +169,12 @@ fmi3Status fmi3EnterContinuousTimeMode(fmi3Instance instance) {
 
 fmi3Status fmi3CompletedIntegratorStep(fmi3Instance instance, fmi3Boolean noSetFMUStatePriorToCurrentPoint,
     fmi3Boolean *enterEventMode, fmi3Boolean *terminateSimulation) {
-    unsigned char wanting[AT_LEAST_ONE(N_TRANSITIONS)] = {0};
     ENTER(fmi3CompletedIntegratorStep, PHASE_CONTINUOUS);
     (void)noSetFMUStatePriorToCurrentPoint;
     NEED(enterEventMode, 1);
     NEED(terminateSimulation, 1);
     if (settle(c) != RESULT_OK) return fmi3Error;
-    *enterEventMode = find_wanting(c, wanting, 1) != 0;
+    *enterEventMode = find_wanting(c, nothing_wanting(c), 1) != 0;
     *terminateSimulation = fmi3False;
     return fmi3OK;
 }
@@ -188,7 +187,7 @@ fmi3Status fmi3SetTime(fmi3Instance instance, fmi3Float64 time) {
 fmi3Status fmi3SetContinuousStates(
     fmi3Instance instance, const fmi3Float64 continuousStates[], size_t nContinuousStates) {
     ENTER(fmi3SetContinuousStates, PHASE_EVENT | PHASE_CONTINUOUS);
-    NEED_SIZE(nContinuousStates, N_X, "continuous states");
+    NEED_SIZE(nContinuousStates, c->model->n_x, "continuous states");
     NEED(continuousStates, nContinuousStates);
     return status(set_states(c, continuousStates));
 }
@@ -203,23 +202,24 @@ fmi3Status fmi3SetContinuousStates(
         return fmi3OK;                                                       \
     }
 
-GET_ALL(fmi3GetContinuousStateDerivatives, READABLE, N_X, "continuous states", get_derivatives(c, values))
-GET_ALL(fmi3GetEventIndicators, READABLE, N_GUARDS, "event indicators", get_indicators(c, values))
-GET_ALL(fmi3GetContinuousStates, READABLE, N_X, "continuous states", memcpy(values, c->state.x, N_X * sizeof(double)))
-GET_ALL(fmi3GetNominalsOfContinuousStates, READABLE, N_X, "continuous states",
-    memcpy(values, model_nominals, N_X * sizeof(double)))
+GET_ALL(fmi3GetContinuousStateDerivatives, READABLE, c->model->n_x, "continuous states", get_derivatives(c, values))
+GET_ALL(fmi3GetEventIndicators, READABLE, c->model->n_guards, "event indicators", get_indicators(c, values))
+GET_ALL(fmi3GetContinuousStates, READABLE, c->model->n_x, "continuous states",
+    memcpy(values, c->x, c->model->n_x * sizeof(double)))
+GET_ALL(fmi3GetNominalsOfContinuousStates, READABLE, c->model->n_x, "continuous states",
+    memcpy(values, c->model->nominals, c->model->n_x * sizeof(double)))
 
 fmi3Status fmi3GetNumberOfEventIndicators(fmi3Instance instance, size_t *nEventIndicators) {
     ENTER(fmi3GetNumberOfEventIndicators, ANY_PHASE);
     NEED(nEventIndicators, 1);
-    *nEventIndicators = N_GUARDS;
+    *nEventIndicators = c->model->n_guards;
     return fmi3OK;
 }
 
 fmi3Status fmi3GetNumberOfContinuousStates(fmi3Instance instance, size_t *nContinuousStates) {
     ENTER(fmi3GetNumberOfContinuousStates, ANY_PHASE);
     NEED(nContinuousStates, 1);
-    *nContinuousStates = N_X;
+    *nContinuousStates = c->model->n_x;
     return fmi3OK;
 }
 

@@ -131,7 +131,7 @@ fmi3Status fmi3SerializedFMUStateSize(fmi3Instance instance, fmi3FMUState FMUSta
     ENTER(fmi3SerializedFMUStateSize, ANY_PHASE);
     NEED(FMUState, 1);
     NEED(size, 1);
-    *size = state_size();
+    *size = state_size(c);
     return fmi3OK;
 }
 

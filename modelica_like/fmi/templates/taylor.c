@@ -153,24 +153,26 @@ static void extend(int operation, const Series a, const Series b, Series f) {
     for (int k = 1; k < ORDERS; k++) f[k] = times(by_a, a[k]) + times(by_b, b[k]);
 }
 
-/* Evaluates a tape, then its coefficients behind the first: coefficient n of slot k is terms[(n - 1) * N_SLOTS + k]. */
+/* Evaluates a tape, then its coefficients behind the first: coefficient n of slot k is terms[(n - 1) * m->n_slots + k].
+ */
 static void run_series(Instance *c, const Tape *tape, int order, double *outputs) {
-    State *s = &c->state;
+    const Model *m = c->model;
     double *slots = c->work.slots, *terms = c->work.dots;
     int k = 0;
-    evaluate(c, tape, s->t, s->x, s->z, outputs);
+    evaluate(c, tape, c->state.t, c->x, c->z, outputs);
     for (int r = 0; r < tape->n_runs; r++)
         for (int end = k + tape->runs[r].count; k < end; k++) {
-            int left = tape->operands[k].left, right = tape->operands[k].right, slot = SLOT_RESULTS + k;
+            int left = tape->operands[k].left, right = tape->operands[k].right, slot = tape->first_result + k;
             Series a = {slots[left]}, b = {slots[right]}, f = {slots[slot]};
             for (int n = 1; n < ORDERS; n++) {
-                a[n] = terms[(n - 1) * N_SLOTS + left];
-                b[n] = terms[(n - 1) * N_SLOTS + right];
+                a[n] = terms[(n - 1) * m->n_slots + left];
+                b[n] = terms[(n - 1) * m->n_slots + right];
             }
             extend(tape->runs[r].operation, a, b, f);
-            for (int n = 1; n < ORDERS; n++) terms[(n - 1) * N_SLOTS + slot] = f[n];
+            for (int n = 1; n < ORDERS; n++) terms[(n - 1) * m->n_slots + slot] = f[n];
         }
-    for (int n = 0; n < tape->n_outputs && order > 0; n++) outputs[n] = terms[(order - 1) * N_SLOTS + tape->outputs[n]];
+    for (int n = 0; n < tape->n_outputs && order > 0; n++)
+        outputs[n] = terms[(order - 1) * m->n_slots + tape->outputs[n]];
 }
 
 /* Derivative of a variable along the solution, with inputs on their straight lines and the implicit unknowns following.
@@ -178,29 +180,31 @@ static void run_series(Instance *c, const Tape *tape, int order, double *outputs
 Result output_rate(Instance *c, uint32_t reference, int order, double *value) {
     const Variable *v = known_variable(c, reference, TYPE_FLOAT64);
     Work *w = &c->work;
+    const Model *m = c->model;
     double *terms = w->dots, factorial = 1;
-    int pivots[AT_LEAST_ONE(N_Z)];
+    int *pivots = w->order;
     if (v == NULL) return RESULT_ERROR;
     if (order < 1 || order >= ORDERS)
         return report(c, LOG_ERROR, RESULT_ERROR, "Outputs have derivatives of order 1 to %d only.", ORDERS - 1);
     if (v->kind != KIND_VARIABLE && v->kind != KIND_STATE)
-        return report(c, LOG_ERROR, RESULT_ERROR, "%s has no time derivative: it is not a variable.", v->name);
+        return report(
+            c, LOG_ERROR, RESULT_ERROR, "%s has no time derivative: it is not a variable.", text_of(m, v->name));
     if (factor_implicit(c, pivots) != RESULT_OK) return RESULT_ERROR;
-    for (int n = 1; n < ORDERS; n++) memset(terms + (n - 1) * N_SLOTS, 0, SLOT_RESULTS * sizeof(double));
-    terms[SLOT_T] = 1;
-    memcpy(terms + SLOT_U, c->state.u_rate, N_U * sizeof(double));
+    for (int n = 1; n < ORDERS; n++) memset(terms + (n - 1) * m->n_slots, 0, m->slot_results * sizeof(double));
+    terms[0] = 1;
+    memcpy(terms + m->slot_u, c->u_rate, m->n_u * sizeof(double));
     for (int n = 1; n <= order; n++) {
-        run_series(c, &tape_rates, n - 1, w->rhs);
-        for (int k = 0; k < N_X; k++) terms[(n - 1) * N_SLOTS + SLOT_X + k] = w->rhs[k] / n;
+        run_series(c, &m->tapes.rates, n - 1, w->rhs);
+        for (int k = 0; k < m->n_x; k++) terms[(n - 1) * m->n_slots + m->slot_x + k] = w->rhs[k] / n;
         factorial *= n;
-        if (N_Z == 0) continue;
-        run_series(c, &tape_alg, n, w->vector); /* without the unknowns' own terms, in which it is linear */
-        lu_solve(N_Z, w->dense_matrix, pivots, w->vector);
-        for (int k = 0; k < N_Z; k++) terms[(n - 1) * N_SLOTS + SLOT_Z + k] = -w->vector[k];
+        if (m->n_z == 0) continue;
+        run_series(c, &m->tapes.alg, n, w->vector); /* without the unknowns' own terms, in which it is linear */
+        lu_solve(m->n_z, w->dense_matrix, pivots, w->vector);
+        for (int k = 0; k < m->n_z; k++) terms[(n - 1) * m->n_slots + m->slot_z + k] = -w->vector[k];
     }
     c->variables_valid = 0;
-    if (v->kind == KIND_VARIABLE) run_series(c, &tape_variables, order, w->variables);
-    *value =
-        factorial * (v->kind == KIND_STATE ? terms[(order - 1) * N_SLOTS + SLOT_X + v->index] : w->variables[v->index]);
+    if (v->kind == KIND_VARIABLE) run_series(c, &m->tapes.variables, order, w->variables);
+    *value = factorial *
+             (v->kind == KIND_STATE ? terms[(order - 1) * m->n_slots + m->slot_x + v->index] : w->variables[v->index]);
     return RESULT_OK;
 }
