@@ -44,8 +44,7 @@ static Result check_unknowns(Instance *c, const uint32_t *unknowns, size_t n) {
     return RESULT_OK;
 }
 
-/* Factorises the Jacobian of the implicit equations at the present point, with the slots of c->model->tapes.rates
- * filled. */
+/* Factorises the Jacobian of the implicit equations at the present point, with the slots of m->tapes.rates filled. */
 Result factor_implicit(Instance *c, int *order) {
     const Model *m = c->model;
     State *s = &c->state;

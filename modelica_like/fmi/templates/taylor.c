@@ -153,16 +153,16 @@ static void extend(int operation, const Series a, const Series b, Series f) {
     for (int k = 1; k < ORDERS; k++) f[k] = times(by_a, a[k]) + times(by_b, b[k]);
 }
 
-/* Evaluates a tape, then its coefficients behind the first: coefficient n of slot k is terms[(n - 1) * m->n_slots + k].
- */
+/* Evaluates a tape, then its coefficients behind the first: coefficient n of slot k is terms[(n - 1) * n_slots + k]. */
 static void run_series(Instance *c, const Tape *tape, int order, double *outputs) {
     const Model *m = c->model;
+    State *s = &c->state;
     double *slots = c->work.slots, *terms = c->work.dots;
     int k = 0;
-    evaluate(c, tape, c->state.t, c->x, c->z, outputs);
+    evaluate(c, tape, s->t, c->x, c->z, outputs);
     for (int r = 0; r < tape->n_runs; r++)
         for (int end = k + tape->runs[r].count; k < end; k++) {
-            int left = tape->operands[k].left, right = tape->operands[k].right, slot = tape->first_result + k;
+            int left = tape->operands[k].left, right = tape->operands[k].right, slot = m->slot_results + k;
             Series a = {slots[left]}, b = {slots[right]}, f = {slots[slot]};
             for (int n = 1; n < ORDERS; n++) {
                 a[n] = terms[(n - 1) * m->n_slots + left];
@@ -178,9 +178,9 @@ static void run_series(Instance *c, const Tape *tape, int order, double *outputs
 /* Derivative of a variable along the solution, with inputs on their straight lines and the implicit unknowns following.
  */
 Result output_rate(Instance *c, uint32_t reference, int order, double *value) {
+    const Model *m = c->model;
     const Variable *v = known_variable(c, reference, TYPE_FLOAT64);
     Work *w = &c->work;
-    const Model *m = c->model;
     double *terms = w->dots, factorial = 1;
     int *pivots = w->order;
     if (v == NULL) return RESULT_ERROR;
