@@ -71,6 +71,25 @@ static uint64_t larger(uint64_t a, uint64_t b) { return a > b ? a : b; }
 #define INTEGERS(array, n) {&(array), ((uint64_t)(n) + 1) / 2}
 #define BYTES(array, n) {&(array), ((uint64_t)(n) + 7) / 8}
 
+/* Operations, or outputs, of the first tapes that are specialised. */
+static uint64_t special_size(const Model *m, int count, int outputs) {
+    uint64_t size = 0;
+    for (int k = 0; k < count; k++)
+        size += (uint64_t)(outputs ? full_tape(m, k)->n_outputs : full_tape(m, k)->n_operations);
+    return size;
+}
+
+static void share_out_specials(Instance *c) {
+    for (int k = 0; k < N_SPECIALS; k++) {
+        Special *s = &c->work.special[k];
+        uint64_t before = special_size(c->model, k, 0);
+        s->runs = c->work.special_runs + before;
+        s->operands = c->work.special_operands + before;
+        s->outputs = c->work.special_outputs + special_size(c->model, k, 1);
+        s->first_known = c->model->n_slots + (int)before;
+    }
+}
+
 /* Lays arrays out in one block, the numbers of the state first; with memory == NULL only measures it, in doubles. */
 static uint64_t lay_out(Instance *c, double *memory) {
     const Model *m = c->model;
@@ -80,6 +99,7 @@ static uint64_t lay_out(Instance *c, double *memory) {
         larger(larger((uint64_t)m->n_start_modes, (uint64_t)m->n_d), (uint64_t)m->n_derived));
     uint64_t steady = (uint64_t)m->n_steady + n_z, members = (uint64_t)m->most_members;
     uint64_t resets = larger(larger((uint64_t)m->n_resets, (uint64_t)m->n_reset_values), (uint64_t)m->n_holds);
+    uint64_t left = special_size(m, N_SPECIALS, 0), outputs = special_size(m, N_SPECIALS, 1);
     uint64_t square =
         larger(larger(m->settings->steady ? 2 * steady * steady : 0, resets * n_x), members * (n_x + 3 * members));
     struct {
@@ -97,7 +117,7 @@ static uint64_t lay_out(Instance *c, double *memory) {
         BYTES(c->start_given, m->n_starts),
         BYTES(c->mode_given, m->n_d),
         BYTES(c->wanting, m->n_transitions),
-        DOUBLES(w->slots, m->n_slots),
+        DOUBLES(w->slots, (uint64_t)m->n_slots + left),
         DOUBLES(w->dots, m->n_slots),
         DOUBLES(w->jacobian, larger((uint64_t)m->n_jacobian, (uint64_t)m->n_start_jacobian)),
         DOUBLES(w->matrix, m->step.n_nonzeros),
@@ -109,7 +129,7 @@ static uint64_t lay_out(Instance *c, double *memory) {
         DOUBLES(w->point, n),
         DOUBLES(w->variables, m->n_nodes),
         DOUBLES(w->guards, small),
-        DOUBLES(w->guards_before, 9 * (uint64_t)m->n_guards),
+        DOUBLES(w->guards_before, 3 * (uint64_t)m->n_guards * MOST_LOOKS),
         DOUBLES(w->rhs, larger(n, (uint64_t)m->n_determinants)),
         DOUBLES(w->dense_matrix, n_z * n_z),
         DOUBLES(w->square, square),
@@ -164,6 +184,18 @@ static uint64_t lay_out(Instance *c, double *memory) {
         DOUBLES(w->respond_z, n_z),
         DOUBLES(w->rates, n_x),
         DOUBLES(w->x_kept, n_x),
+        DOUBLES(w->seen_rates, n_x),
+        DOUBLES(w->seen_indicators, m->n_guards),
+        DOUBLES(w->seen_derived, m->n_derived),
+        DOUBLES(w->first_rates, n),
+        INTEGERS(w->same, m->n_slots),
+        INTEGERS(w->places_of_slots, m->n_slots),
+        BYTES(w->known_slots, m->n_slots),
+        BYTES(w->needed_slots, m->n_slots),
+        BYTES(w->asked, m->n_nodes),
+        BYTES(w->special_runs, left * sizeof(Run)),
+        BYTES(w->special_operands, left * sizeof(Operands)),
+        INTEGERS(w->special_outputs, outputs),
     };
     for (size_t k = 0; k < sizeof arrays / sizeof arrays[0]; k++) {
         double *place = memory == NULL ? NULL : memory + used;
@@ -185,7 +217,7 @@ void instance_reset(Instance *c) {
     memset(c->numbers, 0, c->n_numbers * sizeof(double));
     s->phase = PHASE_INSTANTIATED;
     set_tolerance(s, c->model, c->model->settings->default_tolerance);
-    c->variables_valid = 0;
+    c->variables_valid = c->look_valid = 0;
     start_defaults(c);
 }
 
@@ -206,6 +238,7 @@ static Instance *instance_make(const Instance *bare) {
     }
     memcpy(c->name, bare->name, length + 1);
     lay_out(c, c->numbers);
+    share_out_specials(c);
     memcpy(c->work.slots + m->slot_constants, m->constants, (size_t)m->n_constants * sizeof(double));
     instance_reset(c);
     return c;
@@ -315,7 +348,7 @@ Result state_copy_out(Instance *c, void **copy) {
 Result state_copy_in(Instance *c, const void *copy) {
     memcpy(&c->state, copy, sizeof(State));
     memcpy(c->numbers, (const char *)copy + sizeof(State), c->n_numbers * sizeof(double));
-    c->variables_valid = 0;
+    c->variables_valid = c->look_valid = 0;
     return RESULT_OK;
 }
 
