@@ -43,9 +43,9 @@ STRANGE: tuple[Any, ...] = (
     "J/0", "1/0", "0*(1/0)", "log(0)", "sqrt(-1)", "2**9999", "(-1)**0.5", "x = 1", "a.b", "a..b", "[1]", "a[0]",
     "a" * 3000, "(" * 200 + "1" + ")" * 200, "\x00", "\ud7ff", "é", "10 kg.m²", "∞", "''", '"', "{}", "%s", "[bold]",
     "../../x.toml", "./two_mass.toml", ".", "no_such:Class", "json:JSONDecoder", "math:pi", "Inertia", "Fixed",
-    "Clutch", "Sine", "flange_a", "flange", "y", "steady", "rest", "given", "locked", [], [[]], [0], [[0]], [[0, "1"]], [[0, [1]]],
-    [[0, 1], [0, 2]], [[0, 1], [1, 2]], [["0 rad/s", 0.1]], [[math.nan, 1]], ["a", "b"], ["a.b"], {}, {"a": 1},
-    {"is": "Inertia"}, {"is": "Inertia", "J": 1}, {"is": []}, datetime.date(1979, 5, 27), datetime.time(7, 32),
+    "Clutch", "Sine", "flange_a", "flange", "y", "steady", "rest", "given", "locked", [], [[]], [0], [[0]], [[0, "1"]],
+    [[0, [1]]], [[0, 1], [0, 2]], [[0, 1], [1, 2]], [["0 rad/s", 0.1]], [[math.nan, 1]], ["a", "b"], ["a.b"], {},
+    {"a": 1}, {"is": "Inertia"}, {"is": "Inertia", "J": 1}, {"is": []}, datetime.date(1979, 5, 27), datetime.time(7, 32),
 )  # fmt: skip
 KEYS = (
     "is", "count", "J", "w", "phi", "c", "d", "mu_pos", "table", "until", "start", "rtol", "points", "parts", "series",
