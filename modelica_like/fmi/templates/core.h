@@ -96,7 +96,7 @@ typedef struct {
     double *start_unknowns, *start_values, *start_residual;
     int *order; /* pivots of the implicit equations */
     unsigned char *known, *decided, *wanting;
-    double *d_before, *x_before, *d_fired, *reset_values, *target_values;
+    double *d_before, *d_fired, *reset_values, *target_values;
     int *targets;
     unsigned char *changed;
     double *first; /* point before a step */
@@ -189,6 +189,7 @@ int guard_active(const Instance *c, int guard);
 double next_moment(Instance *c);
 int find_wanting(Instance *c, unsigned char *wanting, int guards_too);
 Result iterate_events(Instance *c, unsigned char *wanting, int located);
+Result update_discrete(Instance *c, int *restart, double *next);
 double number_or_false(double guard);
 void move_states(Instance *c, const int *nodes, const double *values, int count);
 void note_change(Instance *c, int name, int transition, int mode, int target);
@@ -207,7 +208,6 @@ typedef enum { REACHED, AT_EVENT, FAILED } Arrival;
 Arrival integrate_to(Instance *c, double target, int stop_at_events);
 void leave_piece(Instance *c);
 Result handle_event(Instance *c);
-Result update_discrete(Instance *c, int *restart, double *next);
 Result check_step(Instance *c, double point, double size, double *target);
 
 /* values.c */

@@ -341,18 +341,6 @@ Result handle_event(Instance *c) {
     return RESULT_OK;
 }
 
-/* One event iteration for an importer's event mode. Where anything fired or was set, its solver must begin anew even if
-   no state jumped: rates do, and importers restart only when told that states have changed. */
-Result update_discrete(Instance *c, int *restart, double *next) {
-    double before = c->state.n_events;
-    *restart = c->state.inputs_changed;
-    c->state.inputs_changed = 0;
-    if (handle_event(c) != RESULT_OK) return RESULT_ERROR;
-    *restart |= c->state.n_events != before;
-    *next = next_moment(c);
-    return RESULT_OK;
-}
-
 static int is_due(Instance *c) { return c->model->n_moments > 0 && find_wanting(c, nothing_wanting(c), 0); }
 
 /* Checks what the importer asks for and says where the step ends. */
