@@ -191,7 +191,7 @@ def _compiled(drive: Model, ends: Sequence[str], takes: Takes) -> tuple[Compiled
 
         drive = load(drive)
     flat = flatten(with_open_ends(drive, ends, takes), open_inputs=True)
-    return compile(reduce(flat)), str(getattr(drive, "description", "") or ""), _equations(flat)
+    return compile(reduce(flat)), str(getattr(drive, "_description", "") or ""), _equations(flat)
 
 
 def _equations(flat: FlatModel) -> Listing:

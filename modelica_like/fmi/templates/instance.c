@@ -95,24 +95,50 @@ static uint64_t place_state(Instance *c, double *memory) {
     return PLACE(rooms, memory);
 }
 
+/* Operations, or outputs, of the first tapes that are specialised. */
+static uint64_t special_size(const Model *m, int count, int outputs) {
+    uint64_t size = 0;
+    for (int k = 0; k < count; k++)
+        size += (uint64_t)(outputs ? full_tape(m, k)->n_outputs : full_tape(m, k)->n_operations);
+    return size;
+}
+
+static void share_out_specials(Instance *c) {
+    for (int k = 0; k < N_SPECIALS; k++) {
+        Special *s = &c->work.special[k];
+        uint64_t before = special_size(c->model, k, 0);
+        s->runs = c->work.special_runs + before;
+        s->operands = c->work.special_operands + before;
+        s->outputs = c->work.special_outputs + special_size(c->model, k, 1);
+        s->first_known = c->model->n_slots + (int)before;
+    }
+}
+
 /* Tapes, equations and the integrator. */
 static uint64_t place_work(const Model *m, Work *w, double *memory) {
     uint64_t n = m->n_unknowns, n_z = m->n_z, steady = m->n_steady + n_z;
     uint64_t members = m->most_members, n_guards = m->n_guards, n_x = m->n_x;
     uint64_t resets = larger(larger(m->n_resets, m->n_reset_values), m->n_holds);
     uint64_t small = larger(larger(n_guards, m->n_moments), larger(larger(m->n_start_modes, m->n_d), m->n_derived));
+    uint64_t left = special_size(m, N_SPECIALS, 0);
     uint64_t square =
         larger(larger(m->settings->steady ? 2 * steady * steady : 0, resets * n_x), members * (n_x + 3 * members));
-    const Room rooms[] = {{m->n_slots, 8, {&w->slots}}, {3 * (uint64_t)m->n_slots, 8, {&w->dots}},
+    const Room rooms[] = {{m->n_slots + left, 8, {&w->slots}}, {3 * (uint64_t)m->n_slots, 8, {&w->dots}},
         {larger(m->n_jacobian, m->n_start_jacobian), 8, {&w->jacobian}}, {m->step.n_nonzeros, 8, {&w->matrix}},
         {larger(m->step.n_v, m->start.n_v), 8, {&w->qr_v}}, {larger(m->step.n_r, m->start.n_r), 8, {&w->qr_r}},
         {larger(n, m->start.size), 8, {&w->qr_beta, &w->qr_work, &w->start_unknowns}}, {9 * n, 8, {&w->stages}},
         {2 + 5 * n, 8, {&w->whole}}, {n, 8, {&w->point, &w->first}}, {n + n_z, 8, {&w->vector}},
         {larger(n, m->n_determinants), 8, {&w->rhs}}, {m->n_nodes, 8, {&w->variables}}, {small, 8, {&w->guards}},
-        {9 * n_guards, 8, {&w->guards_before}}, {n_guards, 1, {&w->kinds}}, {n_z * n_z, 8, {&w->dense_matrix}},
-        {n_z, 8, {&w->residual, &w->kept_z, &w->respond_z}}, {n_z, sizeof(int), {&w->order}}, {square, 8, {&w->square}},
-        {m->n_starts, 8, {&w->start_values}}, {larger(m->n_start_values, resets), 8, {&w->start_residual}},
-        {resets, 8, {&w->reset_values, &w->target_values}}, {resets, sizeof(int), {&w->targets}}};
+        {3 * n_guards * MOST_LOOKS, 8, {&w->guards_before}}, {n_guards, 1, {&w->kinds}},
+        {n_z * n_z, 8, {&w->dense_matrix}}, {n_z, 8, {&w->residual, &w->kept_z, &w->respond_z}},
+        {n_z, sizeof(int), {&w->order}}, {square, 8, {&w->square}}, {m->n_starts, 8, {&w->start_values}},
+        {larger(m->n_start_values, resets), 8, {&w->start_residual}},
+        {resets, 8, {&w->reset_values, &w->target_values}}, {resets, sizeof(int), {&w->targets}},
+        {n_x, 8, {&w->seen_rates}}, {n, 8, {&w->first_rates}}, {n_guards, 8, {&w->seen_indicators}},
+        {m->n_derived, 8, {&w->seen_derived}}, {m->n_slots, sizeof(int), {&w->same, &w->places_of_slots}},
+        {m->n_slots, 1, {&w->known_slots, &w->needed_slots}}, {m->n_nodes, 1, {&w->asked}},
+        {left, sizeof(Run), {&w->special_runs}}, {left, sizeof(Operands), {&w->special_operands}},
+        {special_size(m, N_SPECIALS, 1), sizeof(int), {&w->special_outputs}}};
     return PLACE(rooms, memory);
 }
 
@@ -151,7 +177,7 @@ void instance_reset(Instance *c) {
     memset(c->numbers, 0, c->n_numbers * sizeof(double));
     s->phase = PHASE_INSTANTIATED;
     set_tolerance(s, c->model, c->model->settings->default_tolerance);
-    c->variables_valid = 0;
+    c->variables_valid = c->look_valid = 0;
     start_defaults(c);
 }
 
@@ -172,6 +198,7 @@ static Instance *instance_make(const Instance *bare) {
     }
     memcpy(c->name, bare->name, length + 1);
     lay_out(c, c->numbers);
+    share_out_specials(c);
     memcpy(c->work.slots + m->slot_constants, m->constants, (size_t)m->n_constants * sizeof(double));
     instance_reset(c);
     return c;
@@ -281,7 +308,7 @@ Result state_copy_out(Instance *c, void **copy) {
 Result state_copy_in(Instance *c, const void *copy) {
     memcpy(&c->state, copy, sizeof(State));
     memcpy(c->numbers, (const char *)copy + sizeof(State), c->n_numbers * sizeof(double));
-    c->variables_valid = 0;
+    c->variables_valid = c->look_valid = 0;
     return RESULT_OK;
 }
 
