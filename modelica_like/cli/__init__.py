@@ -18,7 +18,7 @@ _GROUPS = {
     "analysis": ("modes",),
     "sweeps": ("steady", "sweep"),
     "sensitivity": ("sensitivity",),
-    "export": ("export",),
+    "export": ("export", "runtimes"),
     "cosimulation": ("split", "cosim"),
     "types": ("describe", "schema", "library", "docs"),
     "validation": ("validate", "compare"),

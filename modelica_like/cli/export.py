@@ -1,4 +1,4 @@
-"""Commands that write models for other tools: export."""
+"""Commands that write models for other tools: export, and what it needs."""
 
 from __future__ import annotations
 
@@ -66,6 +66,27 @@ def export(
                 check=check, strict=strict, report=status.update,
             )  # fmt: skip
         out().print(str(done), soft_wrap=True)
+
+
+def runtimes(
+    *, platforms: Annotated[
+        str, Option(metavar="NAMES", help="Platforms to compile for: native, all, or names with commas.")
+    ] = "none",
+    debug: Debug = False,
+) -> None:  # fmt: skip
+    """Tell for which platforms the run-time of FMUs is there; compile it for others."""
+    with told(debug):
+        from rich.console import Console
+
+        from modelica_like.fmi.build import PLATFORMS, chosen_platforms
+        from modelica_like.fmi.runtime import found_runtime, runtime_library
+
+        with Console(stderr=True).status("loading") as status:
+            for name in chosen_platforms(_listed(platforms)):
+                runtime_library(name, status.update)
+        for name in PLATFORMS:
+            library = found_runtime(name)
+            out().print(f"{name:16}{library or 'not compiled'}", soft_wrap=True)
 
 
 def _listed(text: str) -> tuple[str, ...]:

@@ -18,6 +18,13 @@ class Start(StrEnum):
     STEADY = "steady"
 
 
+class Solver(StrEnum):
+    """What integrates."""
+
+    IDAS = "idas"
+    NATIVE = "native"
+
+
 def check(
     netlist: Netlist, assignments: Assignments = None, *,
     start: Annotated[bool, Option("--start", help="Tell the start values, and where each comes from.")] = False,
@@ -47,6 +54,7 @@ def simulate(
     show: Annotated[list[str] | None, Option(metavar="PATTERN", help="What to draw, e.g. '*.w'.")] = None,
     sankey: Annotated[Path | None, Option(metavar="FILE", help="Draw where the energy went.")] = None,
     energy: Annotated[bool, Option(help="Tell the energy balance.")] = True,
+    solver: Annotated[Solver, Option(help="IDAS, or the compiled run-time of FMUs.")] = Solver.IDAS,
     debug: Debug = False,
 ) -> None:  # fmt: skip
     """Simulate a netlist: events, energy balance, results as table and picture."""
@@ -65,7 +73,9 @@ def simulate(
         matching(model, show or ())
         with Bar(until or model.settings.get("until")) as bar:
             begin = start.value if start else None
-            made = Outcome(lambda: run(model, until, start=begin, points=points, progress=bar), debug=debug)
+            made = Outcome(
+                lambda: run(model, until, start=begin, points=points, progress=bar, solver=solver.value), debug=debug
+            )
         energy = energy and made.stopped is None and made.attempt("The energy balance", made.solution.energy)
         made.tell(lambda one: run_report(one, energy=energy), csv)
         pictures = (plot, lambda one: draw(one, show or ())), (sankey, lambda one: one.energy().sankey(model.name))

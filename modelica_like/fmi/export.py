@@ -13,16 +13,16 @@ from typing import get_args
 
 from modelica_like.compile import compile
 from modelica_like.compile.compiled import CompiledDae
-from modelica_like.errors import ExportError, UnknownName, did_you_mean
+from modelica_like.errors import ExportError, UnknownName
 from modelica_like.flatten import flatten
 from modelica_like.flatten.model import FlatModel
-from modelica_like.fmi.build import PLATFORMS, build, native_platform
+from modelica_like.fmi.build import PLATFORMS, build, chosen_platforms, native_platform
 from modelica_like.fmi.check import Check, compare_with_idas, problems
 from modelica_like.fmi.description import About, Kind, Version, build_description, identifier, model_description
 from modelica_like.fmi.documentation import Listing, index_page
 from modelica_like.fmi.icons import drive_icon, icon_name, terminal_icon
 from modelica_like.fmi.interface import Interface, ModesAs, interface
-from modelica_like.fmi.model_file import MODEL, as_c, model_file
+from modelica_like.fmi.model_file import MODEL, as_c, model_file, with_token
 from modelica_like.fmi.package import write_archive
 from modelica_like.fmi.runtime import runtime_library
 from modelica_like.fmi.sources import LOG_CATEGORIES, licenses, runtime_sources, source_files
@@ -110,7 +110,7 @@ def export_fmu(
     begin = time.perf_counter()
     tell = report or _silent
     target = _target(path)
-    chosen, kinds, names = _version(version), _kinds(kind), _platforms(platforms)
+    chosen, kinds, names = _version(version), _kinds(kind), chosen_platforms(platforms)
     tell("compiling the model")
     model, description, equations = _compiled(drive, ends, takes)
     variables = interface(model, outputs, _modes(modes))
@@ -173,20 +173,6 @@ def _kinds(kind: Collection[str]) -> tuple[Kind, ...]:
     if not asked:
         raise ExportError("An FMU needs a kind.", advice="Ask for me (Model Exchange), cs (Co-Simulation) or both.")
     return tuple(one for one in get_args(Kind) if one in asked)
-
-
-def _platforms(platforms: Sequence[str] | str) -> tuple[str, ...]:
-    asked = (platforms,) if isinstance(platforms, str) else tuple(platforms)
-    found: list[str] = []
-    for one in asked:
-        if one not in ("native", "all", *PLATFORMS):
-            known = ["native", "all", *PLATFORMS]
-            raise UnknownName(
-                f"There is no platform '{one}'{did_you_mean(one, known) or '.'}",
-                advice=f"There are {', '.join(known)}.",
-            )
-        found += PLATFORMS if one == "all" else [native_platform() if one == "native" else one]
-    return tuple(dict.fromkeys(found))
 
 
 # -- the model ---------------------------------------------------------------------------------------------------------
@@ -252,7 +238,6 @@ def _contents(
     model: CompiledDae, variables: Interface, about: About, equations: Listing, embed: bool
 ) -> dict[str, bytes]:
     """Return all files but the binaries, under a token that follows from their content."""
-    tables = make_tables(model)
     texts = {"modelDescription.xml": model_description(model, variables, about)}
     texts |= {f"sources/{name}": text for name, text in runtime_sources((about.version,)).items()}
     texts["documentation/index.html"] = index_page(variables, about.description, about.tool, equations)
@@ -264,8 +249,9 @@ def _contents(
         pictures = {f"terminalsAndIcons/icon.{suffix}": drive_icon(suffix) for suffix in ("png", "svg")}
         for family in dict.fromkeys(icon_name(one.kind) for one in model.terminals):
             pictures |= {f"terminalsAndIcons/{family}.{s}": terminal_icon(family, s) for s in ("png", "svg")}
-    token = _token(texts, model_file(tables, variables.variables, _TOKEN, about.tolerance))
-    data = model_file(tables, variables.variables, token, about.tolerance)
+    data = model_file(make_tables(model), variables.variables, _TOKEN, about.tolerance)
+    token = _token(texts, data)
+    data = with_token(data, _TOKEN, token)
     texts |= {name: text.replace(_TOKEN, token) for name, text in texts.items()}
     texts["sources/model_data.c"] = as_c(data)
     files: dict[str, bytes] = {name: text.encode() for name, text in texts.items()} | pictures

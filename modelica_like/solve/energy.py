@@ -21,6 +21,8 @@ _ROUNDING = 1e-9
 _NOTHING = 1e-12
 """Part of the model's largest power below which a power is rounding."""
 _SAME_TIME = 1e-12
+_ADDED_UP = 10.0
+"""Drift, in relative tolerances of the run, from which it is told."""
 
 
 class Loss(Protocol):
@@ -88,11 +90,13 @@ class EnergyBalance:
         throughput: largest of: energy exchanged, brought in, dissipated, stored.
         at_events: largest change of all stored energies together at an event, in J, that neither an impact nor a reset
             explains.
+        tolerance: relative tolerance of the run; 0 if it has none.
     """
 
     rows: tuple[EnergyRow, ...]
     throughput: float
     at_events: float = 0.0
+    tolerance: float = 0.0
 
     def __getitem__(self, component: str) -> EnergyRow:
         return next(row for row in self.rows if row.component == component)
@@ -146,7 +150,7 @@ class EnergyBalance:
 
     @property
     def notices(self) -> tuple[str, ...]:
-        """What is wrong with the equations of components, as sentences: powers that do not balance, negative losses."""
+        """What is wrong, as sentences: powers that do not balance, negative losses, energies that drift."""
         told: list[str] = []
         for row in self.rows:
             name = row.component or "The model itself"
@@ -159,6 +163,13 @@ class EnergyBalance:
                 told.append(f"{name} has a negative loss, {-row.gain:.6g} W at {row.gain_time:.9g} s.")
         if self.at_events > _ROUNDING * self.throughput:
             told.append(f"At an event {self.at_events:.6g} J appear or vanish that no impact and no reset explains.")
+        if self.tolerance and self.drift > _ADDED_UP * self.tolerance:
+            worst = max(self.rows, key=lambda row: abs(row.drift))
+            told.append(
+                f"The stored energy of {worst.component or 'the model itself'} drifts by {worst.drift:.2g} J, "
+                f"{self.drift / self.tolerance:.2g} times the run's relative tolerance: errors of the integrator's "
+                f"steps add up. A smaller rtol lowers them."
+            )
         return tuple(told)
 
     @property
@@ -209,7 +220,8 @@ def energy_balance(
     """
     count = len(model.components)
     audit, totals = _Audit(count), np.zeros((POWERS, count))
-    powers = Powers(model, options or Options())
+    options = options or Options()
+    powers = Powers(model, options, sum(len(segment.times) for segment in segments))
     for some in results(model, segments):
         totals += powers.integrals(some)
         audit.see(some)
@@ -225,10 +237,11 @@ def energy_balance(
         *audit.found(),
     )  # fmt: skip
     rows = tuple(EnergyRow(path, *map(float, values)) for path, *values in zip(model.components, *columns, strict=True))
-    throughput = max([audit.stored, *(float(np.sum(np.abs(part))) for part in (inflow, source, lost + impact))])
+    throughput = max([powers.stored, *(float(np.sum(np.abs(part))) for part in (inflow, source, lost + impact))])
     reset = [event.time for event in events if event.transition >= 0 and model.transitions[event.transition].resets]
     times = np.concatenate(audit.times)[1:]
-    return EnergyBalance(rows, throughput, _unexplained(times, np.sum(jumps, axis=0), reset, impacts))
+    at_events = _unexplained(times, np.sum(jumps, axis=0), reset, impacts)
+    return EnergyBalance(rows, throughput, at_events, options.rtol)
 
 
 class _Audit:
@@ -238,7 +251,6 @@ class _Audit:
     """
 
     def __init__(self, count: int) -> None:
-        self.stored = 0.0
         self.times: list[Vector] = []
         self.starts: list[Vector] = []
         self.ends: list[Vector] = []
@@ -253,7 +265,6 @@ class _Audit:
         self.times.append(some.times[starts])
         self.starts.append(stored[:, starts])
         self.ends.append(stored[:, np.unique(some.last)])
-        self.stored = max(self.stored, float(np.max(np.sum(np.abs(stored), axis=0), initial=0.0)))
         self._largest = np.maximum(self._largest, np.max(np.abs(some.terms[1:]), axis=(0, 2), initial=0.0))
         for k, values in enumerate((np.abs(inflow + source - lost - rate), -lost)):
             worst = np.max(values, axis=1)

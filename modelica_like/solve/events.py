@@ -12,7 +12,7 @@ from modelica_like.errors import StepFailed
 from modelica_like.initialize import Point
 from modelica_like.solve.guards import Candidate, Guards, Located, candidates, locate
 from modelica_like.solve.idas import Integrator
-from modelica_like.solve.instants import SAME_TIME, Instants, just_after
+from modelica_like.solve.instants import SAME_TIME, Instants, just_after, note_sharing
 from modelica_like.solve.looks import Cell, Looks
 from modelica_like.solve.options import Options
 from modelica_like.solve.pace import Pace
@@ -61,6 +61,11 @@ class EventLoop:
         self.pace = Pace(start.t, end, options, guarded=bool(self.guards.count), timed=timed)
         self.instants = Instants(model, options, self.guards, self.record, end - start.t)
 
+    @property
+    def counts(self) -> tuple[int, int, int]:
+        """Steps, evaluations of the equations, and calls of the integrator so far."""
+        return self.integrator.steps, self.integrator.evaluations, self.integrator.calls
+
     def run(self) -> Recorder:
         """Simulate.
 
@@ -69,7 +74,7 @@ class EventLoop:
         """
         try:
             self.instants.settle(self.now, self._wanting())
-            self.instants.note_sharing(self.now)
+            note_sharing(self.record, self.model, self.now)
             self.record.begin(self.now)
             while self.now.t < self.end:
                 self._advance(min(self.instants.next_moment(self.now), self.end))

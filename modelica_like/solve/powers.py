@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import partial
-from typing import Any
+from functools import cache, partial
 
 import casadi as ca
 import numpy as np
@@ -24,10 +23,10 @@ _RATE = 4
 """Column of the rate of the stored energy among the energy terms."""
 _PIECE = 20_000
 """Results that are looked at together."""
-_SHARE = 0.1
-"""Error of one interval, in relative tolerances of the energy that moves, from which it is integrated again."""
+_SHARE, _ALL = 0.1, 50.0
+"""Errors of one interval and of all, in relative tolerances of the energy that moves, that are left as they are."""
 _ASTRAY = 3.0
-"""The same for stored energies that change otherwise than their rates say, however smooth these look."""
+"""The same of one interval for stored energies that change otherwise than their rates say, smooth as these look."""
 _FINER = 0.1
 _FINEST = 1e-12
 """What is integrated again is so much more precise than the run, but no more than this."""
@@ -104,16 +103,18 @@ class Powers:
     Args:
         model: the compiled model.
         options: of the run.
+        count: number of its results.
 
     Attributes:
-        moved: the largest energy that any component exchanged so far, or that all stored at once, in J. What an
-            integral is precise to is a part of that, not of what is left over: an oscillation exchanges its energy
-            again and again.
+        stored: the largest energy that all components stored at one time so far, in J.
+        moved: that, or the largest energy that one exchanged. What an integral is precise to is a part of it, not of
+            what is left over: an oscillation exchanges its energy again and again.
     """
 
-    def __init__(self, model: CompiledDae, options: Options) -> None:
+    def __init__(self, model: CompiledDae, options: Options, count: int) -> None:
         self.model, self.options = model, options
-        self.moved = 0.0
+        self._share = min(_SHARE, _ALL / count)
+        self.stored, self.moved = 0.0, 0.0
 
     def integrals(self, every: Results) -> Vector:
         """Integrate all powers over some results; shape (4, components), in J."""
@@ -123,8 +124,11 @@ class Powers:
         terms = every.terms[..., kept]
         powers = terms[1 : 1 + POWERS].reshape(-1, len(kept))
         whole = _sums(places, weights, len(kept))
-        stored = np.max(np.sum(np.abs(terms[0]), axis=0), initial=0.0)
-        self.moved = max(self.moved, float(stored), float(np.max(np.abs(powers) @ np.abs(whole), initial=0.0)))
+        self.stored = max(self.stored, float(np.max(np.sum(np.abs(terms[0]), axis=0))))
+        # Behind a sudden start, the power of a single result would fill an interval in which it is over at once.
+        sizes = np.abs(powers)
+        least = np.minimum(sizes[:, :-1], sizes[:, 1:]) @ np.diff(every.times[kept])
+        self.moved = max(self.moved, self.stored, float(np.max(least))) or float(np.max(sizes @ np.abs(whole)))
         coarse = self._coarse(terms, intervals, places, weights)
         if not coarse.any():
             return (powers @ whole).reshape(POWERS, -1)
@@ -144,16 +148,15 @@ class Powers:
         if not self.model.states:
             # Nothing tells what happens between the results.
             return np.ones(len(intervals), bool)
-        powers, energies = _mixing(terms[1 : 1 + POWERS]), _mixing(terms[0])
-        rows = np.concatenate([powers, _mixing(terms[_RATE])])[:, places]
-        best, lower, lowest = (np.einsum("rjw,jw->rj", rows, weights[:, k]) for k in range(3))
+        mixed = _mixing(terms.shape[1]) @ terms.reshape(-1, terms.shape[-1])
+        best, lower, lowest = np.matmul(weights, mixed[:4].T[places]).transpose(1, 2, 0).copy()
         near, far = np.abs(best - lower), np.abs(lower - lowest)
-        known = np.max(np.abs(np.diff(energies)[:, intervals] - best[2:]), axis=0, initial=0.0)
-        smooth = np.max(near[2:], axis=0)
+        known = np.maximum(*np.abs(mixed[4:, intervals + 1] - mixed[4:, intervals] - best[2:]))
+        smooth = np.maximum(*near[2:])
         gain = np.maximum(_ratio(near[:2], far[:2]), _ratio(known, smooth))
-        errors = np.maximum(np.max(near[:2] * gain, axis=0), np.minimum(known, smooth))
+        errors = np.maximum(np.maximum(*(near[:2] * gain)), np.minimum(known, smooth))
         allowed = self.options.rtol * self.moved
-        return ~((errors <= _SHARE * allowed) & (known <= _ASTRAY * allowed))
+        return ~((errors <= self._share * allowed) & (known <= _ASTRAY * allowed))
 
     def _again(self, every: Results, ends: Places, stretches: list[Places]) -> tuple[Places, Vector]:
         """Integrate stretches of intervals again, divided where that fails; return which were, and their integrals."""
@@ -261,8 +264,12 @@ def _ratio(small: Vector, large: Vector) -> Vector:
     return np.divide(small, large, out=np.ones_like(small), where=large > small)
 
 
-def _mixing(rows: Vector) -> Any:
-    """Return two sums of rows with different weights, shape (2, n)."""
-    flat = rows.reshape(-1, rows.shape[-1])
-    turns = 0.618 * np.arange(len(flat))
-    return np.array([1.0 + np.modf(turns)[0], 2.0 - 3.0 * np.modf(1.7 * turns)[0]]) @ flat
+@cache
+def _mixing(components: int) -> Vector:
+    """Return weights of two sums each of powers, of rates of stored energies, and of these; (6, 6 components)."""
+    turns = 0.618 * np.arange(POWERS * components)
+    sums = np.array([1.0 + np.modf(turns)[0], 2.0 - 3.0 * np.modf(1.7 * turns)[0]])
+    table = np.zeros((3, 2, 2 + POWERS, components))
+    table[0, :, 1 : 1 + POWERS] = sums.reshape(2, POWERS, components)
+    table[1, :, _RATE] = table[2, :, 0] = sums[:, :components]
+    return table.reshape(6, -1)

@@ -13,7 +13,7 @@ Places = np.ndarray[Any, np.dtype[Any]]
 """Positions of results or intervals, or which of them are meant."""
 _WIDTH = 8
 """Results of the widest rule; its order."""
-_ORDERS = 0, 2, 4
+_ORDERS = np.array([0, 2, 4])
 """By how much the orders of the rules are lower."""
 _UNIFORM, _ROUNDING = 1e-9, 1e-15
 
@@ -42,33 +42,30 @@ def rules(times: Vector, first: Places, last: Places) -> tuple[Places, Places, V
     uneven = np.abs(np.diff(steps)) > _UNIFORM * steps[:-1] + _ROUNDING * np.abs(times[:-1])
     before = np.append(0, np.cumsum(uneven))
     odd = np.flatnonzero(before[np.maximum(starts + sizes - 2, starts)] != before[starts])
-    kinds = sizes[odd] * _WIDTH + offsets[odd]
-    for kind in np.flatnonzero(np.bincount(kinds)):
-        those = odd[kinds == kind]
-        size, offset = divmod(int(kind), _WIDTH)
-        now = times[places[those, :size]] - times[k[those]][:, None]
-        weights[those] = _rules(now / steps[k[those]][:, None], offset)
+    now = (times[places[odd]] - times[k[odd]][:, None]) / steps[k[odd]][:, None]
+    weights[odd] = _rules(now, sizes[odd], offsets[odd])
     return k, places, weights * steps[k][:, None, None]
 
 
 @cache
 def _equidistant() -> Vector:
     """Weights over equidistant results, by their number and the place of the interval among them."""
-    table = np.zeros((_WIDTH + 1, _WIDTH, len(_ORDERS), _WIDTH))
-    for size in range(2, _WIDTH + 1):
-        for offset in range(size - 1):
-            table[size, offset] = _rules(np.arange(float(size))[None, :] - offset, offset)[0]
-    return table
+    sizes, offsets = (part.ravel() for part in np.indices((_WIDTH + 1, _WIDTH)))
+    those = offsets < sizes - 1
+    table = np.zeros((len(those), len(_ORDERS), _WIDTH))
+    table[those] = _rules(np.arange(float(_WIDTH)) - offsets[those, None], sizes[those], offsets[those])
+    return table.reshape(_WIDTH + 1, _WIDTH, len(_ORDERS), _WIDTH)
 
 
-def _rules(places: Vector, offset: int) -> Vector:
-    """Weights of integrals from 0 to 1, which lies behind place `offset`; shapes (m, size), (m, 3, 8)."""
-    size = places.shape[1]
+def _rules(places: Vector, sizes: Places, offsets: Places) -> Vector:
+    """Weights of integrals from 0 to 1 over the first `sizes` places, of which `offsets` is 0; (m, 8), (m, 3, 8)."""
+    fewer = np.maximum(sizes[:, None] - _ORDERS, 1)
+    starts = np.clip(offsets[:, None] - (fewer - 1) // 2, 0, sizes[:, None] - fewer)
     found = np.zeros((len(places), len(_ORDERS), _WIDTH))
-    for k, less in enumerate(_ORDERS):
-        fewer = max(size - less, 1)
-        start = min(max(offset - (fewer - 1) // 2, 0), size - fewer)
-        found[:, k, start : start + fewer] = _weights(places[:, start : start + fewer])
+    for count in np.flatnonzero(np.bincount(fewer.ravel())):
+        row, order = np.nonzero(fewer == count)
+        columns = starts[row, order][:, None] + np.arange(count)
+        found[row[:, None], order[:, None], columns] = _weights(places[row[:, None], columns])
     return found
 
 

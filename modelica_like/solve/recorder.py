@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from modelica_like.compile.compiled import Vector
+from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import Source
 from modelica_like.initialize import Impact, Point
 
@@ -89,6 +89,19 @@ class Recorder:
     def last(self) -> float:
         """Time of the latest point of the open segment in s."""
         return float(self._open[-1][0][-1])
+
+    def note(
+        self, model: CompiledDae, time: float, number: int, change: tuple[int, int], transition: int, round: int
+    ) -> None:
+        """Note that a mode changes from one number to another, by a transition or (-1) by an impact."""
+        mode = model.flat_discretes[number]
+        before, after = (mode.names[k] for k in change)
+        # Who is knocked loose goes without a transition; the first one of the mode tells where it stands.
+        known = transition
+        if known < 0:
+            known = next(k for k, one in enumerate(model.transitions) if one.mode == number)
+        source = model.transitions[known].source
+        self.events.append(Event(time, mode.path, before, after, source, transition, len(self.segments), round))
 
     def end(self, d: Vector) -> None:
         """Close the segment, if one is open."""

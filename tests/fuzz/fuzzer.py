@@ -45,7 +45,8 @@ STRANGE: tuple[Any, ...] = (
     "../../x.toml", "./two_mass.toml", ".", "no_such:Class", "json:JSONDecoder", "math:pi", "Inertia", "Fixed",
     "Clutch", "Sine", "flange_a", "flange", "y", "steady", "rest", "given", "locked", [], [[]], [0], [[0]], [[0, "1"]],
     [[0, [1]]], [[0, 1], [0, 2]], [[0, 1], [1, 2]], [["0 rad/s", 0.1]], [[math.nan, 1]], ["a", "b"], ["a.b"], {},
-    {"a": 1}, {"is": "Inertia"}, {"is": "Inertia", "J": 1}, {"is": []}, datetime.date(1979, 5, 27), datetime.time(7, 32),
+    {"a": 1}, {"is": "Inertia"}, {"is": "Inertia", "J": 1}, {"is": []}, datetime.date(1979, 5, 27),
+    datetime.time(7, 32),
 )  # fmt: skip
 KEYS = (
     "is", "count", "J", "w", "phi", "c", "d", "mu_pos", "table", "until", "start", "rtol", "points", "parts", "series",

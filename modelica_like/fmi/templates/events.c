@@ -94,12 +94,13 @@ void move_states(Instance *c, const int *nodes, const double *values, int count)
 }
 
 /* Tells that a mode changes. */
-void note_change(Instance *c, int name, int mode, int target) {
+void note_change(Instance *c, int name, int transition, int mode, int target) {
     const Model *m = c->model;
     const Mode *one = &m->modes[mode];
     const int *names = m->mode_names + one->first_name;
     double before = c->d[mode];
     c->state.n_events++;
+    if (c->noted != NULL) c->noted(c, transition, mode, target);
     if (before >= 0 && before < one->n_names && target >= 0 && target < one->n_names)
         report(c, LOG_EVENTS, RESULT_OK, "t = %.12g s: %s: %s -> %s", c->state.t, text_of(m, name),
             text_of(m, names[(int)before]), text_of(m, names[target]));
@@ -119,7 +120,7 @@ static void fire(Instance *c, const unsigned char *wanting, Impacts *impacts) {
         const Transition *one = &m->transitions[k];
         if (!wanting[k] || changed[one->mode]) continue;
         changed[one->mode] = 1;
-        note_change(c, one->name, one->mode, one->target);
+        note_change(c, one->name, k, one->mode, one->target);
         if (*text_of(m, one->notice))
             report(c, LOG_WARNING, RESULT_OK, "t = %.9g s: %s", s->t, text_of(m, one->notice));
         d[one->mode] = one->target;
@@ -183,6 +184,7 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
             any |= wanting[k];
         }
         if (!any) return RESULT_OK;
+        c->round = round;
         memcpy(before, c->d, (size_t)m->n_d * sizeof(double));
         fire(c, wanting, impacts);
         share(c);

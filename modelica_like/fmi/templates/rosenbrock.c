@@ -79,7 +79,7 @@ static int factor(Instance *c, double h) {
 
 static double error_norm(const Instance *c, const double *first, const double *last, const double *error) {
     const Model *m = c->model;
-    double sum = 0, rtol = c->state.tolerance, atol = m->settings->absolute_to_relative * rtol;
+    double sum = 0, rtol = c->state.tolerance, atol = c->state.absolute;
     if (m->n_x == 0) return 0;
     for (int k = 0; k < m->n_x; k++) {
         double weight = rtol * fmax(fabs(first[k]), fabs(last[k])) + atol * m->nominals[k];
@@ -105,6 +105,7 @@ int rosenbrock_step(
         evaluate_jacobian(c, t, first);
     }
     if (!factor(c, h)) return 0;
+    c->state.n_evaluations += STAGES + !keep_jacobian;
     for (int i = 0; i < STAGES; i++) {
         double *stage = w->stages + (size_t)i * n;
         memcpy(y, first, size);
