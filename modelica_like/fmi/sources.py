@@ -23,6 +23,7 @@ RUNTIME = (
     "model_file.c",
     "tape.c",
     "linear.c",
+    "special.c",
     "point.c",
     "start.c",
     "holds.c",

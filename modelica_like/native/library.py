@@ -16,15 +16,18 @@ MESSAGE_LENGTH = 512
 _POINTER, _COUNT, _NUMBER, _CODE = c.c_void_p, c.c_int64, c.c_double, c.c_int
 
 
+_ARRAYS = ("times", "states", "outputs", "modes", "firsts", "events", "impacts", "references")
+
+
 class Run(c.Structure):
     """`NativeRun` in native.c."""
 
     _fields_ = [
-        *((name, _POINTER) for name in ("points", "outputs", "modes", "firsts", "events", "impacts", "references")),
+        *((name, _POINTER) for name in _ARRAYS),
         *((name, _COUNT) for name in ("n_outputs", "steps")),
         *((f"room_{name}", _COUNT) for name in ("points", "segments", "events", "impacts")),
         *((f"n_{name}", _COUNT) for name in ("points", "segments", "events", "impacts")),
-        ("next", _COUNT),
+        *((name, _COUNT) for name in ("next", "first")),
         ("begin", _NUMBER),
         ("last", _NUMBER),
     ]
@@ -42,9 +45,8 @@ _SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
     "get": (_CODE, [_POINTER, _COUNT, _POINTER, _POINTER]),
     "begin": (_CODE, [_POINTER]),
     "begin_at": (_CODE, 4 * [_POINTER]),
-    "step": (_CODE, [_POINTER, _NUMBER]),
     "time": (_NUMBER, [_POINTER]),
-    "move": (_CODE, [_POINTER, _NUMBER, _COUNT, _POINTER, _POINTER, _COUNT, _POINTER, _POINTER]),
+    "step": (_CODE, [_POINTER, _NUMBER, _COUNT, _POINTER, _POINTER, _COUNT, _POINTER, _POINTER]),
     "copy": (_CODE, [_POINTER, c.POINTER(_POINTER)]),
     "restore": (_CODE, 2 * [_POINTER]),
     "drop": (None, [_POINTER, c.POINTER(_POINTER)]),

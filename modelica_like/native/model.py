@@ -26,7 +26,7 @@ from modelica_like.errors import (
 from modelica_like.fmi.interface import FmuVariable, interface
 from modelica_like.fmi.model_file import model_file
 from modelica_like.fmi.tables import make_tables
-from modelica_like.initialize import StartKind
+from modelica_like.initialize import Point, StartKind
 from modelica_like.native.library import MESSAGE_LENGTH, OK, library
 from modelica_like.solve.options import Options
 
@@ -77,7 +77,9 @@ class NativeModel:
     def of(model: CompiledDae, start: StartKind | None = None) -> NativeModel:
         """Return the one that was made before of the same model, whatever its parameters were."""
         kind = start or model.settings.get("start", "given")
-        return model._cache.setdefault(("native", kind), None) or _kept(model, kind)
+        if ("native", kind) not in model._cache:
+            model._cache["native", kind] = NativeModel(model, kind)
+        return model._cache["native", kind]
 
     def references(self, names: Iterable[str]) -> np.ndarray[Any, np.dtype[np.uint32]]:
         """Return the value references of variables.
@@ -91,11 +93,6 @@ class NativeModel:
                 raise UnknownName(f"{self.name} has no variable '{name}'{did_you_mean(name, self.variables) or '.'}")
             found.append(self.variables[name])
         return np.array([one.reference for one in found], np.uint32)
-
-
-def _kept(model: CompiledDae, kind: StartKind) -> NativeModel:
-    made = model._cache["native", kind] = NativeModel(model, kind)
-    return made
 
 
 class Instance:
@@ -124,6 +121,11 @@ class Instance:
         """Begin anew at a time in s, with the model's parameters and inputs; `end` may be infinite."""
         self.check(self.library.reset(self.address, t0, end, rtol, atol))
         self.library.set_all(self.address, _at(self.model.p), _at(self.model.u))
+
+    def begin_at(self, point: Point) -> None:
+        """Begin at a consistent start; its events have not happened yet."""
+        arrays = [np.ascontiguousarray(part, dtype=float) for part in (point.x, point.z, point.d)]
+        self.check(self.library.begin_at(self.address, *(_at(one) for one in arrays)))
 
     def counts(self) -> tuple[int, int, int, int]:
         """Steps, rejected steps, evaluations of the equations, and mode changes since the reset."""

@@ -86,6 +86,25 @@ typedef struct { /* at one instant: what has been stopped, and the states before
     unsigned char *entered;
 } Impacts;
 
+typedef enum {
+    SPECIAL_RATES,
+    SPECIAL_JACOBIAN,
+    SPECIAL_ALG,
+    SPECIAL_ALG_JACOBIAN,
+    SPECIAL_VARIABLES,
+    SPECIAL_GUARDS,
+    N_SPECIALS
+} SpecialTape;
+
+typedef struct { /* a tape for the present modes, see special.c */
+    Tape tape;
+    Run *runs;
+    Operands *operands;
+    int *outputs;
+    int first_known, uses;
+    uint64_t belongs_to;
+} Special;
+
 /* Arrays of the model's sizes. Those of single functions are named after them; a function that calls another one does
  * not share with it. */
 typedef struct {
@@ -109,7 +128,16 @@ typedef struct {
     Strike strike;
     Impacts impacts;
     double *respond_d, *respond_z, *rates, *x_kept;
-    double *begun; /* motions that may be held, where the search for a steady state began */
+    Special special[N_SPECIALS];
+    Run *special_runs;
+    Operands *special_operands;
+    int *special_outputs;
+    uint64_t decided_by; /* counts changes of what decides about tapes: modes and parameters */
+    int *same, *places_of_slots;
+    unsigned char *known_slots, *needed_slots, *asked; /* asked: variables that somebody reads */
+    double *seen_rates, *seen_indicators, *seen_derived;
+    double *first_rates; /* right hand side where the step begins */
+    double *begun;       /* motions that may be held, where the search for a steady state began */
     int *standing;
 } Work;
 
@@ -140,7 +168,8 @@ typedef struct Instance {
     int co_simulation, event_mode_used, early_return_allowed, inputs_move;
     Allocate allocate;
     Release release;
-    int variables_valid; /* work.variables belong to the present point */
+    int variables_valid; /* which values belong to the present point, see values.c */
+    int look_valid;      /* the last look at the guards was at the present point */
 } Instance;
 
 /* tape.c */
@@ -159,7 +188,14 @@ void make_orthogonal(int rows, int columns, double *a, double *turns, double *b)
 void least_squares(int rows, int columns, double *a, double *b, double *x);
 void keeping_least_squares(int n, int states, double *a, double *turns, double *b, double *x);
 
+/* special.c */
+const Tape *full_tape(const Model *m, SpecialTape which);
+void run_special(Instance *c, SpecialTape which, double *outputs);
+void evaluate_special(Instance *c, SpecialTape which, double t, const double *x, const double *z, double *outputs);
+void ask_for(Instance *c, int node);
+
 /* point.c */
+void load(Instance *c, double t, const double *x, const double *z);
 void evaluate(Instance *c, const Tape *tape, double t, const double *x, const double *z, double *outputs);
 Result solve_implicit(Instance *c, double t, const double *x, double *z, int quiet);
 Result check_singular(Instance *c);
@@ -189,6 +225,7 @@ int guard_active(const Instance *c, int guard);
 double next_moment(Instance *c);
 int find_wanting(Instance *c, unsigned char *wanting, int guards_too);
 Result iterate_events(Instance *c, unsigned char *wanting, int located);
+Result update_discrete(Instance *c, int *restart, double *next);
 double number_or_false(double guard);
 void move_states(Instance *c, const int *nodes, const double *values, int count);
 void note_change(Instance *c, int name, int transition, int mode, int target);
@@ -203,11 +240,11 @@ void piece_at(const Model *m, const Piece *piece, double t, double *point);
 double first_step(Instance *c);
 
 /* integrate.c */
+#define MOST_LOOKS 12 /* at guards, that there is room for */
 typedef enum { REACHED, AT_EVENT, FAILED } Arrival;
 Arrival integrate_to(Instance *c, double target, int stop_at_events);
 void leave_piece(Instance *c);
 Result handle_event(Instance *c);
-Result update_discrete(Instance *c, int *restart, double *next);
 Result check_step(Instance *c, double point, double size, double *target);
 
 /* values.c */

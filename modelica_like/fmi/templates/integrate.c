@@ -25,14 +25,14 @@ static void clear_pending(Instance *c) {
 }
 
 void leave_piece(Instance *c) {
-    c->state.piece_valid = 0;
+    c->state.piece_valid = c->look_valid = 0;
     clear_pending(c);
 }
 
 static int look_at(Instance *c, double t, double *point, Look *look) {
     const Model *m = c->model;
     if (solve_implicit(c, t, point, point + m->n_x, 1) != RESULT_OK) return 0;
-    evaluate(c, &m->tapes.guards, t, point, point + m->n_x, look->values);
+    evaluate_special(c, SPECIAL_GUARDS, t, point, point + m->n_x, look->values);
     look->t = t;
     look->rates = look->values + m->n_guards;
     for (int g = 0; g < m->n_guards; g++) {
@@ -103,7 +103,7 @@ static int trial(Instance *c, const Piece *whole, double t, Piece *piece, Look *
         piece->end = t;
         memcpy(last_of(m, piece), whole->points, (size_t)m->n_unknowns * sizeof(double));
     } else {
-        if (!rosenbrock_step(c, whole->begin, whole->points, t - whole->begin, 0, piece, &ignored)) return 0;
+        if (!rosenbrock_step(c, whole->begin, whole->points, t - whole->begin, 1, piece, &ignored)) return 0;
         piece->end = t;
     }
     return look_at(c, t, last_of(m, piece), look);
@@ -266,7 +266,7 @@ static Result take_step(Instance *c, double limit) {
         if (cut) h = limit - s->t;
         clear_pending(c);
         if (h < least || !isfinite(h)) break;
-        if (!rosenbrock_step(c, s->t, first, h, 0, c->piece, &error) || !isfinite(error)) error = 1e30;
+        if (!rosenbrock_step(c, s->t, first, h, rejected > 0, c->piece, &error) || !isfinite(error)) error = 1e30;
         if (cut) c->piece->end = limit;
         factor = 0.9 * pow(fmax(error, 1e-10), -0.2);
         if (error > 1) {
@@ -338,18 +338,6 @@ Result handle_event(Instance *c) {
     s->z_valid = 0;
     if (settle(c) != RESULT_OK || iterate_events(c, wanting, located) != RESULT_OK) return RESULT_ERROR;
     s->z_valid = 1;
-    return RESULT_OK;
-}
-
-/* One event iteration for an importer's event mode. Where anything fired or was set, its solver must begin anew even if
-   no state jumped: rates do, and importers restart only when told that states have changed. */
-Result update_discrete(Instance *c, int *restart, double *next) {
-    double before = c->state.n_events;
-    *restart = c->state.inputs_changed;
-    c->state.inputs_changed = 0;
-    if (handle_event(c) != RESULT_OK) return RESULT_ERROR;
-    *restart |= c->state.n_events != before;
-    *next = next_moment(c);
     return RESULT_OK;
 }
 

@@ -18,25 +18,23 @@
 #endif
 
 enum { NATIVE_OK, NATIVE_FAILED, NATIVE_MORE };
-enum { EVENT_COLUMNS = 7, IMPACT_COLUMNS = 3 };
 #define NEAR_EVENT 2e-7 /* of the distance of results: nearer to an event, its left side stands for the result */
 #define SAME 1e-12
 
-/* What a run writes. Where room for one of these ends, or `steps` are done, it returns NATIVE_MORE, and goes on where
- * it was when it is called again. Buffers may be NULL: then they are not written (but `room_points` still counts). */
+/* What a run writes, by rows; NULL: it is not wanted. Where room ends, or `steps` are done (0: any number), a run
+ * returns NATIVE_MORE, and goes on from there when it is called again. Points are results and both sides of every
+ * event. */
 typedef struct {
-    double *points;  /* rows of 1 + n_x + n_z: time, states, implicit unknowns; results and both sides of events */
-    double *outputs; /* rows of n_outputs: at the same points */
-    double *modes;   /* rows of n_d: modes, discrete values and what impacts and shares need, one per segment */
-    double *firsts;  /* first point of every segment */
-    double *events;  /* rows of 7: time, transition (-1: an impact's), mode, from, to, round, segment that follows */
-    double *impacts; /* rows of 3: time, motion that is held, energy in J */
+    double *times, *states, *outputs; /* by point: time; states and implicit unknowns; outputs */
+    double *modes, *firsts;           /* by segment: d (modes, discrete values, what holds need); its first point */
+    double *events;             /* time, transition (-1: an impact's), mode, from, to, round, segment that follows */
+    double *impacts;            /* time, motion that is held, energy in J */
     const uint32_t *references; /* of the outputs */
     int64_t n_outputs, steps;
     int64_t room_points, room_segments, room_events, room_impacts;
     int64_t n_points, n_segments, n_events, n_impacts;
-    int64_t next;       /* number of the next result */
-    double begin, last; /* times of the run's begin and of the last point */
+    int64_t next, first; /* number of the next result, first point of the open segment */
+    double begin, last;  /* times of the run's begin and of the last point */
 } NativeRun;
 
 typedef struct {
@@ -69,13 +67,6 @@ EXPORTED Model *native_open(const unsigned char *bytes, size_t size, char *messa
 }
 
 EXPORTED void native_close(Model *m) { model_free(m); }
-
-/* Sizes: states, implicit unknowns, d. */
-EXPORTED void native_sizes(const Model *m, int64_t *sizes) {
-    sizes[0] = m->n_x;
-    sizes[1] = m->n_z;
-    sizes[2] = m->n_d;
-}
 
 /* A handle of a model, which must outlive it; NULL if there is no memory. */
 EXPORTED Native *native_new(const Model *m) {
@@ -110,8 +101,6 @@ EXPORTED int native_reset(Native *n, double start, double stop, double rtol, dou
 
 /* ---- values ----------------------------------------------------------------------------------------------------- */
 
-static int settled(Native *n) { return n->c->state.at_event ? code(handle_event(n->c)) : NATIVE_OK; }
-
 /* Before the begin: parameters, inputs and start values; later: inputs, and parameters that are tunable. */
 EXPORTED int native_set(Native *n, int64_t count, const uint32_t *references, const double *values) {
     for (int64_t k = 0; k < count; k++) {
@@ -136,7 +125,7 @@ static int read_values(Instance *c, int64_t count, const uint32_t *references, d
 }
 
 EXPORTED int native_get(Native *n, int64_t count, const uint32_t *references, double *values) {
-    if (settled(n) != NATIVE_OK) return NATIVE_FAILED;
+    if (n->c->state.at_event && handle_event(n->c) != RESULT_OK) return NATIVE_FAILED;
     return read_values(n->c, count, references, values);
 }
 
@@ -172,19 +161,14 @@ EXPORTED int native_begin_at(Native *n, const double *x, const double *z, const 
     return begun(n);
 }
 
-/* Goes to a time, through all events. */
-EXPORTED int native_step(Native *n, double time) {
-    return integrate_to(n->c, time, 0) == FAILED || settled(n) != NATIVE_OK ? NATIVE_FAILED : NATIVE_OK;
+/* Sets, goes to a time through all events, gets: a control loop's step. */
+EXPORTED int native_step(Native *n, double time, int64_t n_set, const uint32_t *set, const double *given, int64_t n_get,
+    const uint32_t *get, double *values) {
+    if (native_set(n, n_set, set, given) != NATIVE_OK || integrate_to(n->c, time, 0) == FAILED) return NATIVE_FAILED;
+    return native_get(n, n_get, get, values);
 }
 
 EXPORTED double native_time(const Native *n) { return n->c->state.t; }
-
-/* A control loop's step in one call: sets, goes on, gets. */
-EXPORTED int native_move(Native *n, double time, int64_t n_set, const uint32_t *set, const double *given, int64_t n_get,
-    const uint32_t *get, double *values) {
-    if (native_set(n, n_set, set, given) != NATIVE_OK || native_step(n, time) != NATIVE_OK) return NATIVE_FAILED;
-    return read_values(n->c, n_get, get, values);
-}
 
 /* Copies of the state, to come back to; *copy is NULL or a copy to be written over. */
 EXPORTED int native_copy(Native *n, void **copy) { return code(state_copy_out(n->c, copy)); }
@@ -204,10 +188,10 @@ EXPORTED void native_counts(const Native *n, double *counts) {
 
 static void note_event(Instance *c, int transition, int mode, int target) {
     NativeRun *r = ((Native *)c->environment)->run;
-    if (r == NULL) return;
-    if (r->n_events < r->room_events && r->events != NULL) {
-        double row[EVENT_COLUMNS] = {c->state.t, transition, mode, c->d[mode], target, c->round, (double)r->n_segments};
-        memcpy(r->events + EVENT_COLUMNS * r->n_events, row, sizeof row);
+    if (r == NULL || r->events == NULL) return;
+    if (r->n_events < r->room_events) {
+        double row[] = {c->state.t, transition, mode, c->d[mode], target, c->round, (double)r->n_segments};
+        memcpy(r->events + 7 * r->n_events, row, sizeof row);
     }
     r->n_events++;
 }
@@ -216,15 +200,15 @@ static void note_event(Instance *c, int transition, int mode, int target) {
 static void note_impact(Instance *c, int held, double energy, int first) {
     Native *n = c->environment;
     NativeRun *r = n->run;
-    if (r == NULL) return;
+    if (r == NULL || r->impacts == NULL) return;
     if (first) n->strikes = r->n_impacts;
     if (held < 0) {
         r->n_impacts = n->strikes;
         return;
     }
-    if (r->n_impacts < r->room_impacts && r->impacts != NULL) {
-        double row[IMPACT_COLUMNS] = {c->state.t, held, energy};
-        memcpy(r->impacts + IMPACT_COLUMNS * r->n_impacts, row, sizeof row);
+    if (r->n_impacts < r->room_impacts) {
+        double row[] = {c->state.t, held, energy};
+        memcpy(r->impacts + 3 * r->n_impacts, row, sizeof row);
     }
     r->n_impacts++;
 }
@@ -232,11 +216,11 @@ static void note_impact(Instance *c, int held, double energy, int first) {
 static int write_point(Native *n, NativeRun *r) {
     const Instance *c = n->c;
     const Model *m = c->model;
-    if (r->points != NULL) {
-        double *row = r->points + (size_t)r->n_points * (size_t)(1 + m->n_unknowns);
-        row[0] = c->state.t;
-        memcpy(row + 1, c->x, (size_t)m->n_x * sizeof(double));
-        memcpy(row + 1 + m->n_x, c->z, (size_t)m->n_z * sizeof(double));
+    double *states = r->states == NULL ? NULL : r->states + r->n_points * m->n_unknowns;
+    if (r->times != NULL) r->times[r->n_points] = c->state.t;
+    if (states != NULL) {
+        memcpy(states, c->x, (size_t)m->n_x * sizeof(double));
+        memcpy(states + m->n_x, c->z, (size_t)m->n_z * sizeof(double));
     }
     if (r->outputs != NULL &&
         read_values(n->c, r->n_outputs, r->references, r->outputs + r->n_points * r->n_outputs) != NATIVE_OK)
@@ -249,13 +233,13 @@ static int write_point(Native *n, NativeRun *r) {
 /* The left side of an event, the event, its right side, which begins a segment. */
 static int instant(Native *n, NativeRun *r, double width) {
     Instance *c = n->c;
-    int64_t events = r->n_events, impacts = r->n_impacts;
-    if (r->n_points + 2 > r->room_points || r->n_segments + 1 > r->room_segments) return NATIVE_MORE;
+    int64_t events = r->n_events, impacts = n->strikes = r->n_impacts;
+    int segments = r->modes != NULL || r->firsts != NULL;
+    if (r->n_points + 2 > r->room_points || (segments && r->n_segments == r->room_segments)) return NATIVE_MORE;
     if (r->n_segments > 0 && r->last != c->state.t) {
-        if (c->state.t - r->last <= NEAR_EVENT * width && r->n_points > r->firsts[r->n_segments - 1] + 1) r->n_points--;
+        if (c->state.t - r->last <= NEAR_EVENT * width && r->n_points > r->first + 1) r->n_points--;
         if (write_point(n, r) != NATIVE_OK) return NATIVE_FAILED;
     }
-    n->strikes = impacts;
     if (state_copy_out(c, &n->before) != RESULT_OK || handle_event(c) != RESULT_OK) return NATIVE_FAILED;
     if (r->n_events > r->room_events || r->n_impacts > r->room_impacts) {
         r->n_events = events;
@@ -265,7 +249,9 @@ static int instant(Native *n, NativeRun *r, double width) {
     }
     if (r->modes != NULL)
         memcpy(r->modes + r->n_segments * c->model->n_d, c->d, (size_t)c->model->n_d * sizeof(double));
-    r->firsts[r->n_segments++] = (double)r->n_points;
+    if (r->firsts != NULL) r->firsts[r->n_segments] = (double)r->n_points;
+    r->first = r->n_points;
+    r->n_segments++;
     return write_point(n, r);
 }
 

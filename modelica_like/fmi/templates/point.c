@@ -7,15 +7,19 @@
 
 double input_at(const Instance *c, int k, double t) { return c->u[k] + c->u_rate[k] * (t - c->state.u_time); }
 
-static void load(Instance *c, double t, const double *x, const double *z) {
+void load(Instance *c, double t, const double *x, const double *z) {
     const Model *m = c->model;
     double *slots = c->work.slots;
     slots[0] = t;
     memcpy(slots + m->slot_x, x, m->n_x * sizeof(double));
     memcpy(slots + m->slot_z, z, m->n_z * sizeof(double));
-    memcpy(slots + m->slot_p, c->p, m->n_p * sizeof(double));
     for (int k = 0; k < m->n_u; k++) slots[m->slot_u + k] = input_at(c, k, t);
-    memcpy(slots + m->slot_d, c->d, m->n_d * sizeof(double));
+    if (memcmp(slots + m->slot_p, c->p, (size_t)m->n_p * sizeof(double)) == 0 &&
+        memcmp(slots + m->slot_d, c->d, (size_t)m->n_d * sizeof(double)) == 0)
+        return;
+    memcpy(slots + m->slot_p, c->p, (size_t)m->n_p * sizeof(double));
+    memcpy(slots + m->slot_d, c->d, (size_t)m->n_d * sizeof(double));
+    c->work.decided_by++;
 }
 
 void evaluate(Instance *c, const Tape *tape, double t, const double *x, const double *z, double *outputs) {
@@ -36,8 +40,8 @@ Result solve_implicit(Instance *c, double t, const double *x, double *z, int qui
     int *order = c->work.order;
     if (m->n_z == 0) return RESULT_OK;
     for (int round = 0; round < MAX_NEWTON; round++) {
-        evaluate(c, &m->tapes.alg, t, x, z, step);
-        tape_run(&m->tapes.alg_jacobian, c->work.slots, matrix);
+        evaluate_special(c, SPECIAL_ALG, t, x, z, step);
+        run_special(c, SPECIAL_ALG_JACOBIAN, matrix);
         for (int k = 0; k < m->n_z; k++)
             if (!isfinite(step[k])) return quiet ? RESULT_ERROR : singular(c, t, text_of(m, m->implicit_names[k]));
         if (!lu_factor(m->n_z, matrix, order))

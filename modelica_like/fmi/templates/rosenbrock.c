@@ -48,8 +48,8 @@ static const double DENSE[3][STAGES] = {
 static void evaluate_jacobian(Instance *c, double t, const double *y) {
     const Model *m = c->model;
     Work *w = &c->work;
-    evaluate(c, &m->tapes.rates, t, y, y + m->n_x, w->rhs);
-    tape_run(&m->tapes.jacobian, w->slots, w->jacobian);
+    evaluate_special(c, SPECIAL_RATES, t, y, y + m->n_x, w->first_rates);
+    run_special(c, SPECIAL_JACOBIAN, w->jacobian);
 }
 
 /* Partial derivative of the right hand side by time, with inputs on their straight lines. */
@@ -105,13 +105,14 @@ int rosenbrock_step(
         evaluate_jacobian(c, t, first);
     }
     if (!factor(c, h)) return 0;
-    c->state.n_evaluations += STAGES + !keep_jacobian;
+    c->state.n_evaluations += STAGES - keep_jacobian;
     for (int i = 0; i < STAGES; i++) {
         double *stage = w->stages + (size_t)i * n;
         memcpy(y, first, size);
         for (int j = 0; j < i; j++)
             for (int k = 0; k < n; k++) y[k] += A[i][j] * w->stages[j * n + k];
-        evaluate(c, &m->tapes.rates, t + C_TIME[i] * h, y, y + m->n_x, stage);
+        if (i == 0) memcpy(stage, w->first_rates, size);
+        else evaluate_special(c, SPECIAL_RATES, t + C_TIME[i] * h, y, y + m->n_x, stage);
         for (int j = 0; j < i; j++)
             for (int k = 0; k < m->n_x; k++) stage[k] += C[i][j] / h * w->stages[j * n + k];
         for (int k = 0; k < n; k++) {

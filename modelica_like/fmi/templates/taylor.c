@@ -45,23 +45,15 @@ static double integral(const Series a, const Series slope, int k) {
 /* The slope by a of f = operation(a), from the coefficients of f that are known. */
 static void slope_of(int operation, const Series a, const Series f, Series slope) {
     static const Series one = {1};
-    int sign = operation == OPERATION_SIN || operation == OPERATION_COS ? -1 : 1;
-    Series s, exponent;
-    memcpy(s, a, sizeof s);
+    int negative = 0;
+    double first = 0;
+    Series s;
     memcpy(slope, f, sizeof s);
+    multiply(a, a, s);
+    /* clang-format off */
     switch (operation) {
         case OPERATION_EXP: return;
         case OPERATION_EXPM1: slope[0] += 1; return;
-        case OPERATION_SIN:
-        case OPERATION_COS:
-        case OPERATION_SINH:
-        case OPERATION_COSH: /* the slope's own slope is f or -f */
-            slope[0] = operation == OPERATION_SIN    ? cos(a[0])
-                       : operation == OPERATION_COS  ? -sin(a[0])
-                       : operation == OPERATION_SINH ? cosh(a[0])
-                                                     : sinh(a[0]);
-            for (int k = 1; k < ORDERS; k++) slope[k] = sign * integral(a, f, k);
-            return;
         case OPERATION_TAN:
         case OPERATION_TANH:
             multiply(f, f, slope);
@@ -69,22 +61,28 @@ static void slope_of(int operation, const Series a, const Series f, Series slope
             slope[0] += 1;
             return;
         case OPERATION_ERF:
-            multiply(a, a, s);
-            for (int k = 0; k < ORDERS; k++) exponent[k] = -s[k];
-            slope[0] = 1.1283791670955126 * exp(exponent[0]);
-            for (int k = 1; k < ORDERS; k++) slope[k] = integral(exponent, slope, k);
+            slope[0] = 1.1283791670955126 * exp(-s[0]);
+            for (int k = 1; k < ORDERS; k++) slope[k] = -integral(s, slope, k);
             return;
-        case OPERATION_LOG: break;
-        case OPERATION_LOG1P: s[0] += 1; break;
+        /* The slope's own slope is f or -f. */
+        case OPERATION_SIN: first = cos(a[0]); negative = 1; break;
+        case OPERATION_COS: first = -sin(a[0]); negative = 1; break;
+        case OPERATION_SINH: first = cosh(a[0]); break;
+        case OPERATION_COSH: first = sinh(a[0]); break;
+        case OPERATION_LOG: divide(one, a, slope); return;
+        case OPERATION_LOG1P: memcpy(s, a, sizeof s); s[0] += 1; divide(one, s, slope); return;
         default: /* inverse circular and hyperbolic functions: 1 / (±a² ± 1), or of its root */
-            multiply(a, a, s);
-            sign = operation == OPERATION_ASIN || operation == OPERATION_ACOS || operation == OPERATION_ATANH ? -1 : 1;
-            for (int k = 0; k < ORDERS; k++) s[k] *= sign;
+            negative = operation == OPERATION_ASIN || operation == OPERATION_ACOS || operation == OPERATION_ATANH;
+            for (int k = 0; k < ORDERS && negative; k++) s[k] = -s[k];
             s[0] += operation == OPERATION_ACOSH ? -1 : 1;
             if (operation != OPERATION_ATAN && operation != OPERATION_ATANH) root(s, s);
+            divide(one, s, slope);
+            for (int k = 0; k < ORDERS && operation == OPERATION_ACOS; k++) slope[k] = -slope[k];
+            return;
     }
-    divide(one, s, slope);
-    for (int k = 0; k < ORDERS && operation == OPERATION_ACOS; k++) slope[k] = -slope[k];
+    /* clang-format on */
+    slope[0] = first;
+    for (int k = 1; k < ORDERS; k++) slope[k] = negative ? -integral(a, f, k) : integral(a, f, k);
 }
 
 /* f = a^b. */

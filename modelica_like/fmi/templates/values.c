@@ -26,13 +26,29 @@ const Variable *known_variable(Instance *c, uint32_t reference, ValueType type) 
     return NULL;
 }
 
-static const double *all_variables(Instance *c) {
-    State *s = &c->state;
-    if (c->variables_valid) return c->work.variables;
-    if (settle(c) != RESULT_OK) return NULL;
-    evaluate(c, &c->model->tapes.variables, s->t, c->x, c->z, c->work.variables);
-    c->variables_valid = 1;
-    return c->work.variables;
+/* Values that a tape gives, each computed once per point; NULL if there are none. */
+static const double *seen(Instance *c, const Variable *v) {
+    const Model *m = c->model;
+    const State *s = &c->state;
+    Work *w = &c->work;
+    const double *values = v->kind == KIND_DERIVED      ? w->seen_derived
+                           : v->kind == KIND_DERIVATIVE ? w->seen_rates
+                           : v->kind == KIND_GUARD      ? w->seen_indicators
+                                                        : w->variables;
+    if (v->kind == KIND_VARIABLE) ask_for(c, v->index);
+    if (c->variables_valid & 1 << v->kind) return values;
+    if (v->kind != KIND_DERIVED && settle(c) != RESULT_OK) return NULL;
+    switch (v->kind) {
+        case KIND_DERIVED: evaluate(c, &m->tapes.derived, s->t, c->x, c->z, w->seen_derived); break;
+        case KIND_DERIVATIVE:
+            evaluate_special(c, SPECIAL_RATES, s->t, c->x, c->z, w->rhs);
+            memcpy(w->seen_rates, w->rhs, (size_t)m->n_x * sizeof(double));
+            break;
+        case KIND_GUARD: get_indicators(c, w->seen_indicators); break;
+        default: evaluate_special(c, SPECIAL_VARIABLES, s->t, c->x, c->z, w->variables);
+    }
+    c->variables_valid |= 1 << v->kind;
+    return values;
 }
 
 /* In initialization mode, whatever was set since the last time must have its effect before anything is read. */
@@ -45,7 +61,6 @@ static Result make_ready(Instance *c, const Variable *v) {
 }
 
 Result get_float(Instance *c, uint32_t reference, double *value) {
-    const Model *m = c->model;
     const Variable *v = known_variable(c, reference, TYPE_FLOAT64);
     State *s = &c->state;
     if (v == NULL || make_ready(c, v) != RESULT_OK) return RESULT_ERROR;
@@ -55,28 +70,13 @@ Result get_float(Instance *c, uint32_t reference, double *value) {
         case KIND_PARAMETER: *value = c->p[v->index]; return RESULT_OK;
         case KIND_INPUT: *value = input_at(c, v->index, s->t); return RESULT_OK;
         case KIND_DISCRETE: *value = c->d[v->index]; return RESULT_OK;
-        case KIND_DERIVED:
-            evaluate(c, &m->tapes.derived, s->t, c->x, c->z, c->work.guards);
-            *value = c->work.guards[v->index];
-            return RESULT_OK;
-        case KIND_DERIVATIVE:
-            if (settle(c) != RESULT_OK) return RESULT_ERROR;
-            evaluate(c, &m->tapes.rates, s->t, c->x, c->z, c->work.rhs);
-            *value = c->work.rhs[v->index];
-            return RESULT_OK;
-        case KIND_GUARD:
-            if (settle(c) != RESULT_OK) return RESULT_ERROR;
-            get_indicators(c, c->work.guards);
-            *value = c->work.guards[v->index];
-            return RESULT_OK;
-        case KIND_VARIABLE: {
-            const double *values = all_variables(c);
+        default: {
+            const double *values = seen(c, v);
             if (values == NULL) return RESULT_ERROR;
             *value = values[v->index];
             return RESULT_OK;
         }
     }
-    return RESULT_ERROR;
 }
 
 /* Solves what getting a value from the present point needs. */
