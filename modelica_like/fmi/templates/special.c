@@ -31,12 +31,8 @@ static int result_of(int operation, Operands one, const double *slots, const uns
         case OPERATION_IF_ELSE_ZERO:
             if (a && left == 0) *value = 0;
             return !a ? -2 : left == 0 ? -1 : one.right;
-        case OPERATION_AND:
-            *value = 0;
-            return (a && left == 0) || (b && right == 0) ? -1 : -2;
-        case OPERATION_OR:
-            *value = 1;
-            return (a && left != 0) || (b && right != 0) ? -1 : -2;
+        case OPERATION_AND: *value = 0; return (a && left == 0) || (b && right == 0) ? -1 : -2;
+        case OPERATION_OR: *value = 1; return (a && left != 0) || (b && right != 0) ? -1 : -2;
         case OPERATION_ADD: return a && left == 0 ? one.right : b && right == 0 ? one.left : -2;
         case OPERATION_SUB: return b && right == 0 ? one.left : -2;
         case OPERATION_MUL: return a && left == 1 ? one.right : b && right == 1 ? one.left : -2;
