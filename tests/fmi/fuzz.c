@@ -23,7 +23,7 @@ static void put(size_t at, int32_t value) { memcpy(bytes + at, &value, sizeof va
 static int32_t strange(int32_t old) {
     const int32_t special[] = {0, -1, 1, 2, 7, 64, 1000, INT32_MAX, INT32_MIN, 1 << 20, -(1 << 20), 8};
     switch (next() % 4) {
-        case 0: return old + (int32_t)(next() % 5) - 2;
+        case 0: return (int32_t)((uint32_t)old + next() % 5 - 2);
         case 1: return (int32_t)((uint32_t)old ^ (1u << next() % 32));
         default: return special[next() % (sizeof special / sizeof special[0])];
     }

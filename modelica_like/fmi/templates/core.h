@@ -293,7 +293,8 @@ typedef struct {
     int *special_outputs;
     uint64_t decided_by; /* counts changes of what decides about tapes: modes and parameters */
     int *same, *places_of_slots;
-    unsigned char *known_slots, *needed_slots, *asked; /* asked: variables that somebody reads */
+    unsigned char *known_slots, *needed_slots;
+    unsigned char *asked, *tuned; /* variables that somebody reads; parameters that have changed in a run */
     double *seen_rates, *seen_indicators, *seen_derived;
     double *first_rates; /* right hand side where the step begins */
     double *begun;       /* motions that may be held, where the search for a steady state began */

@@ -194,6 +194,7 @@ static uint64_t lay_out(Instance *c, double *memory) {
         BYTES(w->known_slots, m->n_slots),
         BYTES(w->needed_slots, m->n_slots),
         BYTES(w->asked, m->n_nodes),
+        BYTES(w->tuned, m->n_p),
         BYTES(w->special_runs, left * sizeof(Run)),
         BYTES(w->special_operands, left * sizeof(Operands)),
         INTEGERS(w->special_outputs, outputs),
