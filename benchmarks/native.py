@@ -1,4 +1,4 @@
-"""What runs and steps by the compiled run-time take: python benchmarks/native.py
+"""What runs and steps by the compiled run-time take: python benchmarks/native.py.
 
 CPU time of one warm run with 500 results and 10 outputs, the best of several, by `build(drive).native()` and by
 `simulate(…, solver="native")`; and steps per second of machine_tool_startup under a controller in Python.

@@ -232,9 +232,9 @@ def missing_extra(package: str, extra: str) -> MissingExtra:
     return MissingExtra(f"{package} is not installed.", advice=f'Install it with: pip install "modelica-like[{extra}]"')
 
 
-def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """Return `; did you mean 'sun'?` for the known name nearest to `name`, or an empty string."""
-    names = list(known)
+def did_you_mean(name: object, known: Iterable[str]) -> str:
+    """Return `; did you mean 'sun'?` for the known name nearest to `name`, or an empty string; a file has any value."""
+    name, names = str(name), list(known)
     near = difflib.get_close_matches(name, names, n=1, cutoff=0.58)
     near = near or [one for one in names if one in name.split("_")]
     return f"; did you mean '{near[0]}'?" if near else ""

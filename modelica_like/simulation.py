@@ -23,6 +23,7 @@ from modelica_like.structure import reduce
 from modelica_like.units import parse_unit, to_si
 
 _SECOND = parse_unit("s")
+_SHORTEST = 1e-12
 
 Solver = Literal["idas", "native"]
 Model = Component | CompiledDae | str | Path
@@ -100,6 +101,8 @@ def simulate(
     chosen = _options(options or Options(), settings, rtol=rtol, atol=atol, points=points)
     if end <= t0:
         raise ValueOutOfRange(f"The end time {end:g} s is not after the start time {t0:g} s.")
+    if end - t0 < _SHORTEST * max(1.0, abs(t0)):
+        raise ValueOutOfRange(f"A run of {end - t0:g} s is too short: no times can be told apart in it.")
     make = _loop(solver)
     begin = time.perf_counter()
     first = initialize(model, t0, start or settings.get("start", "given"))

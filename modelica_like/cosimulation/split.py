@@ -78,7 +78,7 @@ def split(
     assembly = _assembly(drive)
     found = cut_netlist(assembly, [at] if isinstance(at, str) else at)
     titles = _titles(found, names)
-    settings = _settings(assembly.__dict__["simulate"].get("until"), step, master)
+    settings = _settings(assembly.__dict__["_simulate"].get("until"), step, master)
     maker = Maker(assembly, found)
     tell("looking for the causality")
     chosen = orient(found, maker.bare)

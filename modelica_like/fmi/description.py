@@ -214,7 +214,7 @@ class _Fmi2(_Writer):
             "providesDirectionalDerivative": True,
         }  # fmt: skip
         own = {
-            "canHandleVariableCommunicationStepSize": True, "canInterpolateInputs": True, "maxOutputDerivativeOrder": 1
+            "canHandleVariableCommunicationStepSize": True, "canInterpolateInputs": True, "maxOutputDerivativeOrder": 3
         }  # fmt: skip
         for kind, tag, more in (("me", "ModelExchange", {}), ("cs", "CoSimulation", own)):
             if kind in self.about.kinds:
@@ -276,7 +276,7 @@ class _Fmi3(_Writer):
         if "cs" in self.about.kinds:
             element(
                 top, "CoSimulation", **common, canHandleVariableCommunicationStepSize=True,
-                maxOutputDerivativeOrder=1, providesIntermediateUpdate=True, mightReturnEarlyFromDoStep=True,
+                maxOutputDerivativeOrder=3, providesIntermediateUpdate=True, mightReturnEarlyFromDoStep=True,
                 canReturnEarlyAfterIntermediateUpdate=True, hasEventMode=True,
             )  # fmt: skip
 
@@ -304,5 +304,5 @@ class _Fmi3(_Writer):
         for tag, unknowns, initial in lists:
             for one in unknowns:
                 known = self.known(one, initial)
-                kinds = None if known is None else ["dependent"] * len(known)
+                kinds = None if known is None else " ".join(["dependent"] * len(known))
                 element(structure, tag, valueReference=one.reference, dependencies=known, dependenciesKind=kinds)

@@ -22,7 +22,7 @@ from modelica_like.fmi.description import About, Kind, Version, build_descriptio
 from modelica_like.fmi.documentation import Listing, index_page
 from modelica_like.fmi.icons import drive_icon, icon_name, terminal_icon
 from modelica_like.fmi.interface import Interface, ModesAs, interface
-from modelica_like.fmi.model_file import MODEL, as_c, model_file
+from modelica_like.fmi.model_file import MODEL, as_c, model_file, with_token
 from modelica_like.fmi.package import write_archive
 from modelica_like.fmi.runtime import runtime_library
 from modelica_like.fmi.sources import LOG_CATEGORIES, licenses, runtime_sources, source_files
@@ -30,6 +30,7 @@ from modelica_like.fmi.tables import make_tables
 from modelica_like.fmi.terminals import Takes, terminals_and_icons, with_open_ends
 from modelica_like.simulation import Model, seconds
 from modelica_like.solve.options import Options
+from modelica_like.solve.plot import save_plot
 from modelica_like.structure import reduce
 from modelica_like.writing import check_writable, write_bytes
 
@@ -190,7 +191,7 @@ def _compiled(drive: Model, ends: Sequence[str], takes: Takes) -> tuple[Compiled
 
         drive = load(drive)
     flat = flatten(with_open_ends(drive, ends, takes), open_inputs=True)
-    return compile(reduce(flat)), str(getattr(drive, "description", "") or ""), _equations(flat)
+    return compile(reduce(flat)), str(getattr(drive, "_description", "") or ""), _equations(flat)
 
 
 def _equations(flat: FlatModel) -> Listing:
@@ -237,7 +238,6 @@ def _contents(
     model: CompiledDae, variables: Interface, about: About, equations: Listing, embed: bool
 ) -> dict[str, bytes]:
     """Return all files but the binaries, under a token that follows from their content."""
-    tables = make_tables(model)
     texts = {"modelDescription.xml": model_description(model, variables, about)}
     texts |= {f"sources/{name}": text for name, text in runtime_sources((about.version,)).items()}
     texts["documentation/index.html"] = index_page(variables, about.description, about.tool, equations)
@@ -249,8 +249,9 @@ def _contents(
         pictures = {f"terminalsAndIcons/icon.{suffix}": drive_icon(suffix) for suffix in ("png", "svg")}
         for family in dict.fromkeys(icon_name(one.kind) for one in model.terminals):
             pictures |= {f"terminalsAndIcons/{family}.{s}": terminal_icon(family, s) for s in ("png", "svg")}
-    token = _token(texts, model_file(tables, variables.variables, _TOKEN, about.tolerance))
-    data = model_file(tables, variables.variables, token, about.tolerance)
+    data = model_file(make_tables(model), variables.variables, _TOKEN, about.tolerance)
+    token = _token(texts, data)
+    data = with_token(data, _TOKEN, token)
     texts |= {name: text.replace(_TOKEN, token) for name, text in texts.items()}
     texts["sources/model_data.c"] = as_c(data)
     files: dict[str, bytes] = {name: text.encode() for name, text in texts.items()} | pictures
@@ -279,5 +280,5 @@ def _draw(check: Check, target: Path) -> Check:
     if not check.differs or check.curves is None:
         return check
     picture = target.with_name(f"{target.stem}_check.png")
-    check.curves.plot().savefig(picture)
+    save_plot(check.curves.plot(), picture)
     return replace(check, picture=picture)

@@ -38,7 +38,7 @@ _INTEGER, _DOUBLE, _TEXT = "<i4", "<f8", "u1"
 
 
 def _record(integers: str, doubles: str = "") -> list[tuple[str, str]]:
-    """A record of integers and then doubles; names as in core.h."""
+    """A record of integers and then doubles; names as in model.h."""
     return [*((name, _INTEGER) for name in integers.split()), *((name, _DOUBLE) for name in doubles.split())]
 
 
@@ -108,8 +108,16 @@ def model_file(tables: Tables, variables: Sequence[FmuVariable], token: str, tol
         entries += _ENTRY.pack(number, records.itemsize, first + len(body), len(records))
         body += records.tobytes()
         body += bytes(-len(body) % _ALIGNED)
-    rest = entries + bytes(body)
+    return _headed(entries + bytes(body))
+
+
+def _headed(rest: bytes) -> bytes:
     return _HEADER.pack(_MAGIC, FORMAT, len(SECTIONS), zlib.crc32(rest), _HEADER.size + len(rest)) + rest
+
+
+def with_token(data: bytes, old: str, new: str) -> bytes:
+    """Return the file of a model with another token of the same length."""
+    return _headed(data[_HEADER.size :].replace(old.encode() + b"\0", new.encode() + b"\0"))
 
 
 def as_c(data: bytes) -> str:
@@ -118,7 +126,7 @@ def as_c(data: bytes) -> str:
     lines = (", ".join(f"{word:#x}u" for word in words[k : k + 6].tolist()) for k in range(0, len(words), 6))
     return (
         "/* The model, as model.c reads it. */\n"
-        '#include "core.h"\n\nconst uint64_t model_data[] = {\n    '
+        '#include "model.h"\n\nconst uint64_t model_data[] = {\n    '
         + ",\n    ".join(lines)
         + "};\nconst size_t model_data_size = sizeof model_data;\n"
     )

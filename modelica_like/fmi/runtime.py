@@ -14,6 +14,7 @@ from tempfile import TemporaryDirectory
 
 from modelica_like.fmi.build import FLAGS, PLATFORMS, build
 from modelica_like.fmi.sources import Face, own_sources, runtime_sources
+from modelica_like.writing import write_bytes
 
 _FACES: tuple[Face, ...] = ("2.0", "3.0", "native")
 SHIPPED = Path(__file__).parent / "runtimes"
@@ -50,10 +51,10 @@ def found_runtime(platform: str) -> Path | None:
 
 def build_runtime(platform: str, folder: Path) -> Path:
     """Compile the run-time for a platform into a folder; a library that others may be reading is replaced at once."""
-    folder.mkdir(parents=True, exist_ok=True)
-    with TemporaryDirectory(dir=folder) as place:
-        built = build(runtime_sources(_FACES), platform, Path(place), "runtime")
-        return built.replace(folder / _library_name(platform))
+    library = folder / _library_name(platform)
+    with TemporaryDirectory(prefix="modelica_like_") as place:
+        write_bytes(library, build(runtime_sources(_FACES), platform, Path(place)).read_bytes())
+    return library
 
 
 def _library_name(platform: str) -> str:

@@ -33,6 +33,7 @@ RUNTIME = (
     "integrate.c",
     "values.c",
     "derivatives.c",
+    "taylor.c",
     "instance.c",
 )
 LOG_CATEGORIES = {
@@ -75,7 +76,7 @@ def runtime_sources(faces: Iterable[Face]) -> dict[str, str]:
 
 def own_sources(faces: Iterable[Face]) -> dict[str, str]:
     """Read the same without the headers of the standard."""
-    names = ("core.h", "model_data.c", *RUNTIME, *(name for face in faces for name in _FACES[face]))
+    names = ("core.h", "model.h", "model_data.c", *RUNTIME, *(name for face in faces for name in _FACES[face]))
     return {name: (_TEMPLATES / name).read_text(encoding="utf-8") for name in names}
 
 

@@ -143,6 +143,13 @@ def _as_written(given: Any) -> Any:
     return [_as_written(one) for one in cast("tuple[Any, ...]", given)] if isinstance(given, tuple) else given
 
 
+def frozen_rows(value: Any) -> Any:
+    """Make lists hashable, so that structural values can be compared."""
+    if isinstance(value, list | tuple):
+        return tuple(frozen_rows(item) for item in cast("list[Any]", value))
+    return value
+
+
 def both_given(label: str, scale: str) -> ModelicaLikeError:
     """Return the error about a table with quantities whose unit is given, too."""
     return NetlistError(

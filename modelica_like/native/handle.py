@@ -128,9 +128,7 @@ class Native:
         return written["times"][:, 0], written["outputs"]
 
     def _read(self, references: Any, values: Vector) -> Vector:
-        self._instance.check(
-            self._library.get(self._address, len(values), references.ctypes.data, values.ctypes.data)
-        )
+        self._instance.check(self._library.get(self._address, len(values), references.ctypes.data, values.ctypes.data))
         return values
 
 

@@ -240,7 +240,12 @@ def _ends(key: str, value: Any) -> list[str]:
     return value
 
 
-def _part(key: str, value: Any) -> Any:
+def check_part(key: str, value: Any) -> Any:
+    """Return the table of a part, or of several, if it has the form of one.
+
+    Raises:
+        NetlistError: it has not.
+    """
     tables = value if isinstance(value, list) and value else [value]
     for table in tables:
         if not isinstance(table, dict):
@@ -298,7 +303,7 @@ _READERS: Mapping[str, Callable[[str, Any, Lines, list[ModelicaLikeError]], Any]
     "name": _text,
     "description": _text,
     "parameters": _each(_value),
-    "parts": _each(_part),
+    "parts": _each(check_part),
     "series": _each(_ends),
     "connect": _each(_ends),
     "start": _each(_value, flat=True),

@@ -26,7 +26,7 @@ _PIECE = 20_000
 _SHARE, _ALL = 0.1, 50.0
 """Errors of one interval and of all, in relative tolerances of the energy that moves, that are left as they are."""
 _ASTRAY = 3.0
-"""The same of one interval for stored energies that change otherwise than their rates say, however smooth these look."""
+"""The same of one interval where stored energies change otherwise than their rates say, however smooth these look."""
 _FINER = 0.1
 _FINEST = 1e-12
 """What is integrated again is so much more precise than the run, but no more than this."""
@@ -34,6 +34,10 @@ _NEAR = 8
 """Intervals that are integrated again as well rather than to start once more behind them."""
 _FAILURES = 20
 """Failures of IDAS in a piece of a run from which the results have to do."""
+_FEW = 4
+"""Intervals of a smooth piece up to which slopes of the powers are taken."""
+_BESIDE = np.array([[1 / 2, 1 / 2], [2 / 3, 1 / 3], [1 / 2, 1 / 2]])
+"""Weights of the powers at both ends of an interval, beside slopes at both and at the first, and without any."""
 _CLOSE = 0.1
 """Distance of two results, as part of the next one, up to which one of them is left out."""
 
@@ -121,24 +125,48 @@ class Powers:
         kept = _apart(every)
         first, last = (np.searchsorted(kept, ends[kept]) for ends in (every.first, every.last))
         intervals, places, weights = rules(every.times[kept], first, last)
+        first, last = first[intervals], last[intervals]
         terms = every.terms[..., kept]
         powers = terms[1 : 1 + POWERS].reshape(-1, len(kept))
-        whole = _sums(places, weights, len(kept))
-        self.stored = max(self.stored, float(np.max(np.sum(np.abs(terms[0]), axis=0))))
-        # Behind a sudden start, the power of a single result would fill an interval in which it is over at once.
-        sizes = np.abs(powers)
-        least = np.minimum(sizes[:, :-1], sizes[:, 1:]) @ np.diff(every.times[kept])
-        self.moved = max(self.moved, self.stored, float(np.max(least))) or float(np.max(sizes @ np.abs(whole)))
-        coarse = self._coarse(terms, intervals, places, weights)
-        if not coarse.any():
-            return (powers @ whole).reshape(POWERS, -1)
-        # A stretch lies within one smooth piece.
+        self._move(terms[0], powers, np.diff(every.times[kept]))
+        bent, bends = intervals[:0], np.zeros((2, len(powers), 0))
+        coarse = self._coarse(terms, intervals, places, weights, bent, bends)
         ends = np.stack([kept[intervals], kept[intervals + 1]])
-        again, total = self._again(every, ends, _stretches(coarse, first[intervals]))
-        total[_nonzero(self.model)] += powers[_nonzero(self.model)] @ _sums(places[~again], weights[~again], len(kept))
+        few = np.flatnonzero(coarse & (last - first < _FEW))
+        if len(few) > 1 and self.model.states and not self.model.implicit:
+            bent, bends = few, self._bends(every, ends[:, few])
+            places[bent, :2] = intervals[bent, None] + np.arange(2)
+            weights[bent] = 0.0
+            weights[bent, :, :2] = _BESIDE * np.diff(every.times[ends[:, bent]], axis=0)[0][:, None, None]
+            coarse = self._coarse(terms, intervals, places, weights, bent, bends)
+        # A stretch lies within one smooth piece.
+        again, total = self._again(every, ends, _stretches(coarse, first))
+        weights[again] = 0.0
+        total += powers @ np.bincount(places.ravel(), weights[:, 0].ravel(), len(kept))
+        total += bends[0] @ ~again[bent]
         return total.reshape(POWERS, -1)
 
-    def _coarse(self, terms: Vector, intervals: Places, places: Places, weights: Vector) -> Places:
+    def _move(self, stored: Vector, powers: Vector, steps: Vector) -> None:
+        """See what energies some results store and exchange."""
+        self.stored = max(self.stored, float(np.max(np.sum(np.abs(stored), axis=0))))
+        # Behind a sudden start, the power of a single result would fill an interval in which it is over at once.
+        sizes = np.abs(powers)
+        least = np.max(np.minimum(sizes[:, :-1], sizes[:, 1:]) @ steps, initial=0.0)
+        most = 0.0 if least else np.max(sizes[:, 1:] @ steps, initial=0.0)
+        self.moved = max(self.moved, self.stored, float(least), float(most))
+
+    def _bends(self, every: Results, ends: Places) -> Vector:
+        """Return what slopes of powers add to the integrals of the first two rules; shape (2, 4 components, m)."""
+        model = self.model
+        function = along(model._cache, "slopes of powers", lambda: _slopes(model))
+        x, z, d = (part[:, ends.ravel()] for part in (every.x, every.z, every.d))
+        slopes = function(every.times[ends.ravel()], x, z, model.p, model.u, d)[0].reshape(-1, *ends.shape)
+        squares = np.diff(every.times[ends], axis=0) ** 2
+        return squares * np.stack([(slopes[:, 0] - slopes[:, 1]) / 12.0, slopes[:, 0] / 6.0])
+
+    def _coarse(
+        self, terms: Vector, intervals: Places, places: Places, weights: Vector, bent: Places, bends: Vector
+    ) -> Places:
         """Tell over which intervals the powers are integrated too coarsely.
 
         The difference of two rules is the error of the lower one; a difference more tells what an order gains. How
@@ -150,6 +178,10 @@ class Powers:
             return np.ones(len(intervals), bool)
         mixed = _mixing(terms.shape[1]) @ terms.reshape(-1, terms.shape[-1])
         best, lower, lowest = np.matmul(weights, mixed[:4].T[places]).transpose(1, 2, 0).copy()
+        if len(bent):
+            more = _mixing(terms.shape[1])[:4, terms.shape[1] : -terms.shape[1]] @ bends
+            best[:, bent] += more[0]
+            lower[:, bent] += more[1]
         near, far = np.abs(best - lower), np.abs(lower - lowest)
         known = np.maximum(*np.abs(mixed[4:, intervals + 1] - mixed[4:, intervals] - best[2:]))
         smooth = np.maximum(*near[2:])
@@ -162,6 +194,8 @@ class Powers:
         """Integrate stretches of intervals again, divided where that fails; return which were, and their integrals."""
         again = np.zeros(ends.shape[1], bool)
         total = np.zeros(POWERS * len(self.model.components))
+        if not stretches:
+            return again, total
         integrator = _Work(self.model, self.options, self.moved)
         failures = 0
         while stretches and failures < _FAILURES:
@@ -175,6 +209,15 @@ class Powers:
             failures += 1
             stretches += np.array_split(stretch, 2) if len(stretch) > 1 else []
         return again, total
+
+
+def _slopes(model: CompiledDae) -> ca.Function:
+    """Return how fast powers change, as a function."""
+    arguments = model.arguments
+    powers = ca.vec(model.energy(*arguments.values())[:, 1 : 1 + POWERS])
+    ode = model.ode(*arguments.values())
+    slopes = ca.jtimes(powers, arguments["x"], ode) + ca.jtimes(powers, arguments["t"], ca.SX(1))
+    return ca.Function("slopes", list(arguments.values()), [ca.densify(slopes)], {"cse": True})
 
 
 class _Work(Integrator):
@@ -251,13 +294,10 @@ def _apart(every: Results) -> Places:
 def _stretches(coarse: Places, piece: Places) -> list[Places]:
     """Return runs of coarse intervals of one smooth piece, with what lies between two that are near."""
     chosen = np.flatnonzero(coarse)
+    if not len(chosen):
+        return []
     cuts = np.flatnonzero((np.diff(chosen) > _NEAR) | (np.diff(piece[chosen]) > 0)) + 1
     return [np.arange(run[0], run[-1] + 1) for run in np.split(chosen, cuts)]
-
-
-def _sums(places: Places, weights: Vector, count: int) -> Vector:
-    """Return the weight of each of `count` results in the sum of the best integrals."""
-    return np.asarray(np.bincount(places.ravel(), weights[:, 0].ravel(), count), float)
 
 
 def _ratio(small: Vector, large: Vector) -> Vector:

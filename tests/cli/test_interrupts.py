@@ -199,7 +199,7 @@ def press(*_: object) -> None:
 def test_an_interrupted_export_leaves_the_old_fmu(tmp_path: Path) -> None:
     path = tmp_path / "drive.fmu"
     path.write_text("old")
-    for moment in ("writing C", "checking"):
+    for moment in ("compiling the model", "checking"):
         with pytest.raises(KeyboardInterrupt):
             export_fmu(DRIVE, path, platforms=(), report=lambda what, moment=moment: what == moment and press())
     assert path.read_text() == "old"

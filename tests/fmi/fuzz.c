@@ -87,7 +87,7 @@ static void use(const Model *m) {
         else get_float(c, v->reference, &value);
         if (k % 7 == 0) directional(c, &v->reference, 1, &v->reference, 1, &one, &value);
         if (k % 7 == 1) adjoint(c, &v->reference, 1, &v->reference, 1, &one, &value);
-        if (k % 7 == 2) output_rate(c, v->reference, &value);
+        if (k % 7 == 2) output_rate(c, v->reference, 1 + k % 3, &value);
     }
     rosenbrock_step(c, 0, c->x, 1e-3, 0, c->piece, &error);
     next_moment(c);

@@ -1,7 +1,11 @@
 """The compiled run-time: where it is found, where it finds its model, and the same results as with one compiled in."""
 
 import ctypes
+import os
+import re
+import shutil
 import subprocess
+import sys
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -162,9 +166,8 @@ def test_a_library_of_other_sources_is_not_used(nothing_built, monkeypatch):
     monkeypatch.setattr(module, "own_sources", lambda _: {"model.c": "/* changed */"})
     assert found_runtime(NATIVE) is None
     said: list[str] = []
-    monkeypatch.setattr(module, "build", lambda sources, platform, folder, name: folder / "x")
-    monkeypatch.setattr(Path, "replace", lambda self, target: target)
-    runtime_library(NATIVE, said.append)
+    monkeypatch.setattr(module, "build", lambda sources, platform, folder: library)
+    assert runtime_library(NATIVE, said.append).parent == cache_folder() / NATIVE
     assert said == [f"compiling the run-time for {NATIVE}, once: its sources have changed"]
 
 
@@ -194,3 +197,35 @@ def test_instances_of_different_models_do_not_disturb_each_other(exported):
             fmu.doStep(0.1 * k, 0.1)
     for drive, fmu in pairs:
         np.testing.assert_array_equal(exported(drive).states(fmu), alone[drive])
+
+
+def test_one_library_has_the_functions_of_both_versions_and_of_native_runs_only():
+    library = runtime_library(NATIVE)
+    listed = subprocess.run(["nm", "-D", "--defined-only", library], capture_output=True, text=True, check=True).stdout
+    sources = runtime_sources(("2.0", "3.0", "native"))
+    declared: set[str] = set()
+    for v in "23":
+        declared |= set(re.findall(rf"FMI{v}_Export \w+\s+(fmi\w+);", sources[f"fmi{v}Functions.h"]))
+    assert len(declared) == 44 + 75
+    declared |= set(re.findall(r"^EXPORTED .*?\b(native_\w+)\(", sources["native.c"], re.MULTILINE))
+    assert {line.split()[-1] for line in listed.splitlines()} == declared
+    needed = re.findall(rb"GLIBC_(\d+)\.(\d+)", library.read_bytes())
+    assert max((int(a), int(b)) for a, b in needed) <= (2, 17)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("platforms", "tag"), [("none", "any"), (NATIVE, "manylinux_2_17_x86_64")])
+def test_a_wheel_is_tagged_for_what_is_in_it(platforms, tag, tmp_path):
+    root, copy = Path(__file__).parents[2], tmp_path / "copy"
+    copy.mkdir()
+    for name in ("modelica_like", "components"):
+        shutil.copytree(root / name, copy / name, ignore=shutil.ignore_patterns("__pycache__", "runtimes"))
+    for name in ("pyproject.toml", "hatch_build.py", "README.md", "LICENSE"):
+        shutil.copy(root / name, copy / name)
+    command = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--wheel-dir", str(tmp_path), str(copy)]
+    subprocess.run(command, check=True, env={**os.environ, "MODELICA_LIKE_PLATFORMS": platforms}, timeout=600)
+    (wheel,) = tmp_path.glob("*.whl")
+    assert wheel.stem.endswith(f"-py3-none-{tag}")
+    with zipfile.ZipFile(wheel) as archive:
+        names = [name for name in archive.namelist() if "/runtimes/" in name]
+    assert [Path(name).parent.name for name in names] == ([] if platforms == "none" else [NATIVE])

@@ -3,6 +3,7 @@
 import contextlib
 import json
 import os
+import re
 import stat
 import subprocess
 import sys
@@ -162,6 +163,22 @@ def test_a_checkpoint_is_begun_whole_or_not_at_all(tmp_path: Path) -> None:
     with pytest.raises(OSError, match="File too large"), full_disk():
         sweep(DRIVE, {"J1.J": [0.01]}, ["J2.w"], until=0.001, checkpoint=tmp_path / "sweep.zarr")
     assert not list(tmp_path.iterdir())
+
+
+WRITES = re.compile(r"\.write_(text|bytes)\(|\.savefig\((?!content|buffer)|shutil\.copy\w*\((?!built, draft)")
+
+
+def test_nothing_else_writes_files() -> None:
+    """But for folders that are temporary, and the module that writes."""
+    root = EXAMPLES.parent / "modelica_like"
+    found = [
+        f"{path.name}: {line.strip()}"
+        for path in root.rglob("*.py")
+        if path.name != "writing.py"
+        for line in path.read_text().splitlines()
+        if WRITES.search(line) and "folder" not in line
+    ]
+    assert found == []
 
 
 KILLED = """

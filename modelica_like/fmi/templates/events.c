@@ -200,3 +200,15 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
         "Modes still switch after %d rounds at t = %.12g s. Give the switching a hysteresis, or smooth what drives it.",
         ROUNDS + ALONE * m->n_holds, s->t);
 }
+
+/* One event iteration for an importer's event mode. Where anything fired or was set, its solver must begin anew even if
+   no state jumped: rates do, and importers restart only when told that states have changed. */
+Result update_discrete(Instance *c, int *restart, double *next) {
+    double before = c->state.n_events;
+    *restart = c->state.inputs_changed;
+    c->state.inputs_changed = 0;
+    if (handle_event(c) != RESULT_OK) return RESULT_ERROR;
+    *restart |= c->state.n_events != before;
+    *next = next_moment(c);
+    return RESULT_OK;
+}

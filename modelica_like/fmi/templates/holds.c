@@ -13,9 +13,8 @@
 #define TURNED 100.0
 
 void hold_terms(Instance *c, Terms *terms) {
-    const Model *m = c->model;
     State *s = &c->state;
-    evaluate(c, &m->tapes.hold_terms, s->t, c->x, c->z, (double *)terms);
+    evaluate(c, &c->model->tapes.hold_terms, s->t, c->x, c->z, (double *)terms);
 }
 
 /* Marks the motions that are held. */

@@ -9,9 +9,8 @@
 #define FELT 1e-9 /* change of a motion, relative to the largest one, from which on it is no rounding */
 
 static const double *motions(Instance *c) {
-    const Model *m = c->model;
     State *s = &c->state;
-    evaluate(c, &m->tapes.variables, s->t, c->x, c->z, c->work.variables);
+    evaluate(c, &c->model->tapes.variables, s->t, c->x, c->z, c->work.variables);
     return c->work.variables;
 }
 

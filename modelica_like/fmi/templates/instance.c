@@ -67,9 +67,33 @@ Result allowed(Instance *c, const char *function, int phases) {
 
 static uint64_t larger(uint64_t a, uint64_t b) { return a > b ? a : b; }
 
-#define DOUBLES(array, n) {&(array), (uint64_t)(n)}
-#define INTEGERS(array, n) {&(array), ((uint64_t)(n) + 1) / 2}
-#define BYTES(array, n) {&(array), ((uint64_t)(n) + 7) / 8}
+typedef struct { /* arrays of one size: number and size of their elements */
+    uint64_t size, bytes;
+    void *arrays[8];
+} Room;
+
+/* Lays arrays out one behind the other; with memory == NULL only measures them. Returns their size in doubles. */
+static uint64_t place(const Room *rooms, size_t count, double *memory) {
+    uint64_t used = 0;
+    for (size_t k = 0; k < count; k++)
+        for (void *const *array = rooms[k].arrays; *array != NULL; array++) {
+            double *first = memory == NULL ? NULL : memory + used;
+            memcpy(*array, &first, sizeof first);
+            used += (rooms[k].size * rooms[k].bytes + 7) / 8 + 1;
+        }
+    return used;
+}
+#define PLACE(rooms, memory) place(rooms, sizeof rooms / sizeof rooms[0], memory)
+
+static uint64_t place_state(Instance *c, double *memory) {
+    const Model *m = c->model;
+    uint64_t n = m->n_unknowns, n_d = m->n_d, n_starts = m->n_starts;
+    const Room rooms[] = {{m->n_x, 8, {&c->x}}, {m->n_z, 8, {&c->z}}, {m->n_p, 8, {&c->p}},
+        {m->n_u, 8, {&c->u, &c->u_rate}}, {n_d, 8, {&c->d}}, {n_d, 1, {&c->mode_given}},
+        {n_starts, 8, {&c->start_value}}, {n_starts, 1, {&c->start_given}}, {2 + 5 * n, 8, {&c->piece}},
+        {m->n_transitions, 1, {&c->wanting}}};
+    return PLACE(rooms, memory);
+}
 
 /* Operations, or outputs, of the first tapes that are specialised. */
 static uint64_t special_size(const Model *m, int count, int outputs) {
@@ -90,18 +114,16 @@ static void share_out_specials(Instance *c) {
     }
 }
 
-/* Lays arrays out in one block, the numbers of the state first; with memory == NULL only measures it, in doubles. */
-static uint64_t lay_out(Instance *c, double *memory) {
-    const Model *m = c->model;
-    Work *w = &c->work;
-    uint64_t used = 0, n = (uint64_t)m->n_unknowns, n_x = (uint64_t)m->n_x, n_z = (uint64_t)m->n_z;
-    uint64_t small = larger(larger((uint64_t)m->n_guards, (uint64_t)m->n_moments),
-        larger(larger((uint64_t)m->n_start_modes, (uint64_t)m->n_d), (uint64_t)m->n_derived));
-    uint64_t steady = (uint64_t)m->n_steady + n_z, members = (uint64_t)m->most_members;
-    uint64_t resets = larger(larger((uint64_t)m->n_resets, (uint64_t)m->n_reset_values), (uint64_t)m->n_holds);
-    uint64_t left = special_size(m, N_SPECIALS, 0), outputs = special_size(m, N_SPECIALS, 1);
+/* Tapes, equations and the integrator. */
+static uint64_t place_work(const Model *m, Work *w, double *memory) {
+    uint64_t n = m->n_unknowns, n_z = m->n_z, steady = m->n_steady + n_z;
+    uint64_t members = m->most_members, n_guards = m->n_guards, n_x = m->n_x;
+    uint64_t resets = larger(larger(m->n_resets, m->n_reset_values), m->n_holds);
+    uint64_t small = larger(larger(n_guards, m->n_moments), larger(larger(m->n_start_modes, m->n_d), m->n_derived));
+    uint64_t left = special_size(m, N_SPECIALS, 0);
     uint64_t square =
         larger(larger(m->settings->steady ? 2 * steady * steady : 0, resets * n_x), members * (n_x + 3 * members));
+<<<<<<< HEAD
     struct {
         void *array;
         uint64_t size;
@@ -206,6 +228,50 @@ static uint64_t lay_out(Instance *c, double *memory) {
         if (arrays[k].array == (void *)&c->wanting) c->n_numbers = (size_t)used;
     }
     return used;
+=======
+    const Room rooms[] = {{m->n_slots + left, 8, {&w->slots}}, {3 * (uint64_t)m->n_slots, 8, {&w->dots}},
+        {larger(m->n_jacobian, m->n_start_jacobian), 8, {&w->jacobian}}, {m->step.n_nonzeros, 8, {&w->matrix}},
+        {larger(m->step.n_v, m->start.n_v), 8, {&w->qr_v}}, {larger(m->step.n_r, m->start.n_r), 8, {&w->qr_r}},
+        {larger(n, m->start.size), 8, {&w->qr_beta, &w->qr_work, &w->start_unknowns}}, {9 * n, 8, {&w->stages}},
+        {2 + 5 * n, 8, {&w->whole}}, {n, 8, {&w->point, &w->first}}, {n + n_z, 8, {&w->vector}},
+        {larger(n, m->n_determinants), 8, {&w->rhs}}, {m->n_nodes, 8, {&w->variables}}, {small, 8, {&w->guards}},
+        {3 * n_guards * MOST_LOOKS, 8, {&w->guards_before}}, {n_guards, 1, {&w->kinds}},
+        {n_z * n_z, 8, {&w->dense_matrix}}, {n_z, 8, {&w->residual, &w->kept_z, &w->respond_z}},
+        {n_z, sizeof(int), {&w->order}}, {square, 8, {&w->square}}, {m->n_starts, 8, {&w->start_values}},
+        {larger(m->n_start_values, resets), 8, {&w->start_residual}},
+        {resets, 8, {&w->reset_values, &w->target_values}}, {resets, sizeof(int), {&w->targets}},
+        {n_x, 8, {&w->seen_rates}}, {n, 8, {&w->first_rates}}, {n_guards, 8, {&w->seen_indicators}},
+        {m->n_derived, 8, {&w->seen_derived}}, {m->n_slots, sizeof(int), {&w->same, &w->places_of_slots}},
+        {m->n_slots, 1, {&w->known_slots, &w->needed_slots}}, {m->n_nodes, 1, {&w->asked}},
+        {left, sizeof(Run), {&w->special_runs}}, {left, sizeof(Operands), {&w->special_operands}},
+        {special_size(m, N_SPECIALS, 1), sizeof(int), {&w->special_outputs}}};
+    return PLACE(rooms, memory);
+}
+
+/* Events, and what modes hold. */
+static uint64_t place_events(const Model *m, Work *w, double *memory) {
+    uint64_t n_x = m->n_x, n_d = m->n_d, n_holds = m->n_holds;
+    uint64_t members = m->most_members + 1;
+    const Room rooms[] = {{n_x, 8, {&w->x_before, &w->strike.jump, &w->impacts.x, &w->rates, &w->x_kept}},
+        {n_x, 1, {&w->known}}, {n_d, 8, {&w->d_before, &w->d_fired, &w->best, &w->respond_d}},
+        {n_d, 1, {&w->decided, &w->changed}}, {m->n_transitions, 1, {&w->wanting}},
+        {n_holds, sizeof(Terms), {&w->terms, &w->strike_terms}},
+        {n_holds, 8, {&w->weights, &w->base_weights, &w->use, &w->strike.before, &w->strike.approach}},
+        {n_holds, 8, {&w->strike.impulse, &w->strike.reaction, &w->begun}}, {n_holds, sizeof(int), {&w->standing}},
+        {n_holds, 1, {&w->held, &w->impacts.entered}},
+        {n_holds, 1, {&w->strike.entering, &w->strike.loose, &w->strike.held, &w->strike.knocked}},
+        {members, 8, {&w->reactions, &w->sizes, &w->zeros}},
+        {members, sizeof(int), {&w->places, &w->member, &w->pivots}}, {members, 1, {&w->other}}};
+    return PLACE(rooms, memory);
+}
+
+/* Lays out everything in one block, the state first; with memory == NULL only measures it. */
+static uint64_t lay_out(Instance *c, double *memory) {
+    uint64_t used = place_state(c, memory);
+    c->n_numbers = (size_t)used;
+    used += place_work(c->model, &c->work, memory == NULL ? NULL : memory + used);
+    return used + place_events(c->model, &c->work, memory == NULL ? NULL : memory + used);
+>>>>>>> main
 }
 
 static void set_tolerance(State *s, const Model *m, double relative) {

@@ -83,10 +83,9 @@ static double cubic_guess(double g0, double r0, double g1, double r1) {
 enum { QUIET, CROSSING, HUMP };
 
 static int find_candidates(const Instance *c, const Look *before, const Look *after, unsigned char *kinds) {
-    const Model *m = c->model;
     double h = after->t - before->t;
     int any = 0;
-    for (int g = 0; g < m->n_guards; g++) {
+    for (int g = 0; g < c->model->n_guards; g++) {
         double g0 = before->values[g], g1 = after->values[g];
         kinds[g] = QUIET;
         if (!guard_active(c, g) || g0 > 0) continue;
@@ -375,11 +374,10 @@ static Result take_changes(Instance *c, int *event) {
 
 /* Fires what was located at the present point, or what wants to fire. */
 Result handle_event(Instance *c) {
-    const Model *m = c->model;
     State *s = &c->state;
     unsigned char *wanting = nothing_wanting(c);
     int located = s->event_pending;
-    if (located) memcpy(wanting, c->wanting, m->n_transitions);
+    if (located) memcpy(wanting, c->wanting, c->model->n_transitions);
     leave_piece(c);
     s->at_event = 0;
     s->step = 0;
@@ -389,22 +387,7 @@ Result handle_event(Instance *c) {
     return RESULT_OK;
 }
 
-/* One event iteration for an importer's event mode. Where anything fired or was set, its solver must begin anew even if
-   no state jumped: rates do, and importers restart only when told that states have changed. */
-Result update_discrete(Instance *c, int *restart, double *next) {
-    double before = c->state.n_events;
-    *restart = c->state.inputs_changed;
-    c->state.inputs_changed = 0;
-    if (handle_event(c) != RESULT_OK) return RESULT_ERROR;
-    *restart |= c->state.n_events != before;
-    *next = next_moment(c);
-    return RESULT_OK;
-}
-
-static int is_due(Instance *c) {
-    const Model *m = c->model;
-    return m->n_moments > 0 && find_wanting(c, nothing_wanting(c), 0);
-}
+static int is_due(Instance *c) { return c->model->n_moments > 0 && find_wanting(c, nothing_wanting(c), 0); }
 
 /* Checks what the importer asks for and says where the step ends. */
 Result check_step(Instance *c, double point, double size, double *target) {
@@ -424,22 +407,24 @@ Result check_step(Instance *c, double point, double size, double *target) {
     return RESULT_OK;
 }
 
-/* Goes to `target`, or to the first event before it. */
+/* Goes to `target`, or to the first event before it; inputs may also move where an internal step has ended. */
 Arrival integrate_to(Instance *c, double target, int stop_at_events) {
     State *s = &c->state;
-    int held = s->inputs_changed, event;
+    int held = 0, event;
     if (s->at_event && handle_event(c) != RESULT_OK) return FAILED;
-    if (take_changes(c, &event) != RESULT_OK) return FAILED;
-    if (event) {
-        s->at_event = 1;
-        if (stop_at_events) return AT_EVENT;
-        if (handle_event(c) != RESULT_OK) return FAILED;
-    }
-    while (s->t < target) {
+    for (;;) {
+        held |= s->inputs_changed;
+        if (take_changes(c, &event) != RESULT_OK) return FAILED;
+        if (event) {
+            s->at_event = 1;
+            if (stop_at_events) return AT_EVENT;
+            if (handle_event(c) != RESULT_OK) return FAILED;
+        }
+        if (!(s->t < target)) return REACHED;
         if (!s->piece_valid && target - s->t < least_step(s)) {
             /* An event was located a rounding error before the target. */
             s->t = target;
-            break;
+            return REACHED;
         }
         if (!s->piece_valid) {
             double limit = s->stop_time_defined && s->stop_time >= target ? s->stop_time : INFINITY;
@@ -457,5 +442,4 @@ Arrival integrate_to(Instance *c, double target, int stop_at_events) {
         }
         if (c->step_finished != NULL) target = fmin(target, fmax(c->step_finished(c), s->t));
     }
-    return REACHED;
 }

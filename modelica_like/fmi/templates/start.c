@@ -106,11 +106,10 @@ static Result check_dependent(Instance *c, const double *values) {
 }
 
 static Result solve_states(Instance *c) {
-    const Model *m = c->model;
     State *s = &c->state;
     const double *values = c->work.start_values;
     if (apply_direct(c, values) != RESULT_OK) return RESULT_ERROR;
-    if (m->n_start_unknowns > 0 && solve_start_system(c, values) != RESULT_OK) return RESULT_ERROR;
+    if (c->model->n_start_unknowns > 0 && solve_start_system(c, values) != RESULT_OK) return RESULT_ERROR;
     if (solve_implicit(c, s->t, c->x, c->z, 0) != RESULT_OK) return RESULT_ERROR;
     return check_dependent(c, values);
 }

@@ -150,14 +150,13 @@ static Result set_parameter(Instance *c, const Variable *v, double value) {
 }
 
 static Result set_start(Instance *c, const Variable *v, double value) {
-    const Model *m = c->model;
     State *s = &c->state;
     if (!before_start(s))
         return refuse_value(c, v, "start values are settable before the end of the initialization only.");
     if (v->kind == KIND_DISCRETE) {
         c->d[v->index] = value;
         c->mode_given[v->index] = 1;
-    } else if (v->start >= 0 && v->start < m->n_starts) {
+    } else if (v->start >= 0 && v->start < c->model->n_starts) {
         c->start_value[v->start] = value;
         c->start_given[v->start] = 1;
     } else return refuse_value(c, v, "it follows from other variables.");
@@ -166,7 +165,6 @@ static Result set_start(Instance *c, const Variable *v, double value) {
 }
 
 Result set_float(Instance *c, uint32_t reference, double value) {
-    const Model *m = c->model;
     const Variable *v = known_variable(c, reference, TYPE_FLOAT64);
     State *s = &c->state;
     if (v == NULL) return RESULT_ERROR;
@@ -174,7 +172,7 @@ Result set_float(Instance *c, uint32_t reference, double value) {
     if (v->kind == KIND_PARAMETER) return set_parameter(c, v, value);
     if (v->kind != KIND_INPUT) return set_start(c, v, value);
     if (input_at(c, v->index, s->t) == value) return RESULT_OK;
-    for (int k = 0; k < m->n_u; k++) c->u[k] = input_at(c, k, s->t);
+    for (int k = 0; k < c->model->n_u; k++) c->u[k] = input_at(c, k, s->t);
     s->u_time = s->t;
     c->u[v->index] = value; /* its rate stays, in whatever order an importer gives the two */
     touch(c);
@@ -183,14 +181,13 @@ Result set_float(Instance *c, uint32_t reference, double value) {
 
 /* From now on the input moves with this rate. */
 Result set_input_rate(Instance *c, uint32_t reference, double rate) {
-    const Model *m = c->model;
     const Variable *v = known_variable(c, reference, TYPE_FLOAT64);
     State *s = &c->state;
     if (v == NULL) return RESULT_ERROR;
     if (v->kind != KIND_INPUT) return refuse_value(c, v, "it is no input, so it has no input derivative.");
     if (!isfinite(rate)) return refuse_value(c, v, "the derivative is not a finite number.");
     if (c->u_rate[v->index] == rate) return RESULT_OK;
-    for (int k = 0; k < m->n_u; k++) c->u[k] = input_at(c, k, s->t);
+    for (int k = 0; k < c->model->n_u; k++) c->u[k] = input_at(c, k, s->t);
     s->u_time = s->t;
     c->u_rate[v->index] = rate;
     touch(c);
