@@ -136,7 +136,7 @@ static uint64_t place_work(const Model *m, Work *w, double *memory) {
         {resets, 8, {&w->reset_values, &w->target_values}}, {resets, sizeof(int), {&w->targets}},
         {n_x, 8, {&w->seen_rates}}, {n, 8, {&w->first_rates}}, {n_guards, 8, {&w->seen_indicators}},
         {m->n_derived, 8, {&w->seen_derived}}, {m->n_slots, sizeof(int), {&w->same, &w->places_of_slots}},
-        {m->n_slots, 1, {&w->known_slots, &w->needed_slots}}, {m->n_nodes, 1, {&w->asked}},
+        {m->n_slots, 1, {&w->known_slots, &w->needed_slots}}, {m->n_nodes, 1, {&w->asked}}, {m->n_p, 1, {&w->tuned}},
         {left, sizeof(Run), {&w->special_runs}}, {left, sizeof(Operands), {&w->special_operands}},
         {special_size(m, N_SPECIALS, 1), sizeof(int), {&w->special_outputs}}};
     return PLACE(rooms, memory);
