@@ -39,7 +39,16 @@ class BufferedFunction:
         for k, array in self._filled:
             array[:] = arguments[k]
         self._evaluate()
+        return self.latest()
+
+    def latest(self) -> list[Vector]:
+        """Return what the last call has computed, even if it failed."""
         return [array.copy() for array in self._results]
+
+    def forget(self) -> None:
+        """Let all results be nan, so that those that are never computed are known."""
+        for array in self._results:
+            array.fill(np.nan)
 
     def along(self, points: list[Vector], p: Vector, u: Vector) -> list[Vector]:
         """Evaluate a mapped function at as many points (t, x, z, d) as there are; what lies behind is left over.

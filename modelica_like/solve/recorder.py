@@ -65,6 +65,9 @@ class Segment:
         return Point(float(self.times[k]), self.x[:, k].copy(), self.z[:, k].copy(), self.d)
 
 
+Points = tuple[Vector, Vector, Vector]
+
+
 @dataclass
 class Recorder:
     """Collects points into segments, events, and what impacts dissipate; `notices` are sentences for the report."""
@@ -73,33 +76,39 @@ class Recorder:
     events: list[Event] = field(default_factory=list)
     impacts: list[Impact] = field(default_factory=list)
     notices: list[str] = field(default_factory=list)
-    _times: list[Vector] = field(default_factory=list)
-    _x: list[Vector] = field(default_factory=list)
-    _z: list[Vector] = field(default_factory=list)
+    _open: list[Points] = field(default_factory=list)
+    _closed: list[tuple[list[Points], Vector]] = field(default_factory=list)
+
+    @property
+    def count(self) -> int:
+        """Number of segments that have ended."""
+        return len(self.segments) + len(self._closed)
 
     def begin(self, point: Point) -> None:
         """Begin a segment at a point."""
-        self._times, self._x, self._z = [], [], []
+        self._open = []
         self.add(np.array([point.t]), point.x[:, None], point.z[:, None])
 
     def add(self, times: Vector, x: Vector, z: Vector) -> None:
-        """Append at least one point; shapes (n,), (nx, n), (nz, n)."""
-        self._times.append(times)
-        self._x.append(x)
-        self._z.append(z)
+        """Append at least one point; shapes (n,), (nx, n), (nz, n). They may be filled in later, up to `build`."""
+        self._open.append((times, x, z))
 
     @property
     def last(self) -> float:
         """Time of the latest point of the open segment in s."""
-        return float(self._times[-1][-1])
+        return float(self._open[-1][0][-1])
 
     def end(self, d: Vector) -> None:
         """Close the segment, if one is open."""
-        if not self._times:
-            return
-        self.segments.append(
-            Segment(
-                np.concatenate(self._times), np.concatenate(self._x, axis=1), np.concatenate(self._z, axis=1), d.copy()
+        if self._open:
+            self._closed.append((self._open, d.copy()))
+            self._open = []
+
+    def build(self) -> None:
+        """Put together the segments that have ended."""
+        for parts, d in self._closed:
+            times, x, z = zip(*parts, strict=True)
+            self.segments.append(
+                Segment(np.concatenate(times), np.concatenate(x, axis=1), np.concatenate(z, axis=1), d)
             )
-        )
-        self._times = []
+        self._closed = []
