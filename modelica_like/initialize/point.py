@@ -99,6 +99,13 @@ def newton_at(model: CompiledDae, *, look: bool) -> ca.Function:
     return ca.Function("newton", arguments, [new, condition])
 
 
+def is_linear(model: CompiledDae) -> bool:
+    """Whether the implicit equations are linear in z: then one step of Newton's method solves them."""
+    if "linear" not in model._cache:
+        model._cache["linear"] = not model.alg_jacobian.jac_sparsity(0, model.alg_jacobian.index_in("z")).nnz()
+    return model._cache["linear"]
+
+
 def _check_regular(model: CompiledDae, point: Point) -> None:
     """Look closely at a Jacobian that may be singular, whatever its units are.
 

@@ -76,6 +76,7 @@ class StartProblem:
     def __init__(self, model: CompiledDae, point: Point) -> None:
         self.model = model
         self.given = call(model, model.start_values, point)
+        self._solved: StartPlan | None = None
         if "start entries" not in model._cache:
             model._cache["start entries"] = _Entries(model)
         self._entries: _Entries = model._cache["start entries"]
@@ -122,8 +123,9 @@ class StartProblem:
         """
         self._entries.fixed.put(point.x, self.given)
         plan = start_plan(self.model, kind, point)
-        if plan.columns:
+        if plan.columns and not (plan is self._solved and _is_free_of_modes(self.model, plan)):
             self._solve(plan, point)
+            self._solved = plan
         solve_implicit(self.model, point)
         for number in plan.dependent:
             self._check_dependent(point, self.model.starts[number])
@@ -217,6 +219,15 @@ def _evaluation(model: CompiledDae, plan: StartPlan) -> _Evaluation:
     if key not in model._cache or model._cache[key][0] is not plan:
         model._cache[key] = plan, _Evaluation(model, plan)
     return model._cache[key][1]
+
+
+def _is_free_of_modes(model: CompiledDae, plan: StartPlan) -> bool:
+    key = "start free of modes", plan.kind
+    if key not in model._cache:
+        function = plan.system.function
+        values, modes = function.name_out().index("values"), function.name_in().index("d")
+        model._cache[key] = not function.jac_sparsity(values, modes).nnz()
+    return model._cache[key]
 
 
 def _dense_values(system: ca.Function) -> ca.Function:

@@ -10,7 +10,7 @@ import numpy as np
 
 from modelica_like.compile.compiled import Vector
 from modelica_like.solve.idas import Integrator
-from modelica_like.solve.looks import EXPONENTS, PRECISE, SCHEMES, Looks, Scheme
+from modelica_like.solve.looks import EXPONENTS, PRECISE, SCHEMES, Looks
 
 _TOGETHER = 64
 _DEEPEST = 10
@@ -86,43 +86,56 @@ class Between:
 
 def interpolate(integrator: Integrator, pieces: list[Piece]) -> list[tuple[int, int]]:
     """Fill in results; return where they are not precise, as numbers of pieces and intervals."""
-    looks = [one.looks for one in pieces]
-    counts, lengths = np.array([one.count for one in looks]), [len(one.times) for one in pieces]
+    looks, lengths = [one.looks for one in pieces], [len(one.times) for one in pieces]
+    counts = np.array([one.count for one in looks])
     owner = np.repeat(np.arange(len(pieces)), lengths)
-    offset = (np.cumsum(counts + 1) - counts - 1)[owner]
-    widths, last = np.array([one.width for one in looks])[owner], np.array([one.last for one in pieces])[owner]
-    times = np.concatenate([one.times for one in pieces])
-    k: Any = np.concatenate([one.looks.intervals(one.times) for one in pieces])
-    place: Any = offset + k
-    x, slopes = (np.concatenate(part, axis=1) for part in ([p.x for p in looks], [p.seen[2] for p in looks]))
+    times, x = np.concatenate([one.times for one in pieces]), np.concatenate([one.x for one in looks], axis=1)
     z, begins = (np.concatenate(part, axis=-1) for part in ([p.z for p in looks], [p.times for p in looks]))
-    share = (times - begins[place]) / widths
-    found, left = x[:, place] + share * (x[:, place + 1] - x[:, place]), np.ones(len(times), bool)
+    k: Any = np.concatenate([one.looks.intervals(one.times) for one in pieces])
+    place: Any = (np.cumsum(counts + 1) - counts - 1)[owner] + k
+    share = (times - begins[place]) / np.array([one.width for one in looks])[owner]
+    new = np.diff(place, prepend=-1) > 0
+    cell: Any = np.cumsum(new) - 1
+    changes, left = _cells(integrator, pieces, x, owner[new], k[new])
+    powers = np.vander(share, len(EXPONENTS), increasing=True)
+    found = x[:, place] + np.einsum("np,inp->in", powers, changes[:, cell])
+    guess = z[:, place] + share * (z[:, place + 1] - z[:, place])
+    implicit = integrator.polished(times, found, guess, np.array([one.d for one in looks])[owner].T)
+    for piece, end, length in zip(pieces, np.cumsum(lengths), lengths, strict=True):
+        piece.x[:], piece.z[:] = found[:, end - length : end], implicit[:, end - length : end]
+    return list(zip(owner[new][left].tolist(), k[new][left].tolist(), strict=True))
+
+
+def _cells(integrator: Integrator, pieces: list[Piece], x: Vector, owner: Any, k: Any) -> tuple[Vector, Any]:
+    """Return polynomials for the changes of states since the beginnings of intervals, and which are not precise.
+
+    Args:
+        integrator: tells the tolerances.
+        pieces: all of them.
+        x: states at all looks of all pieces, shape (nx, looks).
+        owner: pieces of the intervals, shape (intervals,).
+        k: their numbers there.
+    """
+    looks = [one.looks for one in pieces]
+    slopes = np.concatenate([one.seen[2] for one in looks], axis=1)
+    counts, widths = (np.array(part) for part in ([one.count for one in looks], [one.width for one in looks]))
+    offset: Any = (np.cumsum(counts + 1) - counts - 1)[owner]
+    last = np.array([one.last for one in pieces])[owner]
+    base = x[:, offset + k]
+    changes, left = np.zeros((*base.shape, len(EXPONENTS))), np.ones(len(k), bool)
+    changes[:, :, 1] = x[:, offset + k + 1] - base
     for scheme in SCHEMES:
         those = np.flatnonzero(left & (counts[owner] + 1 >= scheme.nodes))
-        if len(those):
-            first = scheme.first(k[those], np.maximum(last[those], scheme.nodes - 1))
-            nodes: Any = (offset[those] + first)[:, None] + np.arange(scheme.nodes)
-            base = np.take(x, place[those], axis=1)
-            data = np.take(x, nodes, axis=1) - base[:, :, None]
-            if scheme.slopes:
-                data = np.concatenate([data, widths[those, None] * np.take(slopes, nodes, axis=1)], axis=2)
-            change, doubt = _change(scheme, data, k[those] - first, share[those])
-            found[:, those] = base + change
-            left[those] = ~(doubt <= PRECISE * integrator.weights(base)).all(axis=0)
-    guess = z[:, place] + share * (z[:, place + 1] - z[:, place])
-    d = np.array([one.d for one in looks])[owner].T
-    implicit = integrator.polished(times, found, guess, d)
-    ends = np.cumsum(lengths)
-    for piece, end, length in zip(pieces, ends, lengths, strict=True):
-        piece.x[:], piece.z[:] = found[:, end - length : end], implicit[:, end - length : end]
-    return sorted({(int(number), int(interval)) for number, interval in zip(owner[left], k[left], strict=True)})
-
-
-def _change(scheme: Scheme, data: Vector, number: Any, share: Vector) -> tuple[Vector, Vector]:
-    """Changes of states since the beginnings of their intervals, and how doubtful they are; shapes (nx, n)."""
-    powers, weights = np.vander(share, len(EXPONENTS), increasing=True), np.empty((len(share), len(EXPONENTS)))
-    for one in range(scheme.nodes - 1):
-        those = number == one
-        weights[those] = powers[those] @ scheme.precise[one]
-    return np.einsum("ink,nk->in", data, weights), np.abs(np.einsum("ink,nk->in", data, scheme.doubt[number]))
+        if not len(those):
+            continue
+        first = scheme.first(k[those], np.maximum(last[those], scheme.nodes - 1))
+        nodes: Any = (offset[those] + first)[:, None] + np.arange(scheme.nodes)
+        data = np.take(x, nodes, axis=1) - base[:, those, None]
+        if scheme.slopes:
+            data = np.concatenate([data, widths[owner[those], None] * np.take(slopes, nodes, axis=1)], axis=2)
+        number = k[those] - first
+        for one in range(scheme.nodes - 1):
+            changes[:, those[number == one]] = data[:, number == one] @ scheme.precise[one].T
+        doubt = np.abs(np.einsum("ink,nk->in", data, scheme.doubt[number]))
+        left[those] = ~(doubt <= PRECISE * integrator.weights(base[:, those])).all(axis=0)
+    return changes, left

@@ -13,7 +13,7 @@ import numpy as np
 from modelica_like.compile.buffers import buffered
 from modelica_like.compile.compiled import CompiledDae, CompiledTransition, Vector
 from modelica_like.flatten.conditions import JUST_TRUE
-from modelica_like.initialize import Point, newton_at
+from modelica_like.initialize import Point, is_linear, newton_at
 from modelica_like.solve.idas import along
 
 _LOCATED = 1e-13
@@ -50,7 +50,7 @@ class Guards:
         return self._at(point.t, point.x, point.z, self.model.p, self.model.u, point.d)
 
     def follow(self, point: Point) -> list[Vector]:
-        """Let the implicit unknowns follow the states by two steps of Newton's method; guards as by `at` there.
+        """Let the implicit unknowns follow the states by one or two steps of Newton's method; guards as by `at`.
 
         Returns:
             Guards, their rates, guards soon, and the implicit unknowns before the last step.
@@ -104,7 +104,7 @@ def _following(model: CompiledDae, at: ca.Function) -> ca.Function:
     arguments = newton.mx_in()
     t, x, z, *rest = arguments
     before = newton(t, x, z, *rest)[0]
-    after = newton(t, x, before, *rest)[0]
+    after = before if is_linear(model) else newton(t, x, before, *rest)[0]
     return ca.Function("guards_follow", arguments, [*at(t, x, after, *rest), before, after])
 
 

@@ -14,7 +14,7 @@ from modelica_like.compile.buffers import BufferedFunction, buffered
 from modelica_like.compile.buffers import along as every_along
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import StepFailed
-from modelica_like.initialize import Point, call, newton_at
+from modelica_like.initialize import Point, call, is_linear, newton_at
 from modelica_like.solve.interrupts import Interrupts
 from modelica_like.solve.options import Options
 
@@ -235,7 +235,7 @@ class Integrator:
                 return z
             z = new
             # What is left after a step of Newton's method is about its square.
-            if not np.max(np.abs(step) - POLISHED * np.abs(z)) > POLISHED:
+            if is_linear(self.model) or not np.max(np.abs(step) - POLISHED * np.abs(z)) > POLISHED:
                 break
         return z
 
