@@ -32,7 +32,8 @@ _FLAGS = {
     "IDA_ILL_INPUT": "an input was not acceptable to it",
 }
 
-_FIRST_STEP = 1e-4
+_FIRST_STEP = 1e-5
+"""In scaled time. The first steps have a low order: longer ones leave errors of some tolerances at every event."""
 _SHORTENED = 1e-6
 """IDAS shortens its first step at most so much before it gives up."""
 _SPARSE_FROM = 50
