@@ -143,9 +143,8 @@ def _regular(model: CompiledDae) -> ca.Function:
     """Return the number of determinants that vanish and of derivatives that are not finite."""
     arguments = list(model.arguments.values())
     sizes, rates = ca.fabs(model.determinants(*arguments)), ca.fabs(model.ode(*arguments))
-    wrong = [ca.logic_not(ca.logic_and(one >= _VANISHES, one < np.inf)) for one in ca.vertsplit(ca.densify(sizes))]
-    wrong += [ca.logic_not(one < np.inf) for one in ca.vertsplit(ca.densify(rates))]
-    return ca.Function("regular", arguments, [ca.cse(ca.sum1(ca.vertcat(0, *wrong)))])
+    wrong = ca.vertcat(0, ca.logic_not(ca.logic_and(sizes >= _VANISHES, sizes < np.inf)), ca.logic_not(rates < np.inf))
+    return ca.Function("regular", arguments, [ca.cse(ca.densify(ca.sum1(wrong)))])
 
 
 def variable_slopes(model: CompiledDae, point: Point, nodes: list[int]) -> Vector:

@@ -82,9 +82,9 @@ def _seen(model: CompiledDae) -> ca.Function:
     """Guards, their rates and the states' in one function: they share most of what they compute."""
     if "seen" not in model._cache:
         arguments = list(model.arguments.values())
-        results = [model.guards(*arguments), model.guard_rates(*arguments), model.ode(*arguments)]
-        results[0] = _each(_number, results[0])
-        results[1] = _each(lambda rate: ca.if_else(ca.fabs(rate) <= _LARGE, rate, 0), results[1])
+        rates = model.guard_rates(*arguments)
+        rates = ca.densify(ca.if_else(ca.fabs(rates) <= _LARGE, rates, 0))
+        results = [_numbers(model.guards(*arguments)), rates, model.ode(*arguments)]
         model._cache["seen"] = ca.Function("seen", arguments, ca.cse(results))
     return model._cache["seen"]
 
@@ -93,7 +93,7 @@ def _clean(model: CompiledDae, events: list[CompiledTransition]) -> ca.Function:
     """Guards, rates and guards a moment later, with what the modes say."""
     arguments, d = list(model.arguments.values()), model.arguments["d"]
     values, rates, _ = _seen(model)(*arguments)
-    soon = _each(_number, model.guards_soon(*arguments))
+    soon = _numbers(model.guards_soon(*arguments))
     may = ca.vertcat(*(functools.reduce(ca.logic_or, [d[one.mode] == k for k in one.sources]) for one in events))
     results = [ca.if_else(may, one, -1) if events else ca.SX(0, 1) for one in (values, soon)]
     return ca.Function("guards_at", arguments, [ca.densify(one) for one in ca.cse([results[0], rates, results[1]])])
@@ -108,15 +108,12 @@ def _following(model: CompiledDae, at: ca.Function) -> ca.Function:
     return ca.Function("guards_follow", arguments, [*at(t, x, after, *rest), before, after])
 
 
-def _each(what: Callable[[Any], Any], guards: Any) -> Any:
-    return ca.densify(ca.vertcat(*map(what, ca.vertsplit(guards)))) if guards.numel() else guards
-
-
-def _number(guard: Any) -> Any:
+def _numbers(guards: Any) -> Any:
     """Let a guard that is not a number be false, and what is nothing but rounding zero."""
-    rounding = ca.logic_and(ca.fabs(guard) < _NOISE, ca.fabs(guard) > JUST_TRUE)
-    number = ca.if_else(guard > _LARGE, _LARGE, ca.if_else(guard >= -_LARGE, guard, -1))
-    return ca.if_else(rounding, 0, number)
+    sizes = ca.fabs(guards)
+    rounding = ca.logic_and(sizes < _NOISE, sizes > JUST_TRUE)
+    numbers = ca.if_else(guards > _LARGE, _LARGE, ca.if_else(guards >= -_LARGE, guards, -1))
+    return ca.densify(ca.if_else(rounding, 0, numbers))
 
 
 @dataclass
