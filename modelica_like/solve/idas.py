@@ -91,7 +91,7 @@ class Integrator:
         self.steps = 0
         self.evaluations = 0
         self.gave_up: StepFailed
-        self.interrupts = Interrupts()
+        self._interrupts = Interrupts()
         self._relaxed = 1.0
         self._gentle_from = np.inf
         self._tail = np.concatenate([model.p, model.u])
@@ -205,9 +205,9 @@ class Integrator:
         screen, sys.stderr = sys.stderr, io.StringIO()
         why = ""
         try:
-            x, z = instance(start.x, start.z, p)
+            with self._interrupts:
+                x, z = instance(start.x, start.z, p)
         except RuntimeError as error:
-            self.interrupts.check()
             why = f"{sys.stderr.getvalue()} {error}"
             x, z = instance.latest()
         finally:

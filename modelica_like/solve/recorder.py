@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from modelica_like.compile.compiled import Vector
+from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import Source
 from modelica_like.initialize import Impact, Point
 
@@ -79,11 +79,6 @@ class Recorder:
     _open: list[Points] = field(default_factory=list)
     _closed: list[tuple[list[Points], Vector]] = field(default_factory=list)
 
-    @property
-    def count(self) -> int:
-        """Number of segments that have ended."""
-        return len(self.segments) + len(self._closed)
-
     def begin(self, point: Point) -> None:
         """Begin a segment at a point."""
         self._open = []
@@ -91,12 +86,26 @@ class Recorder:
 
     def add(self, times: Vector, x: Vector, z: Vector) -> None:
         """Append at least one point; shapes (n,), (nx, n), (nz, n). They may be filled in later, up to `build`."""
+        # At once: an interrupt comes before or after it.
         self._open.append((times, x, z))
 
     @property
     def last(self) -> float:
         """Time of the latest point of the open segment in s."""
         return float(self._open[-1][0][-1])
+
+    def note(
+        self, model: CompiledDae, time: float, number: int, change: tuple[int, int], transition: int, round: int
+    ) -> None:
+        """Note that a mode changes from one number to another, by a transition or (-1) by an impact."""
+        mode = model.flat_discretes[number]
+        before, after = (mode.names[k] for k in change)
+        # Who is knocked loose goes without a transition; the first one of the mode tells where it stands.
+        known = transition
+        if known < 0:
+            known = next(k for k, one in enumerate(model.transitions) if one.mode == number)
+        source, segment = model.transitions[known].source, len(self.segments) + len(self._closed)
+        self.events.append(Event(time, mode.path, before, after, source, transition, segment, round))
 
     def end(self, d: Vector) -> None:
         """Close the segment, if one is open."""
@@ -107,8 +116,6 @@ class Recorder:
     def build(self) -> None:
         """Put together the segments that have ended."""
         for parts, d in self._closed:
-            times, x, z = zip(*parts, strict=True)
-            self.segments.append(
-                Segment(np.concatenate(times), np.concatenate(x, axis=1), np.concatenate(z, axis=1), d)
-            )
+            times, x, z = (np.concatenate(part, axis=-1) for part in zip(*parts, strict=True))
+            self.segments.append(Segment(times, x, z, d))
         self._closed = []

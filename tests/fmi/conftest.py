@@ -1,5 +1,6 @@
 """Compiled models, made once per run of the tests, and FMPy's faces to them."""
 
+import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
@@ -13,9 +14,10 @@ from fmpy.fmi3 import FMU3Model, FMU3Slave
 from modelica_like import build
 from modelica_like.compile import CompiledDae
 from modelica_like.fmi.build import PLATFORMS, native_platform
-from modelica_like.fmi.build import build as build_library
-from modelica_like.fmi.codegen import generate
 from modelica_like.fmi.interface import Interface, interface
+from modelica_like.fmi.model_file import MODEL, model_file
+from modelica_like.fmi.runtime import runtime_library
+from modelica_like.fmi.tables import make_tables
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 TOKEN = "{a-token}"
@@ -23,7 +25,7 @@ TOKEN = "{a-token}"
 
 @dataclass(frozen=True)
 class Exported:
-    """A model with its compiled C code, as FMPy finds it."""
+    """A model with the compiled run-time, as FMPy finds it."""
 
     model: CompiledDae
     face: Interface
@@ -67,7 +69,7 @@ class Exported:
 
 @pytest.fixture(scope="session")
 def exported(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Exported]:
-    """Compile a netlist of examples/ or a component, once per run of the tests."""
+    """Lay out a netlist of examples/ or a component as an unpacked FMU, once per run of the tests."""
 
     @cache
     def make(drive: Any, version: str = "2.0") -> Exported:
@@ -76,7 +78,10 @@ def exported(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Exported
         folder = tmp_path_factory.mktemp("fmu")
         native = PLATFORMS[native_platform()]
         place = folder / "binaries" / (native.fmi2 if version == "2.0" else native.name)
-        build_library(generate(model, face, version, token=TOKEN), native.name, place)
+        place.mkdir(parents=True)
+        shutil.copy(runtime_library(native.name), place / f"model{native.suffix}")
+        (folder / MODEL).parent.mkdir()
+        (folder / MODEL).write_bytes(model_file(make_tables(model), face.variables, TOKEN, 1e-7))
         return Exported(model, face, folder, version)
 
     return make

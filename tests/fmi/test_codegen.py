@@ -12,14 +12,26 @@ import pytest
 
 from modelica_like import build
 from modelica_like.fmi.build import compiler_command, native_platform
-from modelica_like.fmi.codegen import RUNTIME, generate, source_files
+from modelica_like.fmi.codegen import generate
 from modelica_like.fmi.interface import interface
+from modelica_like.fmi.model_file import SECTIONS
+from modelica_like.fmi.sources import RUNTIME
 from modelica_like.fmi.tables import make_tables
 from modelica_like.fmi.tape import ARGUMENTS
 from modelica_like.language import Component, Equations, Parameter, Variable, cos, der, param, var
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 DOUBLES = ctypes.POINTER(ctypes.c_double)
+INSIDE = """
+#include <stdlib.h>
+#include "core.h"
+static char message[MESSAGE_LENGTH];
+Model *read_model(void) {
+    return model_read((const unsigned char *)model_data, model_data_size, calloc, free, message);
+}
+const Tape *tape(const Model *m, int k) { return (const Tape *)(const void *)&m->tapes + k; }
+"""
+TAPES = [name.split(".")[1] for name in SECTIONS if name.startswith("tapes.") and name.endswith(".runs")]
 
 
 def pointer(values: np.ndarray) -> Any:
@@ -34,14 +46,19 @@ class Inside:
         self.tables = make_tables(self.model)
         for name, text in generate(self.model, interface(self.model), token="{t}").items():
             (folder / name).write_text(text)
+        (folder / "inside.c").write_text(INSIDE)
         command = [*compiler_command(native_platform()), "-std=c99", "-O2", "-ffp-contract=off", "-shared", "-fPIC"]
-        files = [name for name in source_files("2.0") if name in ("model.c", *RUNTIME)]
+        files = ["inside.c", "model_data.c", *RUNTIME]
         subprocess.run([*command, "-o", "inside.so", *files, "-lm"], cwd=folder, check=True)
         self.library = ctypes.CDLL(str(folder / "inside.so"))
+        for name in ("read_model", "tape", "instance_new"):
+            getattr(self.library, name).restype = ctypes.c_void_p
+        self.read = ctypes.c_void_p(self.library.read_model())
+        assert self.read.value
         self.size = self.tables.slots.results + max(len(t.operations) for t in self.tables.tapes.values())
 
     def tape(self, name: str) -> Any:
-        return ctypes.byref(ctypes.c_char.in_dll(self.library, f"tape_{name}"))
+        return ctypes.c_void_p(self.library.tape(self.read, TAPES.index(name)))
 
     def slots(self, arguments: dict[str, np.ndarray]) -> np.ndarray:
         slots = np.zeros(self.size)
@@ -185,13 +202,13 @@ def test_the_integrator_has_order_five_and_dense_output_of_order_four(inside):
     code = inside(Circle())
     library = code.library
     assert code.model.implicit == ("z",)
-    library.instance_new.restype = ctypes.c_void_p
     libc = ctypes.CDLL(None)
-    c = ctypes.c_void_p(library.instance_new(b"one", b"{t}", libc.calloc, libc.free, None, None, None, 0))
+    new = library.instance_new(code.read, b"one", b"{t}", libc.calloc, libc.free, None, None, None, 0)
+    c = ctypes.c_void_p(new)
     library.rosenbrock_step.argtypes = [
         ctypes.c_void_p, ctypes.c_double, DOUBLES, ctypes.c_double, ctypes.c_int, ctypes.c_void_p, DOUBLES
     ]  # fmt: skip
-    library.piece_at.argtypes = [ctypes.c_void_p, ctypes.c_double, DOUBLES]
+    library.piece_at.argtypes = [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_double, DOUBLES]
 
     def exact(t: float) -> np.ndarray:
         values = {"a": np.cos(t), "b": np.sin(t)}
@@ -205,7 +222,7 @@ def test_the_integrator_has_order_five_and_dense_output_of_order_four(inside):
             t, h = k / steps, 1 / steps
             assert library.rosenbrock_step(c, t, pointer(point), h, 0, ctypes.byref(piece), pointer(error)) == 1
             middle = np.zeros(3)
-            library.piece_at(ctypes.byref(piece), t + 0.4 * h, pointer(middle))
+            library.piece_at(code.read, ctypes.byref(piece), t + 0.4 * h, pointer(middle))
             inner = max(inner, np.max(np.abs(middle - exact(t + 0.4 * h))))
             point = np.array(piece.last[:])
         errors.append(np.max(np.abs(point - exact(1.0))))

@@ -14,10 +14,10 @@ from components import AngleToTorqueAdaptor, Clutch, Fixed, Inertia, SpringDampe
 from modelica_like import build
 from modelica_like.compile import CompiledDae
 from modelica_like.fmi.check import description_problems
-from modelica_like.fmi.codegen import LOG_CATEGORIES
 from modelica_like.fmi.dependencies import Dependencies, solved_rows
 from modelica_like.fmi.description import About, identifier, model_description
 from modelica_like.fmi.interface import Interface, fmi_name, interface
+from modelica_like.fmi.sources import LOG_CATEGORIES
 from modelica_like.initialize import call, initialize
 from modelica_like.language import Assembly
 

@@ -5,23 +5,30 @@
 #include "core.h"
 
 /* Slot of what derivatives are taken by. */
-static int known_slot(const Variable *v) {
+static int known_slot(const Model *m, const Variable *v) {
     switch (v->kind) {
-        case KIND_TIME: return SLOT_T;
-        case KIND_STATE: return SLOT_X + v->index;
-        case KIND_PARAMETER: return SLOT_P + v->index;
-        case KIND_INPUT: return SLOT_U + v->index;
+        case KIND_TIME: return 0;
+        case KIND_STATE: return m->slot_x + v->index;
+        case KIND_PARAMETER: return m->slot_p + v->index;
+        case KIND_INPUT: return m->slot_u + v->index;
         default: return -1;
     }
 }
 
+/* Before the end of the initialization start values are known instead of states. */
+static int is_start(const Instance *c, const Variable *v) {
+    return c->state.phase == PHASE_INITIALIZATION && (v->kind == KIND_STATE || v->kind == KIND_VARIABLE);
+}
+
 static Result check_knowns(Instance *c, const uint32_t *knowns, size_t n) {
+    const Model *m = c->model;
     for (size_t k = 0; k < n; k++) {
         const Variable *v = known_variable(c, knowns[k], TYPE_FLOAT64);
         if (v == NULL) return RESULT_ERROR;
-        if (known_slot(v) < 0)
-            return report(c, LOG_ERROR, RESULT_ERROR,
-                "Derivatives by %s are not available: it is neither state, input nor parameter.", v->name);
+        if (is_start(c, v) ? v->start < 0 || v->start >= m->n_starts : known_slot(m, v) < 0)
+            return report(c, LOG_ERROR, RESULT_ERROR, "Derivatives by %s are not available: it is neither %s.",
+                text_of(m, v->name),
+                is_start(c, v) ? "a start value, input nor parameter" : "state, input nor parameter");
     }
     return RESULT_OK;
 }
@@ -31,62 +38,129 @@ static Result check_unknowns(Instance *c, const uint32_t *unknowns, size_t n) {
         const Variable *v = known_variable(c, unknowns[k], TYPE_FLOAT64);
         if (v == NULL) return RESULT_ERROR;
         if (v->kind == KIND_DISCRETE)
-            return report(c, LOG_ERROR, RESULT_ERROR, "%s changes at events only: it has no derivatives.", v->name);
+            return report(c, LOG_ERROR, RESULT_ERROR, "%s changes at events only: it has no derivatives.",
+                text_of(c->model, v->name));
     }
     return RESULT_OK;
 }
 
-/* Factorises the Jacobian of the implicit equations at the present point, with the slots of tape_rates filled. */
-static Result factor_implicit(Instance *c, int *order) {
+/* Factorises the Jacobian of the implicit equations at the present point, with the slots of m->tapes.rates filled. */
+Result factor_implicit(Instance *c, int *order) {
+    const Model *m = c->model;
     State *s = &c->state;
     if (settle(c) != RESULT_OK) return RESULT_ERROR;
-    evaluate(c, &tape_alg_jacobian, s->t, s->x, s->z, c->work.dense_matrix);
-    if (!lu_factor(N_Z, c->work.dense_matrix, order))
+    evaluate(c, &m->tapes.alg_jacobian, s->t, c->x, c->z, c->work.dense_matrix);
+    if (!lu_factor(m->n_z, c->work.dense_matrix, order))
         return report(c, LOG_ERROR, RESULT_ERROR, "The implicit equations are singular at t = %.9g s.", s->t);
     return RESULT_OK;
 }
 
 /* With the dots of the arguments given, fills those of z. */
 static void tangent_of_implicit(Instance *c, const int *order) {
+    const Model *m = c->model;
     Work *w = &c->work;
     double *dots = w->dots;
     State *s = &c->state;
-    if (N_Z == 0) return;
-    memset(dots + SLOT_Z, 0, N_Z * sizeof(double));
-    evaluate(c, &tape_alg, s->t, s->x, s->z, w->vector);
-    tape_tangent(&tape_alg, w->slots, dots, w->vector);
-    lu_solve(N_Z, w->dense_matrix, order, w->vector);
-    for (int k = 0; k < N_Z; k++) dots[SLOT_Z + k] = -w->vector[k];
+    if (m->n_z == 0) return;
+    memset(dots + m->slot_z, 0, m->n_z * sizeof(double));
+    evaluate(c, &m->tapes.alg, s->t, c->x, c->z, w->vector);
+    tape_tangent(&m->tapes.alg, w->slots, dots, w->vector);
+    lu_solve(m->n_z, w->dense_matrix, order, w->vector);
+    for (int k = 0; k < m->n_z; k++) dots[m->slot_z + k] = -w->vector[k];
+}
+
+static void seed_knowns(Instance *c, const uint32_t *knowns, size_t n, const double *seed) {
+    const Model *m = c->model;
+    for (size_t k = 0; k < n; k++) {
+        const Variable *v = find_variable(m, knowns[k]);
+        if (!is_start(c, v)) c->work.dots[known_slot(m, v)] += seed[k];
+    }
+}
+
+/* Newton's last step once more, with what the start equations change by instead of what they lack. */
+static Result start_system_tangent(Instance *c, const double *start_dots) {
+    const Model *m = c->model;
+    Work *w = &c->work;
+    State *s = &c->state;
+    double *step = w->start_unknowns;
+    evaluate(c, &m->tapes.start_system, s->t, c->x, c->z, w->start_residual);
+    tape_run(&m->tapes.start_jacobian, w->slots, w->jacobian);
+    if (!qr_factor(&m->start, w->jacobian, w))
+        return report(c, LOG_ERROR, RESULT_ERROR, "The start equations are singular at t = %.9g s.", s->t);
+    evaluate(c, &m->tapes.start_system, s->t, c->x, c->z, w->start_residual);
+    tape_tangent(&m->tapes.start_system, w->slots, w->dots, w->start_residual);
+    for (int k = 0; k < m->n_start_unknowns; k++) {
+        int start = m->start_rows[k].start;
+        step[k] = (start < 0 ? 0 : start_dots[start]) - w->start_residual[m->start_rows[k].row];
+    }
+    qr_solve(&m->start, w, step);
+    for (int k = 0; k < m->n_start_unknowns; k++)
+        if (m->start_columns[k] < m->n_x) w->dots[m->slot_x + m->start_columns[k]] = step[k];
+    return RESULT_OK;
+}
+
+/* What states change by with parameters, inputs and start values: through the start equations, in the modes found. */
+static Result start_tangent(Instance *c, const uint32_t *knowns, size_t n, const double *seed) {
+    const Model *m = c->model;
+    Work *w = &c->work;
+    State *s = &c->state;
+    double *dots = w->dots, *starts = w->start_values;
+    int shared = m->settings->steady;
+    s->solved = 0;
+    if (start_solve(c) != RESULT_OK) return RESULT_ERROR;
+    for (int i = 0; i < m->n_circuits; i++)
+        for (int k = 0; k < m->circuits[i].n_members; k++) shared |= c->d[m->circuits[i].first + k] != 0;
+    if (shared)
+        return report(c, LOG_ERROR, RESULT_ERROR,
+            "A steady start, and one at which parts share a load, have derivatives after the initialization only.");
+    memset(dots, 0, m->slot_results * sizeof(double));
+    seed_knowns(c, knowns, n, seed);
+    evaluate(c, &m->tapes.discrete_starts, s->t, c->x, c->z, w->guards);
+    tape_tangent(&m->tapes.discrete_starts, w->slots, dots, w->guards);
+    for (int k = 0; k < m->n_d; k++) dots[m->slot_d + k] = c->mode_given[k] ? 0 : w->guards[k];
+    evaluate(c, &m->tapes.start_values, s->t, c->x, c->z, starts);
+    tape_tangent(&m->tapes.start_values, w->slots, dots, starts);
+    for (int k = 0; k < m->n_starts; k++) starts[k] = c->start_given[k] ? 0 : starts[k];
+    for (size_t k = 0; k < n; k++) {
+        const Variable *v = find_variable(m, knowns[k]);
+        if (is_start(c, v)) starts[v->start] += seed[k];
+    }
+    for (int k = m->n_start_direct; k-- > 0;) /* the first counts */
+        dots[m->slot_x + m->start_direct[k].position] = starts[m->start_direct[k].start] / m->start_direct[k].factor;
+    return m->n_start_unknowns > 0 ? start_system_tangent(c, starts) : RESULT_OK;
 }
 
 Result directional(Instance *c, const uint32_t *unknowns, size_t n_unknowns, const uint32_t *knowns, size_t n_knowns,
     const double *seed, double *result) {
+    const Model *m = c->model;
     Work *w = &c->work;
     State *s = &c->state;
-    int order[AT_LEAST_ONE(N_Z)];
+    int *order = c->work.order;
     if (check_unknowns(c, unknowns, n_unknowns) != RESULT_OK || check_knowns(c, knowns, n_knowns) != RESULT_OK)
         return RESULT_ERROR;
+    if (s->phase != PHASE_INITIALIZATION) {
+        memset(w->dots, 0, m->slot_results * sizeof(double));
+        seed_knowns(c, knowns, n_knowns, seed);
+    } else if (start_tangent(c, knowns, n_knowns, seed) != RESULT_OK) return RESULT_ERROR;
     if (factor_implicit(c, order) != RESULT_OK) return RESULT_ERROR;
-    memset(w->dots, 0, SLOT_RESULTS * sizeof(double));
-    for (size_t k = 0; k < n_knowns; k++) w->dots[known_slot(find_variable(knowns[k]))] += seed[k];
     tangent_of_implicit(c, order);
-    evaluate(c, &tape_rates, s->t, s->x, s->z, w->rhs);
-    tape_tangent(&tape_rates, w->slots, w->dots, w->rhs);
+    evaluate(c, &m->tapes.rates, s->t, c->x, c->z, w->rhs);
+    tape_tangent(&m->tapes.rates, w->slots, w->dots, w->rhs);
     c->variables_valid = 0;
-    evaluate(c, &tape_variables, s->t, s->x, s->z, w->variables);
-    tape_tangent(&tape_variables, w->slots, w->dots, w->variables);
-    evaluate(c, &tape_derived, s->t, s->x, s->z, w->guards);
-    tape_tangent(&tape_derived, w->slots, w->dots, w->guards);
-    evaluate(c, &tape_guards, s->t, s->x, s->z, w->guards_before);
-    tape_tangent(&tape_guards, w->slots, w->dots, w->guards_before);
+    evaluate(c, &m->tapes.variables, s->t, c->x, c->z, w->variables);
+    tape_tangent(&m->tapes.variables, w->slots, w->dots, w->variables);
+    evaluate(c, &m->tapes.derived, s->t, c->x, c->z, w->guards);
+    tape_tangent(&m->tapes.derived, w->slots, w->dots, w->guards);
+    evaluate(c, &m->tapes.guards, s->t, c->x, c->z, w->guards_before);
+    tape_tangent(&m->tapes.guards, w->slots, w->dots, w->guards_before);
     for (size_t k = 0; k < n_unknowns; k++) {
-        const Variable *v = find_variable(unknowns[k]);
+        const Variable *v = find_variable(m, unknowns[k]);
         switch (v->kind) {
             case KIND_DERIVATIVE: result[k] = w->rhs[v->index]; break;
             case KIND_VARIABLE: result[k] = w->variables[v->index]; break;
             case KIND_DERIVED: result[k] = w->guards[v->index]; break;
-            case KIND_GUARD: result[k] = guard_active(s, v->index) ? w->guards_before[v->index] : 0; break;
-            default: result[k] = w->dots[known_slot(v)];
+            case KIND_GUARD: result[k] = guard_active(c, v->index) ? w->guards_before[v->index] : 0; break;
+            default: result[k] = w->dots[known_slot(m, v)];
         }
     }
     return RESULT_OK;
@@ -94,33 +168,35 @@ Result directional(Instance *c, const uint32_t *unknowns, size_t n_unknowns, con
 
 /* From bars of z to bars of the arguments, through the implicit equations; order NULL: they are singular. */
 static void adjoint_of_implicit(Instance *c, const int *order) {
+    const Model *m = c->model;
     Work *w = &c->work;
     State *s = &c->state;
-    double residual[AT_LEAST_ONE(N_Z)];
-    if (N_Z == 0) return;
-    for (int k = 0; k < N_Z; k++) w->vector[k] = -w->dots[SLOT_Z + k];
-    if (order != NULL) lu_solve_transposed(N_Z, w->dense_matrix, order, w->vector);
+    double *residual = w->residual;
+    if (m->n_z == 0) return;
+    for (int k = 0; k < m->n_z; k++) w->vector[k] = -w->dots[m->slot_z + k];
+    if (order != NULL) lu_solve_transposed(m->n_z, w->dense_matrix, order, w->vector);
     else {
-        memcpy(residual, w->vector, N_Z * sizeof(double));
-        evaluate(c, &tape_alg_jacobian, s->t, s->x, s->z, w->dense_matrix);
-        least_squares(N_Z, N_Z, w->dense_matrix, residual, w->vector);
+        memcpy(residual, w->vector, m->n_z * sizeof(double));
+        evaluate(c, &m->tapes.alg_jacobian, s->t, c->x, c->z, w->dense_matrix);
+        least_squares(m->n_z, m->n_z, w->dense_matrix, residual, w->vector);
     }
-    memset(w->dots + SLOT_Z, 0, N_Z * sizeof(double));
-    evaluate(c, &tape_alg, s->t, s->x, s->z, residual);
-    tape_adjoint(&tape_alg, w->slots, w->dots, w->vector);
+    memset(w->dots + m->slot_z, 0, m->n_z * sizeof(double));
+    evaluate(c, &m->tapes.alg, s->t, c->x, c->z, residual);
+    tape_adjoint(&m->tapes.alg, w->slots, w->dots, w->vector);
 }
 
 Result adjoint(Instance *c, const uint32_t *unknowns, size_t n_unknowns, const uint32_t *knowns, size_t n_knowns,
     const double *seed, double *result) {
+    const Model *m = c->model;
     Work *w = &c->work;
     State *s = &c->state;
-    int order[AT_LEAST_ONE(N_Z)];
+    int *order = c->work.order;
     if (check_unknowns(c, unknowns, n_unknowns) != RESULT_OK || check_knowns(c, knowns, n_knowns) != RESULT_OK)
         return RESULT_ERROR;
     if (factor_implicit(c, order) != RESULT_OK) return RESULT_ERROR;
-    memset(w->dots, 0, SLOT_RESULTS * sizeof(double));
+    memset(w->dots, 0, m->slot_results * sizeof(double));
     for (size_t k = 0; k < n_unknowns; k++) {
-        int slot = known_slot(find_variable(unknowns[k]));
+        int slot = known_slot(m, find_variable(m, unknowns[k]));
         if (slot >= 0) w->dots[slot] += seed[k];
     }
     c->variables_valid = 0;
@@ -130,76 +206,51 @@ Result adjoint(Instance *c, const uint32_t *unknowns, size_t n_unknowns, const u
             Kind kind;
             double *outputs;
         } of[] = {
-            {&tape_rates, KIND_DERIVATIVE, w->rhs},
-            {&tape_variables, KIND_VARIABLE, w->variables},
-            {&tape_derived, KIND_DERIVED, w->guards},
-            {&tape_guards, KIND_GUARD, w->guards_before},
+            {&m->tapes.rates, KIND_DERIVATIVE, w->rhs},
+            {&m->tapes.variables, KIND_VARIABLE, w->variables},
+            {&m->tapes.derived, KIND_DERIVED, w->guards},
+            {&m->tapes.guards, KIND_GUARD, w->guards_before},
         };
         double *bars = of[pass].outputs;
-        evaluate(c, of[pass].tape, s->t, s->x, s->z, bars);
+        evaluate(c, of[pass].tape, s->t, c->x, c->z, bars);
         memset(bars, 0, (size_t)of[pass].tape->n_outputs * sizeof(double));
         for (size_t k = 0; k < n_unknowns; k++) {
-            const Variable *v = find_variable(unknowns[k]);
-            if (v->kind == of[pass].kind && (v->kind != KIND_GUARD || guard_active(s, v->index)))
+            const Variable *v = find_variable(m, unknowns[k]);
+            if (v->kind == (int)of[pass].kind && (v->kind != KIND_GUARD || guard_active(c, v->index)))
                 bars[v->index] += seed[k];
         }
         tape_adjoint(of[pass].tape, w->slots, w->dots, bars);
     }
     adjoint_of_implicit(c, order);
-    for (size_t k = 0; k < n_knowns; k++) result[k] = w->dots[known_slot(find_variable(knowns[k]))];
+    for (size_t k = 0; k < n_knowns; k++) result[k] = w->dots[known_slot(m, find_variable(m, knowns[k]))];
     return RESULT_OK;
 }
 
 /* Total derivative of a variable by the states, z following them. Reactions whose split is undetermined make the
  * equations for z singular; what depends on them is left out. */
 void adjoint_of_node(Instance *c, int node, double *by_state) {
+    const Model *m = c->model;
     Work *w = &c->work;
     State *s = &c->state;
-    int order[AT_LEAST_ONE(N_Z)], follows = 0;
-    memset(w->dots, 0, SLOT_RESULTS * sizeof(double));
+    int *order = w->order, follows = 0;
+    memset(w->dots, 0, m->slot_results * sizeof(double));
     c->variables_valid = 0;
-    evaluate(c, &tape_variables, s->t, s->x, s->z, w->variables);
-    memset(w->variables, 0, N_NODES * sizeof(double));
+    evaluate(c, &m->tapes.variables, s->t, c->x, c->z, w->variables);
+    memset(w->variables, 0, m->n_nodes * sizeof(double));
     w->variables[node] = 1;
-    tape_adjoint(&tape_variables, w->slots, w->dots, w->variables);
-    for (int k = 0; k < N_Z; k++) follows |= w->dots[SLOT_Z + k] != 0;
+    tape_adjoint(&m->tapes.variables, w->slots, w->dots, w->variables);
+    for (int k = 0; k < m->n_z; k++) follows |= w->dots[m->slot_z + k] != 0;
     if (follows) {
-        evaluate(c, &tape_alg_jacobian, s->t, s->x, s->z, w->dense_matrix);
-        adjoint_of_implicit(c, lu_factor(N_Z, w->dense_matrix, order) ? order : NULL);
+        evaluate(c, &m->tapes.alg_jacobian, s->t, c->x, c->z, w->dense_matrix);
+        adjoint_of_implicit(c, lu_factor(m->n_z, w->dense_matrix, order) ? order : NULL);
     }
-    memcpy(by_state, w->dots + SLOT_X, N_X * sizeof(double));
-}
-
-/* Time derivative of a variable along the solution, with inputs on their straight lines. */
-Result output_rate(Instance *c, uint32_t reference, double *value) {
-    const Variable *v = known_variable(c, reference, TYPE_FLOAT64);
-    Work *w = &c->work;
-    State *s = &c->state;
-    int order[AT_LEAST_ONE(N_Z)];
-    if (v == NULL) return RESULT_ERROR;
-    if (v->kind != KIND_VARIABLE && v->kind != KIND_STATE)
-        return report(c, LOG_ERROR, RESULT_ERROR, "%s has no time derivative: it is not a variable.", v->name);
-    if (factor_implicit(c, order) != RESULT_OK) return RESULT_ERROR;
-    evaluate(c, &tape_rates, s->t, s->x, s->z, w->rhs);
-    if (v->kind == KIND_STATE) {
-        *value = w->rhs[v->index];
-        return RESULT_OK;
-    }
-    memset(w->dots, 0, SLOT_RESULTS * sizeof(double));
-    w->dots[SLOT_T] = 1;
-    memcpy(w->dots + SLOT_X, w->rhs, N_X * sizeof(double));
-    memcpy(w->dots + SLOT_U, s->u_rate, N_U * sizeof(double));
-    tangent_of_implicit(c, order);
-    c->variables_valid = 0;
-    evaluate(c, &tape_variables, s->t, s->x, s->z, w->variables);
-    tape_tangent(&tape_variables, w->slots, w->dots, w->variables);
-    *value = w->variables[v->index];
-    return RESULT_OK;
+    memcpy(by_state, w->dots + m->slot_x, m->n_x * sizeof(double));
 }
 
 /* States and inputs on which an unknown depends; returns their number, writes as many as there is room for. */
 size_t dependencies(Instance *c, uint32_t unknown, uint32_t *knowns, size_t capacity, Result *result) {
-    const Variable *v = find_variable(unknown);
+    const Model *m = c->model;
+    const Variable *v = find_variable(m, unknown);
     double *marks = c->work.dots, *outputs;
     const Tape *tape;
     size_t count = 0;
@@ -210,27 +261,29 @@ size_t dependencies(Instance *c, uint32_t unknown, uint32_t *knowns, size_t capa
         return 0;
     }
     *result = RESULT_OK;
-    memset(marks, 0, SLOT_RESULTS * sizeof(double));
+    memset(marks, 0, m->slot_results * sizeof(double));
     c->variables_valid = 0;
-    if (v->kind == KIND_STATE) marks[SLOT_X + v->index] = 1;
+    if (v->kind == KIND_STATE) marks[m->slot_x + v->index] = 1;
     else {
         int implicit = 0;
-        tape = v->kind == KIND_DERIVATIVE ? &tape_rates : v->kind == KIND_GUARD ? &tape_guards : &tape_variables;
+        tape = v->kind == KIND_DERIVATIVE ? &m->tapes.rates
+               : v->kind == KIND_GUARD    ? &m->tapes.guards
+                                          : &m->tapes.variables;
         outputs = v->kind == KIND_DERIVATIVE ? c->work.rhs
                   : v->kind == KIND_GUARD    ? c->work.guards_before
                                              : c->work.variables;
         memset(outputs, 0, (size_t)tape->n_outputs * sizeof(double));
         outputs[v->index] = 1;
         tape_reaches(tape, marks, outputs);
-        for (int k = 0; k < N_Z; k++) implicit |= marks[SLOT_Z + k] != 0;
+        for (int k = 0; k < m->n_z; k++) implicit |= marks[m->slot_z + k] != 0;
         if (implicit) {
-            for (int k = 0; k < N_Z; k++) c->work.vector[k] = 1;
-            tape_reaches(&tape_alg, marks, c->work.vector);
+            for (int k = 0; k < m->n_z; k++) c->work.vector[k] = 1;
+            tape_reaches(&m->tapes.alg, marks, c->work.vector);
         }
     }
-    for (int k = 0; k < N_VARIABLES; k++) {
-        const Variable *one = &model_variables[k];
-        int slot = one->kind == KIND_STATE || one->kind == KIND_INPUT ? known_slot(one) : -1;
+    for (int k = 0; k < m->n_variables; k++) {
+        const Variable *one = &m->variables[k];
+        int slot = one->kind == KIND_STATE || one->kind == KIND_INPUT ? known_slot(m, one) : -1;
         if (slot < 0 || marks[slot] == 0) continue;
         if (count < capacity) knowns[count] = one->reference;
         count++;

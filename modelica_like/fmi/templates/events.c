@@ -16,23 +16,30 @@ double number_or_false(double guard) {
     return fabs(guard) < NOISE && fabs(guard) > JUST_TRUE ? 0 : guard;
 }
 
-static int is_source(const State *s, const Transition *one) {
-    double mode = s->d[one->mode];
+static int is_source(const Instance *c, const Transition *one) {
+    double mode = c->d[one->mode];
     return mode >= 0 && mode < 64 && (one->sources >> (int)mode & 1);
 }
 
-int guard_active(const State *s, int guard) { return is_source(s, &model_transitions[model_guard_transition[guard]]); }
+int guard_active(const Instance *c, int guard) {
+    const Model *m = c->model;
+    return is_source(c, &m->transitions[m->guard_transition[guard]]);
+}
+
+/* Room for a mark per transition; none wants to fire yet. */
+unsigned char *nothing_wanting(Instance *c) { return memset(c->work.wanting, 0, (size_t)c->model->n_transitions); }
 
 static double just_after(const State *s) { return s->t + SAME_TIME * fmax(1, fabs(s->t)); }
 
 double next_moment(Instance *c) {
+    const Model *m = c->model;
     State *s = &c->state;
     double *moments = c->work.guards, next = INFINITY;
-    if (N_MOMENTS == 0) return next;
-    evaluate(c, &tape_moments, s->t, s->x, s->z, moments);
-    for (int k = 0; k < N_TRANSITIONS; k++) {
-        const Transition *one = &model_transitions[k];
-        if (one->timed && is_source(s, one) && moments[one->index] > just_after(s))
+    if (m->n_moments == 0) return next;
+    evaluate(c, &m->tapes.moments, s->t, c->x, c->z, moments);
+    for (int k = 0; k < m->n_transitions; k++) {
+        const Transition *one = &m->transitions[k];
+        if (one->timed && is_source(c, one) && moments[one->index] > just_after(s))
             next = fmin(next, moments[one->index]);
     }
     return next;
@@ -40,21 +47,22 @@ double next_moment(Instance *c) {
 
 /* Adds time events that are due and, unless they were found already, state events that are positive or about to be. */
 int find_wanting(Instance *c, unsigned char *wanting, int guards_too) {
+    const Model *m = c->model;
     State *s = &c->state;
     double *values = c->work.guards;
     int any = 0;
-    if (N_MOMENTS > 0) {
-        evaluate(c, &tape_moments, s->t, s->x, s->z, values);
-        for (int k = 0; k < N_TRANSITIONS; k++)
-            if (model_transitions[k].timed && values[model_transitions[k].index] <= just_after(s)) wanting[k] = 1;
+    if (m->n_moments > 0) {
+        evaluate(c, &m->tapes.moments, s->t, c->x, c->z, values);
+        for (int k = 0; k < m->n_transitions; k++)
+            if (m->transitions[k].timed && values[m->transitions[k].index] <= just_after(s)) wanting[k] = 1;
     }
-    if (N_GUARDS > 0 && guards_too) {
-        evaluate(c, &tape_guards_soon, s->t, s->x, s->z, values);
-        for (int k = 0; k < N_GUARDS; k++)
-            if (number_or_false(values[k]) > 0) wanting[model_guard_transition[k]] = 1;
+    if (m->n_guards > 0 && guards_too) {
+        evaluate(c, &m->tapes.guards_soon, s->t, c->x, c->z, values);
+        for (int k = 0; k < m->n_guards; k++)
+            if (number_or_false(values[k]) > 0) wanting[m->guard_transition[k]] = 1;
     }
-    for (int k = 0; k < N_TRANSITIONS; k++) {
-        wanting[k] = wanting[k] && is_source(s, &model_transitions[k]);
+    for (int k = 0; k < m->n_transitions; k++) {
+        wanting[k] = wanting[k] && is_source(c, &m->transitions[k]);
         any |= wanting[k];
     }
     return any;
@@ -63,65 +71,73 @@ int find_wanting(Instance *c, unsigned char *wanting, int guards_too) {
 /* After a switch, drop state events whose guard is as good as zero at the end of the time resolution: an importer that
    stops there has them balanced on that edge, and would see them switch back and forth. They come a little later. */
 static void drop_balanced(Instance *c, unsigned char *wanting) {
+    const Model *m = c->model;
     State *s = &c->state;
     double *soon = c->work.guards, *now = c->work.guards_before;
-    if (N_GUARDS == 0) return;
-    evaluate(c, &tape_guards_soon, s->t, s->x, s->z, soon);
-    evaluate(c, &tape_guards, s->t, s->x, s->z, now);
-    for (int k = 0; k < N_GUARDS; k++)
+    if (m->n_guards == 0) return;
+    evaluate(c, &m->tapes.guards_soon, s->t, c->x, c->z, soon);
+    evaluate(c, &m->tapes.guards, s->t, c->x, c->z, now);
+    for (int k = 0; k < m->n_guards; k++)
         if (number_or_false(now[k]) < 0 && number_or_false(soon[k]) <= BALANCED * fabs(now[k]))
-            wanting[model_guard_transition[k]] = 0;
+            wanting[m->guard_transition[k]] = 0;
 }
 
-/* Move the states as little as possible, so that variables that follow from them take new values. */
-static void project(Instance *c, const int *targets, const double *values, int count) {
-    State *s = &c->state;
+/* Move the states as little as possible, so that variables that follow from them take new values, or vanish. */
+void move_states(Instance *c, const int *nodes, const double *values, int count) {
+    const Model *m = c->model;
     double *slopes = c->work.square, *change = c->work.start_residual, *step = c->work.point;
-    evaluate(c, &tape_variables, s->t, s->x, s->z, c->work.variables);
-    for (int k = 0; k < count; k++) change[k] = values[k] - c->work.variables[model_reset_nodes[targets[k]]];
-    for (int k = 0; k < count; k++) adjoint_of_node(c, model_reset_nodes[targets[k]], slopes + (size_t)k * N_X);
-    least_squares(count, N_X, slopes, change, step);
-    for (int k = 0; k < N_X; k++) s->x[k] += step[k];
+    evaluate(c, &m->tapes.variables, c->state.t, c->x, c->z, c->work.variables);
+    for (int k = 0; k < count; k++) change[k] = (values ? values[k] : 0) - c->work.variables[nodes[k]];
+    for (int k = 0; k < count; k++) adjoint_of_node(c, nodes[k], slopes + (size_t)k * m->n_x);
+    least_squares(count, m->n_x, slopes, change, step);
+    for (int k = 0; k < m->n_x; k++) c->x[k] += step[k];
 }
 
 /* Tells that a mode changes. */
-void note_change(Instance *c, const char *name, int mode, int target) {
-    const char *const *names = model_mode_names[mode];
-    int before = (int)c->state.d[mode];
+void note_change(Instance *c, int name, int transition, int mode, int target) {
+    const Model *m = c->model;
+    const Mode *one = &m->modes[mode];
+    const int *names = m->mode_names + one->first_name;
+    double before = c->d[mode];
     c->state.n_events++;
-    if (names != NULL && before >= 0 && before < model_mode_counts[mode])
-        report(c, LOG_EVENTS, RESULT_OK, "t = %.12g s: %s: %s -> %s", c->state.t, name, names[before], names[target]);
+    if (c->noted != NULL) c->noted(c, transition, mode, target);
+    if (before >= 0 && before < one->n_names && target >= 0 && target < one->n_names)
+        report(c, LOG_EVENTS, RESULT_OK, "t = %.12g s: %s: %s -> %s", c->state.t, text_of(m, name),
+            text_of(m, names[(int)before]), text_of(m, names[target]));
 }
 
 /* Carry out transitions together; of one mode only the one declared first. */
 static void fire(Instance *c, const unsigned char *wanting, Impacts *impacts) {
+    const Model *m = c->model;
     State *s = &c->state;
-    double values[AT_LEAST_ONE(N_RESETS)], targets_value[AT_LEAST_ONE(N_RESETS)], d[AT_LEAST_ONE(N_D)];
-    int targets[AT_LEAST_ONE(N_RESETS)], count = 0;
-    unsigned char changed[AT_LEAST_ONE(N_D)] = {0};
-    evaluate(c, &tape_resets, s->t, s->x, s->z, values);
-    memcpy(d, s->d, sizeof d);
-    for (int k = 0; k < N_TRANSITIONS; k++) {
-        const Transition *one = &model_transitions[k];
+    Work *w = &c->work;
+    double *values = w->reset_values, *d = w->d_fired;
+    unsigned char *changed = memset(w->changed, 0, (size_t)m->n_modes);
+    int count = 0;
+    evaluate(c, &m->tapes.resets, s->t, c->x, c->z, values);
+    memcpy(d, c->d, (size_t)m->n_d * sizeof(double));
+    for (int k = 0; k < m->n_transitions; k++) {
+        const Transition *one = &m->transitions[k];
         if (!wanting[k] || changed[one->mode]) continue;
         changed[one->mode] = 1;
-        note_change(c, one->name, one->mode, one->target);
-        if (*one->notice) report(c, LOG_WARNING, RESULT_OK, "t = %.9g s: %s", s->t, one->notice);
+        note_change(c, one->name, k, one->mode, one->target);
+        if (*text_of(m, one->notice))
+            report(c, LOG_WARNING, RESULT_OK, "t = %.9g s: %s", s->t, text_of(m, one->notice));
         d[one->mode] = one->target;
         for (int r = one->first_reset; r < one->first_reset + one->n_resets; r++) {
-            const Reset *reset = &model_resets[r];
+            const Reset *reset = &m->resets[r];
             if (reset->kind == RESET_STATE) {
                 impacts->struck = 0;
-                s->x[reset->index] = values[reset->value] / reset->factor;
+                c->x[reset->index] = values[reset->value] / reset->factor;
             } else if (reset->kind == RESET_DISCRETE) d[reset->index] = values[reset->value];
             else {
-                targets[count] = reset->target;
-                targets_value[count++] = values[reset->value];
+                w->targets[count] = m->reset_nodes[reset->target];
+                w->target_values[count++] = values[reset->value];
             }
         }
     }
-    memcpy(s->d, d, sizeof d);
-    if (count > 0) project(c, targets, targets_value, count);
+    memcpy(c->d, d, (size_t)m->n_d * sizeof(double));
+    if (count > 0) move_states(c, w->targets, w->target_values, count);
 }
 
 /* Notes an instant; an error where the last ones came ever faster. */
@@ -137,45 +153,62 @@ static Result crowded(Instance *c) {
 
 /* Before one of several that hold a motion gives way, let the others take more. */
 static Result share_anew(Instance *c, unsigned char *wanting) {
+    const Model *m = c->model;
     State *s = &c->state;
     double *soon = c->work.guards;
-    if (N_CIRCUITS == 0) return RESULT_OK;
+    if (m->n_circuits == 0) return RESULT_OK;
     share(c);
     c->variables_valid = 0;
-    if (solve_implicit(c, s->t, s->x, s->z, 0) != RESULT_OK) return RESULT_ERROR;
-    evaluate(c, &tape_guards_soon, s->t, s->x, s->z, soon);
-    for (int k = 0; k < N_GUARDS; k++)
-        if (!(number_or_false(soon[k]) > 0)) wanting[model_guard_transition[k]] = 0;
+    if (solve_implicit(c, s->t, c->x, c->z, 0) != RESULT_OK) return RESULT_ERROR;
+    evaluate(c, &m->tapes.guards_soon, s->t, c->x, c->z, soon);
+    for (int k = 0; k < m->n_guards; k++)
+        if (!(number_or_false(soon[k]) > 0)) wanting[m->guard_transition[k]] = 0;
     return RESULT_OK;
 }
 
 /* Fire what wants to fire until nothing does. `wanting` holds the state events that were located, if `located`. */
 Result iterate_events(Instance *c, unsigned char *wanting, int located) {
+    const Model *m = c->model;
     State *s = &c->state;
-    Impacts impacts = {0, {0}, {0}};
+    Impacts *impacts = &c->work.impacts;
+    double *before = c->work.d_before;
+    impacts->struck = 0;
+    memset(impacts->entered, 0, (size_t)m->n_holds);
     if (find_wanting(c, wanting, !located)) {
         if (crowded(c) != RESULT_OK || share_anew(c, wanting) != RESULT_OK) return RESULT_ERROR;
     }
-    for (int round = 0; round < ROUNDS + ALONE * N_HOLDS; round++) {
-        double before[AT_LEAST_ONE(N_D)];
+    for (int round = 0; round < ROUNDS + ALONE * m->n_holds; round++) {
         int any = 0;
-        for (int k = 0; k < N_TRANSITIONS; k++) {
+        for (int k = 0; k < m->n_transitions; k++) {
             if (any && round >= TOGETHER) wanting[k] = 0;
             any |= wanting[k];
         }
         if (!any) return RESULT_OK;
-        memcpy(before, s->d, sizeof before);
-        fire(c, wanting, &impacts);
+        c->round = round;
+        memcpy(before, c->d, (size_t)m->n_d * sizeof(double));
+        fire(c, wanting, impacts);
         share(c);
         c->variables_valid = 0;
-        if (solve_implicit(c, s->t, s->x, s->z, 0) != RESULT_OK || stop_motions(c, before, &impacts) != RESULT_OK ||
+        if (solve_implicit(c, s->t, c->x, c->z, 0) != RESULT_OK || stop_motions(c, before, impacts) != RESULT_OK ||
             check_singular(c) != RESULT_OK)
             return RESULT_ERROR;
-        memset(wanting, 0, N_TRANSITIONS);
+        memset(wanting, 0, m->n_transitions);
         find_wanting(c, wanting, 1);
         drop_balanced(c, wanting);
     }
     return report(c, LOG_ERROR, RESULT_ERROR,
         "Modes still switch after %d rounds at t = %.12g s. Give the switching a hysteresis, or smooth what drives it.",
-        ROUNDS + ALONE * N_HOLDS, s->t);
+        ROUNDS + ALONE * m->n_holds, s->t);
+}
+
+/* One event iteration for an importer's event mode. Where anything fired or was set, its solver must begin anew even if
+   no state jumped: rates do, and importers restart only when told that states have changed. */
+Result update_discrete(Instance *c, int *restart, double *next) {
+    double before = c->state.n_events;
+    *restart = c->state.inputs_changed;
+    c->state.inputs_changed = 0;
+    if (handle_event(c) != RESULT_OK) return RESULT_ERROR;
+    *restart |= c->state.n_events != before;
+    *next = next_moment(c);
+    return RESULT_OK;
 }

@@ -30,10 +30,10 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
     fmi2Boolean loggingOn) {
     Instance *c;
     int own_memory;
-    (void)fmuResourceLocation, (void)visible;
+    (void)visible;
     if (functions == NULL || (fmuType != fmi2ModelExchange && fmuType != fmi2CoSimulation)) return NULL;
     own_memory = functions->allocateMemory == NULL || functions->freeMemory == NULL;
-    c = instance_new(instanceName, fmuGUID, own_memory ? calloc : functions->allocateMemory,
+    c = instance_open(fmuResourceLocation, instanceName, fmuGUID, own_memory ? calloc : functions->allocateMemory,
         own_memory ? free : functions->freeMemory, functions->logger ? log_fmi2 : NULL, (AnyFunction)functions->logger,
         functions->componentEnvironment, loggingOn);
     if (c != NULL) c->co_simulation = fmuType == fmi2CoSimulation;
@@ -99,16 +99,15 @@ fmi2Status fmi2EnterEventMode(fmi2Component component) {
 }
 
 fmi2Status fmi2NewDiscreteStates(fmi2Component component, fmi2EventInfo *eventInfo) {
-    double before[AT_LEAST_ONE(N_X)], next;
+    double next;
+    int restart;
     ENTER(fmi2NewDiscreteStates, PHASE_EVENT);
     NEED(eventInfo, 1);
-    memcpy(before, c->state.x, sizeof before);
-    if (handle_event(c) != RESULT_OK) return failed(c);
-    next = next_moment(c);
+    if (update_discrete(c, &restart, &next) != RESULT_OK) return failed(c);
     eventInfo->newDiscreteStatesNeeded = fmi2False;
     eventInfo->terminateSimulation = fmi2False;
     eventInfo->nominalsOfContinuousStatesChanged = fmi2False;
-    eventInfo->valuesOfContinuousStatesChanged = memcmp(before, c->state.x, sizeof before) != 0;
+    eventInfo->valuesOfContinuousStatesChanged = restart;
     eventInfo->nextEventTimeDefined = isfinite(next);
     eventInfo->nextEventTime = isfinite(next) ? next : 0;
     return fmi2OK;
@@ -123,13 +122,12 @@ fmi2Status fmi2EnterContinuousTimeMode(fmi2Component component) {
 
 fmi2Status fmi2CompletedIntegratorStep(fmi2Component component, fmi2Boolean noSetFMUStatePriorToCurrentPoint,
     fmi2Boolean *enterEventMode, fmi2Boolean *terminateSimulation) {
-    unsigned char wanting[AT_LEAST_ONE(N_TRANSITIONS)] = {0};
     ENTER(fmi2CompletedIntegratorStep, PHASE_CONTINUOUS);
     (void)noSetFMUStatePriorToCurrentPoint;
     NEED(enterEventMode, 1);
     NEED(terminateSimulation, 1);
     if (settle(c) != RESULT_OK) return fmi2Error;
-    *enterEventMode = find_wanting(c, wanting, 1);
+    *enterEventMode = find_wanting(c, nothing_wanting(c), 1);
     *terminateSimulation = fmi2False;
     return fmi2OK;
 }
@@ -141,14 +139,14 @@ fmi2Status fmi2SetTime(fmi2Component component, fmi2Real time) {
 
 fmi2Status fmi2SetContinuousStates(fmi2Component component, const fmi2Real x[], size_t nx) {
     ENTER(fmi2SetContinuousStates, PHASE_EVENT | PHASE_CONTINUOUS);
-    NEED_SIZE(nx, N_X, "continuous states");
+    NEED_SIZE(nx, c->model->n_x, "continuous states");
     NEED(x, nx);
     return status(set_states(c, x));
 }
 
 fmi2Status fmi2GetDerivatives(fmi2Component component, fmi2Real derivatives[], size_t nx) {
     ENTER(fmi2GetDerivatives, READABLE);
-    NEED_SIZE(nx, N_X, "continuous states");
+    NEED_SIZE(nx, c->model->n_x, "continuous states");
     NEED(derivatives, nx);
     if (make_consistent(c) != RESULT_OK) return fmi2Error;
     get_derivatives(c, derivatives);
@@ -157,7 +155,7 @@ fmi2Status fmi2GetDerivatives(fmi2Component component, fmi2Real derivatives[], s
 
 fmi2Status fmi2GetEventIndicators(fmi2Component component, fmi2Real eventIndicators[], size_t ni) {
     ENTER(fmi2GetEventIndicators, READABLE);
-    NEED_SIZE(ni, N_GUARDS, "event indicators");
+    NEED_SIZE(ni, c->model->n_guards, "event indicators");
     NEED(eventIndicators, ni);
     if (make_consistent(c) != RESULT_OK) return fmi2Error;
     get_indicators(c, eventIndicators);
@@ -166,18 +164,18 @@ fmi2Status fmi2GetEventIndicators(fmi2Component component, fmi2Real eventIndicat
 
 fmi2Status fmi2GetContinuousStates(fmi2Component component, fmi2Real x[], size_t nx) {
     ENTER(fmi2GetContinuousStates, READABLE);
-    NEED_SIZE(nx, N_X, "continuous states");
+    NEED_SIZE(nx, c->model->n_x, "continuous states");
     NEED(x, nx);
     if (make_consistent(c) != RESULT_OK) return fmi2Error;
-    memcpy(x, c->state.x, nx * sizeof(double));
+    memcpy(x, c->x, nx * sizeof(double));
     return fmi2OK;
 }
 
 fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component component, fmi2Real x_nominal[], size_t nx) {
     ENTER(fmi2GetNominalsOfContinuousStates, ANY_PHASE);
-    NEED_SIZE(nx, N_X, "continuous states");
+    NEED_SIZE(nx, c->model->n_x, "continuous states");
     NEED(x_nominal, nx);
-    memcpy(x_nominal, model_nominals, nx * sizeof(double));
+    memcpy(x_nominal, c->model->nominals, nx * sizeof(double));
     return fmi2OK;
 }
 
@@ -203,8 +201,7 @@ fmi2Status fmi2GetRealOutputDerivatives(
     NEED(order, nvr);
     NEED(value, nvr);
     for (size_t k = 0; k < nvr; k++) {
-        if (order[k] != 1) return refuse(c, "Outputs have derivatives of order 1 only.");
-        if (output_rate(c, vr[k], &value[k]) != RESULT_OK) return fmi2Error;
+        if (output_rate(c, vr[k], order[k], &value[k]) != RESULT_OK) return fmi2Error;
     }
     return fmi2OK;
 }

@@ -20,8 +20,8 @@ const char *fmi3GetVersion(void) { return fmi3Version; }
 fmi3Instance fmi3InstantiateModelExchange(fmi3String instanceName, fmi3String instantiationToken,
     fmi3String resourcePath, fmi3Boolean visible, fmi3Boolean loggingOn, fmi3InstanceEnvironment instanceEnvironment,
     fmi3LogMessageCallback logMessage) {
-    (void)resourcePath, (void)visible;
-    return instance_new(instanceName, instantiationToken, calloc, free, logMessage ? log_fmi3 : NULL,
+    (void)visible;
+    return instance_open(resourcePath, instanceName, instantiationToken, calloc, free, logMessage ? log_fmi3 : NULL,
         (AnyFunction)logMessage, instanceEnvironment, loggingOn);
 }
 
@@ -29,8 +29,8 @@ fmi3Instance fmi3InstantiateModelExchange(fmi3String instanceName, fmi3String in
 static double step_finished(Instance *c) {
     fmi3Boolean early = fmi3False;
     fmi3Float64 time = c->state.t;
-    ((fmi3IntermediateUpdateCallback)c->intermediate_update)(
-        c->environment, c->state.t, fmi3False, fmi3True, fmi3True, c->early_return_allowed != 0, &early, &time);
+    ((fmi3IntermediateUpdateCallback)c->intermediate_update)(c->environment, c->state.t, c->inputs_move != 0, fmi3True,
+        fmi3True, c->early_return_allowed != 0, &early, &time);
     return early && c->early_return_allowed && isfinite(time) ? time : INFINITY;
 }
 
@@ -41,8 +41,11 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String ins
     fmi3LogMessageCallback logMessage, fmi3IntermediateUpdateCallback intermediateUpdate) {
     Instance *c = fmi3InstantiateModelExchange(
         instanceName, instantiationToken, resourcePath, visible, loggingOn, instanceEnvironment, logMessage);
-    (void)requiredIntermediateVariables, (void)nRequiredIntermediateVariables;
     if (c == NULL) return NULL;
+    for (size_t k = 0; requiredIntermediateVariables != NULL && k < nRequiredIntermediateVariables; k++) {
+        const Variable *v = find_variable(c->model, requiredIntermediateVariables[k]);
+        c->inputs_move |= v != NULL && v->kind == KIND_INPUT;
+    }
     c->co_simulation = 1;
     c->event_mode_used = eventModeUsed;
     c->early_return_allowed = earlyReturnAllowed;
@@ -138,7 +141,8 @@ fmi3Status fmi3EvaluateDiscreteStates(fmi3Instance instance) {
 fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discreteStatesNeedUpdate,
     fmi3Boolean *terminateSimulation, fmi3Boolean *nominalsOfContinuousStatesChanged,
     fmi3Boolean *valuesOfContinuousStatesChanged, fmi3Boolean *nextEventTimeDefined, fmi3Float64 *nextEventTime) {
-    double before[AT_LEAST_ONE(N_X)], next;
+    double next;
+    int restart;
     ENTER(fmi3UpdateDiscreteStates, PHASE_EVENT);
     NEED(discreteStatesNeedUpdate, 1);
     NEED(terminateSimulation, 1);
@@ -146,11 +150,9 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discrete
     NEED(valuesOfContinuousStatesChanged, 1);
     NEED(nextEventTimeDefined, 1);
     NEED(nextEventTime, 1);
-    memcpy(before, c->state.x, sizeof before);
-    if (handle_event(c) != RESULT_OK) return failed(c);
-    next = next_moment(c);
+    if (update_discrete(c, &restart, &next) != RESULT_OK) return failed(c);
     *discreteStatesNeedUpdate = *terminateSimulation = *nominalsOfContinuousStatesChanged = fmi3False;
-    *valuesOfContinuousStatesChanged = memcmp(before, c->state.x, sizeof before) != 0;
+    *valuesOfContinuousStatesChanged = restart != 0;
     *nextEventTimeDefined = isfinite(next);
     *nextEventTime = isfinite(next) ? next : 0;
     return fmi3OK;
@@ -167,13 +169,12 @@ fmi3Status fmi3EnterContinuousTimeMode(fmi3Instance instance) {
 
 fmi3Status fmi3CompletedIntegratorStep(fmi3Instance instance, fmi3Boolean noSetFMUStatePriorToCurrentPoint,
     fmi3Boolean *enterEventMode, fmi3Boolean *terminateSimulation) {
-    unsigned char wanting[AT_LEAST_ONE(N_TRANSITIONS)] = {0};
     ENTER(fmi3CompletedIntegratorStep, PHASE_CONTINUOUS);
     (void)noSetFMUStatePriorToCurrentPoint;
     NEED(enterEventMode, 1);
     NEED(terminateSimulation, 1);
     if (settle(c) != RESULT_OK) return fmi3Error;
-    *enterEventMode = find_wanting(c, wanting, 1) != 0;
+    *enterEventMode = find_wanting(c, nothing_wanting(c), 1) != 0;
     *terminateSimulation = fmi3False;
     return fmi3OK;
 }
@@ -186,7 +187,7 @@ fmi3Status fmi3SetTime(fmi3Instance instance, fmi3Float64 time) {
 fmi3Status fmi3SetContinuousStates(
     fmi3Instance instance, const fmi3Float64 continuousStates[], size_t nContinuousStates) {
     ENTER(fmi3SetContinuousStates, PHASE_EVENT | PHASE_CONTINUOUS);
-    NEED_SIZE(nContinuousStates, N_X, "continuous states");
+    NEED_SIZE(nContinuousStates, c->model->n_x, "continuous states");
     NEED(continuousStates, nContinuousStates);
     return status(set_states(c, continuousStates));
 }
@@ -201,23 +202,24 @@ fmi3Status fmi3SetContinuousStates(
         return fmi3OK;                                                       \
     }
 
-GET_ALL(fmi3GetContinuousStateDerivatives, READABLE, N_X, "continuous states", get_derivatives(c, values))
-GET_ALL(fmi3GetEventIndicators, READABLE, N_GUARDS, "event indicators", get_indicators(c, values))
-GET_ALL(fmi3GetContinuousStates, READABLE, N_X, "continuous states", memcpy(values, c->state.x, N_X * sizeof(double)))
-GET_ALL(fmi3GetNominalsOfContinuousStates, READABLE, N_X, "continuous states",
-    memcpy(values, model_nominals, N_X * sizeof(double)))
+GET_ALL(fmi3GetContinuousStateDerivatives, READABLE, c->model->n_x, "continuous states", get_derivatives(c, values))
+GET_ALL(fmi3GetEventIndicators, READABLE, c->model->n_guards, "event indicators", get_indicators(c, values))
+GET_ALL(fmi3GetContinuousStates, READABLE, c->model->n_x, "continuous states",
+    memcpy(values, c->x, c->model->n_x * sizeof(double)))
+GET_ALL(fmi3GetNominalsOfContinuousStates, READABLE, c->model->n_x, "continuous states",
+    memcpy(values, c->model->nominals, c->model->n_x * sizeof(double)))
 
 fmi3Status fmi3GetNumberOfEventIndicators(fmi3Instance instance, size_t *nEventIndicators) {
     ENTER(fmi3GetNumberOfEventIndicators, ANY_PHASE);
     NEED(nEventIndicators, 1);
-    *nEventIndicators = N_GUARDS;
+    *nEventIndicators = c->model->n_guards;
     return fmi3OK;
 }
 
 fmi3Status fmi3GetNumberOfContinuousStates(fmi3Instance instance, size_t *nContinuousStates) {
     ENTER(fmi3GetNumberOfContinuousStates, ANY_PHASE);
     NEED(nContinuousStates, 1);
-    *nContinuousStates = N_X;
+    *nContinuousStates = c->model->n_x;
     return fmi3OK;
 }
 
@@ -238,8 +240,7 @@ fmi3Status fmi3GetOutputDerivatives(fmi3Instance instance, const fmi3ValueRefere
     NEED(orders, nValues);
     NEED(values, nValues);
     for (size_t k = 0; k < nValues; k++) {
-        if (orders[k] != 1) return refuse(c, "Outputs have derivatives of order 1 only.");
-        if (output_rate(c, valueReferences[k], &values[k]) != RESULT_OK) return fmi3Error;
+        if (output_rate(c, valueReferences[k], orders[k], &values[k]) != RESULT_OK) return fmi3Error;
     }
     return fmi3OK;
 }

@@ -19,7 +19,7 @@
 #define NEED(pointer, n) \
     if ((n) > 0 && (pointer) == NULL) return refuse(c, "The argument " #pointer " is a null pointer.")
 #define NEED_SIZE(n, wanted, what) \
-    if ((n) != (wanted)) return wrong_size(c, n, wanted, what)
+    if ((n) != (size_t)(wanted)) return wrong_size(c, n, (size_t)(wanted), what)
 
 static inline fmi3Status status(Result result) {
     if (result == RESULT_OK) return fmi3OK;

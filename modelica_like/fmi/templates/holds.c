@@ -8,59 +8,61 @@
 #define CANCELLED 1e-14 /* what is left of the largest numbers where they cancel */
 #define STIFF 1e5       /* reaction with which a motion that contradicts its being held counts, over the inertia */
 #define LARGE 1e3
-#define SPLITS 20 /* trials to find a split that all can bear */
+#define BEARABLE 0.99 /* part of its capacity that an element may bear in a split */
+#define SPLITS 20     /* trials to find a split that all can bear */
 #define TURNED 100.0
 
 void hold_terms(Instance *c, Terms *terms) {
     State *s = &c->state;
-    evaluate(c, &tape_hold_terms, s->t, s->x, s->z, (double *)terms);
+    evaluate(c, &c->model->tapes.hold_terms, s->t, c->x, c->z, (double *)terms);
 }
 
 /* Marks the motions that are held. */
 void mark_held(Instance *c, const Terms *terms, unsigned char *held) {
-    for (int k = 0; k < N_HOLDS; k++)
-        held[k] = c->state.d[model_holds[k].mode] == model_holds[k].number && terms[k].gain != 0;
+    const Model *m = c->model;
+    for (int k = 0; k < m->n_holds; k++) held[k] = c->d[m->holds[k].mode] == m->holds[k].number && terms[k].gain != 0;
 }
 
 /* The largest variable with the unit of a node. */
-double largest_like(const double *values, int node) {
+double largest_like(const Model *m, const double *values, int node) {
     double largest = 0;
-    for (int n = 0; n < N_NODES; n++)
-        if (model_units[n] == model_units[node]) largest = fmax(largest, fabs(values[n]));
+    for (int n = 0; n < m->n_nodes; n++)
+        if (m->units[n] == m->units[node]) largest = fmax(largest, fabs(values[n]));
     return largest;
 }
 
 /* Put held motions that are zero but for rounding at zero, where they are states. */
 void rest(Instance *c) {
+    const Model *m = c->model;
     State *s = &c->state;
-    Terms terms[AT_LEAST_ONE(N_HOLDS)];
-    unsigned char held[AT_LEAST_ONE(N_HOLDS)];
+    Terms *terms = c->work.terms;
+    unsigned char *held = c->work.held;
     const double *values = c->work.variables;
-    if (N_HOLDS == 0) return;
+    if (m->n_holds == 0) return;
     hold_terms(c, terms);
     mark_held(c, terms, held);
-    evaluate(c, &tape_variables, s->t, s->x, s->z, c->work.variables);
-    for (int k = 0; k < N_HOLDS; k++) {
-        const Held *one = &model_holds[k];
+    evaluate(c, &m->tapes.variables, s->t, c->x, c->z, c->work.variables);
+    for (int k = 0; k < m->n_holds; k++) {
+        const Held *one = &m->holds[k];
         if (!held[k] || one->state < 0) continue;
-        if (fabs(values[one->motion]) <= ROUNDING * largest_like(values, one->motion)) s->x[one->state] = 0;
+        if (fabs(values[one->motion]) <= ROUNDING * largest_like(m, values, one->motion)) c->x[one->state] = 0;
     }
 }
 
 /* Put rates of held motions that are zero but for rounding at zero: an importer's solver takes differences of rates for
  * a Jacobian, and what is nothing but rounding then counts as very stiff. */
 void rest_rates(Instance *c, double *rates) {
-    const State *s = &c->state;
-    Terms terms[AT_LEAST_ONE(N_HOLDS)];
-    unsigned char held[AT_LEAST_ONE(N_HOLDS)];
+    const Model *m = c->model;
+    Terms *terms = c->work.terms;
+    unsigned char *held = c->work.held;
     double largest = 0;
-    if (N_HOLDS == 0) return;
+    if (m->n_holds == 0) return;
     hold_terms(c, terms);
     mark_held(c, terms, held);
-    for (int k = 0; k < N_X; k++) largest = fmax(largest, fabs(rates[k]));
-    for (int k = 0; k < N_Z; k++) largest = fmax(largest, fabs(s->z[k]));
-    for (int k = 0; k < N_HOLDS; k++) {
-        int state = model_holds[k].state;
+    for (int k = 0; k < m->n_x; k++) largest = fmax(largest, fabs(rates[k]));
+    for (int k = 0; k < m->n_z; k++) largest = fmax(largest, fabs(c->z[k]));
+    for (int k = 0; k < m->n_holds; k++) {
+        int state = m->holds[k].state;
         if (held[k] && state >= 0 && fabs(rates[state]) <= CANCELLED * largest) rates[state] = 0;
     }
 }
@@ -70,9 +72,8 @@ void rest_rates(Instance *c, double *rates) {
 /* Bring dependences to the form of an identity in one column each, the largest one left; write these columns' shares.
  */
 static void eliminate(
-    int rows, int n, double *silent, double *weighted, const int *place, int members, double *switches) {
+    int *pivots, int rows, int n, double *silent, double *weighted, const int *place, int members, double *switches) {
     double *shares = switches + members;
-    int pivots[AT_LEAST_ONE(MOST_MEMBERS)];
     for (int row = 0; row < rows; row++) {
         double *own = silent + (size_t)row * n;
         int pivot = 0;
@@ -98,34 +99,36 @@ static void eliminate(
 }
 
 /* Weights that decide the split: what nothing limits takes nearly all, what bears nothing nearly nothing. */
-static void weigh(const Terms *terms, double *weights) {
+static void weigh(const Model *m, const Terms *terms, double *weights) {
     double largest = 0;
-    for (int k = 0; k < N_HOLDS; k++) {
+    for (int k = 0; k < m->n_holds; k++) {
         weights[k] = fmax(terms[k].forward, terms[k].backward);
         if (weights[k] < UNLIMITED) largest = fmax(largest, weights[k]);
     }
     if (largest == 0) largest = 1;
-    for (int k = 0; k < N_HOLDS; k++) weights[k] = 1 / fmin(fmax(weights[k], largest / LARGE), largest * LARGE);
+    for (int k = 0; k < m->n_holds; k++) weights[k] = 1 / fmin(fmax(weights[k], largest / LARGE), largest * LARGE);
 }
 
 /* Dependences among n held motions of a circuit become the rows of `silent`; returns their number. */
 static int dependences(Instance *c, const int *member, int n, double *silent) {
-    double *slopes = c->work.square, *turns = slopes + (size_t)MOST_MEMBERS * N_X;
-    double sizes[AT_LEAST_ONE(MOST_MEMBERS)], nothing[AT_LEAST_ONE(MOST_MEMBERS)] = {0};
+    const Model *m = c->model;
+    double *slopes = c->work.square, *turns = slopes + (size_t)m->most_members * m->n_x;
+    double *sizes = c->work.sizes, *nothing = c->work.zeros;
     int rows = 0;
+    memset(nothing, 0, (size_t)n * sizeof(double));
     memset(turns, 0, (size_t)n * (size_t)n * sizeof(double));
     for (int i = 0; i < n; i++) {
-        double *slope = slopes + (size_t)i * N_X, sum = 0;
-        adjoint_of_node(c, model_holds[member[i]].motion, slope);
-        for (int k = 0; k < N_X; k++) sum += slope[k] * slope[k];
+        double *slope = slopes + (size_t)i * m->n_x, sum = 0;
+        adjoint_of_node(c, m->holds[member[i]].motion, slope);
+        for (int k = 0; k < m->n_x; k++) sum += slope[k] * slope[k];
         sizes[i] = sum > 0 ? sqrt(sum) : 1;
-        for (int k = 0; k < N_X; k++) slope[k] /= sizes[i];
+        for (int k = 0; k < m->n_x; k++) slope[k] /= sizes[i];
         turns[(size_t)i * n + i] = 1;
     }
-    make_orthogonal(n, N_X, slopes, turns, nothing);
+    make_orthogonal(n, m->n_x, slopes, turns, nothing);
     for (int i = 0; i < n; i++) {
         double sum = 0;
-        for (int k = 0; k < N_X; k++) sum += slopes[(size_t)i * N_X + k] * slopes[(size_t)i * N_X + k];
+        for (int k = 0; k < m->n_x; k++) sum += slopes[(size_t)i * m->n_x + k] * slopes[(size_t)i * m->n_x + k];
         if (sqrt(sum) > DEPENDENT) continue;
         for (int k = 0; k < n; k++) silent[(size_t)rows * n + k] = turns[(size_t)i * n + k] / sizes[k];
         rows++;
@@ -134,8 +137,8 @@ static int dependences(Instance *c, const int *member, int n, double *silent) {
 }
 
 /* Whether a member has a part in what a circuit shares. */
-static int shares_in(const State *s, const Circuit *one, int place) {
-    const double *shares = s->d + one->first + one->n_members;
+static int shares_in(const Instance *c, const Circuit *one, int place) {
+    const double *shares = c->d + one->first + one->n_members;
     for (int row = 0; row < one->n_members; row++)
         if (shares[row * one->n_members + place] != 0) return 1;
     return 0;
@@ -144,71 +147,73 @@ static int shares_in(const State *s, const Circuit *one, int place) {
 /* Let a motion that cannot be held by all, because it is prescribed, raise the reactions until one gives way: a
  * switched equation says sum(share * reaction) = stiff * inertia * der(motion). */
 static void yield_to_contradiction(Instance *c, const Circuit *one) {
+    const Model *m = c->model;
     State *s = &c->state;
-    const int *member = model_members + one->first_member;
-    double z[AT_LEAST_ONE(N_Z)], reaction[AT_LEAST_ONE(MOST_MEMBERS)] = {0}, inertia = 0, stiff;
-    unsigned char other[AT_LEAST_ONE(MOST_MEMBERS)];
+    const int *member = m->members + one->first_member;
+    double *z = c->work.kept_z, *reaction = c->work.reactions, inertia = 0, stiff;
+    unsigned char *other = c->work.other;
     int solved = 1;
-    memcpy(z, s->z, sizeof z);
-    for (int k = 0; k < one->n_members; k++) other[k] = s->d[one->first + k] == 0 && shares_in(s, one, k);
+    memcpy(z, c->z, (size_t)m->n_z * sizeof(double));
+    for (int k = 0; k < one->n_members; k++) other[k] = c->d[one->first + k] == 0 && shares_in(c, one, k);
     for (int asked = 0; asked < 2; asked++) {
         for (int k = 0; k < one->n_members; k++)
-            if (other[k]) s->d[model_holds[member[k]].approach] = asked;
-        solved = solved && solve_implicit(c, s->t, s->x, s->z, 1) == RESULT_OK;
-        evaluate(c, &tape_variables, s->t, s->x, s->z, c->work.variables);
+            if (other[k]) c->d[m->holds[member[k]].approach] = asked;
+        solved = solved && solve_implicit(c, s->t, c->x, c->z, 1) == RESULT_OK;
+        evaluate(c, &m->tapes.variables, s->t, c->x, c->z, c->work.variables);
         for (int k = 0; k < one->n_members; k++) {
-            double now = c->work.variables[model_holds[member[k]].reaction];
+            double now = c->work.variables[m->holds[member[k]].reaction];
             if (asked && other[k]) inertia = fmax(inertia, fabs(now - reaction[k]));
             reaction[k] = now;
         }
     }
-    for (int k = 0; k < one->n_members; k++) s->d[model_holds[member[k]].approach] = 0;
-    memcpy(s->z, z, sizeof z);
+    for (int k = 0; k < one->n_members; k++) c->d[m->holds[member[k]].approach] = 0;
+    memcpy(c->z, z, (size_t)m->n_z * sizeof(double));
     stiff = solved && isfinite(inertia) ? STIFF * inertia : 0;
     /* The larger of the two sides has coefficients of about one. */
-    for (int k = 0; k < one->n_members * one->n_members; k++) s->d[one->first + one->n_members + k] /= fmax(stiff, 1);
+    for (int k = 0; k < one->n_members * one->n_members; k++) c->d[one->first + one->n_members + k] /= fmax(stiff, 1);
     for (int k = 0; k < one->n_members; k++)
-        if (s->d[one->first + k] == 1) s->d[one->first + k] += fmin(stiff, 1);
+        if (c->d[one->first + k] == 1) c->d[one->first + k] += fmin(stiff, 1);
 }
 
 /* Writes switches and shares of a circuit; tells whether anything is shared. */
 static int share_circuit(Instance *c, const Circuit *one, const unsigned char *held, const double *weights) {
-    State *s = &c->state;
-    int place[AT_LEAST_ONE(MOST_MEMBERS)], member[AT_LEAST_ONE(MOST_MEMBERS)], n = 0, rows = 0, moved = 0;
-    double *silent = c->work.square + (size_t)MOST_MEMBERS * (N_X + MOST_MEMBERS);
-    double *weighted = silent + (size_t)MOST_MEMBERS * MOST_MEMBERS;
+    const Model *m = c->model;
+    int *place = c->work.places, *member = c->work.member, n = 0, rows = 0, moved = 0;
+    double *silent = c->work.square + (size_t)m->most_members * (m->n_x + m->most_members);
+    double *weighted = silent + (size_t)m->most_members * m->most_members;
     for (int k = 0; k < one->n_members; k++) {
-        member[n] = model_members[one->first_member + k];
+        member[n] = m->members[one->first_member + k];
         place[n] = k;
         n += held[member[n]];
     }
     if (n > 1) rows = dependences(c, member, n, silent);
     for (int k = 0; k < rows * n; k++) weighted[k] = silent[k] * weights[member[k % n]];
-    memset(s->d + one->first, 0, (size_t)one->n_members * (size_t)(1 + one->n_members) * sizeof(double));
-    eliminate(rows, n, silent, weighted, place, one->n_members, s->d + one->first);
-    for (int k = 0; k < n; k++) moved |= model_holds[member[k]].moved;
+    memset(c->d + one->first, 0, (size_t)one->n_members * (size_t)(1 + one->n_members) * sizeof(double));
+    eliminate(c->work.pivots, rows, n, silent, weighted, place, one->n_members, c->d + one->first);
+    for (int k = 0; k < n; k++) moved |= m->holds[member[k]].moved;
     if (rows > 0 && moved) yield_to_contradiction(c, one);
     return rows > 0;
 }
 
 /* Reactions over what can be borne, of the elements that share; returns the largest. */
 static double use_of(Instance *c, const Terms *terms, double *use) {
+    const Model *m = c->model;
     State *s = &c->state;
-    double z[AT_LEAST_ONE(N_Z)], worst = 0;
-    memset(use, 0, N_HOLDS * sizeof(double));
-    memcpy(z, s->z, sizeof z);
-    if (solve_implicit(c, s->t, s->x, s->z, 1) != RESULT_OK) worst = INFINITY;
-    evaluate(c, &tape_variables, s->t, s->x, s->z, c->work.variables);
-    for (int i = 0; i < N_CIRCUITS; i++)
-        for (int place = 0; place < model_circuits[i].n_members; place++) {
-            int k = model_members[model_circuits[i].first_member + place];
-            double reaction = c->work.variables[model_holds[k].reaction];
+    double *z = c->work.kept_z, worst = 0;
+    memset(use, 0, m->n_holds * sizeof(double));
+    memcpy(z, c->z, (size_t)m->n_z * sizeof(double));
+    if (solve_implicit(c, s->t, c->x, c->z, 1) != RESULT_OK) worst = INFINITY;
+    evaluate(c, &m->tapes.variables, s->t, c->x, c->z, c->work.variables);
+    for (int i = 0; i < m->n_circuits; i++)
+        for (int place = 0; place < m->circuits[i].n_members; place++) {
+            int k = m->members[m->circuits[i].first_member + place];
+            double reaction = c->work.variables[m->holds[k].reaction];
             double limit = reaction > 0 ? terms[k].forward : terms[k].backward;
-            if (!shares_in(s, &model_circuits[i], place) || !(limit > 0) || limit >= UNLIMITED) continue;
+            if (!shares_in(c, &m->circuits[i], place) || !(limit > 0) || limit >= UNLIMITED) continue;
             use[k] = fabs(reaction) / limit;
             worst = fmax(worst, use[k]);
         }
-    memcpy(s->z, z, sizeof z);
+    memcpy(c->z, z, (size_t)m->n_z * sizeof(double));
     return worst;
 }
 
@@ -216,26 +221,26 @@ static double use_of(Instance *c, const Terms *terms, double *use) {
  * least norm, weighted by the inverse of the capacities. Where that asks more of one than it can bear, the others take
  * more, as far as they can. */
 void share(Instance *c) {
-    State *s = &c->state;
-    Terms terms[AT_LEAST_ONE(N_HOLDS)];
-    unsigned char held[AT_LEAST_ONE(N_HOLDS)];
-    double weights[AT_LEAST_ONE(N_HOLDS)], base[AT_LEAST_ONE(N_HOLDS)], use[AT_LEAST_ONE(N_HOLDS)];
-    double best[AT_LEAST_ONE(N_D)], least = INFINITY;
-    if (N_CIRCUITS == 0) return;
+    const Model *m = c->model;
+    Terms *terms = c->work.terms;
+    unsigned char *held = c->work.held;
+    double *weights = c->work.weights, *base = c->work.base_weights, *use = c->work.use;
+    double *best = c->work.best, least = INFINITY;
+    if (m->n_circuits == 0) return;
     hold_terms(c, terms);
     mark_held(c, terms, held);
-    weigh(terms, base);
-    memcpy(weights, base, sizeof base);
+    weigh(m, terms, base);
+    memcpy(weights, base, (size_t)m->n_holds * sizeof(double));
     for (int trial = 0; trial < SPLITS; trial++) {
         int shared = 0;
         double worst;
-        for (int i = 0; i < N_CIRCUITS; i++) shared |= share_circuit(c, &model_circuits[i], held, weights);
+        for (int i = 0; i < m->n_circuits; i++) shared |= share_circuit(c, &m->circuits[i], held, weights);
         worst = shared ? use_of(c, terms, use) : 0;
-        if (worst < least || trial == 0) memcpy(best, s->d, sizeof best);
+        if (worst < least || trial == 0) memcpy(best, c->d, (size_t)m->n_d * sizeof(double));
         if (worst < least) least = worst;
-        if (worst <= 1 || !isfinite(worst)) break;
-        for (int k = 0; k < N_HOLDS; k++)
+        if (worst <= BEARABLE || !isfinite(worst)) break;
+        for (int k = 0; k < m->n_holds; k++)
             weights[k] = use[k] > 0 ? fmin(fmax(weights[k] * use[k], base[k] / TURNED), base[k] * TURNED) : base[k];
     }
-    memcpy(s->d, best, sizeof best);
+    memcpy(c->d, best, (size_t)m->n_d * sizeof(double));
 }

@@ -6,8 +6,6 @@
 #include <string.h>
 #include "core.h"
 
-#define MESSAGE_LENGTH 512
-
 static const struct {
     LogCategory category;
     const char *name;
@@ -67,98 +65,196 @@ Result allowed(Instance *c, const char *function, int phases) {
 
 /* ---- memory ----------------------------------------------------------------------------------------------------- */
 
-static size_t larger(size_t a, size_t b) { return a > b ? a : b; }
+static uint64_t larger(uint64_t a, uint64_t b) { return a > b ? a : b; }
 
-/* Lays all work arrays out in one block; with memory == NULL only measures it. */
-static size_t lay_out(Work *w, double *memory) {
-    size_t used = 0, small = larger(larger(N_GUARDS, N_MOMENTS), larger(larger(N_START_MODES, N_D), N_DERIVED));
-    size_t qr_v = larger((size_t)pattern_step.n_v, (size_t)pattern_start.n_v),
-           qr_r = larger((size_t)pattern_step.n_r, (size_t)pattern_start.n_r);
-    size_t rows = larger((size_t)pattern_step.size, (size_t)pattern_start.size);
-    size_t square = larger(START_STEADY ? 2 * (size_t)(N_STEADY + N_Z) * (N_STEADY + N_Z) : 0, (size_t)N_RESETS * N_X);
-    size_t sharing = (size_t)MOST_MEMBERS * (N_X + 3 * MOST_MEMBERS);
-    struct {
-        double **array;
-        size_t size;
-    } arrays[] = {
-        {&w->slots, N_SLOTS},
-        {&w->dots, N_SLOTS},
-        {&w->jacobian, larger(N_JACOBIAN, N_START_JACOBIAN)},
-        {&w->matrix, (size_t)pattern_step.n_nonzeros},
-        {&w->qr_v, qr_v},
-        {&w->qr_r, qr_r},
-        {&w->qr_beta, rows},
-        {&w->qr_work, rows},
-        {&w->stages, 9 * (size_t)AT_LEAST_ONE(N_UNKNOWNS)},
-        {&w->point, N_UNKNOWNS},
-        {&w->variables, N_NODES},
-        {&w->guards, small},
-        {&w->guards_before, 9 * (size_t)N_GUARDS},
-        {&w->rhs, larger(N_UNKNOWNS, N_DETERMINANTS)},
-        {&w->dense_matrix, (size_t)N_Z * N_Z},
-        {&w->square, larger(square, sharing)},
-        {&w->vector, N_UNKNOWNS + (size_t)N_Z},
-        {&w->start_unknowns, N_START_UNKNOWNS},
-        {&w->start_values, N_STARTS},
-        {&w->start_residual, larger(N_START_VALUES, N_RESETS)},
-    };
-    for (size_t k = 0; k < sizeof arrays / sizeof arrays[0]; k++) {
-        if (memory != NULL) *arrays[k].array = memory + used;
-        used += arrays[k].size + 1;
-    }
+typedef struct { /* arrays of one size: number and size of their elements */
+    uint64_t size, bytes;
+    void *arrays[8];
+} Room;
+
+/* Lays arrays out one behind the other; with memory == NULL only measures them. Returns their size in doubles. */
+static uint64_t place(const Room *rooms, size_t count, double *memory) {
+    uint64_t used = 0;
+    for (size_t k = 0; k < count; k++)
+        for (void *const *array = rooms[k].arrays; *array != NULL; array++) {
+            double *first = memory == NULL ? NULL : memory + used;
+            memcpy(*array, &first, sizeof first);
+            used += (rooms[k].size * rooms[k].bytes + 7) / 8 + 1;
+        }
     return used;
+}
+#define PLACE(rooms, memory) place(rooms, sizeof rooms / sizeof rooms[0], memory)
+
+static uint64_t place_state(Instance *c, double *memory) {
+    const Model *m = c->model;
+    uint64_t n = m->n_unknowns, n_d = m->n_d, n_starts = m->n_starts;
+    const Room rooms[] = {{m->n_x, 8, {&c->x}}, {m->n_z, 8, {&c->z}}, {m->n_p, 8, {&c->p}},
+        {m->n_u, 8, {&c->u, &c->u_rate}}, {n_d, 8, {&c->d}}, {n_d, 1, {&c->mode_given}},
+        {n_starts, 8, {&c->start_value}}, {n_starts, 1, {&c->start_given}}, {2 + 5 * n, 8, {&c->piece}},
+        {m->n_transitions, 1, {&c->wanting}}};
+    return PLACE(rooms, memory);
+}
+
+/* Operations, or outputs, of the first tapes that are specialised. */
+static uint64_t special_size(const Model *m, int count, int outputs) {
+    uint64_t size = 0;
+    for (int k = 0; k < count; k++)
+        size += (uint64_t)(outputs ? full_tape(m, k)->n_outputs : full_tape(m, k)->n_operations);
+    return size;
+}
+
+static void share_out_specials(Instance *c) {
+    for (int k = 0; k < N_SPECIALS; k++) {
+        Special *s = &c->work.special[k];
+        uint64_t before = special_size(c->model, k, 0);
+        s->runs = c->work.special_runs + before;
+        s->operands = c->work.special_operands + before;
+        s->outputs = c->work.special_outputs + special_size(c->model, k, 1);
+        s->first_known = c->model->n_slots + (int)before;
+    }
+}
+
+/* Tapes, equations and the integrator. */
+static uint64_t place_work(const Model *m, Work *w, double *memory) {
+    uint64_t n = m->n_unknowns, n_z = m->n_z, steady = m->n_steady + n_z;
+    uint64_t members = m->most_members, n_guards = m->n_guards, n_x = m->n_x;
+    uint64_t resets = larger(larger(m->n_resets, m->n_reset_values), m->n_holds);
+    uint64_t small = larger(larger(n_guards, m->n_moments), larger(larger(m->n_start_modes, m->n_d), m->n_derived));
+    uint64_t left = special_size(m, N_SPECIALS, 0);
+    uint64_t square =
+        larger(larger(m->settings->steady ? 2 * steady * steady : 0, resets * n_x), members * (n_x + 3 * members));
+    const Room rooms[] = {{m->n_slots + left, 8, {&w->slots}}, {3 * (uint64_t)m->n_slots, 8, {&w->dots}},
+        {larger(m->n_jacobian, m->n_start_jacobian), 8, {&w->jacobian}}, {m->step.n_nonzeros, 8, {&w->matrix}},
+        {larger(m->step.n_v, m->start.n_v), 8, {&w->qr_v}}, {larger(m->step.n_r, m->start.n_r), 8, {&w->qr_r}},
+        {larger(n, m->start.size), 8, {&w->qr_beta, &w->qr_work, &w->start_unknowns}}, {9 * n, 8, {&w->stages}},
+        {2 + 5 * n, 8, {&w->whole}}, {n, 8, {&w->point, &w->first}}, {n + n_z, 8, {&w->vector}},
+        {larger(n, m->n_determinants), 8, {&w->rhs}}, {m->n_nodes, 8, {&w->variables}}, {small, 8, {&w->guards}},
+        {2 * n_guards, 8, {&w->guards_before}}, {3 * n_guards * MOST_LOOKS, 8, {&w->looks}}, {n_guards, 1, {&w->kinds}},
+        {n_z * n_z, 8, {&w->dense_matrix}}, {n_z, 8, {&w->residual, &w->kept_z, &w->respond_z}},
+        {n_z, sizeof(int), {&w->order}}, {square, 8, {&w->square}}, {m->n_starts, 8, {&w->start_values}},
+        {larger(m->n_start_values, resets), 8, {&w->start_residual}},
+        {resets, 8, {&w->reset_values, &w->target_values}}, {resets, sizeof(int), {&w->targets}},
+        {n_x, 8, {&w->seen_rates}}, {n, 8, {&w->first_rates}}, {n_guards, 8, {&w->seen_indicators}},
+        {m->n_derived, 8, {&w->seen_derived}}, {m->n_slots, sizeof(int), {&w->same, &w->places_of_slots}},
+        {m->n_slots, 1, {&w->known_slots, &w->needed_slots}}, {m->n_nodes, 1, {&w->asked}}, {m->n_p, 1, {&w->tuned}},
+        {left, sizeof(Run), {&w->special_runs}}, {left, sizeof(Operands), {&w->special_operands}},
+        {special_size(m, N_SPECIALS, 1), sizeof(int), {&w->special_outputs}}};
+    return PLACE(rooms, memory);
+}
+
+/* Events, and what modes hold. */
+static uint64_t place_events(const Model *m, Work *w, double *memory) {
+    uint64_t n_x = m->n_x, n_d = m->n_d, n_holds = m->n_holds;
+    uint64_t members = m->most_members + 1;
+    const Room rooms[] = {{n_x, 8, {&w->strike.jump, &w->impacts.x, &w->rates, &w->x_kept}}, {n_x, 1, {&w->known}},
+        {n_d, 8, {&w->d_before, &w->d_fired, &w->best, &w->respond_d}}, {n_d, 1, {&w->decided, &w->changed}},
+        {m->n_transitions, 1, {&w->wanting}}, {n_holds, sizeof(Terms), {&w->terms, &w->strike_terms}},
+        {n_holds, 8, {&w->weights, &w->base_weights, &w->use, &w->strike.before, &w->strike.approach}},
+        {n_holds, 8, {&w->strike.impulse, &w->strike.reaction, &w->begun}}, {n_holds, sizeof(int), {&w->standing}},
+        {n_holds, 1, {&w->held, &w->impacts.entered}},
+        {n_holds, 1, {&w->strike.entering, &w->strike.loose, &w->strike.held, &w->strike.knocked}},
+        {members, 8, {&w->reactions, &w->sizes, &w->zeros}},
+        {members, sizeof(int), {&w->places, &w->member, &w->pivots}}, {members, 1, {&w->other}}};
+    return PLACE(rooms, memory);
+}
+
+/* Lays out everything in one block, the state first; with memory == NULL only measures it. */
+static uint64_t lay_out(Instance *c, double *memory) {
+    uint64_t used = place_state(c, memory);
+    c->n_numbers = (size_t)used;
+    used += place_work(c->model, &c->work, memory == NULL ? NULL : memory + used);
+    return used + place_events(c->model, &c->work, memory == NULL ? NULL : memory + used);
+}
+
+static void set_tolerance(State *s, const Model *m, double relative) {
+    s->tolerance = relative;
+    s->absolute = relative * m->settings->absolute_to_relative;
 }
 
 void instance_reset(Instance *c) {
     State *s = &c->state;
     memset(s, 0, sizeof *s);
+    memset(c->numbers, 0, c->n_numbers * sizeof(double));
     s->phase = PHASE_INSTANTIATED;
-    s->tolerance = DEFAULT_TOLERANCE;
-    c->variables_valid = 0;
+    set_tolerance(s, c->model, c->model->settings->default_tolerance);
+    c->variables_valid = c->look_valid = 0;
     start_defaults(c);
 }
 
-Instance *instance_new(const char *name, const char *token, void *(*allocate)(size_t, size_t), void (*release)(void *),
-    LogFunction log, AnyFunction logger, void *environment, int logging) {
-    Instance bare = {0}, *c;
-    size_t length = name == NULL ? 0 : strlen(name);
-    bare.log = log;
-    bare.logger = logger;
-    bare.environment = environment;
-    bare.name = (char *)(length ? name : "?");
-    if (length == 0) {
-        report(&bare, LOG_ERROR, RESULT_ERROR, "The instance needs a name.");
-        return NULL;
-    }
-    if (token == NULL || strcmp(token, model_token) != 0) {
-        report(&bare, LOG_ERROR, RESULT_ERROR, "The instantiation token is that of another export of the model.");
-        return NULL;
-    }
-    c = allocate(1, sizeof *c);
+static Instance *instance_make(const Instance *bare) {
+    const Model *m = bare->model;
+    size_t length = strlen(bare->name);
+    Instance measured = *bare, *c = bare->allocate(1, sizeof *c);
+    uint64_t size = lay_out(&measured, NULL);
     if (c == NULL) return NULL;
-    *c = bare;
-    c->memory = allocate(lay_out(&c->work, NULL), sizeof(double));
-    c->name = allocate(length + 1, 1);
-    if (c->memory == NULL || c->name == NULL) {
-        if (c->memory != NULL) release(c->memory);
-        if (c->name != NULL) release(c->name);
-        release(c);
-        report(&bare, LOG_ERROR, RESULT_ERROR, "There is not enough memory.");
+    *c = *bare;
+    c->numbers = size > SIZE_MAX / sizeof(double) ? NULL : bare->allocate((size_t)size, sizeof(double));
+    c->name = bare->allocate(length + 1, 1);
+    if (c->numbers == NULL || c->name == NULL) {
+        if (c->numbers != NULL) bare->release(c->numbers);
+        if (c->name != NULL) bare->release(c->name);
+        bare->release(c);
         return NULL;
     }
-    memcpy(c->name, name, length + 1);
-    lay_out(&c->work, c->memory);
-    memcpy(c->work.slots + SLOT_CONSTANTS, model_constants, N_CONSTANTS * sizeof(double));
-    c->log_enabled = logging ? LOG_ERROR | LOG_WARNING | LOG_EVENTS : LOG_ERROR;
-    c->allocate = allocate;
-    c->release = release;
+    memcpy(c->name, bare->name, length + 1);
+    lay_out(c, c->numbers);
+    share_out_specials(c);
+    memcpy(c->work.slots + m->slot_constants, m->constants, (size_t)m->n_constants * sizeof(double));
     instance_reset(c);
     return c;
 }
 
+/* An instance of a model, which must outlive it; NULL, with a message in the log, if there is none. */
+Instance *instance_new(const Model *model, const char *name, const char *token, Allocate allocate, Release release,
+    LogFunction log, AnyFunction logger, void *environment, int logging) {
+    Instance bare = {0}, *c;
+    bare.model = model;
+    bare.log = log;
+    bare.logger = logger;
+    bare.environment = environment;
+    bare.name = (char *)(name == NULL || *name == 0 ? "?" : name);
+    bare.allocate = allocate;
+    bare.release = release;
+    bare.log_enabled = logging ? LOG_ERROR | LOG_WARNING | LOG_EVENTS : LOG_ERROR;
+    if (name == NULL || *name == 0) {
+        report(&bare, LOG_ERROR, RESULT_ERROR, "The instance needs a name.");
+        return NULL;
+    }
+    if (token == NULL || strcmp(token, model->token) != 0) {
+        report(&bare, LOG_ERROR, RESULT_ERROR, "The instantiation token is that of another export of the model.");
+        return NULL;
+    }
+    c = instance_make(&bare);
+    if (c == NULL) report(&bare, LOG_ERROR, RESULT_ERROR, "There is not enough memory.");
+    return c;
+}
+
+/* The same with a model of its own: the one that is compiled in, or else the one in the folder of resources. */
+Instance *instance_open(const char *location, const char *name, const char *token, Allocate allocate, Release release,
+    LogFunction log, AnyFunction logger, void *environment, int logging) {
+    char message[MESSAGE_LENGTH];
+    Instance bare = {0}, *c;
+    Model *model = model_data_size > 0
+                       ? model_read((const unsigned char *)model_data, model_data_size, allocate, release, message)
+                       : model_open(location, allocate, release, message);
+    bare.log = log;
+    bare.logger = logger;
+    bare.environment = environment;
+    bare.name = (char *)(name == NULL || *name == 0 ? "?" : name);
+    if (model == NULL) {
+        report(&bare, LOG_ERROR, RESULT_ERROR, "%s", message);
+        return NULL;
+    }
+    c = instance_new(model, name, token, allocate, release, log, logger, environment, logging);
+    if (c == NULL) model_free(model);
+    else c->own_model = model;
+    return c;
+}
+
 void instance_free(Instance *c) {
-    void (*release)(void *) = c->release;
-    release(c->memory);
+    Release release = c->release;
+    if (c->own_model != NULL) model_free(c->own_model);
+    release(c->numbers);
     release(c->name);
     release(c);
 }
@@ -171,7 +267,7 @@ Result set_experiment(
             "The start time %g s must be finite and not after the stop time %g s.", start, stop);
     if (tolerance_defined && !(tolerance > 0 && tolerance < 1))
         return report(c, LOG_ERROR, RESULT_ERROR, "The tolerance must be between 0 and 1, not %g.", tolerance);
-    if (tolerance_defined) s->tolerance = tolerance;
+    if (tolerance_defined) set_tolerance(s, c->model, tolerance);
     s->t = s->start_time = s->u_time = start;
     s->stop_time_defined = stop_defined && isfinite(stop);
     s->stop_time = s->stop_time_defined ? stop : 0;
@@ -191,23 +287,28 @@ static uint64_t hash(const unsigned char *bytes, size_t size) { /* FNV-1a */
     return value;
 }
 
-static Header header_of(const State *s) {
-    Header h = {"MLSTATE", sizeof(State), 0, 0};
-    h.model = hash((const unsigned char *)model_token, strlen(model_token));
-    h.check = hash((const unsigned char *)s, sizeof *s);
+/* A copy is the state, and then its numbers. */
+static size_t copy_size(const Instance *c) { return sizeof(State) + c->n_numbers * sizeof(double); }
+
+static Header header_of(const Instance *c, const void *copy) {
+    Header h = {"MLSTATE", copy_size(c), 0, 0};
+    h.model = hash((const unsigned char *)c->model->token, strlen(c->model->token));
+    h.check = hash(copy, copy_size(c));
     return h;
 }
 
 Result state_copy_out(Instance *c, void **copy) {
-    if (*copy == NULL) *copy = c->allocate(1, sizeof(State));
+    if (*copy == NULL) *copy = c->allocate(1, copy_size(c));
     if (*copy == NULL) return report(c, LOG_ERROR, RESULT_ERROR, "There is not enough memory for a copy of the state.");
     memcpy(*copy, &c->state, sizeof(State));
+    memcpy((char *)*copy + sizeof(State), c->numbers, c->n_numbers * sizeof(double));
     return RESULT_OK;
 }
 
 Result state_copy_in(Instance *c, const void *copy) {
     memcpy(&c->state, copy, sizeof(State));
-    c->variables_valid = 0;
+    memcpy(c->numbers, (const char *)copy + sizeof(State), c->n_numbers * sizeof(double));
+    c->variables_valid = c->look_valid = 0;
     return RESULT_OK;
 }
 
@@ -216,30 +317,28 @@ void state_release(Instance *c, void **copy) {
     *copy = NULL;
 }
 
-size_t state_size(void) { return sizeof(Header) + sizeof(State); }
+size_t state_size(const Instance *c) { return sizeof(Header) + copy_size(c); }
 
 Result state_write(Instance *c, const void *copy, unsigned char *bytes, size_t size) {
-    Header h = header_of(copy);
-    if (size < state_size())
-        return report(c, LOG_ERROR, RESULT_ERROR, "The state needs %zu bytes, not %zu.", state_size(), size);
+    Header h = header_of(c, copy);
+    if (size < state_size(c))
+        return report(c, LOG_ERROR, RESULT_ERROR, "The state needs %zu bytes, not %zu.", state_size(c), size);
     memcpy(bytes, &h, sizeof h);
-    memcpy(bytes + sizeof h, copy, sizeof(State));
+    memcpy(bytes + sizeof h, copy, copy_size(c));
     return RESULT_OK;
 }
 
 Result state_read(Instance *c, const unsigned char *bytes, size_t size, void **copy) {
     Header h, expected;
-    State s;
-    if (size != state_size())
-        return report(c, LOG_ERROR, RESULT_ERROR, "A state of this model has %zu bytes, not %zu.", state_size(), size);
+    if (size != state_size(c))
+        return report(c, LOG_ERROR, RESULT_ERROR, "A state of this model has %zu bytes, not %zu.", state_size(c), size);
     memcpy(&h, bytes, sizeof h);
-    memcpy(&s, bytes + sizeof h, sizeof s);
-    expected = header_of(&s);
+    expected = header_of(c, bytes + sizeof h);
     if (memcmp(&h, &expected, sizeof h) != 0)
         return report(c, LOG_ERROR, RESULT_ERROR,
             "These bytes are no state of this model: it is another model's, or they are damaged.");
-    *copy = c->allocate(1, sizeof(State));
+    *copy = c->allocate(1, copy_size(c));
     if (*copy == NULL) return report(c, LOG_ERROR, RESULT_ERROR, "There is not enough memory for a copy of the state.");
-    memcpy(*copy, &s, sizeof s);
+    memcpy(*copy, bytes + sizeof h, copy_size(c));
     return RESULT_OK;
 }

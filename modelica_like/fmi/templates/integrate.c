@@ -7,34 +7,37 @@
 #include <string.h>
 #include "core.h"
 
-#define LOOKS 3 /* looks at the guards per step */
+#define MIDDLE 0.45 /* of a step: where guards are looked at besides its end; not where a period might */
+#define DEPTH 6     /* divisions of a step in which guards do not behave */
+#define BEHAVES 0.05
 #define LOCATED 1e-13
 #define MAX_TRIALS 60
 #define MAX_REJECTIONS 60
 #define NEAR 0.1
 #define SAME_POINT 1e-9 /* rounding of the importer's communication points */
-#define LEAST_LOOKS 500 /* steps per run, where guards could hide between longer ones */
+#define LEAST_STEPS 50  /* per run, where time itself is in the equations: a pulse could hide between longer ones */
 
 typedef struct { /* guards and their rates at a time within a step */
     double t, *values, *rates;
 } Look;
 
-static void clear_pending(State *s) {
-    s->event_pending = 0;
-    memset(s->wanting, 0, sizeof s->wanting);
+static void clear_pending(Instance *c) {
+    c->state.event_pending = 0;
+    memset(c->wanting, 0, (size_t)c->model->n_transitions);
 }
 
 void leave_piece(Instance *c) {
-    c->state.piece_valid = 0;
-    clear_pending(&c->state);
+    c->state.piece_valid = c->look_valid = 0;
+    clear_pending(c);
 }
 
 static int look_at(Instance *c, double t, double *point, Look *look) {
-    if (solve_implicit(c, t, point, point + N_X, 1) != RESULT_OK) return 0;
-    evaluate(c, &tape_guards, t, point, point + N_X, look->values);
+    const Model *m = c->model;
+    if (solve_implicit(c, t, point, point + m->n_x, 1) != RESULT_OK) return 0;
+    evaluate_special(c, SPECIAL_GUARDS, t, point, point + m->n_x, look->values);
     look->t = t;
-    look->rates = look->values + N_GUARDS;
-    for (int g = 0; g < N_GUARDS; g++) {
+    look->rates = look->values + m->n_guards;
+    for (int g = 0; g < m->n_guards; g++) {
         look->values[g] = number_or_false(look->values[g]);
         if (!isfinite(look->rates[g])) look->rates[g] = 0;
     }
@@ -79,13 +82,13 @@ static double cubic_guess(double g0, double r0, double g1, double r1) {
 /* Kinds of candidates per guard. */
 enum { QUIET, CROSSING, HUMP };
 
-static int find_candidates(const State *s, const Look *before, const Look *after, unsigned char *kinds) {
+static int find_candidates(const Instance *c, const Look *before, const Look *after, unsigned char *kinds) {
     double h = after->t - before->t;
     int any = 0;
-    for (int g = 0; g < N_GUARDS; g++) {
+    for (int g = 0; g < c->model->n_guards; g++) {
         double g0 = before->values[g], g1 = after->values[g];
         kinds[g] = QUIET;
-        if (!guard_active(s, g) || g0 > 0) continue;
+        if (!guard_active(c, g) || g0 > 0) continue;
         if (g1 > 0) kinds[g] = CROSSING;
         else if (is_hump(g0, before->rates[g] * h, g1, after->rates[g] * h)) kinds[g] = HUMP;
         any |= kinds[g] != QUIET;
@@ -93,29 +96,31 @@ static int find_candidates(const State *s, const Look *before, const Look *after
     return any;
 }
 
-/* Steps again from the beginning of the piece, to t. */
-static int trial(Instance *c, const Piece *whole, double t, Piece *piece, Look *look) {
-    double ignored;
-    if (t <= whole->begin) {
-        *piece = *whole;
-        piece->end = t;
-        memcpy(piece->last, whole->first, sizeof piece->last);
-    } else {
-        if (!rosenbrock_step(c, whole->begin, whole->first, t - whole->begin, 0, piece, &ignored)) return 0;
-        piece->end = t;
+/* To t: roughly by the dense output, or by a step again from the beginning of the piece. */
+static int trial(Instance *c, const Piece *whole, double t, int rough, Piece *piece, Look *look) {
+    const Model *m = c->model;
+    double ignored, *point = c->work.vector + m->n_z;
+    if (rough) {
+        piece_at(m, whole, t, point);
+        return look_at(c, t, point, look);
     }
-    return look_at(c, t, piece->last, look);
+    if (t <= whole->begin) {
+        memcpy(piece, whole, piece_size(m));
+        memcpy(last_of(m, piece), whole->points, (size_t)m->n_unknowns * sizeof(double));
+    } else if (!rosenbrock_step(c, whole->begin, whole->points, t - whole->begin, 1, piece, &ignored)) return 0;
+    piece->end = t;
+    return look_at(c, t, last_of(m, piece), look);
 }
 
-static double newton(const Look *look, const unsigned char *kinds) {
+static double newton(const Model *m, const Look *look, const unsigned char *kinds) {
     double step = INFINITY;
-    for (int g = 0; g < N_GUARDS; g++)
+    for (int g = 0; g < m->n_guards; g++)
         if (kinds[g] != QUIET && look->rates[g] > 0) step = fmin(step, -look->values[g] / look->rates[g]);
     return step;
 }
 
-static int any_positive(const Look *look, const unsigned char *kinds) {
-    for (int g = 0; g < N_GUARDS; g++)
+static int any_positive(const Model *m, const Look *look, const unsigned char *kinds) {
+    for (int g = 0; g < m->n_guards; g++)
         if (kinds[g] != QUIET && look->values[g] > 0) return 1;
     return 0;
 }
@@ -123,12 +128,13 @@ static int any_positive(const Look *look, const unsigned char *kinds) {
 /* A time at which a guard that rises and falls again is positive. */
 static int positive_top(Instance *c, const Piece *whole, const Look *before, const Look *after, unsigned char *kinds,
     Piece *piece, Look *look, double *time) {
-    for (int g = 0; g < N_GUARDS; g++) {
+    const Model *m = c->model;
+    for (int g = 0; g < m->n_guards; g++) {
         double low = before->t, high = after->t, h = high - low, t;
         if (kinds[g] != HUMP) continue;
         t = low + h * cubic_guess(before->values[g], before->rates[g] * h, after->values[g], after->rates[g] * h);
         for (int n = 0; n < MAX_TRIALS; n++) {
-            if (!trial(c, whole, t, piece, look)) return 0;
+            if (!trial(c, whole, t, 1, piece, look)) return 0;
             if (look->values[g] > 0) {
                 *time = t;
                 return 1;
@@ -143,41 +149,50 @@ static int positive_top(Instance *c, const Piece *whole, const Look *before, con
     return 0;
 }
 
-/* Finds the earliest zero of a candidate between two looks; `piece` then ends there, `look` tells the guards there. */
+/* Finds the earliest zero of a candidate between two looks, first roughly; `piece` then ends there, `look` tells the
+ * guards there. */
 static int locate(Instance *c, const Piece *whole, const Look *before, const Look *after, unsigned char *kinds,
     Piece *piece, Look *look) {
-    double low = before->t, high = after->t, h = high - low, t = high, tolerance = LOCATED * fmax(1, fabs(low));
-    if (!any_positive(after, kinds)) {
+    const Model *m = c->model;
+    double high = after->t, h = high - before->t, t = high, tolerance = LOCATED * fmax(1, fabs(before->t)), last;
+    if (!any_positive(m, after, kinds)) {
         if (!positive_top(c, whole, before, after, kinds, piece, look, &high)) return 0;
     }
-    for (int g = 0; g < N_GUARDS; g++)
+    for (int g = 0; g < m->n_guards; g++)
         if (kinds[g] != QUIET)
             t = fmin(t, before->t + h * cubic_guess(before->values[g], before->rates[g] * h, after->values[g],
                                             after->rates[g] * h));
     t = fmin(t, high);
-    for (int n = 0; n < MAX_TRIALS; n++) {
-        double step;
-        if (!trial(c, whole, t, piece, look)) return 0;
-        if (any_positive(look, kinds)) high = t;
-        else low = t;
-        step = newton(look, kinds);
-        if (fabs(step) <= tolerance) return 1;
-        if (high - low <= tolerance) break;
-        t = t + step > low && t + step < high ? t + step : 0.5 * (low + high);
+    last = high;
+    for (int rough = 1; rough >= 0; rough--) {
+        double low = before->t;
+        high = last;
+        for (int n = 0; n < MAX_TRIALS; n++) {
+            double step;
+            if (!trial(c, whole, t, rough, piece, look)) return 0;
+            if (any_positive(m, look, kinds)) high = t;
+            else low = t;
+            step = newton(m, look, kinds);
+            if (fabs(step) <= tolerance) {
+                if (rough) break;
+                return 1;
+            }
+            if (high - low <= tolerance) break;
+            t = t + step > low && t + step < high ? t + step : 0.5 * (low + high);
+        }
     }
-    return trial(c, whole, high, piece, look);
+    return trial(c, whole, high, 0, piece, look);
 }
 
 /* Which of the located guards want to fire. */
-static int mark_wanting(
-    Instance *c, const Piece *piece, const Look *look, const unsigned char *kinds, double tolerance) {
-    State *s = &c->state;
-    double *soon = look->values + 2 * (size_t)N_GUARDS;
+static int mark_wanting(Instance *c, Piece *piece, const Look *look, const unsigned char *kinds, double tolerance) {
+    const Model *m = c->model;
+    double *soon = look->values + 2 * (size_t)m->n_guards, *last = last_of(m, piece);
     int any = 0;
-    evaluate(c, &tape_guards_soon, piece->end, piece->last, piece->last + N_X, soon);
-    for (int g = 0; g < N_GUARDS; g++) {
+    evaluate(c, &m->tapes.guards_soon, piece->end, last, last + m->n_x, soon);
+    for (int g = 0; g < m->n_guards; g++) {
         int near = look->values[g] > 0 || (look->rates[g] > 0 && -look->values[g] <= 10 * tolerance * look->rates[g]);
-        if (kinds[g] != QUIET && near && number_or_false(soon[g]) > 0) any = s->wanting[model_guard_transition[g]] = 1;
+        if (kinds[g] != QUIET && near && number_or_false(soon[g]) > 0) any = c->wanting[m->guard_transition[g]] = 1;
     }
     return any;
 }
@@ -185,59 +200,97 @@ static int mark_wanting(
 /* Go on by the time resolution; what crossed and is still positive there wants to fire, else the search begins anew. */
 static int look_behind(
     Instance *c, const Piece *whole, double end, const unsigned char *kinds, Piece *piece, Look *look) {
+    const Model *m = c->model;
     double behind = fmin(piece->end + TIME_RESOLUTION * fmax(1, fabs(piece->end)), end);
-    if (!trial(c, whole, behind, piece, look)) return 0;
-    for (int g = 0; g < N_GUARDS; g++)
+    if (!trial(c, whole, behind, 0, piece, look)) return 0;
+    for (int g = 0; g < m->n_guards; g++)
         if (kinds[g] == CROSSING && look->values[g] > 0)
-            c->state.event_pending = c->state.wanting[model_guard_transition[g]] = 1;
+            c->state.event_pending = c->wanting[m->guard_transition[g]] = 1;
     return 1;
 }
 
-/* Looks for events in an accepted step; shortens it to the first. Returns 0 if the step must be shorter. */
-static int search_events(Instance *c) {
-    State *s = &c->state;
-    double *memory = c->work.guards_before, *point = c->work.vector + N_Z, t0 = s->piece.begin;
-    Look before = {0, memory, NULL}, after = {0, memory + 3 * (size_t)N_GUARDS, NULL},
-         found = {0, memory + 6 * (size_t)N_GUARDS, NULL};
-    unsigned char kinds[AT_LEAST_ONE(N_GUARDS)];
-    Piece whole = s->piece, *piece = &s->piece;
-    memcpy(point, whole.first, sizeof(double) * N_UNKNOWNS);
-    if (!look_at(c, t0, point, &before)) return 0;
-    /* What the last event left positive did not want to fire: it is on its way down. */
-    for (int g = 0; g < N_GUARDS; g++) before.values[g] = fmin(before.values[g], 0);
-    for (int k = 1; k <= LOOKS; k++) {
-        double t = k == LOOKS ? whole.end : t0 + (whole.end - t0) * k / LOOKS, *swap;
-        piece_at(&whole, t, point);
-        if (!look_at(c, t, point, &after)) return 0;
-        while (find_candidates(s, &before, &after, kinds)) {
-            double tolerance = LOCATED * fmax(1, fabs(t));
-            int late = 0;
-            if (!locate(c, &whole, &before, &after, kinds, piece, &found)) {
-                if (any_positive(&after, kinds)) return 0;
-                *piece = whole;
-                break;
-            }
-            if (mark_wanting(c, piece, &found, kinds, tolerance)) {
-                s->event_pending = 1;
-                return 1;
-            }
-            /* Positive for less than the time resolution: what the last event left is on its way down. */
-            for (int g = 0; g < N_GUARDS; g++) late |= kinds[g] == CROSSING;
-            if (late) return look_behind(c, &whole, t, kinds, piece, &found);
-            *piece = whole;
-            break;
+typedef enum { NOTHING, ENDED, TOO_LONG } Found;
+
+/* Looks for an event between two looks; shortens the piece to it. */
+static Found check_between(Instance *c, const Piece *whole, const Look *before, const Look *after) {
+    const Model *m = c->model;
+    Piece *piece = c->piece;
+    unsigned char *kinds = c->work.kinds;
+    double tolerance = LOCATED * fmax(1, fabs(after->t));
+    Look found = {0, c->work.looks + 3 * (size_t)m->n_guards * (DEPTH + 2), NULL};
+    int late = 0;
+    if (!find_candidates(c, before, after, kinds)) return NOTHING;
+    if (locate(c, whole, before, after, kinds, piece, &found)) {
+        if (mark_wanting(c, piece, &found, kinds, tolerance)) {
+            c->state.event_pending = 1;
+            return ENDED;
         }
-        swap = before.values;
-        before = after;
-        after.values = swap;
+        /* Positive for less than the time resolution: what the last event left is on its way down. */
+        for (int g = 0; g < m->n_guards; g++) late |= kinds[g] == CROSSING;
+        if (late) return look_behind(c, whole, after->t, kinds, piece, &found) ? ENDED : TOO_LONG;
+    } else if (any_positive(m, after, kinds)) return TOO_LONG;
+    memcpy(piece, whole, piece_size(m));
+    return NOTHING;
+}
+
+/* Are the guards between two looks what these tell of them? */
+static int behave(const Instance *c, const Look *before, const Look *middle, const Look *after) {
+    double h = after->t - before->t;
+    for (int g = 0; g < c->model->n_guards; g++) {
+        double g0 = before->values[g], g1 = after->values[g], value = middle->values[g];
+        double size = fmax(fabs(value), fmax(fabs(g0), fabs(g1)));
+        if (!guard_active(c, g) || g0 > 0 || g1 > 0 || value > 0) continue;
+        if (fabs(value - cubic(MIDDLE, g0, before->rates[g] * h, g1, after->rates[g] * h)) > BEHAVES * size) return 0;
     }
     return 1;
 }
 
-static double largest_step(const State *s) {
+static Found look_into(Instance *c, const Piece *whole, const Look *before, const Look *after, int depth) {
+    const Model *m = c->model;
+    Look middle = {0, c->work.looks + 3 * (size_t)m->n_guards * (size_t)(depth + 1), NULL};
+    double *point = c->work.vector + m->n_z, t = before->t + MIDDLE * (after->t - before->t);
+    int deeper;
+    Found found;
+    piece_at(m, whole, t, point);
+    if (!look_at(c, t, point, &middle)) return TOO_LONG;
+    deeper = depth > 1 && !behave(c, before, &middle, after);
+    found = deeper ? look_into(c, whole, before, &middle, depth - 1) : check_between(c, whole, before, &middle);
+    if (found != NOTHING) return found;
+    return deeper ? look_into(c, whole, &middle, after, depth - 1) : check_between(c, whole, &middle, after);
+}
+
+/* Looks for events in an accepted step; shortens it to the first. Returns 0 if the step must be shorter. */
+static int search_events(Instance *c) {
+    const Model *m = c->model;
+    double *point = c->work.vector + m->n_z;
+    size_t size = 2 * (size_t)m->n_guards;
+    Look before = {0, c->work.looks, NULL}, after = {0, c->work.looks + 3 * (size_t)m->n_guards, NULL};
+    Piece *whole = memcpy(c->work.whole, c->piece, piece_size(m));
+    Found found;
+    if (!c->look_valid) {
+        memcpy(point, whole->points, sizeof(double) * (size_t)m->n_unknowns);
+        if (!look_at(c, whole->begin, point, &before)) return 0;
+    }
+    c->look_valid = 1;
+    before.t = whole->begin;
+    before.rates = before.values + m->n_guards;
+    /* What the last event left positive did not want to fire: it is on its way down. */
+    for (int g = 0; g < m->n_guards; g++) before.values[g] = fmin(before.values[g], 0);
+    memcpy(point, last_of(m, whole), sizeof(double) * (size_t)m->n_unknowns);
+    if (!look_at(c, whole->end, point, &after)) return 0;
+    found = look_into(c, whole, &before, &after, DEPTH);
+    if (found == NOTHING) memcpy(before.values, after.values, size * sizeof(double));
+    else if (found == ENDED) c->look_valid = 0;
+    return found != TOO_LONG;
+}
+
+static double largest_step(const Instance *c) {
+    const Model *m = c->model;
+    const State *s = &c->state;
     double span = s->stop_time - s->start_time;
-    if (!s->stop_time_defined || !(span > 0)) return N_X == 0 ? 1e-3 : INFINITY;
-    return N_GUARDS > 0 || N_X == 0 ? span / LEAST_LOOKS : INFINITY;
+    if (m->n_x > 0 && !m->settings->rates_depend_on_time) return INFINITY;
+    if (!s->stop_time_defined || !(span > 0)) return m->n_x == 0 ? 1e-3 : INFINITY;
+    return span / LEAST_STEPS;
 }
 
 /* Below this, two times are the same. */
@@ -245,21 +298,22 @@ static double least_step(const State *s) { return 1e-15 * fmax(1, fabs(s->t)); }
 
 /* Takes one step from the present point towards `limit`, shorter where accuracy or an event asks for it. */
 static Result take_step(Instance *c, double limit) {
+    const Model *m = c->model;
     State *s = &c->state;
-    double first[AT_LEAST_ONE(N_UNKNOWNS)], wished = s->step > 0 ? s->step : first_step(c);
+    double *first = c->work.first, wished = s->step > 0 ? s->step : first_step(c);
     double least = least_step(s);
     int rejected = 0;
-    memcpy(first, s->x, N_X * sizeof(double));
-    memcpy(first + N_X, s->z, N_Z * sizeof(double));
-    wished = fmin(wished, largest_step(s));
+    memcpy(first, c->x, m->n_x * sizeof(double));
+    memcpy(first + m->n_x, c->z, m->n_z * sizeof(double));
+    wished = fmin(wished, largest_step(c));
     for (int n = 0; n < MAX_REJECTIONS; n++) {
         double error = 0, factor, h = wished;
         int cut = s->t + 1.0001 * h >= limit;
         if (cut) h = limit - s->t;
-        clear_pending(s);
+        clear_pending(c);
         if (h < least || !isfinite(h)) break;
-        if (!rosenbrock_step(c, s->t, first, h, 0, &s->piece, &error) || !isfinite(error)) error = 1e30;
-        if (cut) s->piece.end = limit;
+        if (!rosenbrock_step(c, s->t, first, h, rejected > 0, c->piece, &error) || !isfinite(error)) error = 1e30;
+        if (cut) c->piece->end = limit;
         factor = 0.9 * pow(fmax(error, 1e-10), -0.2);
         if (error > 1) {
             rejected++;
@@ -267,8 +321,8 @@ static Result take_step(Instance *c, double limit) {
             wished = h * fmax(0.1, factor);
             continue;
         }
-        if (solve_implicit(c, s->piece.end, s->piece.last, s->piece.last + N_X, 1) != RESULT_OK ||
-            (N_GUARDS > 0 && !search_events(c))) {
+        if (solve_implicit(c, c->piece->end, last_of(m, c->piece), last_of(m, c->piece) + m->n_x, 1) != RESULT_OK ||
+            (m->n_guards > 0 && !search_events(c))) {
             rejected++;
             s->n_rejected++;
             wished = 0.25 * h;
@@ -280,7 +334,7 @@ static Result take_step(Instance *c, double limit) {
         s->piece_valid = 1;
         if (c->log_enabled & LOG_INTEGRATOR)
             report(c, LOG_INTEGRATOR, RESULT_OK, "t = %.12g s: step %.3e s, error %.2e of the tolerance, %d rejected",
-                s->piece.end, s->piece.end - s->piece.begin, error, rejected);
+                c->piece->end, c->piece->end - c->piece->begin, error, rejected);
         return RESULT_OK;
     }
     leave_piece(c);
@@ -292,12 +346,13 @@ static Result take_step(Instance *c, double limit) {
 
 /* Makes a point of the piece the present one. */
 static Result move_to(Instance *c, double t) {
+    const Model *m = c->model;
     State *s = &c->state;
-    double *point = c->work.vector + N_Z;
-    piece_at(&s->piece, t, point);
+    double *point = c->work.vector + m->n_z;
+    piece_at(m, c->piece, t, point);
     s->t = t;
-    memcpy(s->x, point, N_X * sizeof(double));
-    memcpy(s->z, point + N_X, N_Z * sizeof(double));
+    memcpy(c->x, point, m->n_x * sizeof(double));
+    memcpy(c->z, point + m->n_x, m->n_z * sizeof(double));
     c->variables_valid = 0;
     s->z_valid = 0;
     return settle(c);
@@ -306,7 +361,6 @@ static Result move_to(Instance *c, double t) {
 /* Inputs, parameters or states moved from outside: go on from the present point. */
 static Result take_changes(Instance *c, int *event) {
     State *s = &c->state;
-    unsigned char wanting[AT_LEAST_ONE(N_TRANSITIONS)] = {0};
     *event = 0;
     if (!s->inputs_changed) return RESULT_OK;
     s->inputs_changed = 0;
@@ -314,16 +368,16 @@ static Result take_changes(Instance *c, int *event) {
     s->z_valid = 0;
     c->variables_valid = 0;
     if (settle(c) != RESULT_OK) return RESULT_ERROR;
-    *event = find_wanting(c, wanting, 1);
+    *event = find_wanting(c, nothing_wanting(c), 1);
     return RESULT_OK;
 }
 
 /* Fires what was located at the present point, or what wants to fire. */
 Result handle_event(Instance *c) {
     State *s = &c->state;
-    unsigned char wanting[AT_LEAST_ONE(N_TRANSITIONS)] = {0};
+    unsigned char *wanting = nothing_wanting(c);
     int located = s->event_pending;
-    if (located) memcpy(wanting, s->wanting, N_TRANSITIONS);
+    if (located) memcpy(wanting, c->wanting, c->model->n_transitions);
     leave_piece(c);
     s->at_event = 0;
     s->step = 0;
@@ -333,10 +387,7 @@ Result handle_event(Instance *c) {
     return RESULT_OK;
 }
 
-static int is_due(Instance *c) {
-    unsigned char wanting[AT_LEAST_ONE(N_TRANSITIONS)] = {0};
-    return N_MOMENTS > 0 && find_wanting(c, wanting, 0);
-}
+static int is_due(Instance *c) { return c->model->n_moments > 0 && find_wanting(c, nothing_wanting(c), 0); }
 
 /* Checks what the importer asks for and says where the step ends. */
 Result check_step(Instance *c, double point, double size, double *target) {
@@ -356,22 +407,24 @@ Result check_step(Instance *c, double point, double size, double *target) {
     return RESULT_OK;
 }
 
-/* Goes to `target`, or to the first event before it. */
+/* Goes to `target`, or to the first event before it; inputs may also move where an internal step has ended. */
 Arrival integrate_to(Instance *c, double target, int stop_at_events) {
     State *s = &c->state;
-    int held = s->inputs_changed, event;
+    int held = 0, event;
     if (s->at_event && handle_event(c) != RESULT_OK) return FAILED;
-    if (take_changes(c, &event) != RESULT_OK) return FAILED;
-    if (event) {
-        s->at_event = 1;
-        if (stop_at_events) return AT_EVENT;
-        if (handle_event(c) != RESULT_OK) return FAILED;
-    }
-    while (s->t < target) {
+    for (;;) {
+        held |= s->inputs_changed;
+        if (take_changes(c, &event) != RESULT_OK) return FAILED;
+        if (event) {
+            s->at_event = 1;
+            if (stop_at_events) return AT_EVENT;
+            if (handle_event(c) != RESULT_OK) return FAILED;
+        }
+        if (!(s->t < target)) return REACHED;
         if (!s->piece_valid && target - s->t < least_step(s)) {
             /* An event was located a rounding error before the target. */
             s->t = target;
-            break;
+            return REACHED;
         }
         if (!s->piece_valid) {
             double limit = s->stop_time_defined && s->stop_time >= target ? s->stop_time : INFINITY;
@@ -379,8 +432,8 @@ Arrival integrate_to(Instance *c, double target, int stop_at_events) {
             if (held) limit = fmin(limit, target);
             if (take_step(c, limit) != RESULT_OK) return FAILED;
         }
-        if (s->piece.end > target) return move_to(c, target) == RESULT_OK ? REACHED : FAILED;
-        if (move_to(c, s->piece.end) != RESULT_OK) return FAILED;
+        if (c->piece->end > target) return move_to(c, target) == RESULT_OK ? REACHED : FAILED;
+        if (move_to(c, c->piece->end) != RESULT_OK) return FAILED;
         s->piece_valid = 0;
         if (s->event_pending || is_due(c)) {
             s->at_event = 1;
@@ -389,5 +442,4 @@ Arrival integrate_to(Instance *c, double target, int stop_at_events) {
         }
         if (c->step_finished != NULL) target = fmin(target, fmax(c->step_finished(c), s->t));
     }
-    return REACHED;
 }

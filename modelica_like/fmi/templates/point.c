@@ -5,17 +5,25 @@
 
 #define MAX_NEWTON 50
 
-double input_at(const State *s, int k, double t) { return s->u[k] + s->u_rate[k] * (t - s->u_time); }
+double input_at(const Instance *c, int k, double t) { return c->u[k] + c->u_rate[k] * (t - c->state.u_time); }
 
-static void load(Instance *c, double t, const double *x, const double *z) {
+void load(Instance *c, double t, const double *x, const double *z) {
+    const Model *m = c->model;
     double *slots = c->work.slots;
-    const State *s = &c->state;
-    slots[SLOT_T] = t;
-    memcpy(slots + SLOT_X, x, N_X * sizeof(double));
-    memcpy(slots + SLOT_Z, z, N_Z * sizeof(double));
-    memcpy(slots + SLOT_P, s->p, N_P * sizeof(double));
-    for (int k = 0; k < N_U; k++) slots[SLOT_U + k] = input_at(s, k, t);
-    memcpy(slots + SLOT_D, s->d, N_D * sizeof(double));
+    slots[0] = t;
+    memcpy(slots + m->slot_x, x, m->n_x * sizeof(double));
+    memcpy(slots + m->slot_z, z, m->n_z * sizeof(double));
+    for (int k = 0; k < m->n_u; k++) slots[m->slot_u + k] = input_at(c, k, t);
+    if (memcmp(slots + m->slot_p, c->p, (size_t)m->n_p * sizeof(double)) != 0) {
+        for (int k = 0; k < m->n_p; k++) {
+            if (slots[m->slot_p + k] != c->p[k] && !c->work.tuned[k]) c->work.decided_by++;
+            slots[m->slot_p + k] = c->p[k];
+        }
+    }
+    if (memcmp(slots + m->slot_d, c->d, (size_t)m->n_d * sizeof(double)) != 0) {
+        memcpy(slots + m->slot_d, c->d, (size_t)m->n_d * sizeof(double));
+        c->work.decided_by++;
+    }
 }
 
 void evaluate(Instance *c, const Tape *tape, double t, const double *x, const double *z, double *outputs) {
@@ -31,19 +39,21 @@ static Result singular(Instance *c, double t, const char *names) {
 }
 
 Result solve_implicit(Instance *c, double t, const double *x, double *z, int quiet) {
+    const Model *m = c->model;
     double *step = c->work.vector, *matrix = c->work.dense_matrix, change = INFINITY;
-    int order[AT_LEAST_ONE(N_Z)];
-    if (N_Z == 0) return RESULT_OK;
+    int *order = c->work.order;
+    if (m->n_z == 0) return RESULT_OK;
     for (int round = 0; round < MAX_NEWTON; round++) {
-        evaluate(c, &tape_alg, t, x, z, step);
-        tape_run(&tape_alg_jacobian, c->work.slots, matrix);
-        for (int k = 0; k < N_Z; k++)
-            if (!isfinite(step[k])) return quiet ? RESULT_ERROR : singular(c, t, model_implicit_names[k]);
-        if (!lu_factor(N_Z, matrix, order)) return quiet ? RESULT_ERROR : singular(c, t, model_implicit_names[0]);
-        lu_solve(N_Z, matrix, order, step);
+        evaluate_special(c, SPECIAL_ALG, t, x, z, step);
+        run_special(c, SPECIAL_ALG_JACOBIAN, matrix);
+        for (int k = 0; k < m->n_z; k++)
+            if (!isfinite(step[k])) return quiet ? RESULT_ERROR : singular(c, t, text_of(m, m->implicit_names[k]));
+        if (!lu_factor(m->n_z, matrix, order))
+            return quiet ? RESULT_ERROR : singular(c, t, text_of(m, m->implicit_names[0]));
+        lu_solve(m->n_z, matrix, order, step);
         double moved = 0, largest = 0;
         change = 0;
-        for (int k = 0; k < N_Z; k++) {
+        for (int k = 0; k < m->n_z; k++) {
             z[k] -= step[k];
             change = fmax(change, fabs(step[k]) / (1 + fabs(z[k])));
             moved = fmax(moved, fabs(step[k]));
@@ -55,28 +65,29 @@ Result solve_implicit(Instance *c, double t, const double *x, double *z, int qui
     if (change <= 1e-9) return RESULT_OK;
     return quiet ? RESULT_ERROR
                  : report(c, LOG_ERROR, RESULT_ERROR, "The equations for %s were not solved at t = %.9g s.",
-                       model_implicit_names[0], t);
+                       text_of(m, m->implicit_names[0]), t);
 }
 
 Result check_singular(Instance *c) {
+    const Model *m = c->model;
     State *s = &c->state;
     double *values = c->work.rhs;
-    evaluate(c, &tape_determinants, s->t, s->x, s->z, values);
-    for (int k = 0; k < N_DETERMINANTS; k++)
-        if (!isfinite(values[k]) || fabs(values[k]) < 1e-12) return singular(c, s->t, model_singular_names[k]);
-    tape_run(&tape_rates, c->work.slots, values);
-    for (int k = 0; k < N_X; k++)
+    evaluate(c, &m->tapes.determinants, s->t, c->x, c->z, values);
+    for (int k = 0; k < m->n_determinants; k++)
+        if (!isfinite(values[k]) || fabs(values[k]) < 1e-12) return singular(c, s->t, text_of(m, m->singular_names[k]));
+    tape_run(&m->tapes.rates, c->work.slots, values);
+    for (int k = 0; k < m->n_x; k++)
         if (!isfinite(values[k]))
             return report(c, LOG_ERROR, RESULT_ERROR,
                 "The derivative of %s is not finite at t = %.9g s. Look for a mass, inertia or ratio of zero.",
-                model_state_names[k], s->t);
+                text_of(m, m->state_names[k]), s->t);
     return RESULT_OK;
 }
 
 /* Bring the implicit unknowns up to date with time, states, parameters and inputs. */
 Result settle(Instance *c) {
     if (c->state.z_valid) return RESULT_OK;
-    if (solve_implicit(c, c->state.t, c->state.x, c->state.z, 0) != RESULT_OK) return RESULT_ERROR;
+    if (solve_implicit(c, c->state.t, c->x, c->z, 0) != RESULT_OK) return RESULT_ERROR;
     c->state.z_valid = 1;
     return RESULT_OK;
 }

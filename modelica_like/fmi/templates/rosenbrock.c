@@ -9,7 +9,6 @@
 
 #define STAGES 8
 #define GAMMA 0.21193756319429014
-#define N N_UNKNOWNS
 
 static const double A[STAGES][STAGES - 1] = {
     {0},
@@ -47,106 +46,120 @@ static const double DENSE[3][STAGES] = {
 };
 
 static void evaluate_jacobian(Instance *c, double t, const double *y) {
+    const Model *m = c->model;
     Work *w = &c->work;
-    evaluate(c, &tape_rates, t, y, y + N_X, w->rhs);
-    tape_run(&tape_jacobian, w->slots, w->jacobian);
+    evaluate_special(c, SPECIAL_RATES, t, y, y + m->n_x, w->first_rates);
+    run_special(c, SPECIAL_JACOBIAN, w->jacobian);
 }
 
 /* Partial derivative of the right hand side by time, with inputs on their straight lines. */
 static void evaluate_time_slope(Instance *c, double t, const double *y, double *slope) {
+    const Model *m = c->model;
     Work *w = &c->work;
-    int moving = RATES_DEPEND_ON_TIME;
-    for (int k = 0; k < N_U; k++) moving |= c->state.u_rate[k] != 0;
-    memset(slope, 0, N * sizeof(double));
+    int moving = m->settings->rates_depend_on_time;
+    for (int k = 0; k < m->n_u; k++) moving |= c->u_rate[k] != 0;
+    memset(slope, 0, (size_t)m->n_unknowns * sizeof(double));
     if (!moving) return;
-    evaluate(c, &tape_rates, t, y, y + N_X, w->rhs);
-    memset(w->dots, 0, SLOT_RESULTS * sizeof(double));
-    w->dots[SLOT_T] = 1;
-    for (int k = 0; k < N_U; k++) w->dots[SLOT_U + k] = c->state.u_rate[k];
-    tape_tangent(&tape_rates, w->slots, w->dots, slope);
+    evaluate(c, &m->tapes.rates, t, y, y + m->n_x, w->rhs);
+    memset(w->dots, 0, m->slot_results * sizeof(double));
+    w->dots[0] = 1;
+    for (int k = 0; k < m->n_u; k++) w->dots[m->slot_u + k] = c->u_rate[k];
+    tape_tangent(&m->tapes.rates, w->slots, w->dots, slope);
 }
 
 /* M/(h gamma) - J, factorised. */
 static int factor(Instance *c, double h) {
+    const Model *m = c->model;
     Work *w = &c->work;
-    memset(w->matrix, 0, (size_t)pattern_step.n_nonzeros * sizeof(double));
-    for (int k = 0; k < N_JACOBIAN; k++) w->matrix[jacobian_to_step[k]] = -w->jacobian[k];
-    for (int k = 0; k < N_X; k++) w->matrix[step_diagonal[k]] += 1 / (h * GAMMA);
-    return qr_factor(&pattern_step, w->matrix, w);
+    memset(w->matrix, 0, (size_t)m->step.n_nonzeros * sizeof(double));
+    for (int k = 0; k < m->n_jacobian; k++) w->matrix[m->jacobian_to_step[k]] = -w->jacobian[k];
+    for (int k = 0; k < m->n_x; k++) w->matrix[m->step_diagonal[k]] += 1 / (h * GAMMA);
+    return qr_factor(&m->step, w->matrix, w);
 }
 
 static double error_norm(const Instance *c, const double *first, const double *last, const double *error) {
-    double sum = 0, rtol = c->state.tolerance, atol = ABSOLUTE_TO_RELATIVE * rtol;
-    if (N_X == 0) return 0;
-    for (int k = 0; k < N_X; k++) {
-        double weight = rtol * fmax(fabs(first[k]), fabs(last[k])) + atol * model_nominals[k];
+    const Model *m = c->model;
+    double sum = 0, rtol = c->state.tolerance, atol = c->state.absolute;
+    if (m->n_x == 0) return 0;
+    for (int k = 0; k < m->n_x; k++) {
+        double weight = rtol * fmax(fabs(first[k]), fabs(last[k])) + atol * m->nominals[k];
         sum += (error[k] / weight) * (error[k] / weight);
     }
-    return sqrt(sum / N_X);
+    return sqrt(sum / m->n_x);
 }
 
 /* Steps from `first` at t to t + h. With `keep_jacobian` that of the step before from the same point is used.
  * Returns 0 if the equations gave values that are not finite, or a singular matrix. */
 int rosenbrock_step(
     Instance *c, double t, const double *first, double h, int keep_jacobian, Piece *piece, double *error) {
+    const Model *m = c->model;
     Work *w = &c->work;
-    double *slope = w->stages + (size_t)STAGES * AT_LEAST_ONE(N), *y = w->point;
+    int n = m->n_unknowns;
+    size_t size = (size_t)n * sizeof(double);
+    double *last = last_of(m, piece), *slope = w->stages + (size_t)STAGES * (size_t)n, *y = w->point;
     piece->begin = t;
     piece->end = t + h;
-    memcpy(piece->first, first, N * sizeof(double));
+    memcpy(piece->points, first, size);
     if (!keep_jacobian) {
         evaluate_time_slope(c, t, first, slope);
         evaluate_jacobian(c, t, first);
     }
     if (!factor(c, h)) return 0;
+    c->state.n_evaluations += STAGES - keep_jacobian;
     for (int i = 0; i < STAGES; i++) {
-        double *stage = w->stages + (size_t)i * N;
-        memcpy(y, first, N * sizeof(double));
+        double *stage = w->stages + (size_t)i * n;
+        memcpy(y, first, size);
         for (int j = 0; j < i; j++)
-            for (int k = 0; k < N; k++) y[k] += A[i][j] * w->stages[j * N + k];
-        evaluate(c, &tape_rates, t + C_TIME[i] * h, y, y + N_X, stage);
+            for (int k = 0; k < n; k++) y[k] += A[i][j] * w->stages[j * n + k];
+        if (i == 0) memcpy(stage, w->first_rates, size);
+        else evaluate_special(c, SPECIAL_RATES, t + C_TIME[i] * h, y, y + m->n_x, stage);
         for (int j = 0; j < i; j++)
-            for (int k = 0; k < N_X; k++) stage[k] += C[i][j] / h * w->stages[j * N + k];
-        for (int k = 0; k < N; k++) {
+            for (int k = 0; k < m->n_x; k++) stage[k] += C[i][j] / h * w->stages[j * n + k];
+        for (int k = 0; k < n; k++) {
             stage[k] += h * D_TIME[i] * slope[k];
             if (!isfinite(stage[k])) return 0;
         }
-        qr_solve(&pattern_step, w, stage);
+        qr_solve(&m->step, w, stage);
     }
-    for (int k = 0; k < N; k++) {
-        piece->last[k] = y[k] + w->stages[(STAGES - 1) * N + k];
-        if (!isfinite(piece->last[k])) return 0;
+    for (int k = 0; k < n; k++) {
+        last[k] = y[k] + w->stages[(STAGES - 1) * n + k];
+        if (!isfinite(last[k])) return 0;
         for (int row = 0; row < 3; row++) {
             double sum = 0;
-            for (int i = 0; i < STAGES; i++) sum += DENSE[row][i] * w->stages[i * N + k];
-            piece->dense[row][k] = sum;
+            for (int i = 0; i < STAGES; i++) sum += DENSE[row][i] * w->stages[i * n + k];
+            last[(row + 1) * n + k] = sum;
         }
     }
-    *error = error_norm(c, first, piece->last, w->stages + (STAGES - 1) * N);
+    *error = error_norm(c, first, last, w->stages + (STAGES - 1) * n);
     return 1;
 }
 
+double *last_of(const Model *m, Piece *piece) { return piece->points + m->n_unknowns; }
+
+size_t piece_size(const Model *m) { return sizeof(Piece) + 5 * (size_t)m->n_unknowns * sizeof(double); }
+
 /* Dense output. */
-void piece_at(const Piece *piece, double t, double *point) {
+void piece_at(const Model *m, const Piece *piece, double t, double *point) {
     double s = (t - piece->begin) / (piece->end - piece->begin), r = 1 - s;
+    int n = m->n_unknowns;
+    const double *first = piece->points, *last = first + n, *a = last + n, *b = a + n, *c = b + n;
     if (t >= piece->end) {
-        memcpy(point, piece->last, N * sizeof(double));
+        memcpy(point, last, (size_t)n * sizeof(double));
         return;
     }
-    for (int k = 0; k < N; k++)
-        point[k] = r * piece->first[k] +
-                   s * (piece->last[k] + r * (piece->dense[0][k] + s * (piece->dense[1][k] + s * piece->dense[2][k])));
+    for (int k = 0; k < n; k++) point[k] = r * first[k] + s * (last[k] + r * (a[k] + s * (b[k] + s * c[k])));
 }
 
 /* A first step at which states change by a hundredth (Hairer, Norsett & Wanner I, II.4); states that are nothing but
  * rounding tell nothing about it. */
 double first_step(Instance *c) {
+    const Model *m = c->model;
     const State *s = &c->state;
     double size, speed, *rates = c->work.rhs;
-    evaluate(c, &tape_rates, s->t, s->x, s->z, rates);
-    size = error_norm(c, s->x, s->x, s->x);
-    speed = error_norm(c, s->x, s->x, rates);
-    if (!isfinite(speed) || N_X == 0) return 1e-3;
+    evaluate(c, &m->tapes.rates, s->t, c->x, c->z, rates);
+    size = error_norm(c, c->x, c->x, c->x);
+    speed = error_norm(c, c->x, c->x, rates);
+    if (!isfinite(speed) || m->n_x == 0) return 1e-3;
     if (size < 1e-5 || speed < 1e-5) return 1e-6;
     return fmax(0.01 * size / speed, TIME_RESOLUTION * fmax(1, fabs(s->t)));
 }

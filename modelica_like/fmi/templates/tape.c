@@ -138,7 +138,7 @@ static int is_binary(int operation) {
 }
 
 void tape_run(const Tape *tape, double *slots, double *outputs) {
-    double *result = slots + SLOT_RESULTS;
+    double *result = slots + tape->first_result;
     const Operands *operand = tape->operands;
     for (int r = 0; r < tape->n_runs; r++) {
         int count = tape->runs[r].count;
@@ -159,10 +159,10 @@ void tape_tangent(const Tape *tape, const double *slots, double *dots, double *o
         for (; k < end; k++) {
             const Operands *one = &tape->operands[k];
             double by_a, by_b, dot;
-            slopes(operation, slots[one->left], slots[one->right], slots[SLOT_RESULTS + k], &by_a, &by_b);
+            slopes(operation, slots[one->left], slots[one->right], slots[tape->first_result + k], &by_a, &by_b);
             dot = product(by_a, dots[one->left]);
             if (binary) dot += product(by_b, dots[one->right]);
-            dots[SLOT_RESULTS + k] = dot;
+            dots[tape->first_result + k] = dot;
         }
     }
     for (int n = 0; n < tape->n_outputs; n++) output_dots[n] = dots[tape->outputs[n]];
@@ -171,15 +171,15 @@ void tape_tangent(const Tape *tape, const double *slots, double *dots, double *o
 /* Adds to the bars of the arguments. */
 void tape_adjoint(const Tape *tape, const double *slots, double *bars, const double *output_bars) {
     int k = tape->n_operations;
-    memset(bars + SLOT_RESULTS, 0, (size_t)tape->n_operations * sizeof(double));
+    memset(bars + tape->first_result, 0, (size_t)tape->n_operations * sizeof(double));
     for (int n = 0; n < tape->n_outputs; n++) bars[tape->outputs[n]] += output_bars[n];
     for (int r = tape->n_runs - 1; r >= 0; r--) {
         int operation = tape->runs[r].operation, binary = is_binary(operation), first = k - tape->runs[r].count;
         while (--k >= first) {
             const Operands *one = &tape->operands[k];
-            double by_a, by_b, bar = bars[SLOT_RESULTS + k];
+            double by_a, by_b, bar = bars[tape->first_result + k];
             if (bar == 0) continue;
-            slopes(operation, slots[one->left], slots[one->right], slots[SLOT_RESULTS + k], &by_a, &by_b);
+            slopes(operation, slots[one->left], slots[one->right], slots[tape->first_result + k], &by_a, &by_b);
             bars[one->left] += product(by_a, bar);
             if (binary) bars[one->right] += product(by_b, bar);
         }
@@ -189,11 +189,11 @@ void tape_adjoint(const Tape *tape, const double *slots, double *bars, const dou
 
 /* Marks all slots on which marked outputs depend, whatever the values. */
 void tape_reaches(const Tape *tape, double *marks, const double *output_marks) {
-    memset(marks + SLOT_RESULTS, 0, (size_t)tape->n_operations * sizeof(double));
+    memset(marks + tape->first_result, 0, (size_t)tape->n_operations * sizeof(double));
     for (int n = 0; n < tape->n_outputs; n++)
         if (output_marks[n] != 0) marks[tape->outputs[n]] = 1;
     for (int k = tape->n_operations - 1; k >= 0; k--) {
-        if (marks[SLOT_RESULTS + k] == 0) continue;
+        if (marks[tape->first_result + k] == 0) continue;
         marks[tape->operands[k].left] = 1;
         marks[tape->operands[k].right] = 1;
     }

@@ -3,20 +3,22 @@
 #include <string.h>
 #include "core.h"
 
-const Variable *find_variable(uint32_t reference) {
-    int low = 0, high = N_VARIABLES - 1;
+#define OFFSET 1e-12
+
+const Variable *find_variable(const Model *m, uint32_t reference) {
+    int low = 0, high = m->n_variables - 1;
     while (low <= high) {
         int middle = low + (high - low) / 2;
-        if (model_variables[middle].reference == reference) return &model_variables[middle];
-        if (model_variables[middle].reference < reference) low = middle + 1;
+        if (m->variables[middle].reference == reference) return &m->variables[middle];
+        if (m->variables[middle].reference < reference) low = middle + 1;
         else high = middle - 1;
     }
     return NULL;
 }
 
 const Variable *known_variable(Instance *c, uint32_t reference, ValueType type) {
-    const Variable *v = find_variable(reference);
-    if (v != NULL && v->type == type) return v;
+    const Variable *v = find_variable(c->model, reference);
+    if (v != NULL && v->type == (int)type) return v;
     report(c, LOG_ERROR, RESULT_ERROR,
         v == NULL ? "There is no variable with value reference %u."
                   : "The variable with value reference %u is not of type %s.",
@@ -24,13 +26,29 @@ const Variable *known_variable(Instance *c, uint32_t reference, ValueType type) 
     return NULL;
 }
 
-static const double *all_variables(Instance *c) {
-    State *s = &c->state;
-    if (c->variables_valid) return c->work.variables;
-    if (settle(c) != RESULT_OK) return NULL;
-    evaluate(c, &tape_variables, s->t, s->x, s->z, c->work.variables);
-    c->variables_valid = 1;
-    return c->work.variables;
+/* Values that a tape gives, each computed once per point; NULL if there are none. */
+static const double *seen(Instance *c, const Variable *v) {
+    const Model *m = c->model;
+    const State *s = &c->state;
+    Work *w = &c->work;
+    const double *values = v->kind == KIND_DERIVED      ? w->seen_derived
+                           : v->kind == KIND_DERIVATIVE ? w->seen_rates
+                           : v->kind == KIND_GUARD      ? w->seen_indicators
+                                                        : w->variables;
+    if (v->kind == KIND_VARIABLE) ask_for(c, v->index);
+    if (c->variables_valid & 1 << v->kind) return values;
+    if (v->kind != KIND_DERIVED && settle(c) != RESULT_OK) return NULL;
+    switch (v->kind) {
+        case KIND_DERIVED: evaluate(c, &m->tapes.derived, s->t, c->x, c->z, w->seen_derived); break;
+        case KIND_DERIVATIVE:
+            evaluate_special(c, SPECIAL_RATES, s->t, c->x, c->z, w->rhs);
+            memcpy(w->seen_rates, w->rhs, (size_t)m->n_x * sizeof(double));
+            break;
+        case KIND_GUARD: get_indicators(c, w->seen_indicators); break;
+        default: evaluate_special(c, SPECIAL_VARIABLES, s->t, c->x, c->z, w->variables);
+    }
+    c->variables_valid |= 1 << v->kind;
+    return values;
 }
 
 /* In initialization mode, whatever was set since the last time must have its effect before anything is read. */
@@ -48,32 +66,17 @@ Result get_float(Instance *c, uint32_t reference, double *value) {
     if (v == NULL || make_ready(c, v) != RESULT_OK) return RESULT_ERROR;
     switch (v->kind) {
         case KIND_TIME: *value = s->t; return RESULT_OK;
-        case KIND_STATE: *value = s->x[v->index]; return RESULT_OK;
-        case KIND_PARAMETER: *value = s->p[v->index]; return RESULT_OK;
-        case KIND_INPUT: *value = input_at(s, v->index, s->t); return RESULT_OK;
-        case KIND_DISCRETE: *value = s->d[v->index]; return RESULT_OK;
-        case KIND_DERIVED:
-            evaluate(c, &tape_derived, s->t, s->x, s->z, c->work.guards);
-            *value = c->work.guards[v->index];
-            return RESULT_OK;
-        case KIND_DERIVATIVE:
-            if (settle(c) != RESULT_OK) return RESULT_ERROR;
-            evaluate(c, &tape_rates, s->t, s->x, s->z, c->work.rhs);
-            *value = c->work.rhs[v->index];
-            return RESULT_OK;
-        case KIND_GUARD:
-            if (settle(c) != RESULT_OK) return RESULT_ERROR;
-            get_indicators(c, c->work.guards);
-            *value = c->work.guards[v->index];
-            return RESULT_OK;
-        case KIND_VARIABLE: {
-            const double *values = all_variables(c);
+        case KIND_STATE: *value = c->x[v->index]; return RESULT_OK;
+        case KIND_PARAMETER: *value = c->p[v->index]; return RESULT_OK;
+        case KIND_INPUT: *value = input_at(c, v->index, s->t); return RESULT_OK;
+        case KIND_DISCRETE: *value = c->d[v->index]; return RESULT_OK;
+        default: {
+            const double *values = seen(c, v);
             if (values == NULL) return RESULT_ERROR;
             *value = values[v->index];
             return RESULT_OK;
         }
     }
-    return RESULT_ERROR;
 }
 
 /* Solves what getting a value from the present point needs. */
@@ -83,30 +86,37 @@ Result make_consistent(Instance *c) {
 }
 
 void get_derivatives(Instance *c, double *derivatives) {
+    const Model *m = c->model;
     State *s = &c->state;
-    evaluate(c, &tape_rates, s->t, s->x, s->z, c->work.rhs);
-    memcpy(derivatives, c->work.rhs, N_X * sizeof(double));
+    evaluate(c, &m->tapes.rates, s->t, c->x, c->z, c->work.rhs);
+    memcpy(derivatives, c->work.rhs, m->n_x * sizeof(double));
     rest_rates(c, derivatives);
 }
 
 /* Guards of active modes, as event iteration judges them: an indicator above zero is an event that wants to fire, so
- * that after every event all are at or below zero. The others are constant, so that nobody looks for their zeros. */
+ * that after every event all are below zero. The others are constant, so that nobody looks for their zeros. A root
+ * finder would take an indicator of exactly zero for a root at its first instant: what wants to stay is below zero by
+ * an offset. It shifts no event, as it is gone above zero; its size is that of rounding, and products of it do not
+ * underflow, by whose sign root finders judge. */
 void get_indicators(Instance *c, double *indicators) {
-    State *s = &c->state;
+    const Model *m = c->model;
     double *values = c->work.guards_before;
-    evaluate(c, &tape_guards_soon, s->t, s->x, s->z, values);
-    for (int k = 0; k < N_GUARDS; k++) indicators[k] = guard_active(s, k) ? number_or_false(values[k]) : -1;
+    evaluate(c, &m->tapes.guards_soon, c->state.t, c->x, c->z, values);
+    for (int k = 0; k < m->n_guards; k++) {
+        double value = guard_active(c, k) ? number_or_false(values[k]) : -1;
+        indicators[k] = value > 0 ? value : value - OFFSET;
+    }
 }
 
 Result get_mode(Instance *c, uint32_t reference, int *value) {
     const Variable *v = known_variable(c, reference, TYPE_ENUMERATION);
     if (v == NULL || make_ready(c, v) != RESULT_OK) return RESULT_ERROR;
-    *value = (int)c->state.d[v->index];
+    *value = (int)c->d[v->index];
     return RESULT_OK;
 }
 
 static Result refuse_value(Instance *c, const Variable *v, const char *why) {
-    return report(c, LOG_ERROR, RESULT_ERROR, "%s cannot be set: %s", v->name, why);
+    return report(c, LOG_ERROR, RESULT_ERROR, "%s cannot be set: %s", text_of(c->model, v->name), why);
 }
 
 static void touch(Instance *c) {
@@ -120,17 +130,22 @@ static int before_start(const State *s) {
 }
 
 static Result set_parameter(Instance *c, const Variable *v, double value) {
+    const Model *m = c->model;
     State *s = &c->state;
-    double low = model_parameter_min[v->index], high = model_parameter_max[v->index];
+    double low = m->parameter_min[v->index], high = m->parameter_max[v->index];
     if (!v->tunable && !before_start(s))
         return refuse_value(c, v, "it is a fixed parameter. Set it before the end of the initialization.");
     if (v->tunable && s->phase == PHASE_CONTINUOUS)
         return refuse_value(c, v, "tunable parameters change in event mode only.");
     if (value < low || value > high)
-        return report(c, LOG_ERROR, RESULT_ERROR, "%s = %g is out of range: it must be between %g and %g.", v->name,
-            value, low, high);
-    if (s->p[v->index] != value) touch(c);
-    s->p[v->index] = value;
+        return report(c, LOG_ERROR, RESULT_ERROR, "%s = %g is out of range: it must be between %g and %g.",
+            text_of(m, v->name), value, low, high);
+    if (c->p[v->index] != value) touch(c);
+    if (c->p[v->index] != value && !before_start(s) && !c->work.tuned[v->index]) {
+        c->work.tuned[v->index] = 1;
+        c->work.decided_by++;
+    }
+    c->p[v->index] = value;
     return RESULT_OK;
 }
 
@@ -139,11 +154,11 @@ static Result set_start(Instance *c, const Variable *v, double value) {
     if (!before_start(s))
         return refuse_value(c, v, "start values are settable before the end of the initialization only.");
     if (v->kind == KIND_DISCRETE) {
-        s->d[v->index] = value;
-        s->mode_given[v->index] = 1;
-    } else if (v->start >= 0 && v->start < N_STARTS) {
-        s->start_value[v->start] = value;
-        s->start_given[v->start] = 1;
+        c->d[v->index] = value;
+        c->mode_given[v->index] = 1;
+    } else if (v->start >= 0 && v->start < c->model->n_starts) {
+        c->start_value[v->start] = value;
+        c->start_given[v->start] = 1;
     } else return refuse_value(c, v, "it follows from other variables.");
     touch(c);
     return RESULT_OK;
@@ -156,11 +171,10 @@ Result set_float(Instance *c, uint32_t reference, double value) {
     if (!isfinite(value)) return refuse_value(c, v, "the value is not a finite number.");
     if (v->kind == KIND_PARAMETER) return set_parameter(c, v, value);
     if (v->kind != KIND_INPUT) return set_start(c, v, value);
-    if (input_at(s, v->index, s->t) == value && s->u_rate[v->index] == 0) return RESULT_OK;
-    for (int k = 0; k < N_U; k++) s->u[k] = input_at(s, k, s->t);
+    if (input_at(c, v->index, s->t) == value) return RESULT_OK;
+    for (int k = 0; k < c->model->n_u; k++) c->u[k] = input_at(c, k, s->t);
     s->u_time = s->t;
-    s->u[v->index] = value;
-    s->u_rate[v->index] = 0;
+    c->u[v->index] = value; /* its rate stays, in whatever order an importer gives the two */
     touch(c);
     return RESULT_OK;
 }
@@ -172,21 +186,22 @@ Result set_input_rate(Instance *c, uint32_t reference, double rate) {
     if (v == NULL) return RESULT_ERROR;
     if (v->kind != KIND_INPUT) return refuse_value(c, v, "it is no input, so it has no input derivative.");
     if (!isfinite(rate)) return refuse_value(c, v, "the derivative is not a finite number.");
-    if (s->u_rate[v->index] == rate) return RESULT_OK;
-    for (int k = 0; k < N_U; k++) s->u[k] = input_at(s, k, s->t);
+    if (c->u_rate[v->index] == rate) return RESULT_OK;
+    for (int k = 0; k < c->model->n_u; k++) c->u[k] = input_at(c, k, s->t);
     s->u_time = s->t;
-    s->u_rate[v->index] = rate;
+    c->u_rate[v->index] = rate;
     touch(c);
     return RESULT_OK;
 }
 
 Result set_mode(Instance *c, uint32_t reference, int64_t value) {
+    const Model *m = c->model;
     const Variable *v = known_variable(c, reference, TYPE_ENUMERATION);
     if (v == NULL) return RESULT_ERROR;
     if (v->kind != KIND_DISCRETE) return refuse_value(c, v, "it is calculated.");
-    if (value < 0 || value >= model_mode_counts[v->index])
-        return report(c, LOG_ERROR, RESULT_ERROR, "%s has no mode %lld: they are 0 to %d.", v->name, (long long)value,
-            model_mode_counts[v->index] - 1);
+    if (value < 0 || value >= m->modes[v->index].n_names)
+        return report(c, LOG_ERROR, RESULT_ERROR, "%s has no mode %lld: they are 0 to %d.", text_of(m, v->name),
+            (long long)value, m->modes[v->index].n_names - 1);
     return set_start(c, v, (double)value);
 }
 
@@ -198,11 +213,12 @@ Result set_time(Instance *c, double time) {
 }
 
 Result set_states(Instance *c, const double *x) {
-    for (int k = 0; k < N_X; k++)
+    const Model *m = c->model;
+    for (int k = 0; k < m->n_x; k++)
         if (!isfinite(x[k]))
             return report(c, LOG_ERROR, RESULT_ERROR, "%s cannot be set: the value is not a finite number.",
-                model_state_names[k]);
-    memcpy(c->state.x, x, N_X * sizeof(double));
+                text_of(m, m->state_names[k]));
+    memcpy(c->x, x, m->n_x * sizeof(double));
     c->state.z_valid = c->variables_valid = 0;
     return RESULT_OK;
 }

@@ -1,0 +1,273 @@
+"""The file that the compiled run-time reads a model from: tables and tapes as they lie in memory.
+
+A header (magic, format, number of sections, CRC-32 of the rest, size), one entry per section (number, size of a record,
+offset, count), then the sections, each aligned to 8 bytes. All is little-endian; texts are offsets in the section
+`text`. `model.c` reads the same sections in the same order, and checks every offset and index.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import struct
+import zlib
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+
+from modelica_like.compile.compiled import CompiledDae
+from modelica_like.fmi.interface import FmuVariable
+from modelica_like.fmi.sparse import QrPattern
+from modelica_like.fmi.start_tables import StartTables
+from modelica_like.fmi.tables import Tables
+from modelica_like.fmi.tape import OPERATIONS, Tape
+
+ABSOLUTE_TO_RELATIVE = 1e-2
+"""Absolute tolerance, in nominal values, over the relative one."""
+
+MODEL = "resources/model.bin"
+"""Where the file stands in an FMU."""
+FORMAT = 1
+_MAGIC = b"MLMODEL\0"
+_HEADER = struct.Struct("<8siiII")
+_ENTRY = struct.Struct("<4i")
+_ALIGNED = 8
+
+_INTEGER, _DOUBLE, _TEXT = "<i4", "<f8", "u1"
+
+
+def _record(integers: str, doubles: str = "") -> list[tuple[str, str]]:
+    """A record of integers and then doubles; names as in model.h."""
+    return [*((name, _INTEGER) for name in integers.split()), *((name, _DOUBLE) for name in doubles.split())]
+
+
+_START_OF = _record("position start", "factor")
+_START_ROW = _record("start node row")
+_QR = ("colind", "row", "v_colind", "v_row", "r_colind", "r_row", "row_place", "column_order")
+_TAPES = (
+    "rates", "jacobian", "alg", "alg_jacobian", "variables", "guards", "guards_soon", "moments", "resets",
+    "start_conditions", "start_values", "discrete_starts", "hold_terms", "determinants", "start_system",
+    "start_jacobian", "derived",
+)  # fmt: skip
+SECTIONS: dict[str, Any] = {
+    "settings": _record("n_d n_y steady rates_depend_on_time", "absolute_to_relative default_tolerance"),
+    "text": _TEXT,
+    "token": _TEXT,
+    **dict.fromkeys(("constants", "parameters", "parameter_min", "parameter_max"), _DOUBLE),
+    **dict.fromkeys(("inputs", "guesses", "z_guesses", "nominals"), _DOUBLE),
+    **dict.fromkeys(("state_names", "implicit_names", "singular_names"), _INTEGER),
+    "variables": [("reference", "<u4"), *_record("type kind index start tunable name")],
+    "transitions": [*_record("mode target timed index first_reset n_resets name notice"), ("sources", "<u8")],
+    "guard_transition": _INTEGER,
+    "resets": _record("kind index value target", "factor"),
+    "reset_nodes": _INTEGER,
+    "modes": _record("first_name n_names"),
+    "mode_names": _INTEGER,
+    "holds": _record("mode number loose motion state reaction approach moved name unused", "factor nominal"),
+    "circuits": _record("first_member n_members first"),
+    "members": _INTEGER,
+    "units": _INTEGER,
+    "start_modes": _record("mode target"),
+    **dict.fromkeys(("start_direct", "start_default", "start_x_guess", "start_z_guess"), _START_OF),
+    **dict.fromkeys(("start_rows", "start_dependent"), _START_ROW),
+    **dict.fromkeys(("start_zero", "start_columns", "steady_states", "jacobian_to_step", "step_diagonal"), _INTEGER),
+    **{f"{matrix}.{field}": _INTEGER for matrix in ("step", "start") for field in _QR},
+    **{
+        f"tapes.{tape}.{field}": kind
+        for tape in _TAPES
+        for field, kind in (
+            ("runs", _record("operation count")), ("operands", _record("left right")), ("outputs", _INTEGER),
+        )
+    },
+}  # fmt: skip
+"""Sections in the order of the file, with the type of their records."""
+
+_KINDS = ("time", "state", "der", "variable", "parameter", "derived", "input", "discrete", "guard")
+_TYPES = {"Float64": 0, "Enumeration": 1, "Int64": 1}
+_RESETS = ("state", "discrete", "value")
+_CODES = {name: code for code, name in enumerate(OPERATIONS)}
+
+
+def model_file(tables: Tables, variables: Sequence[FmuVariable], token: str, tolerance: float) -> bytes:
+    """Write the file of a model.
+
+    Args:
+        tables: everything about the model.
+        variables: its FMI variables.
+        token: GUID (2.0) or instantiation token (3.0) of the description.
+        tolerance: relative tolerance of Co-Simulation where the importer gives none.
+    """
+    text = _Text()
+    contents = _contents(tables, variables, tolerance, text)
+    contents |= {"token": np.frombuffer(token.encode() + b"\0", _TEXT), "text": np.frombuffer(text.joined(), _TEXT)}
+    entries, body = b"", bytearray()
+    first = _HEADER.size + _ENTRY.size * len(SECTIONS)
+    for number, (name, kind) in enumerate(SECTIONS.items()):
+        records = np.array(list(contents[name]), dtype=kind)
+        entries += _ENTRY.pack(number, records.itemsize, first + len(body), len(records))
+        body += records.tobytes()
+        body += bytes(-len(body) % _ALIGNED)
+    return _headed(entries + bytes(body))
+
+
+def _headed(rest: bytes) -> bytes:
+    return _HEADER.pack(_MAGIC, FORMAT, len(SECTIONS), zlib.crc32(rest), _HEADER.size + len(rest)) + rest
+
+
+def with_token(data: bytes, old: str, new: str) -> bytes:
+    """Return the file of a model with another token of the same length."""
+    return _headed(data[_HEADER.size :].replace(old.encode() + b"\0", new.encode() + b"\0"))
+
+
+def as_c(data: bytes) -> str:
+    """Write the file of a model as C text, in words of 8 bytes so that it is aligned."""
+    words = np.frombuffer(data, "<u8")
+    lines = (", ".join(f"{word:#x}u" for word in words[k : k + 6].tolist()) for k in range(0, len(words), 6))
+    return (
+        "/* The model, as model.c reads it. */\n"
+        '#include "model.h"\n\nconst uint64_t model_data[] = {\n    '
+        + ",\n    ".join(lines)
+        + "};\nconst size_t model_data_size = sizeof model_data;\n"
+    )
+
+
+class _Text:
+    """Texts one after the other; each is told by where it begins."""
+
+    def __init__(self) -> None:
+        self.places = {"": 0}
+        self.size = 1
+
+    def __call__(self, value: str) -> int:
+        if value not in self.places:
+            self.places[value] = self.size
+            self.size += len(value.encode()) + 1
+        return self.places[value]
+
+    def joined(self) -> bytes:
+        return b"".join(value.encode() + b"\0" for value in self.places)
+
+
+def _contents(tables: Tables, variables: Sequence[FmuVariable], tolerance: float, text: _Text) -> dict[str, Any]:
+    model, start, sizes = tables.model, tables.start, tables.slots.sizes
+    steady, moving = int(start.steady is not None), int(tables.rates_depend_on_time)
+    contents: dict[str, Any] = {
+        "settings": [(sizes["d"], sizes["y"], steady, moving, ABSOLUTE_TO_RELATIVE, tolerance)],
+        "constants": tables.slots.constants,
+        "parameters": model.p,
+        "parameter_min": [-math.inf if one.min is None else one.min for one in model.flat_parameters],
+        "parameter_max": [math.inf if one.max is None else one.max for one in model.flat_parameters],
+        "inputs": model.u,
+        "guesses": model.guesses,
+        "z_guesses": model.z_guesses,
+        "nominals": model.nominals,
+        "state_names": [text(name) for name in model.states],
+        "implicit_names": [text(name) for name in model.implicit],
+        "singular_names": [text(", ".join(names[:6])) for names, _ in model.singular],
+        "variables": [_variable(one, text) for one in sorted(variables, key=lambda one: one.reference)],
+        "jacobian_to_step": tables.to_step,
+        "step_diagonal": tables.diagonal,
+    }
+    contents |= _events(model, text) | _holds(model, text) | _starts(start)
+    for name, pattern in (("step", tables.step), ("start", tables.start_pattern)):
+        contents |= _pattern(name, pattern)
+    for tape in tables.tapes.values():
+        contents |= _tape(tape)
+    return contents
+
+
+def _events(model: CompiledDae, text: _Text) -> dict[str, Any]:
+    transitions: list[tuple[int, ...]] = []
+    resets: list[tuple[float, ...]] = []
+    for one in model.transitions:
+        path = model.flat_discretes[one.mode].path
+        changes = (len(resets), len(one.resets), text(path), text(_notice(path, one.notice)))
+        sources = sum(1 << source for source in one.sources)
+        transitions.append((one.mode, one.target, int(one.timed), one.index, *changes, sources))
+        resets += [(_RESETS.index(r.kind), r.index, r.value, r.target, r.factor) for r in one.resets]
+    guards = {one.index: k for k, one in enumerate(model.transitions) if not one.timed}
+    names = [text(name) for one in model.flat_discretes for name in one.names]
+    return {
+        "transitions": transitions,
+        "guard_transition": [guards[k] for k in range(len(guards))],
+        "resets": resets,
+        "reset_nodes": model.reset_nodes,
+        "modes": _counted(len(one.names) for one in model.flat_discretes),
+        "mode_names": names,
+        "start_modes": [(mode, target) for mode, target, _ in model.start_modes],
+    }
+
+
+def _counted(counts: Iterable[int]) -> list[tuple[int, int]]:
+    """Pairs of the first one and the number."""
+    found: list[tuple[int, int]] = []
+    for count in counts:
+        found.append((sum(found[-1]) if found else 0, count))
+    return found
+
+
+def _holds(model: CompiledDae, text: _Text) -> dict[str, Any]:
+    holds: list[tuple[float, ...]] = []
+    moved = _moved_from_outside(model)
+    for one in model.holds:
+        state, factor = one.state or (-1, 1.0)
+        name = text(model.flat_discretes[one.mode].path)
+        about = (one.reaction, one.approach, int(one.motion in moved), name, 0)
+        nominal = abs(model.flat_variables[one.motion].nominal)
+        holds.append((one.mode, one.number, one.loose, one.motion, state, *about, factor, nominal))
+    first = _counted(len(one.members) for one in model.circuits)
+    units = {str(one.unit): k for k, one in enumerate(model.flat_variables)}
+    return {
+        "holds": holds,
+        "circuits": [(*place, one.first) for place, one in zip(first, model.circuits, strict=True)],
+        "members": [k for circuit in model.circuits for k in circuit.members],
+        "units": [units[str(one.unit)] for one in model.flat_variables] if holds else [],
+    }
+
+
+def _moved_from_outside(model: CompiledDae) -> set[int]:
+    """Variables that something but states moves, such as a source of motion."""
+    if not model.circuits:
+        return set()
+    moving = (model.variables.name_in().index(name) for name in ("t", "u", "d"))
+    return {row for k in moving for row in model.variables.jac_sparsity(0, k).row()}
+
+
+def _notice(path: str, notice: str) -> str:
+    """Put the component's name before what is told, and parameters' names where their values would be."""
+    told = re.sub(r"\{(.*?)\}", r"\1", notice)
+    return f"{path.rpartition('.')[0]} {told}".strip() if notice else ""
+
+
+def _starts(start: StartTables) -> dict[str, Any]:
+    return {
+        "start_direct": start.direct,
+        "start_default": start.defaults,
+        "start_x_guess": start.x_guesses,
+        "start_z_guess": start.z_guesses,
+        "start_rows": start.rows,
+        "start_dependent": start.dependent,
+        "start_zero": start.zero,
+        "start_columns": start.columns,
+        "steady_states": start.steady or (),
+    }
+
+
+def _variable(one: FmuVariable, text: _Text) -> tuple[int, ...]:
+    kind, index = one.slot
+    start = -1 if one.start_entry is None else one.start_entry
+    tunable = int(kind == "parameter" and one.variability == "tunable")
+    return (one.reference, _TYPES[one.type], _KINDS.index(kind), index, start, tunable, text(one.name))
+
+
+def _pattern(name: str, one: QrPattern) -> dict[str, Any]:
+    return {f"{name}.{field}": getattr(one, field) for field in _QR}
+
+
+def _tape(tape: Tape) -> dict[str, Any]:
+    return {
+        f"tapes.{tape.name}.runs": [(_CODES[name], count) for name, count in tape.runs],
+        f"tapes.{tape.name}.operands": [(left, right) for _, left, right in tape.operations],
+        f"tapes.{tape.name}.outputs": tape.outputs,
+    }

@@ -1,0 +1,96 @@
+"""The C sources of the run-time: the same for all models.
+
+This module needs the standard library only, so that building a wheel can import it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Literal
+
+from modelica_like.errors import ExportError
+
+Version = Literal["2.0", "3.0"]
+Face = Literal["2.0", "3.0", "native"]
+
+_TEMPLATES = Path(__file__).parent / "templates"
+
+RUNTIME = (
+    "model.c",
+    "model_check.c",
+    "model_file.c",
+    "tape.c",
+    "linear.c",
+    "special.c",
+    "point.c",
+    "start.c",
+    "holds.c",
+    "impacts.c",
+    "events.c",
+    "rosenbrock.c",
+    "integrate.c",
+    "values.c",
+    "derivatives.c",
+    "taylor.c",
+    "instance.c",
+)
+LOG_CATEGORIES = {
+    "logStatusError": "errors: what went wrong, where, and what to do",
+    "logStatusWarning": "doubtful but possible requests",
+    "logEvents": "mode changes with their time",
+    "logIntegrator": "steps of the Co-Simulation integrator with their size and estimated error",
+}
+"""Log categories of every FMU with a description; errors are always reported."""
+
+_FACES = {
+    "2.0": ("fmi2.h", "fmi2.c", "fmi2_values.c"),
+    "3.0": ("fmi3.h", "fmi3.c", "fmi3_values.c", "fmi3_unused.c"),
+    "native": ("native.c",),
+}
+_HEADERS = {
+    "2.0": ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h"),
+    "3.0": ("fmi3Functions.h", "fmi3FunctionTypes.h", "fmi3PlatformTypes.h"),
+    "native": (),
+}
+
+
+def source_files(version: Version) -> tuple[str, ...]:
+    """Names of the C files that are compiled together."""
+    return ("model_data.c", *RUNTIME, *(name for name in _FACES[version] if name.endswith(".c")))
+
+
+def runtime_sources(faces: Iterable[Face]) -> dict[str, str]:
+    """Read the C sources of the run-time, with the functions by which it is called; no model is compiled in.
+
+    Returns:
+        File name to text; besides C files the headers that they include.
+
+    Raises:
+        ExportError: FMPy, which has the headers of the standard, is not installed.
+    """
+    wanted = tuple(faces)
+    return own_sources(wanted) | {name: _header(name) for face in wanted for name in _HEADERS[face]}
+
+
+def own_sources(faces: Iterable[Face]) -> dict[str, str]:
+    """Read the same without the headers of the standard."""
+    names = ("core.h", "model.h", "model_data.c", *RUNTIME, *(name for face in faces for name in _FACES[face]))
+    return {name: (_TEMPLATES / name).read_text(encoding="utf-8") for name in names}
+
+
+def licenses(version: Version) -> str:
+    """Return the licences of the sources in an FMU: that of the generated code, and that of the standard's headers."""
+    own = (_TEMPLATES / "license.txt").read_text(encoding="utf-8")
+    text = _header(_HEADERS[version][0])
+    comment = text[text.index("Copyright") : text.index("*/")]
+    lines = [line.strip().strip("-") for line in comment.splitlines()]
+    return f"The C code of the model:\n\n{own}\nThe headers fmi*.h:\n\n" + "\n".join(lines).strip() + "\n"
+
+
+def _header(name: str) -> str:
+    found = find_spec("fmpy")
+    if found is None or found.origin is None:
+        raise ExportError("FMPy is not installed; it has the headers of the standard.", advice="pip install fmpy")
+    return (Path(found.origin).parent / "c-code" / name).read_text(encoding="utf-8")

@@ -1,0 +1,195 @@
+/* Reads a model from the bytes of its file (model_file.py), and checks everything that the run-time relies on: whatever
+ * stands in a file, nothing is read or written outside of the tables. */
+#include <stdio.h>
+#include <string.h>
+#include "model.h"
+
+#define FORMAT 1
+#define LONGEST 0x10000000 /* slots, so that their sums stay integers */
+
+typedef struct {
+    char magic[8];
+    int version, n_sections;
+    uint32_t check, size; /* CRC-32 of all that follows; bytes of the file */
+} FileHeader;
+typedef struct {
+    int id, record, offset, count;
+} Section;
+
+/* Sections in the order of SECTIONS in model_file.py. Tables that share a count have as many records. */
+#define TABLE(table, count) {#table, sizeof *((Model *)0)->table, offsetof(Model, table), offsetof(Model, count)}
+#define QR(matrix)                                                                                                    \
+    TABLE(matrix.colind, matrix.n_ends), TABLE(matrix.row, matrix.n_nonzeros), TABLE(matrix.v_colind, matrix.n_ends), \
+        TABLE(matrix.v_row, matrix.n_v), TABLE(matrix.r_colind, matrix.n_ends), TABLE(matrix.r_row, matrix.n_r),      \
+        TABLE(matrix.row_place, matrix.size), TABLE(matrix.column_order, matrix.size)
+#define TAPE(tape)                                                                                  \
+    TABLE(tapes.tape.runs, tapes.tape.n_runs), TABLE(tapes.tape.operands, tapes.tape.n_operations), \
+        TABLE(tapes.tape.outputs, tapes.tape.n_outputs)
+
+static const struct {
+    const char *name;
+    size_t record, table, count;
+} tables[] = {TABLE(settings, n_settings), TABLE(text, n_text), TABLE(token, n_token), TABLE(constants, n_constants),
+    TABLE(parameters, n_p), TABLE(parameter_min, n_p), TABLE(parameter_max, n_p), TABLE(inputs, n_u),
+    TABLE(guesses, n_x), TABLE(z_guesses, n_z), TABLE(nominals, n_x), TABLE(state_names, n_x),
+    TABLE(implicit_names, n_z), TABLE(singular_names, n_determinants), TABLE(variables, n_variables),
+    TABLE(transitions, n_transitions), TABLE(guard_transition, n_guards), TABLE(resets, n_resets),
+    TABLE(reset_nodes, n_reset_nodes), TABLE(modes, n_modes), TABLE(mode_names, n_mode_names), TABLE(holds, n_holds),
+    TABLE(circuits, n_circuits), TABLE(members, n_members), TABLE(units, n_units), TABLE(start_modes, n_start_modes),
+    TABLE(start_direct, n_start_direct), TABLE(start_default, n_start_default), TABLE(start_x_guess, n_start_x_guess),
+    TABLE(start_z_guess, n_start_z_guess), TABLE(start_rows, n_start_unknowns),
+    TABLE(start_dependent, n_start_dependent), TABLE(start_zero, n_start_zero), TABLE(start_columns, n_start_unknowns),
+    TABLE(steady_states, n_steady), TABLE(jacobian_to_step, n_jacobian), TABLE(step_diagonal, n_x), QR(step), QR(start),
+    TAPE(rates), TAPE(jacobian), TAPE(alg), TAPE(alg_jacobian), TAPE(variables), TAPE(guards), TAPE(guards_soon),
+    TAPE(moments), TAPE(resets), TAPE(start_conditions), TAPE(start_values), TAPE(discrete_starts), TAPE(hold_terms),
+    TAPE(determinants), TAPE(start_system), TAPE(start_jacobian), TAPE(derived)};
+enum { N_TABLES = sizeof tables / sizeof tables[0] };
+
+/* As zlib has it, by four bits at a time. */
+static uint32_t crc32_of(const unsigned char *bytes, size_t size) {
+    static const uint32_t table[16] = {0x00000000, 0x1db71064, 0x3b6e20c8, 0x26d930ac, 0x76dc4190, 0x6b6b51f4,
+        0x4db26158, 0x5005713c, 0xedb88320, 0xf00f9344, 0xd6d6a3e8, 0xcb61b38c, 0x9b64c2b0, 0x86d3d2d4, 0xa00ae278,
+        0xbdbdf21c};
+    uint32_t value = 0xffffffff;
+    for (size_t k = 0; k < size; k++) {
+        value ^= bytes[k];
+        value = (value >> 4) ^ table[value & 15];
+        value = (value >> 4) ^ table[value & 15];
+    }
+    return ~value;
+}
+
+static int check_header(const unsigned char *bytes, size_t size, char *message) {
+    FileHeader h;
+    size_t first = sizeof h + N_TABLES * sizeof(Section);
+    if (size < sizeof h) return damaged(message, "it is cut off");
+    memcpy(&h, bytes, sizeof h);
+    if (memcmp(h.magic, "MLMODEL", 8) != 0) return damaged(message, "it is another kind of file");
+    if (h.version != FORMAT || h.n_sections != N_TABLES) {
+        snprintf(message, MESSAGE_LENGTH,
+            "The model file has format %d with %d tables, but this library reads format %d with %d. Export the model "
+            "again.",
+            h.version, h.n_sections, FORMAT, (int)N_TABLES);
+        return 0;
+    }
+    if (h.size != size || size < first) return damaged(message, "it is cut off");
+    if (h.check != crc32_of(bytes + sizeof h, size - sizeof h)) return damaged(message, "its checksum is wrong");
+    return (uintptr_t)bytes % sizeof(double) == 0 || damaged(message, "it is not aligned");
+}
+
+/* Finds the tables in the file, and their sizes. */
+static int find_tables(Model *m, const unsigned char *bytes, size_t size, char *message) {
+    const int unknown = -1;
+    size_t first = sizeof(FileHeader) + N_TABLES * sizeof(Section);
+    for (int k = 0; k < N_TABLES; k++) memcpy((char *)m + tables[k].count, &unknown, sizeof unknown);
+    for (int k = 0; k < N_TABLES; k++) {
+        Section s;
+        int count;
+        const void *table;
+        memcpy(&s, bytes + sizeof(FileHeader) + (size_t)k * sizeof s, sizeof s);
+        memcpy(&count, (char *)m + tables[k].count, sizeof count);
+        if (s.id != k || s.record != (int)tables[k].record || s.count < 0 || s.offset < 0 || s.offset % 8 != 0 ||
+            (uint64_t)s.offset < first || (uint64_t)s.offset + (uint64_t)s.count * tables[k].record > size ||
+            (count >= 0 && count != s.count))
+            return damaged(message, tables[k].name);
+        table = bytes + s.offset;
+        memcpy((char *)m + tables[k].table, &table, sizeof table);
+        memcpy((char *)m + tables[k].count, &s.count, sizeof s.count);
+    }
+    return 1;
+}
+
+/* ---- sizes that follow ------------------------------------------------------------------------------------------ */
+
+/* Where arguments lie in the slots of tapes. */
+static int lay_out_slots(Model *m, size_t size) {
+    Tape *tapes = (Tape *)(void *)&m->tapes;
+    int *const places[] = {
+        &m->slot_x, &m->slot_z, &m->slot_p, &m->slot_u, &m->slot_d, &m->slot_y, &m->slot_constants, &m->slot_results};
+    const int sizes[] = {1, m->n_x, m->n_z, m->n_p, m->n_u, m->n_d, m->n_y, m->n_constants};
+    int operations = 0;
+    int64_t used = 0;
+    for (int k = 0; k < N_TAPES; k++)
+        if (tapes[k].n_operations > operations) operations = tapes[k].n_operations;
+    if ((size_t)m->n_y > size) return 0;
+    for (size_t k = 0; k < sizeof sizes / sizeof sizes[0]; k++) {
+        used += sizes[k];
+        if (sizes[k] < 0 || used + operations > LONGEST) return 0;
+        *places[k] = (int)used;
+    }
+    m->n_slots = (int)used + operations;
+    for (int k = 0; k < N_TAPES; k++) tapes[k].first_result = m->slot_results;
+    return 1;
+}
+
+static int find_sizes(Model *m, size_t size, char *message) {
+    int64_t resets = 0;
+    if (m->n_settings != 1) return damaged(message, "settings");
+    m->n_d = m->settings->n_d;
+    m->n_y = m->settings->n_y;
+    m->n_unknowns = m->n_x + m->n_z;
+    m->n_nodes = m->tapes.variables.n_outputs;
+    m->n_derived = m->tapes.derived.n_outputs;
+    m->n_moments = m->tapes.moments.n_outputs;
+    m->n_starts = m->tapes.start_values.n_outputs;
+    m->n_start_values = m->tapes.start_system.n_outputs;
+    m->n_start_jacobian = m->tapes.start_jacobian.n_outputs;
+    m->n_reset_values = m->tapes.resets.n_outputs;
+    for (int k = 0; k < m->n_transitions; k++) {
+        if (m->transitions[k].first_reset != resets || m->transitions[k].n_resets < 0)
+            return damaged(message, "transitions.first_reset");
+        resets += m->transitions[k].n_resets;
+    }
+    if (resets != m->n_resets) return damaged(message, "transitions.n_resets");
+    for (int k = 0; k < m->n_circuits; k++)
+        if (m->circuits[k].n_members > m->most_members) m->most_members = m->circuits[k].n_members;
+    return lay_out_slots(m, size) || damaged(message, "its sizes");
+}
+
+/* Results of tapes are as many as the tables that they belong to have records. */
+static int check_sizes(const Model *m, char *message) {
+    const int64_t n_z = m->n_z;
+    const struct {
+        const char *name;
+        int64_t found, wanted;
+    } sizes[] = {{"rates", m->tapes.rates.n_outputs, m->n_unknowns},
+        {"jacobian", m->tapes.jacobian.n_outputs, m->n_jacobian}, {"alg", m->tapes.alg.n_outputs, n_z},
+        {"alg_jacobian", m->tapes.alg_jacobian.n_outputs, n_z * n_z},
+        {"guards", m->tapes.guards.n_outputs, 2 * (int64_t)m->n_guards},
+        {"guards_soon", m->tapes.guards_soon.n_outputs, m->n_guards},
+        {"start_conditions", m->tapes.start_conditions.n_outputs, m->n_start_modes},
+        {"discrete_starts", m->tapes.discrete_starts.n_outputs, m->n_d},
+        {"hold_terms", m->tapes.hold_terms.n_outputs, 4 * (int64_t)m->n_holds},
+        {"determinants", m->tapes.determinants.n_outputs, m->n_determinants},
+        {"start_jacobian", m->tapes.start_jacobian.n_outputs, m->start.n_nonzeros},
+        {"step", m->step.size, m->n_unknowns}, {"start", m->start.size, m->n_start_unknowns},
+        {"units", m->n_units, m->n_holds > 0 ? m->n_nodes : 0}};
+    for (size_t k = 0; k < sizeof sizes / sizeof sizes[0]; k++)
+        if (sizes[k].found != sizes[k].wanted) return damaged(message, sizes[k].name);
+    return m->n_modes <= m->n_d || damaged(message, "modes");
+}
+
+/* Reads a model from bytes that are aligned as numbers and outlive it. Returns NULL and a message for `message`, which
+ * has MESSAGE_LENGTH characters, if they are no model. */
+Model *model_read(const unsigned char *bytes, size_t size, Allocate allocate, Release release, char *message) {
+    Model *m;
+    if (!check_header(bytes, size, message)) return NULL;
+    m = allocate(1, sizeof *m);
+    if (m == NULL) {
+        snprintf(message, MESSAGE_LENGTH, "There is not enough memory.");
+        return NULL;
+    }
+    memset(m, 0, sizeof *m);
+    m->release = release;
+    if (find_tables(m, bytes, size, message) && find_sizes(m, size, message) && check_sizes(m, message) &&
+        check_model(m, message))
+        return m;
+    release(m);
+    return NULL;
+}
+
+void model_free(Model *m) {
+    Release release = m->release;
+    if (m->own != NULL) release(m->own);
+    release(m);
+}

@@ -1,0 +1,165 @@
+/* Checks the tables of a model: every index is one of the table that it points into. */
+#include <stdio.h>
+#include <string.h>
+#include "model.h"
+
+/* Tells that a file is no model; returns 0. */
+int damaged(char *message, const char *what) {
+    snprintf(message, MESSAGE_LENGTH, "The model file is damaged (%s). Export the model again.", what);
+    return 0;
+}
+
+/* ---- ranges ----------------------------------------------------------------------------------------------------- */
+
+typedef struct { /* integers of records, not below `low` and below `end` */
+    const char *name;
+    const void *first;
+    size_t stride;
+    int count, low, end;
+} Range;
+#define COLUMN(table, field, n, low, end) {#table "." #field, &m->table[0].field, sizeof m->table[0], n, low, end}
+#define ARRAY(table, n, end) {#table, m->table, sizeof(int), n, 0, end}
+
+static int check_ranges(const Range *ranges, size_t count, char *message) {
+    for (size_t k = 0; k < count; k++)
+        for (int i = 0; i < ranges[k].count; i++) {
+            int value;
+            memcpy(&value, (const char *)ranges[k].first + (size_t)i * ranges[k].stride, sizeof value);
+            if (value < ranges[k].low || value >= ranges[k].end) return damaged(message, ranges[k].name);
+        }
+    return 1;
+}
+
+static int check_events(const Model *m, char *message) {
+    const Range ranges[] = {ARRAY(mode_names, m->n_mode_names, m->n_text),
+        COLUMN(modes, first_name, m->n_modes, 0, m->n_mode_names + 1),
+        COLUMN(modes, n_names, m->n_modes, 0, m->n_mode_names + 1),
+        COLUMN(transitions, mode, m->n_transitions, 0, m->n_modes),
+        COLUMN(transitions, name, m->n_transitions, 0, m->n_text),
+        COLUMN(transitions, notice, m->n_transitions, 0, m->n_text),
+        ARRAY(guard_transition, m->n_guards, m->n_transitions), ARRAY(reset_nodes, m->n_reset_nodes, m->n_nodes),
+        COLUMN(resets, kind, m->n_resets, 0, N_RESET_KINDS), COLUMN(resets, value, m->n_resets, 0, m->n_reset_values),
+        COLUMN(holds, mode, m->n_holds, 0, m->n_modes), COLUMN(holds, motion, m->n_holds, 0, m->n_nodes),
+        COLUMN(holds, state, m->n_holds, -1, m->n_x), COLUMN(holds, reaction, m->n_holds, -1, m->n_nodes),
+        COLUMN(holds, approach, m->n_holds, 0, m->n_d), COLUMN(holds, name, m->n_holds, 0, m->n_text),
+        ARRAY(members, m->n_members, m->n_holds), COLUMN(circuits, first_member, m->n_circuits, 0, m->n_members + 1),
+        COLUMN(circuits, n_members, m->n_circuits, 0, m->n_members + 1),
+        COLUMN(circuits, first, m->n_circuits, 0, m->n_d + 1)};
+    if (!check_ranges(ranges, sizeof ranges / sizeof ranges[0], message)) return 0;
+    for (int k = 0; k < m->n_modes; k++)
+        if (m->modes[k].n_names > m->n_mode_names - m->modes[k].first_name) return damaged(message, "modes.n_names");
+    for (int k = 0; k < m->n_transitions; k++)
+        if (m->transitions[k].index < 0 ||
+            m->transitions[k].index >= (m->transitions[k].timed ? m->n_moments : m->n_guards))
+            return damaged(message, "transitions.index");
+    for (int k = 0; k < m->n_resets; k++) {
+        const Reset *one = &m->resets[k];
+        int index = one->kind == RESET_VALUE ? one->target : one->index;
+        int end = one->kind == RESET_VALUE ? m->n_reset_nodes : one->kind == RESET_STATE ? m->n_x : m->n_d;
+        if (index < 0 || index >= end) return damaged(message, "resets.index");
+    }
+    for (int k = 0; k < m->n_circuits; k++) {
+        const Circuit *one = &m->circuits[k];
+        int64_t n = one->n_members;
+        if (n > m->n_members - one->first_member || n * (n + 1) > m->n_d - one->first)
+            return damaged(message, "circuits.n_members");
+        for (int i = 0; i < one->n_members; i++)
+            if (m->holds[m->members[one->first_member + i]].reaction < 0) return damaged(message, "holds.reaction");
+    }
+    return 1;
+}
+
+static int check_starts(const Model *m, char *message) {
+    const Range ranges[] = {COLUMN(start_modes, mode, m->n_start_modes, 0, m->n_modes),
+        COLUMN(start_direct, position, m->n_start_direct, 0, m->n_x),
+        COLUMN(start_direct, start, m->n_start_direct, 0, m->n_starts),
+        COLUMN(start_default, position, m->n_start_default, 0, m->n_x),
+        COLUMN(start_default, start, m->n_start_default, 0, m->n_starts),
+        COLUMN(start_x_guess, position, m->n_start_x_guess, 0, m->n_x),
+        COLUMN(start_x_guess, start, m->n_start_x_guess, 0, m->n_starts),
+        COLUMN(start_z_guess, position, m->n_start_z_guess, 0, m->n_z),
+        COLUMN(start_z_guess, start, m->n_start_z_guess, 0, m->n_starts),
+        COLUMN(start_rows, start, m->n_start_unknowns, -1, m->n_starts),
+        COLUMN(start_rows, row, m->n_start_unknowns, 0, m->n_start_values),
+        COLUMN(start_dependent, start, m->n_start_dependent, 0, m->n_starts),
+        COLUMN(start_dependent, node, m->n_start_dependent, 0, m->n_nodes), ARRAY(start_zero, m->n_start_zero, m->n_x),
+        ARRAY(start_columns, m->n_start_unknowns, m->n_unknowns + m->n_y), ARRAY(steady_states, m->n_steady, m->n_x),
+        ARRAY(jacobian_to_step, m->n_jacobian, m->step.n_nonzeros), ARRAY(step_diagonal, m->n_x, m->step.n_nonzeros)};
+    return check_ranges(ranges, sizeof ranges / sizeof ranges[0], message);
+}
+
+static int check_variables(const Model *m, char *message) {
+    const int ends[N_KINDS] = {
+        1, m->n_x, m->n_x, m->n_nodes, m->n_p, m->n_derived, m->n_u, m->n_modes, m->n_guards}; /* as Kind */
+    const Range ranges[] = {ARRAY(state_names, m->n_x, m->n_text), ARRAY(implicit_names, m->n_z, m->n_text),
+        ARRAY(singular_names, m->n_determinants, m->n_text), COLUMN(variables, kind, m->n_variables, 0, N_KINDS),
+        COLUMN(variables, type, m->n_variables, 0, N_TYPES), COLUMN(variables, name, m->n_variables, 0, m->n_text)};
+    /* Texts end at the latest where their section ends. */
+    if (m->n_text == 0 || m->text[m->n_text - 1] != 0) return damaged(message, "text");
+    if (m->n_token == 0 || m->token[m->n_token - 1] != 0) return damaged(message, "token");
+    if (!check_ranges(ranges, sizeof ranges / sizeof ranges[0], message)) return 0;
+    for (int k = 0; k < m->n_variables; k++) {
+        const Variable *v = &m->variables[k];
+        if (v->index < 0 || v->index >= ends[v->kind]) return damaged(message, "variables.index");
+        if (v->type == TYPE_ENUMERATION && v->kind != KIND_DISCRETE) return damaged(message, "variables.type");
+        if (k > 0 && v->reference <= v[-1].reference) return damaged(message, "variables.reference");
+    }
+    return 1;
+}
+
+/* ---- tapes and patterns ----------------------------------------------------------------------------------------- */
+
+/* Operations read what stands before them. */
+static int check_tape(const Tape *tape) {
+    int64_t total = 0;
+    for (int k = 0; k < tape->n_runs; k++) {
+        const Run *run = &tape->runs[k];
+        if (run->operation < 0 || run->operation >= N_OPERATION_CODES || run->count < 0) return 0;
+        total += run->count;
+    }
+    if (total != tape->n_operations) return 0;
+    for (int k = 0; k < tape->n_operations; k++) {
+        int left = tape->operands[k].left, right = tape->operands[k].right, end = tape->first_result + k;
+        if (left < 0 || right < 0 || left >= end || right >= end) return 0;
+    }
+    for (int k = 0; k < tape->n_outputs; k++)
+        if (tape->outputs[k] < 0 || tape->outputs[k] >= tape->first_result + tape->n_operations) return 0;
+    return 1;
+}
+
+/* Columns of a sparse matrix; `least` entries in each. */
+static int check_columns(int size, const int *colind, const int *row, int count, int least) {
+    if (colind[0] != 0 || colind[size] != count) return 0;
+    for (int k = 0; k < size; k++)
+        if (colind[k + 1] > count || colind[k + 1] < colind[k] + least) return 0;
+    for (int k = 0; k < count; k++)
+        if (row[k] < 0 || row[k] >= size) return 0;
+    return 1;
+}
+
+static int check_pattern(const QrPattern *a) {
+    int n = a->size;
+    if (a->n_ends != n + 1 || !check_columns(n, a->colind, a->row, a->n_nonzeros, 0) ||
+        !check_columns(n, a->v_colind, a->v_row, a->n_v, 1) || !check_columns(n, a->r_colind, a->r_row, a->n_r, 1))
+        return 0;
+    for (int k = 0; k < n; k++) {
+        if (a->row_place[k] < 0 || a->row_place[k] >= n || a->column_order[k] < 0 || a->column_order[k] >= n) return 0;
+        /* The diagonal of R stands last in its column, and ends the search for it. */
+        for (int r = a->r_colind[k]; r < a->r_colind[k + 1]; r++)
+            if ((r < a->r_colind[k + 1] - 1) != (a->r_row[r] < k)) return 0;
+        if (a->r_row[a->r_colind[k + 1] - 1] != k) return 0;
+    }
+    return 1;
+}
+
+static int check_tapes(const Model *m, char *message) {
+    for (int k = 0; k < N_TAPES; k++)
+        if (!check_tape((const Tape *)(const void *)&m->tapes + k)) return damaged(message, "tapes");
+    if (!check_pattern(&m->step)) return damaged(message, "step");
+    return check_pattern(&m->start) || damaged(message, "start");
+}
+
+int check_model(const Model *m, char *message) {
+    return check_variables(m, message) && check_events(m, message) && check_starts(m, message) &&
+           check_tapes(m, message);
+}
