@@ -1,8 +1,8 @@
 """Sweeps of documents 000 and 003: runs per second by the compiled run-time and by IDAS.
 
 Run with `python benchmarks/sweep.py [RUNS]`. Comparisons with IDAS are included. Per second of CPU is per core; what a
-second core brings is measured in the same round. `python benchmarks/sweep.py 1000000 FOLDER` does document 000 only, with
-a checkpoint in that folder, and says what it took.
+second core brings is measured in the same round. `python benchmarks/sweep.py 1000000 FOLDER` does document 000 only,
+with a checkpoint in that folder, and says what it took.
 """
 
 from __future__ import annotations

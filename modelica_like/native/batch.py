@@ -82,7 +82,12 @@ class Batch:
         places = (one.ctypes.data for one in (self._readings, *numbers, values, failed))
         counts = options.points, options.max_events, runs, len(self._readings)
         arguments = BatchArguments(
-            *self._span, options.rtol, options.atol, *counts, *places, ctypes.pointer(stop or ctypes.c_int(0))
+            *self._span,
+            options.rtol,
+            options.atol,
+            *counts,
+            *places,
+            ctypes.pointer(ctypes.c_int(0) if stop is None else stop),
         )
         if self._native.library.batch(self._native.address, ctypes.byref(arguments)) < 0:
             raise MemoryError(f"There is no memory for runs of {self._native.name}.")
