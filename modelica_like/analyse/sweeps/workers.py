@@ -20,8 +20,8 @@ from typing import Any
 import numpy as np
 
 from modelica_like.analyse.sensitivity.outputs import read_output
+from modelica_like.analyse.sensitivity.readings import read_all
 from modelica_like.analyse.sweeps.native_runs import NativeRuns
-from modelica_like.analyse.sweeps.readings import read_all
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import ModelicaLikeError, WorkersLost, missing_extra
 from modelica_like.simulation import plan, simulate
