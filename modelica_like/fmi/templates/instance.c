@@ -123,126 +123,20 @@ static uint64_t place_work(const Model *m, Work *w, double *memory) {
     uint64_t left = special_size(m, N_SPECIALS, 0);
     uint64_t square =
         larger(larger(m->settings->steady ? 2 * steady * steady : 0, resets * n_x), members * (n_x + 3 * members));
-<<<<<<< HEAD
-    struct {
-        void *array;
-        uint64_t size;
-    } arrays[] = {
-        DOUBLES(c->x, n_x),
-        DOUBLES(c->z, n_z),
-        DOUBLES(c->p, m->n_p),
-        DOUBLES(c->u, m->n_u),
-        DOUBLES(c->d, m->n_d),
-        DOUBLES(c->u_rate, m->n_u),
-        DOUBLES(c->start_value, m->n_starts),
-        DOUBLES(c->piece, 2 + 5 * n),
-        BYTES(c->start_given, m->n_starts),
-        BYTES(c->mode_given, m->n_d),
-        BYTES(c->wanting, m->n_transitions),
-        DOUBLES(w->slots, (uint64_t)m->n_slots + left),
-        DOUBLES(w->dots, m->n_slots),
-        DOUBLES(w->jacobian, larger((uint64_t)m->n_jacobian, (uint64_t)m->n_start_jacobian)),
-        DOUBLES(w->matrix, m->step.n_nonzeros),
-        DOUBLES(w->qr_v, larger((uint64_t)m->step.n_v, (uint64_t)m->start.n_v)),
-        DOUBLES(w->qr_r, larger((uint64_t)m->step.n_r, (uint64_t)m->start.n_r)),
-        DOUBLES(w->qr_beta, larger(n, (uint64_t)m->start.size)),
-        DOUBLES(w->qr_work, larger(n, (uint64_t)m->start.size)),
-        DOUBLES(w->stages, 9 * n),
-        DOUBLES(w->point, n),
-        DOUBLES(w->variables, m->n_nodes),
-        DOUBLES(w->guards, small),
-        DOUBLES(w->guards_before, 2 * (uint64_t)m->n_guards),
-        DOUBLES(w->looks, 3 * (uint64_t)m->n_guards * MOST_LOOKS),
-        DOUBLES(w->rhs, larger(n, (uint64_t)m->n_determinants)),
-        DOUBLES(w->dense_matrix, n_z * n_z),
-        DOUBLES(w->square, square),
-        DOUBLES(w->vector, n + n_z),
-        DOUBLES(w->residual, n_z),
-        DOUBLES(w->start_unknowns, m->n_start_unknowns),
-        DOUBLES(w->start_values, m->n_starts),
-        DOUBLES(w->start_residual, larger((uint64_t)m->n_start_values, resets)),
-        INTEGERS(w->order, n_z),
-        BYTES(w->known, n_x),
-        BYTES(w->decided, m->n_d),
-        BYTES(w->wanting, m->n_transitions),
-        DOUBLES(w->d_before, m->n_d),
-        DOUBLES(w->x_before, n_x),
-        DOUBLES(w->d_fired, m->n_d),
-        DOUBLES(w->reset_values, resets),
-        DOUBLES(w->target_values, resets),
-        INTEGERS(w->targets, resets),
-        BYTES(w->changed, m->n_modes),
-        DOUBLES(w->first, n),
-        DOUBLES(w->whole, 2 + 5 * n),
-        BYTES(w->kinds, m->n_guards),
-        DOUBLES(w->terms, 4 * (uint64_t)m->n_holds),
-        DOUBLES(w->strike_terms, 4 * (uint64_t)m->n_holds),
-        BYTES(w->held, m->n_holds),
-        BYTES(w->other, members),
-        DOUBLES(w->weights, m->n_holds),
-        DOUBLES(w->base_weights, m->n_holds),
-        DOUBLES(w->use, m->n_holds),
-        DOUBLES(w->begun, m->n_holds),
-        INTEGERS(w->standing, m->n_holds),
-        DOUBLES(w->best, m->n_d),
-        DOUBLES(w->kept_z, n_z),
-        DOUBLES(w->reactions, members),
-        DOUBLES(w->sizes, members),
-        DOUBLES(w->zeros, members),
-        INTEGERS(w->places, members + 1),
-        INTEGERS(w->member, members + 1),
-        INTEGERS(w->pivots, members),
-        DOUBLES(w->strike.before, m->n_holds),
-        DOUBLES(w->strike.approach, m->n_holds),
-        DOUBLES(w->strike.impulse, m->n_holds),
-        DOUBLES(w->strike.reaction, m->n_holds),
-        BYTES(w->strike.entering, m->n_holds),
-        BYTES(w->strike.loose, m->n_holds),
-        BYTES(w->strike.held, m->n_holds),
-        BYTES(w->strike.knocked, m->n_holds),
-        DOUBLES(w->strike.jump, n_x),
-        DOUBLES(w->impacts.x, n_x),
-        BYTES(w->impacts.entered, m->n_holds),
-        DOUBLES(w->respond_d, m->n_d),
-        DOUBLES(w->respond_z, n_z),
-        DOUBLES(w->rates, n_x),
-        DOUBLES(w->x_kept, n_x),
-        DOUBLES(w->seen_rates, n_x),
-        DOUBLES(w->seen_indicators, m->n_guards),
-        DOUBLES(w->seen_derived, m->n_derived),
-        DOUBLES(w->first_rates, n),
-        INTEGERS(w->same, m->n_slots),
-        INTEGERS(w->places_of_slots, m->n_slots),
-        BYTES(w->known_slots, m->n_slots),
-        BYTES(w->needed_slots, m->n_slots),
-        BYTES(w->asked, m->n_nodes),
-        BYTES(w->tuned, m->n_p),
-        BYTES(w->special_runs, left * sizeof(Run)),
-        BYTES(w->special_operands, left * sizeof(Operands)),
-        INTEGERS(w->special_outputs, outputs),
-    };
-    for (size_t k = 0; k < sizeof arrays / sizeof arrays[0]; k++) {
-        double *place = memory == NULL ? NULL : memory + used;
-        memcpy(arrays[k].array, &place, sizeof place);
-        used += arrays[k].size + 1;
-        if (arrays[k].array == (void *)&c->wanting) c->n_numbers = (size_t)used;
-    }
-    return used;
-=======
     const Room rooms[] = {{m->n_slots + left, 8, {&w->slots}}, {3 * (uint64_t)m->n_slots, 8, {&w->dots}},
         {larger(m->n_jacobian, m->n_start_jacobian), 8, {&w->jacobian}}, {m->step.n_nonzeros, 8, {&w->matrix}},
         {larger(m->step.n_v, m->start.n_v), 8, {&w->qr_v}}, {larger(m->step.n_r, m->start.n_r), 8, {&w->qr_r}},
         {larger(n, m->start.size), 8, {&w->qr_beta, &w->qr_work, &w->start_unknowns}}, {9 * n, 8, {&w->stages}},
         {2 + 5 * n, 8, {&w->whole}}, {n, 8, {&w->point, &w->first}}, {n + n_z, 8, {&w->vector}},
         {larger(n, m->n_determinants), 8, {&w->rhs}}, {m->n_nodes, 8, {&w->variables}}, {small, 8, {&w->guards}},
-        {3 * n_guards * MOST_LOOKS, 8, {&w->guards_before}}, {n_guards, 1, {&w->kinds}},
+        {2 * n_guards, 8, {&w->guards_before}}, {3 * n_guards * MOST_LOOKS, 8, {&w->looks}}, {n_guards, 1, {&w->kinds}},
         {n_z * n_z, 8, {&w->dense_matrix}}, {n_z, 8, {&w->residual, &w->kept_z, &w->respond_z}},
         {n_z, sizeof(int), {&w->order}}, {square, 8, {&w->square}}, {m->n_starts, 8, {&w->start_values}},
         {larger(m->n_start_values, resets), 8, {&w->start_residual}},
         {resets, 8, {&w->reset_values, &w->target_values}}, {resets, sizeof(int), {&w->targets}},
         {n_x, 8, {&w->seen_rates}}, {n, 8, {&w->first_rates}}, {n_guards, 8, {&w->seen_indicators}},
         {m->n_derived, 8, {&w->seen_derived}}, {m->n_slots, sizeof(int), {&w->same, &w->places_of_slots}},
-        {m->n_slots, 1, {&w->known_slots, &w->needed_slots}}, {m->n_nodes, 1, {&w->asked}},
+        {m->n_slots, 1, {&w->known_slots, &w->needed_slots}}, {m->n_nodes, 1, {&w->asked}}, {m->n_p, 1, {&w->tuned}},
         {left, sizeof(Run), {&w->special_runs}}, {left, sizeof(Operands), {&w->special_operands}},
         {special_size(m, N_SPECIALS, 1), sizeof(int), {&w->special_outputs}}};
     return PLACE(rooms, memory);
@@ -252,10 +146,9 @@ static uint64_t place_work(const Model *m, Work *w, double *memory) {
 static uint64_t place_events(const Model *m, Work *w, double *memory) {
     uint64_t n_x = m->n_x, n_d = m->n_d, n_holds = m->n_holds;
     uint64_t members = m->most_members + 1;
-    const Room rooms[] = {{n_x, 8, {&w->x_before, &w->strike.jump, &w->impacts.x, &w->rates, &w->x_kept}},
-        {n_x, 1, {&w->known}}, {n_d, 8, {&w->d_before, &w->d_fired, &w->best, &w->respond_d}},
-        {n_d, 1, {&w->decided, &w->changed}}, {m->n_transitions, 1, {&w->wanting}},
-        {n_holds, sizeof(Terms), {&w->terms, &w->strike_terms}},
+    const Room rooms[] = {{n_x, 8, {&w->strike.jump, &w->impacts.x, &w->rates, &w->x_kept}}, {n_x, 1, {&w->known}},
+        {n_d, 8, {&w->d_before, &w->d_fired, &w->best, &w->respond_d}}, {n_d, 1, {&w->decided, &w->changed}},
+        {m->n_transitions, 1, {&w->wanting}}, {n_holds, sizeof(Terms), {&w->terms, &w->strike_terms}},
         {n_holds, 8, {&w->weights, &w->base_weights, &w->use, &w->strike.before, &w->strike.approach}},
         {n_holds, 8, {&w->strike.impulse, &w->strike.reaction, &w->begun}}, {n_holds, sizeof(int), {&w->standing}},
         {n_holds, 1, {&w->held, &w->impacts.entered}},
@@ -271,7 +164,6 @@ static uint64_t lay_out(Instance *c, double *memory) {
     c->n_numbers = (size_t)used;
     used += place_work(c->model, &c->work, memory == NULL ? NULL : memory + used);
     return used + place_events(c->model, &c->work, memory == NULL ? NULL : memory + used);
->>>>>>> main
 }
 
 static void set_tolerance(State *s, const Model *m, double relative) {
