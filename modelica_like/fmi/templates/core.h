@@ -115,7 +115,7 @@ typedef struct {
     double *start_unknowns, *start_values, *start_residual;
     int *order; /* pivots of the implicit equations */
     unsigned char *known, *decided, *wanting;
-    double *d_before, *x_before, *d_fired, *reset_values, *target_values;
+    double *d_before, *d_fired, *reset_values, *target_values;
     int *targets;
     unsigned char *changed;
     double *first; /* point before a step */
