@@ -12,10 +12,19 @@ EXAMPLES = Path(__file__).parents[2] / "examples"
 NETLISTS = sorted(
     path.relative_to(EXAMPLES).with_suffix("").as_posix()
     for path in EXAMPLES.rglob("*.toml")
-    if {"parts", "simulate"} <= set(content := tomllib.loads(path.read_text())) and "until" in content["simulate"]
+    if path.parent.name != "cosim"
+    and {"parts", "simulate"} <= set(content := tomllib.loads(path.read_text()))
+    and "until" in content["simulate"]
 )
 SLOW = {"msl/translational/PreLoad", "lepelletier", "msl/dcmachines/DCPM_Cooling", "msl/dcmachines/DCSE_SinglePhase"}
-UNDECIDED: dict[str, set[str]] = {}
+UNDECIDED = {
+    "components/h_bridge": {"load.load"},
+    "msl/rotational/LossyGearDemo2": {"bearingFriction.mode"},
+    "msl/rotational/OneWayClutch": {"oneWayClutch.mode"},
+    "msl/translational/PreLoad": {
+        f"{one}.{mode}" for one in ("innerContactA", "outerContactA") for mode in ("contact", "surfaces")
+    },
+}
 """Mode changes that rounding decides; docs/native.md says why."""
 RTOL = 1e-10
 
@@ -51,7 +60,8 @@ def test_both_solvers_agree(name):
     for mode in (expected.keys() | found.keys()) - UNDECIDED.get(name, set()):
         ours, theirs = found.get(mode, []), expected.get(mode, [])
         assert [one[:2] for one in ours] == [one[:2] for one in theirs], mode
-        assert np.allclose([one[2] for one in ours], [one[2] for one in theirs], rtol=0, atol=1e-6), mode
+        times = np.array([one[2] for one in ours]), np.array([one[2] for one in theirs])
+        assert np.abs(times[0] - times[1]).max(initial=0) < max(1e-6, 1e-10 * first.time[-1]), mode
     for one in second.segments:
         assert np.all(np.diff(one.times) > 0) or len(one.times) == 1
     assert first.time[-1] == second.time[-1]
