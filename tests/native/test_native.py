@@ -168,6 +168,20 @@ def test_an_unknown_solver():
         simulate(STARTUP, solver="nativ")
 
 
+def test_an_interrupt_keeps_what_was_done(monkeypatch):
+    monkeypatch.setattr(buffers, "_BREATH", 50)
+
+    def stop(time: float) -> None:
+        if time > 0.3:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt) as caught:
+        simulate(STARTUP, solver="native", progress=stop)
+    run = vars(caught.value)["run"]
+    assert 0.3 < run.time[-1] < 0.6
+    assert run.events[0].time < 0.3
+
+
 # -- handles -----------------------------------------------------------------------------------------------------------
 
 
