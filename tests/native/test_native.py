@@ -22,7 +22,19 @@ from modelica_like.errors import (
 from modelica_like.fmi import sources
 from modelica_like.fmi.build import build as compiled
 from modelica_like.fmi.build import native_platform
-from modelica_like.language import Assembly, Component, Equations, Events, Mode, Parameter, Variable, der, param, var
+from modelica_like.language import (
+    Assembly,
+    Component,
+    Equations,
+    Events,
+    Mode,
+    Parameter,
+    Variable,
+    der,
+    param,
+    sin,
+    var,
+)
 from modelica_like.native import buffers, model
 from modelica_like.native.library import Run, declared
 
@@ -143,6 +155,32 @@ class Exploding(Component):
 
     def equations(self) -> Equations:
         yield self.T * der(self.x) == self.x**2
+
+
+class Teeth(Component):
+    """Straight motion, over teeth of which its integrator knows nothing."""
+
+    x: Variable = var("1", "way")
+    T: Parameter = param("s", "time", default=1.0)
+    n: Parameter = param("1", "phase per way")
+    level: Parameter = param("1", "height at which they count")
+    place = Mode("between", "on")
+
+    def equations(self) -> Equations:
+        yield self.T * der(self.x) == 1
+
+    def events(self) -> Events:
+        height = sin(self.n * self.x)
+        yield self.place.go("between", "on", when=height > self.level)
+        yield self.place.go("on", "between", when=height < 0.9 * self.level - 0.1)
+
+
+@pytest.mark.parametrize("n", [7.0, 40.0])
+@pytest.mark.parametrize("level", [0.5, 0.9, 0.999])
+def test_guards_do_not_hide_between_long_steps(n, level):
+    run = simulate(Teeth(x=0.0, n=n, level=level), 1.0, solver="native")
+    expected = np.arange(np.arcsin(level) / n, 1.0, 2 * np.pi / n)
+    assert [one.time for one in run.events if one.after == "on"] == pytest.approx(expected, abs=1e-9)
 
 
 @pytest.mark.parametrize(("part", "kind"), [(Trembling, Chattering), (Exploding, StepFailed)])
