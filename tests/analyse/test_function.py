@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from modelica_like import build, load, simulation_function
-from modelica_like.errors import LanguageError, NoGradient
+from modelica_like.errors import ExportError, LanguageError, NoGradient
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 INPUTS = ("clutch_torque", "load_torque")
@@ -48,6 +48,27 @@ def test_value_and_jacobian_share_one_simulation() -> None:
     before = function.runs
     both([91.0, 13.0])
     assert function.runs == before + 1
+
+
+def test_values_alone_need_no_replay_and_are_those_of_it() -> None:
+    names = ["clutch.lock_time", "shaft1.tau", "at(shaft1.tau, 0.3 s)", "stored_energy"]
+    function = simulation_function(EXAMPLES / "machine_tool_startup.toml", ["k1", "J1.J"], names)
+    differentiated = []
+    function._differentiate = lambda solution, of=function._differentiate: differentiated.append(1) or of(solution)
+    point = [6000.0, 1.7]
+    alone = np.array(function(point)).ravel()
+    assert (function.runs, differentiated) == (1, [])
+    replayed = [one.value for one in function.at(point).outputs]
+    assert (function.runs, differentiated) == (1, [1])
+    assert alone == pytest.approx(replayed, rel=1e-7)
+
+
+def test_without_a_library_functions_take_idas(monkeypatch: pytest.MonkeyPatch) -> None:
+    def none() -> None:
+        raise ExportError("There is no C compiler.")
+
+    monkeypatch.setattr("modelica_like.native.model.library", none)
+    assert np.array(table()([90.0, 14.0])).ravel() == pytest.approx([J * w / 76, 90 * J * w**2 / 76 / 2], rel=1e-9)
 
 
 def test_adjoint_and_forward_products() -> None:

@@ -89,6 +89,13 @@ def test_energy_terms_are_results(run):
     np.testing.assert_allclose(run["clutch.loss_power"], run["clutch.tau"] * run["clutch.w_rel"], atol=1e-12)
 
 
+def test_energy_terms_at_one_instant_are_those_of_that_instant(run):
+    """10 rad/s at the start, 5 rad/s from 1 s on: 0.5 J w²."""
+    assert run.final["left.stored_energy"] == pytest.approx(12.5, rel=1e-6)
+    assert run.at(0.5)["left.stored_energy"] == pytest.approx(0.5 * 7.5**2, rel=1e-6)
+    assert run.at(0.5)["clutch.loss_power"] == pytest.approx(5.0 * 5.0, rel=1e-6)
+
+
 def test_unknown_names_are_told_with_a_suggestion(run):
     with pytest.raises(UnknownName, match=r"^Drive has no variable 'clutch\.tua'; did you mean 'clutch\.tau'\?"):
         run["clutch.tua"]
