@@ -9,8 +9,8 @@ from typing import Any
 from modelica_like.fmi.build import native_platform
 from modelica_like.fmi.runtime import runtime_library
 
-OK, FAILED, MORE = 0, 1, 2
-"""What functions return; MORE: a buffer is full, or it is time for a breath."""
+OK, FAILED, MORE, PAUSED = range(4)
+"""What functions return; runs also that a buffer is full, or that so many steps are done."""
 MESSAGE_LENGTH = 512
 
 _POINTER, _COUNT, _NUMBER, _CODE = c.c_void_p, c.c_int64, c.c_double, c.c_int
@@ -62,7 +62,11 @@ def library() -> Any:
     Raises:
         ExportError: it must be compiled, and there is no compiler, or the compiler failed.
     """
-    loaded = c.CDLL(str(runtime_library(native_platform())))
+    return declared(c.CDLL(str(runtime_library(native_platform()))))
+
+
+def declared(loaded: c.CDLL) -> Any:
+    """Declare the functions of a library."""
     for name, (result, arguments) in _SIGNATURES.items():
         function = getattr(loaded, f"native_{name}")
         function.restype, function.argtypes = result, arguments

@@ -239,7 +239,7 @@ static int behave(const Instance *c, const Look *before, const Look *middle, con
     for (int g = 0; g < c->model->n_guards; g++) {
         double g0 = before->values[g], g1 = after->values[g], value = middle->values[g];
         double size = fmax(fabs(value), fmax(fabs(g0), fabs(g1)));
-        if (!guard_active(c, g) || g0 > 0 || g1 > 0 || value > 0) continue;
+        if (!guard_active(c, g)) continue;
         if (fabs(value - cubic(MIDDLE, g0, before->rates[g] * h, g1, after->rates[g] * h)) > BEHAVES * size) return 0;
     }
     return 1;
