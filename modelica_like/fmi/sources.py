@@ -29,6 +29,7 @@ RUNTIME = (
     "events.c",
     "rosenbrock.c",
     "integrate.c",
+    "fixed.c",
     "values.c",
     "derivatives.c",
     "instance.c",

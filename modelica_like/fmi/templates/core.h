@@ -123,7 +123,9 @@ typedef struct {
 } StartRow;
 typedef struct {
     int n_d, n_y, steady, rates_depend_on_time;
+    int implicit_linear, unused; /* the implicit equations are linear in z */
     double absolute_to_relative, default_tolerance;
+    double fixed_step; /* 0: as accuracy asks for */
 } Settings;
 
 typedef struct Model { /* tables lie in the bytes of the file; texts are offsets in `text` */
@@ -212,6 +214,7 @@ typedef struct { /* an accepted integrator step: its first and last point, and t
 typedef struct { /* what changes; arrays of the model's sizes stand behind it, see `Instance` */
     double t, u_time;
     int phase, solved, z_valid, inputs_changed, piece_valid, event_pending, at_event;
+    int looked; /* the guards are known from the end of the last fixed step */
     double tolerance, start_time, stop_time;
     int stop_time_defined;
     double step;            /* next step size, 0: choose one */
@@ -282,6 +285,7 @@ typedef struct Instance {
     unsigned char *start_given, *mode_given;
     unsigned char *wanting; /* transitions that fire at the end of the piece */
     Piece *piece;
+    double *looks; /* guards and their rates at the end of the last fixed step */
     Work work;
     char *name;
     void *environment;
@@ -292,6 +296,8 @@ typedef struct Instance {
     int co_simulation, event_mode_used, early_return_allowed;
     Allocate allocate;
     Release release;
+    int bounded;         /* the work of a step is bounded: iterations end early */
+    int budget;          /* rounds of events and further pieces that are left of a bounded step */
     int variables_valid; /* work.variables belong to the present point */
 } Instance;
 
@@ -329,6 +335,7 @@ int choose_modes(Instance *c, unsigned char *decided);
 void hold_terms(Instance *c, Terms *terms);
 void mark_held(Instance *c, const Terms *terms, unsigned char *held);
 double largest_like(const Model *m, const double *values, int node);
+int anything_shared(const Instance *c);
 void share(Instance *c);
 void rest(Instance *c);
 void rest_rates(Instance *c, double *rates);
@@ -346,8 +353,7 @@ void note_change(Instance *c, int name, int mode, int target);
 unsigned char *nothing_wanting(Instance *c);
 
 /* rosenbrock.c */
-int rosenbrock_step(
-    Instance *c, double t, const double *first, double h, int keep_jacobian, Piece *piece, double *error);
+int rosenbrock_step(Instance *c, double t, const double *first, double h, Piece *piece, double *error);
 double *last_of(const Model *m, Piece *piece);
 size_t piece_size(const Model *m);
 void piece_at(const Model *m, const Piece *piece, double t, double *point);
@@ -359,6 +365,14 @@ Arrival integrate_to(Instance *c, double target, int stop_at_events);
 void leave_piece(Instance *c);
 Result handle_event(Instance *c);
 Result check_step(Instance *c, double point, double size, double *target);
+
+double cubic_guess(double g0, double r0, double g1, double r1);
+Result move_to(Instance *c, double t);
+Result take_changes(Instance *c, int *event);
+int is_due(Instance *c);
+
+/* fixed.c */
+Arrival step_fixed(Instance *c, double target);
 
 /* values.c */
 const Variable *find_variable(const Model *m, uint32_t reference);
@@ -379,7 +393,7 @@ Result directional(Instance *c, const uint32_t *unknowns, size_t n_unknowns, con
     const double *seed, double *result);
 Result adjoint(Instance *c, const uint32_t *unknowns, size_t n_unknowns, const uint32_t *knowns, size_t n_knowns,
     const double *seed, double *result);
-void adjoint_of_node(Instance *c, int node, double *by_state);
+void slope_of_node(Instance *c, int node, int again, double *by_state);
 Result output_rate(Instance *c, uint32_t reference, double *value);
 size_t dependencies(Instance *c, uint32_t unknown, uint32_t *knowns, size_t capacity, Result *result);
 

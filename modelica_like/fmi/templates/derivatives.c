@@ -159,15 +159,15 @@ Result adjoint(Instance *c, const uint32_t *unknowns, size_t n_unknowns, const u
 }
 
 /* Total derivative of a variable by the states, z following them. Reactions whose split is undetermined make the
- * equations for z singular; what depends on them is left out. */
-void adjoint_of_node(Instance *c, int node, double *by_state) {
+ * equations for z singular; what depends on them is left out. `again`: at the same point as the call before. */
+void slope_of_node(Instance *c, int node, int again, double *by_state) {
     const Model *m = c->model;
     Work *w = &c->work;
     State *s = &c->state;
     int *order = w->order, follows = 0;
     memset(w->dots, 0, m->slot_results * sizeof(double));
     c->variables_valid = 0;
-    evaluate(c, &m->tapes.variables, s->t, c->x, c->z, w->variables);
+    if (!again) evaluate(c, &m->tapes.variables, s->t, c->x, c->z, w->variables);
     memset(w->variables, 0, m->n_nodes * sizeof(double));
     w->variables[node] = 1;
     tape_adjoint(&m->tapes.variables, w->slots, w->dots, w->variables);
@@ -175,6 +175,7 @@ void adjoint_of_node(Instance *c, int node, double *by_state) {
     if (follows) {
         evaluate(c, &m->tapes.alg_jacobian, s->t, c->x, c->z, w->dense_matrix);
         adjoint_of_implicit(c, lu_factor(m->n_z, w->dense_matrix, order) ? order : NULL);
+        evaluate(c, &m->tapes.variables, s->t, c->x, c->z, w->variables);
     }
     memcpy(by_state, w->dots + m->slot_x, m->n_x * sizeof(double));
 }

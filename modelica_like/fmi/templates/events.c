@@ -73,9 +73,8 @@ int find_wanting(Instance *c, unsigned char *wanting, int guards_too) {
 static void drop_balanced(Instance *c, unsigned char *wanting) {
     const Model *m = c->model;
     State *s = &c->state;
-    double *soon = c->work.guards, *now = c->work.guards_before;
+    double *soon = c->work.guards /* from find_wanting */, *now = c->work.guards_before;
     if (m->n_guards == 0) return;
-    evaluate(c, &m->tapes.guards_soon, s->t, c->x, c->z, soon);
     evaluate(c, &m->tapes.guards, s->t, c->x, c->z, now);
     for (int k = 0; k < m->n_guards; k++)
         if (number_or_false(now[k]) < 0 && number_or_false(soon[k]) <= BALANCED * fabs(now[k]))
@@ -89,7 +88,7 @@ static void project(Instance *c, const int *targets, const double *values, int c
     double *slopes = c->work.square, *change = c->work.start_residual, *step = c->work.point;
     evaluate(c, &m->tapes.variables, s->t, c->x, c->z, c->work.variables);
     for (int k = 0; k < count; k++) change[k] = values[k] - c->work.variables[m->reset_nodes[targets[k]]];
-    for (int k = 0; k < count; k++) adjoint_of_node(c, m->reset_nodes[targets[k]], slopes + (size_t)k * m->n_x);
+    for (int k = 0; k < count; k++) slope_of_node(c, m->reset_nodes[targets[k]], k > 0, slopes + (size_t)k * m->n_x);
     least_squares(count, m->n_x, slopes, change, step);
     for (int k = 0; k < m->n_x; k++) c->x[k] += step[k];
 }
@@ -157,6 +156,7 @@ static Result share_anew(Instance *c, unsigned char *wanting) {
     State *s = &c->state;
     double *soon = c->work.guards;
     if (m->n_circuits == 0) return RESULT_OK;
+    if (c->bounded && !anything_shared(c)) return RESULT_OK;
     share(c);
     c->variables_valid = 0;
     if (solve_implicit(c, s->t, c->x, c->z, 0) != RESULT_OK) return RESULT_ERROR;
@@ -172,18 +172,23 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
     State *s = &c->state;
     Impacts *impacts = &c->work.impacts;
     double *before = c->work.d_before;
+    int rounds = ROUNDS + ALONE * m->n_holds;
     impacts->struck = 0;
     memset(impacts->entered, 0, (size_t)m->n_holds);
     if (find_wanting(c, wanting, !located)) {
         if (crowded(c) != RESULT_OK || share_anew(c, wanting) != RESULT_OK) return RESULT_ERROR;
     }
-    for (int round = 0; round < ROUNDS + ALONE * m->n_holds; round++) {
+    for (int round = 0; round < rounds; round++) {
         int any = 0;
         for (int k = 0; k < m->n_transitions; k++) {
             if (any && round >= TOGETHER) wanting[k] = 0;
             any |= wanting[k];
         }
         if (!any) return RESULT_OK;
+        if (c->bounded && --c->budget < 1) {
+            s->at_event = 1; /* the rest comes at the beginning of the next step */
+            return RESULT_OK;
+        }
         memcpy(before, c->d, (size_t)m->n_d * sizeof(double));
         fire(c, wanting, impacts);
         share(c);
@@ -192,10 +197,9 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
             check_singular(c) != RESULT_OK)
             return RESULT_ERROR;
         memset(wanting, 0, m->n_transitions);
-        find_wanting(c, wanting, 1);
-        drop_balanced(c, wanting);
+        if (find_wanting(c, wanting, 1) && !c->bounded) drop_balanced(c, wanting);
     }
     return report(c, LOG_ERROR, RESULT_ERROR,
         "Modes still switch after %d rounds at t = %.12g s. Give the switching a hysteresis, or smooth what drives it.",
-        ROUNDS + ALONE * m->n_holds, s->t);
+        rounds, s->t);
 }

@@ -94,6 +94,7 @@ static uint64_t lay_out(Instance *c, double *memory) {
         DOUBLES(c->u_rate, m->n_u),
         DOUBLES(c->start_value, m->n_starts),
         DOUBLES(c->piece, 2 + 5 * n),
+        DOUBLES(c->looks, m->settings->fixed_step > 0 ? 2 * (uint64_t)m->n_guards : 0),
         BYTES(c->start_given, m->n_starts),
         BYTES(c->mode_given, m->n_d),
         BYTES(c->wanting, m->n_transitions),

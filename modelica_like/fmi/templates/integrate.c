@@ -13,6 +13,7 @@
 #define MAX_REJECTIONS 60
 #define NEAR 0.1
 #define SAME_POINT 1e-9 /* rounding of the importer's communication points */
+#define SAME_PART 1e-6  /* of a fixed step */
 #define LEAST_LOOKS 500 /* steps per run, where guards could hide between longer ones */
 
 typedef struct { /* guards and their rates at a time within a step */
@@ -25,7 +26,7 @@ static void clear_pending(Instance *c) {
 }
 
 void leave_piece(Instance *c) {
-    c->state.piece_valid = 0;
+    c->state.piece_valid = c->state.looked = 0;
     clear_pending(c);
 }
 
@@ -42,7 +43,7 @@ static int look_at(Instance *c, double t, double *point, Look *look) {
     return 1;
 }
 
-static double cubic(double s, double g0, double r0, double g1, double r1) {
+static inline double cubic(double s, double g0, double r0, double g1, double r1) {
     double r = 1 - s;
     return g0 * (1 + 2 * s) * r * r + r0 * s * r * r + g1 * s * s * (3 - 2 * s) + r1 * s * s * (s - 1);
 }
@@ -56,7 +57,7 @@ static int is_hump(double g0, double r0, double g1, double r1) {
 }
 
 /* First zero of the cubic, or its top. */
-static double cubic_guess(double g0, double r0, double g1, double r1) {
+double cubic_guess(double g0, double r0, double g1, double r1) {
     double best = -INFINITY, place = 0.5;
     for (int k = 1; k <= 40; k++) {
         double value = cubic(k / 40.0, g0, r0, g1, r1);
@@ -104,7 +105,7 @@ static int trial(Instance *c, const Piece *whole, double t, Piece *piece, Look *
         piece->end = t;
         memcpy(last_of(m, piece), whole->points, (size_t)m->n_unknowns * sizeof(double));
     } else {
-        if (!rosenbrock_step(c, whole->begin, whole->points, t - whole->begin, 0, piece, &ignored)) return 0;
+        if (!rosenbrock_step(c, whole->begin, whole->points, t - whole->begin, piece, &ignored)) return 0;
         piece->end = t;
     }
     return look_at(c, t, last_of(m, piece), look);
@@ -267,7 +268,7 @@ static Result take_step(Instance *c, double limit) {
         if (cut) h = limit - s->t;
         clear_pending(c);
         if (h < least || !isfinite(h)) break;
-        if (!rosenbrock_step(c, s->t, first, h, 0, c->piece, &error) || !isfinite(error)) error = 1e30;
+        if (!rosenbrock_step(c, s->t, first, h, c->piece, &error) || !isfinite(error)) error = 1e30;
         if (cut) c->piece->end = limit;
         factor = 0.9 * pow(fmax(error, 1e-10), -0.2);
         if (error > 1) {
@@ -300,7 +301,7 @@ static Result take_step(Instance *c, double limit) {
 }
 
 /* Makes a point of the piece the present one. */
-static Result move_to(Instance *c, double t) {
+Result move_to(Instance *c, double t) {
     const Model *m = c->model;
     State *s = &c->state;
     double *point = c->work.vector + m->n_z;
@@ -314,7 +315,7 @@ static Result move_to(Instance *c, double t) {
 }
 
 /* Inputs, parameters or states moved from outside: go on from the present point. */
-static Result take_changes(Instance *c, int *event) {
+Result take_changes(Instance *c, int *event) {
     State *s = &c->state;
     *event = 0;
     if (!s->inputs_changed) return RESULT_OK;
@@ -343,7 +344,7 @@ Result handle_event(Instance *c) {
     return RESULT_OK;
 }
 
-static int is_due(Instance *c) {
+int is_due(Instance *c) {
     const Model *m = c->model;
     return m->n_moments > 0 && find_wanting(c, nothing_wanting(c), 0);
 }
@@ -351,13 +352,19 @@ static int is_due(Instance *c) {
 /* Checks what the importer asks for and says where the step ends. */
 Result check_step(Instance *c, double point, double size, double *target) {
     State *s = &c->state;
-    double slack = SAME_POINT * fmax(1, fabs(s->t));
+    double slack = SAME_POINT * fmax(1, fabs(s->t)), fixed = c->model->settings->fixed_step;
     *target = point + size;
     if (!isfinite(point) || fabs(point - s->t) > slack)
         return report(c, LOG_ERROR, RESULT_ERROR,
             "The communication point is %.12g s, but the instance stands at %.12g s.", point, s->t);
     if (!(size > 0) || !isfinite(*target))
         return report(c, LOG_ERROR, RESULT_ERROR, "The communication step size %g s is not positive.", size);
+    if (fixed > 0 && !(fabs(size / fixed - floor(size / fixed + 0.5)) <= SAME_PART && size > 0.5 * fixed))
+        return report(c, LOG_ERROR, RESULT_ERROR,
+            "The communication step size %.9g s is not a whole number of fixed steps of %.9g s, for which the model "
+            "was "
+            "exported.",
+            size, fixed);
     if (!s->stop_time_defined || *target <= s->stop_time) return RESULT_OK;
     if (*target > s->stop_time + slack)
         return report(c, LOG_ERROR, RESULT_ERROR, "The step to %.12g s goes beyond the stop time %.12g s.", *target,
@@ -370,6 +377,7 @@ Result check_step(Instance *c, double point, double size, double *target) {
 Arrival integrate_to(Instance *c, double target, int stop_at_events) {
     State *s = &c->state;
     int held = s->inputs_changed, event;
+    if (c->model->settings->fixed_step > 0) return step_fixed(c, target);
     if (s->at_event && handle_event(c) != RESULT_OK) return FAILED;
     if (take_changes(c, &event) != RESULT_OK) return FAILED;
     if (event) {

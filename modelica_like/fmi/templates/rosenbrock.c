@@ -45,26 +45,21 @@ static const double DENSE[3][STAGES] = {
         -59.78993625266729, -0.15582684282751913, 4.883087185713722},
 };
 
-static void evaluate_jacobian(Instance *c, double t, const double *y) {
-    const Model *m = c->model;
-    Work *w = &c->work;
-    evaluate(c, &m->tapes.rates, t, y, y + m->n_x, w->rhs);
-    tape_run(&m->tapes.jacobian, w->slots, w->jacobian);
-}
-
-/* Partial derivative of the right hand side by time, with inputs on their straight lines. */
-static void evaluate_time_slope(Instance *c, double t, const double *y, double *slope) {
+/* The right hand side, its partial derivatives by time, with inputs on their straight lines, and its Jacobian. */
+static void linearize(Instance *c, double t, const double *y, double *rates, double *slope) {
     const Model *m = c->model;
     Work *w = &c->work;
     int moving = m->settings->rates_depend_on_time;
     for (int k = 0; k < m->n_u; k++) moving |= c->u_rate[k] != 0;
+    evaluate(c, &m->tapes.rates, t, y, y + m->n_x, rates);
     memset(slope, 0, (size_t)m->n_unknowns * sizeof(double));
-    if (!moving) return;
-    evaluate(c, &m->tapes.rates, t, y, y + m->n_x, w->rhs);
-    memset(w->dots, 0, m->slot_results * sizeof(double));
-    w->dots[0] = 1;
-    for (int k = 0; k < m->n_u; k++) w->dots[m->slot_u + k] = c->u_rate[k];
-    tape_tangent(&m->tapes.rates, w->slots, w->dots, slope);
+    if (moving) {
+        memset(w->dots, 0, m->slot_results * sizeof(double));
+        w->dots[0] = 1;
+        for (int k = 0; k < m->n_u; k++) w->dots[m->slot_u + k] = c->u_rate[k];
+        tape_tangent(&m->tapes.rates, w->slots, w->dots, slope);
+    }
+    tape_run(&m->tapes.jacobian, w->slots, w->jacobian);
 }
 
 /* M/(h gamma) - J, factorised. */
@@ -88,10 +83,9 @@ static double error_norm(const Instance *c, const double *first, const double *l
     return sqrt(sum / m->n_x);
 }
 
-/* Steps from `first` at t to t + h. With `keep_jacobian` that of the step before from the same point is used.
- * Returns 0 if the equations gave values that are not finite, or a singular matrix. */
-int rosenbrock_step(
-    Instance *c, double t, const double *first, double h, int keep_jacobian, Piece *piece, double *error) {
+/* Steps from `first` at t to t + h. Returns 0 if the equations gave values that are not finite, or a singular matrix.
+ */
+int rosenbrock_step(Instance *c, double t, const double *first, double h, Piece *piece, double *error) {
     const Model *m = c->model;
     Work *w = &c->work;
     int n = m->n_unknowns;
@@ -100,17 +94,14 @@ int rosenbrock_step(
     piece->begin = t;
     piece->end = t + h;
     memcpy(piece->points, first, size);
-    if (!keep_jacobian) {
-        evaluate_time_slope(c, t, first, slope);
-        evaluate_jacobian(c, t, first);
-    }
+    linearize(c, t, first, w->stages, slope);
     if (!factor(c, h)) return 0;
     for (int i = 0; i < STAGES; i++) {
         double *stage = w->stages + (size_t)i * n;
         memcpy(y, first, size);
         for (int j = 0; j < i; j++)
             for (int k = 0; k < n; k++) y[k] += A[i][j] * w->stages[j * n + k];
-        evaluate(c, &m->tapes.rates, t + C_TIME[i] * h, y, y + m->n_x, stage);
+        if (i > 0) evaluate(c, &m->tapes.rates, t + C_TIME[i] * h, y, y + m->n_x, stage);
         for (int j = 0; j < i; j++)
             for (int k = 0; k < m->n_x; k++) stage[k] += C[i][j] / h * w->stages[j * n + k];
         for (int k = 0; k < n; k++) {

@@ -1,0 +1,113 @@
+/* Co-Simulation in fixed steps with a bound on the work of every step, for hardware in the loop.
+ *
+ * The method is that of rosenbrock.c: eight stages, one factorisation, order five; a step from one point to the next is
+ * a piece. Every further piece of a step, every round of events and every impact takes one from BUDGET; what is left to
+ * do when it is used up comes at the beginning of the next step. So modes change at two places inside of a step at the
+ * most, each located by one evaluation of the guards and the zero of a cubic, and a step costs at most that of
+ * 1 + BUDGET pieces or rounds. Where `bounded` is set, iterations that would ask for accuracy end early: the implicit
+ * equations are solved by one Newton iteration where they are linear, by three else (point.c), and what holds the same
+ * motion shares it by capacities, without a second trial (holds.c). Nothing is allocated, and nothing outside of the
+ * run-time is called but arithmetic and copies, unless logging is on or the step fails.
+ */
+#include <math.h>
+#include <string.h>
+#include "core.h"
+
+#define BUDGET 4    /* rounds of events and further pieces per step */
+#define BEHIND 1e-4 /* of the piece: so far behind the zero of its cubic a guard is taken for positive */
+#define QUIET 2
+
+/* The part of the piece at which the first guard becomes positive, by the cubic through values and rates at both ends;
+ * behind an event, where the last round has left values but no rates, by a parabola. QUIET where none does. */
+static double first_crossing(Instance *c, int behind_event) {
+    const Model *m = c->model;
+    Piece *piece = c->piece;
+    int n = m->n_guards;
+    double *last = c->work.guards_before, *first = behind_event ? c->work.guards : c->looks, part = QUIET;
+    double h = piece->end - piece->begin;
+    evaluate(c, &m->tapes.guards, piece->end, last_of(m, piece), last_of(m, piece) + m->n_x, last);
+    for (int g = 0; g < n; g++) {
+        double g0, r0, r1 = isfinite(last[n + g]) ? h * last[n + g] : 0;
+        if (!guard_active(c, g) || !(number_or_false(last[g]) > 0)) continue;
+        if (!behind_event && !c->state.looked)
+            evaluate(c, &m->tapes.guards, piece->begin, piece->points, piece->points + m->n_x, first);
+        c->state.looked = 1;
+        g0 = fmin(number_or_false(first[g]), 0);
+        r0 = behind_event ? 2 * (last[g] - g0) - r1 : h * first[n + g];
+        part = fmin(part, cubic_guess(g0, isfinite(r0) ? r0 : 0, last[g], r1) + BEHIND);
+    }
+    if (part != QUIET) return fmin(part, 1);
+    memcpy(c->looks, last, 2 * (size_t)n * sizeof(double));
+    c->state.looked = 1;
+    return QUIET;
+}
+
+/* Fires what wants to fire at the present point; tells whether anything did. */
+static Result fire_here(Instance *c, int *fired) {
+    unsigned char *wanting = nothing_wanting(c);
+    c->state.at_event = c->state.looked = 0;
+    *fired = find_wanting(c, wanting, 1);
+    if (!*fired) return RESULT_OK;
+    c->variables_valid = 0;
+    return iterate_events(c, wanting, 1);
+}
+
+/* Goes from the present point to `limit`, or to an event before it while the budget allows for one. */
+static Result go_on(Instance *c, double limit, int *fired) {
+    const Model *m = c->model;
+    State *s = &c->state;
+    double *first = c->work.first, begin = s->t, error, part = QUIET;
+    int behind_event = *fired;
+    *fired = 0;
+    memcpy(first, c->x, m->n_x * sizeof(double));
+    memcpy(first + m->n_x, c->z, m->n_z * sizeof(double));
+    if (!rosenbrock_step(c, begin, first, limit - begin, c->piece, &error))
+        return report(c, LOG_ERROR, RESULT_ERROR,
+            "The step from t = %.12g s gives values that are not finite, or singular equations. Take smaller steps.",
+            begin);
+    c->piece->end = limit;
+    if (c->budget < 2) s->looked = !(s->at_event = 1);
+    else if (m->n_guards > 0) part = first_crossing(c, behind_event);
+    if (part < 1) {
+        if (move_to(c, begin + part * (limit - begin)) != RESULT_OK || fire_here(c, fired) != RESULT_OK)
+            return RESULT_ERROR;
+        c->budget -= *fired;
+        if (*fired) return RESULT_OK;
+    }
+    /* What the cubic has not met is taken at the end. */
+    if (move_to(c, limit) != RESULT_OK) return RESULT_ERROR;
+    return part == QUIET ? RESULT_OK : fire_here(c, fired);
+}
+
+static Result one_step(Instance *c, double end) {
+    State *s = &c->state;
+    int fired = 0;
+    c->budget = BUDGET;
+    if (s->at_event && fire_here(c, &fired) != RESULT_OK) return RESULT_ERROR;
+    while (s->t < end) {
+        double moment = c->budget >= 2 ? next_moment(c) : INFINITY;
+        if (go_on(c, fmin(end, moment), &fired) != RESULT_OK) return RESULT_ERROR;
+        if (fired || s->at_event || !is_due(c)) continue;
+        if (fire_here(c, &fired) != RESULT_OK) return RESULT_ERROR;
+        c->budget -= s->t < end;
+    }
+    s->n_steps++;
+    return RESULT_OK;
+}
+
+/* Goes to `target`, a whole number of fixed steps away (see check_step). */
+Arrival step_fixed(Instance *c, double target) {
+    State *s = &c->state;
+    double begin = s->t, h = c->model->settings->fixed_step;
+    int n = (int)(0.5 + (target - begin) / h), event, done = 1;
+    c->bounded = 1;
+    if (take_changes(c, &event) == RESULT_OK) {
+        s->at_event |= event;
+        for (int k = 1; k <= n && done; k++) {
+            done = one_step(c, k < n ? begin + k * h : target) == RESULT_OK;
+            if (done && c->step_finished != NULL && c->step_finished(c) <= s->t) break;
+        }
+    } else done = 0;
+    c->bounded = 0;
+    return done ? REACHED : FAILED;
+}
