@@ -9,6 +9,10 @@ BIN := .venv/bin
 C := $(wildcard modelica_like/fmi/templates/*.[ch] fmus/*/*.[ch] tests/fmi/*.c tests/fmus/*/*.c)
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
 
+# Without a C compiler everything but the export of FMUs works; zig of the extra `dev` compiles for the tests.
+COMPILED := ls modelica_like/fmi/runtimes/* >/dev/null 2>&1 || echo "No C compiler was found: the run-time of FMUs is \
+compiled at first use. Install cc, gcc or clang, or zig by $(BIN)/pip install 'modelica-like[cross]'."
+
 .PHONY: demo test lint types layers pytest benchmark fmus format clean
 
 demo: .venv/installed
@@ -59,8 +63,10 @@ clean:
 
 .venv/installed: .venv/python pyproject.toml constraints.txt
 	test -f .venv/installed-dev || $(PIP) --editable .
+	@$(COMPILED)
 	@touch $@
 
 .venv/installed-dev: .venv/python pyproject.toml constraints.txt
 	$(PIP) --editable '.[dev,data]'
+	@$(COMPILED)
 	@touch $@ .venv/installed

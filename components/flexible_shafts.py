@@ -6,7 +6,19 @@ from components.friction import ShaftFriction
 from components.inertias import Inertia
 from components.interfaces import Flange, ShaftInHousing
 from components.springs import SpringDamper
-from modelica_like.language import Component, Equations, Expr, Parameter, Variable, connect, exp, param, series, var
+from modelica_like.language import (
+    Component,
+    Equations,
+    Expr,
+    LanguageError,
+    Parameter,
+    Variable,
+    connect,
+    exp,
+    param,
+    series,
+    var,
+)
 
 
 class FlexibleShaft(Component):
@@ -25,6 +37,8 @@ class FlexibleShaft(Component):
     d: Parameter = param("N.m.s/rad", "damping coefficient of the whole shaft", default=0.0, min=0)
 
     def build(self) -> None:
+        if self.n < 1:
+            raise LanguageError(f"A flexible shaft has at least one piece, not {self.n}.")
         ends = (0, self.n)
         self.masses = [Inertia(J=f"J / {2 * self.n if k in ends else self.n}") for k in range(self.n + 1)]
         self.springs = [SpringDamper(c=f"{self.n} * c", d=f"{self.n} * d") for _ in range(self.n)]

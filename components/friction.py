@@ -17,12 +17,14 @@ from modelica_like.language import (
     Variable,
     absolute,
     all_of,
+    column,
     der,
     interpolate,
     maximum,
     negate,
     param,
     prescribed,
+    rows,
     signal_in,
     var,
     where,
@@ -34,6 +36,8 @@ HOLDS = {"stuck": Hold("slip", reaction="friction", capacity="limits")}
 """What surfaces that stick hold, in whatever unit."""
 _NOW = 1e-9
 """What counts as one instant, in creep_time."""
+_FAINT = 1e-10
+"""Part of what surfaces can bear up to which more than that may be rounding: they do not break away in a tie."""
 
 
 class Sticking(Lossy, partial=True):
@@ -91,11 +95,13 @@ class Sticking(Lossy, partial=True):
 
     def breaks_forward(self) -> Expr:
         """Return the condition on which surfaces that stick begin to slide forward."""
-        return where(self.carried(), self._soon() - self.rest, self.friction - self.holds_forward()) > 0
+        bearable = self.holds_forward()
+        return where(self.carried(), self._soon() - self.rest, self.friction - bearable - _FAINT * bearable) > 0
 
     def breaks_backward(self) -> Expr:
         """Return the condition on which surfaces that stick begin to slide backward."""
-        return where(self.carried(), self._soon() + self.rest, self.friction - self.holds_backward()) < 0
+        bearable = self.holds_backward()
+        return where(self.carried(), self._soon() + self.rest, self.friction - bearable - _FAINT * bearable) < 0
 
     def _soon(self) -> Expr:
         return self.slip + self.creep_time * der(self.slip)
@@ -204,8 +210,11 @@ class PressedFriction(ShaftFriction, partial=True):
     f_normalized: Input = signal_in("1", "normal force over fn_max; the surfaces are free at 0", default=1.0)
     fn_max: Parameter = param("N", "normal force at f_normalized = 1", default=None, min=0)
     cgeo: Parameter = param("m", "friction radius times number of friction surfaces", default=1.0, min=0)
-    mu_pos: Rows = ((0.0, 0.5),)
-    """Rows of slip speed in w_scale and sliding friction coefficient."""
+    mu_pos: Rows = rows(
+        column("slip speed", scale="w_scale", rising=True),
+        column("sliding friction coefficient"),
+        default=((0.0, 0.5),),
+    )
     smooth: bool = False
     """Interpolate mu_pos with a continuous slope."""
     w_scale: Parameter = param("rad/s", "slip speed that counts as 1 in mu_pos", default=1.0)
@@ -281,8 +290,10 @@ class BearingFriction(ShaftFriction, ShaftInHousing):
     """Friction of a bearing: a torque against the rotation that depends on the speed, with stiction."""
 
     w: Variable = var("rad/s", "speed of the shaft relative to the housing", state="always")
-    tau_pos: Rows = ((0.0, 1.0),)
-    """Rows of speed in w_scale and friction torque in tau_scale."""
+    tau_pos: Rows = rows(
+        column("speed", scale="w_scale", rising=True), column("friction torque", scale="tau_scale"),
+        default=((0.0, 1.0),),
+    )  # fmt: skip
     smooth: bool = False
     """Interpolate tau_pos with a continuous slope."""
     w_scale: Parameter = param("rad/s", "speed that counts as 1 in tau_pos", default=1.0)

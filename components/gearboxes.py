@@ -5,7 +5,16 @@ from __future__ import annotations
 from components.interfaces import Flange
 from components.lossy_gears import LossRows, LossyGear
 from components.springs import ElastoBacklash, SpringDamper
-from modelica_like.language import Component, Equations, Parameter, connect, param, series
+from modelica_like.language import (
+    Component,
+    Equations,
+    Parameter,
+    column,
+    connect,
+    param,
+    rows,
+    series,
+)
 
 
 class Gearbox(Component):
@@ -17,8 +26,11 @@ class Gearbox(Component):
     flange_a = Flange("input shaft")
     flange_b = Flange("output shaft")
     support = Flange("housing", optional=True)
-    loss_table: LossRows = ((0.0, 1.0, 1.0, 0.0, 0.0),)
-    """Rows of speed |w_a| in rad/s, eta_mf1, eta_mf2, and |tau_bf1|, |tau_bf2| in N.m, as in a `LossyGear`."""
+    loss_table: LossRows = rows(
+        column("speed |w_a|", "rad/s", rising=True), column("eta_mf1"), column("eta_mf2"),
+        column("|tau_bf1|", "N.m"), column("|tau_bf2|", "N.m"), default=((0.0, 1.0, 1.0, 0.0, 0.0),),
+    )  # fmt: skip
+    """As in a `LossyGear`: rows of speed |w_a| in rad/s, eta_mf1, eta_mf2, and |tau_bf1|, |tau_bf2| in N.m."""
     has_backlash: bool = True
     """The flanks have backlash."""
     ratio: Parameter = param("1", "transmission ratio, speed of flange_a over speed of flange_b")

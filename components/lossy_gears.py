@@ -12,11 +12,13 @@ from modelica_like.language import (
     Parameter,
     Variable,
     absolute,
+    column,
     der,
     interpolate,
     maximum,
     minimum,
     param,
+    rows,
     signal_out,
     var,
     where,
@@ -107,8 +109,10 @@ class LossyGear(MeshWithFriction):
     while flange_b drives, tau_bf likewise. Two numbers are enough in a `ConstantEfficiencyGear`.
     """
 
-    loss_table: LossRows
-    """Rows of speed |w_a| in w_scale, eta_mf1, eta_mf2, and |tau_bf1|, |tau_bf2| in tau_scale."""
+    loss_table: LossRows = rows(
+        column("speed |w_a|", scale="w_scale", rising=True), column("eta_mf1"), column("eta_mf2"),
+        column("|tau_bf1|", scale="tau_scale"), column("|tau_bf2|", scale="tau_scale"),
+    )  # fmt: skip
     w_scale: Parameter = param("rad/s", "speed that counts as 1 in loss_table", default=1.0)
     tau_scale: Parameter = param("N.m", "torque that counts as 1 in loss_table", default=1.0)
 

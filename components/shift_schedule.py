@@ -15,8 +15,10 @@ from modelica_like.language import (
     Mode,
     Output,
     Parameter,
+    column,
     discrete,
     param,
+    rows,
     signal_out,
     where,
 )
@@ -37,9 +39,14 @@ class ShiftSchedule(Component):
     two gears being locked at once. Elements that stay closed keep their pressure.
     """
 
-    shifts: tuple[tuple[float, str, float], ...]
+    shifts: tuple[tuple[float, str, float], ...] = rows(
+        column("time", scale="time_scale"), column("gear", text=True),
+        column("duration of the shift", scale="time_scale"),
+    )  # fmt: skip
     """Rows of time, gear, and duration of the shift, both in time_scale; the run begins in the first gear."""
-    pattern: tuple[tuple[str, str], ...] = _GEARS
+    pattern: tuple[tuple[str, str], ...] = rows(
+        column("gear", text=True), column("closed elements", text=True), default=_GEARS
+    )
     """Gears and the elements closed in them; as it stands, that of a `Lepelletier` gearbox."""
     time_scale: Parameter = param("s", "what counts as 1 in the times", default=1.0)
     a: Output = signal_out("1", "pressure of element a")

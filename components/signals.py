@@ -19,6 +19,7 @@ from modelica_like.language import (
     Output,
     Parameter,
     any_of,
+    column,
     discrete,
     exp,
     floor,
@@ -27,6 +28,7 @@ from modelica_like.language import (
     minimum,
     param,
     parse_formula,
+    rows,
     signal_in,
     signal_out,
     sin,
@@ -255,8 +257,9 @@ class Rowwise(Component, partial=True):
 class Table(Rowwise):
     """Signal that interpolates in a table of time and value; beyond its ends the last slope goes on."""
 
-    table: tuple[tuple[float, float], ...]
-    """Rows of time in units of time_scale and value in units of scale."""
+    table: tuple[tuple[float, float], ...] = rows(
+        column("time", scale="time_scale", rising=True), column("value", scale="scale")
+    )
     smooth: bool = False
     """Interpolate with a continuous slope instead of straight lines."""
     scale: Parameter = param("*", "what counts as 1 in the values", default=1.0)

@@ -17,12 +17,14 @@ from modelica_like.language import (
     Variable,
     all_of,
     any_of,
+    column,
     der,
     exp,
     interpolate,
     maximum,
     negate,
     param,
+    rows,
     signal_in,
     var,
     where,
@@ -128,8 +130,10 @@ class SlideFriction(SlideSticking, DryFriction, SlideInHousing, partial=True):
 class SupportFriction(SlideFriction):
     """Friction of a slideway: a force against the motion that depends on the velocity, with stiction."""
 
-    f_pos: Rows = ((0.0, 1.0),)
-    """Rows of velocity in v_scale and friction force in f_scale."""
+    f_pos: Rows = rows(
+        column("velocity", scale="v_scale", rising=True), column("friction force", scale="f_scale"),
+        default=((0.0, 1.0),),
+    )  # fmt: skip
     smooth: bool = False
     """Interpolate f_pos with a continuous slope."""
     v_scale: Parameter = param("m/s", "velocity that counts as 1 in f_pos", default=1.0)
@@ -161,8 +165,11 @@ class TranslationalBrake(SlideFriction):
     f_normalized: Input = signal_in("1", "normal force over fn_max; the brake is free at 0", default=1.0)
     fn_max: Parameter = param("N", "normal force at f_normalized = 1", min=0)
     cgeo: Parameter = param("1", "number of friction surfaces", default=1.0, min=0)
-    mu_pos: Rows = ((0.0, 0.5),)
-    """Rows of velocity in v_scale and sliding friction coefficient."""
+    mu_pos: Rows = rows(
+        column("velocity", scale="v_scale", rising=True),
+        column("sliding friction coefficient"),
+        default=((0.0, 0.5),),
+    )
     smooth: bool = False
     """Interpolate mu_pos with a continuous slope."""
     v_scale: Parameter = param("m/s", "velocity that counts as 1 in mu_pos", default=1.0)

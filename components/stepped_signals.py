@@ -11,7 +11,9 @@ from modelica_like.language import (
     Mode,
     Output,
     Parameter,
+    column,
     param,
+    rows,
     signal_out,
     where,
 )
@@ -20,8 +22,9 @@ from modelica_like.language import (
 class StepTable(Rowwise):
     """Signal that keeps the value of a row until the next one; before the first row it has the value of that."""
 
-    table: tuple[tuple[float, float], ...]
-    """Rows of time in units of time_scale and value in units of scale."""
+    table: tuple[tuple[float, float], ...] = rows(
+        column("time", scale="time_scale", rising=True), column("value", scale="scale")
+    )
     scale: Parameter = param("*", "what counts as 1 in the values", default=1.0)
 
     def moments(self) -> tuple[float, ...]:
@@ -37,8 +40,7 @@ class StepTable(Rowwise):
 class BooleanTable(Rowwise):
     """Signal 0 or 1 that changes at every time of a table."""
 
-    times: tuple[float, ...]
-    """Times of the changes, in units of time_scale."""
+    times: tuple[float, ...] = rows(column("time of a change", scale="time_scale", rising=True), flat=True)
     start_value: bool = False
     """Value before the first change."""
     y: Output = signal_out("1", "signal, 0 or 1")

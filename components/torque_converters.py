@@ -11,11 +11,13 @@ from modelica_like.language import (
     Variable,
     absolute,
     all_of,
+    column,
     der,
     interpolate,
     maximum,
     minimum,
     param,
+    rows,
     var,
     where,
 )
@@ -38,10 +40,11 @@ class TorqueConverter(Lossy, TwoFlanges):
     With the torque ratio 1 throughout it is a hydrodynamic coupling. VDI 2153.
     """
 
-    capacity: Rows
+    capacity: Rows = rows(column("speed ratio", rising=True), column("capacity", scale="C_scale"))
     """Rows of speed ratio and capacity in C_scale, which should end with zero at the speed ratio 1."""
-    torque_ratio: Rows = ((0.0, 1.0),)
-    """Rows of speed ratio and torque of the turbine over that of the pump."""
+    torque_ratio: Rows = rows(
+        column("speed ratio", rising=True), column("torque of the turbine over that of the pump"), default=((0.0, 1.0),)
+    )
     C_scale: Parameter = param("N.m.s2/rad2", "what counts as 1 in capacity", default=1.0)
     w_still: Parameter = param("rad/s", "speed that counts as standstill", default=1e-6, min=1e-12)
     w_pump: Variable = var("rad/s", "speed of the pump relative to the housing")

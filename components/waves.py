@@ -15,11 +15,13 @@ from modelica_like.language import (
     Output,
     Parameter,
     Variable,
+    column,
     cos,
     der,
     exp,
     maximum,
     param,
+    rows,
     signal_in,
     signal_out,
     sin,
@@ -146,8 +148,9 @@ class VariableSine(Component):
 class CombiTable(Component):
     """Several signals from one table over time: columns[1].y, columns[2].y, …; see `Table`."""
 
-    table: tuple[tuple[float, ...], ...]
-    """Rows of time in units of time_scale and values."""
+    table: tuple[tuple[float, ...], ...] = rows(
+        column("time", scale="time_scale", rising=True), column("value"), more=True
+    )
     smooth: bool = False
     """Interpolate with a continuous slope instead of straight lines."""
     time_scale: Parameter = param("s", "what counts as 1 in the times", default=1.0)

@@ -15,6 +15,7 @@ from typing import Any
 
 from modelica_like.fmi.export import export_fmu
 from modelica_like.fmi.validate import FAILED, PASSED, Validation, validate_fmu
+from modelica_like.writing import write_text
 
 HERE = Path(__file__).parent
 PAGE = HERE / "importers.md"
@@ -92,7 +93,7 @@ def replace(section: str, lines: list[str]) -> None:
     before, _, rest = text.partition(SECTIONS[section])
     after = rest.strip().partition("\n\n")[2]
     head = [f"| {' | '.join(HEADS)} |", f"|{'---|' * len(HEADS)}"]
-    PAGE.write_text("\n".join([f"{before}{SECTIONS[section]}", *head, *lines, "", after]), encoding="utf-8")
+    write_text(PAGE, "\n".join([f"{before}{SECTIONS[section]}", *head, *lines, "", after]))
 
 
 def main(chosen: list[str]) -> None:

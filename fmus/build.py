@@ -21,6 +21,8 @@ from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import quoteattr
 
+from modelica_like.writing import replacing
+
 HERE = Path(__file__).parent
 TARGET = HERE.parent / "build" / "fmus"
 VERSIONS = ("2.0", "3.0")
@@ -299,7 +301,7 @@ def build_one(folder: Path, version: str, target: Path) -> Path:
     path = target / f"{model.name}_fmi{version[0]}.fmu"
     with tempfile.TemporaryDirectory() as work:
         library = compile_model(folder, model, version, Path(work))
-        with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        with replacing(path) as draft, zipfile.ZipFile(draft, "w", zipfile.ZIP_DEFLATED) as archive:
             archive.writestr("modelDescription.xml", fmi2_xml(model) if version == "2.0" else fmi3_xml(model))
             archive.write(library, f"binaries/{binary_folder(version)[0]}/{library.name}")
     return path
@@ -307,7 +309,6 @@ def build_one(folder: Path, version: str, target: Path) -> Path:
 
 def build(names: Iterable[str] = (), target: Path = TARGET) -> list[Path]:
     """Build the named reference FMUs, or all, and return their paths."""
-    target.mkdir(parents=True, exist_ok=True)
     folders = [HERE / name for name in names] or sorted(path.parent for path in HERE.glob("*/model.toml"))
     return [build_one(folder, version, target) for folder in folders for version in VERSIONS]
 

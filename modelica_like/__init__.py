@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from modelica_like.fmi.validate import validate_fmu as validate_fmu
     from modelica_like.language import Assembly as Assembly
     from modelica_like.language import Component as Component
+    from modelica_like.native.handle import Native as Native
     from modelica_like.netlist import load as load
     from modelica_like.report.compare import compare as compare
     from modelica_like.simulation import build as build
@@ -41,6 +42,7 @@ _HOME = {
     "CompiledDae": "modelica_like.compile.compiled",
     "Component": "modelica_like.language",
     "ModelicaLikeError": "modelica_like.errors",
+    "Native": "modelica_like.native.handle",
     "Options": "modelica_like.solve.options",
     "Solution": "modelica_like.solve.solution",
     "build": "modelica_like.simulation",
@@ -68,6 +70,7 @@ __all__ = [
     "CompiledDae",
     "Component",
     "ModelicaLikeError",
+    "Native",
     "Options",
     "Solution",
     "build",

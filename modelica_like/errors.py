@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 _SHOWN = 160
+_ENDLESS = re.compile(r"\S{500,}")
+"""What somebody wrote without a space, at such a length, is not repeated."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +45,7 @@ class ModelicaLikeError(Exception):
     """
 
     def __init__(self, what: str, *, where: Source | Iterable[Source] = (), why: str = "", advice: str = "") -> None:
+        what = _ENDLESS.sub(lambda word: f"{word[0][:_SHOWN]}…", what)
         super().__init__(what)
         self.what = what
         places = (where,) if isinstance(where, Source) else tuple(where)
@@ -165,10 +169,10 @@ class SolveError(ModelicaLikeError):
     """The simulation cannot go on.
 
     Attributes:
-        record: segments and events up to there, a `Recorder`, if there are any.
+        run: the `Solution` up to there, if there is any. The `KeyboardInterrupt` that ends a simulation has it, too.
     """
 
-    record: Any = None
+    run: Any = None
 
 
 class SingularAtStart(SolveError):
@@ -228,9 +232,9 @@ def missing_extra(package: str, extra: str) -> MissingExtra:
     return MissingExtra(f"{package} is not installed.", advice=f'Install it with: pip install "modelica-like[{extra}]"')
 
 
-def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """Return `; did you mean 'sun'?` for the known name nearest to `name`, or an empty string."""
-    names = list(known)
+def did_you_mean(name: object, known: Iterable[str]) -> str:
+    """Return `; did you mean 'sun'?` for the known name nearest to `name`, or an empty string; a file has any value."""
+    name, names = str(name), list(known)
     near = difflib.get_close_matches(name, names, n=1, cutoff=0.58)
     near = near or [one for one in names if one in name.split("_")]
     return f"; did you mean '{near[0]}'?" if near else ""

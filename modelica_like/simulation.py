@@ -6,12 +6,13 @@ import copy
 import gc
 import time
 from collections.abc import Iterable, Mapping
+from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, get_args
 
 from modelica_like.compile import compile
 from modelica_like.compile.compiled import CompiledDae
-from modelica_like.errors import UnitError, ValueOutOfRange
+from modelica_like.errors import SolveError, UnitError, UnknownName, ValueOutOfRange, did_you_mean
 from modelica_like.flatten import flatten
 from modelica_like.initialize import StartKind, initialize
 from modelica_like.language import Component
@@ -22,7 +23,9 @@ from modelica_like.structure import reduce
 from modelica_like.units import parse_unit, to_si
 
 _SECOND = parse_unit("s")
+_SHORTEST = 1e-12
 
+Solver = Literal["idas", "native"]
 Model = Component | CompiledDae | str | Path
 
 
@@ -69,6 +72,7 @@ def simulate(
     drive: Model, until: float | str | None = None, *, parameters: Mapping[str, Any] | None = None,
     start: StartKind | None = None, t0: float = 0.0, rtol: float | None = None, atol: float | None = None,
     points: int | None = None, options: Options | None = None, progress: Progress | None = None,
+    solver: Solver = "idas",
 ) -> Solution:  # fmt: skip
     """Simulate a drive.
 
@@ -83,9 +87,11 @@ def simulate(
         points: number of equal intervals of the results.
         options: all options together; the arguments before win.
         progress: called with the time reached.
+        solver: `idas`, the reference, or `native`: the compiled run-time of FMUs, several times as fast.
 
     Raises:
         ModelicaLikeError: the model or a value is wrong, or the simulation cannot go on.
+        KeyboardInterrupt: it was interrupted. `run` of this and of a `SolveError` is the solution up to there.
     """
     model = build(drive)
     if parameters:
@@ -95,15 +101,39 @@ def simulate(
     chosen = _options(options or Options(), settings, rtol=rtol, atol=atol, points=points)
     if end <= t0:
         raise ValueOutOfRange(f"The end time {end:g} s is not after the start time {t0:g} s.")
+    if end - t0 < _SHORTEST * max(1.0, abs(t0)):
+        raise ValueOutOfRange(f"A run of {end - t0:g} s is too short: no times can be told apart in it.")
+    make = _loop(solver)
     begin = time.perf_counter()
     first = initialize(model, t0, start or settings.get("start", "given"))
-    loop = EventLoop(model, chosen, first, end, progress)
-    record = loop.run()
-    elapsed = time.perf_counter() - begin
-    counts = loop.integrator
-    statistics = Statistics(counts.steps, counts.evaluations, counts.calls, len(record.events), elapsed)
+    loop = make(model, chosen, first, end, progress)
+    try:
+        loop.run()
+    except (SolveError, KeyboardInterrupt) as error:
+        vars(error)["run"] = _solution(loop, begin) if loop.record.segments else None
+        raise
+    return _solution(loop, begin)
+
+
+def _loop(solver: str) -> Any:
+    """Return what runs a model."""
+    if solver == "idas":
+        return EventLoop
+    if solver == "native":
+        # It stands above this layer.
+        return import_module("modelica_like.native.run").NativeLoop
+    raise UnknownName(
+        f"There is no solver '{solver}'{did_you_mean(solver, get_args(Solver)) or '.'}",
+        advice="There are idas (the reference) and native (the compiled run-time of FMUs).",
+    )
+
+
+def _solution(loop: Any, begin: float) -> Solution:
+    """Return what a loop has computed since it began."""
+    record, elapsed = loop.record, time.perf_counter() - begin
+    statistics = Statistics(*loop.counts[:3], len(record.events), elapsed)
     return Solution(
-        model, chosen, tuple(record.segments), tuple(record.events), statistics, tuple(record.impacts),
+        loop.model, loop.options, tuple(record.segments), tuple(record.events), statistics, tuple(record.impacts),
         tuple(record.notices),
     )  # fmt: skip
 

@@ -317,7 +317,10 @@ def _quantity(value: object, unit: Unit, name: str) -> tuple[float, Unit]:
     if isinstance(value, bool) or value is None:
         raise UnitError(f"{name} expects {unit}; {value} is not a number.")
     if isinstance(value, Real):
-        return float(value), unit
+        try:
+            return float(value), unit
+        except OverflowError:
+            raise ValueOutOfRange(f"{name} is larger than any number that computes.") from None
     return _foreign(value, unit, name)
 
 

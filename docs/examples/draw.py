@@ -13,6 +13,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from modelica_like import load, simulate
+from modelica_like.solve.plot import save_plot
 from modelica_like.solve.style import COLOURS, STYLE
 
 HERE = Path(__file__).parent
@@ -207,7 +208,7 @@ FIGURES: dict[str, Callable[[], Figure]] = {
 
 def save(figure: Figure, name: str) -> None:
     """Write a small picture."""
-    figure.savefig(HERE / "pictures" / f"{name}.png", dpi=60, pil_kwargs={"optimize": True})
+    save_plot(figure, HERE / "pictures" / f"{name}.png", dpi=60, pil_kwargs={"optimize": True})
 
 
 def main(*wanted: str) -> None:

@@ -18,7 +18,7 @@ _GROUPS = {
     "analysis": ("modes",),
     "sweeps": ("steady", "sweep"),
     "sensitivity": ("sensitivity",),
-    "export": ("export",),
+    "export": ("export", "runtimes"),
     "cosimulation": ("split", "cosim"),
     "types": ("describe", "schema", "library", "docs"),
     "validation": ("validate", "compare"),
@@ -44,8 +44,11 @@ def __getattr__(name: str) -> Any:
 def main() -> None:
     """Run the command line; classes of modules in the working directory can be used in netlists."""
     sys.path.insert(0, "")
-    if not _ran(sys.argv[1:]):
-        __getattr__("app")()
+    try:
+        if not _ran(sys.argv[1:]):
+            __getattr__("app")()
+    except KeyboardInterrupt:  # while modules are loaded
+        raise SystemExit(130) from None
 
 
 def _ran(words: list[str]) -> bool:
@@ -63,6 +66,4 @@ def _ran(words: list[str]) -> bool:
         function(**values)
     except WrongUse:
         return False
-    except KeyboardInterrupt:
-        raise SystemExit(130) from None
     return True

@@ -22,7 +22,7 @@ def modes(
     debug: Debug = False,
 ) -> None:  # fmt: skip
     """Linearise a netlist at a point: eigenvalues, damping, where the energy of each mode is."""
-    with told(debug):
+    with told(debug, pictures=[shapes, bode]):
         assembly = load_netlist(netlist, assignments)
         from modelica_like.analyse.linear.linearize import linearize
         from modelica_like.analyse.linear.points import when

@@ -74,7 +74,7 @@ def cosim(
     ] = None,
     master: Annotated[MasterName | None, Option(help="All at once, or one after the other.")] = None,
     inputs: Annotated[InputsName | None, Option(help="Inputs on straight lines, or held.")] = None,
-    csv: Annotated[Path | None, Option(metavar="FILE", help="Write all trajectories as a table.")] = None,
+    csv: Annotated[Path | None, Option(metavar="FILE", help="Write a table: .csv, .parquet, .nc.")] = None,
     units: Annotated[bool, Option("--units", help="Units in a second header line of the table.")] = False,
     plot: Annotated[Path | None, Option(metavar="FILE", help="Draw the results: .png, .svg or .pdf.")] = None,
     show: Annotated[list[str] | None, Option(metavar="PATTERN", help="What to draw, e.g. '*.w'.")] = None,
@@ -82,27 +82,23 @@ def cosim(
     debug: Debug = False,
 ) -> None:  # fmt: skip
     """Run a system of FMUs together: mode changes, energies at the couplings, results as table and picture."""
-    with told(debug):
+    with told(debug, tables=[csv], pictures=[plot]):
+        from modelica_like.cli.outcome import Outcome
         from modelica_like.cosimulation.load import opened
         from modelica_like.cosimulation.run import cosim as run
         from modelica_like.report.cosimulation import cosimulation_report
         from modelica_like.report.progress import Bar
+        from modelica_like.solve.plot import plot as draw
 
         with opened(system) as known, Bar(until or known.settings.until) as bar:
-            solution = run(
-                known, until, step=step, master=master, inputs=inputs, tolerance=tolerance,
-                parameters=_numbers(assignments or ()), timeout=timeout, progress=bar,
+            made = Outcome(
+                lambda: run(
+                    known, until, step=step, master=master, inputs=inputs, tolerance=tolerance,
+                    parameters=_numbers(assignments or ()), timeout=timeout, progress=bar,
+                ), debug=debug,
             )  # fmt: skip
-        out().print(cosimulation_report(solution))
-        if csv:
-            from modelica_like.report.files import write_csv
-
-            write_csv(solution, csv, units=units)
-        if plot:
-            from modelica_like.solve.plot import plot as draw
-            from modelica_like.solve.plot import save_plot
-
-            save_plot(draw(solution, show or ()), plot)
+        made.tell(cosimulation_report, csv)
+        made.write(csv, units=units, pictures=[(plot, lambda one: draw(one, show or ()))])
 
 
 def _numbers(assignments: list[str] | tuple[str, ...]) -> dict[str, float]:

@@ -1,7 +1,8 @@
-"""Commands that write models for other tools: export."""
+"""Commands that write models for other tools: export, and what it needs."""
 
 from __future__ import annotations
 
+import gc
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -15,6 +16,14 @@ class Takes(StrEnum):
 
     FLOW = "flow"
     POTENTIAL = "potential"
+
+
+class Modes(StrEnum):
+    """What modes are in an FMU."""
+
+    OUTPUT = "output"
+    LOCAL = "local"
+    INTEGER = "integer"
 
 
 def export(
@@ -37,12 +46,17 @@ def export(
     embed: Annotated[
         bool, Option("--embed", help="Compile the model into the binary, for importers that do not name resources.")
     ] = False,
+    modes: Annotated[Modes, Option(help="Modes as enumeration outputs, as local ones, or as integer outputs.")] = (
+        Modes.OUTPUT
+    ),
     check: Annotated[bool, Option(help="Run the FMU against IDAS before it is handed over.")] = True,
+    strict: Annotated[bool, Option("--strict", help="Do not write an FMU that differs from IDAS.")] = False,
     debug: Debug = False,
 ) -> None:  # fmt: skip
-    """Export a netlist as an FMU: compiled C that needs no Python, checked before it is written."""
+    """Export a netlist as an FMU: compiled C that needs no Python, and check it."""
     with told(debug):
         assembly = load_netlist(netlist, assignments)
+        gc.disable()  # the process ends soon: looking for cycles takes a sixth of the time of a large model
         from rich.console import Console
 
         from modelica_like.fmi.export import export_fmu
@@ -50,10 +64,31 @@ def export(
         with Console(stderr=True).status("loading") as status:
             done = export_fmu(
                 assembly, output or Path(f"{netlist.stem}.fmu"), fmi, _listed(kind), _listed(platforms),
-                outputs=outputs or (), ends=ends or (), takes=takes.value, embed=embed, check=check,
-                report=status.update,
+                outputs=outputs or (), ends=ends or (), takes=takes.value, embed=embed, modes=modes.value,
+                check=check, strict=strict, report=status.update,
             )  # fmt: skip
         out().print(str(done), soft_wrap=True)
+
+
+def runtimes(
+    *, platforms: Annotated[
+        str, Option(metavar="NAMES", help="Platforms to compile for: native, all, or names with commas.")
+    ] = "none",
+    debug: Debug = False,
+) -> None:  # fmt: skip
+    """Tell for which platforms the run-time of FMUs is there; compile it for others."""
+    with told(debug):
+        from rich.console import Console
+
+        from modelica_like.fmi.build import PLATFORMS, chosen_platforms
+        from modelica_like.fmi.runtime import found_runtime, runtime_library
+
+        with Console(stderr=True).status("loading") as status:
+            for name in chosen_platforms(_listed(platforms)):
+                runtime_library(name, status.update)
+        for name in PLATFORMS:
+            library = found_runtime(name)
+            out().print(f"{name:16}{library or 'not compiled'}", soft_wrap=True)
 
 
 def _listed(text: str) -> tuple[str, ...]:

@@ -18,6 +18,13 @@ class Start(StrEnum):
     STEADY = "steady"
 
 
+class Solver(StrEnum):
+    """What integrates."""
+
+    IDAS = "idas"
+    NATIVE = "native"
+
+
 def check(
     netlist: Netlist, assignments: Assignments = None, *,
     start: Annotated[bool, Option("--start", help="Tell the start values, and where each comes from.")] = False,
@@ -40,38 +47,36 @@ def simulate(
     netlist: Netlist, assignments: Assignments = None, *,
     until: Annotated[str | None, Option(metavar="TIME", help="End time, e.g. 2s; else the netlist's.")] = None,
     start: Annotated[Start | None, Option(help="Start values: as given, from rest, or the steady state.")] = None,
-    csv: Annotated[Path | None, Option(metavar="FILE", help="Write all trajectories as a table.")] = None,
+    csv: Annotated[Path | None, Option(metavar="FILE", help="Write a table: .csv, .parquet, .nc.")] = None,
     points: Annotated[int | None, Option(metavar="N", help="Number of equal intervals of the results.")] = None,
     units: Annotated[bool, Option("--units", help="Units in a second header line of the table.")] = False,
     plot: Annotated[Path | None, Option(metavar="FILE", help="Draw the results: .png, .svg or .pdf.")] = None,
     show: Annotated[list[str] | None, Option(metavar="PATTERN", help="What to draw, e.g. '*.w'.")] = None,
     sankey: Annotated[Path | None, Option(metavar="FILE", help="Draw where the energy went.")] = None,
     energy: Annotated[bool, Option(help="Tell the energy balance.")] = True,
+    solver: Annotated[Solver, Option(help="IDAS, or the compiled run-time of FMUs.")] = Solver.IDAS,
     debug: Debug = False,
 ) -> None:  # fmt: skip
     """Simulate a netlist: events, energy balance, results as table and picture."""
-    with told(debug):
+    with told(debug, tables=[csv], pictures=[plot, sankey]):
         # What is wrong in the file is told before the solver is loaded.
         assembly = load_netlist(netlist, assignments)
+        from modelica_like.cli.outcome import Outcome
         from modelica_like.report.progress import Bar
         from modelica_like.report.run import run_report
         from modelica_like.simulation import build
         from modelica_like.simulation import simulate as run
+        from modelica_like.solve.plot import matching
+        from modelica_like.solve.plot import plot as draw
 
         model = build(assembly)
+        matching(model, show or ())
         with Bar(until or model.settings.get("until")) as bar:
-            solution = run(model, until, start=start.value if start else None, points=points, progress=bar)
-        out().print(run_report(solution, energy=energy))
-        if csv:
-            from modelica_like.report.files import write_csv
-
-            write_csv(solution, csv, units=units)
-        if plot:
-            from modelica_like.solve.plot import plot as draw
-            from modelica_like.solve.plot import save_plot
-
-            save_plot(draw(solution, show or ()), plot)
-        if sankey:
-            from modelica_like.solve.plot import save_plot
-
-            save_plot(solution.energy().sankey(model.name), sankey)
+            begin = start.value if start else None
+            made = Outcome(
+                lambda: run(model, until, start=begin, points=points, progress=bar, solver=solver.value), debug=debug
+            )
+        energy = energy and made.stopped is None and made.attempt("The energy balance", made.solution.energy)
+        made.tell(lambda one: run_report(one, energy=energy), csv)
+        pictures = (plot, lambda one: draw(one, show or ())), (sankey, lambda one: one.energy().sankey(model.name))
+        made.write(csv, units=units, pictures=pictures)

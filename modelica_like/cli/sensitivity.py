@@ -21,7 +21,7 @@ def sensitivity(
     debug: Debug = False,
 ) -> None:  # fmt: skip
     """Differentiate a run exactly, through its events: ranking tables, tornado plot."""
-    with told(debug):
+    with told(debug, pictures=[tornado]):
         assembly = load_netlist(netlist, assignments)
         from modelica_like.analyse.sensitivity.derivatives import sensitivities
         from modelica_like.report.sensitivity import sensitivity_report

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import os
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 from modelica_like.cli.declare import Argument, Option, WrongUse
 from modelica_like.errors import InitializationError, ModelicaLikeError, SolveError
+from modelica_like.writing import check_writable
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -17,8 +19,13 @@ if TYPE_CHECKING:
 BAD_INPUT = 2
 SOLVE_FAILED = 1
 
+INTERRUPTED = 130
+
 # What only a defect of this package raises; everything foreseen is a ModelicaLikeError.
-_DEFECTS = (ArithmeticError, AssertionError, AttributeError, LookupError, RuntimeError, TypeError, ValueError)
+DEFECTS = (
+    ArithmeticError, AssertionError, AttributeError, EOFError, LookupError, MemoryError, RuntimeError, StopIteration,
+    SyntaxError, TypeError, ValueError,
+)  # fmt: skip
 
 Netlist = Annotated[Path, Argument(metavar="NETLIST", help="TOML file", show_default=False)]
 Debug = Annotated[bool, Option("--debug", help="Show where in the code an error was raised.")]
@@ -28,23 +35,59 @@ Assignments = Annotated[
 
 
 @contextmanager
-def told(debug: bool) -> Iterator[None]:
-    """Turn errors into one block of sentences on stderr, and into the exit code."""
+def told(
+    debug: bool, *, tables: Iterable[Path | None] = (), pictures: Iterable[Path | None] = (),
+    files: Iterable[Path | None] = (),
+) -> Iterator[None]:  # fmt: skip
+    """Turn errors into one block of sentences on stderr, and into the exit code.
+
+    Args:
+        debug: raise them instead.
+        tables: to be written; whether they can be is told before anything is done.
+        pictures: to be written.
+        files: of any kind, to be written.
+    """
     try:
+        _check(filter(None, tables), filter(None, pictures), filter(None, files))
         yield
+    except KeyboardInterrupt as error:
+        if debug:
+            raise
+        _fail(" ".join(["Interrupted.", *(_notes(error) or ["What was not finished is not written."])]), INTERRUPTED)
     except ModelicaLikeError as error:
         if debug:
             raise
-        _fail(str(error), exit_code(error))
+        _fail("\n".join([str(error), *_notes(error)]), exit_code(error))
+    except BrokenPipeError:
+        # Who reads the results has seen enough.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        raise SystemExit(SOLVE_FAILED) from None
     except OSError as error:
         if debug:
             raise
-        _fail(f"{error.filename or 'A file'}: {error.strerror or error}.", BAD_INPUT)
-    except _DEFECTS as error:
+        _fail(f"{error.filename or 'A temporary file'}: {error.strerror or error}.", BAD_INPUT)
+    except DEFECTS as error:
         if debug:
             raise
         what = f"{type(error).__name__}: {error}"
         _fail(f"This should not happen: {what}\nRun again with --debug, and report what it shows.", SOLVE_FAILED)
+
+
+def _check(tables: Iterable[Path], pictures: Iterable[Path], files: Iterable[Path]) -> None:
+    for file in files:
+        check_writable(file)
+    for file in tables:
+        from modelica_like.report.files import check_table
+
+        check_table(file)
+    for file in pictures:
+        from modelica_like.solve.plot import check_picture
+
+        check_picture(file)
+
+
+def _notes(error: BaseException) -> list[str]:
+    return getattr(error, "__notes__", [])
 
 
 def exit_code(error: ModelicaLikeError) -> int:
@@ -54,22 +97,28 @@ def exit_code(error: ModelicaLikeError) -> int:
 
 
 def _fail(message: str, code: int) -> NoReturn:
+    warn(message, "red")
+    raise SystemExit(code)
+
+
+def warn(message: str, colour: str = "yellow") -> None:
+    """Tell a block of sentences on stderr."""
     from rich.console import Console
     from rich.markup import escape
 
     what, *rest = message.split("\n")
     console = Console(stderr=True, highlight=False, soft_wrap=True, emoji=False)
-    console.print(f"[bold red]{escape(what)}[/]")
+    console.print(f"[bold {colour}]{escape(what)}[/]")
     for line in rest:
         console.print(escape(line), style="dim" if line.startswith("  ") else None)
-    raise SystemExit(code)
 
 
-def out() -> Console:
+def out(*, stderr: bool = False) -> Console:
     """Return the console for results; a pipe gets plain text that is wide enough for tables."""
     from rich.console import Console
 
-    return Console(highlight=False, emoji=False, width=None if sys.stdout.isatty() else 160)
+    stream = sys.stderr if stderr else sys.stdout
+    return Console(highlight=False, emoji=False, stderr=stderr, width=None if stream.isatty() else 160)
 
 
 def load_netlist(netlist: Path, assignments: list[str] | None) -> Any:

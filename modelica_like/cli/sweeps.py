@@ -24,7 +24,7 @@ def steady(
     debug: Debug = False,
 ) -> None:  # fmt: skip
     """Find operating points of a netlist: powers, losses and efficiency, or a characteristic curve."""
-    with told(debug):
+    with told(debug, pictures=[plot]):
         assembly = load_netlist(netlist, assignments)
         from modelica_like.analyse.operating.curves import characteristic
         from modelica_like.analyse.operating.steady import steady as find
@@ -53,22 +53,23 @@ def sweep(
     checkpoint: Annotated[Path | None, Option(metavar="FOLDER", help="Keeps what is done.")] = None,
     processes: Annotated[int | None, Option(metavar="N", help="Of this machine; else one per core.")] = None,
     scheduler: Annotated[str | None, Option(metavar="ADDRESS", help="Dask, e.g. tcp://host:8786.")] = None,
-    output: Annotated[Path | None, Option("--output", "-o", metavar="FILE", help="Write a table: .csv.")] = None,
+    output: Annotated[Path | None, Option("--output", "-o", metavar="FILE", help=".csv, .parquet, .nc.")] = None,
     debug: Debug = False,
 ) -> None:  # fmt: skip
     """Simulate a netlist over a grid of parameter values."""
-    with told(debug):
+    with told(debug, tables=[output], files=[checkpoint / "zarr.json" if checkpoint else None]):
         assembly = load_netlist(netlist, assignments)
         from modelica_like.analyse.sweeps.ranges import read_range
         from modelica_like.analyse.sweeps.sweep import sweep as run
+        from modelica_like.report.files import STDOUT, write_dataset
         from modelica_like.report.progress import RunsBar
-        from modelica_like.report.sweep import sweep_report, write_sweep
+        from modelica_like.report.sweep import sweep_report
 
         with RunsBar() as bar:
             found = run(
                 assembly, dict(read_range(text) for text in over), of, until=until, checkpoint=checkpoint,
                 processes=processes, scheduler=scheduler, progress=bar,
             )  # fmt: skip
-        out().print(sweep_report(found))
+        out(stderr=output == STDOUT).print(sweep_report(found))
         if output:
-            write_sweep(found, output)
+            write_dataset(found, output)

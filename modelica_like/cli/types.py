@@ -53,7 +53,7 @@ def docs(
     debug: Debug = False,
 ) -> None:
     """Write pages about component types in Markdown: all types and an index, or the named ones."""
-    with told(debug):
+    with told(debug, files=[output / "README.md"]):
         from modelica_like.report.component_pages.library import write_component_pages
 
         pages = write_component_pages(output, examples, types)

@@ -38,7 +38,7 @@ def compare(
     *, debug: Debug = False,
 ) -> None:  # fmt: skip
     """Compare two trajectories of one system: the largest deviation of each signal, the times of the events."""
-    with told(debug):
+    with told(debug, pictures=[plot]):
         from modelica_like.report.compare import compare as run
 
         comparison = run(a, b, signals=signals or (), until=until, points=points, tolerance=tolerance)

@@ -39,7 +39,16 @@ class BufferedFunction:
         for k, array in self._filled:
             array[:] = arguments[k]
         self._evaluate()
+        return self.latest()
+
+    def latest(self) -> list[Vector]:
+        """Return what the last call has computed, even if it failed."""
         return [array.copy() for array in self._results]
+
+    def forget(self) -> None:
+        """Let all results be nan, so that those that are never computed are known."""
+        for array in self._results:
+            array.fill(np.nan)
 
     def along(self, points: list[Vector], p: Vector, u: Vector) -> list[Vector]:
         """Evaluate a mapped function at as many points (t, x, z, d) as there are; what lies behind is left over.
@@ -70,6 +79,8 @@ def buffered(cache: dict[Any, Any], key: Any, make: Any, results: tuple[int, ...
 
 _BLOCKS = 4096, 64
 """Points that are evaluated in one call: many, and the rest."""
+_GROUP, _SMALL = 8, 2000
+"""Points whose operations are written out one after the other, and operations of one point up to which that is done."""
 
 
 class Along:
@@ -80,7 +91,10 @@ class Along:
     """
 
     def __init__(self, function: ca.Function) -> None:
-        self._function = function
+        # A call costs as much as fifty operations.
+        group = _GROUP if function.is_a("SXFunction") and function.n_instructions() <= _SMALL else 1
+        self._function = function.map("group", "serial", group, [3, 4], []).expand() if group > 1 else function
+        self._group = group
         self.rows = [function.numel_out(k) for k in range(function.n_out())]
         self._made: dict[int, BufferedFunction] = {}
 
@@ -97,7 +111,7 @@ class Along:
             while total - first >= (size if size > _BLOCKS[-1] else 1):
                 last = min(first + size, total)
                 if size not in self._made:
-                    self._made[size] = BufferedFunction(self._function.map(size))
+                    self._made[size] = BufferedFunction(self._function.map(size // self._group))
                 now = [part[..., first:last].ravel("F") for part in (times, x, z, d)]
                 block = self._made[size].along(now, p, u)
                 for whole, part in zip(results, block, strict=True):

@@ -282,6 +282,16 @@ class CompiledDae:
         # Analysis stands above this layer: only the face of the package knows where.
         return import_module("modelica_like").simulation_function(self, inputs, outputs, **run)
 
+    def native(self, inputs: Sequence[str] = (), outputs: Sequence[str] = (), **how: Any) -> Any:
+        """Return a handle for control loops: an instance that steps at the speed of C.
+
+        Args:
+            inputs: inputs and tunable parameters that its steps set.
+            outputs: variables and modes that its steps read.
+            how: further arguments of `modelica_like.Native`, which says more.
+        """
+        return import_module("modelica_like").Native(self, inputs, outputs, **how)
+
     def __getstate__(self) -> dict[str, Any]:
         if self._make_energy is not None:
             _ = self.energy, self.start_system, self.rest_system  # symbols do not pickle, functions do

@@ -85,7 +85,7 @@ def compile(reduced: ReducedDae) -> CompiledDae:
         implicit_blocks=reduced.implicit_blocks,
         motion_sources=_motion_sources(flat),
         summary=str(reduced),
-        settings=dict(getattr(flat.components.get(""), "simulate", {})),
+        settings=dict(getattr(flat.components.get(""), "_simulate", {})),
         _make_energy=lambda: build.function("energy", energy_terms(reduced)),
         _make_start=lambda rest: start_system(reduced, rest),
     )

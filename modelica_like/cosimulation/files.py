@@ -31,6 +31,7 @@ from modelica_like.errors import (
 from modelica_like.netlist.document import parse_toml, read_text
 from modelica_like.netlist.locate import Lines, locate
 from modelica_like.units import parse_unit, to_si
+from modelica_like.writing import write_text
 
 _SECTIONS = ("name", "own_names", "fmus", "connect", "bonds", "simulate")
 _OPTIONS = ("until", "step", "master", "inputs", "tolerance")
@@ -185,7 +186,7 @@ def write_system(system: System, path: Path) -> None:
     for name, entries in sections.items():
         if entries:
             document.add(name, _table(entries))
-    path.write_text(tomlkit.dumps(document), encoding="utf-8")
+    write_text(path, tomlkit.dumps(document))
 
 
 def _unit_table(unit: Unit, folder: Path) -> Any:

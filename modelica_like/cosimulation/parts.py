@@ -46,7 +46,7 @@ class Maker:
             f"{self.assembly.label}_{names[0]}", parts=parts, connect=wires, free=free, parameters=parameters
         )
         # The part starts with numbers, whatever the whole starts from.
-        made.__dict__["simulate"] = {**self.assembly.__dict__["simulate"], "start": "given"}
+        made.__dict__["_simulate"] = {**self.assembly.__dict__["_simulate"], "start": "given"}
         return made
 
     def adaptor(self, end: End) -> tuple[Component, str]:

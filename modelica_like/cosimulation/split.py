@@ -31,16 +31,18 @@ class Split:
         system: the FMUs and their connections.
         path: its TOML file.
         ends: what each end of a cut takes from the other side: `flow` (torque) or `potential` (angle and speed).
+        notes: what the runs of the FMUs against IDAS have told.
     """
 
     system: System
     path: Path
     ends: Mapping[str, Takes]
+    notes: tuple[str, ...] = ()
 
     def __str__(self) -> str:
         words = {"flow": "takes the load, and tells how it moves", "potential": "is moved, and tells its load"}
         lines = [f"{self.path}: {', '.join(unit.file.name for unit in self.system.units)}"]
-        return "\n".join([*lines, *(f"  {path} {words[takes]}" for path, takes in self.ends.items())])
+        return "\n".join([*lines, *(f"  {path} {words[takes]}" for path, takes in self.ends.items()), *self.notes])
 
 
 def split(
@@ -76,7 +78,7 @@ def split(
     assembly = _assembly(drive)
     found = cut_netlist(assembly, [at] if isinstance(at, str) else at)
     titles = _titles(found, names)
-    settings = _settings(assembly.__dict__["simulate"].get("until"), step, master)
+    settings = _settings(assembly.__dict__["_simulate"].get("until"), step, master)
     maker = Maker(assembly, found)
     tell("looking for the causality")
     chosen = orient(found, maker.bare)
@@ -84,19 +86,22 @@ def split(
     target = Path(folder)
     target.mkdir(parents=True, exist_ok=True)
     units: list[Unit] = []
+    notes: list[str] = []
     for k, title in enumerate(titles):
         tell(f"exporting {title}")
         ends = open_ends(found, k, chosen)
         part = maker.started(k, ends, values)
         part.__dict__["_name"] = title
         save(part, target / f"{title}.toml")
-        export_fmu(part, target / f"{title}.fmu", version, {"cs"}, check=check)
+        done = export_fmu(part, target / f"{title}.fmu", version, {"cs"}, check=check)
+        notes += [f"{title}: {done.check.sentence}"] if done.check.sentence else []
         units.append(Unit(title, target / f"{title}.fmu", maker.not_passed_on(ends)))
     links, bonds = _couplings(maker, chosen, titles)
     system = System(assembly._name, tuple(units), links, bonds, settings, own_names=True)
     path = target / "system.toml"
     write_system(system, path)
-    return Split(system, path, {end.path: end.takes for cut, takes in chosen.items() for end in ends_of(cut, takes)})
+    taken: dict[str, Takes] = {end.path: end.takes for cut, takes in chosen.items() for end in ends_of(cut, takes)}
+    return Split(system, path, taken, tuple(notes))
 
 
 def _settings(until: float | str | None, step: float | str | None, master: str | None) -> Settings:

@@ -17,6 +17,7 @@ from modelica_like.errors import NetlistError, UnknownName, did_you_mean
 from modelica_like.fmi.package import write_archive
 from modelica_like.fmi.unpack import SSP, unpack
 from modelica_like.language import Component
+from modelica_like.writing import check_writable
 
 
 def write_ssp(system: System, path: str | Path, version: Version | str = "1.0") -> Path:
@@ -80,6 +81,7 @@ def _target(path: str | Path) -> Path:
         raise NetlistError(f"An SSP is a file with the ending .ssp, not '{target.name}'.")
     if not target.absolute().parent.is_dir():
         raise NetlistError(f"There is no folder '{target.parent}' for {target.name}.", advice="Make it first.")
+    check_writable(target)
     return target
 
 

@@ -9,12 +9,13 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 
 from modelica_like.errors import ExportError, MissingExtra, UnknownName, did_you_mean
+from modelica_like.writing import replacing
 
 
 @dataclass(frozen=True)
@@ -24,7 +25,7 @@ class Platform:
     Attributes:
         name: FMI 3.0's name, the folder of its binaries there.
         fmi2: the folder of its binaries in FMI 2.0.
-        target: name for zig; glibc 2.17 is older than any Linux in use.
+        target: name for zig; glibc 2.17 is older than any Linux in use, macOS 11 the first on arm64.
         suffix: of shared libraries.
     """
 
@@ -41,15 +42,17 @@ PLATFORMS = {
         Platform("aarch64-linux", "aarch64-linux", "aarch64-linux-gnu.2.17", ".so"),
         Platform("x86_64-windows", "win64", "x86_64-windows-gnu", ".dll"),
         Platform("aarch64-windows", "aarch64-windows", "aarch64-windows-gnu", ".dll"),
-        Platform("x86_64-darwin", "darwin64", "x86_64-macos", ".dylib"),
-        Platform("aarch64-darwin", "aarch64-darwin", "aarch64-macos", ".dylib"),
+        Platform("x86_64-darwin", "darwin64", "x86_64-macos.11.0", ".dylib"),
+        Platform("aarch64-darwin", "aarch64-darwin", "aarch64-macos.11.0", ".dylib"),
     )
 }
 """All platforms by FMI 3.0's names."""
 
 # -O1 runs as fast as -O2 here and compiles in two thirds of the time. Changed flags make zig compile its C runtime
 # again, which takes minutes for Windows.
-FLAGS = ("-std=c99", "-O1", "-ffp-contract=off", "-fvisibility=hidden", "-shared", "-Wall", "-Wextra", "-DOLD_GLIBC")
+FLAGS = (
+    "-std=c99", "-O1", "-ffp-contract=off", "-fvisibility=hidden", "-shared", "-s", "-Wall", "-Wextra", "-DOLD_GLIBC",
+)  # fmt: skip
 _COMPILERS = ("cc", "gcc", "clang")
 _SYSTEMS = {"Linux": "linux", "Windows": "windows", "Darwin": "darwin"}
 _MACHINES = {"x86_64": "x86_64", "AMD64": "x86_64", "aarch64": "aarch64", "arm64": "aarch64", "ARM64": "aarch64"}
@@ -67,6 +70,26 @@ def native_platform() -> str:
             f"There are no FMU binaries for this machine ({name}).", advice=f"Choose among {', '.join(PLATFORMS)}."
         )
     return name
+
+
+def chosen_platforms(platforms: Sequence[str] | str) -> tuple[str, ...]:
+    """Return the names of platforms that are asked for by names, `native` or `all`.
+
+    Raises:
+        UnknownName: there is no such platform.
+        ExportError: FMUs have no binaries for this machine.
+    """
+    asked = (platforms,) if isinstance(platforms, str) else tuple(platforms)
+    found: list[str] = []
+    for one in asked:
+        if one not in ("native", "all", *PLATFORMS):
+            known = ["native", "all", *PLATFORMS]
+            raise UnknownName(
+                f"There is no platform '{one}'{did_you_mean(one, known) or '.'}",
+                advice=f"There are {', '.join(known)}.",
+            )
+        found += PLATFORMS if one == "all" else [native_platform() if one == "native" else one]
+    return tuple(dict.fromkeys(found))
 
 
 def build(sources: Mapping[str, str], platform: str, output_dir: Path, identifier: str = "model") -> Path:
@@ -97,7 +120,6 @@ def build(sources: Mapping[str, str], platform: str, output_dir: Path, identifie
     chosen = PLATFORMS[platform]
     library = Path(output_dir) / f"{identifier}{chosen.suffix}"
     command = compiler_command(platform)
-    library.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix="modelica_like_") as folder:
         for name, content in sources.items():
             (Path(folder) / name).write_text(content, encoding="utf-8")
@@ -109,7 +131,8 @@ def build(sources: Mapping[str, str], platform: str, output_dir: Path, identifie
         libraries = [] if chosen.suffix == ".dll" else ["-lm"]
         built = Path(folder) / f"{identifier}{chosen.suffix}"
         _run([*command, *FLAGS, *position, "-o", str(built), *wholes, *libraries], folder, platform)
-        shutil.copyfile(built, library)
+        with replacing(library) as draft:
+            shutil.copyfile(built, draft)
     return library
 
 
@@ -137,7 +160,7 @@ def compiler_command(platform: str) -> list[str]:
         if given or found:
             return given or [str(found)]
     if find_spec("ziglang") is not None:
-        return [sys.executable, "-m", "ziglang", "cc", "-target", PLATFORMS[platform].target, "-s"]
+        return [sys.executable, "-m", "ziglang", "cc", "-target", PLATFORMS[platform].target]
     if native:
         raise ExportError(
             "There is no C compiler.", advice="Install cc, gcc or clang, or zig by `pip install modelica-like[cross]`."

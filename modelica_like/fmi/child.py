@@ -7,18 +7,21 @@ The folder holds `job.json` and the unpacked FMU in `fmu`. What came out is left
 from __future__ import annotations
 
 import json
+import math
 import mmap
 import struct
 import sys
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import Any, Literal
 
 import fmpy
 import numpy as np
 from fmpy.simulation import Recorder
 
+Side = Literal["left", "right"]
 KINDS = {"me": "ModelExchange", "cs": "CoSimulation"}
 NUMBERS = ("Real", "Float32", "Float64")
 DISCRETE = (
@@ -143,6 +146,8 @@ def choose_kind(description: Any, kind: str | None) -> str:
     """Return me or cs."""
     has = {"cs": description.coSimulation is not None, "me": description.modelExchange is not None}
     chosen = kind or ("cs" if has["cs"] else "me")
+    if not any(has.values()):
+        raise Refusal(kind="scheduled")
     if not has[chosen]:
         raise Refusal(kind="no kind", wanted=KINDS[chosen])
     return chosen
@@ -160,14 +165,106 @@ def check_names(job: dict[str, Any], found: list[dict[str, Any]]) -> None:
             raise Refusal(kind="no input", name=name, causality=causality[name], known=known)
 
 
-def input_table(inputs: dict[str, Any], stop: float) -> Any:
-    """Return inputs as FMPy wants them; a number is a constant, otherwise pairs of time and value."""
+def interpolate(series: Any, times: Any, side: Side) -> Any:
+    """Return a series of (time, value) at times: straight lines; where it jumps, its `left` or `right` value."""
+    known, values = np.transpose(series)
+    if len(known) == 1:
+        return np.full(np.shape(times), values[0])
+    after = np.clip(np.searchsorted(known, times, side), 1, len(known) - 1)
+    span = known[after] - known[after - 1]
+    part = np.clip((times - known[after - 1]) / np.where(span > 0, span, 1), 0, 1)
+    return values[after - 1] + part * (values[after] - values[after - 1])
+
+
+def input_table(inputs: dict[str, Any]) -> Any:
+    """Return inputs as FMPy wants them: a row for every instant, two where one of them jumps."""
     if not inputs:
         return None
-    series = {n: np.atleast_2d(v if isinstance(v, list) else [[0.0, v], [stop, v]]) for n, v in inputs.items()}
-    times = np.unique(np.concatenate([s[:, 0] for s in series.values()]))
-    columns = [times, *(np.interp(times, s[:, 0], s[:, 1]) for s in series.values())]
-    return np.array(list(zip(*columns, strict=True)), dtype=[("time", float), *((n, float) for n in series)])
+    times = np.unique(np.concatenate([s[:, 0] for s in inputs.values()]))
+    jumps = np.unique(np.concatenate([s[1:, 0][np.diff(s[:, 0]) == 0] for s in inputs.values()]))
+    rows: list[tuple[float, ...]] = []
+    sides: tuple[tuple[Side, Any], ...] = (("left", times), ("right", jumps))
+    for side, instants in sides:
+        rows += zip(instants, *(interpolate(s, instants, side) for s in inputs.values()), strict=True)
+    rows.sort(key=lambda row: row[0])
+    return np.array(rows, dtype=[("time", float), *((n, float) for n in inputs)])
+
+
+class Ramps:
+    """Gives an FMU inputs that move.
+
+    A slave gets their slopes where it takes them, else their means over short steps; FMPy would hold them for a step.
+    In Model Exchange they follow every time that is set; FMPy's solver would keep those of its last look at indicators.
+    """
+
+    def __init__(self, fmu: Any, description: Any, inputs: dict[str, Any], kind: str, start: float) -> None:
+        found = [v for v in description.modelVariables if v.name in inputs and v.type in ("Real", "Float64")]
+        moving = [v for v in found if v.variability in (None, "continuous") and np.ptp(inputs[v.name][:, 1])]
+        self._fmu, self._series = fmu, [inputs[v.name] for v in moving]
+        self._references = [v.valueReference for v in moving]
+        self._kinks = np.unique(np.concatenate([[], *(s[:, 0] for s in self._series)]))
+        self._write = fmu.setFloat64 if description.fmiVersion.startswith("3") else fmu.setReal
+        if kind == "cs":
+            side = description.coSimulation
+            self._sloped = description.fmiVersion == "2.0" and side.canInterpolateInputs
+            self._divides = side.canHandleVariableCommunicationStepSize
+            self._do_step, fmu.doStep = fmu.doStep, self.step
+        elif description.fmiVersion != "1.0":
+            self._now = self._begin = start
+            self._end = math.inf
+            self._set_time, fmu.setTime = fmu.setTime, self.set_time
+            self._resume, fmu.enterContinuousTimeMode = fmu.enterContinuousTimeMode, self.resume
+
+    def set_time(self, time: float) -> None:
+        """Set the time, and the inputs of this time; behind a jump those before it hold until its event."""
+        self._set_time(time)
+        self._now = time
+        place = min(max(time, self._begin), self._end)
+        self._set(self._values(place, "left" if place > self._begin else "right"))
+
+    def resume(self) -> None:
+        """Go on after an event."""
+        self._resume()
+        self._begin = self._now
+        jumps = (t for s in self._series for t in s[1:, 0][np.diff(s[:, 0]) == 0] if t > self._begin)
+        self._end = min(jumps, default=math.inf)
+
+    def step(self, currentCommunicationPoint: float, communicationStepSize: float, **rest: Any) -> Any:
+        """Do a step in pieces: in each, inputs are straight and, without slopes, move little."""
+        done: Any = None
+        end = currentCommunicationPoint + communicationStepSize
+        grid = self._grid(currentCommunicationPoint, end)
+        for low, high in pairwise(grid):
+            first, last = self._values(low, "right"), self._values(high, "left")
+            self._set(first if self._sloped else (first + last) / 2)
+            if self._sloped:
+                slopes = (last - first) / (high - low)
+                self._fmu.setRealInputDerivatives(self._references, [1] * len(slopes), list(slopes))
+            done = self._do_step(currentCommunicationPoint=low, communicationStepSize=high - low, **rest)
+            if isinstance(done, tuple) and any(done[:3]):
+                done = (*done[:2], done[2] or high < end, end := done[3] if done[2] else high)
+                break
+        if not self._sloped:
+            self._set(self._values(end, "left"))
+        return done
+
+    def _grid(self, begin: float, end: float) -> list[float]:
+        if not self._divides:
+            return [begin, end]
+        corners = [begin, *self._kinks[(self._kinks > begin) & (self._kinks < end)], end]
+        grid = [begin]
+        for low, high in pairwise(corners):
+            change = self._values(high, "left") - self._values(low, "right")
+            parts = [abs(c) / np.ptp(s[:, 1]) * POINTS for c, s in zip(change, self._series, strict=True)]
+            count = 1 if self._sloped else math.ceil(max(parts))
+            grid += [*np.linspace(low, high, max(count, 1) + 1)[1:]]
+        return grid
+
+    def _values(self, time: float, side: Side) -> Any:
+        return np.array([float(interpolate(series, time, side)) for series in self._series])
+
+    def _set(self, values: Any) -> None:
+        self._write(self._references, list(values))
 
 
 def output_step(job: dict[str, Any], stop: float, suggested: Any) -> float | None:
@@ -216,6 +313,7 @@ def run(folder: Path) -> None:
     stop = job["stop"] if job["stop"] is not None else getattr(experiment, "stopTime", None)
     stop = float(stop) if stop is not None else job["start"] + 1.0
     step = output_step(job, stop, getattr(experiment, "stepSize", None))
+    inputs = {n: np.array(v if isinstance(v, list) else [[0.0, v]]) for n, v in job["inputs"].items()}
     outputs = job["outputs"] or [v["name"] for v in found if v["causality"] != "parameter"]
     event_mode = bool(getattr(description.coSimulation, "hasEventMode", False))
     messages: list[str] = []
@@ -227,12 +325,19 @@ def run(folder: Path) -> None:
 
     sys.excepthook = reporter(folder, messages)
     simulate: Any = fmpy.simulate_fmu
+    make: Any = fmpy.instantiate_fmu
+    fmu = make(
+        str(folder / "fmu"), description, KINDS[kind], logger=log, early_return_allowed=event_mode,
+        event_mode_used=event_mode, require_functions=False,
+    )  # fmt: skip
+    if any(np.ptp(series[:, 1]) for series in inputs.values()):
+        Ramps(fmu, description, inputs, kind, job["start"])
     result = simulate(
         str(folder / "fmu"), validate=False, model_description=description, fmi_type=KINDS[kind],
         start_time=job["start"], stop_time=stop, solver=job["solver"], relative_tolerance=job["tolerance"],
         step_size=step if job["solver"] == "Euler" else None, output_interval=step,
-        start_values=job["parameters"], input=input_table(job["inputs"], stop), output=outputs,
-        use_event_mode=event_mode, early_return_allowed=event_mode, remote_platform=None, logger=log,
+        start_values=job["parameters"], input=input_table(inputs), output=outputs,
+        use_event_mode=event_mode, early_return_allowed=event_mode, fmu_instance=fmu,
         step_finished=watcher(folder, description, kind),
     )  # fmt: skip
     np.save(folder / "result.npy", np.asarray(result))

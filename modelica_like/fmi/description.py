@@ -183,7 +183,7 @@ class _Writer(ABC):
     def attributes(self, one: FmuVariable) -> dict[str, Any]:
         """Attributes that mean the same in both versions."""
         name = unit_name(one.unit)
-        whole = one.type == "Enumeration"
+        whole = one.type != "Float64"
         return {
             "unit": name,
             "displayUnit": DISPLAY_UNITS[name][0] if name in _SUGGESTED else None,
@@ -214,7 +214,7 @@ class _Fmi2(_Writer):
             "providesDirectionalDerivative": True,
         }  # fmt: skip
         own = {
-            "canHandleVariableCommunicationStepSize": True, "canInterpolateInputs": True, "maxOutputDerivativeOrder": 1
+            "canHandleVariableCommunicationStepSize": True, "canInterpolateInputs": True, "maxOutputDerivativeOrder": 3
         }  # fmt: skip
         for kind, tag, more in (("me", "ModelExchange", {}), ("cs", "CoSimulation", own)):
             if kind in self.about.kinds:
@@ -232,9 +232,9 @@ class _Fmi2(_Writer):
             initial=one.initial,
         )  # fmt: skip
         attributes = self.attributes(one)
-        if one.modes:
+        if one.type != "Float64":
             kept = {key: attributes[key] for key in ("min", "max", "start")}
-            element(scalar, "Enumeration", declaredType=self.types[one.modes], **kept)
+            element(scalar, "Enumeration" if one.modes else "Integer", declaredType=self.types.get(one.modes), **kept)
         else:
             derivative = None if one.derivative_of is None else one.derivative_of + 1
             element(scalar, "Real", **attributes, derivative=derivative)
@@ -276,7 +276,7 @@ class _Fmi3(_Writer):
         if "cs" in self.about.kinds:
             element(
                 top, "CoSimulation", **common, canHandleVariableCommunicationStepSize=True,
-                maxOutputDerivativeOrder=1, providesIntermediateUpdate=True, mightReturnEarlyFromDoStep=True,
+                maxOutputDerivativeOrder=3, providesIntermediateUpdate=True, mightReturnEarlyFromDoStep=True,
                 canReturnEarlyAfterIntermediateUpdate=True, hasEventMode=True,
             )  # fmt: skip
 
@@ -285,7 +285,7 @@ class _Fmi3(_Writer):
 
     def _variable(self, listed: Any, one: FmuVariable) -> None:
         attributes = self.attributes(one)
-        if one.modes:
+        if one.type != "Float64":
             del attributes["unit"], attributes["displayUnit"], attributes["nominal"]
         element(
             listed, one.type, name=one.name, valueReference=one.reference, description=one.description or None,
@@ -304,5 +304,5 @@ class _Fmi3(_Writer):
         for tag, unknowns, initial in lists:
             for one in unknowns:
                 known = self.known(one, initial)
-                kinds = None if known is None else ["dependent"] * len(known)
+                kinds = None if known is None else " ".join(["dependent"] * len(known))
                 element(structure, tag, valueReference=one.reference, dependencies=known, dependenciesKind=kinds)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
 from html import escape
 
 from modelica_like.fmi.description import DISPLAY_UNITS
@@ -64,9 +65,12 @@ def _row(one: FmuVariable) -> str:
     unit = unit_name(one.unit) or ""
     start = "" if one.start is None else f"{one.start:.9g}"
     shown = ", ".join(DISPLAY_UNITS.get(unit, ()))
-    cells = (f"<code>{escape(one.name)}</code>", escape(unit), escape(shown), escape(one.description))
+    cells = (f"<code>{escape(one.name)}</code>", _known(unit), _known(shown), _known(one.description))
     name, *rest = (f"<td>{cell}</td>" for cell in cells)
     return f'<tr>{name}<td class="number">{start}</td>{"".join(rest)}</tr>'
+
+
+_known = cache(escape)
 
 
 def _component(path: str, kind: str, lines: Sequence[str]) -> str:

@@ -6,23 +6,23 @@ import hashlib
 import tempfile
 import time
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import get_args
 
 from modelica_like.compile import compile
 from modelica_like.compile.compiled import CompiledDae
-from modelica_like.errors import ExportError, UnknownName, did_you_mean
+from modelica_like.errors import ExportError, UnknownName
 from modelica_like.flatten import flatten
 from modelica_like.flatten.model import FlatModel
-from modelica_like.fmi.build import PLATFORMS, build, native_platform
-from modelica_like.fmi.check import compare_with_idas, problems
+from modelica_like.fmi.build import PLATFORMS, build, chosen_platforms, native_platform
+from modelica_like.fmi.check import Check, compare_with_idas, problems
 from modelica_like.fmi.description import About, Kind, Version, build_description, identifier, model_description
 from modelica_like.fmi.documentation import Listing, index_page
 from modelica_like.fmi.icons import drive_icon, icon_name, terminal_icon
-from modelica_like.fmi.interface import Interface, interface
-from modelica_like.fmi.model_file import MODEL, as_c, model_file
+from modelica_like.fmi.interface import Interface, ModesAs, interface
+from modelica_like.fmi.model_file import MODEL, as_c, model_file, with_token
 from modelica_like.fmi.package import write_archive
 from modelica_like.fmi.runtime import runtime_library
 from modelica_like.fmi.sources import LOG_CATEGORIES, licenses, runtime_sources, source_files
@@ -30,7 +30,9 @@ from modelica_like.fmi.tables import make_tables
 from modelica_like.fmi.terminals import Takes, terminals_and_icons, with_open_ends
 from modelica_like.simulation import Model, seconds
 from modelica_like.solve.options import Options
+from modelica_like.solve.plot import save_plot
 from modelica_like.structure import reduce
+from modelica_like.writing import check_writable, write_bytes
 
 _TOKEN = "{00000000-0000-0000-0000-000000000000}"
 
@@ -48,6 +50,7 @@ class Export:
         platforms: names of the platforms it has binaries for.
         size: of the file in bytes.
         seconds: how long it took.
+        check: how it compares with IDAS.
     """
 
     path: Path
@@ -56,17 +59,21 @@ class Export:
     platforms: tuple[str, ...]
     size: int
     seconds: float
+    check: Check
 
     def __str__(self) -> str:
         kinds = " and ".join({"me": "Model Exchange", "cs": "Co-Simulation"}[kind] for kind in self.kinds)
         where = ", ".join(self.platforms) or "sources only"
-        return f"{self.path}: FMI {self.version}, {kinds}, {self.size / 1000:.0f} kB, {where}, {self.seconds:.1f} s"
+        line = f"{self.path}: FMI {self.version}, {kinds}, {self.size / 1000:.0f} kB, {where}, {self.seconds:.1f} s"
+        picture = f"See {self.check.picture}." if self.check.picture else ""
+        return " ".join(filter(None, (f"{line}\n{self.check.sentence}".rstrip(), picture)))
 
 
 def export_fmu(
     drive: Model, path: str | Path, version: Version | str = "2.0", kind: Collection[Kind | str] = ("me", "cs"),
     platforms: Sequence[str] | str = "native", *, outputs: Sequence[str] = (), ends: Sequence[str] = (),
-    takes: Takes = "flow", embed: bool = False, check: bool = True, report: Report | None = None,
+    takes: Takes = "flow", embed: bool = False, modes: ModesAs | str = "output", check: bool = True,
+    strict: bool = False, report: Report | None = None,
 ) -> Export:  # fmt: skip
     """Export a drive as an FMU: a model and a compiled run-time that need no Python.
 
@@ -84,25 +91,29 @@ def export_fmu(
         takes: what open ends take from outside: the `flow` (torque, force, current, heat flow) or the `potential`.
         embed: whether to compile the model into the binaries, for importers that do not tell where resources are; else
             the binary is the run-time of all models and reads the model from `resources/`.
-        check: whether to run the FMU against IDAS, where it has a binary for this machine.
+        modes: `output` (enumerations), `local` (enumerations that are no outputs), or `integer` (outputs): some
+            importers know no enumerations.
+        check: whether to run the FMU against IDAS, where it has a binary for this machine. What it shows is told by the
+            `check` of what is returned; where they differ, a picture `…_check.png` is drawn next to the FMU.
+        strict: whether not to write an FMU that differs from IDAS.
         report: called with what is being done.
 
     Returns:
         What was exported.
 
     Raises:
-        ExportError: it cannot be exported or compiled, or does not pass its checks; nothing is written then.
-        UnknownName: there is no such version, kind, platform, connector or variable.
+        ExportError: it cannot be exported or compiled, or has a fault; nothing is written then.
+        UnknownName: there is no such version, kind, platform, connector, variable or way of modes.
         MissingExtra: binaries for other platforms need zig.
         ModelicaLikeError: something is wrong with the model.
     """
     begin = time.perf_counter()
     tell = report or _silent
     target = _target(path)
-    chosen, kinds, names = _version(version), _kinds(kind), _platforms(platforms)
+    chosen, kinds, names = _version(version), _kinds(kind), chosen_platforms(platforms)
     tell("compiling the model")
     model, description, equations = _compiled(drive, ends, takes)
-    variables = interface(model, outputs)
+    variables = interface(model, outputs, _modes(modes))
     tell("writing the model")
     files = _contents(model, variables, _about(model, chosen, kinds, description), equations, embed)
     with tempfile.TemporaryDirectory(prefix="modelica_like_") as folder:
@@ -113,9 +124,13 @@ def export_fmu(
         draft = Path(folder) / "draft.fmu"
         write_archive(draft, files)
         tell("checking")
-        _check(draft, model, kinds, names, check)
-        target.write_bytes(draft.read_bytes())
-    return Export(target, chosen, kinds, names, target.stat().st_size, time.perf_counter() - begin)
+        _check_parts(draft)
+        checked = compare_with_idas(draft, model, kinds[-1]) if check and native_platform() in names else Check()
+        if strict and checked.differs:
+            raise ExportError(checked.sentence, advice="Without `strict` it is written all the same, with a picture.")
+        write_bytes(target, draft.read_bytes())
+    checked = _draw(checked, target)
+    return Export(target, chosen, kinds, names, target.stat().st_size, time.perf_counter() - begin, checked)
 
 
 def _silent(_: str) -> None:
@@ -131,6 +146,7 @@ def _target(path: str | Path) -> Path:
         raise ExportError(f"An FMU is a file with the ending .fmu, not '{target.name}'.")
     if not target.absolute().parent.is_dir():
         raise ExportError(f"There is no folder '{target.parent}' for {target.name}.", advice="Make it first.")
+    check_writable(target)
     return target
 
 
@@ -139,6 +155,13 @@ def _version(asked: str) -> Version:
         if asked == one:
             return one
     raise UnknownName(f"FMI {asked} is not supported.", advice="There are 2.0 and 3.0.")
+
+
+def _modes(asked: str) -> ModesAs:
+    for one in get_args(ModesAs):
+        if asked == one:
+            return one
+    raise UnknownName(f"Modes cannot be exported as '{asked}'.", advice=f"There are {', '.join(get_args(ModesAs))}.")
 
 
 def _kinds(kind: Collection[str]) -> tuple[Kind, ...]:
@@ -150,20 +173,6 @@ def _kinds(kind: Collection[str]) -> tuple[Kind, ...]:
     if not asked:
         raise ExportError("An FMU needs a kind.", advice="Ask for me (Model Exchange), cs (Co-Simulation) or both.")
     return tuple(one for one in get_args(Kind) if one in asked)
-
-
-def _platforms(platforms: Sequence[str] | str) -> tuple[str, ...]:
-    asked = (platforms,) if isinstance(platforms, str) else tuple(platforms)
-    found: list[str] = []
-    for one in asked:
-        if one not in ("native", "all", *PLATFORMS):
-            known = ["native", "all", *PLATFORMS]
-            raise UnknownName(
-                f"There is no platform '{one}'{did_you_mean(one, known) or '.'}",
-                advice=f"There are {', '.join(known)}.",
-            )
-        found += PLATFORMS if one == "all" else [native_platform() if one == "native" else one]
-    return tuple(dict.fromkeys(found))
 
 
 # -- the model ---------------------------------------------------------------------------------------------------------
@@ -182,7 +191,7 @@ def _compiled(drive: Model, ends: Sequence[str], takes: Takes) -> tuple[Compiled
 
         drive = load(drive)
     flat = flatten(with_open_ends(drive, ends, takes), open_inputs=True)
-    return compile(reduce(flat)), str(getattr(drive, "description", "") or ""), _equations(flat)
+    return compile(reduce(flat)), str(getattr(drive, "_description", "") or ""), _equations(flat)
 
 
 def _equations(flat: FlatModel) -> Listing:
@@ -229,7 +238,6 @@ def _contents(
     model: CompiledDae, variables: Interface, about: About, equations: Listing, embed: bool
 ) -> dict[str, bytes]:
     """Return all files but the binaries, under a token that follows from their content."""
-    tables = make_tables(model)
     texts = {"modelDescription.xml": model_description(model, variables, about)}
     texts |= {f"sources/{name}": text for name, text in runtime_sources((about.version,)).items()}
     texts["documentation/index.html"] = index_page(variables, about.description, about.tool, equations)
@@ -241,8 +249,9 @@ def _contents(
         pictures = {f"terminalsAndIcons/icon.{suffix}": drive_icon(suffix) for suffix in ("png", "svg")}
         for family in dict.fromkeys(icon_name(one.kind) for one in model.terminals):
             pictures |= {f"terminalsAndIcons/{family}.{s}": terminal_icon(family, s) for s in ("png", "svg")}
-    token = _token(texts, model_file(tables, variables.variables, _TOKEN, about.tolerance))
-    data = model_file(tables, variables.variables, token, about.tolerance)
+    data = model_file(make_tables(model), variables.variables, _TOKEN, about.tolerance)
+    token = _token(texts, data)
+    data = with_token(data, _TOKEN, token)
     texts |= {name: text.replace(_TOKEN, token) for name, text in texts.items()}
     texts["sources/model_data.c"] = as_c(data)
     files: dict[str, bytes] = {name: text.encode() for name, text in texts.items()} | pictures
@@ -258,11 +267,18 @@ def _token(texts: dict[str, str], data: bytes) -> str:
     return f"{{{digest[:8]}-{digest[8:12]}-{digest[12:16]}-{digest[16:20]}-{digest[20:32]}}}"
 
 
-def _check(draft: Path, model: CompiledDae, kinds: tuple[Kind, ...], names: tuple[str, ...], run: bool) -> None:
+def _check_parts(draft: Path) -> None:
     found = problems(draft)
     if found:
         raise ExportError(
             f"The FMU does not pass its checks: {'; '.join(found[:3])}.", why="This is a fault of the export."
         )
-    if run and native_platform() in names:
-        compare_with_idas(draft, model, kinds[-1])
+
+
+def _draw(check: Check, target: Path) -> Check:
+    """Draw curves that differ next to the FMU."""
+    if not check.differs or check.curves is None:
+        return check
+    picture = target.with_name(f"{target.stem}_check.png")
+    save_plot(check.curves.plot(), picture)
+    return replace(check, picture=picture)

@@ -1,15 +1,31 @@
-"""Icons of FMUs and of their terminals, drawn the same in every run."""
+"""Icons of FMUs and of their terminals, drawn the same in every run: boxes with round corners, as PNG and as SVG."""
 
 from __future__ import annotations
 
-import io
-from collections.abc import Callable
-from typing import Any
+import struct
+import zlib
+from dataclasses import dataclass
+
+import numpy as np
 
 _INK = "#1f2937"
 _STEEL = "#9aa5b4"
 _LIGHT = "#e5e9ef"
 _COLOURS = {"rotational": "#6b7280", "translational": "#2f7d4f", "electrical": "#1d4ed8", "thermal": "#c2410c"}
+_PIXELS = 128
+_LINE = 3.2
+
+
+@dataclass(frozen=True)
+class _Box:
+    """A box with a frame of ink, in hundredths of the picture; with a radius of half its width it is a disc."""
+
+    x: float
+    y: float
+    width: float
+    height: float
+    fill: str
+    radius: float = 0.0
 
 
 def icon_name(kind: str) -> str:
@@ -24,46 +40,49 @@ def terminal_icon(family: str, suffix: str) -> bytes:
         family: as `icon_name` returns it.
         suffix: `png` or `svg`.
     """
-    from matplotlib.patches import Circle, Rectangle
-
-    def draw(axes: Any) -> None:
-        colour = _COLOURS.get(family, _STEEL)
-        style = {"facecolor": colour, "edgecolor": _INK, "linewidth": 3}
-        if family == "rotational":
-            axes.add_patch(Circle((50, 50), 44, **style))
-            axes.add_patch(Circle((50, 50), 16, facecolor="white", edgecolor=_INK, linewidth=3))
-        else:
-            axes.add_patch(Rectangle((8, 8), 84, 84, **style))
-
-    return _drawn(draw, suffix)
+    colour = _COLOURS.get(family, _STEEL)
+    if family == "rotational":
+        return _drawn([_Box(6, 6, 88, 88, colour, 44), _Box(34, 34, 32, 32, "#ffffff", 16)], suffix)
+    return _drawn([_Box(8, 8, 84, 84, colour)], suffix)
 
 
 def drive_icon(suffix: str) -> bytes:
     """Draw the icon of an FMU: two discs of a clutch on a shaft that leaves to the right."""
-    from matplotlib.patches import FancyBboxPatch, Rectangle
-
-    def draw(axes: Any) -> None:
-        frame = {"boxstyle": "round,pad=0,rounding_size=10", "facecolor": "white", "edgecolor": _INK, "linewidth": 3}
-        axes.add_patch(FancyBboxPatch((4, 4), 92, 92, **frame))
-        parts = [(12, 44, 76, 12, _STEEL), (18, 26, 22, 48, _LIGHT), (48, 20, 7, 60, _STEEL), (58, 20, 7, 60, _STEEL)]
-        for x, y, width, height, colour in parts:
-            axes.add_patch(Rectangle((x, y), width, height, facecolor=colour, edgecolor=_INK, linewidth=2.5))
-
-    return _drawn(draw, suffix)
+    parts = [(12, 44, 76, 12, _STEEL), (18, 26, 22, 48, _LIGHT), (48, 20, 7, 60, _STEEL), (58, 20, 7, 60, _STEEL)]
+    return _drawn([_Box(4, 4, 92, 92, "#ffffff", 10), *(_Box(*part) for part in parts)], suffix)
 
 
-def _drawn(draw: Callable[[Any], None], suffix: str) -> bytes:
-    import matplotlib as mpl
-    from matplotlib.figure import Figure
+def _drawn(boxes: list[_Box], suffix: str) -> bytes:
+    return _svg(boxes) if suffix == "svg" else _png(boxes)
 
-    figure = Figure(figsize=(1.28, 1.28), dpi=100)
-    axes = figure.add_axes((0, 0, 1, 1))
-    axes.set(xlim=(0, 100), ylim=(0, 100))
-    axes.set_axis_off()
-    draw(axes)
-    buffer = io.BytesIO()
-    metadata = {"Software": None} if suffix == "png" else {"Date": None, "Creator": None}
-    # Names inside an SVG are random unless they are salted.
-    with mpl.rc_context({"svg.hashsalt": "fmu"}):
-        figure.savefig(buffer, format=suffix, metadata=metadata, transparent=True)
-    return buffer.getvalue()
+
+def _svg(boxes: list[_Box]) -> bytes:
+    style = f'stroke="{_INK}" stroke-width="{_LINE}"'
+    rows = (
+        f'<rect x="{b.x}" y="{b.y}" width="{b.width}" height="{b.height}" rx="{b.radius}" fill="{b.fill}" {style}/>'
+        for b in boxes
+    )
+    head = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 100 100">'
+    return "\n".join(("<?xml version='1.0' encoding='utf-8'?>", head, *rows, "</svg>\n")).encode()
+
+
+def _png(boxes: list[_Box]) -> bytes:
+    """Paint boxes over each other; how much of a pixel one covers follows from the distance to its edge."""
+    picture = np.zeros((_PIXELS, _PIXELS, 4))
+    along = (np.arange(_PIXELS) + 0.5) * 100 / _PIXELS
+    for b in boxes:
+        inside = b.width / 2 - b.radius, b.height / 2 - b.radius
+        x, y = np.abs(along - b.x - b.width / 2) - inside[0], np.abs(along - b.y - b.height / 2) - inside[1]
+        across, down = np.meshgrid(x, y)
+        outside = np.hypot(np.maximum(across, 0), np.maximum(down, 0))
+        distance = outside + np.minimum(np.maximum(across, down), 0) - b.radius
+        for edge, colour in ((_LINE / 2, _INK), (-_LINE / 2, b.fill)):
+            cover = np.clip(0.5 - (distance - edge) * _PIXELS / 100, 0, 1)[..., None]
+            paint = np.array([*bytes.fromhex(colour[1:]), 255.0])
+            picture += (paint - picture) * cover
+    rows = np.round(picture).astype(np.uint8).reshape(_PIXELS, -1)
+    data = b"".join(b"\0" + row.tobytes() for row in rows)
+    head = struct.pack(">IIBBBBB", _PIXELS, _PIXELS, 8, 6, 0, 0, 0)
+    chunks = ((b"IHDR", head), (b"IDAT", zlib.compress(data, 9)), (b"IEND", b""))
+    parts = (struct.pack(">I", len(c)) + kind + c + struct.pack(">I", zlib.crc32(kind + c)) for kind, c in chunks)
+    return b"\x89PNG\r\n\x1a\n" + b"".join(parts)

@@ -20,6 +20,7 @@ from modelica_like.units import ONE, Unit, coherent, parse_unit
 
 Causality = Literal["independent", "parameter", "calculatedParameter", "input", "output", "local"]
 Variability = Literal["fixed", "tunable", "discrete", "continuous"]
+ModesAs = Literal["output", "local", "integer"]
 Initial = Literal["exact", "approx", "calculated"]
 SlotKind = Literal["time", "state", "der", "variable", "parameter", "derived", "input", "discrete", "guard"]
 
@@ -44,7 +45,7 @@ class FmuVariable:
 
     name: str
     reference: int
-    type: Literal["Float64", "Enumeration"]
+    type: Literal["Float64", "Enumeration", "Int64"]
     causality: Causality
     variability: Variability
     initial: Initial | None
@@ -91,7 +92,7 @@ class Interface:
         return f"Interface {self.name}: {len(self.states)} states; {parts}"
 
 
-def interface(model: CompiledDae, outputs: Sequence[str] = ()) -> Interface:
+def interface(model: CompiledDae, outputs: Sequence[str] = (), modes: ModesAs = "output") -> Interface:
     """List the FMI variables of a model, by the names they have in Python.
 
     Signal outputs of components and modes are outputs, inputs of the model are inputs, everything else is local.
@@ -99,6 +100,7 @@ def interface(model: CompiledDae, outputs: Sequence[str] = ()) -> Interface:
     Args:
         model: the compiled model.
         outputs: patterns of further variables that are to be outputs, such as `load.w` or `*.tau`.
+        modes: whether modes are outputs of an enumeration type, local variables of one, or integer outputs.
 
     Raises:
         UnknownName: no variable has a name of such a pattern.
@@ -107,7 +109,7 @@ def interface(model: CompiledDae, outputs: Sequence[str] = ()) -> Interface:
     build = _Builder(model, outputs)
     build.parameters()
     build.continuous()
-    build.discretes()
+    build.discretes(modes)
     build.guards()
     return build.result()
 
@@ -199,13 +201,15 @@ class _Builder:
                     unit=coherent(units[name] / _SECOND), derivative_of=self.states[k],
                 )  # fmt: skip
 
-    def discretes(self) -> None:
-        """Modes are outputs, other discrete values are local."""
+    def discretes(self, modes: ModesAs) -> None:
+        """Modes, and other discrete values, which are local."""
         for k, one in enumerate(self.model.flat_discretes):
             slot, about = ("discrete", k), {"unit": coherent(one.unit), "description": _mode_text(one)}
             if one.names:
-                bounds = {"min": 0, "max": len(one.names) - 1, "modes": one.names}
-                self.add(one.path, "Enumeration", "output", "discrete", "calculated", slot, **about, **bounds)
+                kind, names = ("Int64", ()) if modes == "integer" else ("Enumeration", one.names)
+                causality = "local" if modes == "local" else "output"
+                bounds = {"min": 0, "max": len(one.names) - 1, "modes": names}
+                self.add(one.path, kind, causality, "discrete", "calculated", slot, **about, **bounds)
             else:
                 start = self.starts.discrete(k)
                 self.add(one.path, "Float64", "local", "discrete", "exact", slot, start=start, **about)

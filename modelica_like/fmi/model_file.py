@@ -38,7 +38,7 @@ _INTEGER, _DOUBLE, _TEXT = "<i4", "<f8", "u1"
 
 
 def _record(integers: str, doubles: str = "") -> list[tuple[str, str]]:
-    """A record of integers and then doubles; names as in core.h."""
+    """A record of integers and then doubles; names as in model.h."""
     return [*((name, _INTEGER) for name in integers.split()), *((name, _DOUBLE) for name in doubles.split())]
 
 
@@ -87,7 +87,7 @@ SECTIONS: dict[str, Any] = {
 """Sections in the order of the file, with the type of their records."""
 
 _KINDS = ("time", "state", "der", "variable", "parameter", "derived", "input", "discrete", "guard")
-_TYPES = ("Float64", "Enumeration")
+_TYPES = {"Float64": 0, "Enumeration": 1, "Int64": 1}
 _RESETS = ("state", "discrete", "value")
 _CODES = {name: code for code, name in enumerate(OPERATIONS)}
 
@@ -114,8 +114,16 @@ def model_file(
         entries += _ENTRY.pack(number, records.itemsize, first + len(body), len(records))
         body += records.tobytes()
         body += bytes(-len(body) % _ALIGNED)
-    rest = entries + bytes(body)
+    return _headed(entries + bytes(body))
+
+
+def _headed(rest: bytes) -> bytes:
     return _HEADER.pack(_MAGIC, FORMAT, len(SECTIONS), zlib.crc32(rest), _HEADER.size + len(rest)) + rest
+
+
+def with_token(data: bytes, old: str, new: str) -> bytes:
+    """Return the file of a model with another token of the same length."""
+    return _headed(data[_HEADER.size :].replace(old.encode() + b"\0", new.encode() + b"\0"))
 
 
 def as_c(data: bytes) -> str:
@@ -124,7 +132,7 @@ def as_c(data: bytes) -> str:
     lines = (", ".join(f"{word:#x}u" for word in words[k : k + 6].tolist()) for k in range(0, len(words), 6))
     return (
         "/* The model, as model.c reads it. */\n"
-        '#include "core.h"\n\nconst uint64_t model_data[] = {\n    '
+        '#include "model.h"\n\nconst uint64_t model_data[] = {\n    '
         + ",\n    ".join(lines)
         + "};\nconst size_t model_data_size = sizeof model_data;\n"
     )
@@ -258,7 +266,7 @@ def _variable(one: FmuVariable, text: _Text) -> tuple[int, ...]:
     kind, index = one.slot
     start = -1 if one.start_entry is None else one.start_entry
     tunable = int(kind == "parameter" and one.variability == "tunable")
-    return (one.reference, _TYPES.index(one.type), _KINDS.index(kind), index, start, tunable, text(one.name))
+    return (one.reference, _TYPES[one.type], _KINDS.index(kind), index, start, tunable, text(one.name))
 
 
 def _pattern(name: str, one: QrPattern) -> dict[str, Any]:

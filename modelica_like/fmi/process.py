@@ -57,6 +57,7 @@ def _wait(command: Sequence[str], folder: Path, timeout: float, environment: dic
             return None
         finally:
             _end(process)
+            process.wait()  # an interrupted `with` does not
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:

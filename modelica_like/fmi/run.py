@@ -37,7 +37,9 @@ def run_fmu(
 
     Args:
         path: the FMU.
-        inputs: a number, or pairs (time in s, value), by name; linear in between.
+        inputs: a number, or pairs (time in s, value), by name; linear in between, with jumps where a time is repeated.
+            A Co-Simulation gets their slopes where it takes them (FMI 2.0, `canInterpolateInputs`), else their means
+            over steps in which none moves by more than a five-hundredth of its range, or over its own fixed steps.
         parameters: start values of parameters and variables by name, in the FMU's units.
         start: start time in s.
         stop: end time in s; by default that of the FMU.
@@ -111,6 +113,11 @@ def _tell_error(name: str, folder: Path) -> None:
     if kind == "no input":
         has = f"It has {', '.join(error['known'])}." if error["known"] else "It has none."
         raise UnknownName(f"{name}: '{error['name']}' is no input but {article(error['causality'])}. {has}")
+    if kind == "scheduled":
+        raise FmuRefused(
+            f"{name} is for Scheduled Execution only: its importer activates its tasks one by one, by a schedule.",
+            advice="Export it for Model Exchange or Co-Simulation, too.",
+        )
     if kind == "no kind":
         raise FmuRefused(f"{name} has no {error['wanted']} part.", advice="Ask for the other kind, or for none.")
     said = [printable(text) for text in error["messages"]]

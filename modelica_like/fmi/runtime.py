@@ -13,8 +13,10 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from modelica_like.fmi.build import FLAGS, PLATFORMS, build
-from modelica_like.fmi.sources import runtime_sources
+from modelica_like.fmi.sources import Face, own_sources, runtime_sources
+from modelica_like.writing import write_bytes
 
+_FACES: tuple[Face, ...] = ("2.0", "3.0", "native")
 SHIPPED = Path(__file__).parent / "runtimes"
 """Libraries of the package, one folder per platform."""
 
@@ -33,31 +35,31 @@ def runtime_library(platform: str, report: Callable[[str], None] = lambda _: Non
         UnknownName: there is no such platform.
         MissingExtra, ExportError: it must be built, and there is no compiler, or the compiler failed.
     """
-    sources = runtime_sources(("2.0", "3.0"))
-    name = library_name(platform, sources)
-    homes = [folder / platform for folder in (SHIPPED, cache_folder())]
-    for home in homes:
-        if (home / name).is_file():
-            return home / name
-    stale = any(homes[0].glob("runtime-*"))
+    found = found_runtime(platform)
+    if found is not None:
+        return found
+    stale = any((SHIPPED / platform).glob("runtime-*"))
     report(f"compiling the run-time for {platform}, once" + (": its sources have changed" if stale else ""))
-    return build_runtime(platform, homes[1], sources)
+    return build_runtime(platform, cache_folder() / platform)
 
 
-def build_runtime(platform: str, folder: Path, sources: dict[str, str] | None = None) -> Path:
+def found_runtime(platform: str) -> Path | None:
+    """Return the library for a platform that belongs to the sources, if there is one."""
+    homes = (folder / platform / _library_name(platform) for folder in (SHIPPED, cache_folder()))
+    return next((home for home in homes if home.is_file()), None)
+
+
+def build_runtime(platform: str, folder: Path) -> Path:
     """Compile the run-time for a platform into a folder; a library that others may be reading is replaced at once."""
-    sources = sources or runtime_sources(("2.0", "3.0"))
-    folder.mkdir(parents=True, exist_ok=True)
-    with TemporaryDirectory(dir=folder) as place:
-        built = build(sources, platform, Path(place), "runtime")
-        return built.replace(folder / library_name(platform, sources))
+    library = folder / _library_name(platform)
+    with TemporaryDirectory(prefix="modelica_like_") as place:
+        write_bytes(library, build(runtime_sources(_FACES), platform, Path(place)).read_bytes())
+    return library
 
 
-def library_name(platform: str, sources: dict[str, str]) -> str:
-    """Return the file name of the library that belongs to some sources."""
-    total = hashlib.sha256(repr((sorted(sources.items()), FLAGS)).encode()).hexdigest()
-    suffix = PLATFORMS[platform].suffix if platform in PLATFORMS else ""
-    return f"runtime-{total[:16]}{suffix}"
+def _library_name(platform: str) -> str:
+    total = hashlib.sha256(repr((own_sources(_FACES), FLAGS)).encode()).hexdigest()
+    return f"runtime-{total[:16]}{PLATFORMS[platform].suffix}"
 
 
 def cache_folder() -> Path:

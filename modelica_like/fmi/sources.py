@@ -13,6 +13,7 @@ from typing import Literal
 from modelica_like.errors import ExportError
 
 Version = Literal["2.0", "3.0"]
+Face = Literal["2.0", "3.0", "native"]
 
 _TEMPLATES = Path(__file__).parent / "templates"
 
@@ -22,6 +23,7 @@ RUNTIME = (
     "model_file.c",
     "tape.c",
     "linear.c",
+    "special.c",
     "point.c",
     "start.c",
     "holds.c",
@@ -32,6 +34,7 @@ RUNTIME = (
     "fixed.c",
     "values.c",
     "derivatives.c",
+    "taylor.c",
     "instance.c",
 )
 LOG_CATEGORIES = {
@@ -45,10 +48,12 @@ LOG_CATEGORIES = {
 _FACES = {
     "2.0": ("fmi2.h", "fmi2.c", "fmi2_values.c"),
     "3.0": ("fmi3.h", "fmi3.c", "fmi3_values.c", "fmi3_unused.c"),
+    "native": ("native.c",),
 }
 _HEADERS = {
     "2.0": ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h"),
     "3.0": ("fmi3Functions.h", "fmi3FunctionTypes.h", "fmi3PlatformTypes.h"),
+    "native": (),
 }
 
 
@@ -57,8 +62,8 @@ def source_files(version: Version) -> tuple[str, ...]:
     return ("model_data.c", *RUNTIME, *(name for name in _FACES[version] if name.endswith(".c")))
 
 
-def runtime_sources(versions: Iterable[Version]) -> dict[str, str]:
-    """Read the C sources of the run-time, with the functions of some FMI versions; no model is compiled in.
+def runtime_sources(faces: Iterable[Face]) -> dict[str, str]:
+    """Read the C sources of the run-time, with the functions by which it is called; no model is compiled in.
 
     Returns:
         File name to text; besides C files the headers that they include.
@@ -66,13 +71,14 @@ def runtime_sources(versions: Iterable[Version]) -> dict[str, str]:
     Raises:
         ExportError: FMPy, which has the headers of the standard, is not installed.
     """
-    names = ["core.h", "model_data.c", *RUNTIME]
-    headers: list[str] = []
-    for version in versions:
-        names += _FACES[version]
-        headers += _HEADERS[version]
-    texts = {name: (_TEMPLATES / name).read_text(encoding="utf-8") for name in names}
-    return texts | {name: _header(name) for name in headers}
+    wanted = tuple(faces)
+    return own_sources(wanted) | {name: _header(name) for face in wanted for name in _HEADERS[face]}
+
+
+def own_sources(faces: Iterable[Face]) -> dict[str, str]:
+    """Read the same without the headers of the standard."""
+    names = ("core.h", "model.h", "model_data.c", *RUNTIME, *(name for face in faces for name in _FACES[face]))
+    return {name: (_TEMPLATES / name).read_text(encoding="utf-8") for name in names}
 
 
 def licenses(version: Version) -> str:

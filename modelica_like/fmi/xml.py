@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 import lxml.etree as etree
@@ -38,16 +39,18 @@ def _lines(one: Any, indent: str) -> list[str]:
 
 
 def _text(value: object) -> str:
+    if isinstance(value, str):  # control characters are no XML
+        return value if value.isprintable() else "".join(c if c.isprintable() else " " for c in value)
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, float):
         return repr(value + 0.0)  # no negative zero
     if isinstance(value, list | tuple):
         return " ".join(map(_text, value))
-    # Control characters are no XML.
-    return "".join(c if c.isprintable() else " " for c in str(value))
+    return str(value)
 
 
+@cache
 def unit_name(unit: Unit) -> str | None:
     """Return the name of a unit in a description, or None for a plain number."""
     return None if unit in (ONE, ANY) else str(unit)

@@ -192,7 +192,10 @@ class _Choice:
             if column in self.place:
                 self.entries[row][self.place[column]] = number
         self.choice: Matching | Elimination = (Matching if matrix is None else Elimination)(len(self.columns))
-        added = [self._add({len(self.free) + row: 1.0, **self.entries[row]}) for row in range(self.own)]
+        if matrix is None:  # every one has an unknown of its own, by whatever structure solves it
+            for row in range(self.own):
+                self.entries[row][len(self.free) + row] = 1.0
+        added = [self._add(self.entries[row]) for row in range(self.own)]
         return [row for row, new in enumerate(added) if new or matrix is None]
 
     def _keep(self, some: bool) -> list[int]:

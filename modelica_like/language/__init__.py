@@ -48,5 +48,7 @@ from modelica_like.language.hold import UNLIMITED as UNLIMITED
 from modelica_like.language.hold import Hold as Hold
 from modelica_like.language.mode import BoundMode as BoundMode
 from modelica_like.language.mode import Mode as Mode
+from modelica_like.language.tables import column as column
+from modelica_like.language.tables import rows as rows
 from modelica_like.language.terminal import Terminal as Terminal
 from modelica_like.language.transition import Events as Events

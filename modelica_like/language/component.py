@@ -13,6 +13,7 @@ from modelica_like.language.expr import TIME, Expr
 from modelica_like.language.fields import Discrete, Field, Input, Output, Parameter, Value, param, require_identifier
 from modelica_like.language.mode import Mode
 from modelica_like.language.places import NOWHERE, caller
+from modelica_like.language.tables import REQUIRED, Rows, both_given, frozen_rows, rows
 from modelica_like.language.terminal import Terminal
 
 if TYPE_CHECKING:
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from modelica_like.language.transition import Events
 
 
-@dataclass_transform(kw_only_default=True, field_specifiers=(param,))
+@dataclass_transform(kw_only_default=True, field_specifiers=(param, rows))
 class Component(Declared):
     """A machine element: declared fields, connectors and parts, with equations between them.
 
@@ -36,6 +37,9 @@ class Component(Declared):
     _class_parts: ClassVar[dict[str, Component | list[Component]]] = {}
     _replaceable: ClassVar[frozenset[str]] = frozenset()
     _structural: ClassVar[dict[str, Any]] = {}
+    _tables: ClassVar[dict[str, Rows]] = {}
+    _given_tables: Mapping[str, Any] = {}
+    _measured: Mapping[str, str] = {}
     _class_modes: ClassVar[dict[str, Mode]] = {}
 
     def __init_subclass__(cls, partial: bool = False, **options: Any) -> None:
@@ -44,7 +48,7 @@ class Component(Declared):
         own = {name: value for name, value in vars(cls).items() if not name.startswith("_")}
         annotations = {
             name: text
-            for name, text in vars(cls).get("__annotations__", {}).items()
+            for name, text in _annotated(cls).items()
             if not str(text).startswith(("ClassVar", "typing.ClassVar")) and not name.startswith("_")
         }
         # A class may extend several bases, as in Modelica: everything is collected along the whole line of ancestors.
@@ -56,8 +60,11 @@ class Component(Declared):
         cls._replaceable = frozenset(parts.keys() & annotations).union(*(base._replaceable for base in ancestors))
         declared = (Field, Connector, Mode)
         plain = {
-            n: own.get(n, _REQUIRED) for n in annotations if not isinstance(own.get(n), declared) and n not in parts
+            n: own.get(n, REQUIRED) for n in annotations if not isinstance(own.get(n), declared) and n not in parts
         }
+        tables = {name: value for name, value in plain.items() if isinstance(value, Rows)}
+        plain |= {name: table.default for name, table in tables.items()}
+        cls._tables = {name: table for base in ancestors for name, table in base._tables.items()} | tables
         cls._structural = {name: value for base in ancestors for name, value in base._structural.items()} | plain
         for name in (*cls._class_fields, *cls._class_connectors, *cls._class_modes, *cls._class_parts):
             require_identifier(name, cls.__name__)
@@ -156,6 +163,8 @@ class Component(Declared):
             if not error.where:
                 error.where = (caller(),)
             raise
+        if field.name in self._measured:
+            raise both_given(self._measured[field.name], field.name)
         store = self._values if isinstance(field, Parameter | Input) else self._starts
         store[field.name] = understood
 
@@ -169,20 +178,28 @@ class Component(Declared):
 
         Raises:
             NetlistError: it has another type.
+            UnitError, ValueOutOfRange: a cell of a table has another dimension or is not finite.
         """
+        if name in cls._tables:
+            cls._tables[name].read(f"{cls.__name__}.{name}", cls._class_fields, frozen_rows(value))
+            return
+        if type(value) is int and abs(value) > _MOST:
+            # It may be a number of parts, which would be made.
+            raise NetlistError(f"{cls.__name__}.{name} is larger than {_MOST}; no drive has as many parts.")
         wanted = cast("type[object]", type(cls._structural[name]))
-        if wanted not in (bool, int, float, str) or (
-            isinstance(value, wanted) and isinstance(value, bool) == (wanted is bool)
-        ):
+        if cls._structural[name] is REQUIRED:
+            hint = next(_annotated(base)[name] for base in cls.__mro__ if name in _annotated(base))
+            wanted = next((kind for kind in _PLAIN if hint in (kind, kind.__name__)), object)
+        if wanted not in _PLAIN or (isinstance(value, wanted) and isinstance(value, bool) == (wanted is bool)):
             return
         if not (wanted is float and isinstance(value, int) and not isinstance(value, bool)):
-            names = {bool: "true or false", int: "a whole number", float: "a number", str: "a text"}
-            raise NetlistError(f"{cls.__name__}.{name} = {value!r} must be {names[wanted]}.")
+            raise NetlistError(f"{cls.__name__}.{name} = {value!r} must be {_PLAIN[wanted]}.")
 
     def _set_structural(self, name: str, value: Any) -> None:
-        if value is _REQUIRED:
+        if value is REQUIRED:
             raise LanguageError(f"{type(self).__name__} needs a value for {name}.", where=caller())
-        self.__dict__[name] = _frozen(value)
+        frozen = frozen_rows(value)
+        self.__dict__[name] = self._tables[name].store(self, name, frozen) if name in self._tables else frozen
 
     def value(self, name: str) -> Value | None:
         """Return the value of a parameter or input: given, default, or None."""
@@ -356,7 +373,8 @@ class Component(Declared):
         return f"{type(self).__name__}({', '.join(values)})"
 
 
-_REQUIRED = object()
+_MOST = 100_000
+_PLAIN: dict[type, str] = {bool: "true or false", int: "a whole number", float: "a number", str: "a text"}
 _Kind = TypeVar("_Kind")
 
 
@@ -367,13 +385,10 @@ def _is_part(value: object) -> bool:
     return isinstance(value, Component)
 
 
+def _annotated(cls: type) -> Mapping[str, Any]:
+    return vars(cls).get("__annotations__", {})
+
+
 def _of_kind(cls: type, kind: type[_Kind]) -> dict[str, _Kind]:
     lineage = reversed(cls.__mro__)
     return {name: value for base in lineage for name, value in vars(base).items() if isinstance(value, kind)}
-
-
-def _frozen(value: Any) -> Any:
-    """Make lists hashable, so that structural values can be compared."""
-    if isinstance(value, list | tuple):
-        return tuple(_frozen(item) for item in cast("list[Any]", value))
-    return value

@@ -83,7 +83,8 @@ class Mode:
         """
         if name not in self.names:
             raise UnknownName(
-                f"{self.label} has no mode '{name}'{did_you_mean(name, self.names)} It has {', '.join(self.names)}."
+                f"{self.label} has no mode '{name}'{did_you_mean(name, self.names) or '.'} "
+                f"It has {', '.join(self.names)}."
             )
         return self.names.index(name)
 

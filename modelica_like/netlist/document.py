@@ -21,6 +21,7 @@ from modelica_like.errors import (
 from modelica_like.netlist.locate import Lines, locate
 from modelica_like.units import parse_unit, to_si
 
+_ENDLESS = re.compile(r"[0-9]{4301}")
 MAX_BYTES = 2_000_000
 START_KINDS = ("given", "rest", "steady")
 
@@ -125,6 +126,9 @@ def parse_toml(text: str, lines: Lines) -> dict[str, Any]:
         return tomllib.loads(text)
     except (tomllib.TOMLDecodeError, RecursionError) as error:
         raise _not_toml(str(error), lines) from None
+    except ValueError:
+        number = next((k for k, line in enumerate(lines.text, 1) if _ENDLESS.search(line.replace("_", ""))), 0)
+        raise NetlistError("A number has more than 4300 digits.", where=lines.line(number)) from None
 
 
 def _not_toml(message: str, lines: Lines) -> ModelicaLikeError:
@@ -236,7 +240,12 @@ def _ends(key: str, value: Any) -> list[str]:
     return value
 
 
-def _part(key: str, value: Any) -> Any:
+def check_part(key: str, value: Any) -> Any:
+    """Return the table of a part, or of several, if it has the form of one.
+
+    Raises:
+        NetlistError: it has not.
+    """
     tables = value if isinstance(value, list) and value else [value]
     for table in tables:
         if not isinstance(table, dict):
@@ -294,7 +303,7 @@ _READERS: Mapping[str, Callable[[str, Any, Lines, list[ModelicaLikeError]], Any]
     "name": _text,
     "description": _text,
     "parameters": _each(_value),
-    "parts": _each(_part),
+    "parts": _each(check_part),
     "series": _each(_ends),
     "connect": _each(_ends),
     "start": _each(_value, flat=True),

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import inspect
+from collections.abc import Mapping
 from typing import Any
 
 from modelica_like.language import Component, Input, Parameter, Variable
 from modelica_like.language.fields import Discrete, Field
+from modelica_like.language.tables import REQUIRED, Column, Rows
 from modelica_like.netlist.document import START_KINDS
 from modelica_like.netlist.registry import library_types
+from modelica_like.units import ANY
 
 _QUANTITY = {"type": ["number", "string"]}
 _JSON_TYPES: dict[type, str] = {bool: "boolean", int: "integer", float: "number", str: "string", tuple: "array"}
@@ -93,7 +96,8 @@ def _component(kind: type[Component]) -> dict[str, Any]:
     properties: dict[str, Any] = {"is": {"const": kind.__name__}, "count": {"type": "integer"}}
     properties |= {name: _field(field) for name, field in kind._class_fields.items() if isinstance(field, described)}
     properties |= {name: {"enum": list(mode.names)} for name, mode in kind._class_modes.items()}
-    properties |= {name: _structural(default) for name, default in kind._structural.items()}
+    properties |= {name: _structural(default) for name, default in kind._structural.items() if name not in kind._tables}
+    properties |= {name: _table(table, kind._class_fields) for name, table in kind._tables.items()}
     properties |= {name: {"type": "object"} for name in kind._class_parts}
     return {
         "description": inspect.cleandoc(kind.__doc__ or "").partition("\n")[0],
@@ -114,14 +118,26 @@ def _field(field: Field) -> dict[str, Any]:
     return described
 
 
+def _table(table: Rows, fields: Mapping[str, Field]) -> dict[str, Any]:
+    cells = [{"type": _cell_types(one, fields), "description": one.described(fields)} for one in table.columns]
+    size = {"minItems": len(cells)} | ({"items": cells[-1]} if table.more else {"items": False})
+    row = cells[0] if table.flat else {"type": "array", "prefixItems": cells, **size}
+    found: dict[str, Any] = {"type": "array", "description": table.description, "minItems": 1, "items": row}
+    return found if table.default is REQUIRED else found | {"default": table.default}
+
+
+def _cell_types(column: Column, fields: Mapping[str, Field]) -> str | list[str]:
+    if column.text:
+        return "string"
+    return "number" if column.unit_in(fields) == ANY else ["number", "string"]
+
+
 def _structural(default: object) -> dict[str, Any]:
     names: dict[type, str] = {
         bool: "boolean",
         int: "integer",
         float: "number",
         str: "string",
-        tuple: "array",
-        list: "array",
     }
     kind = names.get(type(default))
     return {"type": kind, "default": default} if kind else {}

@@ -55,6 +55,8 @@ class Lines:
 
     def add(self, path: Path, number: int, *, table: bool = False) -> None:
         """Remember a key; a table may be mentioned more than once, as part of the names of its keys."""
+        if not path:  # no TOML: it has no key
+            return
         if path in self.numbers and not table:
             self.repeated.append((path, self.numbers[path], number))
         self.numbers.setdefault(path, number)

@@ -18,7 +18,7 @@ from modelica_like.errors import (
 )
 from modelica_like.language import Assembly, Component, Variable, guess
 from modelica_like.language.fields import Discrete
-from modelica_like.netlist.document import Document, parse, read_text
+from modelica_like.netlist.document import Document, check_part, parse, read_text
 from modelica_like.netlist.registry import find_type
 
 _MAX_PARTS = 200_000
@@ -77,7 +77,7 @@ class _Loader:
             document.name, connect=document.connect, series=document.series, free=document.free,
             description=document.description,
         )  # fmt: skip
-        assembly.__dict__.update(origin=str(chain[-1]), simulate=document.simulate)
+        assembly.__dict__.update(_origin=str(chain[-1]), _simulate=document.simulate)
         task = _Task(document, assembly, chain, self)
         task.run()
         if task.errors:
@@ -166,7 +166,7 @@ class _Task:
         if not isinstance(value, dict):
             part.set(key, value)
         elif "is" in value:
-            part.give(key, self._part(label, value))
+            part.give(key, self._part(label, check_part(f"parts.{label}", value)))
         else:
             for inner, inner_value in value.items():
                 self._give(part.find(key), inner, inner_value, f"{label}.{inner}")

@@ -14,15 +14,16 @@ from modelica_like.errors import NetlistError
 from modelica_like.language import Assembly, Component
 from modelica_like.language.fields import Field, Value
 from modelica_like.language.formula import Formula
+from modelica_like.language.tables import frozen_rows
 from modelica_like.netlist.convert import as_assembly
 from modelica_like.netlist.read import load, new_component
 from modelica_like.netlist.registry import type_name
+from modelica_like.writing import write_text
 
 
 def save(component: Component, path: str | Path) -> None:
     """Write a component as a netlist file; see `dumps`."""
-    path = Path(path)
-    path.write_text(dumps(component, folder=path.parent), encoding="utf-8")
+    write_text(path, dumps(component, folder=Path(path).parent))
 
 
 def dumps(component: Component, *, folder: str | Path = ".") -> str:
@@ -57,12 +58,12 @@ class _Writer:
             "expose": dict(assembly.exposed),
             "start": self.start,
             "guess": self.guess,
-            "simulate": assembly.__dict__["simulate"],
+            "simulate": assembly.__dict__["_simulate"],
         }
         document = tomlkit.document()
         document.add("name", tomlkit.item(assembly._name))
-        if assembly.__dict__["description"]:
-            document.add("description", tomlkit.item(assembly.__dict__["description"]))
+        if assembly.__dict__["_description"]:
+            document.add("description", tomlkit.item(assembly.__dict__["_description"]))
         if assembly.free_ends:
             document.add("free", tomlkit.item(list(assembly.free_ends)))
         for name, entries in sections.items():
@@ -80,14 +81,14 @@ class _Writer:
     def entry(self, path: str, part: Component) -> dict[str, Any]:
         """Return the table of one part: its type, and what differs from a new one of that type."""
         if isinstance(part, Assembly):
-            return {"is": self.file_of(part), **self.changes(path, part, load(part.__dict__["origin"]))}
-        structural = {key: plain(part.__dict__[key]) for key in part._structural}
+            return {"is": self.file_of(part), **self.changes(path, part, load(part.__dict__["_origin"]))}
+        structural = {key: plain(part._given_tables.get(key, part.__dict__[key])) for key in part._structural}
         reference = new_component(type(part), dict(structural))
-        different = {key: value for key, value in structural.items() if _frozen(value) != part._structural[key]}
+        different = {key: value for key, value in structural.items() if frozen_rows(value) != part._structural[key]}
         return {"is": type_name(type(part)), **different, **self.changes(path, part, reference)}
 
     def file_of(self, assembly: Assembly) -> str:
-        origin = assembly.__dict__["origin"]
+        origin = assembly.__dict__["_origin"]
         if not origin:
             raise NetlistError(
                 f"{assembly.label} is an assembly without a file, so a netlist cannot name it.",
@@ -115,11 +116,6 @@ class _Writer:
             elif change := self.changes(f"{path}.{name}", inner, known[name]):
                 table[name] = change
         return table
-
-
-def _frozen(value: Any) -> Any:
-    """Return lists as the tuples that structural defaults are."""
-    return tuple(_frozen(item) for item in value) if isinstance(value, list) else value
 
 
 def _given(component: Component, name: str) -> Value:

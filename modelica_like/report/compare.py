@@ -3,123 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from rich.console import Group, RenderableType
 from rich.markup import escape
 from rich.table import Table
 
-from modelica_like.compile.compiled import Vector
-from modelica_like.errors import UnknownName, ValueOutOfRange, did_you_mean
 from modelica_like.report.sources import trajectories
 from modelica_like.report.types import table
-from modelica_like.solve.plot import unit_of
-from modelica_like.solve.ranges import ranges
-from modelica_like.solve.recorder import Event
+from modelica_like.solve.curves import Curves, compare_solutions
 from modelica_like.solve.solution import Solution
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-_Rows = np.ndarray[Any, np.dtype[np.intp]]
-_Marks = np.ndarray[Any, np.dtype[np.bool_]]
-
-_SAME_TIME = 1e-9
-_SAME_INSTANT = 1e-8
-"""Time within which a mode that is left again counts as passed through."""
 _SHOWN = 20
 
 Source = str | Path | Solution
 
 
-@dataclass(frozen=True)
-class Deviation:
-    """How far one signal is apart.
-
-    Attributes:
-        signal: name.
-        unit: of `largest`.
-        largest: largest difference.
-        relative: the same over the signal's range in the first of the two.
-        time: when, in s.
-    """
-
-    signal: str
-    unit: str
-    largest: float
-    relative: float
-    time: float
-
-
-@dataclass(frozen=True)
-class EventDifference:
-    """A mode change that both have, or only one of them.
-
-    Attributes:
-        mode: path of the mode.
-        after: name of the mode that was entered last at that instant.
-        first: its time in the first of the two, in s; None if it is not there.
-        second: the same for the second.
-    """
-
-    mode: str
-    after: str
-    first: float | None
-    second: float | None
-
-    @property
-    def difference(self) -> float | None:
-        """Second time minus first, in s."""
-        return None if self.first is None or self.second is None else self.second - self.first
-
-
-@dataclass(frozen=True)
-class Comparison:
-    """Two trajectories, signal by signal and event by event.
-
-    Attributes:
-        first: one of them.
-        second: the other.
-        deviations: largest first.
-        events: by time.
-        labels: what to call the two: their files, or the names of their models.
-        interpolated: the results lie at different times; the second is interpolated in between, which costs precision.
-    """
-
-    first: Solution
-    second: Solution
-    deviations: tuple[Deviation, ...]
-    events: tuple[EventDifference, ...]
-    labels: tuple[str, str]
-    interpolated: bool
-
-    @property
-    def largest(self) -> float:
-        """Largest deviation of all signals, relative to their ranges."""
-        return max((deviation.relative for deviation in self.deviations), default=0.0)
-
-    @property
-    def largest_event_difference(self) -> float:
-        """Largest difference of the times of an event, in s; infinite if one of them misses an event."""
-        return max((abs(e.difference) if e.difference is not None else np.inf for e in self.events), default=0.0)
-
-    def __getitem__(self, signal: str) -> Deviation:
-        return next(deviation for deviation in self.deviations if deviation.signal == signal)
-
-    def difference(self, signal: str) -> tuple[Vector, Vector]:
-        """Return times at which the two are compared, and second minus first there."""
-        grid = _Grid.of(self.first, self.second, self.events)
-        return grid.times, _difference(self.first, self.second, signal, grid)
-
-    def plot(self, *patterns: str) -> Figure:
-        """Draw both over each other, and their difference below; by default the signals that deviate most."""
-        from modelica_like.report.compare_plot import plot_comparison
-
-        return plot_comparison(self, patterns)
+class Comparison(Curves):
+    """Two trajectories, signal by signal and event by event, printed as tables."""
 
     def __rich__(self) -> RenderableType:
         return comparison_report(self)
@@ -150,126 +51,11 @@ def compare(
     first = trajectories(a, until, points, tolerance)
     second = trajectories(b, until if until is not None else float(first.time[-1]), points, tolerance)
     labels = _label(a), _label(b)
-    if min(first.time[-1], second.time[-1]) <= max(first.time[0], second.time[0]):
-        raise ValueOutOfRange(f"{' and '.join(labels)} have no time in common.")
-    names = _signals(first, second, labels, signals)
-    events = tuple(_match_events(first, second))
-    grid = _Grid.of(first, second, events)
-    scales = ranges(first, names)
-    deviations = [_deviation(first, second, name, grid, scales[name]) for name in names]
-    ordered = tuple(sorted(deviations, key=lambda deviation: -deviation.relative))
-    return Comparison(first, second, ordered, events, labels, grid.interpolated)
+    return Comparison(**vars(compare_solutions(first, second, signals, labels)))
 
 
 def _label(source: Source) -> str:
     return source.model.name if isinstance(source, Solution) else Path(source).name
-
-
-def _signals(first: Solution, second: Solution, labels: tuple[str, str], patterns: Sequence[str]) -> list[str]:
-    common = [name for name in first.names if name in first.model.position and name in second.model.position]
-    if not common:
-        raise UnknownName(
-            f"{' and '.join(labels)} have no signal in common.",
-            advice="Signals are compared by their names, such as clutch.tau.",
-        )
-    chosen: dict[str, None] = {}
-    for pattern in patterns:
-        fitting = [name for name in common if name == pattern or fnmatchcase(name, pattern)]
-        if not fitting:
-            raise UnknownName(f"They have no common signal '{pattern}'{did_you_mean(pattern, common) or '.'}")
-        chosen.update(dict.fromkeys(fitting))
-    return list(chosen) or common
-
-
-def _instants(events: Sequence[Event], start: float, known: set[str]) -> dict[str, list[tuple[float, str]]]:
-    """Return time and last mode of every instant after the start, by mode."""
-    by_mode: dict[str, list[tuple[float, str]]] = {}
-    for event in events:
-        if event.mode in known and event.time > start + _SAME_INSTANT:
-            instants = by_mode.setdefault(event.mode, [])
-            if instants and event.time - instants[-1][0] < _SAME_INSTANT:
-                instants.pop()
-            instants.append((event.time, event.after))
-    return by_mode
-
-
-def _match_events(first: Solution, second: Solution) -> list[EventDifference]:
-    """Pair the changes of each mode that both have, in their order."""
-    known = set(first.model.discrete_position) & set(second.model.discrete_position)
-    ours, theirs = (_instants(run.events, float(run.time[0]), known) for run in (first, second))
-    found: list[EventDifference] = []
-    for mode in {**ours, **theirs}:
-        left, right = list(ours.get(mode, ())), list(theirs.get(mode, ()))
-        while left or right:
-            if left and right and left[0][1] == right[0][1]:
-                (t, after), (u, _) = left.pop(0), right.pop(0)
-                found.append(EventDifference(mode, after, t, u))
-            elif left and (not right or left[0][0] <= right[0][0]):
-                t, after = left.pop(0)
-                found.append(EventDifference(mode, after, t, None))
-            else:
-                u, after = right.pop(0)
-                found.append(EventDifference(mode, after, None, u))
-    return sorted(found, key=lambda event: min(t for t in (event.first, event.second) if t is not None))
-
-
-@dataclass(frozen=True)
-class _Grid:
-    """Where two solutions are compared: rows of the first, and the times and rows of the second.
-
-    Attributes:
-        rows: of the first.
-        times: of these rows.
-        partners: rows of the second at the same times; not used where it is interpolated.
-        interpolated: the second has no results at these times.
-    """
-
-    rows: _Rows
-    times: Vector
-    partners: _Rows
-    interpolated: bool
-
-    @classmethod
-    def of(cls, first: Solution, second: Solution, events: Sequence[EventDifference]) -> _Grid:
-        """Take the times that both have, or those of the first where they have few in common."""
-        time, other = first.time, second.time
-        once = np.flatnonzero(_single(time) & (time >= other[0]) & (time <= other[-1]))
-        near = np.clip(np.searchsorted(other, time[once] - _SAME_TIME), 0, len(other) - 1)
-        common = (np.abs(other[near] - time[once]) <= _SAME_TIME) & _single(other)[near]
-        interpolated = bool(2 * np.count_nonzero(common) < min(len(once), np.count_nonzero(_single(other))))
-        if not interpolated:
-            once, near = once[common], near[common]
-        clear = ~_between(time[once], events)
-        return cls(once[clear], time[once][clear], near[clear], interpolated)
-
-
-def _single(time: Vector) -> _Marks:
-    """Return where a time stands alone: at an event it is there twice."""
-    apart = np.diff(time) > _SAME_TIME
-    return np.append(apart, True) & np.insert(apart, 0, True)
-
-
-def _between(times: Vector, events: Sequence[EventDifference]) -> _Marks:
-    """Return which times lie between the times at which the two change a mode."""
-    inside = np.zeros(len(times), dtype=bool)
-    for event in events:
-        if event.first is not None and event.second is not None:
-            low, high = sorted((event.first, event.second))
-            inside |= (times >= low - _SAME_TIME) & (times <= high + _SAME_TIME)
-    return inside
-
-
-def _difference(first: Solution, second: Solution, name: str, grid: _Grid) -> Vector:
-    other = np.interp(grid.times, second.time, second[name]) if grid.interpolated else second[name][grid.partners]
-    return other - first[name][grid.rows]
-
-
-def _deviation(first: Solution, second: Solution, name: str, grid: _Grid, scale: float) -> Deviation:
-    difference = np.abs(_difference(first, second, name, grid))
-    difference = np.where(np.isnan(difference), np.inf, difference)
-    k = int(np.argmax(difference))
-    largest = float(difference[k])
-    return Deviation(name, unit_of(first, name), largest, largest / scale, float(grid.times[k]))
 
 
 def comparison_report(comparison: Comparison) -> RenderableType:

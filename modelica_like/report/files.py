@@ -1,34 +1,103 @@
-"""Results as files."""
+"""Results as files: tables by the ending of their name."""
 
 from __future__ import annotations
 
 import csv
+import sys
+from collections.abc import Callable
+from importlib.util import find_spec
 from pathlib import Path
+from typing import TYPE_CHECKING, TextIO
 
 import numpy as np
 
+from modelica_like.errors import NetlistError, missing_extra
 from modelica_like.solve.plot import unit_of
 from modelica_like.solve.solution import Solution
+from modelica_like.writing import check_writable, replacing
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+
+STDOUT = Path("-")
+"""The name of standard output."""
+_NEEDED = {".csv": (), ".parquet": (("pyarrow", "parquet"),), ".nc": (("scipy", "analyse"), ("xarray", "data"))}
+"""Endings of tables, with the packages that write them and the extras that install those."""
 
 
-def write_csv(solution: Solution, path: Path, *, units: bool = False) -> None:
-    """Write all trajectories: first column `time`, then one column per variable, modes as numbers.
+def check_table(path: Path) -> None:
+    """Tell before a run why a table cannot be written.
 
-    A repeated time is an event's left and right value. Numbers have as many digits as reading them back needs.
+    Raises:
+        NetlistError: no table has this ending.
+        MissingExtra: a package that writes it is not installed.
+        OSError: it cannot be written there.
+    """
+    if path == STDOUT:
+        return
+    if path.suffix.lower() not in _NEEDED:
+        raise NetlistError(
+            f"'{path.name}': a table can be {', '.join(_NEEDED)}.", advice="`-` is standard output, as .csv."
+        )
+    for package, extra in _NEEDED[path.suffix.lower()]:
+        if find_spec(package) is None:
+            raise missing_extra(package, extra)
+    check_writable(path)
+
+
+def write_solution(solution: Solution, path: Path, *, units: bool = False) -> None:
+    """Write all trajectories as a table; its ending chooses the format.
+
+    A repeated time is an event's left and right value.
 
     Args:
         solution: the run.
-        path: file to write.
-        units: write a second header line with the units.
+        path: `.csv` (first column `time`, then one column per variable, modes as numbers, with as many digits as
+            reading them back needs), `.parquet` or `.nc` (netCDF); `-` is standard output.
+        units: write a second header line with the units into a .csv; a netCDF always tells them.
 
     Raises:
+        NetlistError: no table has this ending.
         OSError: the file cannot be written.
     """
+    _write(path, lambda file: _rows(solution, file, units=units), solution.to_pandas, solution.to_xarray)
+
+
+def write_dataset(found: xarray.Dataset, path: Path) -> None:
+    """Write a sweep as a table, one row per run, or as netCDF; see `write_solution`.
+
+    Raises:
+        NetlistError: no table has this ending.
+        OSError: the file cannot be written.
+    """
+    _write(path, lambda file: found.to_dataframe().to_csv(file), found.to_dataframe, lambda: found)
+
+
+def _write(
+    path: Path, rows: Callable[[TextIO], None], frame: Callable[[], pandas.DataFrame],
+    dataset: Callable[[], xarray.Dataset],
+) -> None:  # fmt: skip
+    check_table(path)
+    if path == STDOUT:
+        rows(sys.stdout)
+        return
+    with replacing(path) as draft:
+        match path.suffix.lower():
+            case ".parquet":
+                frame().to_parquet(draft)
+            case ".nc":
+                dataset().to_netcdf(draft, engine="scipy")
+            case _:
+                with draft.open("w", newline="", encoding="utf-8") as file:
+                    rows(file)
+
+
+def _rows(solution: Solution, file: TextIO, *, units: bool) -> None:
     columns = [solution.time, *solution.together(*solution.names).values()]
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(["time", *solution.names])
-        if units:
-            writer.writerow(["s", *(unit_of(solution, name) for name in solution.names)])
-        for row in np.column_stack(columns).tolist():
-            writer.writerow(map(repr, row))
+    writer = csv.writer(file)
+    writer.writerow(["time", *solution.names])
+    if units:
+        writer.writerow(["s", *(unit_of(solution, name) for name in solution.names)])
+    for row in np.column_stack(columns).tolist():
+        writer.writerow(map(repr, row))

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich.console import Group, RenderableType
 from rich.markup import escape
 
-from modelica_like.errors import NetlistError
 from modelica_like.report.types import table
 
 if TYPE_CHECKING:
@@ -45,17 +43,3 @@ def sweep_report(found: xarray.Dataset) -> RenderableType:
 def _where(found: xarray.Dataset, place: Mapping[Any, xarray.DataArray]) -> str:
     point = found.isel({str(key): value.item() for key, value in place.items()})
     return escape(", ".join(f"{name} = {point[name].item():.6g}" for name in point.coords))
-
-
-def write_sweep(found: xarray.Dataset, path: Path) -> None:
-    """Write a sweep as a table, one row per run.
-
-    Raises:
-        NetlistError: the ending of the file is not .csv.
-    """
-    if path.suffix != ".csv":
-        raise NetlistError(
-            f"'{path.name}': a sweep can be written as .csv.", advice="For others use the dataset in Python."
-        )
-    path.parent.mkdir(parents=True, exist_ok=True)
-    found.to_dataframe().to_csv(path)

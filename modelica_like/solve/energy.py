@@ -10,7 +10,7 @@ import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.solve.options import Options
-from modelica_like.solve.powers import POWERS, Powers, pieces, stored_at_ends
+from modelica_like.solve.powers import POWERS, Powers, Results, results
 from modelica_like.solve.recorder import Event, Segment
 
 if TYPE_CHECKING:
@@ -21,6 +21,8 @@ _ROUNDING = 1e-9
 _NOTHING = 1e-12
 """Part of the model's largest power below which a power is rounding."""
 _SAME_TIME = 1e-12
+_ADDED_UP = 10.0
+"""Drift, in relative tolerances of the run, from which it is told."""
 
 
 class Loss(Protocol):
@@ -88,11 +90,13 @@ class EnergyBalance:
         throughput: largest of: energy exchanged, brought in, dissipated, stored.
         at_events: largest change of all stored energies together at an event, in J, that neither an impact nor a reset
             explains.
+        tolerance: relative tolerance of the run; 0 if it has none.
     """
 
     rows: tuple[EnergyRow, ...]
     throughput: float
     at_events: float = 0.0
+    tolerance: float = 0.0
 
     def __getitem__(self, component: str) -> EnergyRow:
         return next(row for row in self.rows if row.component == component)
@@ -146,7 +150,7 @@ class EnergyBalance:
 
     @property
     def notices(self) -> tuple[str, ...]:
-        """What is wrong with the equations of components, as sentences: powers that do not balance, negative losses."""
+        """What is wrong, as sentences: powers that do not balance, negative losses, energies that drift."""
         told: list[str] = []
         for row in self.rows:
             name = row.component or "The model itself"
@@ -159,6 +163,13 @@ class EnergyBalance:
                 told.append(f"{name} has a negative loss, {-row.gain:.6g} W at {row.gain_time:.9g} s.")
         if self.at_events > _ROUNDING * self.throughput:
             told.append(f"At an event {self.at_events:.6g} J appear or vanish that no impact and no reset explains.")
+        if self.tolerance and self.drift > _ADDED_UP * self.tolerance:
+            worst = max(self.rows, key=lambda row: abs(row.drift))
+            told.append(
+                f"The stored energy of {worst.component or 'the model itself'} drifts by {worst.drift:.2g} J, "
+                f"{self.drift / self.tolerance:.2g} times the run's relative tolerance: errors of the integrator's "
+                f"steps add up. A smaller rtol lowers them."
+            )
         return tuple(told)
 
     @property
@@ -197,9 +208,8 @@ def energy_balance(
 ) -> EnergyBalance:
     """Integrate the energy terms of every component along a run.
 
-    It is a quadrature over the results of the run; where they are too coarse, states in between are interpolated or, if
-    that is too coarse, too, integrated once more. Where even this fails, the coarser value stands: there is always a
-    balance.
+    It is a quadrature over the results of the run; where they are too coarse, IDAS integrates powers and states once
+    more from there. Where this fails, the coarser value stands: there is always a balance.
 
     Args:
         model: the compiled model.
@@ -210,15 +220,16 @@ def energy_balance(
     """
     count = len(model.components)
     audit, totals = _Audit(count), np.zeros((POWERS, count))
-    for piece in pieces(segments):
-        powers = Powers(model, options or Options(), piece)
-        totals += powers.integrals()
-        audit.see(powers)
-    lost, source, inflow, rate, _ = totals
+    options = options or Options()
+    powers = Powers(model, options, sum(len(segment.times) for segment in segments))
+    for some in results(model, segments):
+        totals += powers.integrals(some)
+        audit.see(some)
+    lost, source, inflow, rate = totals
     impact = np.zeros(count)
     for one in impacts:
         impact[model.components.index(one.component)] += one.energy
-    starts, ends = stored_at_ends(model, segments)
+    starts, ends = (np.concatenate(parts, axis=1) for parts in (audit.starts, audit.ends))
     jumps = starts[:, 1:] - ends[:, :-1]
     change, at_once = ends[:, -1] - starts[:, 0], np.sum(jumps, axis=1)
     columns = (
@@ -226,38 +237,46 @@ def energy_balance(
         *audit.found(),
     )  # fmt: skip
     rows = tuple(EnergyRow(path, *map(float, values)) for path, *values in zip(model.components, *columns, strict=True))
-    throughput = max([audit.stored, *(float(np.sum(np.abs(part))) for part in (inflow, source, lost + impact))])
+    throughput = max([powers.stored, *(float(np.sum(np.abs(part))) for part in (inflow, source, lost + impact))])
     reset = [event.time for event in events if event.transition >= 0 and model.transitions[event.transition].resets]
-    times = np.array([segment.times[0] for segment in segments[1:]])
-    return EnergyBalance(rows, throughput, _unexplained(times, np.sum(jumps, axis=0), reset, impacts))
+    times = np.concatenate(audit.times)[1:]
+    at_events = _unexplained(times, np.sum(jumps, axis=0), reset, impacts)
+    return EnergyBalance(rows, throughput, at_events, options.rtol)
 
 
 class _Audit:
-    """The largest imbalance of each component with its time, and its largest negative loss with its time."""
+    """The largest imbalance of each component and its largest negative loss, with their times.
+
+    Besides, stored energies at both ends of smooth pieces, and when these begin.
+    """
 
     def __init__(self, count: int) -> None:
-        self.stored = 0.0
+        self.times: list[Vector] = []
+        self.starts: list[Vector] = []
+        self.ends: list[Vector] = []
         self._largest = np.zeros(count)
         self._worst = np.zeros((2, count))
-        self._times = np.zeros((2, count))
+        self._when = np.zeros((2, count))
 
-    def see(self, powers: Powers) -> None:
-        """Look at all results of a piece of the run."""
-        table = powers.table(powers.at_results.powers)
-        lost, source, inflow, rate, _ = table
-        self.stored = max(self.stored, powers.stored)
-        self._largest = np.maximum(self._largest, np.max(np.abs(table), axis=(0, 2), initial=0.0))
+    def see(self, some: Results) -> None:
+        """Look at some results of the run."""
+        stored, lost, source, inflow, rate, _ = some.terms
+        starts = np.unique(some.first)
+        self.times.append(some.times[starts])
+        self.starts.append(stored[:, starts])
+        self.ends.append(stored[:, np.unique(some.last)])
+        self._largest = np.maximum(self._largest, np.max(np.abs(some.terms[1:]), axis=(0, 2), initial=0.0))
         for k, values in enumerate((np.abs(inflow + source - lost - rate), -lost)):
             worst = np.max(values, axis=1)
             later = worst > self._worst[k]
-            self._times[k, later] = powers.results.times[np.argmax(values[later], axis=1)]
+            self._when[k, later] = some.times[np.argmax(values[later], axis=1)]
             self._worst[k, later] = worst[later]
 
     def found(self) -> tuple[Vector, Vector, Vector, Vector]:
         """Return imbalances, as fractions of the largest powers, and negative losses, without what is rounding."""
         floor = _NOTHING * np.max(self._largest, initial=0.0)
         real = self._worst > np.maximum(_ROUNDING * self._largest, floor)
-        (imbalance, gain), (when, then) = np.where(real, self._worst, 0.0), np.where(real, self._times, 0.0)
+        (imbalance, gain), (when, then) = np.where(real, self._worst, 0.0), np.where(real, self._when, 0.0)
         return imbalance / np.maximum(self._largest, 1e-300), when, gain, then
 
 

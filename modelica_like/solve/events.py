@@ -8,11 +8,11 @@ import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, CompiledTransition, Vector
 from modelica_like.compile.soon import TIME_RESOLUTION
-from modelica_like.errors import SolveError, StepFailed
+from modelica_like.errors import StepFailed
 from modelica_like.initialize import Point
 from modelica_like.solve.guards import Candidate, Guards, Located, candidates, locate
 from modelica_like.solve.idas import Integrator
-from modelica_like.solve.instants import SAME_TIME, Instants, just_after
+from modelica_like.solve.instants import SAME_TIME, Instants, just_after, note_sharing
 from modelica_like.solve.looks import Cell, Looks
 from modelica_like.solve.options import Options
 from modelica_like.solve.pace import Pace
@@ -61,24 +61,25 @@ class EventLoop:
         self.pace = Pace(start.t, end, options, guarded=bool(self.guards.count), timed=timed)
         self.instants = Instants(model, options, self.guards, self.record, end - start.t)
 
+    @property
+    def counts(self) -> tuple[int, int, int]:
+        """Steps, evaluations of the equations, and calls of the integrator so far."""
+        return self.integrator.steps, self.integrator.evaluations, self.integrator.calls
+
     def run(self) -> Recorder:
         """Simulate.
 
         Raises:
-            Chattering, StepFailed, SingularAtStart: the run cannot go on; `record` of the error is what came before.
+            Chattering, StepFailed, SingularAtStart: the run cannot go on; `record` is what came before.
         """
         try:
-            with self.integrator.interrupts:
-                self.instants.settle(self.now, self._wanting())
-                self.instants.note_sharing(self.now)
-                self.record.begin(self.now)
-                while self.now.t < self.end:
-                    self._advance(min(self.instants.next_moment(self.now), self.end))
-                    if self.progress is not None:
-                        self.progress(self.now.t)
-        except SolveError as error:
-            error.record = self.record
-            raise
+            self.instants.settle(self.now, self._wanting())
+            note_sharing(self.record, self.model, self.now)
+            self.record.begin(self.now)
+            while self.now.t < self.end:
+                self._advance(min(self.instants.next_moment(self.now), self.end))
+                if self.progress is not None:
+                    self.progress(self.now.t)
         finally:
             self.record.end(self.now.d)
         return self.record
@@ -111,9 +112,8 @@ class EventLoop:
         times = self.pace.results(float(looks.times[0]), end)
         if not len(times):
             return
-        place = (times - looks.times[0]) / looks.width
-        numbers = np.rint(place).astype(int)
-        if np.all(np.abs(place - numbers) < 1e-7 * np.maximum(1.0, place)):
+        numbers = np.minimum(np.rint((times - looks.times[0]) / looks.width).astype(int), looks.count)
+        if np.all(np.abs(times - looks.times[numbers]) <= SAME_TIME * np.maximum(1.0, np.abs(times))):
             self.record.add(times, looks.x[:, numbers], looks.z[:, numbers])
         else:
             self.record.add(times, *self._between(looks, times, last))

@@ -88,7 +88,7 @@ class Integrator:
         self.calls = 0
         self.steps = 0
         self.evaluations = 0
-        self.interrupts = Interrupts()
+        self._interrupts = Interrupts()
         self._relaxed = 1.0
         self._gentle_from = np.inf
         self._tail = np.concatenate([model.p, model.u])
@@ -195,9 +195,9 @@ class Integrator:
         instance = self._instance(outputs, steps, gentle, first)
         screen, sys.stderr = sys.stderr, io.StringIO()
         try:
-            found = instance(start.x, start.z, p)
+            with self._interrupts:
+                found = instance(start.x, start.z, p)
         except RuntimeError as error:
-            self.interrupts.check()
             return f"{sys.stderr.getvalue()} {error}"
         finally:
             sys.stderr = screen

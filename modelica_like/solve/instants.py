@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -57,7 +58,6 @@ class Instants:
         self.guards = guards
         self.record = record
         self.span = span
-        self._recent: deque[Event] = deque(maxlen=_CHATTER_EVENTS)
         self._struck: Vector | None = None
         self._entered: set[int] = set()
         self._impacts = 0
@@ -118,23 +118,13 @@ class Instants:
             wanting = [*self.due(now), *self.rising(now)]
         else:
             raise self._chattering(f"Modes still switch after {alone} rounds at one instant")
-        self.note_sharing(now)
+        note_sharing(self.record, self.model, now)
         if len(self.record.events) > noted:
             self._instants.append(now.t)
         if len(self._instants) == _CHATTER_INSTANTS and now.t - self._instants[0] < _CHATTER_WINDOW * self.span:
             raise self._chattering("Events follow each other ever faster")
         if len(self.record.events) > self.options.max_events:
             raise self._chattering(f"There were more than {self.options.max_events} events")
-
-    def note_sharing(self, now: Point) -> None:
-        """Tell once who shares what the balance leaves undetermined."""
-        for parts in sharing(self.model, now):
-            text = (
-                f"{', '.join(parts[:-1])} and {parts[-1]} hold the same motion: they share the reaction in proportion "
-                "to what they can bear, because nothing else determines the split."
-            )
-            if text not in self.record.notices:
-                self.record.notices.append(text)
 
     def _share_anew(self, now: Point, wanting: list[CompiledTransition]) -> list[CompiledTransition]:
         """Before one of several that hold a motion gives way, let the others take more; what still wants to fire."""
@@ -227,34 +217,37 @@ class Instants:
         return self._numbers[id(transition)]
 
     def _note(self, now: Point, number: int, target: int, transition: int) -> None:
-        mode = self.model.flat_discretes[number]
-        # Who is knocked loose goes without a transition; the first one of the mode tells where it stands.
-        known = (
-            transition
-            if transition >= 0
-            else next(k for k, one in enumerate(self.model.transitions) if one.mode == number)
-        )
-        event = Event(
-            float(now.t), mode.path, mode.names[int(now.d[number])], mode.names[target],
-            self.model.transitions[known].source, transition, len(self.record.segments), self._round,
-        )  # fmt: skip
-        self.record.events.append(event)
-        self._recent.append(event)
+        self.record.note(self.model, float(now.t), number, (int(now.d[number]), target), transition, self._round)
 
     def _chattering(self, why: str) -> Chattering:
-        recent = list(self._recent)
-        counts: dict[str, list[Event]] = {}
-        for event in recent:
-            counts.setdefault(event.mode, []).append(event)
-        mode, events = max(counts.items(), key=lambda item: len(item[1]))
-        names = " ⇄ ".join(dict.fromkeys(name for event in events for name in (event.before, event.after)))
-        first, last = f"{events[0].time:.9g}", f"{events[-1].time:.9g}"
-        when = f"at t = {last} s" if first == last else f"in t = {first}…{last} s"
-        return Chattering(
-            f"{mode} switched {len(events)} times {when} ({names}).",
-            where=list(dict.fromkeys(event.source for event in events))[:3], why=f"{why}.",
-            advice="Give the switching a hysteresis (a peak above 1 in friction), or smooth what drives it.",
-        )  # fmt: skip
+        return chattering(self.record.events, why)
+
+
+def chattering(events: Sequence[Event], why: str) -> Chattering:
+    """Return the error of a run whose last events switch without end."""
+    counts: dict[str, list[Event]] = {}
+    for event in events[-_CHATTER_EVENTS:]:
+        counts.setdefault(event.mode, []).append(event)
+    mode, those = max(counts.items(), key=lambda item: len(item[1]))
+    names = " ⇄ ".join(dict.fromkeys(name for event in those for name in (event.before, event.after)))
+    first, last = f"{those[0].time:.9g}", f"{those[-1].time:.9g}"
+    when = f"at t = {last} s" if first == last else f"in t = {first}…{last} s"
+    return Chattering(
+        f"{mode} switched {len(those)} times {when} ({names}).",
+        where=list(dict.fromkeys(event.source for event in those))[:3], why=f"{why}.",
+        advice="Give the switching a hysteresis (a peak above 1 in friction), or smooth what drives it.",
+    )  # fmt: skip
+
+
+def note_sharing(record: Recorder, model: CompiledDae, now: Point) -> None:
+    """Tell once who shares what the balance leaves undetermined."""
+    for parts in sharing(model, now):
+        text = (
+            f"{', '.join(parts[:-1])} and {parts[-1]} hold the same motion: they share the reaction in proportion "
+            "to what they can bear, because nothing else determines the split."
+        )
+        if text not in record.notices:
+            record.notices.append(text)
 
 
 def _is_source(now: Point, transition: CompiledTransition) -> bool:

@@ -9,10 +9,13 @@ from typing import Any
 
 
 class Interrupts:
-    """Keeps what a handler of SIGINT raised; a context around everything that may be interrupted.
+    """A context around foreign code that swallows interrupts: what a handler of SIGINT raises inside is raised behind.
 
-    CasADi looks for signals while it evaluates equations, but an integrator takes the exception for a failure of the
-    equations. In other threads than the main one there are no signals.
+    CasADi looks for signals while it integrates, but takes the exception for a failure of the equations. In other
+    threads than the main one there are no signals.
+
+    Raises:
+        KeyboardInterrupt: or what else the program's own handler raises.
     """
 
     def __init__(self) -> None:
@@ -31,6 +34,9 @@ class Interrupts:
         if self._previous is not None:
             signal.signal(signal.SIGINT, self._previous)
             self._previous = None
+        if self._raised is not None:
+            raised, self._raised = self._raised, None
+            raise raised from None
 
     def _note(self, number: int, frame: FrameType | None) -> None:
         try:
@@ -38,12 +44,3 @@ class Interrupts:
         except BaseException as error:
             self._raised = error
             raise
-
-    def check(self) -> None:
-        """Raise what the handler raised, after something else came of it.
-
-        Raises:
-            KeyboardInterrupt: or what else the program's own handler raises.
-        """
-        if self._raised is not None:
-            raise self._raised from None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -68,17 +69,21 @@ class Pace:
 
     def snap(self, times: Vector) -> None:
         """Put times exactly on the regular grid, so that they do not collect rounding errors."""
-        numbers = np.rint((times - self.begin) / self.look)
-        on_grid = np.abs((times - self.begin) / self.look - numbers) < _ON_GRID
-        times[on_grid] = self._at(numbers[on_grid], self.points * self.checks)
+        grid = self._at(np.rint((times - self.begin) / self.look), self.points * self.checks)
+        on_grid = np.abs(times - grid) <= self._same(grid)
+        times[on_grid] = grid[on_grid]
 
     def _at(self, numbers: Vector, count: int) -> Vector:
         return self.begin + (self.end - self.begin) * (numbers / count)
 
+    def _same(self, times: Any) -> Any:
+        """Distance of times that are the same, and surely of no others on the grid."""
+        return np.minimum(_ON_GRID * self.look, SAME_TIME * np.maximum(1.0, np.abs(times)))
+
     def results(self, first: float, last: float) -> Vector:
         """Return the times of results after `first` up to `last`, both with a little room."""
-        low = math.floor(float(first - self.begin) / self.step + _ON_GRID) + 1
-        high = math.floor(float(last - self.begin) / self.step + _ON_GRID)
+        low = math.floor(float(first + self._same(first) - self.begin) / self.step) + 1
+        high = math.floor(float(last + self._same(last) - self.begin) / self.step)
         return self._at(np.arange(low, high + 1, dtype=float), self.points)
 
     def before(self, t: float) -> float:

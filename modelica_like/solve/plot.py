@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Sequence
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,10 +14,13 @@ from modelica_like.errors import NetlistError, UnknownName, did_you_mean
 from modelica_like.solve.recorder import Event
 from modelica_like.solve.solution import Solution
 from modelica_like.solve.style import COLOURS, STYLE, headline, panels, with_unit
+from modelica_like.writing import check_writable, write_bytes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    from modelica_like.compile.compiled import CompiledDae
 
 _QUANTITIES = {
     "rad/s": "speed", "N.m": "torque", "m/s": "velocity", "N": "force", "rad": "angle", "m": "position", "W": "power",
@@ -52,18 +56,38 @@ def plot(solution: Solution, patterns: Sequence[str] = (), *, title: str = "") -
     return figure
 
 
-def save_plot(figure: Figure, path: Path) -> None:
+def check_picture(path: Path) -> None:
+    """Tell before a run why a picture cannot be written.
+
+    Raises:
+        NetlistError: matplotlib does not know the format.
+        OSError: it cannot be written there.
+    """
+    from matplotlib.backend_bases import FigureCanvasBase
+
+    known = FigureCanvasBase.get_supported_filetypes()
+    if path.suffix.lower().lstrip(".") not in known:
+        raise NetlistError(f"'{path.name}': a picture can be {', '.join(sorted(known))}.")
+    check_writable(path)
+
+
+def save_plot(figure: Figure, path: Path, **options: Any) -> None:
     """Write a picture; the ending of the file chooses the format.
+
+    Args:
+        figure: the picture.
+        path: the file.
+        options: of matplotlib's `savefig`.
 
     Raises:
         NetlistError: matplotlib does not know the format.
         OSError: the file cannot be written.
     """
-    known = figure.canvas.get_supported_filetypes()
-    if path.suffix.lstrip(".") not in known:
-        raise NetlistError(f"'{path.name}': a picture can be {', '.join(sorted(known))}.")
-    path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path)
+    check_picture(path)
+    # In memory first: not every format tells that a disk is full.
+    content = io.BytesIO()
+    figure.savefig(content, format=path.suffix[1:].lower(), **options)
+    write_bytes(path, content.getvalue())
 
 
 def chosen(solution: Solution, patterns: Sequence[str]) -> list[str]:
@@ -72,14 +96,21 @@ def chosen(solution: Solution, patterns: Sequence[str]) -> list[str]:
     Raises:
         UnknownName: nothing fits a pattern.
     """
-    if not patterns:
-        return _usual(solution)
+    return matching(solution.model, patterns) if patterns else _usual(solution)
+
+
+def matching(model: CompiledDae, patterns: Sequence[str]) -> list[str]:
+    """Return the variables and modes of a model that fit patterns, before it is run.
+
+    Raises:
+        UnknownName: nothing fits a pattern.
+    """
+    known = (*model.position, *model.discrete_position)
     names: dict[str, None] = {}
     for pattern in patterns:
-        fitting = [name for name in solution.names if name == pattern or fnmatchcase(name, pattern)]
+        fitting = [name for name in known if name == pattern or fnmatchcase(name, pattern)]
         if not fitting:
-            hint = did_you_mean(pattern, solution.names) or "."
-            raise UnknownName(f"{solution.model.name} has no variable '{pattern}'{hint}")
+            raise UnknownName(f"{model.name} has no variable '{pattern}'{did_you_mean(pattern, known) or '.'}")
         names.update(dict.fromkeys(fitting))
     return list(names)
 

@@ -1,67 +1,75 @@
-"""Integrals of the powers along a run, by quadrature over its own results, and in between where that is too coarse."""
+"""Integrals of the powers along a run: by a rule over its own results and, where these are too coarse, by IDAS."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cache, partial
 
 import casadi as ca
 import numpy as np
 
-from modelica_like.compile.buffers import along
+from modelica_like.compile.buffers import BufferedFunction, along, buffered
 from modelica_like.compile.compiled import CompiledDae, Vector
-from modelica_like.errors import ModelicaLikeError
-from modelica_like.initialize import Point, implicit_at
-from modelica_like.solve.idas import Integrator
-from modelica_like.solve.nodes import LOBATTO, LOBATTO_WEIGHTS, Nodes, Places, Rule, between, rules
+from modelica_like.initialize import Point
+from modelica_like.solve.idas import Integrator, scaled_problem
 from modelica_like.solve.options import Options
+from modelica_like.solve.quadrature import Places, rules
 from modelica_like.solve.recorder import Segment
 
-POWERS = 5
-"""Powers of a component: loss, source, inflow, rate of the stored energy, magnitudes through the connectors."""
-_GAIN = 0.1
-"""How much better than the next lower one a rule is believed to be at most."""
-_RATE = 3
-_SHARE = 3.0
-"""Part of the run's relative tolerance that the quadrature may add."""
-_TRUSTED = 100.0
-"""Mismatch of states, in relative tolerances of the run, up to which they are interpolated and not integrated again."""
-_SUSPECT = 1e-3
-"""Mismatch of states, relative to their largest values, from which the energies there are compared."""
-_ENOUGH = 4
-_ROUNDS, _EVERYWHERE = 9, 3
-_TRIALS = 40
-"""Calls of the integrator for one piece of a run."""
-_CLOSE = 0.1
-"""Distance of two results, as part of the next one, up to which one of them is left out."""
-_MOST_POINTS = 200_000
+POWERS = 4
+"""Powers of a component that are integrated: loss, source, inflow, rate of the stored energy."""
+_RATE = 4
+"""Column of the rate of the stored energy among the energy terms."""
 _PIECE = 20_000
 """Results that are looked at together."""
+_SHARE, _ALL = 0.1, 50.0
+"""Errors of one interval and of all, in relative tolerances of the energy that moves, that are left as they are."""
+_ASTRAY = 3.0
+"""The same of one interval where stored energies change otherwise than their rates say, however smooth these look."""
+_FINER = 0.1
+_FINEST = 1e-12
+"""What is integrated again is so much more precise than the run, but no more than this."""
 _NEAR = 8
 """Intervals that are integrated again as well rather than to start once more behind them."""
-_SOME, _MANY, _MOST_OUTPUTS = 32, 128, 4096
-_UNRESOLVED = 1e-2
-"""Mismatch of states, relative to their largest values, from which many points are needed at once."""
-_POLISHING, _SMALL_STEP = 6, 1e-8
-"""Newton's steps; behind a small one there is nothing but rounding."""
+_FAILURES = 20
+"""Failures of IDAS in a piece of a run from which the results have to do."""
+_FEW = 4
+"""Intervals of a smooth piece up to which slopes of the powers are taken."""
+_BESIDE = np.array([[1 / 2, 1 / 2], [2 / 3, 1 / 3], [1 / 2, 1 / 2]])
+"""Weights of the powers at both ends of an interval, beside slopes at both and at the first, and without any."""
+_CLOSE = 0.1
+"""Distance of two results, as part of the next one, up to which one of them is left out."""
 
 
 @dataclass
-class Terms:
-    """Energy terms at some points.
+class Results:
+    """Some results of a run with their energy terms.
 
     Attributes:
-        stored: energies, shape (components, n).
-        powers: those that are not zero anyway, shape (kept, n).
-        rates: derivatives of the states, shape (nx, n).
+        times: shape (n,), in s.
+        x: states, shape (nx, n).
+        z: implicit unknowns, shape (nz, n).
+        d: modes and discrete values, shape (nd, n).
+        first: the first result of the smooth piece each one belongs to, shape (n,).
+        last: its last result, shape (n,).
+        terms: energy terms in the order of `CompiledDae.energy`, shape (6, components, n).
     """
 
-    stored: Vector
-    powers: Vector
-    rates: Vector
+    times: Vector
+    x: Vector
+    z: Vector
+    d: Vector
+    first: Places
+    last: Places
+    terms: Vector
+
+    def point(self, k: int) -> Point:
+        """Return one result."""
+        return Point(float(self.times[k]), self.x[:, k].copy(), self.z[:, k].copy(), self.d[:, k].copy())
 
 
-def pieces(segments: tuple[Segment, ...]) -> Iterator[tuple[Segment, ...]]:
+def results(model: CompiledDae, segments: tuple[Segment, ...]) -> Iterator[Results]:
     """Go through a run in pieces of bounded size; a long segment is cut into some that share a result."""
     held: list[Segment] = []
     count = 0
@@ -71,329 +79,237 @@ def pieces(segments: tuple[Segment, ...]) -> Iterator[tuple[Segment, ...]]:
             held.append(Segment(segment.times[part], segment.x[:, part], segment.z[:, part], segment.d))
             count += len(held[-1].times)
             if count > _PIECE:
-                yield tuple(held)
+                yield _together(model, held)
                 held, count = [], 0
     if held:
-        yield tuple(held)
+        yield _together(model, held)
 
 
-def stored_at_ends(model: CompiledDae, segments: tuple[Segment, ...]) -> tuple[Vector, Vector]:
-    """Return stored energies at the beginnings and at the ends of segments, shapes (components, segments), in J."""
-    function = along(model._cache, "energy terms", lambda: _terms_function(model))
-    d = np.array([segment.d for segment in segments]).T
+def _together(model: CompiledDae, segments: list[Segment]) -> Results:
+    sizes = [len(segment.times) for segment in segments]
+    ends = np.cumsum(sizes)
+    times = np.concatenate([segment.times for segment in segments])
+    x, z = (np.concatenate([getattr(segment, name) for segment in segments], axis=1) for name in "xz")
+    d = np.repeat(np.array([segment.d for segment in segments]).T, sizes, axis=1)
+    function = along(model._cache, "energy terms", lambda: _terms(model))
+    terms = function(times, x, z, model.p, model.u, d)[0].reshape(-1, len(model.components), len(times))
+    return Results(times, x, z, d, np.repeat(ends - sizes, sizes), np.repeat(ends - 1, sizes), terms)
 
-    def at(k: int) -> Vector:
-        times = np.array([segment.times[k] for segment in segments])
-        x, z = (np.array([getattr(segment, name)[:, k] for segment in segments]).T for name in "xz")
-        return function(times, x, z, model.p, model.u, d)[0]
 
-    return at(0), at(-1)
+def _terms(model: CompiledDae) -> ca.Function:
+    arguments = list(model.arguments.values())
+    return ca.Function("terms", arguments, [ca.densify(ca.vec(model.energy(*arguments)))], {"cse": True})
 
 
 class Powers:
-    """Evaluates and integrates the energy terms of a run.
+    """Integrates the powers along a run, piece by piece.
 
     Args:
         model: the compiled model.
         options: of the run.
-        segments: smooth pieces of it.
+        count: number of its results.
 
     Attributes:
-        results: all of them.
-        at_results: the energy terms there.
-        stored: largest energy that is stored at one time, in J.
+        stored: the largest energy that all components stored at one time so far, in J.
+        moved: that, or the largest energy that one exchanged. What an integral is precise to is a part of it, not of
+            what is left over: an oscillation exchanges its energy again and again.
     """
 
-    def __init__(self, model: CompiledDae, options: Options, segments: tuple[Segment, ...]) -> None:
-        self.model, self.options, self.segments = model, options, segments
-        self._discretes = np.array([segment.d for segment in segments]).T
-        self._kept = _kept(model)
-        self.results = _together([(s.times, s.x, s.z, k) for k, s in enumerate(segments)])
-        self.at_results = self._terms(self.results)
-        largest = np.max(np.abs(self.results.x), axis=1, initial=0.0)
-        self._scales = np.maximum(largest, options.atol * model.nominals)[:, None]
-        self.stored = float(np.max(np.sum(np.abs(self.at_results.stored), axis=0), initial=0.0))
-        self._points = 0
+    def __init__(self, model: CompiledDae, options: Options, count: int) -> None:
+        self.model, self.options = model, options
+        self._share = min(_SHARE, _ALL / count)
+        self.stored, self.moved = 0.0, 0.0
 
-    def table(self, powers: Vector) -> Vector:
-        """Return powers of all components, shape (5, components, ...): loss, source, inflow, rate, magnitudes."""
-        whole = np.zeros((POWERS * len(self.model.components), *powers.shape[1:]))
-        whole[self._kept] = powers
-        return whole.reshape(POWERS, len(self.model.components), *powers.shape[1:])
-
-    def integrals(self) -> Vector:
-        """Integrate all powers over the run; shape (5, components), in J."""
-        every, terms = self.results, self.at_results
+    def integrals(self, every: Results) -> Vector:
+        """Integrate all powers over some results; shape (4, components), in J."""
         kept = _apart(every)
         first, last = (np.searchsorted(kept, ends[kept]) for ends in (every.first, every.last))
-        nodes = Nodes(every.times[kept], every.x[:, kept], every.z[:, kept], every.segment[kept], first, last)
-        terms = Terms(terms.stored[:, kept], terms.powers[:, kept], terms.rates[:, kept])
-        return self.table(self._integrate(nodes, terms, 0, None))
+        intervals, places, weights = rules(every.times[kept], first, last)
+        first, last = first[intervals], last[intervals]
+        terms = every.terms[..., kept]
+        powers = terms[1 : 1 + POWERS].reshape(-1, len(kept))
+        self._move(terms[0], powers, np.diff(every.times[kept]))
+        bent, bends = intervals[:0], np.zeros((2, len(powers), 0))
+        coarse = self._coarse(terms, intervals, places, weights, bent, bends)
+        ends = np.stack([kept[intervals], kept[intervals + 1]])
+        few = np.flatnonzero(coarse & (last - first < _FEW))
+        if len(few) > 1 and self.model.states and not self.model.implicit:
+            bent, bends = few, self._bends(every, ends[:, few])
+            places[bent, :2] = intervals[bent, None] + np.arange(2)
+            weights[bent] = 0.0
+            weights[bent, :, :2] = _BESIDE * np.diff(every.times[ends[:, bent]], axis=0)[0][:, None, None]
+            coarse = self._coarse(terms, intervals, places, weights, bent, bends)
+        # A stretch lies within one smooth piece.
+        again, total = self._again(every, ends, _stretches(coarse, first))
+        weights[again] = 0.0
+        total += powers @ np.bincount(places.ravel(), weights[:, 0].ravel(), len(kept))
+        total += bends[0] @ ~again[bent]
+        return total.reshape(POWERS, -1)
 
-    # -- terms -------------------------------------------------------------------------------------------------------
+    def _move(self, stored: Vector, powers: Vector, steps: Vector) -> None:
+        """See what energies some results store and exchange."""
+        self.stored = max(self.stored, float(np.max(np.sum(np.abs(stored), axis=0))))
+        # Behind a sudden start, the power of a single result would fill an interval in which it is over at once.
+        sizes = np.abs(powers)
+        least = np.max(np.minimum(sizes[:, :-1], sizes[:, 1:]) @ steps, initial=0.0)
+        most = 0.0 if least else np.max(sizes[:, 1:] @ steps, initial=0.0)
+        self.moved = max(self.moved, self.stored, float(least), float(most))
 
-    def _terms(self, nodes: Nodes) -> Terms:
+    def _bends(self, every: Results, ends: Places) -> Vector:
+        """Return what slopes of powers add to the integrals of the first two rules; shape (2, 4 components, m)."""
         model = self.model
-        function = along(model._cache, "energy terms", lambda: _terms_function(model))
-        d = self._discretes[:, nodes.segment]
-        return Terms(*function(nodes.times, nodes.x, nodes.z, model.p, model.u, d))
+        function = along(model._cache, "slopes of powers", lambda: _slopes(model))
+        x, z, d = (part[:, ends.ravel()] for part in (every.x, every.z, every.d))
+        slopes = function(every.times[ends.ravel()], x, z, model.p, model.u, d)[0].reshape(-1, *ends.shape)
+        squares = np.diff(every.times[ends], axis=0) ** 2
+        return squares * np.stack([(slopes[:, 0] - slopes[:, 1]) / 12.0, slopes[:, 0] / 6.0])
 
-    def _polished(self, nodes: Nodes) -> None:
-        """Let interpolated implicit unknowns meet their equations."""
-        model, size = self.model, len(self.model.implicit)
-        function = along(model._cache, "implicit equations", lambda: implicit_at(model))
-        d = self._discretes[:, nodes.segment]
-        for _ in range(_POLISHING if size else 0):
-            residual, jacobian = function(nodes.times, nodes.x, nodes.z, model.p, model.u, d)
-            slopes = jacobian.T.reshape(-1, size, size).transpose(0, 2, 1)
-            try:
-                step = np.linalg.solve(slopes, residual.T[:, :, None])[:, :, 0].T
-            except np.linalg.LinAlgError:
-                # What is not determined stays as near to the interpolation as it can.
-                step = (np.linalg.pinv(slopes) @ residual.T[:, :, None])[:, :, 0].T
-            if not np.isfinite(step).all():
-                return
-            nodes.z = nodes.z - step
-            if np.max(np.abs(step) / (1.0 + np.abs(nodes.z)), initial=0.0) < _SMALL_STEP:
-                return
+    def _coarse(
+        self, terms: Vector, intervals: Places, places: Places, weights: Vector, bent: Places, bends: Vector
+    ) -> Places:
+        """Tell over which intervals the powers are integrated too coarsely.
 
-    # -- integration -------------------------------------------------------------------------------------------------
-
-    def _integrate(self, nodes: Nodes, terms: Terms, depth: int, allowed: float | None) -> Vector:
-        """Integrate over the intervals of some points, over those that are too coarse with more points inside."""
-        intervals = nodes.intervals
-        intervals = intervals[nodes.times[intervals + 1] > nodes.times[intervals]]
-        if not len(intervals):
-            return np.zeros(len(terms.powers))
-        self._points += len(nodes.times)
-        order = rules(nodes, intervals)
-        weights = order[0].totals(len(nodes.times), slice(None))
-        whole = terms.powers @ weights
-        if allowed is None:
-            share = _SHARE if self.model.states else 0.1 * _SHARE
-            allowed = share * self.options.rtol * self._moved(np.abs(terms.powers) @ np.abs(weights))
-        errors, mismatch = self._errors(nodes, terms, intervals, order)
-        coarse = _largest(errors, allowed)
-        # Further down, it is the integrator's own error that energies drift with.
-        adrift = self._adrift(nodes, terms, intervals, 2.0 * allowed if depth == 1 else np.inf)
-        coarse |= adrift
-        if not self.model.states and (depth == 0 or (depth < _EVERYWHERE and coarse.any())):
-            # No rates of states tell what happens between the results.
-            coarse[:] = True
-        if not coarse.any() or depth >= _ROUNDS or self._points > _MOST_POINTS:
-            return whole
-        # A few results alone say too little about the states between them.
-        enough = nodes.last[intervals] - nodes.first[intervals] >= _ENOUGH
-        again = adrift | coarse & enough & (mismatch > _TRUSTED * self.options.rtol)
-        if nodes.made:
-            # What was interpolated in vain is integrated from its beginning.
-            again = np.isin(nodes.first[intervals], nodes.first[intervals[again]])
-        finer, done = self._integrated_again(nodes, intervals, again, mismatch)
-        inside = coarse & ~done
-        parts = [(finer, self._terms(finer))] if finer is not None else []
-        parts += [self._interpolated(nodes, terms, intervals[inside])] if inside.any() else []
-        total = terms.powers @ order[0].totals(len(nodes.times), ~(done | inside))
-        for part, there in parts:
-            total = total + self._integrate(part, there, depth + 1, allowed / len(parts))
-        return total
-
-    def _moved(self, integrals: Vector) -> float:
-        """Return the energy that moves in a run: what it is precise to is a part of that, not of what is left over.
-
-        An oscillation exchanges its energy again and again.
+        The difference of two rules is the error of the lower one; a difference more tells what an order gains. How
+        stored energies change is known, so that there the error itself is. It tells what an order gains, too, unless
+        it is the error of the states. All are looked at in two sums with different weights, lest they cancel.
         """
-        return max(self.stored, float(np.nanmax(integrals, initial=0.0)))
-
-    def _errors(
-        self, nodes: Nodes, terms: Terms, intervals: Places, order: tuple[Rule, Rule, Rule]
-    ) -> tuple[Vector, Vector]:
-        """Return for each interval the error of its integrals in J, and how far its states are off, as fractions.
-
-        Powers, and rates of states, are looked at in two sums of all with different weights, lest they cancel.
-        """
-        mixed = np.concatenate([_mixed(terms.powers), _mixed(terms.rates / self._scales)])
-        best, lower, lowest = (rule.apply(mixed) for rule in order)
+        if not self.model.states:
+            # Nothing tells what happens between the results.
+            return np.ones(len(intervals), bool)
+        mixed = _mixing(terms.shape[1]) @ terms.reshape(-1, terms.shape[-1])
+        best, lower, lowest = np.matmul(weights, mixed[:4].T[places]).transpose(1, 2, 0).copy()
+        if len(bent):
+            more = _mixing(terms.shape[1])[:4, terms.shape[1] : -terms.shape[1]] @ bends
+            best[:, bent] += more[0]
+            lower[:, bent] += more[1]
         near, far = np.abs(best - lower), np.abs(lower - lowest)
-        errors = np.max(_gaining(near, far)[:2], axis=0)
-        if nodes.made:
-            errors = errors * self._balanced(nodes, mixed[:2], errors)
-        moved = np.diff(_mixed(nodes.x / self._scales), axis=1)[:, intervals]
-        mismatch = np.max(np.abs(moved - best[2:]), axis=0)
-        suspect = np.flatnonzero(mismatch > _SUSPECT)
-        if len(suspect):
-            errors[suspect] = np.maximum(
-                errors[suspect], self._astray(nodes, terms, intervals[suspect], order[0], suspect)
-            )
-        return np.where(np.isfinite(errors), errors, np.inf), np.where(np.isfinite(mismatch), mismatch, np.inf)
+        known = np.maximum(*np.abs(mixed[4:, intervals + 1] - mixed[4:, intervals] - best[2:]))
+        smooth = np.maximum(*near[2:])
+        gain = np.maximum(_ratio(near[:2], far[:2]), _ratio(known, smooth))
+        errors = np.maximum(np.maximum(*(near[:2] * gain)), np.minimum(known, smooth))
+        allowed = self.options.rtol * self.moved
+        return ~((errors <= self._share * allowed) & (known <= _ASTRAY * allowed))
 
-    def _balanced(self, nodes: Nodes, mixed: Vector, errors: Vector) -> Vector:
-        """Return by how much errors within a block cancel: Lobatto's rule as a whole is better than its parts."""
-        size = len(LOBATTO)
-        if len(errors) * size != len(nodes.times) * (size - 1):
-            return np.ones(len(errors))
-        spans = nodes.times[size - 1 :: size] - nodes.times[::size]
-        blocks = mixed.reshape(2, -1, size)
-        best, lower, lowest = (blocks @ weights * spans for weights in LOBATTO_WEIGHTS)
-        whole = np.max(_gaining(np.abs(best - lower), np.abs(lower - lowest)), axis=0)
-        parts = np.sum(errors.reshape(-1, size - 1), axis=1)
-        return np.repeat(np.minimum(1.0, whole / np.maximum(parts, 1e-300)), size - 1)
-
-    def _astray(self, nodes: Nodes, terms: Terms, intervals: Places, rule: Rule, rows: Places) -> Vector:
-        """Return how much stored energies differ between what the rates lead to and the state at the end, in J."""
-        ends = intervals + 1
-        reached = nodes.x[:, intervals] + Rule(rule.places[rows], rule.weights[rows]).apply(terms.rates)
-        led = Nodes(nodes.times[ends], reached, nodes.z[:, ends], nodes.segment[ends], ends, ends)
-        return np.max(np.abs(self._terms(led).stored - terms.stored[:, ends]), axis=0, initial=0.0)
-
-    def _adrift(self, nodes: Nodes, terms: Terms, intervals: Places, allowed: float) -> Places:
-        """Mark intervals of interpolated blocks over which stored energies change otherwise than their rates say."""
-        if not nodes.made or allowed == np.inf:
-            return np.zeros(len(intervals), bool)
-        size = len(LOBATTO)
-        spans = nodes.times[size - 1 :: size] - nodes.times[::size]
-        means = np.einsum("rbk,k->rb", terms.powers.reshape(len(terms.powers), -1, size), LOBATTO_WEIGHTS[0])
-        change = terms.stored[:, size - 1 :: size] - terms.stored[:, ::size]
-        drift = np.max(np.abs(change - self.table(means * spans)[_RATE]), axis=0, initial=0.0)
-        return _largest(np.nan_to_num(drift, nan=np.inf), allowed)[nodes.first[intervals] // size]
-
-    # -- points in between -------------------------------------------------------------------------------------------
-
-    def _interpolated(self, nodes: Nodes, terms: Terms, intervals: Places) -> tuple[Nodes, Terms]:
-        """Return a block of five points for each interval, and the energy terms there."""
-        times, x, z = between(nodes, terms.rates, intervals, LOBATTO[1:-1])
-        inner = np.repeat(nodes.segment[intervals], times.shape[1])
-        x, z = (values.reshape(len(values), times.size) for values in (x, z))
-        flat = Nodes(times.ravel(), x, z, inner, inner, inner)
-        self._polished(flat)
-        new = self._terms(flat)
-
-        def joined(outer: Vector, inside: Vector) -> Vector:
-            middle = inside.reshape(*outer.shape[:-1], *times.shape)
-            block = [outer[..., intervals, None], middle, outer[..., intervals + 1, None]]
-            return np.concatenate(block, axis=-1).reshape(*outer.shape[:-1], len(times) * len(LOBATTO))
-
-        first = np.repeat(np.arange(len(times)) * len(LOBATTO), len(LOBATTO))
-        made = Nodes(
-            joined(nodes.times, flat.times), joined(nodes.x, flat.x), joined(nodes.z, flat.z),
-            np.repeat(nodes.segment[intervals], len(LOBATTO)), first, first + len(LOBATTO) - 1, made=True,
-        )  # fmt: skip
-        pairs = ((terms.stored, new.stored), (terms.powers, new.powers), (terms.rates, new.rates))
-        return made, Terms(*(joined(*pair) for pair in pairs))
-
-    def _integrated_again(
-        self, nodes: Nodes, intervals: Places, wanted: Places, mismatch: Vector
-    ) -> tuple[Nodes | None, Places]:
-        """Integrate the wanted intervals with more results, as far as that succeeds; return which these are."""
-        done = np.zeros(len(intervals), bool)
-        blocks: list[_Block] = []
-        for run in _contiguous(nodes, intervals, wanted):
-            a, b = intervals[run[0]], intervals[run[-1]] + 1
-            d = self._discretes[:, nodes.segment[a]]
-            start = Point(float(nodes.times[a]), nodes.x[:, a].copy(), nodes.z[:, a].copy(), d)
-            fewest = _MANY if np.max(mismatch[run]) > _UNRESOLVED else _SOME
-            outputs = min(max(fewest, 1 << (4 * len(run) - 1).bit_length()), _MOST_OUTPUTS)
-            found = self._followed(start, float(nodes.times[b]), outputs, int(nodes.segment[a]))
-            blocks += found
-            done[run] = bool(found)
-        return (_together(blocks) if blocks else None), done
-
-    def _followed(self, start: Point, end: float, outputs: int, segment: int) -> list[_Block]:
-        """Integrate from a point to a time, in pieces where it fails in one; nothing if it fails for good."""
-        blocks: list[_Block] = []
-        span = end - start.t
-        for _ in range(_TRIALS):
-            last = start.t + span >= end - 1e-9 * span
-            span = end - start.t if last else span
-            try:
-                x, z = Integrator(self.model, self.options).run(start, span, outputs)
-            except ModelicaLikeError:
-                span /= 8
+    def _again(self, every: Results, ends: Places, stretches: list[Places]) -> tuple[Places, Vector]:
+        """Integrate stretches of intervals again, divided where that fails; return which were, and their integrals."""
+        again = np.zeros(ends.shape[1], bool)
+        total = np.zeros(POWERS * len(self.model.components))
+        if not stretches:
+            return again, total
+        integrator = _Work(self.model, self.options, self.moved)
+        failures = 0
+        while stretches and failures < _FAILURES:
+            stretch = stretches.pop()
+            start = every.point(ends[0, stretch[0]])
+            found = integrator.over(start, float(every.times[ends[1, stretch[-1]]]) - start.t)
+            if found is not None:
+                total[_nonzero(self.model)] += found
+                again[stretch] = True
                 continue
-            times = start.t + span * np.arange(outputs + 1) / outputs
-            times[-1] = end if last else times[-1]
-            x = np.concatenate([start.x[:, None], x], axis=1)
-            z = np.concatenate([start.z[:, None], z], axis=1)
-            blocks.append((times, x, z, segment))
-            if last:
-                return blocks
-            start = Point(float(times[-1]), x[:, -1].copy(), z[:, -1].copy(), start.d)
-            span *= 2
-        return []
+            failures += 1
+            stretches += np.array_split(stretch, 2) if len(stretch) > 1 else []
+        return again, total
 
 
-_Block = tuple[Vector, Vector, Vector, int]
+def _slopes(model: CompiledDae) -> ca.Function:
+    """Return how fast powers change, as a function."""
+    arguments = model.arguments
+    powers = ca.vec(model.energy(*arguments.values())[:, 1 : 1 + POWERS])
+    ode = model.ode(*arguments.values())
+    slopes = ca.jtimes(powers, arguments["x"], ode) + ca.jtimes(powers, arguments["t"], ca.SX(1))
+    return ca.Function("slopes", list(arguments.values()), [ca.densify(slopes)], {"cse": True})
 
 
-def _contiguous(nodes: Nodes, intervals: Places, wanted: Places) -> list[Places]:
-    """Return runs of wanted intervals that follow each other in time, with what lies between two that are near."""
-    breaks = nodes.times[intervals[1:]] != nodes.times[intervals[:-1] + 1]
-    breaks |= nodes.segment[intervals[1:]] != nodes.segment[intervals[:-1]]
-    piece = np.append(0, np.cumsum(breaks))
-    chosen = np.flatnonzero(wanted)
-    cuts = (np.diff(chosen) > _NEAR) | (np.diff(piece[chosen]) > 0)
-    long = _MOST_OUTPUTS // 4
-    found: list[Places] = []
-    for run in np.split(chosen, np.flatnonzero(cuts) + 1) if len(chosen) else ():
-        whole = np.arange(run[0], run[-1] + 1)
-        found += np.split(whole, range(long, len(whole), long))
-    return found
+class _Work(Integrator):
+    """Integrates powers together with the states, as further states.
+
+    IDAS' own quadratures do not serve: where states are straight lines they leave it at order one.
+
+    Args:
+        model: the compiled model.
+        options: of the run.
+        moved: energy, in J, of which the integrals are precise to the relative tolerance.
+    """
+
+    def __init__(self, model: CompiledDae, options: Options, moved: float) -> None:
+        # Without states nothing else asks for short steps.
+        finer = _FINER if model.states else _FINER**3
+        rtol = min(options.rtol, max(finer * options.rtol, _FINEST))
+        super().__init__(model, replace(options, rtol=rtol, atol=options.atol * rtol / options.rtol))
+        # IDAS has one absolute tolerance for all.
+        self._scale = self._settings(1, False, 1.0)["abstol"] / (rtol * (moved or 1.0))
+        self._tail = np.concatenate([[self._scale], self._tail])
+
+    def over(self, start: Point, span: float) -> Vector | None:
+        """Integrate the powers that are not zero anyway from a start over a time in s; None if IDAS gives up."""
+        p = np.concatenate([[start.t, span], self._tail, start.d])
+        start = replace(start, x=np.concatenate([start.x, np.zeros(len(_nonzero(self.model)))]))
+        for gentle in (False, True) if self.model.states else (False,):
+            self._call(start, p, 1, self.options.max_steps, gentle)
+            found = self._latest.latest()[0]
+            if np.isfinite(found).all():
+                return found[len(self.model.states) :] / self._scale
+        return None
+
+    def _first_step(self, start: Point, span: float) -> float:
+        return super()._first_step(replace(start, x=start.x[: len(self.model.states)]), span)
+
+    def _instance(self, outputs: int, steps: int, gentle: bool, first: float) -> BufferedFunction:
+        key = "work", self.rtol, self.options.atol, gentle, first
+        self._latest = buffered(self.model._cache, key, partial(self._make, outputs, steps, gentle, first), (0, 1))
+        self._latest.forget()
+        return self._latest
+
+    def _make(self, outputs: int, steps: int, gentle: bool, first: float) -> ca.Function:
+        problem = dict(scaled_problem(self.model, gentle=gentle))
+        inner, speed = problem.pop("inner"), problem.pop("span")
+        scale, p = ca.SX.sym("scale"), problem["p"]
+        powers = ca.densify(ca.vec(self.model.energy(*inner)[:, 1 : 1 + POWERS])[_nonzero(self.model)])
+        problem["x"] = ca.vertcat(problem["x"], ca.SX.sym("work", len(_nonzero(self.model))))
+        problem["ode"] = ca.cse(ca.vertcat(problem["ode"], powers * (speed * scale)))
+        problem["p"] = ca.vertcat(p[:2], scale, p[2:])
+        return ca.integrator("work", "idas", problem, 0, [1.0], self._settings(steps, gentle, first))
 
 
-def _together(blocks: list[_Block]) -> Nodes:
-    sizes = [len(times) for times, *_ in blocks]
-    ends = np.cumsum(sizes)
-    times = np.concatenate([block[0] for block in blocks])
-    x, z = (np.concatenate([block[k] for block in blocks], axis=1) for k in (1, 2))
-    segment = np.repeat([block[3] for block in blocks], sizes)
-    return Nodes(times, x, z, segment, np.repeat(ends - sizes, sizes), np.repeat(ends - 1, sizes))
+def _nonzero(model: CompiledDae) -> list[int]:
+    """Powers that are not zero anyway."""
+    if "powers" not in model._cache:
+        every = ca.vec(model.energy(*model.arguments.values())[:, 1 : 1 + POWERS])
+        model._cache["powers"] = [k for k in range(every.numel()) if not every[k].is_zero()]
+    return model._cache["powers"]
 
 
-def _apart(nodes: Nodes) -> Places:
+def _apart(every: Results) -> Places:
     """Return the ends of segments, and what lies between them well apart from its neighbours.
 
     The results beside an event may be as near to it as they like; a polynomial through both would follow their errors.
     """
-    gaps = np.diff(nodes.times)
+    gaps = np.diff(every.times)
     before, after = np.append(0.0, gaps), np.append(gaps, 0.0)
-    places = np.arange(len(nodes.times))
-    inner = (places > nodes.first) & (places < nodes.last)
+    places = np.arange(len(every.times))
+    inner = (places > every.first) & (places < every.last)
     return np.flatnonzero(~inner | (np.minimum(before, after) >= _CLOSE * np.maximum(before, after)))
 
 
-def _largest(errors: Vector, allowed: float) -> Places:
-    """Mark the largest errors, so that the others together are no more than allowed."""
-    order = np.argsort(errors)
-    marked = np.zeros(len(errors), bool)
-    marked[order[np.cumsum(errors[order]) > allowed]] = True
-    return marked
+def _stretches(coarse: Places, piece: Places) -> list[Places]:
+    """Return runs of coarse intervals of one smooth piece, with what lies between two that are near."""
+    chosen = np.flatnonzero(coarse)
+    if not len(chosen):
+        return []
+    cuts = np.flatnonzero((np.diff(chosen) > _NEAR) | (np.diff(piece[chosen]) > 0)) + 1
+    return [np.arange(run[0], run[-1] + 1) for run in np.split(chosen, cuts)]
 
 
-def _gaining(near: Vector, far: Vector) -> Vector:
-    """Estimate the error of a rule from how much it differs from one of lower order, and this from one of still lower.
-
-    The difference of two rules is the error of the lower one; a difference more tells what an order gains.
-    """
-    return near * np.divide(near, far, out=np.ones_like(near), where=far > near).clip(_GAIN)
+def _ratio(small: Vector, large: Vector) -> Vector:
+    return np.divide(small, large, out=np.ones_like(small), where=large > small)
 
 
-def _mixed(rows: Vector) -> Vector:
-    """Return two sums of rows with different weights, shape (2, n)."""
-    turns = 0.618 * np.arange(len(rows))
-    weights = np.array([1.0 + np.modf(turns)[0], 2.0 - 3.0 * np.modf(1.7 * turns)[0]])
-    return weights @ rows
-
-
-def _kept(model: CompiledDae) -> list[int]:
-    if "energy kept" not in model._cache:
-        every = ca.vec(model.energy(*model.arguments.values())[:, 1:])
-        model._cache["energy kept"] = [k for k in range(every.numel()) if not every[k].is_zero()]
-    return model._cache["energy kept"]
-
-
-def _terms_function(model: CompiledDae) -> ca.Function:
-    """Return stored energies, powers that are not zero anyway, and derivatives of the states, as one function."""
-    arguments = list(model.arguments.values())
-    terms = model.energy(*arguments)
-    powers = ca.vec(terms[:, 1:])[_kept(model)]
-    results = [ca.densify(one) for one in (terms[:, 0], powers, model.ode(*arguments))]
-    return ca.Function("terms", arguments, results, {"cse": True})
+@cache
+def _mixing(components: int) -> Vector:
+    """Return weights of two sums each of powers, of rates of stored energies, and of these; (6, 6 components)."""
+    turns = 0.618 * np.arange(POWERS * components)
+    sums = np.array([1.0 + np.modf(turns)[0], 2.0 - 3.0 * np.modf(1.7 * turns)[0]])
+    table = np.zeros((3, 2, 2 + POWERS, components))
+    table[0, :, 1 : 1 + POWERS] = sums.reshape(2, POWERS, components)
+    table[1, :, _RATE] = table[2, :, 0] = sums[:, :components]
+    return table.reshape(6, -1)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from modelica_like.compile.compiled import Vector
+from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import Source
 from modelica_like.initialize import Impact, Point
 
@@ -73,33 +73,40 @@ class Recorder:
     events: list[Event] = field(default_factory=list)
     impacts: list[Impact] = field(default_factory=list)
     notices: list[str] = field(default_factory=list)
-    _times: list[Vector] = field(default_factory=list)
-    _x: list[Vector] = field(default_factory=list)
-    _z: list[Vector] = field(default_factory=list)
+    _open: list[tuple[Vector, Vector, Vector]] = field(default_factory=list)
 
     def begin(self, point: Point) -> None:
         """Begin a segment at a point."""
-        self._times, self._x, self._z = [], [], []
+        self._open = []
         self.add(np.array([point.t]), point.x[:, None], point.z[:, None])
 
     def add(self, times: Vector, x: Vector, z: Vector) -> None:
         """Append at least one point; shapes (n,), (nx, n), (nz, n)."""
-        self._times.append(times)
-        self._x.append(x)
-        self._z.append(z)
+        # At once: an interrupt comes before or after it.
+        self._open.append((times, x, z))
 
     @property
     def last(self) -> float:
         """Time of the latest point of the open segment in s."""
-        return float(self._times[-1][-1])
+        return float(self._open[-1][0][-1])
+
+    def note(
+        self, model: CompiledDae, time: float, number: int, change: tuple[int, int], transition: int, round: int
+    ) -> None:
+        """Note that a mode changes from one number to another, by a transition or (-1) by an impact."""
+        mode = model.flat_discretes[number]
+        before, after = (mode.names[k] for k in change)
+        # Who is knocked loose goes without a transition; the first one of the mode tells where it stands.
+        known = transition
+        if known < 0:
+            known = next(k for k, one in enumerate(model.transitions) if one.mode == number)
+        source = model.transitions[known].source
+        self.events.append(Event(time, mode.path, before, after, source, transition, len(self.segments), round))
 
     def end(self, d: Vector) -> None:
         """Close the segment, if one is open."""
-        if not self._times:
+        if not self._open:
             return
-        self.segments.append(
-            Segment(
-                np.concatenate(self._times), np.concatenate(self._x, axis=1), np.concatenate(self._z, axis=1), d.copy()
-            )
-        )
-        self._times = []
+        times, x, z = (np.concatenate(parts, axis=-1) for parts in zip(*self._open, strict=True))
+        self.segments.append(Segment(times, x, z, d.copy()))
+        self._open = []

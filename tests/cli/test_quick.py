@@ -30,6 +30,7 @@ CALLS = [
     "describe Clutch",
     "schema",
     "library",
+    "runtimes --platforms all",
     "docs -o pages",
     "docs Clutch Gear --output pages --examples folder",
     "validate a.fmu --timeout 2.5",

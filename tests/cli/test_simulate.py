@@ -179,9 +179,9 @@ def test_the_picture_is_written(run: CliRunner, pendulum: str, tmp_path: Path, e
             "has no variable 'mas.w'; did you mean 'mass.w'?",
         ),
         (
-            ["simulate", "PENDULUM", "--csv", "no/such/folder/x.csv"],
+            ["simulate", "PENDULUM", "--csv", "pendulum.toml/x.csv"],
             2,
-            "no/such/folder/x.csv: No such file or directory.",
+            "pendulum.toml: Not a directory.",
         ),
         (["simulate"], 2, "Missing argument 'NETLIST'"),
         (["simulat", "x"], 2, "No such command 'simulat'"),

@@ -9,17 +9,13 @@ from random_drives import random_drive
 
 ORDINARY = 150
 BLOCK = 50
-OPEN = {
-    475: "no start from rest is found in its loops",
-    1883: "no start from rest is found in its loops",
-    1546: "an impact of 24 kg.m2 rad/s leaves a speed of 3e-11 rad/s to a shaft at rest",
-    1862: "the end speeds are off by 7e-8 of their size",
-    1991: "events come so close together that the run takes too long",
-}
+HARD = (475, 1862, 1883, 1991)
+"""Drives that were the last to be right: loops at rest, ties between torque and capacity."""
+OPEN = {1546: "an impact of 24 kg.m2 rad/s leaves a speed of 3e-11 rad/s to a shaft at rest"}
 """Drives that are not right yet, and why; everything else must be."""
 
 
-@pytest.mark.parametrize("number", range(ORDINARY))
+@pytest.mark.parametrize("number", [*range(ORDINARY), *HARD])
 def test_drive(number):
     outcome = judge(random_drive(number), number)
     assert not outcome.category, str(outcome)

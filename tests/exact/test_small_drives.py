@@ -49,6 +49,9 @@ SMALL = {
     "held, although the least split exceeds a capacity": drive(
         (1, 1), (0, 0), clutch("c", 0, 1, 0.25), brake("b", 0), brake("d", 1, 4), t0=1.125
     ),
+    "parallel clutches beside a freewheel at rest": drive(
+        (1, 1, 1, 1), (0, 0, 0, 0), clutch("c", 0, 1), clutch("d", 2, 1), clutch("e", 2, 1), freewheel("f", 0, 3)
+    ),
     "two brakes on one shaft": drive((1,), (1,), brake("b", 0), brake("d", 0, 2), t0=2.5),
     "ring of three clutches": drive(
         (1, 1, 1), (3, 0, -1), clutch("c", 0, 1), clutch("d", 1, 2), clutch("e", 2, 0), until=8.0

@@ -206,7 +206,7 @@ def test_the_integrator_has_order_five_and_dense_output_of_order_four(inside):
     new = library.instance_new(code.read, b"one", b"{t}", libc.calloc, libc.free, None, None, None, 0)
     c = ctypes.c_void_p(new)
     library.rosenbrock_step.argtypes = [
-        ctypes.c_void_p, ctypes.c_double, DOUBLES, ctypes.c_double, ctypes.c_void_p, DOUBLES
+        ctypes.c_void_p, ctypes.c_double, DOUBLES, ctypes.c_double, ctypes.c_int, ctypes.c_void_p, DOUBLES
     ]  # fmt: skip
     library.piece_at.argtypes = [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_double, DOUBLES]
 
@@ -220,7 +220,7 @@ def test_the_integrator_has_order_five_and_dense_output_of_order_four(inside):
         inner = 0.0
         for k in range(steps):
             t, h = k / steps, 1 / steps
-            assert library.rosenbrock_step(c, t, pointer(point), h, ctypes.byref(piece), pointer(error)) == 1
+            assert library.rosenbrock_step(c, t, pointer(point), h, 0, ctypes.byref(piece), pointer(error)) == 1
             middle = np.zeros(3)
             library.piece_at(code.read, ctypes.byref(piece), t + 0.4 * h, pointer(middle))
             inner = max(inner, np.max(np.abs(middle - exact(t + 0.4 * h))))

@@ -33,6 +33,7 @@ from components import (
     VoltageToCurrentAdaptor,
 )
 from modelica_like import build, export_fmu, load, simulate
+from modelica_like.errors import UnknownName
 from modelica_like.fmi.build import PLATFORMS, native_platform
 from modelica_like.fmi.check import problems
 from modelica_like.fmi.export import Export
@@ -81,6 +82,23 @@ def test_parameters_starts_and_inputs_count(exported: Callable[[str], Export], v
     np.testing.assert_allclose(run["J.w"], 7.0 + 4.0 / 5.0 * run.time, rtol=1e-7)
     np.testing.assert_allclose(run["shaft_end.phi"], 7.0 * run.time + 0.4 * run.time**2, rtol=1e-7, atol=1e-9)
     np.testing.assert_allclose(run["shaft_end.a"], 0.8, rtol=1e-9)
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+@pytest.mark.parametrize("kind", ["me", "cs"])
+@pytest.mark.parametrize("step", [0.4, 0.01])
+def test_ramps_and_jumps_of_inputs_are_met(
+    exported: Callable[[str], Export], version: str, kind: Any, step: float
+) -> None:
+    """J der(w) = 4 t until 1 s, then -2, whatever the steps are."""
+    torque = [(0.0, 0.0), (1.0, 4.0), (1.0, -2.0), (2.0, -2.0)]
+    run = run_fmu(exported(version).path, {"shaft_end.tau": torque}, kind=kind, step=step, tolerance=1e-9)
+    t, late = run.time, run.time - 1.0
+    before = t < 1.0
+    np.testing.assert_allclose(run["J.w"], np.where(before, 3 + t**2, 4 - late), rtol=1e-6)
+    angle = np.where(before, 3 * t + t**3 / 3, 10 / 3 + 4 * late - late**2 / 2)
+    np.testing.assert_allclose(run["J.phi"], angle, rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(run["shaft_end.tau"][before], 4 * t[before], rtol=1e-12, atol=1e-12)
 
 
 def test_start_values_that_are_equations_count(tmp_path: Path) -> None:
@@ -192,6 +210,32 @@ def test_further_outputs(tmp_path: Path) -> None:
     export_fmu(flywheel(), tmp_path / "one.fmu", platforms=(), outputs=["J.w"])
     description: Any = fmpy.read_model_description(str(tmp_path / "one.fmu"))
     assert "J.w" in {one.variable.name for one in description.outputs}
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+@pytest.mark.parametrize(
+    ("modes", "kind", "causality"), [("local", "Enumeration", "local"), ("integer", "Integer", "output")]
+)
+def test_modes_for_importers_that_know_no_enumerations(
+    version: str, modes: str, kind: str, causality: str, tmp_path: Path
+) -> None:
+    path = export_fmu(
+        EXAMPLES / "machine_table_direct.toml", tmp_path / "m.fmu", version, modes=modes, check=False
+    ).path
+    assert validate_fmu(str(path)) == []
+    description: Any = fmpy.read_model_description(str(path))
+    (mode,) = (one for one in description.modelVariables if one.name == "clutch.mode")
+    assert (mode.type.replace("Int64", "Integer"), mode.causality) == (kind, causality)
+    assert ("clutch.mode" in {one.variable.name for one in description.outputs}) == (causality == "output")
+    run = run_fmu(path, outputs=["clutch.mode"])
+    truth = simulate(EXAMPLES / "machine_table_direct.toml")
+    assert [e.time for e in run.events] == pytest.approx([e.time for e in truth.events if e.mode == "clutch.mode"])
+    assert run.final["clutch.mode"] == truth.final["clutch.mode"]
+
+
+def test_another_way_of_modes_is_told(tmp_path: Path) -> None:
+    with pytest.raises(UnknownName, match="There are output, local, integer"):
+        export_fmu(flywheel(), tmp_path / "x.fmu", platforms=(), modes="real")
 
 
 def test_a_compiled_model_can_be_exported(tmp_path: Path) -> None:

@@ -232,17 +232,44 @@ class Driven(Component):
 DRIVEN = Driven()
 
 
-def test_inputs_on_straight_lines_are_exact(exported):
+@pytest.mark.parametrize("slope_first", [False, True])
+def test_inputs_on_straight_lines_are_exact(exported, slope_first):
     case = exported(DRIVEN)
     fmu = case.started(until=1.0, tau=0.0)
     torque, speed, angle = case.ref("tau"), case.ref("rotor.w"), case.ref("rotor.phi")
     for k in range(10):
+        if slope_first:
+            fmu.setRealInputDerivatives([torque], [1], [3.0])
         fmu.setReal([torque], [0.3 * k])
-        fmu.setRealInputDerivatives([torque], [1], [3.0])
+        if not slope_first:
+            fmu.setRealInputDerivatives([torque], [1], [3.0])
         fmu.doStep(k / 10, 0.1)
     # 2 w' = 3 t
     assert fmu.getReal([speed, angle]) == pytest.approx([0.75, 0.25], rel=1e-9)
     assert fmu.getRealOutputDerivatives([speed, angle], [1, 1]) == pytest.approx([1.5, 0.75], rel=1e-9)
+
+
+def test_inputs_move_at_intermediate_updates(exported):
+    """2 w' = tau, where tau = 4 - 3 w is given anew whenever an internal step has ended."""
+    case = exported(DRIVEN, "3.0")
+    torque, speed = [case.ref("tau")], [case.ref("rotor.w")]
+    given, requested = [(0.0, 4.0)], []
+
+    def update(_environment, time, asked, _get, _finished, _can, _early, _until):
+        requested.append(asked)
+        given.append((time, 4.0 - 3.0 * fmu.getFloat64(speed)[0]))
+        fmu.setFloat64(torque, [given[-1][1]])
+
+    fmu = case.instance(intermediateUpdate=update, requiredIntermediateVariables=torque)
+    case.initialize(fmu, until=1.0, tau=4.0)
+    for k in range(10):
+        fmu.doStep(k / 10, 0.1)
+    times, values = np.transpose(given)
+    exact = np.sum(values * np.diff([*times, 1.0])) / 2
+    assert all(requested)
+    assert len(given) > 10
+    assert fmu.getFloat64(speed) == pytest.approx([exact], rel=1e-12)
+    assert len(set(values)) > 5
 
 
 def test_held_inputs_jump_between_steps(exported):

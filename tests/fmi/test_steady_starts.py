@@ -1,10 +1,16 @@
 """Steady starts of FMUs."""
 
+from pathlib import Path
+
 import pytest
 from fmpy.fmi1 import FMICallException
 
 from components import BearingFriction, Clutch, ConstantTorque, Inertia
+from modelica_like.initialize import initialize
 from modelica_like.language import Assembly, guess
+from modelica_like.netlist import load
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
 
 
 def rubbing():
@@ -51,6 +57,19 @@ def test_a_clutch_that_sticks_turns_as_one_in_a_steady_start(exported, version):
     assert read([case.ref("clutch.w_rel")]) == pytest.approx([0.0], abs=1e-14)
     mode = fmu.getInteger if version == "2.0" else fmu.getInt64
     assert case.model.flat_discretes[0].names[mode([case.ref("clutch.mode")])[0]] == "stuck"
+
+
+def test_a_gearbox_starts_in_the_steady_state_of_python(exported):
+    """Meshes slide one way where the search begins and the other way where it ends: they are held in between."""
+    drive = load(EXAMPLES / "lepelletier_gears.toml")
+    drive.simulate.update(start="steady")
+    case = exported(drive)
+    point = initialize(case.model, start="steady")
+    fmu = case.started("me")
+    modes = [one for one in case.face.variables if one.modes]
+    assert fmu.getInteger([one.reference for one in modes]) == [int(point.d[one.slot[1]]) for one in modes]
+    named = [x for name, x in zip(case.model.states, point.x, strict=True) if name in case.face.by_name]
+    assert case.states(fmu) == pytest.approx(named, rel=1e-9, abs=1e-9)
 
 
 def test_a_steady_start_that_no_mode_allows_is_refused(exported):

@@ -1,5 +1,6 @@
 """What a foreign FMU does wrong becomes a sentence; nothing of it reaches this process."""
 
+import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -89,6 +90,18 @@ def test_tells_a_missing_kind(reference_fmus: Built) -> None:
     with pytest.raises(FmuRefused) as told:
         run_fmu(reference_fmus["dc_bench", "2.0"], kind="me")
     assert str(told.value) == ("dc_bench_fmi2.fmu has no ModelExchange part.\nAsk for the other kind, or for none.")
+
+
+def test_tells_scheduled_execution(tmp_path: Path) -> None:
+    path = tmp_path / "tasks.fmu"
+    description = (
+        '<fmiModelDescription fmiVersion="3.0" modelName="tasks" instantiationToken="x">'
+        '<ScheduledExecution modelIdentifier="tasks"/><ModelVariables/><ModelStructure/></fmiModelDescription>'
+    )
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("modelDescription.xml", description)
+    with pytest.raises(FmuRefused, match=r"^tasks\.fmu is for Scheduled Execution only: its importer"):
+        run_fmu(path)
 
 
 def test_a_component_without_inputs_says_so(reference_fmus: Built) -> None:

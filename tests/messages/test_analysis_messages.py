@@ -37,7 +37,7 @@ from modelica_like.errors import (
     WorkersLost,
 )
 from modelica_like.language import Component, Equations, series
-from modelica_like.report.sweep import write_sweep
+from modelica_like.report.files import write_dataset
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 MOTOR, GEARED = EXAMPLES / "dc_bench_motor.toml", EXAMPLES / "machine_table_geared.toml"
@@ -162,9 +162,9 @@ Write for example 'motor.w=4000 rpm'."""),
     "no range": (ValueOutOfRange, lambda: read_range("load=0:x:3"), """\
 'load=0:x:3': '0:x:3' is neither FIRST:LAST:COUNT nor a list of numbers.
 Write for example 'load=0:0.25:26 N.m' or 'load=0,0.1,0.2 N.m'."""),
-    "a sweep as a picture": (NetlistError, lambda: write_sweep(swept(), Path("found.png")), """\
-'found.png': a sweep can be written as .csv.
-For others use the dataset in Python."""),
+    "a sweep as a picture": (NetlistError, lambda: write_dataset(swept(), Path("found.png")), """\
+'found.png': a table can be .csv, .parquet, .nc.
+`-` is standard output, as .csv."""),
 }  # fmt: skip
 
 

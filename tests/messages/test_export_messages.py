@@ -6,10 +6,10 @@ from typing import Any
 import pytest
 
 import components
-from components import Clutch, Inertia
-from modelica_like import build, export_fmu
-from modelica_like.errors import ExportError, UnknownName
-from modelica_like.fmi import export
+from components import Clutch, Inertia, Spring
+from modelica_like import build, export_fmu, simulate
+from modelica_like.errors import ExportError, StepFailed, UnknownName
+from modelica_like.fmi import check, export
 from modelica_like.fmi.check import compare_with_idas
 from modelica_like.language import Assembly
 
@@ -96,10 +96,44 @@ def test_disagreement_with_idas_is_told(tmp_path: Path) -> None:
     export_fmu(flywheel(), tmp_path / "d.fmu", check=False)
     faster = flywheel()
     faster.set("J.w", "4 rad/s")
-    with pytest.raises(ExportError) as caught:
-        compare_with_idas(tmp_path / "d.fmu", build(faster), "cs")
+    found = compare_with_idas(tmp_path / "d.fmu", build(faster), "cs")
     # The speed is 1 rad/s too low. It is constant, so that a thousandth of it counts as its range.
-    assert str(caught.value) == (
-        "The FMU does not agree with IDAS: J.w differs by 2.5e+02 of its range until t = 0.2 s.\n"
-        "Export without the check to look at it, and report this."
+    assert found.differs
+    assert found.sentence == (
+        "Until t = 0.2 s the FMU differs from IDAS by more than its tolerance explains: "
+        "J.w by 2.5e+02, J.phi by 0.25 of the range."
     )
+
+
+def test_an_fmu_that_differs_is_written_with_a_picture(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    faster = flywheel()
+    faster.set("J.w", "4 rad/s")
+    monkeypatch.setattr(check, "simulate", lambda _, *rest, **given: simulate(faster, *rest, **given))
+    with pytest.raises(ExportError, match=r"differs from IDAS by more than its tolerance explains: J\.w by"):
+        export_fmu(flywheel(), tmp_path / "d.fmu", strict=True)
+    assert list(tmp_path.iterdir()) == []
+    done = export_fmu(flywheel(), tmp_path / "d.fmu")
+    assert str(done).endswith(f" of the range. See {tmp_path / 'd_check.png'}.")
+    assert (tmp_path / "d_check.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_where_idas_gives_up_the_fmu_is_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def give_up(*_: object, **__: object) -> None:
+        raise StepFailed("IDAS gave up at about t = 0.1 s.")
+
+    monkeypatch.setattr(check, "simulate", give_up)
+    done = export_fmu(flywheel(), tmp_path / "d.fmu", strict=True)
+    assert str(done).splitlines()[1:] == [
+        "The FMU runs, but nothing was compared, as IDAS gave up: IDAS gave up at about t = 0.1 s."
+    ]
+    assert done.path.exists()
+
+
+def test_a_drift_of_phase_is_what_tolerances_do(tmp_path: Path) -> None:
+    """32 kHz for 0.2 s: 6400 periods."""
+    parts = {"a": Inertia(J=1e-6, phi=0.0, w=1.0), "spring": Spring(c=4e4, phi_rel=0.0), "b": Inertia(J=0.08, w=0.0)}
+    drive = Assembly("fast", parts=parts, series={"shaft": ["a", "spring", "b"]})
+    drive.simulate["until"] = "2 s"
+    found = export_fmu(drive, tmp_path / "d.fmu").check
+    assert not found.differs
+    assert found.sentence.startswith("Until t = 0.2 s the FMU differs from IDAS as the tolerance 1e-07 lets it: ")

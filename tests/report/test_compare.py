@@ -9,7 +9,7 @@ from rich.console import Console
 from modelica_like import simulate
 from modelica_like.errors import ModelicaLikeError
 from modelica_like.report.compare import Comparison, compare
-from modelica_like.report.files import write_csv
+from modelica_like.report.files import write_solution
 from modelica_like.report.sources import read_csv, trajectories
 from modelica_like.solve.recorded import RecordedModel, RecordedSolution, RecordedVariable
 
@@ -85,7 +85,7 @@ def test_not_a_number_is_a_deviation() -> None:
 def test_a_netlist_and_its_own_table(tmp_path: Path) -> None:
     """What was written reads back the same, events included."""
     run = simulate(DIRECT)
-    write_csv(run, tmp_path / "run.csv", units=True)
+    write_solution(run, tmp_path / "run.csv", units=True)
     table = read_csv(tmp_path / "run.csv")
     np.testing.assert_array_equal(table["table.v"], run["table.v"])
     comparison = compare(DIRECT, tmp_path / "run.csv")

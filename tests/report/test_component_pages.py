@@ -312,7 +312,7 @@ def test_the_command_writes_pages_and_leaves_other_files_alone(tmp_path: Path) -
             ["-o", "new", "--examples", "nowhere"],
             "There is no folder 'nowhere' with examples.\nName a folder of netlists.\n",
         ),
-        (["-o", "drive.toml", "Clutch"], "drive.toml/friction: Not a directory.\n"),
+        (["-o", "drive.toml", "Clutch"], "drive.toml: Not a directory.\n"),
         (
             ["-o", "new", "Cluch"],
             "There is no component type 'Cluch'; did you mean 'Clutch'?\n`modelica-like library` lists all types.\n",

@@ -161,6 +161,20 @@ def test_a_time_event_and_a_state_event_at_the_same_instant(at, points):
     np.testing.assert_allclose(times(run), at, rtol=0, atol=1e-12)
 
 
+@pytest.mark.parametrize("points", [4, 8, 16])
+def test_an_event_just_beside_the_grid_of_results_moves_no_later_one(points):
+    class Beside(Clock):
+        first: Parameter = param("s", "when the other one is")
+
+        def events(self) -> Events:
+            yield self.b.go("off", "on", at=self.first)
+            yield self.a.go("off", "on", when=self.x > self.at)
+
+    first = 0.5 - 9e-8 / points
+    run = simulate(Beside(x=0.0, first=first, at=0.76), 1.0, points=points)
+    np.testing.assert_allclose(times(run), [first, 0.76], rtol=0, atol=1e-12)
+
+
 # -- guards at zero --------------------------------------------------------------------------------------------------
 
 

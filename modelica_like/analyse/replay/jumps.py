@@ -18,6 +18,7 @@ from modelica_like.initialize import Point, Strike, call, holding, share, solve_
 from modelica_like.solve.recorder import Event
 
 _GRAZING = 1e-6
+_ROUNDING = 1e-12
 _SAME = 1e-9
 _SMOOTH = 1e-9
 
@@ -38,6 +39,23 @@ class Trigger:
 
 
 @dataclass(frozen=True)
+class Apart:
+    """Something that happens at the same instant as an event, but for a different reason.
+
+    Attributes:
+        x: derivative of the distance in time by the states before the event, shape (nx,).
+        theta: derivative by (p, u, d), shape (ntheta,).
+        size: what is rounding is measured by, in s.
+        reason: what to say where they do not stay together.
+    """
+
+    x: Vector
+    theta: Vector
+    size: float
+    reason: NoGradient
+
+
+@dataclass(frozen=True)
 class Jump:
     """An instant at which modes change, carried back and forth to the recorded time.
 
@@ -50,7 +68,8 @@ class Jump:
         d: derivatives of the discrete values after, shape (nd, nx + ntheta).
         reason: why there is no trigger.
         gain: what the integrands lose at the event: quadratures grow by it times the shift of the event, shape (nq,).
-        disputed: positions in theta by which nothing after the event has a derivative, with the reason.
+        apart: other reasons for which it happens at this instant.
+        matters: whether it matters when it happens.
     """
 
     before: Point
@@ -61,7 +80,8 @@ class Jump:
     d: Vector
     reason: NoGradient | None = None
     gain: Vector = field(default_factory=lambda: np.zeros(0))
-    disputed: tuple[tuple[int, ...], NoGradient] | None = None
+    apart: tuple[Apart, ...] = ()
+    matters: bool = False
 
     @property
     def late(self) -> Vector:
@@ -112,18 +132,14 @@ def make_jump(
         work.fire([event for event in events if event.round == number])
     rate_after = slopes(model, work.point, "ode").value
     gain = integrands(before) - integrands(work.point)
-    disputed = None
-    if when.reason is not None and (
-        np.any(np.abs(gain) > _SMOOTH) or _matters(model, before, rate_before, work.point, rate_after)
-    ):
-        if trigger is None:
-            raise when.reason
-        disputed = when.disputed, when.reason
+    matters = bool(np.any(np.abs(gain) > _SMOOTH)) or _matters(model, before, rate_before, work.point, rate_after)
+    if when.reason is not None and matters:
+        raise when.reason
     if trigger is not None:
         work.x -= np.outer(rate_after, time)
         work.point.x = work.point.x - rate_after * trigger.shift
         solve_implicit(model, work.point)
-    return Jump(before, work.point, events, trigger, work.x, work.d, when.reason, gain, disputed)
+    return Jump(before, work.point, events, trigger, work.x, work.d, when.reason, gain, when.apart, matters)
 
 
 def _matters(model: CompiledDae, before: Point, f_before: Vector, after: Point, f_after: Vector) -> bool:
@@ -135,11 +151,11 @@ def _matters(model: CompiledDae, before: Point, f_before: Vector, after: Point, 
 
 @dataclass(frozen=True)
 class When:
-    """What decides when an event happens, and by which entries of theta that is not certain."""
+    """What decides when an event happens, why nothing does, and what else would do so for a different reason."""
 
     trigger: Trigger | None
     reason: NoGradient | None = None
-    disputed: tuple[int, ...] = ()
+    apart: tuple[Apart, ...] = ()
 
 
 def event_time(model: CompiledDae, before: Point, events: tuple[Event, ...], begin: Point) -> When:
@@ -158,17 +174,14 @@ def event_time(model: CompiledDae, before: Point, events: tuple[Event, ...], beg
         found.append((event, trigger))
     first, trigger = found[0]
     theta = np.concatenate([model.p, model.u, before.d])
+    weights = np.maximum(np.abs(before.x), model.nominals), np.maximum(np.abs(theta), 1.0)
+    size = max(before.t - begin.t, abs(before.t), *(float(np.max(np.abs(one.x) * weights[0])) for _, one in found))
+    apart: list[Apart] = []
     for other, second in found[1:]:
-        weights = np.maximum(np.abs(before.x), model.nominals), np.maximum(np.abs(theta), 1.0)
-        apart = [
-            np.flatnonzero(np.abs(part) * weight > _SAME * max(before.t - begin.t, abs(before.t)))
-            for part, weight in zip(_difference(model, before, trigger, second), weights, strict=True)
-        ]
-        if apart[0].size:
-            return When(None, _coincidence(first, other))
-        if apart[1].size:
-            return When(trigger, _coincidence(first, other), tuple(map(int, apart[1])))
-    return When(trigger)
+        parts = _difference(model, before, trigger, second)
+        if any(np.any(np.abs(part) * weight > _SAME * size) for part, weight in zip(parts, weights, strict=True)):
+            apart.append(Apart(*parts, _SAME * size, _coincidence(first, other)))
+    return When(trigger, None, tuple(apart))
 
 
 def _difference(model: CompiledDae, before: Point, one: Trigger, other: Trigger) -> tuple[Vector, Vector]:
@@ -193,10 +206,9 @@ def _crossing(model: CompiledDae, before: Point, transition: CompiledTransition,
     k = transition.index
     part = slopes(model, before, f"guard {k}", lambda: model.guards(*model.arguments.values())[k])
     rate = float(part.t[0] + part.x[0] @ slopes(model, before, "ode").value)
-    change = abs(float(call(model, model.guards, begin)[k])) + float(
-        np.abs(part.x[0]) @ (np.abs(before.x) + model.nominals)
-    )
-    if not rate * (before.t - begin.t) > _GRAZING * change:
+    change = abs(float(call(model, model.guards, begin)[k]))
+    terms = float(np.abs(part.x[0]) @ (np.abs(before.x) + model.nominals))
+    if not rate * (before.t - begin.t) > _GRAZING * change + _ROUNDING * terms:
         return None
     return Trigger(-float(part.value[0]) / rate, -part.x[0] / rate, -part.theta[0] / rate)
 

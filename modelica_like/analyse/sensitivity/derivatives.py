@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 import numpy as np
 
 from modelica_like.analyse.replay.chain import Replay, Tolerances, replay
+from modelica_like.analyse.replay.edges import edges
 from modelica_like.analyse.replay.slopes import Sizes
 from modelica_like.analyse.replay.sweeps import adjoint, forward
 from modelica_like.analyse.sensitivity.formulas import Freed, bound_by_formula, equal_to, free_formulas
@@ -175,7 +176,6 @@ def sensitivities(
     column, name = quadratures(model, outputs)
     stops = solution.time if any(one.kind == "series" for one in outputs) else ()
     chain = replay(solution, column, name, start=start, stops=stops, tolerances=Tolerances(precision))
-    _check_disputed(chain, chosen)
     return _differentiate(solution, chain, outputs, chosen, method, freed)
 
 
@@ -206,15 +206,6 @@ def _chosen(model: CompiledDae, names: Sequence[str]) -> list[tuple[int, Quantit
     return found
 
 
-def _check_disputed(chain: Replay, chosen: list[tuple[int, Quantity]]) -> None:
-    fixed = Sizes.of(chain.model).fixed
-    for _, jump in chain.jumps:
-        if (jump.disputed is not None and {k for k, _ in chosen} & set(jump.disputed[0])) or (
-            jump.disputed is not None and any(k >= fixed for k in jump.disputed[0])
-        ):
-            raise jump.disputed[1]
-
-
 def _differentiate(
     solution: Solution, chain: Replay, outputs: list[Output], chosen: list[tuple[int, Quantity]], method: Method,
     freed: Freed,
@@ -225,7 +216,8 @@ def _differentiate(
     readings = read_off(solution, chain, plain)
     nodes = range(len(chain.nodes)) if series else range(0)
     over_time = [value_at(chain, one.path, k) for one in series for k in nodes]
-    total = [*readings, *over_time]
+    on_edge = edges(chain, {reading.jump for reading in readings})
+    total = [*readings, *over_time, *(edge.reading for edge in on_edge)]
     positions = [k for k, _ in chosen]
     # A column costs about the same in both directions.
     way = method if method != "auto" else "adjoint" if len(total) < len(chosen) else "forward"
@@ -235,6 +227,10 @@ def _differentiate(
         directions = np.zeros((size.fixed, len(positions)))
         directions[positions, range(len(positions))] = 1.0
         derivatives = forward(chain, total, directions)
+    changes = np.abs(derivatives) * [abs(quantity.value) or 1.0 for _, quantity in chosen]
+    for edge, change in zip(on_edge, changes[len(total) - len(on_edge) :], strict=True):
+        edge.check(float(change.max(initial=0.0)))
+    derivatives = derivatives[: len(total) - len(on_edge)]
     if freed.slopes:
         derivatives = derivatives @ freed.taken_along([quantity.name for _, quantity in chosen])
     count = len(plain)

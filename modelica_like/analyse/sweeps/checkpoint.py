@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ import numpy as np
 from modelica_like.analyse.sweeps.plan import Plan
 from modelica_like.analyse.sweeps.workers import Chunk, Done, Job
 from modelica_like.errors import CheckpointMismatch, missing_extra
+from modelica_like.writing import write_text
 
 
 class Checkpoint:
@@ -45,14 +47,13 @@ class Checkpoint:
         elif self.path.exists() and (not self.path.is_dir() or any(self.path.iterdir())):
             raise CheckpointMismatch(f"{self.path.name} exists and is not the checkpoint of a sweep.")
         else:
-            self._group = zarr.open_group(self.path, mode="w")
-            count, width = len(plan), len(job.outputs)
-            self._group.create_array(
-                "values", shape=(count, width), chunks=(size, width), dtype="f8", fill_value=np.nan
-            )
-            chunks = -(-count // size)
-            self._group.create_array("done", shape=(chunks,), chunks=(1,), dtype="bool", fill_value=False)
-            self._group.attrs["sweep"] = key
+            # Whole or not at all, like files.
+            with TemporaryDirectory(prefix=".", dir=_made(self.path.absolute().parent)) as draft:
+                _begin(zarr.open_group(f"{draft}/sweep", mode="w"), len(plan), len(job.outputs), size, key)
+                if self.path.exists():
+                    self.path.rmdir()
+                Path(draft, "sweep").rename(self.path)
+            self._group = zarr.open_group(self.path, mode="r+")
         self._size = size
 
     def left(self, chunks: list[Chunk]) -> list[Chunk]:
@@ -66,7 +67,7 @@ class Checkpoint:
         self._group["values"][first : first + len(values)] = np.array(values)
         number = first // self._size
         told = {str(first + k): text for k, text in enumerate(failures) if text}
-        (self.path / f"failures-{number}.json").write_text(json.dumps(told), encoding="utf-8")
+        write_text(self.path / f"failures-{number}.json", json.dumps(told))
         self._group["done"][number] = True
 
     def results(self) -> tuple[Any, dict[int, str]]:
@@ -75,6 +76,17 @@ class Checkpoint:
         for file in sorted(self.path.glob("failures-*.json")):
             failures.update({int(k): text for k, text in json.loads(file.read_text(encoding="utf-8")).items()})
         return self._group["values"][:], failures
+
+
+def _made(folder: Path) -> Path:
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
+def _begin(group: Any, runs: int, outputs: int, size: int, key: str) -> None:
+    group.create_array("values", shape=(runs, outputs), chunks=(size, outputs), dtype="f8", fill_value=np.nan)
+    group.create_array("done", shape=(-(-runs // size),), chunks=(1,), dtype="bool", fill_value=False)
+    group.attrs["sweep"] = key
 
 
 def _fingerprint(job: Job, plan: Plan, size: int) -> str:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
+from modelica_like.analyse.sweeps.ranges import MOST_RUNS, too_many
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import LanguageError, UnknownName, ValueOutOfRange, did_you_mean, missing_extra
 from modelica_like.units import Unit, coherent, to_si
@@ -107,7 +109,7 @@ def make_plan(model: CompiledDae, over: Mapping[str, Iterable[Any]], sampling: S
 
     Raises:
         UnknownName: there is no such parameter or input.
-        ValueOutOfRange: there are no values, or not two bounds.
+        ValueOutOfRange: there are no values, not two bounds, or too many runs.
         UnitError: a value has the wrong unit.
     """
     if not over:
@@ -120,6 +122,8 @@ def make_plan(model: CompiledDae, over: Mapping[str, Iterable[Any]], sampling: S
             needed = "a lower and an upper bound" if sampling is not None else "at least one value"
             raise ValueOutOfRange(f"{name}: a sweep needs {needed}, not {list(map(float, numbers))}.")
     if sampling is None:
+        if math.prod(len(numbers) for numbers in values.values()) > MOST_RUNS:
+            raise too_many(" × ".join(names))
         points = np.array(list(itertools.product(*values.values())), float)
         return Plan(names, texts, points, tuple(values.values()))
     low, high = np.array(list(values.values())).T

@@ -8,6 +8,9 @@ import numpy as np
 
 from modelica_like.errors import ValueOutOfRange
 
+MOST_RUNS = 10_000_000
+_DIGITS = len(str(MOST_RUNS))
+
 
 def read_assignment(text: str) -> tuple[str, str]:
     """Read `motor.w=4000 rpm`.
@@ -21,17 +24,24 @@ def read_assignment(text: str) -> tuple[str, str]:
     return name.strip(), value.strip()
 
 
+def too_many(what: str) -> ValueOutOfRange:
+    """Return the error about more runs than a sweep can have."""
+    return ValueOutOfRange(f"{what}: a sweep has at most {MOST_RUNS} runs.", advice="Give fewer values.")
+
+
 def read_range(text: str) -> tuple[str, list[Any]]:
     """Read `load=0:0.25:26 N.m` (first, last, count) or `load=0,0.1,0.2 N.m`; the unit counts for all.
 
     Raises:
-        ValueOutOfRange: it is neither.
+        ValueOutOfRange: it is neither, or there are more values than any sweep has runs.
     """
     name, values = read_assignment(text)
     numbers, _, unit = values.partition(" ")
     try:
         if numbers.count(":") == 2:
             first, last, count = numbers.split(":")
+            if len(count) > _DIGITS or int(count) > MOST_RUNS:
+                raise too_many(name)
             given = np.linspace(float(first), float(last), int(count)).tolist()
         else:
             given = [float(one) for one in numbers.split(",")]

@@ -60,6 +60,7 @@ def sweep(
         UnknownName: a name is not known.
         ValueOutOfRange: there is nothing to vary, nothing to read, or no positive number of processes.
         CheckpointMismatch: the checkpoint belongs to another sweep.
+        KeyboardInterrupt: it was interrupted; its note says how much is in the checkpoint.
         WorkersLost: workers died again and again.
     """
     model = build(drive, free=over)
@@ -98,15 +99,20 @@ def _collect(
     left = kept.left(chunks) if kept is not None else chunks
     count = total - sum(len(points) for _, points in left)
     values, failures = np.full((total, len(job.outputs)), np.nan), {}
-    for done in workers(left):
-        first, numbers, told = done
-        if kept is not None:
-            kept.keep(done)
-        values[first : first + len(numbers)] = numbers
-        failures.update({first + k: text for k, text in enumerate(told) if text})
-        count += len(numbers)
-        if progress is not None:
-            progress(count, total)
+    try:
+        for done in workers(left):
+            first, numbers, told = done
+            if kept is not None:
+                kept.keep(done)
+            values[first : first + len(numbers)] = numbers
+            failures.update({first + k: text for k, text in enumerate(told) if text})
+            count += len(numbers)
+            if progress is not None:
+                progress(count, total)
+    except KeyboardInterrupt as error:
+        where = f"in {kept.path}: the same sweep goes on there" if kept is not None else "lost without a checkpoint"
+        error.add_note(f"{count} of {total} runs are {where}.")
+        raise
     return kept.results() if kept is not None else (values, failures)
 
 

@@ -5,9 +5,12 @@ from __future__ import annotations
 import multiprocessing
 import os
 import pickle
+import signal
+import threading
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
@@ -19,6 +22,7 @@ from modelica_like.errors import ModelicaLikeError, WorkersLost, missing_extra
 from modelica_like.simulation import simulate
 
 _RESTARTS = 3
+_DEAF = signal.SIGINT, signal.SIG_IGN
 _PATIENCE = 10.0
 """Seconds to wait for a scheduler."""
 
@@ -91,10 +95,12 @@ def in_processes(job: Job, chunks: Sequence[Chunk], count: int) -> Iterator[Done
         WorkersLost: processes die again and again.
     """
     left = dict(chunks)
+    others = set(multiprocessing.active_children())
     for _ in range(_RESTARTS):
         # Spawned, not forked: libraries of this process may have threads.
-        with ProcessPoolExecutor(count, multiprocessing.get_context("spawn")) as pool:
-            futures: list[Future[Done]] = [pool.submit(run_chunk, job, first, points) for first, points in left.items()]
+        with ProcessPoolExecutor(count, multiprocessing.get_context("spawn"), signal.signal, _DEAF) as pool:
+            with _deaf():
+                futures: list[Future[Done]] = [pool.submit(run_chunk, job, *chunk) for chunk in left.items()]
             try:
                 for future in as_completed(futures):
                     done = future.result()
@@ -102,6 +108,11 @@ def in_processes(job: Job, chunks: Sequence[Chunk], count: int) -> Iterator[Done
                     yield done
             except BrokenProcessPool:
                 continue
+            except (KeyboardInterrupt, GeneratorExit):
+                # Nobody waits for what they are at.
+                for process in set(multiprocessing.active_children()) - others:
+                    process.terminate()
+                raise
             finally:
                 for future in futures:
                     future.cancel()
@@ -111,6 +122,18 @@ def in_processes(job: Job, chunks: Sequence[Chunk], count: int) -> Iterator[Done
         'If they died at their start: a script that sweeps keeps its own work behind if __name__ == "__main__":, '
         "or says processes=1.",
     )  # fmt: skip
+
+
+@contextmanager
+def _deaf() -> Iterator[None]:
+    """Ignore Ctrl-C for the moment in which processes are started: they inherit it, and are ended by this one."""
+    here = threading.current_thread() is threading.main_thread()
+    before = signal.signal(*_DEAF) if here else None
+    try:
+        yield
+    finally:
+        if here:
+            signal.signal(signal.SIGINT, before)
 
 
 def on_cluster(job: Job, chunks: Sequence[Chunk], scheduler: str) -> Iterator[Done]:

@@ -1,6 +1,6 @@
 /* The run-time of all models: types and functions behind the FMI functions.
  *
- * A model is data: tables and tapes, read from a file (model.c). All that changes lives in `State` and in the numbers
+ * A model is data: tables and tapes, read from a file (model.h). All that changes lives in `State` and in the numbers
  * behind it, none of which are pointers, so that a copy of these bytes is a copy of the instance's state. Work memory
  * holds only what can be computed again. Nothing is static and mutable, so instances are independent of each other.
  *
@@ -9,8 +9,7 @@
 #ifndef CORE_H
 #define CORE_H
 
-#include <stddef.h>
-#include <stdint.h>
+#include "model.h"
 
 /* Compiled on a new Linux, the FMU is to run on an old one: these functions have got new versions since glibc 2.17.
    Versions can only be told to a linker that is given libm. */
@@ -34,166 +33,6 @@ OLD(fmod);
 
 typedef enum { RESULT_OK, RESULT_DISCARD, RESULT_ERROR } Result;
 
-/* ---- tables of the model ---------------------------------------------------------------------------------------- */
-
-/* clang-format off */
-/* The order is that of OPERATIONS in tape.py. */
-typedef enum {
-    OPERATION_ADD, OPERATION_SUB, OPERATION_MUL, OPERATION_DIV, OPERATION_NEG, OPERATION_EXP, OPERATION_LOG,
-    OPERATION_POW, OPERATION_CONSTPOW, OPERATION_SQRT, OPERATION_SQ, OPERATION_TWICE, OPERATION_SIN, OPERATION_COS,
-    OPERATION_TAN, OPERATION_ASIN, OPERATION_ACOS, OPERATION_ATAN, OPERATION_LT, OPERATION_LE, OPERATION_EQ,
-    OPERATION_NE, OPERATION_NOT, OPERATION_AND, OPERATION_OR, OPERATION_FLOOR, OPERATION_CEIL, OPERATION_FMOD,
-    OPERATION_REMAINDER, OPERATION_FABS, OPERATION_SIGN, OPERATION_COPYSIGN, OPERATION_IF_ELSE_ZERO, OPERATION_ERF,
-    OPERATION_FMIN, OPERATION_FMAX, OPERATION_INV, OPERATION_SINH, OPERATION_COSH, OPERATION_TANH, OPERATION_ASINH,
-    OPERATION_ACOSH, OPERATION_ATANH, OPERATION_ATAN2, OPERATION_HYPOT, OPERATION_LOG1P, OPERATION_EXPM1,
-    N_OPERATION_CODES
-} OperationCode;
-/* clang-format on */
-
-/* Records lie in the file as they lie in memory: numbers of 4 and 8 bytes, without gaps. */
-typedef struct {
-    int operation, count;
-} Run;
-typedef struct {
-    int left, right;
-} Operands; /* slots */
-
-typedef struct { /* see tape.py */
-    int n_operations, n_runs, n_outputs, first_result;
-    const Run *runs;          /* equal operations that follow each other */
-    const Operands *operands; /* of all operations; operation k writes slot first_result + k */
-    const int *outputs;       /* slots */
-} Tape;
-
-typedef struct { /* pattern of a square matrix and of its QR factors, see sparse.py */
-    int size, n_ends, n_nonzeros, n_v, n_r;
-    const int *colind, *row, *v_colind, *v_row, *r_colind, *r_row, *row_place, *column_order;
-} QrPattern;
-
-typedef enum {
-    KIND_TIME,
-    KIND_STATE,
-    KIND_DERIVATIVE,
-    KIND_VARIABLE,
-    KIND_PARAMETER,
-    KIND_DERIVED,
-    KIND_INPUT,
-    KIND_DISCRETE,
-    KIND_GUARD,
-    N_KINDS
-} Kind;
-typedef enum { TYPE_FLOAT64, TYPE_ENUMERATION, N_TYPES } ValueType;
-
-typedef struct {
-    uint32_t reference;
-    int type, kind, index;
-    int start;   /* start value that determines it, or -1 */
-    int tunable; /* a parameter that may change during a run */
-    int name;
-} Variable; /* sorted by reference */
-
-typedef enum { RESET_STATE, RESET_DISCRETE, RESET_VALUE, N_RESET_KINDS } ResetKind;
-typedef struct {
-    int kind, index, value, target;
-    double factor;
-} Reset;
-typedef struct {
-    int mode, target, timed, index, first_reset, n_resets, name, notice;
-    uint64_t sources;
-} Transition;
-typedef struct {
-    int first_name, n_names; /* none: a discrete value */
-} Mode;
-typedef struct {
-    int mode, target;
-} StartMode;
-typedef struct {
-    int mode, number, loose, motion, state, reaction, approach, moved, name, unused;
-    double factor, nominal;
-} Held; /* see CompiledHold in compiled.py; state -1: the motion is none; moved: something but states moves it */
-typedef struct {
-    int first_member, n_members, first;
-} Circuit;
-typedef struct {
-    int position, start;
-    double factor;
-} StartOf;
-typedef struct {
-    int start, node, row;
-} StartRow;
-typedef struct {
-    int n_d, n_y, steady, rates_depend_on_time;
-    int implicit_linear, unused; /* the implicit equations are linear in z */
-    double absolute_to_relative, default_tolerance;
-    double fixed_step; /* 0: as accuracy asks for */
-} Settings;
-
-typedef struct Model { /* tables lie in the bytes of the file; texts are offsets in `text` */
-    const Settings *settings;
-    const char *text, *token;
-    int n_settings, n_text, n_token, n_x, n_z, n_p, n_u, n_constants, n_variables;
-    const double *constants, *parameters, *parameter_min, *parameter_max, *inputs, *guesses, *z_guesses, *nominals;
-    const int *state_names, *implicit_names, *singular_names;
-    const Variable *variables;
-
-    int n_transitions, n_guards, n_resets, n_reset_nodes, n_modes, n_mode_names;
-    const Transition *transitions; /* in the order in which they are declared */
-    const int *guard_transition;   /* transition of every guard */
-    const Reset *resets;
-    const int *reset_nodes;
-    const Mode *modes; /* by position in d */
-    const int *mode_names;
-
-    int n_holds, n_circuits, n_members, n_units;
-    const Held *holds;
-    const Circuit *circuits; /* those that depend on each other; in d from `first`: switches, then shares */
-    const int *members;
-    const int *units; /* by node: which have the same unit; empty where nothing is held */
-
-    int n_start_modes, n_start_direct, n_start_default, n_start_x_guess, n_start_z_guess, n_start_dependent;
-    int n_start_zero, n_start_unknowns, n_steady;
-    const StartMode *start_modes;
-    const StartOf *start_direct, *start_default, *start_x_guess, *start_z_guess;
-    const StartRow *start_rows, *start_dependent;
-    const int *start_zero, *start_columns, *steady_states;
-
-    int n_jacobian;
-    const int *jacobian_to_step; /* nonzero of the Jacobian -> nonzero of the step matrix */
-    const int *step_diagonal;    /* nonzero of the step matrix on the diagonal of state k */
-    QrPattern step, start;
-    struct {
-        Tape rates, jacobian, alg, alg_jacobian, variables, guards, guards_soon, moments, resets, start_conditions,
-            start_values, discrete_starts, hold_terms, determinants, start_system, start_jacobian, derived;
-    } tapes;
-
-    /* What follows from the sizes of the tables. */
-    int n_unknowns, n_d, n_y, n_nodes, n_derived, n_moments, n_determinants, n_starts, n_start_values;
-    int n_start_jacobian, n_reset_values, most_members;
-    int slot_x, slot_z, slot_p, slot_u, slot_d, slot_y, slot_constants, slot_results, n_slots;
-    unsigned char *own; /* bytes that belong to the model, or NULL */
-    void (*release)(void *memory);
-} Model;
-enum { N_TAPES = sizeof((Model *)0)->tapes / sizeof(Tape) };
-
-/* model.c */
-#define MESSAGE_LENGTH 512
-typedef void *(*Allocate)(size_t count, size_t size);
-typedef void (*Release)(void *memory);
-Model *model_read(const unsigned char *bytes, size_t size, Allocate allocate, Release release, char *message);
-void model_free(Model *m);
-static inline const char *text_of(const Model *m, int place) { return m->text + place; }
-
-/* model_check.c */
-int damaged(char *message, const char *what);
-int check_model(const Model *m, char *message);
-
-/* model_file.c */
-Model *model_open(const char *location, Allocate allocate, Release release, char *message);
-
-/* model_data.c: the bytes of the file where they are compiled in, of size 0 where they are read */
-extern const uint64_t model_data[];
-extern const size_t model_data_size;
-
 /* ---- state and instance ----------------------------------------------------------------------------------------- */
 
 typedef enum {
@@ -214,13 +53,13 @@ typedef struct { /* an accepted integrator step: its first and last point, and t
 typedef struct { /* what changes; arrays of the model's sizes stand behind it, see `Instance` */
     double t, u_time;
     int phase, solved, z_valid, inputs_changed, piece_valid, event_pending, at_event;
-    int looked; /* the guards are known from the end of the last fixed step */
-    double tolerance, start_time, stop_time;
+    int looked;                                        /* the guards are known from the end of the last fixed step */
+    double tolerance, absolute, start_time, stop_time; /* absolute: in nominal values */
     int stop_time_defined;
     double step;            /* next step size, 0: choose one */
     double instants[CROWD]; /* of the last events, in a circle */
     int n_instants;
-    double n_steps, n_rejected, n_events;
+    double n_steps, n_rejected, n_evaluations, n_events;
 } State;
 
 typedef void (*AnyFunction)(void); /* a callback of the importer, cast back before it is called */
@@ -248,17 +87,36 @@ typedef struct { /* at one instant: what has been stopped, and the states before
     unsigned char *entered;
 } Impacts;
 
+typedef enum {
+    SPECIAL_RATES,
+    SPECIAL_JACOBIAN,
+    SPECIAL_ALG,
+    SPECIAL_ALG_JACOBIAN,
+    SPECIAL_VARIABLES,
+    SPECIAL_GUARDS,
+    N_SPECIALS
+} SpecialTape;
+
+typedef struct { /* a tape for the present modes, see special.c */
+    Tape tape;
+    Run *runs;
+    Operands *operands;
+    int *outputs;
+    int first_known, uses;
+    uint64_t belongs_to;
+} Special;
+
 /* Arrays of the model's sizes. Those of single functions are named after them; a function that calls another one does
  * not share with it. */
 typedef struct {
-    double *slots, *dots; /* values, and derivatives in either direction, of tape slots */
+    double *slots, *dots; /* values, and derivatives in either direction or three Taylor coefficients, of tape slots */
     double *jacobian, *matrix, *qr_v, *qr_r, *qr_beta, *qr_work;
     double *stages, *point; /* of the integrator: 8 stages, a point */
     double *variables, *guards, *guards_before, *rhs, *dense_matrix, *square, *vector, *residual;
     double *start_unknowns, *start_values, *start_residual;
     int *order; /* pivots of the implicit equations */
     unsigned char *known, *decided, *wanting;
-    double *d_before, *x_before, *d_fired, *reset_values, *target_values;
+    double *d_before, *d_fired, *reset_values, *target_values;
     int *targets;
     unsigned char *changed;
     double *first; /* point before a step */
@@ -271,6 +129,17 @@ typedef struct {
     Strike strike;
     Impacts impacts;
     double *respond_d, *respond_z, *rates, *x_kept;
+    Special special[N_SPECIALS];
+    Run *special_runs;
+    Operands *special_operands;
+    int *special_outputs;
+    uint64_t decided_by; /* counts changes of what decides about tapes: modes and parameters */
+    int *same, *places_of_slots;
+    unsigned char *known_slots, *needed_slots, *asked; /* asked: variables that somebody reads */
+    double *seen_rates, *seen_indicators, *seen_derived;
+    double *first_rates; /* right hand side where the step begins */
+    double *begun;       /* motions that may be held, where the search for a steady state began */
+    int *standing;
 } Work;
 
 typedef struct Instance {
@@ -292,13 +161,19 @@ typedef struct Instance {
     AnyFunction logger, intermediate_update;
     LogFunction log;
     double (*step_finished)(struct Instance *c); /* tells until when to go on; or NULL */
+    /* Told of mode changes (transition -1: an impact's), and what impacts cost (held -1: forget what was told); or NULL
+     */
+    void (*noted)(struct Instance *c, int transition, int mode, int target);
+    void (*struck)(struct Instance *c, int held, double energy, int first);
+    int round; /* of the events at the present instant */
     unsigned log_enabled;
-    int co_simulation, event_mode_used, early_return_allowed;
+    int co_simulation, event_mode_used, early_return_allowed, inputs_move;
     Allocate allocate;
     Release release;
     int bounded;         /* the work of a step is bounded: iterations end early */
     int budget;          /* rounds of events and further pieces that are left of a bounded step */
-    int variables_valid; /* work.variables belong to the present point */
+    int variables_valid; /* which values belong to the present point, see values.c */
+    int look_valid;      /* the last look at the guards was at the present point */
 } Instance;
 
 /* tape.c */
@@ -317,7 +192,14 @@ void make_orthogonal(int rows, int columns, double *a, double *turns, double *b)
 void least_squares(int rows, int columns, double *a, double *b, double *x);
 void keeping_least_squares(int n, int states, double *a, double *turns, double *b, double *x);
 
+/* special.c */
+const Tape *full_tape(const Model *m, SpecialTape which);
+void run_special(Instance *c, SpecialTape which, double *outputs);
+void evaluate_special(Instance *c, SpecialTape which, double t, const double *x, const double *z, double *outputs);
+void ask_for(Instance *c, int node);
+
 /* point.c */
+void load(Instance *c, double t, const double *x, const double *z);
 void evaluate(Instance *c, const Tape *tape, double t, const double *x, const double *z, double *outputs);
 Result solve_implicit(Instance *c, double t, const double *x, double *z, int quiet);
 Result check_singular(Instance *c);
@@ -327,7 +209,7 @@ double input_at(const Instance *c, int k, double t);
 /* start.c */
 void start_defaults(Instance *c);
 Result start_solve(Instance *c);
-int choose_modes(Instance *c, unsigned char *decided);
+void choose_modes(Instance *c, unsigned char *decided);
 
 /* holds.c */
 #define UNLIMITED 1e30
@@ -348,24 +230,27 @@ int guard_active(const Instance *c, int guard);
 double next_moment(Instance *c);
 int find_wanting(Instance *c, unsigned char *wanting, int guards_too);
 Result iterate_events(Instance *c, unsigned char *wanting, int located);
+Result update_discrete(Instance *c, int *restart, double *next);
 double number_or_false(double guard);
-void note_change(Instance *c, int name, int mode, int target);
+void move_states(Instance *c, const int *nodes, const double *values, int count);
+void note_change(Instance *c, int name, int transition, int mode, int target);
 unsigned char *nothing_wanting(Instance *c);
 
 /* rosenbrock.c */
-int rosenbrock_step(Instance *c, double t, const double *first, double h, Piece *piece, double *error);
+int rosenbrock_step(
+    Instance *c, double t, const double *first, double h, int keep_jacobian, Piece *piece, double *error);
 double *last_of(const Model *m, Piece *piece);
 size_t piece_size(const Model *m);
 void piece_at(const Model *m, const Piece *piece, double t, double *point);
 double first_step(Instance *c);
 
 /* integrate.c */
+#define MOST_LOOKS 12 /* at guards, that there is room for */
 typedef enum { REACHED, AT_EVENT, FAILED } Arrival;
 Arrival integrate_to(Instance *c, double target, int stop_at_events);
 void leave_piece(Instance *c);
 Result handle_event(Instance *c);
 Result check_step(Instance *c, double point, double size, double *target);
-
 double cubic_guess(double g0, double r0, double g1, double r1);
 Result move_to(Instance *c, double t);
 Result take_changes(Instance *c, int *event);
@@ -394,8 +279,11 @@ Result directional(Instance *c, const uint32_t *unknowns, size_t n_unknowns, con
 Result adjoint(Instance *c, const uint32_t *unknowns, size_t n_unknowns, const uint32_t *knowns, size_t n_knowns,
     const double *seed, double *result);
 void slope_of_node(Instance *c, int node, int again, double *by_state);
-Result output_rate(Instance *c, uint32_t reference, double *value);
+Result factor_implicit(Instance *c, int *order);
 size_t dependencies(Instance *c, uint32_t unknown, uint32_t *knowns, size_t capacity, Result *result);
+
+/* taylor.c */
+Result output_rate(Instance *c, uint32_t reference, int order, double *value);
 
 /* instance.c */
 Instance *instance_new(const Model *model, const char *name, const char *token, Allocate allocate, Release release,

@@ -15,32 +15,37 @@ static int known_slot(const Model *m, const Variable *v) {
     }
 }
 
+/* Before the end of the initialization start values are known instead of states. */
+static int is_start(const Instance *c, const Variable *v) {
+    return c->state.phase == PHASE_INITIALIZATION && (v->kind == KIND_STATE || v->kind == KIND_VARIABLE);
+}
+
 static Result check_knowns(Instance *c, const uint32_t *knowns, size_t n) {
     const Model *m = c->model;
     for (size_t k = 0; k < n; k++) {
         const Variable *v = known_variable(c, knowns[k], TYPE_FLOAT64);
         if (v == NULL) return RESULT_ERROR;
-        if (known_slot(m, v) < 0)
-            return report(c, LOG_ERROR, RESULT_ERROR,
-                "Derivatives by %s are not available: it is neither state, input nor parameter.", text_of(m, v->name));
+        if (is_start(c, v) ? v->start < 0 || v->start >= m->n_starts : known_slot(m, v) < 0)
+            return report(c, LOG_ERROR, RESULT_ERROR, "Derivatives by %s are not available: it is neither %s.",
+                text_of(m, v->name),
+                is_start(c, v) ? "a start value, input nor parameter" : "state, input nor parameter");
     }
     return RESULT_OK;
 }
 
 static Result check_unknowns(Instance *c, const uint32_t *unknowns, size_t n) {
-    const Model *m = c->model;
     for (size_t k = 0; k < n; k++) {
         const Variable *v = known_variable(c, unknowns[k], TYPE_FLOAT64);
         if (v == NULL) return RESULT_ERROR;
         if (v->kind == KIND_DISCRETE)
-            return report(
-                c, LOG_ERROR, RESULT_ERROR, "%s changes at events only: it has no derivatives.", text_of(m, v->name));
+            return report(c, LOG_ERROR, RESULT_ERROR, "%s changes at events only: it has no derivatives.",
+                text_of(c->model, v->name));
     }
     return RESULT_OK;
 }
 
 /* Factorises the Jacobian of the implicit equations at the present point, with the slots of m->tapes.rates filled. */
-static Result factor_implicit(Instance *c, int *order) {
+Result factor_implicit(Instance *c, int *order) {
     const Model *m = c->model;
     State *s = &c->state;
     if (settle(c) != RESULT_OK) return RESULT_ERROR;
@@ -64,6 +69,64 @@ static void tangent_of_implicit(Instance *c, const int *order) {
     for (int k = 0; k < m->n_z; k++) dots[m->slot_z + k] = -w->vector[k];
 }
 
+static void seed_knowns(Instance *c, const uint32_t *knowns, size_t n, const double *seed) {
+    const Model *m = c->model;
+    for (size_t k = 0; k < n; k++) {
+        const Variable *v = find_variable(m, knowns[k]);
+        if (!is_start(c, v)) c->work.dots[known_slot(m, v)] += seed[k];
+    }
+}
+
+/* Newton's last step once more, with what the start equations change by instead of what they lack. */
+static Result start_system_tangent(Instance *c, const double *start_dots) {
+    const Model *m = c->model;
+    Work *w = &c->work;
+    State *s = &c->state;
+    double *step = w->start_unknowns;
+    evaluate(c, &m->tapes.start_system, s->t, c->x, c->z, w->start_residual);
+    tape_run(&m->tapes.start_jacobian, w->slots, w->jacobian);
+    if (!qr_factor(&m->start, w->jacobian, w))
+        return report(c, LOG_ERROR, RESULT_ERROR, "The start equations are singular at t = %.9g s.", s->t);
+    evaluate(c, &m->tapes.start_system, s->t, c->x, c->z, w->start_residual);
+    tape_tangent(&m->tapes.start_system, w->slots, w->dots, w->start_residual);
+    for (int k = 0; k < m->n_start_unknowns; k++) {
+        int start = m->start_rows[k].start;
+        step[k] = (start < 0 ? 0 : start_dots[start]) - w->start_residual[m->start_rows[k].row];
+    }
+    qr_solve(&m->start, w, step);
+    for (int k = 0; k < m->n_start_unknowns; k++)
+        if (m->start_columns[k] < m->n_x) w->dots[m->slot_x + m->start_columns[k]] = step[k];
+    return RESULT_OK;
+}
+
+/* What states change by with parameters, inputs and start values: through the start equations, in the modes found. */
+static Result start_tangent(Instance *c, const uint32_t *knowns, size_t n, const double *seed) {
+    const Model *m = c->model;
+    Work *w = &c->work;
+    State *s = &c->state;
+    double *dots = w->dots, *starts = w->start_values;
+    s->solved = 0;
+    if (start_solve(c) != RESULT_OK) return RESULT_ERROR;
+    if (m->settings->steady || anything_shared(c))
+        return report(c, LOG_ERROR, RESULT_ERROR,
+            "A steady start, and one at which parts share a load, have derivatives after the initialization only.");
+    memset(dots, 0, m->slot_results * sizeof(double));
+    seed_knowns(c, knowns, n, seed);
+    evaluate(c, &m->tapes.discrete_starts, s->t, c->x, c->z, w->guards);
+    tape_tangent(&m->tapes.discrete_starts, w->slots, dots, w->guards);
+    for (int k = 0; k < m->n_d; k++) dots[m->slot_d + k] = c->mode_given[k] ? 0 : w->guards[k];
+    evaluate(c, &m->tapes.start_values, s->t, c->x, c->z, starts);
+    tape_tangent(&m->tapes.start_values, w->slots, dots, starts);
+    for (int k = 0; k < m->n_starts; k++) starts[k] = c->start_given[k] ? 0 : starts[k];
+    for (size_t k = 0; k < n; k++) {
+        const Variable *v = find_variable(m, knowns[k]);
+        if (is_start(c, v)) starts[v->start] += seed[k];
+    }
+    for (int k = m->n_start_direct; k-- > 0;) /* the first counts */
+        dots[m->slot_x + m->start_direct[k].position] = starts[m->start_direct[k].start] / m->start_direct[k].factor;
+    return m->n_start_unknowns > 0 ? start_system_tangent(c, starts) : RESULT_OK;
+}
+
 Result directional(Instance *c, const uint32_t *unknowns, size_t n_unknowns, const uint32_t *knowns, size_t n_knowns,
     const double *seed, double *result) {
     const Model *m = c->model;
@@ -72,9 +135,11 @@ Result directional(Instance *c, const uint32_t *unknowns, size_t n_unknowns, con
     int *order = c->work.order;
     if (check_unknowns(c, unknowns, n_unknowns) != RESULT_OK || check_knowns(c, knowns, n_knowns) != RESULT_OK)
         return RESULT_ERROR;
+    if (s->phase != PHASE_INITIALIZATION) {
+        memset(w->dots, 0, m->slot_results * sizeof(double));
+        seed_knowns(c, knowns, n_knowns, seed);
+    } else if (start_tangent(c, knowns, n_knowns, seed) != RESULT_OK) return RESULT_ERROR;
     if (factor_implicit(c, order) != RESULT_OK) return RESULT_ERROR;
-    memset(w->dots, 0, m->slot_results * sizeof(double));
-    for (size_t k = 0; k < n_knowns; k++) w->dots[known_slot(m, find_variable(m, knowns[k]))] += seed[k];
     tangent_of_implicit(c, order);
     evaluate(c, &m->tapes.rates, s->t, c->x, c->z, w->rhs);
     tape_tangent(&m->tapes.rates, w->slots, w->dots, w->rhs);
@@ -178,35 +243,6 @@ void slope_of_node(Instance *c, int node, int again, double *by_state) {
         evaluate(c, &m->tapes.variables, s->t, c->x, c->z, w->variables);
     }
     memcpy(by_state, w->dots + m->slot_x, m->n_x * sizeof(double));
-}
-
-/* Time derivative of a variable along the solution, with inputs on their straight lines. */
-Result output_rate(Instance *c, uint32_t reference, double *value) {
-    const Model *m = c->model;
-    const Variable *v = known_variable(c, reference, TYPE_FLOAT64);
-    Work *w = &c->work;
-    State *s = &c->state;
-    int *order = c->work.order;
-    if (v == NULL) return RESULT_ERROR;
-    if (v->kind != KIND_VARIABLE && v->kind != KIND_STATE)
-        return report(
-            c, LOG_ERROR, RESULT_ERROR, "%s has no time derivative: it is not a variable.", text_of(m, v->name));
-    if (factor_implicit(c, order) != RESULT_OK) return RESULT_ERROR;
-    evaluate(c, &m->tapes.rates, s->t, c->x, c->z, w->rhs);
-    if (v->kind == KIND_STATE) {
-        *value = w->rhs[v->index];
-        return RESULT_OK;
-    }
-    memset(w->dots, 0, m->slot_results * sizeof(double));
-    w->dots[0] = 1;
-    memcpy(w->dots + m->slot_x, w->rhs, m->n_x * sizeof(double));
-    memcpy(w->dots + m->slot_u, c->u_rate, m->n_u * sizeof(double));
-    tangent_of_implicit(c, order);
-    c->variables_valid = 0;
-    evaluate(c, &m->tapes.variables, s->t, c->x, c->z, w->variables);
-    tape_tangent(&m->tapes.variables, w->slots, w->dots, w->variables);
-    *value = w->variables[v->index];
-    return RESULT_OK;
 }
 
 /* States and inputs on which an unknown depends; returns their number, writes as many as there is room for. */

@@ -81,25 +81,25 @@ static void drop_balanced(Instance *c, unsigned char *wanting) {
             wanting[m->guard_transition[k]] = 0;
 }
 
-/* Move the states as little as possible, so that variables that follow from them take new values. */
-static void project(Instance *c, const int *targets, const double *values, int count) {
+/* Move the states as little as possible, so that variables that follow from them take new values, or vanish. */
+void move_states(Instance *c, const int *nodes, const double *values, int count) {
     const Model *m = c->model;
-    State *s = &c->state;
     double *slopes = c->work.square, *change = c->work.start_residual, *step = c->work.point;
-    evaluate(c, &m->tapes.variables, s->t, c->x, c->z, c->work.variables);
-    for (int k = 0; k < count; k++) change[k] = values[k] - c->work.variables[m->reset_nodes[targets[k]]];
-    for (int k = 0; k < count; k++) slope_of_node(c, m->reset_nodes[targets[k]], k > 0, slopes + (size_t)k * m->n_x);
+    evaluate(c, &m->tapes.variables, c->state.t, c->x, c->z, c->work.variables);
+    for (int k = 0; k < count; k++) change[k] = (values ? values[k] : 0) - c->work.variables[nodes[k]];
+    for (int k = 0; k < count; k++) slope_of_node(c, nodes[k], k > 0, slopes + (size_t)k * m->n_x);
     least_squares(count, m->n_x, slopes, change, step);
     for (int k = 0; k < m->n_x; k++) c->x[k] += step[k];
 }
 
 /* Tells that a mode changes. */
-void note_change(Instance *c, int name, int mode, int target) {
+void note_change(Instance *c, int name, int transition, int mode, int target) {
     const Model *m = c->model;
     const Mode *one = &m->modes[mode];
     const int *names = m->mode_names + one->first_name;
     double before = c->d[mode];
     c->state.n_events++;
+    if (c->noted != NULL) c->noted(c, transition, mode, target);
     if (before >= 0 && before < one->n_names && target >= 0 && target < one->n_names)
         report(c, LOG_EVENTS, RESULT_OK, "t = %.12g s: %s: %s -> %s", c->state.t, text_of(m, name),
             text_of(m, names[(int)before]), text_of(m, names[target]));
@@ -119,7 +119,7 @@ static void fire(Instance *c, const unsigned char *wanting, Impacts *impacts) {
         const Transition *one = &m->transitions[k];
         if (!wanting[k] || changed[one->mode]) continue;
         changed[one->mode] = 1;
-        note_change(c, one->name, one->mode, one->target);
+        note_change(c, one->name, k, one->mode, one->target);
         if (*text_of(m, one->notice))
             report(c, LOG_WARNING, RESULT_OK, "t = %.9g s: %s", s->t, text_of(m, one->notice));
         d[one->mode] = one->target;
@@ -130,13 +130,13 @@ static void fire(Instance *c, const unsigned char *wanting, Impacts *impacts) {
                 c->x[reset->index] = values[reset->value] / reset->factor;
             } else if (reset->kind == RESET_DISCRETE) d[reset->index] = values[reset->value];
             else {
-                w->targets[count] = reset->target;
+                w->targets[count] = m->reset_nodes[reset->target];
                 w->target_values[count++] = values[reset->value];
             }
         }
     }
     memcpy(c->d, d, (size_t)m->n_d * sizeof(double));
-    if (count > 0) project(c, w->targets, w->target_values, count);
+    if (count > 0) move_states(c, w->targets, w->target_values, count);
 }
 
 /* Notes an instant; an error where the last ones came ever faster. */
@@ -155,8 +155,7 @@ static Result share_anew(Instance *c, unsigned char *wanting) {
     const Model *m = c->model;
     State *s = &c->state;
     double *soon = c->work.guards;
-    if (m->n_circuits == 0) return RESULT_OK;
-    if (c->bounded && !anything_shared(c)) return RESULT_OK;
+    if (m->n_circuits == 0 || (c->bounded && !anything_shared(c))) return RESULT_OK;
     share(c);
     c->variables_valid = 0;
     if (solve_implicit(c, s->t, c->x, c->z, 0) != RESULT_OK) return RESULT_ERROR;
@@ -172,13 +171,12 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
     State *s = &c->state;
     Impacts *impacts = &c->work.impacts;
     double *before = c->work.d_before;
-    int rounds = ROUNDS + ALONE * m->n_holds;
     impacts->struck = 0;
     memset(impacts->entered, 0, (size_t)m->n_holds);
     if (find_wanting(c, wanting, !located)) {
         if (crowded(c) != RESULT_OK || share_anew(c, wanting) != RESULT_OK) return RESULT_ERROR;
     }
-    for (int round = 0; round < rounds; round++) {
+    for (int round = 0; round < ROUNDS + ALONE * m->n_holds; round++) {
         int any = 0;
         for (int k = 0; k < m->n_transitions; k++) {
             if (any && round >= TOGETHER) wanting[k] = 0;
@@ -189,6 +187,7 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
             s->at_event = 1; /* the rest comes at the beginning of the next step */
             return RESULT_OK;
         }
+        c->round = round;
         memcpy(before, c->d, (size_t)m->n_d * sizeof(double));
         fire(c, wanting, impacts);
         share(c);
@@ -201,5 +200,17 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
     }
     return report(c, LOG_ERROR, RESULT_ERROR,
         "Modes still switch after %d rounds at t = %.12g s. Give the switching a hysteresis, or smooth what drives it.",
-        rounds, s->t);
+        ROUNDS + ALONE * m->n_holds, s->t);
+}
+
+/* One event iteration for an importer's event mode. Where anything fired or was set, its solver must begin anew even if
+   no state jumped: rates do, and importers restart only when told that states have changed. */
+Result update_discrete(Instance *c, int *restart, double *next) {
+    double before = c->state.n_events;
+    *restart = c->state.inputs_changed;
+    c->state.inputs_changed = 0;
+    if (handle_event(c) != RESULT_OK) return RESULT_ERROR;
+    *restart |= c->state.n_events != before;
+    *next = next_moment(c);
+    return RESULT_OK;
 }

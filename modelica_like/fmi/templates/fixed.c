@@ -61,7 +61,7 @@ static Result go_on(Instance *c, double limit, int *fired) {
     *fired = 0;
     memcpy(first, c->x, m->n_x * sizeof(double));
     memcpy(first + m->n_x, c->z, m->n_z * sizeof(double));
-    if (!rosenbrock_step(c, begin, first, limit - begin, c->piece, &error))
+    if (!rosenbrock_step(c, begin, first, limit - begin, 0, c->piece, &error))
         return report(c, LOG_ERROR, RESULT_ERROR,
             "The step from t = %.12g s gives values that are not finite, or singular equations. Take smaller steps.",
             begin);

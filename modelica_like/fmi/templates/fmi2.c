@@ -99,19 +99,15 @@ fmi2Status fmi2EnterEventMode(fmi2Component component) {
 }
 
 fmi2Status fmi2NewDiscreteStates(fmi2Component component, fmi2EventInfo *eventInfo) {
-    double *before, next;
-    size_t size;
+    double next;
+    int restart;
     ENTER(fmi2NewDiscreteStates, PHASE_EVENT);
     NEED(eventInfo, 1);
-    before = c->work.x_before;
-    size = (size_t)c->model->n_x * sizeof(double);
-    memcpy(before, c->x, size);
-    if (handle_event(c) != RESULT_OK) return failed(c);
-    next = next_moment(c);
+    if (update_discrete(c, &restart, &next) != RESULT_OK) return failed(c);
     eventInfo->newDiscreteStatesNeeded = fmi2False;
     eventInfo->terminateSimulation = fmi2False;
     eventInfo->nominalsOfContinuousStatesChanged = fmi2False;
-    eventInfo->valuesOfContinuousStatesChanged = memcmp(before, c->x, size) != 0;
+    eventInfo->valuesOfContinuousStatesChanged = restart;
     eventInfo->nextEventTimeDefined = isfinite(next);
     eventInfo->nextEventTime = isfinite(next) ? next : 0;
     return fmi2OK;
@@ -205,8 +201,7 @@ fmi2Status fmi2GetRealOutputDerivatives(
     NEED(order, nvr);
     NEED(value, nvr);
     for (size_t k = 0; k < nvr; k++) {
-        if (order[k] != 1) return refuse(c, "Outputs have derivatives of order 1 only.");
-        if (output_rate(c, vr[k], &value[k]) != RESULT_OK) return fmi2Error;
+        if (output_rate(c, vr[k], order[k], &value[k]) != RESULT_OK) return fmi2Error;
     }
     return fmi2OK;
 }

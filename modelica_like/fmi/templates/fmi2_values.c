@@ -73,7 +73,7 @@ fmi2Status fmi2SetString(fmi2Component component, const fmi2ValueReference vr[],
 fmi2Status fmi2GetDirectionalDerivative(fmi2Component component, const fmi2ValueReference vUnknown_ref[],
     size_t nUnknown, const fmi2ValueReference vKnown_ref[], size_t nKnown, const fmi2Real dvKnown[],
     fmi2Real dvUnknown[]) {
-    ENTER(fmi2GetDirectionalDerivative, PHASE_EVENT | PHASE_CONTINUOUS | PHASE_STEP | PHASE_TERMINATED);
+    ENTER(fmi2GetDirectionalDerivative, READABLE);
     NEED(vUnknown_ref, nUnknown);
     NEED(dvUnknown, nUnknown);
     NEED(vKnown_ref, nKnown);

@@ -29,8 +29,8 @@ fmi3Instance fmi3InstantiateModelExchange(fmi3String instanceName, fmi3String in
 static double step_finished(Instance *c) {
     fmi3Boolean early = fmi3False;
     fmi3Float64 time = c->state.t;
-    ((fmi3IntermediateUpdateCallback)c->intermediate_update)(
-        c->environment, c->state.t, fmi3False, fmi3True, fmi3True, c->early_return_allowed != 0, &early, &time);
+    ((fmi3IntermediateUpdateCallback)c->intermediate_update)(c->environment, c->state.t, c->inputs_move != 0, fmi3True,
+        fmi3True, c->early_return_allowed != 0, &early, &time);
     return early && c->early_return_allowed && isfinite(time) ? time : INFINITY;
 }
 
@@ -41,8 +41,11 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String ins
     fmi3LogMessageCallback logMessage, fmi3IntermediateUpdateCallback intermediateUpdate) {
     Instance *c = fmi3InstantiateModelExchange(
         instanceName, instantiationToken, resourcePath, visible, loggingOn, instanceEnvironment, logMessage);
-    (void)requiredIntermediateVariables, (void)nRequiredIntermediateVariables;
     if (c == NULL) return NULL;
+    for (size_t k = 0; requiredIntermediateVariables != NULL && k < nRequiredIntermediateVariables; k++) {
+        const Variable *v = find_variable(c->model, requiredIntermediateVariables[k]);
+        c->inputs_move |= v != NULL && v->kind == KIND_INPUT;
+    }
     c->co_simulation = 1;
     c->event_mode_used = eventModeUsed;
     c->early_return_allowed = earlyReturnAllowed;
@@ -138,8 +141,8 @@ fmi3Status fmi3EvaluateDiscreteStates(fmi3Instance instance) {
 fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discreteStatesNeedUpdate,
     fmi3Boolean *terminateSimulation, fmi3Boolean *nominalsOfContinuousStatesChanged,
     fmi3Boolean *valuesOfContinuousStatesChanged, fmi3Boolean *nextEventTimeDefined, fmi3Float64 *nextEventTime) {
-    double *before, next;
-    size_t size;
+    double next;
+    int restart;
     ENTER(fmi3UpdateDiscreteStates, PHASE_EVENT);
     NEED(discreteStatesNeedUpdate, 1);
     NEED(terminateSimulation, 1);
@@ -147,13 +150,9 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discrete
     NEED(valuesOfContinuousStatesChanged, 1);
     NEED(nextEventTimeDefined, 1);
     NEED(nextEventTime, 1);
-    before = c->work.x_before;
-    size = (size_t)c->model->n_x * sizeof(double);
-    memcpy(before, c->x, size);
-    if (handle_event(c) != RESULT_OK) return failed(c);
-    next = next_moment(c);
+    if (update_discrete(c, &restart, &next) != RESULT_OK) return failed(c);
     *discreteStatesNeedUpdate = *terminateSimulation = *nominalsOfContinuousStatesChanged = fmi3False;
-    *valuesOfContinuousStatesChanged = memcmp(before, c->x, size) != 0;
+    *valuesOfContinuousStatesChanged = restart != 0;
     *nextEventTimeDefined = isfinite(next);
     *nextEventTime = isfinite(next) ? next : 0;
     return fmi3OK;
@@ -241,8 +240,7 @@ fmi3Status fmi3GetOutputDerivatives(fmi3Instance instance, const fmi3ValueRefere
     NEED(orders, nValues);
     NEED(values, nValues);
     for (size_t k = 0; k < nValues; k++) {
-        if (orders[k] != 1) return refuse(c, "Outputs have derivatives of order 1 only.");
-        if (output_rate(c, valueReferences[k], &values[k]) != RESULT_OK) return fmi3Error;
+        if (output_rate(c, valueReferences[k], orders[k], &values[k]) != RESULT_OK) return fmi3Error;
     }
     return fmi3OK;
 }

@@ -84,7 +84,7 @@ fmi3Status fmi3GetVariableDependencies(fmi3Instance instance, fmi3ValueReference
 fmi3Status fmi3GetDirectionalDerivative(fmi3Instance instance, const fmi3ValueReference unknowns[], size_t nUnknowns,
     const fmi3ValueReference knowns[], size_t nKnowns, const fmi3Float64 seed[], size_t nSeed,
     fmi3Float64 sensitivity[], size_t nSensitivity) {
-    ENTER(fmi3GetDirectionalDerivative, PHASE_EVENT | PHASE_CONTINUOUS | PHASE_STEP | PHASE_TERMINATED);
+    ENTER(fmi3GetDirectionalDerivative, READABLE);
     NEED_SIZE(nSeed, nKnowns, "seeds, one per known");
     NEED_SIZE(nSensitivity, nUnknowns, "sensitivities, one per unknown");
     NEED(unknowns, nUnknowns);

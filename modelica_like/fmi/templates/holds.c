@@ -8,13 +8,13 @@
 #define CANCELLED 1e-14 /* what is left of the largest numbers where they cancel */
 #define STIFF 1e5       /* reaction with which a motion that contradicts its being held counts, over the inertia */
 #define LARGE 1e3
-#define SPLITS 20 /* trials to find a split that all can bear */
+#define BEARABLE 0.99 /* part of its capacity that an element may bear in a split */
+#define SPLITS 20     /* trials to find a split that all can bear */
 #define TURNED 100.0
 
 void hold_terms(Instance *c, Terms *terms) {
-    const Model *m = c->model;
     State *s = &c->state;
-    evaluate(c, &m->tapes.hold_terms, s->t, c->x, c->z, (double *)terms);
+    evaluate(c, &c->model->tapes.hold_terms, s->t, c->x, c->z, (double *)terms);
 }
 
 /* Marks the motions that are held. */
@@ -246,7 +246,7 @@ void share(Instance *c) {
         worst = shared ? use_of(c, terms, use) : 0;
         if (worst < least || trial == 0) memcpy(best, c->d, (size_t)m->n_d * sizeof(double));
         if (worst < least) least = worst;
-        if (worst <= 1 || !isfinite(worst)) break;
+        if (worst <= BEARABLE || !isfinite(worst)) break;
         for (int k = 0; k < m->n_holds; k++)
             weights[k] = use[k] > 0 ? fmin(fmax(weights[k] * use[k], base[k] / TURNED), base[k] * TURNED) : base[k];
     }

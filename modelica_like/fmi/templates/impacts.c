@@ -9,9 +9,8 @@
 #define FELT 1e-9 /* change of a motion, relative to the largest one, from which on it is no rounding */
 
 static const double *motions(Instance *c) {
-    const Model *m = c->model;
     State *s = &c->state;
-    evaluate(c, &m->tapes.variables, s->t, c->x, c->z, c->work.variables);
+    evaluate(c, &c->model->tapes.variables, s->t, c->x, c->z, c->work.variables);
     return c->work.variables;
 }
 
@@ -112,8 +111,22 @@ static void mark_moved(Instance *c, Strike *strike, const Terms *terms) {
     }
 }
 
+/* Tells what the impact has cost. */
+static void book(Instance *c, const Strike *strike, int first) {
+    const Model *m = c->model;
+    const double *after = motions(c);
+    int any = 0;
+    for (int k = 0; k < m->n_holds; k++) {
+        double energy = 0.5 * (strike->before[k] + after[m->holds[k].motion]) * strike->impulse[k];
+        if (!strike->held[k] || strike->approach[k] == 0 || energy == 0) continue;
+        if (!any) c->struck(c, -1, 0, first);
+        c->struck(c, k, energy, 0);
+        any = 1;
+    }
+}
+
 /* Carries out the impact; `loose` then tells what was knocked loose, bounces, or was moved in passing. */
-static Result carry_out(Instance *c, Strike *strike) {
+static Result carry_out(Instance *c, Strike *strike, int first) {
     const Model *m = c->model;
     State *s = &c->state;
     Terms *terms = c->work.strike_terms;
@@ -136,6 +149,7 @@ static Result carry_out(Instance *c, Strike *strike) {
             c->x[one->state] = -terms[k].restitution * strike->before[k] / one->factor;
     }
     if (solve_implicit(c, s->t, c->x, c->z, 0) != RESULT_OK) return RESULT_ERROR;
+    if (strike->hard && c->struck != NULL) book(c, strike, first);
     if (strike->hard) mark_moved(c, strike, terms);
     return RESULT_OK;
 }
@@ -160,7 +174,7 @@ static void choose_again(Instance *c, const Strike *strike) {
         int mode = m->holds[k].mode, chosen = (int)c->d[mode];
         if (chosen == (int)d[mode]) continue;
         c->d[mode] = d[mode];
-        note_change(c, m->holds[k].name, mode, chosen);
+        note_change(c, m->holds[k].name, -1, mode, chosen);
         c->d[mode] = d[mode] = chosen;
     }
 }
@@ -172,7 +186,7 @@ static Result hold_again(Instance *c, const unsigned char *entered) {
     for (int k = 0; k < m->n_holds; k++) {
         const Held *one = &m->holds[k];
         if (!entered[k] || c->d[one->mode] == one->number) continue;
-        note_change(c, one->name, one->mode, one->number);
+        note_change(c, one->name, -1, one->mode, one->number);
         c->d[one->mode] = one->number;
     }
     share(c);
@@ -202,7 +216,7 @@ Result stop_motions(Instance *c, const double *before, Impacts *impacts) {
     State *s = &c->state;
     Strike *strike = &c->work.strike;
     Terms *terms = c->work.strike_terms;
-    int any = 0;
+    int any = 0, first = !impacts->struck;
     if (m->n_holds == 0) return RESULT_OK;
     memset(strike->loose, 0, (size_t)m->n_holds);
     hold_terms(c, terms);
@@ -221,7 +235,7 @@ Result stop_motions(Instance *c, const double *before, Impacts *impacts) {
         if (hold_again(c, impacts->entered) != RESULT_OK) return RESULT_ERROR;
         begin_strike(c, strike, terms);
     }
-    if (carry_out(c, strike) != RESULT_OK) return RESULT_ERROR;
+    if (carry_out(c, strike, first) != RESULT_OK) return RESULT_ERROR;
     for (int k = 0; k < m->n_holds; k++) impacts->entered[k] &= !strike->knocked[k];
     any = 0;
     for (int k = 0; k < m->n_holds; k++) any |= strike->loose[k];

@@ -67,110 +67,109 @@ Result allowed(Instance *c, const char *function, int phases) {
 
 static uint64_t larger(uint64_t a, uint64_t b) { return a > b ? a : b; }
 
-#define DOUBLES(array, n) {&(array), (uint64_t)(n)}
-#define INTEGERS(array, n) {&(array), ((uint64_t)(n) + 1) / 2}
-#define BYTES(array, n) {&(array), ((uint64_t)(n) + 7) / 8}
+typedef struct { /* arrays of one size: number and size of their elements */
+    uint64_t size, bytes;
+    void *arrays[8];
+} Room;
 
-/* Lays arrays out in one block, the numbers of the state first; with memory == NULL only measures it, in doubles. */
-static uint64_t lay_out(Instance *c, double *memory) {
+/* Lays arrays out one behind the other; with memory == NULL only measures them. Returns their size in doubles. */
+static uint64_t place(const Room *rooms, size_t count, double *memory) {
+    uint64_t used = 0;
+    for (size_t k = 0; k < count; k++)
+        for (void *const *array = rooms[k].arrays; *array != NULL; array++) {
+            double *first = memory == NULL ? NULL : memory + used;
+            memcpy(*array, &first, sizeof first);
+            used += (rooms[k].size * rooms[k].bytes + 7) / 8 + 1;
+        }
+    return used;
+}
+#define PLACE(rooms, memory) place(rooms, sizeof rooms / sizeof rooms[0], memory)
+
+static uint64_t place_state(Instance *c, double *memory) {
     const Model *m = c->model;
-    Work *w = &c->work;
-    uint64_t used = 0, n = (uint64_t)m->n_unknowns, n_x = (uint64_t)m->n_x, n_z = (uint64_t)m->n_z;
-    uint64_t small = larger(larger((uint64_t)m->n_guards, (uint64_t)m->n_moments),
-        larger(larger((uint64_t)m->n_start_modes, (uint64_t)m->n_d), (uint64_t)m->n_derived));
-    uint64_t steady = (uint64_t)m->n_steady + n_z, members = (uint64_t)m->most_members;
-    uint64_t resets = larger((uint64_t)m->n_resets, (uint64_t)m->n_reset_values);
+    uint64_t n = m->n_unknowns, n_d = m->n_d, n_starts = m->n_starts;
+    const Room rooms[] = {{m->n_x, 8, {&c->x}}, {m->n_z, 8, {&c->z}}, {m->n_p, 8, {&c->p}},
+        {m->n_u, 8, {&c->u, &c->u_rate}}, {n_d, 8, {&c->d}}, {n_d, 1, {&c->mode_given}},
+        {n_starts, 8, {&c->start_value}}, {n_starts, 1, {&c->start_given}}, {2 + 5 * n, 8, {&c->piece}},
+        {m->settings->fixed_step > 0 ? 2 * (uint64_t)m->n_guards : 0, 8, {&c->looks}},
+        {m->n_transitions, 1, {&c->wanting}}};
+    return PLACE(rooms, memory);
+}
+
+/* Operations, or outputs, of the first tapes that are specialised. */
+static uint64_t special_size(const Model *m, int count, int outputs) {
+    uint64_t size = 0;
+    for (int k = 0; k < count; k++)
+        size += (uint64_t)(outputs ? full_tape(m, k)->n_outputs : full_tape(m, k)->n_operations);
+    return size;
+}
+
+static void share_out_specials(Instance *c) {
+    for (int k = 0; k < N_SPECIALS; k++) {
+        Special *s = &c->work.special[k];
+        uint64_t before = special_size(c->model, k, 0);
+        s->runs = c->work.special_runs + before;
+        s->operands = c->work.special_operands + before;
+        s->outputs = c->work.special_outputs + special_size(c->model, k, 1);
+        s->first_known = c->model->n_slots + (int)before;
+    }
+}
+
+/* Tapes, equations and the integrator. */
+static uint64_t place_work(const Model *m, Work *w, double *memory) {
+    uint64_t n = m->n_unknowns, n_z = m->n_z, steady = m->n_steady + n_z;
+    uint64_t members = m->most_members, n_guards = m->n_guards, n_x = m->n_x;
+    uint64_t resets = larger(larger(m->n_resets, m->n_reset_values), m->n_holds);
+    uint64_t small = larger(larger(n_guards, m->n_moments), larger(larger(m->n_start_modes, m->n_d), m->n_derived));
+    uint64_t left = special_size(m, N_SPECIALS, 0);
     uint64_t square =
         larger(larger(m->settings->steady ? 2 * steady * steady : 0, resets * n_x), members * (n_x + 3 * members));
-    struct {
-        void *array;
-        uint64_t size;
-    } arrays[] = {
-        DOUBLES(c->x, n_x),
-        DOUBLES(c->z, n_z),
-        DOUBLES(c->p, m->n_p),
-        DOUBLES(c->u, m->n_u),
-        DOUBLES(c->d, m->n_d),
-        DOUBLES(c->u_rate, m->n_u),
-        DOUBLES(c->start_value, m->n_starts),
-        DOUBLES(c->piece, 2 + 5 * n),
-        DOUBLES(c->looks, m->settings->fixed_step > 0 ? 2 * (uint64_t)m->n_guards : 0),
-        BYTES(c->start_given, m->n_starts),
-        BYTES(c->mode_given, m->n_d),
-        BYTES(c->wanting, m->n_transitions),
-        DOUBLES(w->slots, m->n_slots),
-        DOUBLES(w->dots, m->n_slots),
-        DOUBLES(w->jacobian, larger((uint64_t)m->n_jacobian, (uint64_t)m->n_start_jacobian)),
-        DOUBLES(w->matrix, m->step.n_nonzeros),
-        DOUBLES(w->qr_v, larger((uint64_t)m->step.n_v, (uint64_t)m->start.n_v)),
-        DOUBLES(w->qr_r, larger((uint64_t)m->step.n_r, (uint64_t)m->start.n_r)),
-        DOUBLES(w->qr_beta, larger(n, (uint64_t)m->start.size)),
-        DOUBLES(w->qr_work, larger(n, (uint64_t)m->start.size)),
-        DOUBLES(w->stages, 9 * n),
-        DOUBLES(w->point, n),
-        DOUBLES(w->variables, m->n_nodes),
-        DOUBLES(w->guards, small),
-        DOUBLES(w->guards_before, 9 * (uint64_t)m->n_guards),
-        DOUBLES(w->rhs, larger(n, (uint64_t)m->n_determinants)),
-        DOUBLES(w->dense_matrix, n_z * n_z),
-        DOUBLES(w->square, square),
-        DOUBLES(w->vector, n + n_z),
-        DOUBLES(w->residual, n_z),
-        DOUBLES(w->start_unknowns, m->n_start_unknowns),
-        DOUBLES(w->start_values, m->n_starts),
-        DOUBLES(w->start_residual, larger((uint64_t)m->n_start_values, resets)),
-        INTEGERS(w->order, n_z),
-        BYTES(w->known, n_x),
-        BYTES(w->decided, m->n_d),
-        BYTES(w->wanting, m->n_transitions),
-        DOUBLES(w->d_before, m->n_d),
-        DOUBLES(w->x_before, n_x),
-        DOUBLES(w->d_fired, m->n_d),
-        DOUBLES(w->reset_values, resets),
-        DOUBLES(w->target_values, resets),
-        INTEGERS(w->targets, resets),
-        BYTES(w->changed, m->n_modes),
-        DOUBLES(w->first, n),
-        DOUBLES(w->whole, 2 + 5 * n),
-        BYTES(w->kinds, m->n_guards),
-        DOUBLES(w->terms, 4 * (uint64_t)m->n_holds),
-        DOUBLES(w->strike_terms, 4 * (uint64_t)m->n_holds),
-        BYTES(w->held, m->n_holds),
-        BYTES(w->other, members),
-        DOUBLES(w->weights, m->n_holds),
-        DOUBLES(w->base_weights, m->n_holds),
-        DOUBLES(w->use, m->n_holds),
-        DOUBLES(w->best, m->n_d),
-        DOUBLES(w->kept_z, n_z),
-        DOUBLES(w->reactions, members),
-        DOUBLES(w->sizes, members),
-        DOUBLES(w->zeros, members),
-        INTEGERS(w->places, members + 1),
-        INTEGERS(w->member, members + 1),
-        INTEGERS(w->pivots, members),
-        DOUBLES(w->strike.before, m->n_holds),
-        DOUBLES(w->strike.approach, m->n_holds),
-        DOUBLES(w->strike.impulse, m->n_holds),
-        DOUBLES(w->strike.reaction, m->n_holds),
-        BYTES(w->strike.entering, m->n_holds),
-        BYTES(w->strike.loose, m->n_holds),
-        BYTES(w->strike.held, m->n_holds),
-        BYTES(w->strike.knocked, m->n_holds),
-        DOUBLES(w->strike.jump, n_x),
-        DOUBLES(w->impacts.x, n_x),
-        BYTES(w->impacts.entered, m->n_holds),
-        DOUBLES(w->respond_d, m->n_d),
-        DOUBLES(w->respond_z, n_z),
-        DOUBLES(w->rates, n_x),
-        DOUBLES(w->x_kept, n_x),
-    };
-    for (size_t k = 0; k < sizeof arrays / sizeof arrays[0]; k++) {
-        double *place = memory == NULL ? NULL : memory + used;
-        memcpy(arrays[k].array, &place, sizeof place);
-        used += arrays[k].size + 1;
-        if (arrays[k].array == (void *)&c->wanting) c->n_numbers = (size_t)used;
-    }
-    return used;
+    const Room rooms[] = {{m->n_slots + left, 8, {&w->slots}}, {3 * (uint64_t)m->n_slots, 8, {&w->dots}},
+        {larger(m->n_jacobian, m->n_start_jacobian), 8, {&w->jacobian}}, {m->step.n_nonzeros, 8, {&w->matrix}},
+        {larger(m->step.n_v, m->start.n_v), 8, {&w->qr_v}}, {larger(m->step.n_r, m->start.n_r), 8, {&w->qr_r}},
+        {larger(n, m->start.size), 8, {&w->qr_beta, &w->qr_work, &w->start_unknowns}}, {9 * n, 8, {&w->stages}},
+        {2 + 5 * n, 8, {&w->whole}}, {n, 8, {&w->point, &w->first}}, {n + n_z, 8, {&w->vector}},
+        {larger(n, m->n_determinants), 8, {&w->rhs}}, {m->n_nodes, 8, {&w->variables}}, {small, 8, {&w->guards}},
+        {3 * n_guards * MOST_LOOKS, 8, {&w->guards_before}}, {n_guards, 1, {&w->kinds}},
+        {n_z * n_z, 8, {&w->dense_matrix}}, {n_z, 8, {&w->residual, &w->kept_z, &w->respond_z}},
+        {n_z, sizeof(int), {&w->order}}, {square, 8, {&w->square}}, {m->n_starts, 8, {&w->start_values}},
+        {larger(m->n_start_values, resets), 8, {&w->start_residual}},
+        {resets, 8, {&w->reset_values, &w->target_values}}, {resets, sizeof(int), {&w->targets}},
+        {n_x, 8, {&w->seen_rates}}, {n, 8, {&w->first_rates}}, {n_guards, 8, {&w->seen_indicators}},
+        {m->n_derived, 8, {&w->seen_derived}}, {m->n_slots, sizeof(int), {&w->same, &w->places_of_slots}},
+        {m->n_slots, 1, {&w->known_slots, &w->needed_slots}}, {m->n_nodes, 1, {&w->asked}},
+        {left, sizeof(Run), {&w->special_runs}}, {left, sizeof(Operands), {&w->special_operands}},
+        {special_size(m, N_SPECIALS, 1), sizeof(int), {&w->special_outputs}}};
+    return PLACE(rooms, memory);
+}
+
+/* Events, and what modes hold. */
+static uint64_t place_events(const Model *m, Work *w, double *memory) {
+    uint64_t n_x = m->n_x, n_d = m->n_d, n_holds = m->n_holds;
+    uint64_t members = m->most_members + 1;
+    const Room rooms[] = {{n_x, 8, {&w->strike.jump, &w->impacts.x, &w->rates, &w->x_kept}}, {n_x, 1, {&w->known}},
+        {n_d, 8, {&w->d_before, &w->d_fired, &w->best, &w->respond_d}}, {n_d, 1, {&w->decided, &w->changed}},
+        {m->n_transitions, 1, {&w->wanting}}, {n_holds, sizeof(Terms), {&w->terms, &w->strike_terms}},
+        {n_holds, 8, {&w->weights, &w->base_weights, &w->use, &w->strike.before, &w->strike.approach}},
+        {n_holds, 8, {&w->strike.impulse, &w->strike.reaction, &w->begun}}, {n_holds, sizeof(int), {&w->standing}},
+        {n_holds, 1, {&w->held, &w->impacts.entered}},
+        {n_holds, 1, {&w->strike.entering, &w->strike.loose, &w->strike.held, &w->strike.knocked}},
+        {members, 8, {&w->reactions, &w->sizes, &w->zeros}},
+        {members, sizeof(int), {&w->places, &w->member, &w->pivots}}, {members, 1, {&w->other}}};
+    return PLACE(rooms, memory);
+}
+
+/* Lays out everything in one block, the state first; with memory == NULL only measures it. */
+static uint64_t lay_out(Instance *c, double *memory) {
+    uint64_t used = place_state(c, memory);
+    c->n_numbers = (size_t)used;
+    used += place_work(c->model, &c->work, memory == NULL ? NULL : memory + used);
+    return used + place_events(c->model, &c->work, memory == NULL ? NULL : memory + used);
+}
+
+static void set_tolerance(State *s, const Model *m, double relative) {
+    s->tolerance = relative;
+    s->absolute = relative * m->settings->absolute_to_relative;
 }
 
 void instance_reset(Instance *c) {
@@ -178,8 +177,8 @@ void instance_reset(Instance *c) {
     memset(s, 0, sizeof *s);
     memset(c->numbers, 0, c->n_numbers * sizeof(double));
     s->phase = PHASE_INSTANTIATED;
-    s->tolerance = c->model->settings->default_tolerance;
-    c->variables_valid = 0;
+    set_tolerance(s, c->model, c->model->settings->default_tolerance);
+    c->variables_valid = c->look_valid = 0;
     start_defaults(c);
 }
 
@@ -200,6 +199,7 @@ static Instance *instance_make(const Instance *bare) {
     }
     memcpy(c->name, bare->name, length + 1);
     lay_out(c, c->numbers);
+    share_out_specials(c);
     memcpy(c->work.slots + m->slot_constants, m->constants, (size_t)m->n_constants * sizeof(double));
     instance_reset(c);
     return c;
@@ -268,7 +268,7 @@ Result set_experiment(
             "The start time %g s must be finite and not after the stop time %g s.", start, stop);
     if (tolerance_defined && !(tolerance > 0 && tolerance < 1))
         return report(c, LOG_ERROR, RESULT_ERROR, "The tolerance must be between 0 and 1, not %g.", tolerance);
-    if (tolerance_defined) s->tolerance = tolerance;
+    if (tolerance_defined) set_tolerance(s, c->model, tolerance);
     s->t = s->start_time = s->u_time = start;
     s->stop_time_defined = stop_defined && isfinite(stop);
     s->stop_time = s->stop_time_defined ? stop : 0;
@@ -309,7 +309,7 @@ Result state_copy_out(Instance *c, void **copy) {
 Result state_copy_in(Instance *c, const void *copy) {
     memcpy(&c->state, copy, sizeof(State));
     memcpy(c->numbers, (const char *)copy + sizeof(State), c->n_numbers * sizeof(double));
-    c->variables_valid = 0;
+    c->variables_valid = c->look_valid = 0;
     return RESULT_OK;
 }
 

@@ -26,14 +26,14 @@ static void clear_pending(Instance *c) {
 }
 
 void leave_piece(Instance *c) {
-    c->state.piece_valid = c->state.looked = 0;
+    c->state.piece_valid = c->state.looked = c->look_valid = 0;
     clear_pending(c);
 }
 
 static int look_at(Instance *c, double t, double *point, Look *look) {
     const Model *m = c->model;
     if (solve_implicit(c, t, point, point + m->n_x, 1) != RESULT_OK) return 0;
-    evaluate(c, &m->tapes.guards, t, point, point + m->n_x, look->values);
+    evaluate_special(c, SPECIAL_GUARDS, t, point, point + m->n_x, look->values);
     look->t = t;
     look->rates = look->values + m->n_guards;
     for (int g = 0; g < m->n_guards; g++) {
@@ -82,10 +82,9 @@ double cubic_guess(double g0, double r0, double g1, double r1) {
 enum { QUIET, CROSSING, HUMP };
 
 static int find_candidates(const Instance *c, const Look *before, const Look *after, unsigned char *kinds) {
-    const Model *m = c->model;
     double h = after->t - before->t;
     int any = 0;
-    for (int g = 0; g < m->n_guards; g++) {
+    for (int g = 0; g < c->model->n_guards; g++) {
         double g0 = before->values[g], g1 = after->values[g];
         kinds[g] = QUIET;
         if (!guard_active(c, g) || g0 > 0) continue;
@@ -105,7 +104,7 @@ static int trial(Instance *c, const Piece *whole, double t, Piece *piece, Look *
         piece->end = t;
         memcpy(last_of(m, piece), whole->points, (size_t)m->n_unknowns * sizeof(double));
     } else {
-        if (!rosenbrock_step(c, whole->begin, whole->points, t - whole->begin, piece, &ignored)) return 0;
+        if (!rosenbrock_step(c, whole->begin, whole->points, t - whole->begin, 1, piece, &ignored)) return 0;
         piece->end = t;
     }
     return look_at(c, t, last_of(m, piece), look);
@@ -268,7 +267,7 @@ static Result take_step(Instance *c, double limit) {
         if (cut) h = limit - s->t;
         clear_pending(c);
         if (h < least || !isfinite(h)) break;
-        if (!rosenbrock_step(c, s->t, first, h, c->piece, &error) || !isfinite(error)) error = 1e30;
+        if (!rosenbrock_step(c, s->t, first, h, rejected > 0, c->piece, &error) || !isfinite(error)) error = 1e30;
         if (cut) c->piece->end = limit;
         factor = 0.9 * pow(fmax(error, 1e-10), -0.2);
         if (error > 1) {
@@ -330,11 +329,10 @@ Result take_changes(Instance *c, int *event) {
 
 /* Fires what was located at the present point, or what wants to fire. */
 Result handle_event(Instance *c) {
-    const Model *m = c->model;
     State *s = &c->state;
     unsigned char *wanting = nothing_wanting(c);
     int located = s->event_pending;
-    if (located) memcpy(wanting, c->wanting, m->n_transitions);
+    if (located) memcpy(wanting, c->wanting, c->model->n_transitions);
     leave_piece(c);
     s->at_event = 0;
     s->step = 0;
@@ -344,10 +342,7 @@ Result handle_event(Instance *c) {
     return RESULT_OK;
 }
 
-int is_due(Instance *c) {
-    const Model *m = c->model;
-    return m->n_moments > 0 && find_wanting(c, nothing_wanting(c), 0);
-}
+int is_due(Instance *c) { return c->model->n_moments > 0 && find_wanting(c, nothing_wanting(c), 0); }
 
 /* Checks what the importer asks for and says where the step ends. */
 Result check_step(Instance *c, double point, double size, double *target) {
@@ -373,23 +368,25 @@ Result check_step(Instance *c, double point, double size, double *target) {
     return RESULT_OK;
 }
 
-/* Goes to `target`, or to the first event before it. */
+/* Goes to `target`, or to the first event before it; inputs may also move where an internal step has ended. */
 Arrival integrate_to(Instance *c, double target, int stop_at_events) {
     State *s = &c->state;
-    int held = s->inputs_changed, event;
+    int held = 0, event;
     if (c->model->settings->fixed_step > 0) return step_fixed(c, target);
     if (s->at_event && handle_event(c) != RESULT_OK) return FAILED;
-    if (take_changes(c, &event) != RESULT_OK) return FAILED;
-    if (event) {
-        s->at_event = 1;
-        if (stop_at_events) return AT_EVENT;
-        if (handle_event(c) != RESULT_OK) return FAILED;
-    }
-    while (s->t < target) {
+    for (;;) {
+        held |= s->inputs_changed;
+        if (take_changes(c, &event) != RESULT_OK) return FAILED;
+        if (event) {
+            s->at_event = 1;
+            if (stop_at_events) return AT_EVENT;
+            if (handle_event(c) != RESULT_OK) return FAILED;
+        }
+        if (!(s->t < target)) return REACHED;
         if (!s->piece_valid && target - s->t < least_step(s)) {
             /* An event was located a rounding error before the target. */
             s->t = target;
-            break;
+            return REACHED;
         }
         if (!s->piece_valid) {
             double limit = s->stop_time_defined && s->stop_time >= target ? s->stop_time : INFINITY;
@@ -407,5 +404,4 @@ Arrival integrate_to(Instance *c, double target, int stop_at_events) {
         }
         if (c->step_finished != NULL) target = fmin(target, fmax(c->step_finished(c), s->t));
     }
-    return REACHED;
 }

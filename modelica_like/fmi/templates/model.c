@@ -2,7 +2,7 @@
  * stands in a file, nothing is read or written outside of the tables. */
 #include <stdio.h>
 #include <string.h>
-#include "core.h"
+#include "model.h"
 
 #define FORMAT 1
 #define LONGEST 0x10000000 /* slots, so that their sums stay integers */
@@ -29,64 +29,20 @@ typedef struct {
 static const struct {
     const char *name;
     size_t record, table, count;
-} tables[] = {
-    TABLE(settings, n_settings),
-    TABLE(text, n_text),
-    TABLE(token, n_token),
-    TABLE(constants, n_constants),
-    TABLE(parameters, n_p),
-    TABLE(parameter_min, n_p),
-    TABLE(parameter_max, n_p),
-    TABLE(inputs, n_u),
-    TABLE(guesses, n_x),
-    TABLE(z_guesses, n_z),
-    TABLE(nominals, n_x),
-    TABLE(state_names, n_x),
-    TABLE(implicit_names, n_z),
-    TABLE(singular_names, n_determinants),
-    TABLE(variables, n_variables),
-    TABLE(transitions, n_transitions),
-    TABLE(guard_transition, n_guards),
-    TABLE(resets, n_resets),
-    TABLE(reset_nodes, n_reset_nodes),
-    TABLE(modes, n_modes),
-    TABLE(mode_names, n_mode_names),
-    TABLE(holds, n_holds),
-    TABLE(circuits, n_circuits),
-    TABLE(members, n_members),
-    TABLE(units, n_units),
-    TABLE(start_modes, n_start_modes),
-    TABLE(start_direct, n_start_direct),
-    TABLE(start_default, n_start_default),
-    TABLE(start_x_guess, n_start_x_guess),
-    TABLE(start_z_guess, n_start_z_guess),
-    TABLE(start_rows, n_start_unknowns),
-    TABLE(start_dependent, n_start_dependent),
-    TABLE(start_zero, n_start_zero),
-    TABLE(start_columns, n_start_unknowns),
-    TABLE(steady_states, n_steady),
-    TABLE(jacobian_to_step, n_jacobian),
-    TABLE(step_diagonal, n_x),
-    QR(step),
-    QR(start),
-    TAPE(rates),
-    TAPE(jacobian),
-    TAPE(alg),
-    TAPE(alg_jacobian),
-    TAPE(variables),
-    TAPE(guards),
-    TAPE(guards_soon),
-    TAPE(moments),
-    TAPE(resets),
-    TAPE(start_conditions),
-    TAPE(start_values),
-    TAPE(discrete_starts),
-    TAPE(hold_terms),
-    TAPE(determinants),
-    TAPE(start_system),
-    TAPE(start_jacobian),
-    TAPE(derived),
-};
+} tables[] = {TABLE(settings, n_settings), TABLE(text, n_text), TABLE(token, n_token), TABLE(constants, n_constants),
+    TABLE(parameters, n_p), TABLE(parameter_min, n_p), TABLE(parameter_max, n_p), TABLE(inputs, n_u),
+    TABLE(guesses, n_x), TABLE(z_guesses, n_z), TABLE(nominals, n_x), TABLE(state_names, n_x),
+    TABLE(implicit_names, n_z), TABLE(singular_names, n_determinants), TABLE(variables, n_variables),
+    TABLE(transitions, n_transitions), TABLE(guard_transition, n_guards), TABLE(resets, n_resets),
+    TABLE(reset_nodes, n_reset_nodes), TABLE(modes, n_modes), TABLE(mode_names, n_mode_names), TABLE(holds, n_holds),
+    TABLE(circuits, n_circuits), TABLE(members, n_members), TABLE(units, n_units), TABLE(start_modes, n_start_modes),
+    TABLE(start_direct, n_start_direct), TABLE(start_default, n_start_default), TABLE(start_x_guess, n_start_x_guess),
+    TABLE(start_z_guess, n_start_z_guess), TABLE(start_rows, n_start_unknowns),
+    TABLE(start_dependent, n_start_dependent), TABLE(start_zero, n_start_zero), TABLE(start_columns, n_start_unknowns),
+    TABLE(steady_states, n_steady), TABLE(jacobian_to_step, n_jacobian), TABLE(step_diagonal, n_x), QR(step), QR(start),
+    TAPE(rates), TAPE(jacobian), TAPE(alg), TAPE(alg_jacobian), TAPE(variables), TAPE(guards), TAPE(guards_soon),
+    TAPE(moments), TAPE(resets), TAPE(start_conditions), TAPE(start_values), TAPE(discrete_starts), TAPE(hold_terms),
+    TAPE(determinants), TAPE(start_system), TAPE(start_jacobian), TAPE(derived)};
 enum { N_TABLES = sizeof tables / sizeof tables[0] };
 
 /* As zlib has it, by four bits at a time. */
@@ -196,10 +152,8 @@ static int check_sizes(const Model *m, char *message) {
     const struct {
         const char *name;
         int64_t found, wanted;
-    } sizes[] = {
-        {"rates", m->tapes.rates.n_outputs, m->n_unknowns},
-        {"jacobian", m->tapes.jacobian.n_outputs, m->n_jacobian},
-        {"alg", m->tapes.alg.n_outputs, n_z},
+    } sizes[] = {{"rates", m->tapes.rates.n_outputs, m->n_unknowns},
+        {"jacobian", m->tapes.jacobian.n_outputs, m->n_jacobian}, {"alg", m->tapes.alg.n_outputs, n_z},
         {"alg_jacobian", m->tapes.alg_jacobian.n_outputs, n_z * n_z},
         {"guards", m->tapes.guards.n_outputs, 2 * (int64_t)m->n_guards},
         {"guards_soon", m->tapes.guards_soon.n_outputs, m->n_guards},
@@ -208,10 +162,8 @@ static int check_sizes(const Model *m, char *message) {
         {"hold_terms", m->tapes.hold_terms.n_outputs, 4 * (int64_t)m->n_holds},
         {"determinants", m->tapes.determinants.n_outputs, m->n_determinants},
         {"start_jacobian", m->tapes.start_jacobian.n_outputs, m->start.n_nonzeros},
-        {"step", m->step.size, m->n_unknowns},
-        {"start", m->start.size, m->n_start_unknowns},
-        {"units", m->n_units, m->n_holds > 0 ? m->n_nodes : 0},
-    };
+        {"step", m->step.size, m->n_unknowns}, {"start", m->start.size, m->n_start_unknowns},
+        {"units", m->n_units, m->n_holds > 0 ? m->n_nodes : 0}};
     for (size_t k = 0; k < sizeof sizes / sizeof sizes[0]; k++)
         if (sizes[k].found != sizes[k].wanted) return damaged(message, sizes[k].name);
     return m->n_modes <= m->n_d || damaged(message, "modes");

@@ -1,7 +1,7 @@
 /* Checks the tables of a model: every index is one of the table that it points into. */
 #include <stdio.h>
 #include <string.h>
-#include "core.h"
+#include "model.h"
 
 /* Tells that a file is no model; returns 0. */
 int damaged(char *message, const char *what) {
@@ -31,28 +31,20 @@ static int check_ranges(const Range *ranges, size_t count, char *message) {
 }
 
 static int check_events(const Model *m, char *message) {
-    const Range ranges[] = {
-        ARRAY(mode_names, m->n_mode_names, m->n_text),
+    const Range ranges[] = {ARRAY(mode_names, m->n_mode_names, m->n_text),
         COLUMN(modes, first_name, m->n_modes, 0, m->n_mode_names + 1),
         COLUMN(modes, n_names, m->n_modes, 0, m->n_mode_names + 1),
         COLUMN(transitions, mode, m->n_transitions, 0, m->n_modes),
         COLUMN(transitions, name, m->n_transitions, 0, m->n_text),
         COLUMN(transitions, notice, m->n_transitions, 0, m->n_text),
-        ARRAY(guard_transition, m->n_guards, m->n_transitions),
-        ARRAY(reset_nodes, m->n_reset_nodes, m->n_nodes),
-        COLUMN(resets, kind, m->n_resets, 0, N_RESET_KINDS),
-        COLUMN(resets, value, m->n_resets, 0, m->n_reset_values),
-        COLUMN(holds, mode, m->n_holds, 0, m->n_modes),
-        COLUMN(holds, motion, m->n_holds, 0, m->n_nodes),
-        COLUMN(holds, state, m->n_holds, -1, m->n_x),
-        COLUMN(holds, reaction, m->n_holds, -1, m->n_nodes),
-        COLUMN(holds, approach, m->n_holds, 0, m->n_d),
-        COLUMN(holds, name, m->n_holds, 0, m->n_text),
-        ARRAY(members, m->n_members, m->n_holds),
-        COLUMN(circuits, first_member, m->n_circuits, 0, m->n_members + 1),
+        ARRAY(guard_transition, m->n_guards, m->n_transitions), ARRAY(reset_nodes, m->n_reset_nodes, m->n_nodes),
+        COLUMN(resets, kind, m->n_resets, 0, N_RESET_KINDS), COLUMN(resets, value, m->n_resets, 0, m->n_reset_values),
+        COLUMN(holds, mode, m->n_holds, 0, m->n_modes), COLUMN(holds, motion, m->n_holds, 0, m->n_nodes),
+        COLUMN(holds, state, m->n_holds, -1, m->n_x), COLUMN(holds, reaction, m->n_holds, -1, m->n_nodes),
+        COLUMN(holds, approach, m->n_holds, 0, m->n_d), COLUMN(holds, name, m->n_holds, 0, m->n_text),
+        ARRAY(members, m->n_members, m->n_holds), COLUMN(circuits, first_member, m->n_circuits, 0, m->n_members + 1),
         COLUMN(circuits, n_members, m->n_circuits, 0, m->n_members + 1),
-        COLUMN(circuits, first, m->n_circuits, 0, m->n_d + 1),
-    };
+        COLUMN(circuits, first, m->n_circuits, 0, m->n_d + 1)};
     if (!check_ranges(ranges, sizeof ranges / sizeof ranges[0], message)) return 0;
     for (int k = 0; k < m->n_modes; k++)
         if (m->modes[k].n_names > m->n_mode_names - m->modes[k].first_name) return damaged(message, "modes.n_names");
@@ -78,8 +70,7 @@ static int check_events(const Model *m, char *message) {
 }
 
 static int check_starts(const Model *m, char *message) {
-    const Range ranges[] = {
-        COLUMN(start_modes, mode, m->n_start_modes, 0, m->n_modes),
+    const Range ranges[] = {COLUMN(start_modes, mode, m->n_start_modes, 0, m->n_modes),
         COLUMN(start_direct, position, m->n_start_direct, 0, m->n_x),
         COLUMN(start_direct, start, m->n_start_direct, 0, m->n_starts),
         COLUMN(start_default, position, m->n_start_default, 0, m->n_x),
@@ -91,27 +82,18 @@ static int check_starts(const Model *m, char *message) {
         COLUMN(start_rows, start, m->n_start_unknowns, -1, m->n_starts),
         COLUMN(start_rows, row, m->n_start_unknowns, 0, m->n_start_values),
         COLUMN(start_dependent, start, m->n_start_dependent, 0, m->n_starts),
-        COLUMN(start_dependent, node, m->n_start_dependent, 0, m->n_nodes),
-        ARRAY(start_zero, m->n_start_zero, m->n_x),
-        ARRAY(start_columns, m->n_start_unknowns, m->n_unknowns + m->n_y),
-        ARRAY(steady_states, m->n_steady, m->n_x),
-        ARRAY(jacobian_to_step, m->n_jacobian, m->step.n_nonzeros),
-        ARRAY(step_diagonal, m->n_x, m->step.n_nonzeros),
-    };
+        COLUMN(start_dependent, node, m->n_start_dependent, 0, m->n_nodes), ARRAY(start_zero, m->n_start_zero, m->n_x),
+        ARRAY(start_columns, m->n_start_unknowns, m->n_unknowns + m->n_y), ARRAY(steady_states, m->n_steady, m->n_x),
+        ARRAY(jacobian_to_step, m->n_jacobian, m->step.n_nonzeros), ARRAY(step_diagonal, m->n_x, m->step.n_nonzeros)};
     return check_ranges(ranges, sizeof ranges / sizeof ranges[0], message);
 }
 
 static int check_variables(const Model *m, char *message) {
     const int ends[N_KINDS] = {
         1, m->n_x, m->n_x, m->n_nodes, m->n_p, m->n_derived, m->n_u, m->n_modes, m->n_guards}; /* as Kind */
-    const Range ranges[] = {
-        ARRAY(state_names, m->n_x, m->n_text),
-        ARRAY(implicit_names, m->n_z, m->n_text),
-        ARRAY(singular_names, m->n_determinants, m->n_text),
-        COLUMN(variables, kind, m->n_variables, 0, N_KINDS),
-        COLUMN(variables, type, m->n_variables, 0, N_TYPES),
-        COLUMN(variables, name, m->n_variables, 0, m->n_text),
-    };
+    const Range ranges[] = {ARRAY(state_names, m->n_x, m->n_text), ARRAY(implicit_names, m->n_z, m->n_text),
+        ARRAY(singular_names, m->n_determinants, m->n_text), COLUMN(variables, kind, m->n_variables, 0, N_KINDS),
+        COLUMN(variables, type, m->n_variables, 0, N_TYPES), COLUMN(variables, name, m->n_variables, 0, m->n_text)};
     /* Texts end at the latest where their section ends. */
     if (m->n_text == 0 || m->text[m->n_text - 1] != 0) return damaged(message, "text");
     if (m->n_token == 0 || m->token[m->n_token - 1] != 0) return damaged(message, "token");

@@ -2,7 +2,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include "core.h"
+#include "model.h"
 
 #define NAME "model.bin"
 #define LONGEST_PATH 4096

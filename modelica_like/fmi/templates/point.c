@@ -4,20 +4,24 @@
 #include "core.h"
 
 #define MAX_NEWTON 50
-#define SOLVED 1e-8      /* of the residual before an iteration: they are piecewise linear, and solved */
 #define BOUNDED_NEWTON 3 /* iterations where the work is bounded; the next step takes up what they leave */
+#define SOLVED 1e-8      /* of the residual before an iteration: they are piecewise linear, and solved */
 
 double input_at(const Instance *c, int k, double t) { return c->u[k] + c->u_rate[k] * (t - c->state.u_time); }
 
-static inline void load(Instance *c, double t, const double *x, const double *z) {
+void load(Instance *c, double t, const double *x, const double *z) {
     const Model *m = c->model;
     double *slots = c->work.slots;
     slots[0] = t;
     memcpy(slots + m->slot_x, x, m->n_x * sizeof(double));
     memcpy(slots + m->slot_z, z, m->n_z * sizeof(double));
-    memcpy(slots + m->slot_p, c->p, m->n_p * sizeof(double));
     for (int k = 0; k < m->n_u; k++) slots[m->slot_u + k] = input_at(c, k, t);
-    memcpy(slots + m->slot_d, c->d, m->n_d * sizeof(double));
+    if (memcmp(slots + m->slot_p, c->p, (size_t)m->n_p * sizeof(double)) == 0 &&
+        memcmp(slots + m->slot_d, c->d, (size_t)m->n_d * sizeof(double)) == 0)
+        return;
+    memcpy(slots + m->slot_p, c->p, (size_t)m->n_p * sizeof(double));
+    memcpy(slots + m->slot_d, c->d, (size_t)m->n_d * sizeof(double));
+    c->work.decided_by++;
 }
 
 void evaluate(Instance *c, const Tape *tape, double t, const double *x, const double *z, double *outputs) {
@@ -44,10 +48,10 @@ Result solve_implicit(Instance *c, double t, const double *x, double *z, int qui
     int *order = c->work.order, rounds = !c->bounded ? MAX_NEWTON : m->settings->implicit_linear ? 1 : BOUNDED_NEWTON;
     if (m->n_z == 0) return RESULT_OK;
     for (int round = 0; round < rounds; round++) {
-        evaluate(c, &m->tapes.alg, t, x, z, step);
+        evaluate_special(c, SPECIAL_ALG, t, x, z, step);
         if (c->bounded && round > 0 && largest_of(m->n_z, step) <= SOLVED * residual) return RESULT_OK;
         residual = largest_of(m->n_z, step);
-        tape_run(&m->tapes.alg_jacobian, c->work.slots, matrix);
+        run_special(c, SPECIAL_ALG_JACOBIAN, matrix);
         for (int k = 0; k < m->n_z; k++)
             if (!isfinite(step[k])) return quiet ? RESULT_ERROR : singular(c, t, text_of(m, m->implicit_names[k]));
         if (!lu_factor(m->n_z, matrix, order))

@@ -46,20 +46,20 @@ static const double DENSE[3][STAGES] = {
 };
 
 /* The right hand side, its partial derivatives by time, with inputs on their straight lines, and its Jacobian. */
-static void linearize(Instance *c, double t, const double *y, double *rates, double *slope) {
+static void linearize(Instance *c, double t, const double *y, double *slope) {
     const Model *m = c->model;
     Work *w = &c->work;
     int moving = m->settings->rates_depend_on_time;
     for (int k = 0; k < m->n_u; k++) moving |= c->u_rate[k] != 0;
-    evaluate(c, &m->tapes.rates, t, y, y + m->n_x, rates);
     memset(slope, 0, (size_t)m->n_unknowns * sizeof(double));
     if (moving) {
+        evaluate(c, &m->tapes.rates, t, y, y + m->n_x, w->first_rates);
         memset(w->dots, 0, m->slot_results * sizeof(double));
         w->dots[0] = 1;
         for (int k = 0; k < m->n_u; k++) w->dots[m->slot_u + k] = c->u_rate[k];
         tape_tangent(&m->tapes.rates, w->slots, w->dots, slope);
-    }
-    tape_run(&m->tapes.jacobian, w->slots, w->jacobian);
+    } else evaluate_special(c, SPECIAL_RATES, t, y, y + m->n_x, w->first_rates);
+    run_special(c, SPECIAL_JACOBIAN, w->jacobian);
 }
 
 /* M/(h gamma) - J, factorised. */
@@ -74,7 +74,7 @@ static int factor(Instance *c, double h) {
 
 static double error_norm(const Instance *c, const double *first, const double *last, const double *error) {
     const Model *m = c->model;
-    double sum = 0, rtol = c->state.tolerance, atol = m->settings->absolute_to_relative * rtol;
+    double sum = 0, rtol = c->state.tolerance, atol = c->state.absolute;
     if (m->n_x == 0) return 0;
     for (int k = 0; k < m->n_x; k++) {
         double weight = rtol * fmax(fabs(first[k]), fabs(last[k])) + atol * m->nominals[k];
@@ -83,9 +83,10 @@ static double error_norm(const Instance *c, const double *first, const double *l
     return sqrt(sum / m->n_x);
 }
 
-/* Steps from `first` at t to t + h. Returns 0 if the equations gave values that are not finite, or a singular matrix.
- */
-int rosenbrock_step(Instance *c, double t, const double *first, double h, Piece *piece, double *error) {
+/* Steps from `first` at t to t + h. With `keep_jacobian` that of the step before from the same point is used.
+ * Returns 0 if the equations gave values that are not finite, or a singular matrix. */
+int rosenbrock_step(
+    Instance *c, double t, const double *first, double h, int keep_jacobian, Piece *piece, double *error) {
     const Model *m = c->model;
     Work *w = &c->work;
     int n = m->n_unknowns;
@@ -94,14 +95,16 @@ int rosenbrock_step(Instance *c, double t, const double *first, double h, Piece 
     piece->begin = t;
     piece->end = t + h;
     memcpy(piece->points, first, size);
-    linearize(c, t, first, w->stages, slope);
+    if (!keep_jacobian) linearize(c, t, first, slope);
     if (!factor(c, h)) return 0;
+    c->state.n_evaluations += STAGES - keep_jacobian;
     for (int i = 0; i < STAGES; i++) {
         double *stage = w->stages + (size_t)i * n;
         memcpy(y, first, size);
         for (int j = 0; j < i; j++)
             for (int k = 0; k < n; k++) y[k] += A[i][j] * w->stages[j * n + k];
-        if (i > 0) evaluate(c, &m->tapes.rates, t + C_TIME[i] * h, y, y + m->n_x, stage);
+        if (i == 0) memcpy(stage, w->first_rates, size);
+        else evaluate_special(c, SPECIAL_RATES, t + C_TIME[i] * h, y, y + m->n_x, stage);
         for (int j = 0; j < i; j++)
             for (int k = 0; k < m->n_x; k++) stage[k] += C[i][j] / h * w->stages[j * n + k];
         for (int k = 0; k < n; k++) {

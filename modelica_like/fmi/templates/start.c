@@ -106,11 +106,10 @@ static Result check_dependent(Instance *c, const double *values) {
 }
 
 static Result solve_states(Instance *c) {
-    const Model *m = c->model;
     State *s = &c->state;
     const double *values = c->work.start_values;
     if (apply_direct(c, values) != RESULT_OK) return RESULT_ERROR;
-    if (m->n_start_unknowns > 0 && solve_start_system(c, values) != RESULT_OK) return RESULT_ERROR;
+    if (c->model->n_start_unknowns > 0 && solve_start_system(c, values) != RESULT_OK) return RESULT_ERROR;
     if (solve_implicit(c, s->t, c->x, c->z, 0) != RESULT_OK) return RESULT_ERROR;
     return check_dependent(c, values);
 }
@@ -152,28 +151,34 @@ static Result solve_steady(Instance *c) {
     return report(c, LOG_ERROR, RESULT_ERROR, "No steady state was found at t = %.9g s.", s->t);
 }
 
-/* Choose modes that are not decided by their start conditions: the first that holds wins. Tells whether one changed. */
-int choose_modes(Instance *c, unsigned char *decided) {
+/* Choose modes that are not decided by their start conditions: the first that holds wins. */
+void choose_modes(Instance *c, unsigned char *decided) {
     const Model *m = c->model;
-    State *s = &c->state;
     double *holds = c->work.guards;
-    int changed = 0;
-    evaluate(c, &m->tapes.start_conditions, s->t, c->x, c->z, holds);
+    evaluate(c, &m->tapes.start_conditions, c->state.t, c->x, c->z, holds);
     for (int k = 0; k < m->n_start_modes; k++) {
         const StartMode *one = &m->start_modes[k];
         if (holds[k] == 0 || decided[one->mode]) continue;
         decided[one->mode] = 1;
-        changed |= c->d[one->mode] != one->target;
         c->d[one->mode] = one->target;
     }
-    return changed;
 }
 
-static int choose_start_modes(Instance *c) {
+/* What slides one way where it began the other way (`begun`, if there is a steady state before) is held: equilibrium
+ * lies in between, where it stands still. Tells whether a mode changed. */
+static int choose_start_modes(Instance *c, const double *begun) {
     const Model *m = c->model;
-    unsigned char *decided = c->work.decided;
-    memcpy(decided, c->mode_given, (size_t)m->n_d);
-    return choose_modes(c, decided);
+    Work *w = &c->work;
+    memcpy(w->decided, c->mode_given, (size_t)m->n_d);
+    memcpy(w->d_before, c->d, (size_t)m->n_d * sizeof(double));
+    choose_modes(c, w->decided);
+    if (begun) evaluate(c, &m->tapes.variables, c->state.t, c->x, c->z, w->variables);
+    for (int k = 0; k < m->n_holds && begun; k++) {
+        const Held *one = &m->holds[k];
+        if (begun[k] * w->variables[one->motion] < 0 && c->d[one->mode] != w->d_before[one->mode])
+            c->d[one->mode] = one->number;
+    }
+    return memcmp(w->d_before, c->d, (size_t)m->n_d * sizeof(double)) != 0;
 }
 
 static void start_discretes(Instance *c) {
@@ -191,6 +196,24 @@ static void apply_defaults(Instance *c, const double *values) {
         const StartOf *one = &m->start_default[k];
         c->x[one->position] = values[one->start] / one->factor;
     }
+}
+
+/* The steady state of the present modes, in which what they hold stands still; held motions become what they were. */
+static Result find_steady(Instance *c, double *begun) {
+    const Model *m = c->model;
+    Work *w = &c->work;
+    int count = 0;
+    apply_defaults(c, w->start_values);
+    if (apply_direct(c, w->start_values) != RESULT_OK) return RESULT_ERROR;
+    if (m->n_holds > 0) hold_terms(c, w->terms);
+    mark_held(c, w->terms, w->held);
+    evaluate(c, &m->tapes.variables, c->state.t, c->x, c->z, w->variables);
+    for (int k = 0; k < m->n_holds; k++) {
+        begun[k] = w->variables[m->holds[k].motion];
+        if (w->held[k]) w->standing[count++] = m->holds[k].motion;
+    }
+    if (count > 0) move_states(c, w->standing, NULL, count);
+    return solve_steady(c);
 }
 
 /* Surfaces that stick against too large a torque are not in equilibrium. */
@@ -213,6 +236,7 @@ static Result check_modes_hold(Instance *c) {
 Result start_solve(Instance *c) {
     const Model *m = c->model;
     State *s = &c->state;
+    double *begun = c->work.begun;
     int round;
     memcpy(c->x, m->guesses, m->n_x * sizeof(double));
     memcpy(c->z, m->z_guesses, m->n_z * sizeof(double));
@@ -224,15 +248,12 @@ Result start_solve(Instance *c) {
     if (m->settings->steady) {
         apply_defaults(c, c->work.start_values);
         if (apply_direct(c, c->work.start_values) != RESULT_OK) return RESULT_ERROR;
-        choose_start_modes(c);
+        choose_start_modes(c, NULL);
         share(c);
     }
     for (round = 0; round < MODE_ROUNDS; round++) {
-        if (m->settings->steady) {
-            apply_defaults(c, c->work.start_values);
-            if (apply_direct(c, c->work.start_values) != RESULT_OK || solve_steady(c) != RESULT_OK) return RESULT_ERROR;
-        } else if (solve_states(c) != RESULT_OK) return RESULT_ERROR;
-        if (!choose_start_modes(c)) break;
+        if ((m->settings->steady ? find_steady(c, begun) : solve_states(c)) != RESULT_OK) return RESULT_ERROR;
+        if (!choose_start_modes(c, m->settings->steady ? begun : NULL)) break;
         share(c);
     }
     if (round == MODE_ROUNDS)

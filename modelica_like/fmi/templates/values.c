@@ -3,6 +3,8 @@
 #include <string.h>
 #include "core.h"
 
+#define OFFSET 1e-12
+
 const Variable *find_variable(const Model *m, uint32_t reference) {
     int low = 0, high = m->n_variables - 1;
     while (low <= high) {
@@ -24,14 +26,29 @@ const Variable *known_variable(Instance *c, uint32_t reference, ValueType type) 
     return NULL;
 }
 
-static const double *all_variables(Instance *c) {
+/* Values that a tape gives, each computed once per point; NULL if there are none. */
+static const double *seen(Instance *c, const Variable *v) {
     const Model *m = c->model;
-    State *s = &c->state;
-    if (c->variables_valid) return c->work.variables;
-    if (settle(c) != RESULT_OK) return NULL;
-    evaluate(c, &m->tapes.variables, s->t, c->x, c->z, c->work.variables);
-    c->variables_valid = 1;
-    return c->work.variables;
+    const State *s = &c->state;
+    Work *w = &c->work;
+    const double *values = v->kind == KIND_DERIVED      ? w->seen_derived
+                           : v->kind == KIND_DERIVATIVE ? w->seen_rates
+                           : v->kind == KIND_GUARD      ? w->seen_indicators
+                                                        : w->variables;
+    if (v->kind == KIND_VARIABLE) ask_for(c, v->index);
+    if (c->variables_valid & 1 << v->kind) return values;
+    if (v->kind != KIND_DERIVED && settle(c) != RESULT_OK) return NULL;
+    switch (v->kind) {
+        case KIND_DERIVED: evaluate(c, &m->tapes.derived, s->t, c->x, c->z, w->seen_derived); break;
+        case KIND_DERIVATIVE:
+            evaluate_special(c, SPECIAL_RATES, s->t, c->x, c->z, w->rhs);
+            memcpy(w->seen_rates, w->rhs, (size_t)m->n_x * sizeof(double));
+            break;
+        case KIND_GUARD: get_indicators(c, w->seen_indicators); break;
+        default: evaluate_special(c, SPECIAL_VARIABLES, s->t, c->x, c->z, w->variables);
+    }
+    c->variables_valid |= 1 << v->kind;
+    return values;
 }
 
 /* In initialization mode, whatever was set since the last time must have its effect before anything is read. */
@@ -44,7 +61,6 @@ static Result make_ready(Instance *c, const Variable *v) {
 }
 
 Result get_float(Instance *c, uint32_t reference, double *value) {
-    const Model *m = c->model;
     const Variable *v = known_variable(c, reference, TYPE_FLOAT64);
     State *s = &c->state;
     if (v == NULL || make_ready(c, v) != RESULT_OK) return RESULT_ERROR;
@@ -54,28 +70,13 @@ Result get_float(Instance *c, uint32_t reference, double *value) {
         case KIND_PARAMETER: *value = c->p[v->index]; return RESULT_OK;
         case KIND_INPUT: *value = input_at(c, v->index, s->t); return RESULT_OK;
         case KIND_DISCRETE: *value = c->d[v->index]; return RESULT_OK;
-        case KIND_DERIVED:
-            evaluate(c, &m->tapes.derived, s->t, c->x, c->z, c->work.guards);
-            *value = c->work.guards[v->index];
-            return RESULT_OK;
-        case KIND_DERIVATIVE:
-            if (settle(c) != RESULT_OK) return RESULT_ERROR;
-            evaluate(c, &m->tapes.rates, s->t, c->x, c->z, c->work.rhs);
-            *value = c->work.rhs[v->index];
-            return RESULT_OK;
-        case KIND_GUARD:
-            if (settle(c) != RESULT_OK) return RESULT_ERROR;
-            get_indicators(c, c->work.guards);
-            *value = c->work.guards[v->index];
-            return RESULT_OK;
-        case KIND_VARIABLE: {
-            const double *values = all_variables(c);
+        default: {
+            const double *values = seen(c, v);
             if (values == NULL) return RESULT_ERROR;
             *value = values[v->index];
             return RESULT_OK;
         }
     }
-    return RESULT_ERROR;
 }
 
 /* Solves what getting a value from the present point needs. */
@@ -93,13 +94,18 @@ void get_derivatives(Instance *c, double *derivatives) {
 }
 
 /* Guards of active modes, as event iteration judges them: an indicator above zero is an event that wants to fire, so
- * that after every event all are at or below zero. The others are constant, so that nobody looks for their zeros. */
+ * that after every event all are below zero. The others are constant, so that nobody looks for their zeros. A root
+ * finder would take an indicator of exactly zero for a root at its first instant: what wants to stay is below zero by
+ * an offset. It shifts no event, as it is gone above zero; its size is that of rounding, and products of it do not
+ * underflow, by whose sign root finders judge. */
 void get_indicators(Instance *c, double *indicators) {
     const Model *m = c->model;
-    State *s = &c->state;
     double *values = c->work.guards_before;
-    evaluate(c, &m->tapes.guards_soon, s->t, c->x, c->z, values);
-    for (int k = 0; k < m->n_guards; k++) indicators[k] = guard_active(c, k) ? number_or_false(values[k]) : -1;
+    evaluate(c, &m->tapes.guards_soon, c->state.t, c->x, c->z, values);
+    for (int k = 0; k < m->n_guards; k++) {
+        double value = guard_active(c, k) ? number_or_false(values[k]) : -1;
+        indicators[k] = value > 0 ? value : value - OFFSET;
+    }
 }
 
 Result get_mode(Instance *c, uint32_t reference, int *value) {
@@ -140,14 +146,13 @@ static Result set_parameter(Instance *c, const Variable *v, double value) {
 }
 
 static Result set_start(Instance *c, const Variable *v, double value) {
-    const Model *m = c->model;
     State *s = &c->state;
     if (!before_start(s))
         return refuse_value(c, v, "start values are settable before the end of the initialization only.");
     if (v->kind == KIND_DISCRETE) {
         c->d[v->index] = value;
         c->mode_given[v->index] = 1;
-    } else if (v->start >= 0 && v->start < m->n_starts) {
+    } else if (v->start >= 0 && v->start < c->model->n_starts) {
         c->start_value[v->start] = value;
         c->start_given[v->start] = 1;
     } else return refuse_value(c, v, "it follows from other variables.");
@@ -156,32 +161,29 @@ static Result set_start(Instance *c, const Variable *v, double value) {
 }
 
 Result set_float(Instance *c, uint32_t reference, double value) {
-    const Model *m = c->model;
     const Variable *v = known_variable(c, reference, TYPE_FLOAT64);
     State *s = &c->state;
     if (v == NULL) return RESULT_ERROR;
     if (!isfinite(value)) return refuse_value(c, v, "the value is not a finite number.");
     if (v->kind == KIND_PARAMETER) return set_parameter(c, v, value);
     if (v->kind != KIND_INPUT) return set_start(c, v, value);
-    if (input_at(c, v->index, s->t) == value && c->u_rate[v->index] == 0) return RESULT_OK;
-    for (int k = 0; k < m->n_u; k++) c->u[k] = input_at(c, k, s->t);
+    if (input_at(c, v->index, s->t) == value) return RESULT_OK;
+    for (int k = 0; k < c->model->n_u; k++) c->u[k] = input_at(c, k, s->t);
     s->u_time = s->t;
-    c->u[v->index] = value;
-    c->u_rate[v->index] = 0;
+    c->u[v->index] = value; /* its rate stays, in whatever order an importer gives the two */
     touch(c);
     return RESULT_OK;
 }
 
 /* From now on the input moves with this rate. */
 Result set_input_rate(Instance *c, uint32_t reference, double rate) {
-    const Model *m = c->model;
     const Variable *v = known_variable(c, reference, TYPE_FLOAT64);
     State *s = &c->state;
     if (v == NULL) return RESULT_ERROR;
     if (v->kind != KIND_INPUT) return refuse_value(c, v, "it is no input, so it has no input derivative.");
     if (!isfinite(rate)) return refuse_value(c, v, "the derivative is not a finite number.");
     if (c->u_rate[v->index] == rate) return RESULT_OK;
-    for (int k = 0; k < m->n_u; k++) c->u[k] = input_at(c, k, s->t);
+    for (int k = 0; k < c->model->n_u; k++) c->u[k] = input_at(c, k, s->t);
     s->u_time = s->t;
     c->u_rate[v->index] = rate;
     touch(c);

@@ -30,9 +30,11 @@ def declarations(kind: type[Component], optional: Mapping[str, str]) -> list[str
     connectors = (_connector_row(name, connector) for name, connector in kind._class_connectors.items())
     fields = list(kind._class_fields.values())
     modes = kind._class_modes.items()
-    described = _structure_descriptions(kind)
+    texts = _structure_descriptions(kind)
+    described = dict.fromkeys(kind._structural, "") | {name: one.description for name, one in kind._tables.items()}
+    described |= {name: text for name, text in texts.items() if text}
     structure = (
-        (f"`{name}`", f"`{default}`" if has_default(default) else "required", cell(described.get(name, "")))
+        (f"`{name}`", f"`{default}`" if has_default(default) else "required", cell(described[name]))
         for name, default in kind._structural.items()
     )
     return [

@@ -15,6 +15,7 @@ from modelica_like.netlist.registry import find_type, library_types
 from modelica_like.report.component_pages.markdown import module_title, place
 from modelica_like.report.component_pages.page import Example, page
 from modelica_like.report.types import summary
+from modelica_like.writing import write_text
 
 INDEX = "README.md"
 
@@ -48,8 +49,7 @@ def write_component_pages(folder: Path, examples: Path | None = None, types: Seq
     """
     pages = component_pages(folder, examples, types)
     for file, content in pages.items():
-        file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_text(content, encoding="utf-8")
+        write_text(file, content)
     return list(pages)
 
 

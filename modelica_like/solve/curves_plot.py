@@ -7,18 +7,17 @@ from fnmatch import fnmatchcase
 from typing import TYPE_CHECKING
 
 from modelica_like.errors import UnknownName
-from modelica_like.solve.ranges import ranges
 from modelica_like.solve.style import COLOURS, STYLE
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from modelica_like.report.compare import Comparison
+    from modelica_like.solve.curves import Curves
 
 _MOST = 4
 
 
-def plot_comparison(comparison: Comparison, patterns: Sequence[str] = ()) -> Figure:
+def plot_curves(curves: Curves, patterns: Sequence[str] = ()) -> Figure:
     """Draw signals of both, and below each the difference relative to its range.
 
     Raises:
@@ -27,22 +26,22 @@ def plot_comparison(comparison: Comparison, patterns: Sequence[str] = ()) -> Fig
     import matplotlib as mpl
     from matplotlib.figure import Figure
 
-    names = [row.signal for row in comparison.deviations if not patterns or _fits(row.signal, patterns)]
+    names = [row.signal for row in curves.deviations if not patterns or _fits(row.signal, patterns)]
     names = names if patterns else names[:_MOST]
     if not names:
         raise UnknownName(f"Neither has a signal '{patterns[0]}'.")
-    first, second = comparison.first, comparison.second
+    first, second = curves.first, curves.second
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(8.0, 0.8 + 2.6 * len(names)), layout="constrained", dpi=150)
         ratios = [2.0, 1.0] * len(names)
         panels = figure.subplots(2 * len(names), 1, sharex=True, squeeze=False, height_ratios=ratios)[:, 0]
         for name, upper, lower in zip(names, panels[::2], panels[1::2], strict=True):
-            unit = comparison[name].unit.replace(".", "\N{MIDDLE DOT}")
-            upper.plot(first.time, first[name], color=COLOURS[0], label=comparison.labels[0])
-            upper.plot(second.time, second[name], "--", color=COLOURS[1], label=comparison.labels[1])
+            unit = curves[name].unit.replace(".", "\N{MIDDLE DOT}")
+            upper.plot(first.time, first[name], color=COLOURS[0], label=curves.labels[0])
+            upper.plot(second.time, second[name], "--", color=COLOURS[1], label=curves.labels[1])
             upper.set_ylabel(name if unit == "1" else f"{name} in {unit}")
-            scale = ranges(first, [name])[name]
-            times, difference = comparison.difference(name)
+            scale = curves[name].largest / curves[name].relative if curves[name].relative else 1.0
+            times, difference = curves.difference(name)
             lower.plot(times, difference / scale, color="#444444", linewidth=1.0)
             lower.set_ylabel("difference\n/ range")
         panels[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)

@@ -1,0 +1,100 @@
+"""Edges: parameter values at which a run has other derivatives on one side than on the other."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+
+import numpy as np
+
+from modelica_like.analyse.replay.chain import Replay
+from modelica_like.analyse.replay.jumps import Jump
+from modelica_like.analyse.replay.slopes import slopes
+from modelica_like.analyse.replay.sweeps import Reading
+from modelica_like.errors import NoGradient
+from modelica_like.solve.guards import Guards
+
+_STILL = 1e-7
+"""Values of a guard, relative to its largest one, that may be zero; and to what a parameter changes, that are."""
+_ROUNDING = 1e-9
+
+
+@dataclass(frozen=True)
+class Edge:
+    """Where a run may be on an edge: it is, if the reading changes with a parameter.
+
+    Attributes:
+        reading: what is zero on the edge.
+        least: change per relative change of a parameter up to which it is rounding.
+        error: what to say.
+    """
+
+    reading: Reading
+    least: float
+    error: NoGradient
+
+    def check(self, change: float) -> None:
+        """Raise the error if a relative change of a parameter leads away from the edge.
+
+        Args:
+            change: largest change of the reading per relative change of a parameter.
+
+        Raises:
+            NoGradient: it does.
+        """
+        if change > self.least and abs(self.reading.value) <= _STILL * change:
+            raise self.error
+
+
+def edges(chain: Replay, timed: Collection[int | None]) -> list[Edge]:
+    """Find where a run may be on an edge.
+
+    Args:
+        chain: the run.
+        timed: positions of jumps whose times are asked for.
+    """
+    found = [
+        Edge(Reading(0.0, k, one.x, one.theta), one.size, one.reason)
+        for k, jump in chain.jumps
+        for one in (jump.apart if jump.matters or k in timed else ())
+    ]
+    return found + _ties(chain)
+
+
+def _ties(chain: Replay) -> list[Edge]:
+    """Guards that are zero all along a segment, without firing: torque that is just what friction can bear."""
+    model = chain.model
+    guards, found = Guards(model), list[Edge]()
+    if not guards.count:
+        return found
+    values, rates = np.array([guards.at(node) for node in chain.nodes]).transpose(1, 0, 2)
+    near = _STILL * np.maximum(1.0, np.abs(values).max(axis=0))
+    still_at = (np.abs(values) <= near) & (np.abs(rates) * (chain.nodes[-1].t - chain.nodes[0].t) <= near)
+    first = 0
+    for last in [*(k for k, _ in chain.jumps), len(chain.nodes) - 1]:
+        here, lasts = chain.nodes[first], chain.nodes[last].t > chain.nodes[first].t
+        still = guards.active(here.d) & np.all(still_at[first : last + 1], axis=0)
+        if isinstance(move := chain.moves[last] if last < len(chain.moves) else None, Jump):
+            # What fires at the end of the segment was on its way.
+            fired = [model.transitions[one.transition] for one in move.events if one.transition >= 0 and not one.round]
+            still[[guards.positions[id(one)] for one in fired if not one.timed]] = False
+        if lasts:
+            found += [_tie(chain, guards, int(k), first, last) for k in np.flatnonzero(still)]
+        first = last + 1
+    return found
+
+
+def _tie(chain: Replay, guards: Guards, guard: int, first: int, last: int) -> Edge:
+    model, point, one = chain.model, chain.nodes[last], guards.state_events[guard]
+    k, mode = one.index, model.flat_discretes[one.mode]
+    part = slopes(model, point, f"guard {k}", lambda: model.guards(*model.arguments.values())[k])
+    x, theta = np.max([np.abs(node.x) for node in chain.nodes], axis=0), np.concatenate([model.p, model.u, point.d])
+    terms = np.abs(part.x[0]) @ (x + model.nominals) + np.abs(part.theta[0]) @ np.abs(theta)
+    error = NoGradient(
+        f"No gradient from t = {chain.nodes[first].t:.9g} s on: {mode.path} stays {mode.names[int(point.d[one.mode])]} "
+        f"just at the limit at which it becomes {mode.names[one.target]}.",
+        where=one.source,
+        why="A small change of a parameter decides whether it does, so the derivatives of both sides differ.",
+        advice="Move the parameters away from this limit.",
+    )
+    return Edge(Reading(float(part.value[0]), last, part.x[0], part.theta[0]), _ROUNDING * float(terms), error)

@@ -1,0 +1,86 @@
+"""What commands make of a run, whole or not: report, table, pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from modelica_like.cli.shared import DEFECTS, out, warn
+from modelica_like.errors import ModelicaLikeError, SolveError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from modelica_like.solve.solution import Solution
+
+Picture = tuple[Path | None, "Callable[[Solution], Figure]"]
+
+
+class Outcome:
+    """Makes one thing after the other of a run; one that cannot be made is a warning, as the run is right all the same.
+
+    Args:
+        run: runs.
+        debug: raise instead of warning.
+    """
+
+    def __init__(self, run: Callable[[], Solution], *, debug: bool) -> None:
+        self._debug = debug
+        self._written: list[str] = []
+        self._unwritten: OSError | None = None
+        self.stopped: SolveError | KeyboardInterrupt | None = None
+        try:
+            self.solution = run()
+        except (SolveError, KeyboardInterrupt) as error:
+            if getattr(error, "run", None) is None:
+                raise
+            self.stopped, self.solution = error, vars(error)["run"]
+
+    def attempt(self, what: str, make: Callable[[], object], file: Path | None = None) -> bool:
+        """Make something, and a file of it; False if it could not be made."""
+        try:
+            make()
+        except OSError as error:
+            self._unwritten = self._unwritten or error
+        except (ModelicaLikeError, *DEFECTS) as error:
+            if self._debug:
+                raise
+            warn(f"{what} could not be made: {str(error) or type(error).__name__}")
+        else:
+            self._written += [str(file)] if file else []
+            return True
+        return False
+
+    def write(self, table: Path | None, *, units: bool, pictures: Sequence[Picture]) -> None:
+        """Write the files that were asked for.
+
+        Raises:
+            SolveError, KeyboardInterrupt: the run has stopped; a note says what was kept.
+            OSError: a file could not be written; the others are.
+        """
+        if table:
+            from modelica_like.report.files import write_solution
+
+            self.attempt("The table", lambda: write_solution(self.solution, table, units=units), table)
+        for file, draw in pictures:
+            if file:
+                self.attempt(f"The picture {file.name}", lambda file=file, draw=draw: self._draw(file, draw), file)
+        if self.stopped is not None:
+            files = ", ".join(self._written)
+            kept = f"is in {files}" if files else "is lost: no --csv or --plot was asked for"
+            self.stopped.add_note(f"What was computed up to t = {self.solution.time[-1]:.6g} s {kept}.")
+            raise self.stopped
+        if self._unwritten is not None:
+            raise self._unwritten
+
+    def _draw(self, file: Path, draw: Callable[[Solution], Figure]) -> None:
+        from modelica_like.solve.plot import save_plot
+
+        save_plot(draw(self.solution), file)
+
+    def tell(self, report: Callable[[Any], Any], table: Path | None) -> None:
+        """Print a report; a table on standard output is alone there."""
+        from modelica_like.report.files import STDOUT
+
+        self.attempt("The report", lambda: out(stderr=table == STDOUT).print(report(self.solution)))

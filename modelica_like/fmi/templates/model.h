@@ -1,0 +1,166 @@
+/* A model as data: tables and tapes, as model_file.py writes them. */
+#ifndef MODEL_H
+#define MODEL_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+/* clang-format off */
+/* The order is that of OPERATIONS in tape.py. */
+typedef enum {
+    OPERATION_ADD, OPERATION_SUB, OPERATION_MUL, OPERATION_DIV, OPERATION_NEG, OPERATION_EXP, OPERATION_LOG,
+    OPERATION_POW, OPERATION_CONSTPOW, OPERATION_SQRT, OPERATION_SQ, OPERATION_TWICE, OPERATION_SIN, OPERATION_COS,
+    OPERATION_TAN, OPERATION_ASIN, OPERATION_ACOS, OPERATION_ATAN, OPERATION_LT, OPERATION_LE, OPERATION_EQ,
+    OPERATION_NE, OPERATION_NOT, OPERATION_AND, OPERATION_OR, OPERATION_FLOOR, OPERATION_CEIL, OPERATION_FMOD,
+    OPERATION_REMAINDER, OPERATION_FABS, OPERATION_SIGN, OPERATION_COPYSIGN, OPERATION_IF_ELSE_ZERO, OPERATION_ERF,
+    OPERATION_FMIN, OPERATION_FMAX, OPERATION_INV, OPERATION_SINH, OPERATION_COSH, OPERATION_TANH, OPERATION_ASINH,
+    OPERATION_ACOSH, OPERATION_ATANH, OPERATION_ATAN2, OPERATION_HYPOT, OPERATION_LOG1P, OPERATION_EXPM1,
+    N_OPERATION_CODES
+} OperationCode;
+/* clang-format on */
+
+/* Records lie in the file as they lie in memory: numbers of 4 and 8 bytes, without gaps. */
+typedef struct {
+    int operation, count;
+} Run;
+typedef struct {
+    int left, right;
+} Operands; /* slots */
+
+typedef struct { /* see tape.py */
+    int n_operations, n_runs, n_outputs, first_result;
+    const Run *runs;          /* equal operations that follow each other */
+    const Operands *operands; /* of all operations; operation k writes slot first_result + k */
+    const int *outputs;       /* slots */
+} Tape;
+
+typedef struct { /* pattern of a square matrix and of its QR factors, see sparse.py */
+    int size, n_ends, n_nonzeros, n_v, n_r;
+    const int *colind, *row, *v_colind, *v_row, *r_colind, *r_row, *row_place, *column_order;
+} QrPattern;
+
+typedef enum {
+    KIND_TIME,
+    KIND_STATE,
+    KIND_DERIVATIVE,
+    KIND_VARIABLE,
+    KIND_PARAMETER,
+    KIND_DERIVED,
+    KIND_INPUT,
+    KIND_DISCRETE,
+    KIND_GUARD,
+    N_KINDS
+} Kind;
+typedef enum { TYPE_FLOAT64, TYPE_ENUMERATION, N_TYPES } ValueType;
+
+typedef struct {
+    uint32_t reference;
+    int type, kind, index;
+    int start;   /* start value that determines it, or -1 */
+    int tunable; /* a parameter that may change during a run */
+    int name;
+} Variable; /* sorted by reference */
+
+typedef enum { RESET_STATE, RESET_DISCRETE, RESET_VALUE, N_RESET_KINDS } ResetKind;
+typedef struct {
+    int kind, index, value, target;
+    double factor;
+} Reset;
+typedef struct {
+    int mode, target, timed, index, first_reset, n_resets, name, notice;
+    uint64_t sources;
+} Transition;
+typedef struct {
+    int first_name, n_names; /* none: a discrete value */
+} Mode;
+typedef struct {
+    int mode, target;
+} StartMode;
+typedef struct {
+    int mode, number, loose, motion, state, reaction, approach, moved, name, unused;
+    double factor, nominal;
+} Held; /* see CompiledHold in compiled.py; state -1: the motion is none; moved: something but states moves it */
+typedef struct {
+    int first_member, n_members, first;
+} Circuit;
+typedef struct {
+    int position, start;
+    double factor;
+} StartOf;
+typedef struct {
+    int start, node, row;
+} StartRow;
+typedef struct {
+    int n_d, n_y, steady, rates_depend_on_time;
+    int implicit_linear, unused; /* the implicit equations are linear in z */
+    double absolute_to_relative, default_tolerance;
+    double fixed_step; /* 0: as accuracy asks for */
+} Settings;
+
+typedef struct Model { /* tables lie in the bytes of the file; texts are offsets in `text` */
+    const Settings *settings;
+    const char *text, *token;
+    int n_settings, n_text, n_token, n_x, n_z, n_p, n_u, n_constants, n_variables;
+    const double *constants, *parameters, *parameter_min, *parameter_max, *inputs, *guesses, *z_guesses, *nominals;
+    const int *state_names, *implicit_names, *singular_names;
+    const Variable *variables;
+
+    int n_transitions, n_guards, n_resets, n_reset_nodes, n_modes, n_mode_names;
+    const Transition *transitions; /* in the order in which they are declared */
+    const int *guard_transition;   /* transition of every guard */
+    const Reset *resets;
+    const int *reset_nodes;
+    const Mode *modes; /* by position in d */
+    const int *mode_names;
+
+    int n_holds, n_circuits, n_members, n_units;
+    const Held *holds;
+    const Circuit *circuits; /* those that depend on each other; in d from `first`: switches, then shares */
+    const int *members;
+    const int *units; /* by node: which have the same unit; empty where nothing is held */
+
+    int n_start_modes, n_start_direct, n_start_default, n_start_x_guess, n_start_z_guess, n_start_dependent;
+    int n_start_zero, n_start_unknowns, n_steady;
+    const StartMode *start_modes;
+    const StartOf *start_direct, *start_default, *start_x_guess, *start_z_guess;
+    const StartRow *start_rows, *start_dependent;
+    const int *start_zero, *start_columns, *steady_states;
+
+    int n_jacobian;
+    const int *jacobian_to_step; /* nonzero of the Jacobian -> nonzero of the step matrix */
+    const int *step_diagonal;    /* nonzero of the step matrix on the diagonal of state k */
+    QrPattern step, start;
+    struct {
+        Tape rates, jacobian, alg, alg_jacobian, variables, guards, guards_soon, moments, resets, start_conditions,
+            start_values, discrete_starts, hold_terms, determinants, start_system, start_jacobian, derived;
+    } tapes;
+
+    /* What follows from the sizes of the tables. */
+    int n_unknowns, n_d, n_y, n_nodes, n_derived, n_moments, n_determinants, n_starts, n_start_values;
+    int n_start_jacobian, n_reset_values, most_members;
+    int slot_x, slot_z, slot_p, slot_u, slot_d, slot_y, slot_constants, slot_results, n_slots;
+    unsigned char *own; /* bytes that belong to the model, or NULL */
+    void (*release)(void *memory);
+} Model;
+enum { N_TAPES = sizeof((Model *)0)->tapes / sizeof(Tape) };
+
+/* model.c */
+#define MESSAGE_LENGTH 512
+typedef void *(*Allocate)(size_t count, size_t size);
+typedef void (*Release)(void *memory);
+Model *model_read(const unsigned char *bytes, size_t size, Allocate allocate, Release release, char *message);
+void model_free(Model *m);
+static inline const char *text_of(const Model *m, int place) { return m->text + place; }
+
+/* model_check.c */
+int damaged(char *message, const char *what);
+int check_model(const Model *m, char *message);
+
+/* model_file.c */
+Model *model_open(const char *location, Allocate allocate, Release release, char *message);
+
+/* model_data.c: the bytes of the file where they are compiled in, of size 0 where they are read */
+extern const uint64_t model_data[];
+extern const size_t model_data_size;
+
+#endif

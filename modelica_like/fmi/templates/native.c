@@ -1,0 +1,308 @@
+/* Whole runs and single steps for programs that load this library: Python through ctypes, a page in a browser.
+ *
+ * Open a model from the bytes of its file once; make as many handles of it as there are threads. A handle is begun
+ * (native_begin finds the start itself, native_begin_at takes one), then it steps, or runs into buffers of the caller.
+ * Functions return NATIVE_OK, NATIVE_FAILED (native_message tells why) or NATIVE_MORE. Variables go by their value
+ * references. A handle belongs to one thread at a time; handles share nothing that changes.
+ */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include "core.h"
+
+#ifdef _WIN32
+#define EXPORTED __declspec(dllexport)
+#else
+#define EXPORTED __attribute__((visibility("default")))
+#endif
+
+enum { NATIVE_OK, NATIVE_FAILED, NATIVE_MORE };
+#define NEAR_EVENT 2e-7 /* of the distance of results: nearer to an event, its left side stands for the result */
+#define SAME 1e-12
+
+/* What a run writes, by rows; NULL: it is not wanted. Where room ends, or `steps` are done (0: any number), a run
+ * returns NATIVE_MORE, and goes on from there when it is called again. Points are results and both sides of every
+ * event. */
+typedef struct {
+    double *times, *states, *outputs; /* by point: time; states and implicit unknowns; outputs */
+    double *modes, *firsts;           /* by segment: d (modes, discrete values, what holds need); its first point */
+    double *events;             /* time, transition (-1: an impact's), mode, from, to, round, segment that follows */
+    double *impacts;            /* time, motion that is held, energy in J */
+    const uint32_t *references; /* of the outputs */
+    int64_t n_outputs, steps;
+    int64_t room_points, room_segments, room_events, room_impacts;
+    int64_t n_points, n_segments, n_events, n_impacts;
+    int64_t next, first; /* number of the next result, first point of the open segment */
+    double begin, last;  /* times of the run's begin and of the last point */
+} NativeRun;
+
+typedef struct {
+    Instance *c;
+    NativeRun *run;
+    void *before;    /* state before an instant for whose events there may be no room */
+    int64_t strikes; /* impacts before the present instant */
+    double pause;
+    char message[MESSAGE_LENGTH];
+} Native;
+
+static void keep_message(const Instance *c, int status, const char *category, const char *message) {
+    Native *n = c->environment;
+    (void)category;
+    if (status != RESULT_OK) snprintf(n->message, sizeof n->message, "%s", message);
+}
+
+static int code(Result result) { return result == RESULT_OK ? NATIVE_OK : NATIVE_FAILED; }
+
+/* ---- models and handles ----------------------------------------------------------------------------------------- */
+
+/* Returns NULL, and why in `message` (of 512 characters), if the bytes are no model. They are copied. */
+EXPORTED Model *native_open(const unsigned char *bytes, size_t size, char *message) {
+    unsigned char *own = calloc(size + 1, 1);
+    Model *m = own == NULL ? NULL : model_read(memcpy(own, bytes, size), size, calloc, free, message);
+    if (own == NULL) snprintf(message, MESSAGE_LENGTH, "There is not enough memory.");
+    if (m == NULL) free(own);
+    else m->own = own;
+    return m;
+}
+
+EXPORTED void native_close(Model *m) { model_free(m); }
+
+/* A handle of a model, which must outlive it; NULL if there is no memory. */
+EXPORTED Native *native_new(const Model *m) {
+    Native *n = calloc(1, sizeof *n);
+    if (n == NULL) return NULL;
+    n->c = instance_new(m, "native", m->token, calloc, free, keep_message, NULL, n, 0);
+    if (n->c == NULL) {
+        free(n);
+        return NULL;
+    }
+    n->c->co_simulation = 1;
+    return n;
+}
+
+EXPORTED void native_free(Native *n) {
+    state_release(n->c, &n->before);
+    instance_free(n->c);
+    free(n);
+}
+
+EXPORTED const char *native_message(const Native *n) { return n->message; }
+
+/* Begins anew: start time, end (infinite: unknown), relative tolerance, absolute one in nominal values. All values are
+ * those of the model. */
+EXPORTED int native_reset(Native *n, double start, double stop, double rtol, double atol) {
+    Result result;
+    instance_reset(n->c);
+    result = set_experiment(n->c, 1, rtol, start, isfinite(stop), stop);
+    n->c->state.absolute = atol;
+    return code(result);
+}
+
+/* ---- values ----------------------------------------------------------------------------------------------------- */
+
+/* Before the begin: parameters, inputs and start values; later: inputs, and parameters that are tunable. */
+EXPORTED int native_set(Native *n, int64_t count, const uint32_t *references, const double *values) {
+    for (int64_t k = 0; k < count; k++) {
+        const Variable *v = find_variable(n->c->model, references[k]);
+        Result result = v != NULL && v->type == TYPE_ENUMERATION ? set_mode(n->c, references[k], (int64_t)values[k])
+                                                                 : set_float(n->c, references[k], values[k]);
+        if (result != RESULT_OK) return NATIVE_FAILED;
+    }
+    return NATIVE_OK;
+}
+
+static int read_values(Instance *c, int64_t count, const uint32_t *references, double *values) {
+    for (int64_t k = 0; k < count; k++) {
+        const Variable *v = find_variable(c->model, references[k]);
+        int mode = 0;
+        if (v != NULL && v->type == TYPE_ENUMERATION) {
+            if (get_mode(c, references[k], &mode) != RESULT_OK) return NATIVE_FAILED;
+            values[k] = mode;
+        } else if (get_float(c, references[k], &values[k]) != RESULT_OK) return NATIVE_FAILED;
+    }
+    return NATIVE_OK;
+}
+
+EXPORTED int native_get(Native *n, int64_t count, const uint32_t *references, double *values) {
+    if (n->c->state.at_event && handle_event(n->c) != RESULT_OK) return NATIVE_FAILED;
+    return read_values(n->c, count, references, values);
+}
+
+/* All parameters and inputs at once, in the order of the model's tables and unchecked. */
+EXPORTED void native_set_all(Native *n, const double *parameters, const double *inputs) {
+    memcpy(n->c->p, parameters, (size_t)n->c->model->n_p * sizeof(double));
+    memcpy(n->c->u, inputs, (size_t)n->c->model->n_u * sizeof(double));
+}
+
+/* ---- start, steps, copies --------------------------------------------------------------------------------------- */
+
+static int begun(Native *n) {
+    n->c->state.phase = PHASE_STEP;
+    n->c->state.inputs_changed = 0;
+    n->c->state.at_event = 1; /* events at the start come first, whatever is asked for next */
+    return NATIVE_OK;
+}
+
+/* Finds the start from the model's start values and from those that were set. */
+EXPORTED int native_begin(Native *n) {
+    n->c->state.phase = PHASE_INITIALIZATION;
+    return start_solve(n->c) == RESULT_OK ? begun(n) : NATIVE_FAILED;
+}
+
+/* Begins at states, implicit unknowns and d that are given; events there have not happened yet. */
+EXPORTED int native_begin_at(Native *n, const double *x, const double *z, const double *d) {
+    Instance *c = n->c;
+    memcpy(c->x, x, (size_t)c->model->n_x * sizeof(double));
+    memcpy(c->z, z, (size_t)c->model->n_z * sizeof(double));
+    memcpy(c->d, d, (size_t)c->model->n_d * sizeof(double));
+    c->state.solved = 1;
+    c->state.z_valid = c->variables_valid = 0;
+    return begun(n);
+}
+
+/* Sets, goes to a time through all events, gets: a control loop's step. */
+EXPORTED int native_step(Native *n, double time, int64_t n_set, const uint32_t *set, const double *given, int64_t n_get,
+    const uint32_t *get, double *values) {
+    if (native_set(n, n_set, set, given) != NATIVE_OK || integrate_to(n->c, time, 0) == FAILED) return NATIVE_FAILED;
+    return native_get(n, n_get, get, values);
+}
+
+EXPORTED double native_time(const Native *n) { return n->c->state.t; }
+
+/* Copies of the state, to come back to; *copy is NULL or a copy to be written over. */
+EXPORTED int native_copy(Native *n, void **copy) { return code(state_copy_out(n->c, copy)); }
+EXPORTED int native_restore(Native *n, const void *copy) { return code(state_copy_in(n->c, copy)); }
+EXPORTED void native_drop(Native *n, void **copy) { state_release(n->c, copy); }
+
+/* What the handle has done so far: steps, rejected steps, evaluations of the equations, mode changes. */
+EXPORTED void native_counts(const Native *n, double *counts) {
+    const State *s = &n->c->state;
+    counts[0] = s->n_steps;
+    counts[1] = s->n_rejected;
+    counts[2] = s->n_evaluations;
+    counts[3] = s->n_events;
+}
+
+/* ---- runs ------------------------------------------------------------------------------------------------------- */
+
+static void note_event(Instance *c, int transition, int mode, int target) {
+    NativeRun *r = ((Native *)c->environment)->run;
+    if (r == NULL || r->events == NULL) return;
+    if (r->n_events < r->room_events) {
+        double row[] = {c->state.t, transition, mode, c->d[mode], target, c->round, (double)r->n_segments};
+        memcpy(r->events + 7 * r->n_events, row, sizeof row);
+    }
+    r->n_events++;
+}
+
+/* Impacts at one instant are one: a later one (it begins with held -1) takes the place of those before. */
+static void note_impact(Instance *c, int held, double energy, int first) {
+    Native *n = c->environment;
+    NativeRun *r = n->run;
+    if (r == NULL || r->impacts == NULL) return;
+    if (first) n->strikes = r->n_impacts;
+    if (held < 0) {
+        r->n_impacts = n->strikes;
+        return;
+    }
+    if (r->n_impacts < r->room_impacts) {
+        double row[] = {c->state.t, held, energy};
+        memcpy(r->impacts + 3 * r->n_impacts, row, sizeof row);
+    }
+    r->n_impacts++;
+}
+
+static int write_point(Native *n, NativeRun *r) {
+    const Instance *c = n->c;
+    const Model *m = c->model;
+    double *states = r->states == NULL ? NULL : r->states + r->n_points * m->n_unknowns;
+    if (r->times != NULL) r->times[r->n_points] = c->state.t;
+    if (states != NULL) {
+        memcpy(states, c->x, (size_t)m->n_x * sizeof(double));
+        memcpy(states + m->n_x, c->z, (size_t)m->n_z * sizeof(double));
+    }
+    if (r->outputs != NULL &&
+        read_values(n->c, r->n_outputs, r->references, r->outputs + r->n_points * r->n_outputs) != NATIVE_OK)
+        return NATIVE_FAILED;
+    r->last = c->state.t;
+    r->n_points++;
+    return NATIVE_OK;
+}
+
+/* The left side of an event, the event, its right side, which begins a segment. */
+static int instant(Native *n, NativeRun *r, double width) {
+    Instance *c = n->c;
+    int64_t events = r->n_events, impacts = n->strikes = r->n_impacts;
+    int segments = r->modes != NULL || r->firsts != NULL;
+    if (r->n_points + 2 > r->room_points || (segments && r->n_segments == r->room_segments)) return NATIVE_MORE;
+    if (r->n_segments > 0 && r->last != c->state.t) {
+        if (c->state.t - r->last <= NEAR_EVENT * width && r->n_points > r->first + 1) r->n_points--;
+        if (write_point(n, r) != NATIVE_OK) return NATIVE_FAILED;
+    }
+    if (state_copy_out(c, &n->before) != RESULT_OK || handle_event(c) != RESULT_OK) return NATIVE_FAILED;
+    if (r->n_events > r->room_events || r->n_impacts > r->room_impacts) {
+        r->n_events = events;
+        r->n_impacts = impacts;
+        state_copy_in(c, n->before);
+        return NATIVE_MORE;
+    }
+    if (r->modes != NULL)
+        memcpy(r->modes + r->n_segments * c->model->n_d, c->d, (size_t)c->model->n_d * sizeof(double));
+    if (r->firsts != NULL) r->firsts[r->n_segments] = (double)r->n_points;
+    r->first = r->n_points;
+    r->n_segments++;
+    return write_point(n, r);
+}
+
+static double pause_after(Instance *c) {
+    Native *n = c->environment;
+    return c->state.n_steps >= n->pause ? c->state.t : INFINITY;
+}
+
+static int run_on(Native *n, double end, int64_t results, NativeRun *r) {
+    Instance *c = n->c;
+    State *s = &c->state;
+    double width = (end - r->begin) / (double)results;
+    while (s->t < end || s->at_event) {
+        double t = r->begin + (end - r->begin) * ((double)r->next / (double)results);
+        int result;
+        if (r->n_segments == 0 || s->at_event) {
+            result = instant(n, r, width);
+            if (result != NATIVE_OK) return result;
+            continue;
+        }
+        if (r->n_points == r->room_points || s->n_steps >= n->pause) return NATIVE_MORE;
+        if (r->next < results && t <= s->t + fmin(0.5 * NEAR_EVENT * width, SAME * fmax(1, fabs(s->t)))) {
+            r->next++;
+            continue;
+        }
+        switch (integrate_to(c, r->next < results ? t : end, 1)) {
+            case FAILED: return NATIVE_FAILED;
+            case AT_EVENT: continue;
+            case REACHED:
+                if (s->t < t) return NATIVE_MORE;
+                r->next++;
+        }
+        if (write_point(n, r) != NATIVE_OK) return NATIVE_FAILED;
+    }
+    return NATIVE_OK;
+}
+
+/* Runs to `end`, with results at `results` equal distances. All counts of `run` are zero at first. */
+EXPORTED int native_run(Native *n, double end, int64_t results, NativeRun *run) {
+    int result;
+    if (run->n_segments == 0) {
+        run->begin = n->c->state.t;
+        run->next = 1;
+    }
+    n->run = run;
+    n->pause = run->steps > 0 ? n->c->state.n_steps + (double)run->steps : INFINITY;
+    n->c->noted = note_event;
+    n->c->struck = note_impact;
+    n->c->step_finished = run->steps > 0 ? pause_after : NULL;
+    result = run_on(n, end, results, run);
+    n->run = NULL;
+    n->c->step_finished = NULL;
+    return result;
+}

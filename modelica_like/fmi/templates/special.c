@@ -1,0 +1,157 @@
+/* Tapes for the present modes and parameters: what these decide is worked out once, and what nothing asks for is left
+ * out. A model is one set of equations for all modes, of which few matter at a time, so little is left of a tape.
+ *
+ * The operations that are left are the same, in the same order, so values are the same; only x + 0 and x * 1 are x.
+ */
+#include <string.h>
+#include "core.h"
+
+#define WORTH_IT 6 /* runs of a tape in the same modes from which on it is worth it */
+
+enum { MOVING, KNOWN };
+
+const Tape *full_tape(const Model *m, SpecialTape which) {
+    const Tape *const tapes[] = {&m->tapes.rates, &m->tapes.jacobian, &m->tapes.alg, &m->tapes.alg_jacobian,
+        &m->tapes.variables, &m->tapes.guards};
+    return tapes[which];
+}
+
+/* Is the output asked for? Of guards, those of the present modes. */
+static int is_wanted(const Instance *c, SpecialTape which, int output) {
+    if (which == SPECIAL_VARIABLES) return c->work.asked[output];
+    return which != SPECIAL_GUARDS || guard_active(c, output % c->model->n_guards);
+}
+
+/* The operand that the result of an operation is, -1 where it is known to be `*value`, or -2: it must be computed. */
+static int result_of(int operation, Operands one, const double *slots, const unsigned char *known, double *value) {
+    int a = known[one.left] == KNOWN, b = known[one.right] == KNOWN;
+    double left = slots[one.left], right = slots[one.right];
+    if (a && b) return -1;
+    switch (operation) {
+        case OPERATION_IF_ELSE_ZERO:
+            if (a && left == 0) *value = 0;
+            return !a ? -2 : left == 0 ? -1 : one.right;
+        case OPERATION_AND: *value = 0; return (a && left == 0) || (b && right == 0) ? -1 : -2;
+        case OPERATION_OR: *value = 1; return (a && left != 0) || (b && right != 0) ? -1 : -2;
+        case OPERATION_ADD: return a && left == 0 ? one.right : b && right == 0 ? one.left : -2;
+        case OPERATION_SUB: return b && right == 0 ? one.left : -2;
+        case OPERATION_MUL: return a && left == 1 ? one.right : b && right == 1 ? one.left : -2;
+        case OPERATION_DIV: return b && right == 1 ? one.left : -2;
+        default: return -2;
+    }
+}
+
+/* Finds for every slot which other one has its value (`same`), and whether it is known. The tape has just been run. */
+static void work_out(Instance *c, const Tape *tape, int *same, unsigned char *known) {
+    const Model *m = c->model;
+    double *slots = c->work.slots;
+    const Operands *operand = tape->operands;
+    int slot = tape->first_result;
+    memset(known, MOVING, (size_t)m->n_slots);
+    memset(known + m->slot_p, KNOWN, (size_t)m->n_p);
+    memset(known + m->slot_d, KNOWN, (size_t)m->n_d);
+    memset(known + m->slot_constants, KNOWN, (size_t)m->n_constants);
+    for (int k = 0; k < slot; k++) same[k] = k;
+    for (int r = 0; r < tape->n_runs; r++)
+        for (int k = 0; k < tape->runs[r].count; k++, operand++, slot++) {
+            Operands one = {same[operand->left], same[operand->right]};
+            double value = slots[slot];
+            int found = result_of(tape->runs[r].operation, one, slots, known, &value);
+            same[slot] = found >= 0 ? found : slot;
+            known[slot] = found == -1 ? KNOWN : MOVING;
+            if (found == -1) slots[slot] = value;
+        }
+}
+
+/* Marks what the wanted outputs need. */
+static void mark_needed(Instance *c, SpecialTape which, const Tape *tape, const int *same, unsigned char *needed) {
+    memset(needed, 0, (size_t)c->model->n_slots);
+    for (int k = 0; k < tape->n_outputs; k++)
+        if (is_wanted(c, which, k)) needed[same[tape->outputs[k]]] = 1;
+    for (int k = tape->n_operations - 1; k >= 0; k--) {
+        int slot = tape->first_result + k;
+        if (!needed[slot] || c->work.known_slots[slot] == KNOWN) continue;
+        needed[same[tape->operands[k].left]] = 1;
+        needed[same[tape->operands[k].right]] = 1;
+    }
+}
+
+/* Writes the operations that are left; known results that they need get slots behind all others. */
+static void write_special(Instance *c, SpecialTape which, const Tape *tape, const unsigned char *needed) {
+    Work *w = &c->work;
+    Special *s = &w->special[which];
+    int *place = w->places_of_slots, written = 0, values = s->first_known, k = 0;
+    for (int slot = 0; slot < tape->first_result; slot++) place[slot] = slot;
+    s->tape.n_runs = 0;
+    for (int r = 0; r < tape->n_runs; r++)
+        for (int end = k + tape->runs[r].count; k < end; k++) {
+            int slot = tape->first_result + k, same = w->same[slot], operation = tape->runs[r].operation;
+            if (same != slot) place[slot] = place[same];
+            if (same != slot || !needed[slot]) continue;
+            if (w->known_slots[slot] == KNOWN) {
+                w->slots[values] = w->slots[slot];
+                place[slot] = values++;
+                continue;
+            }
+            s->operands[written].left = place[w->same[tape->operands[k].left]];
+            s->operands[written].right = place[w->same[tape->operands[k].right]];
+            if (s->tape.n_runs == 0 || s->runs[s->tape.n_runs - 1].operation != operation) {
+                s->runs[s->tape.n_runs].operation = operation;
+                s->runs[s->tape.n_runs++].count = 0;
+            }
+            s->runs[s->tape.n_runs - 1].count++;
+            place[slot] = tape->first_result + written++;
+        }
+    s->tape.n_operations = written;
+    for (int n = 0; n < tape->n_outputs; n++) {
+        int slot = w->same[tape->outputs[n]];
+        s->outputs[n] = needed[slot] && is_wanted(c, which, n) ? place[slot] : c->model->slot_constants;
+    }
+}
+
+static void specialise(Instance *c, SpecialTape which, const Tape *tape) {
+    Work *w = &c->work;
+    Special *s = &w->special[which];
+    work_out(c, tape, w->same, w->known_slots);
+    mark_needed(c, which, tape, w->same, w->needed_slots);
+    write_special(c, which, tape, w->needed_slots);
+    s->tape.runs = s->runs;
+    s->tape.operands = s->operands;
+    s->tape.outputs = s->outputs;
+    s->tape.n_outputs = tape->n_outputs;
+    s->tape.first_result = tape->first_result;
+}
+
+/* Runs a tape with the slots as they are loaded. Of outputs that are not wanted, any value may come. */
+void run_special(Instance *c, SpecialTape which, double *outputs) {
+    const Tape *tape = full_tape(c->model, which);
+    Special *s = &c->work.special[which];
+    if (c->bounded) { /* working out costs more than a step */
+        tape_run(tape, c->work.slots, outputs);
+        return;
+    }
+    if (s->belongs_to != c->work.decided_by) {
+        s->belongs_to = c->work.decided_by;
+        s->uses = 0;
+    }
+    if (s->uses > WORTH_IT) {
+        tape_run(&s->tape, c->work.slots, outputs);
+        return;
+    }
+    tape_run(tape, c->work.slots, outputs);
+    if (++s->uses > WORTH_IT) specialise(c, which, tape);
+}
+
+/* The same at a point. */
+void evaluate_special(Instance *c, SpecialTape which, double t, const double *x, const double *z, double *outputs) {
+    load(c, t, x, z);
+    run_special(c, which, outputs);
+}
+
+/* From now on this variable is wanted. */
+void ask_for(Instance *c, int node) {
+    if (c->work.asked[node]) return;
+    c->work.asked[node] = 1;
+    c->work.special[SPECIAL_VARIABLES].uses = 0;
+    c->variables_valid = 0;
+}

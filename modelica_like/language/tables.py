@@ -1,0 +1,183 @@
+"""Structural fields that are tables: rows of numbers and texts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any, cast
+
+from modelica_like.errors import ModelicaLikeError, NetlistError
+from modelica_like.language.expr import Expr
+from modelica_like.language.fields import Field
+from modelica_like.language.places import caller
+from modelica_like.units import ANY, Unit, parse_unit, to_si
+
+REQUIRED = object()
+"""Stands for the default of a structural field that must be given."""
+_SHOWN = 60
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column of a table; see `column`."""
+
+    what: str
+    unit: str
+    scale: str
+    rising: bool
+    text: bool
+
+    def unit_in(self, fields: Mapping[str, Field]) -> Unit:
+        """Return the unit of the numbers: that of the parameter that says what counts as 1, or its own."""
+        return fields[self.scale].unit if self.scale else parse_unit(self.unit)
+
+    def described(self, fields: Mapping[str, Field]) -> str:
+        """Return what it is and its unit: `slip speed in rad/s`."""
+        unit = str(self.unit_in(fields))
+        return f"{self.what} (a text)" if self.text else f"{self.what} in {unit}" if unit not in "1*" else self.what
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Declaration of a table; see `rows`."""
+
+    columns: tuple[Column, ...]
+    default: Any
+    flat: bool
+    more: bool
+
+    @property
+    def description(self) -> str:
+        """What the rows are: `Rows of slip speed in w_scale and friction coefficient.`."""
+        parts = [f"{one.what} in {one.scale or one.unit}" if one.scale or one.unit != "1" else one.what
+                 for one in self.columns]  # fmt: skip
+        listed = ", ".join(parts[:-1]) + " and " + parts[-1] if len(parts) > 1 else parts[0]
+        return f"{'List' if self.flat else 'Rows'} of {listed}{' and so on' if self.more else ''}."
+
+    def read(self, label: str, fields: Mapping[str, Field], given: Any) -> tuple[tuple[Any, ...], frozenset[str]]:
+        """Understand a table.
+
+        Args:
+            label: how messages call it, such as `Clutch.mu_pos`.
+            fields: of the component.
+            given: tuple of rows, tuples; cells are numbers in the column's unit, quantities, or texts.
+
+        Returns:
+            The table, in SI units, and the parameters that say what counts as 1 in columns with quantities.
+
+        Raises:
+            NetlistError: it has not the shape of the table, or a column does not rise.
+            UnitError, ValueOutOfRange: a cell has another dimension or is not finite.
+        """
+        wanted = [one.described(fields) for one in self.columns]
+        row = wanted[0] if self.flat else f"[{', '.join(wanted)}{', …' if self.more else ''}]"
+        if not isinstance(given, tuple) or not given:
+            shape = f"a list of {row}" if self.flat else f"a list of rows {row}"
+            raise NetlistError(f"{label} = {_short(given)} must be {shape}.")
+        width = len(self.columns)
+        if self.more and isinstance(given[0], tuple):
+            width = max(width, len(cast("tuple[Any, ...]", given[0])))
+        columns = self.columns + (self.columns[-1],) * (width - len(self.columns))
+        table: list[tuple[Any, ...]] = []
+        measured: set[str] = set()
+        for number, one in enumerate(cast("tuple[Any, ...]", given), 1):
+            cells: Any = (one,) if self.flat else one
+            if not isinstance(cells, tuple) or len(cast("tuple[Any, ...]", cells)) != width:
+                raise NetlistError(f"{label}, row {number}: {_short(one)} must be {row}.")
+            pairs = list(zip(columns, cast("tuple[Any, ...]", cells), strict=True))
+            place = f"{label}, row {number}, "
+            table.append(tuple(_cell(f"{place}{column.what}", column, fields, cell) for column, cell in pairs))
+            measured |= {column.scale for column, cell in pairs if column.scale and isinstance(cell, str)}
+        self._check_rising(label, table)
+        return tuple(one[0] for one in table) if self.flat else tuple(table), frozenset(measured)
+
+    def store(self, owner: Any, name: str, given: Any) -> tuple[Any, ...]:
+        """Understand a table for a component, which keeps it as it was given, and the scales it then must not have.
+
+        Raises:
+            ModelicaLikeError: see `read`, or a scale has a value.
+        """
+        label = f"{type(owner).__name__}.{name}"
+        try:
+            understood, measured = self.read(label, owner.fields, given)
+            for scale in measured & owner._values.keys():
+                raise both_given(label, scale)
+        except ModelicaLikeError as error:
+            error.where = error.where or (caller(),)
+            raise
+        owner._given_tables = {**owner._given_tables, name: given}
+        owner._measured = {k: v for k, v in owner._measured.items() if v != label} | dict.fromkeys(measured, label)
+        return understood
+
+    def _check_rising(self, label: str, table: list[tuple[Any, ...]]) -> None:
+        for k, column in enumerate(self.columns):
+            for number, (before, after) in enumerate(pairwise(table), 2):
+                if column.rising and not isinstance(after[k], Expr) and not before[k] < after[k]:
+                    raise NetlistError(
+                        f"{label}, row {number}: the {column.what} {after[k]:g} is not above {before[k]:g}, that of "
+                        "the row before.", advice="Sort the rows, each once.",
+                    )  # fmt: skip
+
+
+def _cell(label: str, column: Column, fields: Mapping[str, Field], given: Any) -> Any:
+    """Return a cell in SI units; symbols stay what they are."""
+    if isinstance(given, Expr) or (column.text and isinstance(given, str)):
+        return given
+    unit = column.unit_in(fields)
+    if column.text or isinstance(given, bool) or not isinstance(given, int | float | str) or (
+        unit == ANY and isinstance(given, str)
+    ):  # fmt: skip
+        plain = "a text" if column.text else "a number"
+        kind = plain if column.text or str(unit) in "1*" else f"{plain} or a quantity in {unit}"
+        raise NetlistError(f"{label}: {_short(given)} must be {kind}.")
+    return to_si(given, unit, label)
+
+
+def _short(given: Any) -> str:
+    text = repr(_as_written(given))
+    return text if len(text) <= _SHOWN else f"{text[: _SHOWN - 1]}…"
+
+
+def _as_written(given: Any) -> Any:
+    return [_as_written(one) for one in cast("tuple[Any, ...]", given)] if isinstance(given, tuple) else given
+
+
+def frozen_rows(value: Any) -> Any:
+    """Make lists hashable, so that structural values can be compared."""
+    if isinstance(value, list | tuple):
+        return tuple(frozen_rows(item) for item in cast("list[Any]", value))
+    return value
+
+
+def both_given(label: str, scale: str) -> ModelicaLikeError:
+    """Return the error about a table with quantities whose unit is given, too."""
+    return NetlistError(
+        f"{label} has quantities, and {scale} says what counts as 1.",
+        advice=f"Write numbers and {scale}, or quantities without {scale}.",
+    )
+
+
+def column(what: str, unit: str = "1", *, scale: str = "", rising: bool = False, text: bool = False) -> Column:
+    """Declare a column of a table.
+
+    Args:
+        what: one phrase.
+        unit: in Modelica notation.
+        scale: parameter that says what counts as 1 in numbers, with its unit; quantities need none.
+        rising: every value is above the one before.
+        text: it holds texts, not numbers.
+    """
+    return Column(what, unit, scale, rising, text)
+
+
+def rows(*columns: Column, default: Any = REQUIRED, flat: bool = False, more: bool = False) -> Any:
+    """Declare a structural field that is a table: in equations a tuple of rows, in SI units or in units of a scale.
+
+    Args:
+        columns: what stands in a row.
+        default: rows; without it they must be given.
+        flat: the rows are no lists, but single values.
+        more: there may be more columns like the last.
+    """
+    return Rows(columns, default, flat, more)

@@ -1,0 +1,1 @@
+"""Runs and steps by the compiled run-time of FMUs, inside this process."""

@@ -1,0 +1,75 @@
+"""Buffers that the run-time writes a run into."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
+
+import numpy as np
+
+from modelica_like.compile.compiled import Vector
+from modelica_like.native.library import MORE, Run
+from modelica_like.native.model import Instance
+
+_COUNTED = {
+    "points": ("times", "states", "outputs"), "segments": ("modes", "firsts"), "events": ("events",),
+    "impacts": ("impacts",),
+}  # fmt: skip
+_LEAST = 32
+_BREATH = 5000
+"""Steps between two looks at whether the user wants to go on."""
+
+
+class Buffers:
+    """A run of an instance, and what it has written.
+
+    Args:
+        instance: one that has begun.
+        end: end time in s.
+        points: number of equal intervals of the results.
+        widths: what is to be written (arrays of `NativeRun` in native.c), with the number of columns.
+        outputs: value references of the outputs.
+    """
+
+    def __init__(
+        self, instance: Instance, end: float, points: int, widths: Mapping[str, int], outputs: Any = ()
+    ) -> None:
+        self.instance, self.end, self.points = instance, end, points
+        self.references = np.array(outputs, np.uint32)
+        self.run = Run(steps=_BREATH, n_outputs=len(self.references), references=self.references.ctypes.data)
+        self._widths, self._arrays = widths, dict[str, Vector]()
+        for counted, names in _COUNTED.items():
+            self._make_room(counted, names, points + 2 * _LEAST if counted == "points" else _LEAST)
+
+    def go(self, reached: Callable[[float], bool]) -> int:
+        """Run to the end, and return the last code.
+
+        Args:
+            reached: called now and then with the time reached; tells whether to go on.
+        """
+        while True:
+            arguments = self.instance.address, self.end, self.points, ctypes.byref(self.run)
+            code = self.instance.library.run(*arguments)
+            if not reached(self.run.last) or code != MORE:
+                return code
+            for counted, names in _COUNTED.items():
+                room = getattr(self.run, f"room_{counted}")
+                if 2 * getattr(self.run, f"n_{counted}") >= room:
+                    self._make_room(counted, names, 2 * room)
+
+    def __getitem__(self, name: str) -> Vector:
+        """What was written, shape (rows, columns)."""
+        counted = next(counted for counted, names in _COUNTED.items() if name in names)
+        return self._arrays[name][: getattr(self.run, f"n_{counted}")]
+
+    def _make_room(self, counted: str, names: Iterable[str], room: int) -> None:
+        setattr(self.run, f"room_{counted}", room)
+        for name in names:
+            if name not in self._widths:
+                continue
+            new = np.zeros((room, self._widths[name]))
+            if name in self._arrays:
+                new[: len(self[name])] = self[name]
+            self._arrays[name] = new
+            setattr(self.run, name, new.ctypes.data)

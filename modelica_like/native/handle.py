@@ -1,0 +1,151 @@
+"""A handle for control loops and learning: set, step, read and go back, at the speed of C."""
+
+from __future__ import annotations
+
+import ctypes
+import math
+import weakref
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from modelica_like.compile.compiled import CompiledDae, Vector
+from modelica_like.errors import ValueOutOfRange
+from modelica_like.initialize import StartKind
+from modelica_like.native.buffers import Buffers
+from modelica_like.native.model import Instance
+from modelica_like.solve.options import Options
+
+
+class Native:
+    """One instance of a model in memory.
+
+    ```python
+    drive = build("drive.toml").native(inputs=["drive.u"], outputs=["load.w"])
+    while drive.time < 1.0:
+        drive.inputs[0] = controller(drive.outputs[0])
+        drive.step(drive.time + 1e-3)
+    ```
+
+    Values are in SI units. A handle belongs to one thread at a time; handles of one model run side by side.
+
+    Args:
+        model: the compiled model.
+        inputs: inputs and tunable parameters that steps set.
+        outputs: variables, modes (as numbers) and whatever else an FMU of the model has, that steps read.
+        start: `given`, `rest` or `steady`; by default as the netlist says.
+        rtol: relative tolerance.
+        atol: absolute tolerance, in nominal values.
+
+    Attributes:
+        inputs: what the next step sets, shape (inputs,); to be written into.
+        outputs: what the last step has read, shape (outputs,); written over by the next one.
+    """
+
+    def __init__(
+        self, model: CompiledDae, inputs: Sequence[str] = (), outputs: Sequence[str] = (), *,
+        start: StartKind | None = None, rtol: float = Options.rtol, atol: float | None = None,
+    ) -> None:  # fmt: skip
+        self._instance = Instance(model, start)
+        self._library, self._address = self._instance.library, self._instance.address
+        self._tolerances = rtol, rtol / 100 if atol is None else atol
+        names = self._instance.native
+        self._references = names.references(inputs), names.references(outputs)
+        self.inputs, self.outputs = np.zeros(len(inputs)), np.zeros(len(outputs))
+        self._step = tuple(
+            part
+            for references, values in zip(self._references, (self.inputs, self.outputs), strict=True)
+            for part in (len(values), references.ctypes.data, values.ctypes.data)
+        )
+        self.reset()
+
+    def reset(self, values: Mapping[str, float] | None = None, *, t0: float = 0.0, until: float = math.inf) -> None:
+        """Begin anew.
+
+        Args:
+            values: other values of parameters, inputs and start values by path.
+            t0: start time in s.
+            until: end of the run, if it is known.
+
+        Raises:
+            UnknownName, ValueOutOfRange: a value cannot be set.
+            InitializationError, SolveError: there is no start with these values.
+        """
+        given = values or {}
+        self._instance.reset(t0, until, *self._tolerances)
+        self.set(given)
+        self._instance.check(self._library.begin(self._address))
+        self._read(self._references[0], self.inputs)
+        self._read(self._references[1], self.outputs)
+
+    def set(self, values: Mapping[str, float]) -> None:
+        """Set inputs and tunable parameters by path; they hold from now on."""
+        references, numbers = self._instance.native.references(values), np.array([*values.values()], float)
+        self._instance.check(
+            self._library.set(self._address, len(numbers), references.ctypes.data, numbers.ctypes.data)
+        )
+
+    def get(self, *names: str) -> Vector:
+        """Return variables at the present point, shape (names,)."""
+        return self._read(self._instance.native.references(names), np.zeros(len(names)))
+
+    def step(self, time: float) -> Vector:
+        """Set `inputs`, go on to a time in s through all events, and read `outputs`, which is returned.
+
+        Raises:
+            SolveError: the run cannot go on; `restore` or `reset` helps.
+            ValueOutOfRange: an input cannot be set.
+        """
+        code = self._library.step(self._address, time, *self._step)
+        if code:
+            self._instance.check(code)
+        return self.outputs
+
+    @property
+    def time(self) -> float:
+        """Where it stands, in s."""
+        return self._library.time(self._address)
+
+    def copy(self) -> Copy:
+        """Return a copy of the state, to come back to as often as is wanted."""
+        return Copy(self._instance)
+
+    def restore(self, copy: Copy) -> None:
+        """Go back to a copy of this handle or of another one of the same model; `outputs` follow."""
+        copy.into(self._instance)
+        self._read(self._references[1], self.outputs)
+
+    def run(self, until: float, points: int = 500) -> tuple[Vector, Vector]:
+        """Go on to a time, with results at equal distances and on both sides of every event.
+
+        Returns:
+            Times, shape (n,), and outputs, shape (n, outputs).
+        """
+        widths = {"times": 1, "outputs": len(self.outputs)}
+        written = Buffers(self._instance, until, points, widths, self._references[1])
+        self._instance.check(written.go(lambda _: True))
+        return written["times"][:, 0], written["outputs"]
+
+    def _read(self, references: Any, values: Vector) -> Vector:
+        self._instance.check(self._library.get(self._address, len(values), references.ctypes.data, values.ctypes.data))
+        return values
+
+
+class Copy:
+    """A copy of an instance's state."""
+
+    def __init__(self, instance: Instance) -> None:
+        self._instance, self._memory = instance, ctypes.c_void_p()
+        instance.check(instance.library.copy(instance.address, ctypes.byref(self._memory)))
+        weakref.finalize(self, _drop, instance, self._memory)
+
+    def into(self, instance: Instance) -> None:
+        """Write it into an instance of the same model."""
+        if instance.native is not self._instance.native:
+            raise ValueOutOfRange("The copy is that of another model.")
+        instance.check(instance.library.restore(instance.address, self._memory))
+
+
+def _drop(instance: Instance, memory: Any) -> None:
+    instance.library.drop(instance.address, ctypes.byref(memory))

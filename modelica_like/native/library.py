@@ -1,0 +1,70 @@
+"""The compiled run-time as functions: what `native.c` exports, by ctypes, which lets other threads run meanwhile."""
+
+from __future__ import annotations
+
+import ctypes as c
+from functools import cache
+from typing import Any
+
+from modelica_like.fmi.build import native_platform
+from modelica_like.fmi.runtime import runtime_library
+
+OK, FAILED, MORE = 0, 1, 2
+"""What functions return; MORE: a buffer is full, or it is time for a breath."""
+MESSAGE_LENGTH = 512
+
+_POINTER, _COUNT, _NUMBER, _CODE = c.c_void_p, c.c_int64, c.c_double, c.c_int
+
+
+_ARRAYS = ("times", "states", "outputs", "modes", "firsts", "events", "impacts", "references")
+
+
+class Run(c.Structure):
+    """`NativeRun` in native.c."""
+
+    _fields_ = [
+        *((name, _POINTER) for name in _ARRAYS),
+        *((name, _COUNT) for name in ("n_outputs", "steps")),
+        *((f"room_{name}", _COUNT) for name in ("points", "segments", "events", "impacts")),
+        *((f"n_{name}", _COUNT) for name in ("points", "segments", "events", "impacts")),
+        *((name, _COUNT) for name in ("next", "first")),
+        ("begin", _NUMBER),
+        ("last", _NUMBER),
+    ]
+
+
+_SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
+    "open": (_POINTER, [c.c_char_p, c.c_size_t, c.c_char_p]),
+    "close": (None, [_POINTER]),
+    "new": (_POINTER, [_POINTER]),
+    "free": (None, [_POINTER]),
+    "message": (c.c_char_p, [_POINTER]),
+    "reset": (_CODE, [_POINTER, *4 * [_NUMBER]]),
+    "set": (_CODE, [_POINTER, _COUNT, _POINTER, _POINTER]),
+    "set_all": (None, 3 * [_POINTER]),
+    "get": (_CODE, [_POINTER, _COUNT, _POINTER, _POINTER]),
+    "begin": (_CODE, [_POINTER]),
+    "begin_at": (_CODE, 4 * [_POINTER]),
+    "time": (_NUMBER, [_POINTER]),
+    "step": (_CODE, [_POINTER, _NUMBER, _COUNT, _POINTER, _POINTER, _COUNT, _POINTER, _POINTER]),
+    "copy": (_CODE, [_POINTER, c.POINTER(_POINTER)]),
+    "restore": (_CODE, 2 * [_POINTER]),
+    "drop": (None, [_POINTER, c.POINTER(_POINTER)]),
+    "counts": (None, 2 * [_POINTER]),
+    "run": (_CODE, [_POINTER, _NUMBER, _COUNT, c.POINTER(Run)]),
+}
+
+
+@cache
+def library() -> Any:
+    """Load the run-time of this machine; its functions have the names of native.c without the prefix.
+
+    Raises:
+        ExportError: it must be compiled, and there is no compiler, or the compiler failed.
+    """
+    loaded = c.CDLL(str(runtime_library(native_platform())))
+    for name, (result, arguments) in _SIGNATURES.items():
+        function = getattr(loaded, f"native_{name}")
+        function.restype, function.argtypes = result, arguments
+        setattr(loaded, name, function)
+    return loaded

@@ -1,0 +1,143 @@
+"""Compiled models as the run-time reads them, and instances of them."""
+
+from __future__ import annotations
+
+import ctypes
+import re
+import weakref
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from modelica_like.compile.compiled import CompiledDae, Vector
+from modelica_like.errors import (
+    Chattering,
+    ContradictingStart,
+    InitializationError,
+    ModelicaLikeError,
+    SingularAtStart,
+    StepFailed,
+    UnknownName,
+    ValueOutOfRange,
+    did_you_mean,
+)
+from modelica_like.fmi.interface import FmuVariable, interface
+from modelica_like.fmi.model_file import model_file
+from modelica_like.fmi.tables import make_tables
+from modelica_like.initialize import Point, StartKind
+from modelica_like.native.library import MESSAGE_LENGTH, OK, library
+from modelica_like.solve.options import Options
+
+_ERRORS: tuple[tuple[str, type[ModelicaLikeError]], ...] = (
+    ("The integrator gave up", StepFailed),
+    ("Modes still switch|Events follow each other", Chattering),
+    ("The Jacobian is singular|The derivative of .* is not finite", SingularAtStart),
+    ("Two start values|A start value of", ContradictingStart),
+    ("The equations for|No start|No steady|The modes at the start", InitializationError),
+)
+"""Which error a message of the run-time is; all others are wrong values."""
+
+
+def failure(message: str) -> ModelicaLikeError:
+    """Return a message of the run-time as the error that Python raises for the same: what, then what to do."""
+    kind = next((kind for pattern, kind in _ERRORS if re.match(pattern, message)), ValueOutOfRange)
+    what, _, advice = message.partition(". ")
+    return kind(f"{what.removesuffix('.')}.", advice=advice)
+
+
+class NativeModel:
+    """A model that the run-time has read; instances in all threads share it.
+
+    Args:
+        model: the compiled model.
+        start: what its instances begin from when they find the start themselves; by default as the netlist says.
+
+    Raises:
+        MissingStart, ContradictingStart: the start values do not determine all states.
+        ExportError: there is no library, and none can be compiled.
+        LanguageError: a function has no counterpart in C.
+    """
+
+    def __init__(self, model: CompiledDae, start: StartKind | None = None) -> None:
+        twin = replace(model, settings={**model.settings, **({"start": start} if start else {})})
+        variables = interface(twin).variables
+        data = model_file(make_tables(twin), variables, "{native}", Options.rtol)
+        self.library = library()
+        message = ctypes.create_string_buffer(MESSAGE_LENGTH)
+        self.address = self.library.open(data, len(data), message)
+        if not self.address:
+            raise ModelicaLikeError(message.value.decode())
+        weakref.finalize(self, self.library.close, self.address)
+        self.variables = {one.name: one for one in variables}
+        self.name, self.sizes = model.name, (len(model.states), len(model.implicit), model.discrete_size)
+
+    @staticmethod
+    def of(model: CompiledDae, start: StartKind | None = None) -> NativeModel:
+        """Return the one that was made before of the same model, whatever its parameters were."""
+        kind = start or model.settings.get("start", "given")
+        if ("native", kind) not in model._cache:
+            model._cache["native", kind] = NativeModel(model, kind)
+        return model._cache["native", kind]
+
+    def references(self, names: Iterable[str]) -> np.ndarray[Any, np.dtype[np.uint32]]:
+        """Return the value references of variables.
+
+        Raises:
+            UnknownName: there is no such variable.
+        """
+        found: list[FmuVariable] = []
+        for name in names:
+            if name not in self.variables:
+                raise UnknownName(f"{self.name} has no variable '{name}'{did_you_mean(name, self.variables) or '.'}")
+            found.append(self.variables[name])
+        return np.array([one.reference for one in found], np.uint32)
+
+
+class Instance:
+    """An instance of a model: memory, a state, functions of the run-time whose failures are raised.
+
+    Args:
+        model: the compiled model; its parameters and inputs are those of the instance.
+        start: as of `NativeModel`.
+    """
+
+    def __init__(self, model: CompiledDae, start: StartKind | None = None) -> None:
+        self.model, self.native = model, NativeModel.of(model, start)
+        self.library = self.native.library
+        self.address = self.library.new(self.native.address)
+        if not self.address:
+            raise MemoryError(f"There is no memory for an instance of {model.name}.")
+        # The model must outlive it.
+        weakref.finalize(self, _free, self.library, self.address, self.native)
+
+    def check(self, code: int) -> None:
+        """Raise what a call has failed with."""
+        if code != OK:
+            raise failure(self.library.message(self.address).decode())
+
+    def reset(self, t0: float, end: float, rtol: float, atol: float) -> None:
+        """Begin anew at a time in s, with the model's parameters and inputs; `end` may be infinite."""
+        self.check(self.library.reset(self.address, t0, end, rtol, atol))
+        self.library.set_all(self.address, _at(self.model.p), _at(self.model.u))
+
+    def begin_at(self, point: Point) -> None:
+        """Begin at a consistent start; its events have not happened yet."""
+        arrays = [np.ascontiguousarray(part, dtype=float) for part in (point.x, point.z, point.d)]
+        self.check(self.library.begin_at(self.address, *(_at(one) for one in arrays)))
+
+    def counts(self) -> tuple[int, int, int, int]:
+        """Steps, rejected steps, evaluations of the equations, and mode changes since the reset."""
+        found = np.zeros(4)
+        self.library.counts(self.address, _at(found))
+        steps, rejected, evaluations, events = (int(one) for one in found)
+        return steps, rejected, evaluations, events
+
+
+def _free(loaded: Any, address: int, _: NativeModel) -> None:
+    loaded.free(address)
+
+
+def _at(array: Vector) -> int:
+    return array.ctypes.data

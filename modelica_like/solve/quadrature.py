@@ -1,0 +1,77 @@
+"""Rules of high order over the results of a run, for each interval between two of them."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from modelica_like.compile.compiled import Vector
+
+Places = np.ndarray[Any, np.dtype[Any]]
+"""Positions of results or intervals, or which of them are meant."""
+_WIDTH = 8
+"""Results of the widest rule; its order."""
+_ORDERS = np.array([0, 2, 4])
+"""By how much the orders of the rules are lower."""
+_UNIFORM, _ROUNDING = 1e-9, 1e-15
+
+
+def rules(times: Vector, first: Places, last: Places) -> tuple[Places, Places, Vector]:
+    """Return three rules of falling order for each interval that takes time.
+
+    Args:
+        times: of results, in smooth pieces, shape (n,).
+        first: the first result of the piece each one belongs to, shape (n,).
+        last: its last result, shape (n,).
+
+    Returns:
+        The m intervals by the result before; the results that count for each, shape (m, 8); their weights, in s, shape
+        (m, 3, 8).
+    """
+    steps = np.diff(times, append=times[-1])
+    k = np.flatnonzero((np.arange(len(times)) < last) & (steps > 0))
+    first, last = first[k], last[k]
+    sizes = np.minimum(last - first + 1, _WIDTH)
+    starts = np.clip(k - (sizes - 1) // 2, first, last + 1 - sizes)
+    places = np.minimum(starts[:, None] + np.arange(_WIDTH), last[:, None])
+    offsets = k - starts
+    weights = _equidistant()[sizes, offsets]
+    # Times are rounded themselves.
+    uneven = np.abs(np.diff(steps)) > _UNIFORM * steps[:-1] + _ROUNDING * np.abs(times[:-1])
+    before = np.append(0, np.cumsum(uneven))
+    odd = np.flatnonzero(before[np.maximum(starts + sizes - 2, starts)] != before[starts])
+    now = (times[places[odd]] - times[k[odd]][:, None]) / steps[k[odd]][:, None]
+    weights[odd] = _rules(now, sizes[odd], offsets[odd])
+    return k, places, weights * steps[k][:, None, None]
+
+
+@cache
+def _equidistant() -> Vector:
+    """Weights over equidistant results, by their number and the place of the interval among them."""
+    sizes, offsets = (part.ravel() for part in np.indices((_WIDTH + 1, _WIDTH)))
+    those = offsets < sizes - 1
+    table = np.zeros((len(those), len(_ORDERS), _WIDTH))
+    table[those] = _rules(np.arange(float(_WIDTH)) - offsets[those, None], sizes[those], offsets[those])
+    return table.reshape(_WIDTH + 1, _WIDTH, len(_ORDERS), _WIDTH)
+
+
+def _rules(places: Vector, sizes: Places, offsets: Places) -> Vector:
+    """Weights of integrals from 0 to 1 over the first `sizes` places, of which `offsets` is 0; (m, 8), (m, 3, 8)."""
+    fewer = np.maximum(sizes[:, None] - _ORDERS, 1)
+    starts = np.clip(offsets[:, None] - (fewer - 1) // 2, 0, sizes[:, None] - fewer)
+    found = np.zeros((len(places), len(_ORDERS), _WIDTH))
+    for count in np.flatnonzero(np.bincount(fewer.ravel())):
+        row, order = np.nonzero(fewer == count)
+        columns = starts[row, order][:, None] + np.arange(count)
+        found[row[:, None], order[:, None], columns] = _weights(places[row[:, None], columns])
+    return found
+
+
+def _weights(places: Vector) -> Vector:
+    """Weights of the integral from 0 to 1 of the polynomials through values at some places; shapes (m, size)."""
+    powers = np.arange(places.shape[1])
+    scale = np.maximum(np.max(np.abs(places), axis=1, keepdims=True), 1.0)
+    moments = scale**-powers / (powers + 1.0)
+    return np.linalg.solve((places / scale)[:, None, :] ** powers[None, :, None], moments[:, :, None])[:, :, 0]

@@ -1,0 +1,89 @@
+"""Files are written beside their place and put there when they are whole."""
+
+from __future__ import annotations
+
+import errno
+import os
+import secrets
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+
+@contextmanager
+def replacing(path: str | Path) -> Iterator[Path]:
+    """Yield a file to write that takes the place of `path` at the end: a full disk or an interrupt leaves that whole.
+
+    Args:
+        path: the file; its folder is made if it does not exist. Pipes and devices are written as they are.
+
+    Raises:
+        OSError: it cannot be written; its `filename` is the path.
+    """
+    check_writable(path)
+    # A link goes on pointing where it points.
+    target = Path(os.path.realpath(path))
+    beside = target.is_file() or not target.exists()
+    draft = target.with_name(f".{secrets.token_hex(4)}{target.suffix}") if beside else target
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        yield draft
+        if beside:
+            if target.exists():
+                shutil.copymode(target, draft)
+            draft.replace(target)
+    except OSError as error:
+        if error.filename is not None and os.fspath(error.filename) != os.fspath(draft):
+            raise
+        raise _refused(path, error.errno or errno.EIO, error.strerror or str(error)) from error
+    finally:
+        if beside:
+            draft.unlink(missing_ok=True)
+
+
+def write_bytes(path: str | Path, content: bytes) -> None:
+    """Write a file whole or not at all.
+
+    Raises:
+        OSError: it cannot be written.
+    """
+    with replacing(path) as draft:
+        draft.write_bytes(content)
+
+
+def write_text(path: str | Path, text: str) -> None:
+    """Write a text file as UTF-8, whole or not at all.
+
+    Raises:
+        OSError: it cannot be written.
+    """
+    write_bytes(path, text.encode())
+
+
+def check_writable(path: str | Path) -> None:
+    """Tell before any work is done why a file cannot be written, as far as that can be known.
+
+    Raises:
+        OSError: it is a folder, its folder is a file, or nothing can be written there.
+    """
+    target = Path(os.path.realpath(path))
+    if target.is_dir():
+        raise _refused(path, errno.EISDIR)
+    if target.exists() and not os.access(target, os.W_OK):
+        raise _refused(path, errno.EACCES)
+    if target.exists() and not target.is_file():
+        return
+    given = target if Path(path).is_symlink() else Path(path)
+    folder = next(one for one in given.parents if one.exists())
+    if not folder.is_dir():
+        raise _refused(folder, errno.ENOTDIR)
+    try:
+        tempfile.TemporaryFile(dir=folder).close()
+    except OSError as error:
+        raise _refused(folder, error.errno or errno.EACCES, error.strerror or "") from error
+
+
+def _refused(path: str | Path, code: int, text: str = "") -> OSError:
+    return OSError(code, text or os.strerror(code), os.fspath(path))

@@ -1,0 +1,225 @@
+"""Ctrl-C and failures: what was computed is kept, what was not finished is not there, and the exit code says so."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from modelica_like.analyse.calibration.calibrate import Numbers, calibrate
+from modelica_like.analyse.sweeps.sweep import sweep
+from modelica_like.cosimulation.run import cosim
+from modelica_like.cosimulation.split import split
+from modelica_like.fmi.export import export_fmu
+
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals to oneself")
+
+DRIVE = Path(__file__).parents[2] / "examples" / "two_mass.toml"
+# A command in whose progress Ctrl-C is pressed once.
+PRESSED = """
+import os, signal, sys
+from modelica_like.report import progress
+pressed, moment = [], float(sys.argv.pop(1))
+def press(self, reached, *of):
+    if reached >= moment and not pressed:
+        pressed.append(reached)
+        os.killpg(os.getpgrp(), signal.SIGINT)
+progress.Bar.__call__ = progress.RunsBar.__call__ = press
+from modelica_like.cli import main
+main()
+"""
+
+
+def command(folder: Path, *words: str) -> "subprocess.CompletedProcess[str]":
+    """Run a command with its children in a process group of its own, as a terminal does."""
+    return subprocess.run(
+        [sys.executable, *words], cwd=folder, capture_output=True, text=True, check=False, timeout=120,
+        start_new_session=True,
+    )  # fmt: skip
+
+
+def test_an_interrupted_simulation_keeps_what_there_is(tmp_path: Path) -> None:
+    words = ("simulate", str(DRIVE), "--until", "20 s", "--points", "20000")
+    result = command(tmp_path, "-c", PRESSED, "5", *words, "--csv", "run.csv", "--plot", "run.png")
+    assert result.returncode == 130
+    told = re.fullmatch(
+        r"Interrupted\. What was computed up to t = ([0-9.]+) s is in run\.csv, run\.png\.\n", result.stderr
+    )
+    assert told is not None, result.stderr
+    table = np.genfromtxt(tmp_path / "run.csv", delimiter=",", names=True)
+    assert table["time"][-1] == pytest.approx(float(told[1]), rel=1e-5)
+    assert 5.0 <= table["time"][-1] < 20.0
+    assert (tmp_path / "run.png").read_bytes()[:4] == b"\x89PNG"
+    assert "two_mass  0 s to" in result.stdout
+    assert "energy" not in result.stdout
+
+
+def test_an_interrupted_simulation_says_what_is_lost(tmp_path: Path) -> None:
+    result = command(tmp_path, "-c", PRESSED, "5", "simulate", str(DRIVE), "--until", "20 s", "--points", "20000")
+    assert result.returncode == 130
+    assert result.stderr.endswith(" s is lost: no --csv or --plot was asked for.\n")
+    assert result.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize("processes", ["1", "2"])
+def test_an_interrupted_sweep_records_nothing_false(processes: str, tmp_path: Path) -> None:
+    words = ("sweep", str(DRIVE), "--over", "J1.J=0.01:0.03:120", "--of", "J2.w", "--until", "0.2 s")
+    keep = ("--processes", processes, "--checkpoint", "runs.zarr", "-o", "table.csv")
+    result = command(tmp_path, "-c", PRESSED, "25", *words, *keep)
+    assert result.returncode == 130, result.stderr
+    told = re.fullmatch(
+        r"Interrupted\. (\d+) of 120 runs are in runs\.zarr: the same sweep goes on there\.\n", result.stderr
+    )
+    assert told is not None, result.stderr
+    assert 25 <= int(told[1]) < 120
+    assert not (tmp_path / "table.csv").exists()
+    counts = []
+    found = sweep(
+        DRIVE, {"J1.J": np.linspace(0.01, 0.03, 120)}, ["J2.w"], until="0.2 s", checkpoint=tmp_path / "runs.zarr",
+        processes=1, progress=lambda done, total: counts.append(done),
+    )  # fmt: skip
+    assert counts[0] == int(told[1]) + 25
+    assert found["failure"].to_numpy().tolist() == [""] * 120
+    whole = sweep(DRIVE, {"J1.J": np.linspace(0.01, 0.03, 120)}, ["J2.w"], until="0.2 s", processes=1)
+    np.testing.assert_array_equal(found["J2.w"], whole["J2.w"])
+
+
+def test_an_interrupted_sweep_without_a_checkpoint(tmp_path: Path) -> None:
+    words = ("sweep", str(DRIVE), "--over", "J1.J=0.01:0.03:50", "--of", "J2.w", "--until", "0.01 s")
+    result = command(tmp_path, "-c", PRESSED, "25", *words)
+    assert (result.returncode, result.stderr) == (
+        130,
+        "Interrupted. 25 of 50 runs are lost without a checkpoint.\n",
+    )
+
+
+FAILING = """
+[parts]
+up = { is = "Constant", k = 1 }
+torque = { is = "Torque" }
+a = { is = "Inertia", J = 1, phi = 0, w = 0 }
+blow = { is = "blow:Blow", x = 1 }
+[series]
+s = ["torque", "a"]
+[connect]
+c = ["up.y", "torque.tau"]
+[simulate]
+until = "2 s"
+"""
+BLOW = """
+from modelica_like.language import *
+
+class Blow(Component):
+    x: Variable = var("1", "grows without bound at 1 s")
+    T: Parameter = param("s", "time", default=1.0)
+    large = Mode("no", "yes")
+
+    def equations(self):
+        yield self.T * der(self.x) == self.x**2
+
+    def events(self):
+        yield self.large.go("no", "yes", when=self.x > 2)
+"""
+
+
+def test_a_failed_simulation_keeps_what_there_is(tmp_path: Path) -> None:
+    """x = 1/(1 - t): the integrator gives up at 1 s; results up to there are those of the closed form."""
+    (tmp_path / "drive.toml").write_text(FAILING)
+    (tmp_path / "blow.py").write_text(BLOW)
+    result = command(tmp_path, "-m", "modelica_like", "simulate", "drive.toml", "--csv", "run.csv")
+    assert result.returncode == 1
+    assert result.stderr.startswith("IDAS gave up at about t = ")
+    told = re.search(r"\nWhat was computed up to t = ([0-9.]+) s is in run\.csv\.\n$", result.stderr)
+    assert told is not None, result.stderr
+    table = np.genfromtxt(tmp_path / "run.csv", delimiter=",", names=True)
+    assert 0.9 < table["time"][-1] == pytest.approx(float(told[1]), rel=1e-5)
+    np.testing.assert_allclose(table["aw"], table["time"], rtol=0, atol=1e-6)
+    np.testing.assert_allclose(1 / table["blowx"], 1 - table["time"], rtol=0, atol=1e-5)
+    assert re.search(r"0\.[45]\d* +blow\.large +no +yes", result.stdout)
+
+
+BROKEN = """
+import sys
+from modelica_like.solve.solution import Solution
+from modelica_like.errors import SolveError
+def energy(self):
+    raise {error}
+Solution.energy = energy
+from modelica_like.cli import main
+main()
+"""
+
+
+@pytest.mark.parametrize(
+    ("error", "reason"),
+    [('SolveError("The powers cannot be integrated.")', "The powers cannot be integrated."), ("StopIteration", "Stop")],
+)
+def test_a_run_whose_balance_fails_is_a_run(error: str, reason: str, tmp_path: Path) -> None:
+    words = ("simulate", str(DRIVE), "--until", "0.01", "--csv", "run.csv", "--sankey", "flow.png", "--plot", "run.png")
+    result = command(tmp_path, "-c", BROKEN.format(error=error), *words)
+    assert result.returncode == 0
+    assert f"The energy balance could not be made: {reason}" in result.stderr
+    assert f"The picture flow.png could not be made: {reason}" in result.stderr
+    assert " steps, " in result.stdout
+    assert {one.name for one in tmp_path.iterdir()} == {"run.csv", "run.png"}
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        (["--plot", "x.foo"], "'x.foo': a picture can be avif, "),
+        (["--sankey", "x.foo"], "'x.foo': a picture can be avif, "),
+        (["--plot", "x.png", "--show", "nix.*"], "two_mass has no variable 'nix.*'."),
+        (["--csv", "x.xls"], "'x.xls': a table can be .csv, .parquet, .nc."),
+        (["--csv", "/proc/x.csv"], "/proc: No such file or directory."),
+        (["--csv", "file/x.csv"], "Not a directory."),
+        (["--csv", "folder.csv"], "folder.csv: Is a directory."),
+    ],
+)
+def test_options_are_checked_before_the_run(options: list[str], told: str, tmp_path: Path) -> None:
+    """The run itself would take hours."""
+    (tmp_path / "file").write_text("")
+    (tmp_path / "folder.csv").mkdir()
+    result = command(tmp_path, "-m", "modelica_like", "simulate", str(DRIVE), "--until", "1e6 s", *options)
+    assert (result.returncode, result.stdout) == (2, "")
+    assert told in result.stderr
+
+
+# -- in Python ---------------------------------------------------------------------------------------------------------
+
+
+def press(*_: object) -> None:
+    os.kill(os.getpid(), signal.SIGINT)
+
+
+def test_an_interrupted_export_leaves_the_old_fmu(tmp_path: Path) -> None:
+    path = tmp_path / "drive.fmu"
+    path.write_text("old")
+    for moment in ("compiling the model", "checking"):
+        with pytest.raises(KeyboardInterrupt):
+            export_fmu(DRIVE, path, platforms=(), report=lambda what, moment=moment: what == moment and press())
+    assert path.read_text() == "old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_an_interrupted_cosimulation_ends_its_process(tmp_path: Path) -> None:
+    system = split(DRIVE, "shaft", tmp_path, names=("motor", "wheel"), check=False).path
+    with pytest.raises(KeyboardInterrupt):
+        cosim(system, "1000 s", step="0.1 ms", progress=press)
+    children = subprocess.run(["pgrep", "-P", str(os.getpid()), "-f", "cosimulation/child.py"], check=False)
+    assert children.returncode == 1
+
+
+def test_an_interrupted_calibration_is_no_failed_start() -> None:
+    class Interrupted(Numbers):
+        def residuals(self, *_: object) -> tuple[object, object]:
+            press()
+            raise AssertionError
+
+    data = Interrupted({"J2.w": (1.0, 0.1)}, until=0.01)
+    with pytest.raises(KeyboardInterrupt):
+        calibrate(DRIVE, data, {"J1.J": (0.01, 0.03)}, starts=3)

@@ -1,0 +1,103 @@
+"""Model Exchange in an importer like most written in C: SUNDIALS CVODE with roots, restarted only when told to."""
+
+import ctypes
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from modelica_like import simulate
+
+sundae: Any = pytest.importorskip("sksundae.cvode")
+DRIVES = [
+    "machine_table_direct", "machine_table_geared", "machine_tool_startup", "ravigneaux", "lepelletier", "dc_bench",
+    "stick_slip", "two_mass", "msl/rotational/CoupledClutches", "msl/rotational/LossyGearDemo1",
+    "msl/rotational/Backlash", "msl/rotational/Friction", "msl/rotational/OneWayClutch",
+    "msl/rotational/SimpleGearShift", "msl/translational/Friction", "../tests/system/new_drives/winch",
+]  # fmt: skip
+POINTS = 200
+RTOL = 1e-8
+AGREEMENT = 1e-4
+ROOT = 2  # CV_ROOT_RETURN
+BESIDE = 1e-6  # s; what jumps at an event is compared further away from it
+
+
+class Importer:
+    """An instance of FMI 2.0 under CVODE."""
+
+    def __init__(self, fmu: Any, states: int, guards: int) -> None:
+        self.fmu, self.states, self.guards = fmu, states, guards
+        self.time = 0.0
+        self.update()
+        self.nominals = self.get("fmi2GetNominalsOfContinuousStates", states)
+        self.restart()
+
+    def get(self, name: str, count: int) -> Any:
+        values = (ctypes.c_double * count)()
+        getattr(self.fmu, name)(self.fmu.component, values, count)
+        return np.array(values)
+
+    def move(self, time: float, x: Any) -> None:
+        self.fmu.setTime(time)
+        self.fmu.fmi2SetContinuousStates(self.fmu.component, (ctypes.c_double * len(x))(*x), len(x))
+
+    def rates(self, time: float, x: Any, result: Any) -> None:
+        self.move(time, x)
+        result[:] = self.get("fmi2GetDerivatives", self.states)
+
+    def indicators(self, time: float, x: Any, result: Any) -> None:
+        self.move(time, x)
+        result[:] = self.get("fmi2GetEventIndicators", self.guards)
+
+    def update(self) -> bool:
+        """Handle the events of this instant; return whether the FMU says that its states have changed."""
+        _, _, _, changed, defined, moment = self.fmu.newDiscreteStates()
+        self.moment = moment if defined else np.inf
+        self.fmu.enterContinuousTimeMode()
+        return changed
+
+    def restart(self) -> None:
+        roots = {"eventsfn": lambda t, x, g: self.indicators(t, x, g), "num_events": self.guards} if self.guards else {}
+        weights = RTOL / 100 * self.nominals
+        self.solver = sundae.CVODE(self.rates, rtol=RTOL, atol=weights, max_num_steps=100_000, **roots)
+        self.solver.init_step(self.time, self.get("fmi2GetContinuousStates", self.states))
+
+    def go(self, until: float) -> None:
+        while self.time < until:
+            target = min(until, self.moment)
+            found = self.solver.step(target, tstop=target) if target > self.time else None
+            if found is not None:
+                assert found.success, f"t = {self.time:.12g} s: {found.message}"
+                self.time = float(found.t)
+                self.move(self.time, found.y)
+            due = self.time >= self.moment or (found is not None and found.status == ROOT)
+            if self.fmu.completedIntegratorStep()[0] or due:
+                self.fmu.enterEventMode()
+                if self.update():
+                    self.restart()
+
+
+@pytest.mark.parametrize("netlist", DRIVES)
+def test_agrees_with_idas(exported: Callable[..., Any], netlist: str) -> None:
+    case = exported(f"{netlist}.toml")
+    model = case.model
+    truth = simulate(model, rtol=1e-9, atol=1e-11)
+    until = float(truth.time[-1])
+    outputs = [one for one in case.face.variables if one.reference in case.face.outputs and not one.modes]
+    names = [*outputs, *(one for one in case.face.variables if one.slot[0] == "state" and one.name in model.position)]
+    importer = Importer(case.started("me", until=until), len(model.states), model.guards.numel_out(0))
+    events = [one.time for one in truth.events]
+    instants = [t for t in np.linspace(0, until, POINTS + 1)[1:] if all(abs(t - e) > BESIDE for e in events)]
+    found = []
+    for instant in instants:
+        importer.go(instant)
+        found.append(importer.fmu.getReal([one.reference for one in names]))
+    rows = [truth.at(t) for t in instants]
+    worst = {}
+    for one, column in zip(names, np.transpose(found), strict=True):
+        exact = truth[one.name]
+        size = np.ptp(exact) + 1e-3 * np.max(np.abs(exact)) + 1e-6 * (one.nominal or 1.0)
+        worst[one.name] = float(np.max(np.abs(column - [row[one.name] for row in rows])) / size)
+    culprit = max(worst, key=worst.__getitem__)
+    assert worst[culprit] <= AGREEMENT, f"{culprit}: {worst[culprit]:.2g} of its range"
