@@ -81,8 +81,10 @@ static Result go_on(Instance *c, double limit, int *fired) {
 
 static Result one_step(Instance *c, double end) {
     State *s = &c->state;
-    int fired = 0;
+    int fired = 0, event;
     c->budget = BUDGET;
+    if (take_changes(c, &event) != RESULT_OK) return RESULT_ERROR;
+    s->at_event |= event;
     if (s->at_event && fire_here(c, &fired) != RESULT_OK) return RESULT_ERROR;
     while (s->t < end) {
         double moment = c->budget >= 2 ? next_moment(c) : INFINITY;
@@ -95,19 +97,15 @@ static Result one_step(Instance *c, double end) {
     return RESULT_OK;
 }
 
-/* Goes to `target`, a whole number of fixed steps away (see check_step). */
+/* Goes to `target`, a whole number of fixed steps away (see check_step), or to where the importer wants to stop. */
 Arrival step_fixed(Instance *c, double target) {
-    State *s = &c->state;
-    double begin = s->t, h = c->model->settings->fixed_step;
-    int n = (int)(0.5 + (target - begin) / h), event, done = 1;
+    double begin = c->state.t, h = c->model->settings->fixed_step, until = target;
+    int n = (int)(0.5 + (target - begin) / h), done = 1;
     c->bounded = 1;
-    if (take_changes(c, &event) == RESULT_OK) {
-        s->at_event |= event;
-        for (int k = 1; k <= n && done; k++) {
-            done = one_step(c, k < n ? begin + k * h : target) == RESULT_OK;
-            if (done && c->step_finished != NULL && c->step_finished(c) <= s->t) break;
-        }
-    } else done = 0;
+    for (int k = 1; k <= n && done && c->state.t < until; k++) {
+        done = one_step(c, k < n ? begin + k * h : target) == RESULT_OK;
+        if (done && c->step_finished != NULL) until = fmin(until, c->step_finished(c));
+    }
     c->bounded = 0;
     return done ? REACHED : FAILED;
 }
