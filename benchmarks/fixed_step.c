@@ -1,8 +1,8 @@
 /* Times every fixed step of an FMU whose sources are compiled with this file: see fixed_step.py.
  *
  * Arguments: step size, end time, steps in all, repeats. Runs differ in the step size (up to 10 % less), so that events
- * fall at other places within a step. Every run is repeated; of a step the shortest time counts, as the machine
- * interrupts here and there, but the run does the same each time. Prints median, 99.99 % and longest in s.
+ * fall at other places within a step. All runs are repeated one after the other; of a step the shortest time counts, as
+ * the machine interrupts here and there, but a run does the same each time. Prints median, 99.99 % and longest in s.
  */
 #define _POSIX_C_SOURCE 199309L
 #include <stdio.h>
@@ -58,16 +58,20 @@ static void run(double h, size_t n, double *shortest) {
 
 int main(int count, char **given) {
     double step = count == 5 ? atof(given[1]) : 0, end = count == 5 ? atof(given[2]) : 0, *times;
-    size_t wanted = count == 5 ? (size_t)atof(given[3]) : 0, done = 0, least = (size_t)(end / step);
+    size_t wanted = count == 5 ? (size_t)atof(given[3]) : 0, least = (size_t)(end / step), size, done = 0;
     must(count == 5 && wanted > 0 && least > 0, "reading arguments");
-    times = malloc((wanted + 2 * least) * sizeof *times);
+    size = wanted + 2 * least;
+    times = malloc(size * sizeof *times);
     must(times != NULL, "malloc");
-    for (srand(1); done < wanted;) {
-        double h = step * (1 - 0.1 * rand() / RAND_MAX);
-        size_t n = (size_t)(end / h);
-        for (size_t k = 0; k < n; k++) times[done + k] = 1e30;
-        for (int repeat = 0; repeat < atoi(given[4]); repeat++) run(h, n, times + done);
-        done += n;
+    for (size_t k = 0; k < size; k++) times[k] = 1e30;
+    for (int repeat = 0; repeat < atoi(given[4]); repeat++) {
+        srand(1);
+        for (done = 0; done < wanted;) {
+            double h = step * (1 - 0.1 * rand() / RAND_MAX);
+            size_t n = (size_t)(end / h);
+            run(h, n, times + done);
+            done += n;
+        }
     }
     qsort(times, done, sizeof *times, by_size);
     printf("%zu %g %g %g\n", done, times[done / 2], times[(size_t)(0.9999 * (double)done)], times[done - 1]);

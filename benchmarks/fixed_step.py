@@ -58,7 +58,7 @@ def main() -> None:
     for name in asked:
         count, median, most, worst = timed(HERE.parent / f"{NETLISTS[name]}.toml", steps)
         times = "".join(f" {1e6 * value:6.2f} µs" for value in (median, most, worst))
-        print(f"{name:16} {count:9.0f}{times} {worst / median:13.2f}")
+        print(f"{name:16} {count:9.0f}{times} {worst / median:13.2f}", flush=True)
 
 
 if __name__ == "__main__":
