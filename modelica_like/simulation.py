@@ -131,7 +131,8 @@ def _loop(solver: str) -> Any:
 def _solution(loop: Any, begin: float) -> Solution:
     """Return what a loop has computed since it began."""
     record, elapsed = loop.record, time.perf_counter() - begin
-    statistics = Statistics(*loop.counts[:3], len(record.events), elapsed)
+    steps, evaluations, integrations = loop.counts
+    statistics = Statistics(steps, evaluations, integrations, len(record.events), elapsed)
     return Solution(
         loop.model, loop.options, tuple(record.segments), tuple(record.events), statistics, tuple(record.impacts),
         tuple(record.notices),

@@ -21,7 +21,7 @@
  * or a parabola where no rates are known at the begin. */
 static double first_zero(const Instance *c, const double *first, int rates_known) {
     int n = c->model->n_guards;
-    const double *last = c->work.guards_before;
+    const double *last = c->work.looks;
     double part = 1, h = c->piece->end - c->piece->begin;
     for (int g = 0; g < n; g++) {
         double g0, r0, r1 = isfinite(last[n + g]) ? h * last[n + g] : 0;
@@ -30,7 +30,7 @@ static double first_zero(const Instance *c, const double *first, int rates_known
         r0 = rates_known ? h * first[n + g] : 2 * (last[g] - g0) - r1;
         part = fmin(part, cubic_guess(g0, isfinite(r0) ? r0 : 0, last[g], r1) + BEHIND);
     }
-    memcpy(c->work.guards_before + 2 * n, first, (size_t)n * sizeof(double));
+    memcpy(c->work.looks + 2 * n, first, (size_t)n * sizeof(double));
     return part;
 }
 
@@ -38,7 +38,7 @@ static double first_zero(const Instance *c, const double *first, int rates_known
  * the end. */
 static double next_zero(Instance *c, double before, double part, double behind) {
     int n = c->model->n_guards;
-    double *last = c->work.guards_before, *first = last + 2 * n, *now = c->work.guards, next = 1;
+    double *last = c->work.looks, *first = last + 2 * n, *now = c->work.guards, next = 1;
     for (int g = 0; g < n; g++) {
         double v0 = fmin(number_or_false(first[g]), 0), v1 = fmin(number_or_false(now[g]), 0), slope, bend, zero;
         if (!guard_active(c, g) || !(number_or_false(last[g]) > 0)) continue;
@@ -57,14 +57,14 @@ static double first_crossing(Instance *c, int behind_event) {
     const Model *m = c->model;
     Piece *piece = c->piece;
     int n = m->n_guards, any = 0;
-    double *last = c->work.guards_before;
+    double *last = c->work.looks;
     evaluate(c, &m->tapes.guards, piece->end, last_of(m, piece), last_of(m, piece) + m->n_x, last);
     for (int g = 0; g < n; g++) any |= guard_active(c, g) && number_or_false(last[g]) > 0;
     if (any && behind_event) return first_zero(c, c->work.guards, 0); /* as the last round has left them */
     if (any && !c->state.looked)
-        evaluate(c, &m->tapes.guards, piece->begin, piece->points, piece->points + m->n_x, c->looks);
-    if (any) return first_zero(c, c->looks, 1);
-    memcpy(c->looks, last, 2 * (size_t)n * sizeof(double));
+        evaluate(c, &m->tapes.guards, piece->begin, piece->points, piece->points + m->n_x, c->end_look);
+    if (any) return first_zero(c, c->end_look, 1);
+    memcpy(c->end_look, last, 2 * (size_t)n * sizeof(double));
     c->state.looked = 1;
     return QUIET;
 }
