@@ -1,6 +1,6 @@
 """How evenly fixed steps of 1 ms take their time: median and worst case over a million steps, events at random phases.
 
-Run with `python benchmarks/fixed_step.py [name …] [--steps=1e6]`; it takes a C compiler and about five minutes. Every
+Run with `python benchmarks/fixed_step.py [name …] [--steps=1e6]`; it takes a C compiler and about ten minutes. Every
 step is timed by a C program (`fixed_step.c`) around `fmi2DoStep`; of several repeats of the same step the shortest
 counts, which tells apart what the machine does besides.
 """
@@ -30,7 +30,7 @@ NETLISTS = {
     "winch": "tests/system/new_drives/winch",
     "Lepelletier": "examples/lepelletier",
 }
-STEP, REPEATS, TOKEN = 1e-3, 5, "{timed}"
+STEP, REPEATS, TOKEN = 1e-3, 10, "{timed}"
 
 
 def timed(netlist: Path, steps: float) -> tuple[float, ...]:

@@ -38,10 +38,10 @@ class About:
         stop_time: end of the default experiment in s.
         tolerance: relative tolerance of the default experiment.
         step_size: communication step of the default experiment in s.
-        fixed_step: step size inside of Co-Simulation in s, 0 for one that accuracy asks for.
         sources: names of the C files.
         log_categories: with a description.
         tool: name and version of the exporting tool.
+        fixed_step: step size inside of Co-Simulation in s, 0 for one that accuracy asks for.
     """
 
     version: Version
@@ -51,10 +51,10 @@ class About:
     stop_time: float | None
     tolerance: float
     step_size: float | None
-    fixed_step: float
     sources: tuple[str, ...]
     log_categories: dict[str, str]
     tool: str
+    fixed_step: float = 0.0
 
 
 def identifier(name: str) -> str:

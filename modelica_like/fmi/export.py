@@ -230,7 +230,8 @@ def _about(model: CompiledDae, version: Version, kinds: tuple[Kind, ...], descri
     return About(
         version=version, kinds=frozenset(kinds), token=_TOKEN, description=description, stop_time=end,
         tolerance=float(settings.get("rtol", Options.rtol)), step_size=step,
-        fixed_step=fixed_step, sources=source_files(version), log_categories=LOG_CATEGORIES, tool=_tool(),
+        sources=source_files(version), log_categories=LOG_CATEGORIES, tool=_tool(),
+        fixed_step=fixed_step,
     )  # fmt: skip
 
 
