@@ -29,6 +29,7 @@ _LEAST_RANGE = 1e-3
 _ROUNDING = 1e-10
 _TRUTH = 1e-9
 _TOLD = 5
+_LISTED = 12
 _PART_NAME = r"(?:[_a-zA-Z]\w*|'[^'\\]+')(?:\[\d+(?:,\d+)*\])?"
 _IDENTIFIER = rf"{_PART_NAME}(?:\.{_PART_NAME})*"
 _NAME = re.compile(rf"{_IDENTIFIER}|der\({_IDENTIFIER}(?:,\d+)?\)", re.ASCII)
@@ -156,8 +157,9 @@ def error_of_fixed_steps(path: Path, model: CompiledDae, step: float) -> Check:
     except SolveError as error:
         return Check(f"The error of fixed steps of {step:g} s is not known, as IDAS gave up: {error.what}")
     curves = compare_solutions(truth, run, names, ("IDAS", "FMU"), _LEAST_RANGE)
-    shares = ", ".join(f"{d.signal} {d.relative:.2g}" for d in curves.deviations)
-    told = f"Error of fixed steps of {step:g} s until t = {end:g} s, against IDAS, over the range: {shares}."
+    shares = ", ".join(f"{d.signal} {d.relative:.2g}" for d in curves.deviations[:_LISTED])
+    rest = f"; {len(names) - _LISTED} others less" if len(names) > _LISTED else ""
+    told = f"Error of fixed steps of {step:g} s until t = {end:g} s, against IDAS, over the range: {shares}{rest}."
     return Check(told, curves)
 
 
