@@ -1,4 +1,4 @@
-"""The compiled run-time as functions: what `native.c` exports, by ctypes, which lets other threads run meanwhile."""
+"""The compiled run-time as functions: what native.c and batch.c export, by ctypes, which lets other threads run."""
 
 from __future__ import annotations
 
@@ -33,6 +33,17 @@ class Run(c.Structure):
     ]
 
 
+class BatchArguments(c.Structure):
+    """`NativeBatch` in batch.c."""
+
+    _fields_ = [
+        *((name, _NUMBER) for name in ("start", "end", "rtol", "atol")),
+        *((name, _COUNT) for name in ("results", "most_events", "n_runs", "n_readings")),
+        *((name, _POINTER) for name in ("readings", "parameters", "inputs", "values", "failed")),
+        ("stop", c.POINTER(c.c_int)),
+    ]
+
+
 _SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
     "open": (_POINTER, [c.c_char_p, c.c_size_t, c.c_char_p]),
     "close": (None, [_POINTER]),
@@ -52,12 +63,13 @@ _SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
     "drop": (None, [_POINTER, c.POINTER(_POINTER)]),
     "counts": (None, 2 * [_POINTER]),
     "run": (_CODE, [_POINTER, _NUMBER, _COUNT, c.POINTER(Run)]),
+    "batch": (_COUNT, [_POINTER, c.POINTER(BatchArguments)]),
 }
 
 
 @cache
 def library() -> Any:
-    """Load the run-time of this machine; its functions have the names of native.c without the prefix.
+    """Load the run-time of this machine; its functions have the names of these files without the prefix.
 
     Raises:
         ExportError: it must be compiled, and there is no compiler, or the compiler failed.
