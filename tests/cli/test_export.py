@@ -7,6 +7,7 @@ import pytest
 from typer.testing import CliRunner
 
 from modelica_like.cli import app
+from modelica_like.fmi.build import PLATFORMS
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 NETLIST = str(EXAMPLES / "two_mass.toml")
@@ -44,3 +45,11 @@ def test_mistakes_are_told(tmp_path: Path) -> None:
     result = CliRunner().invoke(app, ["export", NETLIST, "-o", str(tmp_path / "x.fmu"), "--fmi", "1.0"])
     assert result.exit_code == 2
     assert result.stderr == "FMI 1.0 is not supported.\nThere are 2.0 and 3.0.\n"
+
+
+def test_runtimes_are_listed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("MODELICA_LIKE_CACHE", str(tmp_path))
+    lines = CliRunner().invoke(app, ["runtimes"]).stdout.splitlines()
+    assert [line.split()[0] for line in lines] == [*PLATFORMS, "wasm32"]
+    result = CliRunner().invoke(app, ["runtimes", "--platforms", "wasm64"])
+    assert result.stderr.startswith("There is no platform 'wasm64'; did you mean 'wasm32'?")
