@@ -2,21 +2,24 @@
 /* A drive as a page. PAGE (see page.py) has the compiled run-time, the model, what can be set and what can be shown. */
 const PAGE = JSON.parse(document.getElementById("page").textContent);
 const MODES = PAGE.modes.filter((one) => one.names); // the others are discrete values
-const OK = 0, FAILED = 1, MORE = 2;
+const OK = 0, FAILED = 1, MORE = 2, MOST_MARKS = 40; // more events are not marked
 const BREATH = 1000, PATIENCE = 40; // steps between two looks at the clock; ms until the page answers again
-const MOST_MARKS = 40; // more events are not marked
 const at = (id) => document.getElementById(id);
 const escaped = (text) => text.replace(/[&<>"]/g, (letter) => `&#${letter.charCodeAt(0)};`);
-const bytes = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+
+async function bytes(text) {
+  const packed = new Blob([Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0))]);
+  const stream = packed.stream().pipeThrough(new DecompressionStream("gzip"));
+  return new Uint8Array(await new Response(stream).arrayBuffer());
+}
 
 /* ---- the compiled run-time: native.c tells what its functions do ---- */
 
 class Drive {
-  constructor(library) {
-    this.c = library;
-    this.places = {};
+  constructor(library, file) {
+    [this.c, this.places] = [library, {}];
     library._initialize();
-    const file = bytes(PAGE.model), why = this.room("message", PAGE.message_length);
+    const why = this.room("message", PAGE.message_length);
     const model = library.native_open(this.put("file", file), file.length, why);
     this.handle = model === 0 ? 0 : library.native_new(model);
     if (this.handle === 0) throw new Error(model === 0 ? this.text(why) : "There is not enough memory.");
@@ -309,8 +312,9 @@ async function update() {
   Object.assign(at("status").dataset, { turn: mine, run: computed - begin, draw: drawn - computed });
 }
 
-function begin({ instance }) {
-  drive = new Drive(instance.exports);
+async function begin() {
+  const { instance } = await WebAssembly.instantiate(await bytes(PAGE.runtime), {});
+  drive = new Drive(instance.exports, await bytes(PAGE.model));
   ask();
 }
 
@@ -331,4 +335,4 @@ function listen() {
 
 controls();
 listen();
-WebAssembly.instantiate(bytes(PAGE.runtime), {}).then(begin).catch(tell);
+begin().catch(tell);

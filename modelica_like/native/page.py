@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import ctypes
+import gzip
 import json
 import re
 import time
@@ -23,6 +24,7 @@ from modelica_like.fmi.runtime import runtime_library
 from modelica_like.fmi.tables import make_tables
 from modelica_like.native.library import MESSAGE_LENGTH, Run
 from modelica_like.simulation import Model, seconds, simulate
+from modelica_like.solve.options import Options
 from modelica_like.solve.plot import _QUANTITIES, chosen
 from modelica_like.units import ANY, ONE, Unit, coherent
 from modelica_like.writing import write_bytes
@@ -73,7 +75,10 @@ class _Slider:
     log: bool
 
 
-def export_html(drive: Model, path: str | Path, *, show: Sequence[str] = (), report: Report = _silent) -> Page:
+def export_html(
+    drive: Model, path: str | Path, until: float | str | None = None, *, show: Sequence[str] = (),
+    report: Report = _silent,
+) -> Page:  # fmt: skip
     """Write a drive as a page that simulates it in a browser: one file that asks for nothing else.
 
     It has a slider for every tunable parameter and for every input without a value, and curves over time by unit, with
@@ -81,8 +86,9 @@ def export_html(drive: Model, path: str | Path, *, show: Sequence[str] = (), rep
     it. The drive is run once by IDAS first, which chooses the curves.
 
     Args:
-        drive: a component, a netlist file, or a compiled model; it says the end time.
+        drive: a component, a netlist file, or a compiled model.
         path: the page to write, with the ending .html.
+        until: end time, a number in s or a quantity; by default what the netlist says.
         show: patterns of what is drawn at first, such as `*.w`; by default speeds, torques and forces of the parts.
         report: called with what is being done.
 
@@ -97,9 +103,9 @@ def export_html(drive: Model, path: str | Path, *, show: Sequence[str] = (), rep
     report("compiling the model")
     model, description, _ = _compiled(drive, (), "flow")
     report("simulating")
-    solution = simulate(model)
-    content = _content(model, chosen(solution, show), solution.options.rtol, solution.options.atol)
-    content |= {"points": solution.options.points, "most_events": solution.options.max_events, "tool": _tool()}
+    end = seconds(until if until is not None else model.settings.get("until"))
+    solution = simulate(model, end)
+    content = _content(model, chosen(solution, show), end, solution.options)
     report("writing the page")
     content["runtime"] = _text(runtime_library(BROWSER.name, report).read_bytes())
     write_bytes(target, _page(model.name, description, content).encode())
@@ -120,15 +126,15 @@ def _page(name: str, description: str, content: dict[str, Any]) -> str:
     return re.sub(r"\{\{(\w+)\}\}", lambda found: parts[found[1]], page)
 
 
-def _content(model: CompiledDae, names: Sequence[str], rtol: float, atol: float) -> dict[str, Any]:
-    """Return what the script reads."""
+def _content(model: CompiledDae, names: Sequence[str], until: float, options: Options) -> dict[str, Any]:
+    """Return what the script reads, but for the run-time."""
     variables = interface(model)
-    until = seconds(model.settings.get("until"))
     end = _Slider("end time", "", None, "", "s", 1.0, 0.0, until, until / _SPREAD, until * _SPREAD, True)
     units = _Units()
     return {
-        "model": _text(model_file(make_tables(model), variables.variables, "{page}", rtol)),
-        "layout": _layout(), "message_length": MESSAGE_LENGTH, "rtol": rtol, "atol": atol, "until": until,
+        "model": _text(model_file(make_tables(model), variables.variables, "{page}", options.rtol)),
+        "layout": _layout(), "message_length": MESSAGE_LENGTH, "tool": _tool(), "until": until,
+        "rtol": options.rtol, "atol": options.atol, "points": options.points, "most_events": options.max_events,
         "sliders": [asdict(end), *(asdict(one) for one in _sliders(model, variables.by_name))],
         "variables": list(_variables(model, variables.by_name, set(names), units)),
         "modes": [
@@ -143,7 +149,7 @@ def _content(model: CompiledDae, names: Sequence[str], rtol: float, atol: float)
 
 
 def _text(data: bytes) -> str:
-    return base64.b64encode(data).decode()
+    return base64.b64encode(gzip.compress(data, mtime=0)).decode()
 
 
 def _layout() -> dict[str, int]:

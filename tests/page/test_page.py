@@ -196,7 +196,7 @@ def test_a_moved_slider_redraws_at_once(browser: Any, pages: dict[str, Path], na
 def test_what_cannot_run_is_told_and_reset_mends_it(browser: Any, pages: dict[str, Path]) -> None:
     browser.open(pages["machine_table_direct"])
     put(browser, "clutch.creep_time", -1.0)
-    assert said(browser).startswith("clutch.creep_time = -1 is out of range")
+    assert said(browser) == "clutch.creep_time = -1 is out of range: it must be at least 0."
     assert browser.run("document.getElementById('curves').className") == "stale"
     browser.run("document.getElementById('reset').click()")
     browser.run("new Promise((go) => setTimeout(go, 300))")
