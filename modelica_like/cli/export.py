@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -58,6 +59,7 @@ def export(
     """Export a netlist as an FMU: compiled C that needs no Python, and check it; or as a page for a browser."""
     with told(debug):
         assembly = load_netlist(netlist, assignments)
+        gc.disable()  # the process ends soon: looking for cycles takes a sixth of the time of a large model
         from rich.console import Console
 
         from modelica_like.fmi.export import export_fmu

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from threading import get_ident
 from typing import Any
 
 import casadi as ca
@@ -75,6 +76,7 @@ class StartProblem:
     def __init__(self, model: CompiledDae, point: Point) -> None:
         self.model = model
         self.given = call(model, model.start_values, point)
+        self._solved: StartPlan | None = None
         if "start entries" not in model._cache:
             model._cache["start entries"] = _Entries(model)
         self._entries: _Entries = model._cache["start entries"]
@@ -121,8 +123,9 @@ class StartProblem:
         """
         self._entries.fixed.put(point.x, self.given)
         plan = start_plan(self.model, kind, point)
-        if plan.columns:
+        if plan.columns and not (plan is self._solved and _is_free_of_modes(self.model, plan)):
             self._solve(plan, point)
+            self._solved = plan
         solve_implicit(self.model, point)
         for number in plan.dependent:
             self._check_dependent(point, self.model.starts[number])
@@ -137,7 +140,7 @@ class StartProblem:
         nx, ny = len(model.states), len(y)
         state = np.concatenate([point.x, y, point.z])
         error, sizes = np.zeros(len(target)), np.full(len(target), -1.0)
-        system = _Evaluation(model, plan)
+        system = _evaluation(model, plan)
         for _ in range(_MAX_NEWTON):
             matrix, values = system(
                 point.t, state[:nx], state[nx : nx + ny], state[nx + ny :], model.p, model.u, point.d
@@ -199,6 +202,7 @@ class _Evaluation:
         self._pattern = function.sparsity_out(1)
         self._entries = self._pattern.get_triplet()
         self._rows, self._columns = list(plan.wanted), list(plan.columns)
+        self._chosen = np.ix_(self._rows, self._columns)
 
     def __call__(self, *arguments: Any) -> tuple[Any, Vector]:
         entries, values = self._fast(*arguments)
@@ -206,7 +210,24 @@ class _Evaluation:
             return ca.DM(self._pattern, entries)[self._rows, self._columns], values[self._rows]
         whole = np.zeros(self._pattern.shape)
         whole[self._entries] = entries
-        return whole[np.ix_(self._rows, self._columns)], values[self._rows]
+        return whole[self._chosen], values[self._rows]
+
+
+def _evaluation(model: CompiledDae, plan: StartPlan) -> _Evaluation:
+    """Return what evaluates a plan; the last one of this thread is kept."""
+    key = "start evaluation", get_ident()
+    if key not in model._cache or model._cache[key][0] is not plan:
+        model._cache[key] = plan, _Evaluation(model, plan)
+    return model._cache[key][1]
+
+
+def _is_free_of_modes(model: CompiledDae, plan: StartPlan) -> bool:
+    key = "start free of modes", plan.kind
+    if key not in model._cache:
+        function = plan.system.function
+        values, modes = function.name_out().index("values"), function.name_in().index("d")
+        model._cache[key] = not function.jac_sparsity(values, modes).nnz()
+    return model._cache[key]
 
 
 def _dense_values(system: ca.Function) -> ca.Function:

@@ -12,7 +12,7 @@ import numpy as np
 from modelica_like.compile.buffers import BufferedFunction, along, buffered
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.initialize import Point
-from modelica_like.solve.idas import Integrator, scaled_problem
+from modelica_like.solve.idas import Integrator, linear_solver, scaled_problem
 from modelica_like.solve.options import Options
 from modelica_like.solve.quadrature import Places, rules
 from modelica_like.solve.recorder import Segment
@@ -268,7 +268,9 @@ class _Work(Integrator):
         problem["x"] = ca.vertcat(problem["x"], ca.SX.sym("work", len(_nonzero(self.model))))
         problem["ode"] = ca.cse(ca.vertcat(problem["ode"], powers * (speed * scale)))
         problem["p"] = ca.vertcat(p[:2], scale, p[2:])
-        return ca.integrator("work", "idas", problem, 0, [1.0], self._settings(steps, gentle, first))
+        settings = self._settings(steps, gentle, first)
+        settings["linear_solver"] = linear_solver(problem["x"].numel() + problem["z"].numel())
+        return ca.integrator("work", "idas", problem, 0, [1.0], settings)
 
 
 def _nonzero(model: CompiledDae) -> list[int]:

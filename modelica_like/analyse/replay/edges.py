@@ -81,7 +81,10 @@ def _ties(chain: Replay) -> list[Edge]:
         if lasts:
             found += [_tie(chain, guards, int(k), first, last) for k in np.flatnonzero(still)]
         first = last + 1
-    return found
+    # What fires just at the end of the run does so only on one side.
+    last = len(chain.nodes) - 1
+    fires = guards.active(chain.nodes[last].d) & (np.abs(values[last]) <= near) & ~still_at[last] & (rates[last] > 0.0)
+    return found + [_tie(chain, guards, int(k), last, last) for k in np.flatnonzero(fires)]
 
 
 def _tie(chain: Replay, guards: Guards, guard: int, first: int, last: int) -> Edge:

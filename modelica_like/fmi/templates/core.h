@@ -111,11 +111,11 @@ typedef struct {
     double *slots, *dots; /* values, and derivatives in either direction or three Taylor coefficients, of tape slots */
     double *jacobian, *matrix, *qr_v, *qr_r, *qr_beta, *qr_work;
     double *stages, *point; /* of the integrator: 8 stages, a point */
-    double *variables, *guards, *guards_before, *rhs, *dense_matrix, *square, *vector, *residual;
+    double *variables, *guards, *guards_before, *looks, *rhs, *dense_matrix, *square, *vector, *residual;
     double *start_unknowns, *start_values, *start_residual;
     int *order; /* pivots of the implicit equations */
     unsigned char *known, *decided, *wanting;
-    double *d_before, *x_before, *d_fired, *reset_values, *target_values;
+    double *d_before, *d_fired, *reset_values, *target_values;
     int *targets;
     unsigned char *changed;
     double *first; /* point before a step */
@@ -134,7 +134,8 @@ typedef struct {
     int *special_outputs;
     uint64_t decided_by; /* counts changes of what decides about tapes: modes and parameters */
     int *same, *places_of_slots;
-    unsigned char *known_slots, *needed_slots, *asked; /* asked: variables that somebody reads */
+    unsigned char *known_slots, *needed_slots;
+    unsigned char *asked, *tuned; /* variables that somebody reads; parameters that have changed in a run */
     double *seen_rates, *seen_indicators, *seen_derived;
     double *first_rates; /* right hand side where the step begins */
     double *begun;       /* motions that may be held, where the search for a steady state began */
@@ -240,7 +241,7 @@ void piece_at(const Model *m, const Piece *piece, double t, double *point);
 double first_step(Instance *c);
 
 /* integrate.c */
-#define MOST_LOOKS 12 /* at guards, that there is room for */
+#define MOST_LOOKS 9 /* at guards, that there is room for */
 typedef enum { REACHED, AT_EVENT, FAILED } Arrival;
 Arrival integrate_to(Instance *c, double target, int stop_at_events);
 void leave_piece(Instance *c);

@@ -129,14 +129,14 @@ static uint64_t place_work(const Model *m, Work *w, double *memory) {
         {larger(n, m->start.size), 8, {&w->qr_beta, &w->qr_work, &w->start_unknowns}}, {9 * n, 8, {&w->stages}},
         {2 + 5 * n, 8, {&w->whole}}, {n, 8, {&w->point, &w->first}}, {n + n_z, 8, {&w->vector}},
         {larger(n, m->n_determinants), 8, {&w->rhs}}, {m->n_nodes, 8, {&w->variables}}, {small, 8, {&w->guards}},
-        {3 * n_guards * MOST_LOOKS, 8, {&w->guards_before}}, {n_guards, 1, {&w->kinds}},
+        {2 * n_guards, 8, {&w->guards_before}}, {3 * n_guards * MOST_LOOKS, 8, {&w->looks}}, {n_guards, 1, {&w->kinds}},
         {n_z * n_z, 8, {&w->dense_matrix}}, {n_z, 8, {&w->residual, &w->kept_z, &w->respond_z}},
         {n_z, sizeof(int), {&w->order}}, {square, 8, {&w->square}}, {m->n_starts, 8, {&w->start_values}},
         {larger(m->n_start_values, resets), 8, {&w->start_residual}},
         {resets, 8, {&w->reset_values, &w->target_values}}, {resets, sizeof(int), {&w->targets}},
         {n_x, 8, {&w->seen_rates}}, {n, 8, {&w->first_rates}}, {n_guards, 8, {&w->seen_indicators}},
         {m->n_derived, 8, {&w->seen_derived}}, {m->n_slots, sizeof(int), {&w->same, &w->places_of_slots}},
-        {m->n_slots, 1, {&w->known_slots, &w->needed_slots}}, {m->n_nodes, 1, {&w->asked}},
+        {m->n_slots, 1, {&w->known_slots, &w->needed_slots}}, {m->n_nodes, 1, {&w->asked}}, {m->n_p, 1, {&w->tuned}},
         {left, sizeof(Run), {&w->special_runs}}, {left, sizeof(Operands), {&w->special_operands}},
         {special_size(m, N_SPECIALS, 1), sizeof(int), {&w->special_outputs}}};
     return PLACE(rooms, memory);
@@ -146,10 +146,9 @@ static uint64_t place_work(const Model *m, Work *w, double *memory) {
 static uint64_t place_events(const Model *m, Work *w, double *memory) {
     uint64_t n_x = m->n_x, n_d = m->n_d, n_holds = m->n_holds;
     uint64_t members = m->most_members + 1;
-    const Room rooms[] = {{n_x, 8, {&w->x_before, &w->strike.jump, &w->impacts.x, &w->rates, &w->x_kept}},
-        {n_x, 1, {&w->known}}, {n_d, 8, {&w->d_before, &w->d_fired, &w->best, &w->respond_d}},
-        {n_d, 1, {&w->decided, &w->changed}}, {m->n_transitions, 1, {&w->wanting}},
-        {n_holds, sizeof(Terms), {&w->terms, &w->strike_terms}},
+    const Room rooms[] = {{n_x, 8, {&w->strike.jump, &w->impacts.x, &w->rates, &w->x_kept}}, {n_x, 1, {&w->known}},
+        {n_d, 8, {&w->d_before, &w->d_fired, &w->best, &w->respond_d}}, {n_d, 1, {&w->decided, &w->changed}},
+        {m->n_transitions, 1, {&w->wanting}}, {n_holds, sizeof(Terms), {&w->terms, &w->strike_terms}},
         {n_holds, 8, {&w->weights, &w->base_weights, &w->use, &w->strike.before, &w->strike.approach}},
         {n_holds, 8, {&w->strike.impulse, &w->strike.reaction, &w->begun}}, {n_holds, sizeof(int), {&w->standing}},
         {n_holds, 1, {&w->held, &w->impacts.entered}},

@@ -7,13 +7,15 @@
 #include <string.h>
 #include "core.h"
 
-#define LOOKS 3 /* looks at the guards per step */
+#define MIDDLE 0.45 /* of a step: where guards are looked at besides its end; not where a period might */
+#define DEPTH 6     /* divisions of a step in which guards do not behave */
+#define BEHAVES 0.05
 #define LOCATED 1e-13
 #define MAX_TRIALS 60
 #define MAX_REJECTIONS 60
 #define NEAR 0.1
 #define SAME_POINT 1e-9 /* rounding of the importer's communication points */
-#define LEAST_LOOKS 500 /* steps per run, where guards could hide between longer ones */
+#define LEAST_STEPS 50  /* per run, where time itself is in the equations: a pulse could hide between longer ones */
 
 typedef struct { /* guards and their rates at a time within a step */
     double t, *values, *rates;
@@ -94,18 +96,19 @@ static int find_candidates(const Instance *c, const Look *before, const Look *af
     return any;
 }
 
-/* Steps again from the beginning of the piece, to t. */
-static int trial(Instance *c, const Piece *whole, double t, Piece *piece, Look *look) {
+/* To t: roughly by the dense output, or by a step again from the beginning of the piece. */
+static int trial(Instance *c, const Piece *whole, double t, int rough, Piece *piece, Look *look) {
     const Model *m = c->model;
-    double ignored;
+    double ignored, *point = c->work.vector + m->n_z;
+    if (rough) {
+        piece_at(m, whole, t, point);
+        return look_at(c, t, point, look);
+    }
     if (t <= whole->begin) {
         memcpy(piece, whole, piece_size(m));
-        piece->end = t;
         memcpy(last_of(m, piece), whole->points, (size_t)m->n_unknowns * sizeof(double));
-    } else {
-        if (!rosenbrock_step(c, whole->begin, whole->points, t - whole->begin, 1, piece, &ignored)) return 0;
-        piece->end = t;
-    }
+    } else if (!rosenbrock_step(c, whole->begin, whole->points, t - whole->begin, 1, piece, &ignored)) return 0;
+    piece->end = t;
     return look_at(c, t, last_of(m, piece), look);
 }
 
@@ -131,7 +134,7 @@ static int positive_top(Instance *c, const Piece *whole, const Look *before, con
         if (kinds[g] != HUMP) continue;
         t = low + h * cubic_guess(before->values[g], before->rates[g] * h, after->values[g], after->rates[g] * h);
         for (int n = 0; n < MAX_TRIALS; n++) {
-            if (!trial(c, whole, t, piece, look)) return 0;
+            if (!trial(c, whole, t, 1, piece, look)) return 0;
             if (look->values[g] > 0) {
                 *time = t;
                 return 1;
@@ -146,12 +149,13 @@ static int positive_top(Instance *c, const Piece *whole, const Look *before, con
     return 0;
 }
 
-/* Finds the earliest zero of a candidate between two looks; `piece` then ends there, `look` tells the guards there. */
+/* Finds the earliest zero of a candidate between two looks, first roughly; `piece` then ends there, `look` tells the
+ * guards there. */
 static int locate(Instance *c, const Piece *whole, const Look *before, const Look *after, unsigned char *kinds,
     Piece *piece, Look *look) {
     const Model *m = c->model;
-    double low = before->t, high = after->t, h = high - low, t = high, tolerance = LOCATED * fmax(1, fabs(low));
-    if (!any_positive(c->model, after, kinds)) {
+    double high = after->t, h = high - before->t, t = high, tolerance = LOCATED * fmax(1, fabs(before->t)), last;
+    if (!any_positive(m, after, kinds)) {
         if (!positive_top(c, whole, before, after, kinds, piece, look, &high)) return 0;
     }
     for (int g = 0; g < m->n_guards; g++)
@@ -159,17 +163,25 @@ static int locate(Instance *c, const Piece *whole, const Look *before, const Loo
             t = fmin(t, before->t + h * cubic_guess(before->values[g], before->rates[g] * h, after->values[g],
                                             after->rates[g] * h));
     t = fmin(t, high);
-    for (int n = 0; n < MAX_TRIALS; n++) {
-        double step;
-        if (!trial(c, whole, t, piece, look)) return 0;
-        if (any_positive(c->model, look, kinds)) high = t;
-        else low = t;
-        step = newton(c->model, look, kinds);
-        if (fabs(step) <= tolerance) return 1;
-        if (high - low <= tolerance) break;
-        t = t + step > low && t + step < high ? t + step : 0.5 * (low + high);
+    last = high;
+    for (int rough = 1; rough >= 0; rough--) {
+        double low = before->t;
+        high = last;
+        for (int n = 0; n < MAX_TRIALS; n++) {
+            double step;
+            if (!trial(c, whole, t, rough, piece, look)) return 0;
+            if (any_positive(m, look, kinds)) high = t;
+            else low = t;
+            step = newton(m, look, kinds);
+            if (fabs(step) <= tolerance) {
+                if (rough) break;
+                return 1;
+            }
+            if (high - low <= tolerance) break;
+            t = t + step > low && t + step < high ? t + step : 0.5 * (low + high);
+        }
     }
-    return trial(c, whole, high, piece, look);
+    return trial(c, whole, high, 0, piece, look);
 }
 
 /* Which of the located guards want to fire. */
@@ -190,61 +202,95 @@ static int look_behind(
     Instance *c, const Piece *whole, double end, const unsigned char *kinds, Piece *piece, Look *look) {
     const Model *m = c->model;
     double behind = fmin(piece->end + TIME_RESOLUTION * fmax(1, fabs(piece->end)), end);
-    if (!trial(c, whole, behind, piece, look)) return 0;
+    if (!trial(c, whole, behind, 0, piece, look)) return 0;
     for (int g = 0; g < m->n_guards; g++)
         if (kinds[g] == CROSSING && look->values[g] > 0)
             c->state.event_pending = c->wanting[m->guard_transition[g]] = 1;
     return 1;
 }
 
+typedef enum { NOTHING, ENDED, TOO_LONG } Found;
+
+/* Looks for an event between two looks; shortens the piece to it. */
+static Found check_between(Instance *c, const Piece *whole, const Look *before, const Look *after) {
+    const Model *m = c->model;
+    Piece *piece = c->piece;
+    unsigned char *kinds = c->work.kinds;
+    double tolerance = LOCATED * fmax(1, fabs(after->t));
+    Look found = {0, c->work.looks + 3 * (size_t)m->n_guards * (DEPTH + 2), NULL};
+    int late = 0;
+    if (!find_candidates(c, before, after, kinds)) return NOTHING;
+    if (locate(c, whole, before, after, kinds, piece, &found)) {
+        if (mark_wanting(c, piece, &found, kinds, tolerance)) {
+            c->state.event_pending = 1;
+            return ENDED;
+        }
+        /* Positive for less than the time resolution: what the last event left is on its way down. */
+        for (int g = 0; g < m->n_guards; g++) late |= kinds[g] == CROSSING;
+        if (late) return look_behind(c, whole, after->t, kinds, piece, &found) ? ENDED : TOO_LONG;
+    } else if (any_positive(m, after, kinds)) return TOO_LONG;
+    memcpy(piece, whole, piece_size(m));
+    return NOTHING;
+}
+
+/* Are the guards between two looks what these tell of them? */
+static int behave(const Instance *c, const Look *before, const Look *middle, const Look *after) {
+    double h = after->t - before->t;
+    for (int g = 0; g < c->model->n_guards; g++) {
+        double g0 = before->values[g], g1 = after->values[g], value = middle->values[g];
+        double size = fmax(fabs(value), fmax(fabs(g0), fabs(g1)));
+        if (!guard_active(c, g) || g0 > 0 || g1 > 0 || value > 0) continue;
+        if (fabs(value - cubic(MIDDLE, g0, before->rates[g] * h, g1, after->rates[g] * h)) > BEHAVES * size) return 0;
+    }
+    return 1;
+}
+
+static Found look_into(Instance *c, const Piece *whole, const Look *before, const Look *after, int depth) {
+    const Model *m = c->model;
+    Look middle = {0, c->work.looks + 3 * (size_t)m->n_guards * (size_t)(depth + 1), NULL};
+    double *point = c->work.vector + m->n_z, t = before->t + MIDDLE * (after->t - before->t);
+    int deeper;
+    Found found;
+    piece_at(m, whole, t, point);
+    if (!look_at(c, t, point, &middle)) return TOO_LONG;
+    deeper = depth > 1 && !behave(c, before, &middle, after);
+    found = deeper ? look_into(c, whole, before, &middle, depth - 1) : check_between(c, whole, before, &middle);
+    if (found != NOTHING) return found;
+    return deeper ? look_into(c, whole, &middle, after, depth - 1) : check_between(c, whole, &middle, after);
+}
+
 /* Looks for events in an accepted step; shortens it to the first. Returns 0 if the step must be shorter. */
 static int search_events(Instance *c) {
     const Model *m = c->model;
-    State *s = &c->state;
-    double *memory = c->work.guards_before, *point = c->work.vector + m->n_z, t0 = c->piece->begin;
-    Look before = {0, memory, NULL}, after = {0, memory + 3 * (size_t)m->n_guards, NULL},
-         found = {0, memory + 6 * (size_t)m->n_guards, NULL};
-    unsigned char *kinds = c->work.kinds;
-    Piece *whole = memcpy(c->work.whole, c->piece, piece_size(m)), *piece = c->piece;
-    memcpy(point, whole->points, sizeof(double) * (size_t)m->n_unknowns);
-    if (!look_at(c, t0, point, &before)) return 0;
+    double *point = c->work.vector + m->n_z;
+    size_t size = 2 * (size_t)m->n_guards;
+    Look before = {0, c->work.looks, NULL}, after = {0, c->work.looks + 3 * (size_t)m->n_guards, NULL};
+    Piece *whole = memcpy(c->work.whole, c->piece, piece_size(m));
+    Found found;
+    if (!c->look_valid) {
+        memcpy(point, whole->points, sizeof(double) * (size_t)m->n_unknowns);
+        if (!look_at(c, whole->begin, point, &before)) return 0;
+    }
+    c->look_valid = 1;
+    before.t = whole->begin;
+    before.rates = before.values + m->n_guards;
     /* What the last event left positive did not want to fire: it is on its way down. */
     for (int g = 0; g < m->n_guards; g++) before.values[g] = fmin(before.values[g], 0);
-    for (int k = 1; k <= LOOKS; k++) {
-        double t = k == LOOKS ? whole->end : t0 + (whole->end - t0) * k / LOOKS, *swap;
-        piece_at(m, whole, t, point);
-        if (!look_at(c, t, point, &after)) return 0;
-        while (find_candidates(c, &before, &after, kinds)) {
-            double tolerance = LOCATED * fmax(1, fabs(t));
-            int late = 0;
-            if (!locate(c, whole, &before, &after, kinds, piece, &found)) {
-                if (any_positive(m, &after, kinds)) return 0;
-                memcpy(piece, whole, piece_size(m));
-                break;
-            }
-            if (mark_wanting(c, piece, &found, kinds, tolerance)) {
-                s->event_pending = 1;
-                return 1;
-            }
-            /* Positive for less than the time resolution: what the last event left is on its way down. */
-            for (int g = 0; g < m->n_guards; g++) late |= kinds[g] == CROSSING;
-            if (late) return look_behind(c, whole, t, kinds, piece, &found);
-            memcpy(piece, whole, piece_size(m));
-            break;
-        }
-        swap = before.values;
-        before = after;
-        after.values = swap;
-    }
-    return 1;
+    memcpy(point, last_of(m, whole), sizeof(double) * (size_t)m->n_unknowns);
+    if (!look_at(c, whole->end, point, &after)) return 0;
+    found = look_into(c, whole, &before, &after, DEPTH);
+    if (found == NOTHING) memcpy(before.values, after.values, size * sizeof(double));
+    else if (found == ENDED) c->look_valid = 0;
+    return found != TOO_LONG;
 }
 
 static double largest_step(const Instance *c) {
     const Model *m = c->model;
     const State *s = &c->state;
     double span = s->stop_time - s->start_time;
+    if (m->n_x > 0 && !m->settings->rates_depend_on_time) return INFINITY;
     if (!s->stop_time_defined || !(span > 0)) return m->n_x == 0 ? 1e-3 : INFINITY;
-    return m->n_guards > 0 || m->n_x == 0 ? span / LEAST_LOOKS : INFINITY;
+    return span / LEAST_STEPS;
 }
 
 /* Below this, two times are the same. */

@@ -14,12 +14,16 @@ void load(Instance *c, double t, const double *x, const double *z) {
     memcpy(slots + m->slot_x, x, m->n_x * sizeof(double));
     memcpy(slots + m->slot_z, z, m->n_z * sizeof(double));
     for (int k = 0; k < m->n_u; k++) slots[m->slot_u + k] = input_at(c, k, t);
-    if (memcmp(slots + m->slot_p, c->p, (size_t)m->n_p * sizeof(double)) == 0 &&
-        memcmp(slots + m->slot_d, c->d, (size_t)m->n_d * sizeof(double)) == 0)
-        return;
-    memcpy(slots + m->slot_p, c->p, (size_t)m->n_p * sizeof(double));
-    memcpy(slots + m->slot_d, c->d, (size_t)m->n_d * sizeof(double));
-    c->work.decided_by++;
+    if (memcmp(slots + m->slot_p, c->p, (size_t)m->n_p * sizeof(double)) != 0) {
+        for (int k = 0; k < m->n_p; k++) {
+            if (slots[m->slot_p + k] != c->p[k] && !c->work.tuned[k]) c->work.decided_by++;
+            slots[m->slot_p + k] = c->p[k];
+        }
+    }
+    if (memcmp(slots + m->slot_d, c->d, (size_t)m->n_d * sizeof(double)) != 0) {
+        memcpy(slots + m->slot_d, c->d, (size_t)m->n_d * sizeof(double));
+        c->work.decided_by++;
+    }
 }
 
 void evaluate(Instance *c, const Tape *tape, double t, const double *x, const double *z, double *outputs) {

@@ -48,7 +48,7 @@ static void work_out(Instance *c, const Tape *tape, int *same, unsigned char *kn
     const Operands *operand = tape->operands;
     int slot = tape->first_result;
     memset(known, MOVING, (size_t)m->n_slots);
-    memset(known + m->slot_p, KNOWN, (size_t)m->n_p);
+    for (int k = 0; k < m->n_p; k++) known[m->slot_p + k] = c->work.tuned[k] ? MOVING : KNOWN;
     memset(known + m->slot_d, KNOWN, (size_t)m->n_d);
     memset(known + m->slot_constants, KNOWN, (size_t)m->n_constants);
     for (int k = 0; k < slot; k++) same[k] = k;

@@ -141,6 +141,10 @@ static Result set_parameter(Instance *c, const Variable *v, double value) {
         return report(c, LOG_ERROR, RESULT_ERROR, "%s = %g is out of range: it must be at %s %g.", text_of(m, v->name),
             value, value < low ? "least" : "most", value < low ? low : high);
     if (c->p[v->index] != value) touch(c);
+    if (c->p[v->index] != value && !before_start(s) && !c->work.tuned[v->index]) {
+        c->work.tuned[v->index] = 1;
+        c->work.decided_by++;
+    }
     c->p[v->index] = value;
     return RESULT_OK;
 }
