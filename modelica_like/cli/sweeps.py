@@ -62,10 +62,10 @@ def sweep(
         from modelica_like.analyse.sweeps.ranges import read_range
         from modelica_like.analyse.sweeps.sweep import sweep as run
         from modelica_like.report.files import STDOUT, write_dataset
-        from modelica_like.report.progress import RunsBar
+        from modelica_like.report.progress import Bar
         from modelica_like.report.sweep import sweep_report
 
-        with RunsBar() as bar:
+        with Bar(title="runs") as bar:
             found = run(
                 assembly, dict(read_range(text) for text in over), of, until=until, checkpoint=checkpoint,
                 processes=processes, scheduler=scheduler, progress=bar,

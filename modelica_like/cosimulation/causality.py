@@ -9,7 +9,7 @@ from typing import Literal
 
 from modelica_like.compile import compile
 from modelica_like.compile.compiled import CompiledDae
-from modelica_like.cosimulation.cut import Cut, CutNetlist
+from modelica_like.cosimulation.cut import Cut, CutNetlist, as_name
 from modelica_like.errors import ModelicaLikeError, NetlistError, StructureError
 from modelica_like.flatten import flatten
 from modelica_like.fmi.dependencies import Dependencies
@@ -44,12 +44,7 @@ def ends_of(cut: Cut, near_takes: Takes) -> tuple[End, End]:
     """Return both ends of a cut; the names of their adaptors are those of the ends."""
     other: Takes = "flow" if near_takes == "potential" else "potential"
     near, far = cut.near[0], cut.far[0]
-    return End(adaptor_name(near), near, near_takes), End(adaptor_name(far), far, other)
-
-
-def adaptor_name(path: str) -> str:
-    """Return the name of the adaptor at an end."""
-    return path.replace(".", "_").replace("[", "_").replace("]", "")
+    return End(as_name(near), near, near_takes), End(as_name(far), far, other)
 
 
 def orient(found: CutNetlist, make: Make) -> dict[Cut, Takes]:

@@ -150,7 +150,7 @@ def _find(assembly: Assembly, wires: Sequence[Wire], name: str) -> tuple[Cut, Wi
         _check_can_open(assembly, far)
     else:
         far = tuple(end for end in wire.ends if end != near)
-    return Cut(_as_name(name), (near,), far, wire.signal, wire.source), wire
+    return Cut(as_name(name), (near,), far, wire.signal, wire.source), wire
 
 
 def _near_end(assembly: Assembly, wires: Sequence[Wire], name: str) -> str:
@@ -217,7 +217,8 @@ def _is_output(assembly: Assembly, path: str) -> bool:
     return type(assembly.find(owner).fields[name]).__name__ == "Output"
 
 
-def _as_name(text: str) -> str:
+def as_name(text: str) -> str:
+    """Return the path of an end as a name: of a cut, or of the adaptor there."""
     return text.replace(".", "_").replace("[", "_").replace("]", "")
 
 
