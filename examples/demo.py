@@ -171,13 +171,13 @@ def run_case(case: Case, examples: Path) -> tuple[Runs, float]:
 
 def comparison(case: Case, runs: Runs) -> Table:
     """Return computed values beside expected and published ones."""
-    made = table(case.title, "", "computed>", "expected>", "deviation>", "published>", "unit")
+    rows: list[tuple[str, ...]] = []
     for number in case.numbers:
         value = number.computed(runs)
         published = "" if number.published is None else f"{number.published:g}"
         deviation = f"{value / number.expected - 1:+.1e}"
-        made.add_row(number.name, f"{value:.7g}", f"{number.expected:.7g}", deviation, published, number.unit)
-    return made
+        rows.append((number.name, f"{value:.7g}", f"{number.expected:.7g}", deviation, published, number.unit))
+    return table(case.title, "", "computed>", "expected>", "deviation>", "published>", "unit", rows=rows)
 
 
 def pages(examples: Path, pictures: Path) -> Iterator[RenderableType]:

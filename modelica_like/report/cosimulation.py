@@ -26,13 +26,14 @@ def cosimulation_report(solution: CosimSolution) -> RenderableType:
 
 def couplings_table(solution: CosimSolution) -> Table:
     """Return the energies at the couplings: what one FMU has sent and the other has not got, the coupling has lost."""
-    made = table("energy at the couplings in J", "coupling", "through>", "made by it>", "share>", "mismatch>")
-    for one in solution.couplings:
-        share = f"{one.residual / one.throughput:.1e}" if one.throughput else ""
-        made.add_row(
-            escape(one.name), f"{one.throughput:.6g}", f"{one.residual:.3g}", share, f"{one.mismatch:.3g}"
-        )  # fmt: skip
-    return made
+    rows = [
+        (one.name, f"{one.throughput:.6g}", f"{one.residual:.3g}",
+         f"{one.residual / one.throughput:.1e}" if one.throughput else "", f"{one.mismatch:.3g}")
+        for one in solution.couplings
+    ]  # fmt: skip
+    return table(
+        "energy at the couplings in J", "coupling", "through>", "made by it>", "share>", "mismatch>", rows=rows
+    )
 
 
 def steps_line(solution: CosimSolution) -> str:

@@ -19,9 +19,8 @@ def modes_report(modes: Modes) -> RenderableType:
     made = table(
         "modes", ">", "eigenvalue in rad/s>", "frequency in Hz>", "damping>", "time constant in s>", "energy in",
         "lost in",
+        rows=[(str(k), *_numbers(mode), _shares(mode.stored), _shares(mode.lost)) for k, mode in enumerate(modes, 1)],
     )  # fmt: skip
-    for k, mode in enumerate(modes):
-        made.add_row(str(k + 1), *_numbers(mode), _shares(mode.stored), _shares(mode.lost))
     parts: list[RenderableType] = [head, "", made]
     if linear.held:
         parts.append(f"[dim]Held by modes that are active there: {escape(', '.join(linear.held))}.[/]")
@@ -38,4 +37,4 @@ def _numbers(mode: Mode) -> tuple[str, str, str, str]:
 
 def _shares(shares: dict[str, float]) -> str:
     shown = [(path, share) for path, share in shares.items() if abs(share) >= _LEAST][:_MOST]
-    return ", ".join(f"{escape(path)} {100 * share:.0f} %" for path, share in shown)
+    return ", ".join(f"{path} {100 * share:.0f} %" for path, share in shown)

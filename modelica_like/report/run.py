@@ -37,15 +37,13 @@ def _span(solution: Solution) -> str:
 
 def events_table(solution: Solution) -> Table:
     """Return the mode changes; of many only the first and the last."""
-    made = table(_mode_changes(len(solution.events)), "time in s>", "mode", "from", "to", "because of")
-    events = list(solution.events)
-    for k, event in enumerate(events):
-        if len(events) > _SHOWN and k == _SHOWN // 2:
-            made.add_row("…")
-        if len(events) <= _SHOWN or k < _SHOWN // 2 or k >= len(events) - _SHOWN // 2:
-            place = f"{event.source}".partition(" `")[0]
-            made.add_row(f"{event.time:.9g}", escape(event.mode), event.before, event.after, escape(place))
-    return made
+    rows = [
+        (f"{event.time:.9g}", event.mode, event.before, event.after, f"{event.source}".partition(" `")[0])
+        for event in solution.events
+    ]
+    if len(rows) > _SHOWN:
+        rows[_SHOWN // 2 : -_SHOWN // 2] = [("…", "", "", "", "")]
+    return table(_mode_changes(len(solution.events)), "time in s>", "mode", "from", "to", "because of", rows=rows)
 
 
 def notices(solution: Solution) -> list[str]:
@@ -65,16 +63,14 @@ def energy_table(solution: Solution) -> Table:
     # Where nothing collides there is no column for it.
     collides = any(row.impact for row in balance)
     columns = ["component", "in>", "from outside>", "stored>", "lost>", *["of it in impacts>"][: int(collides)]]
-    made = table("energy balance in J", *columns)
     rows = {
         row.component: (row.inflow, row.source, row.stored, row.lost, *[row.impact][: int(collides)]) for row in balance
     }
     active = [name for name, values in rows.items() if any(values)]
     largest = set(sorted(active, key=lambda name: max(map(abs, rows[name])), reverse=True)[:_SHOWN])
-    for name in (name for name in active if name in largest):
-        made.add_row(escape(name or solution.model.name), *map(_energy, rows[name]))
-    if len(active) > _SHOWN:
-        made.add_row(f"… {len(active) - _SHOWN} more")
+    shown = [(name or solution.model.name, *map(_energy, rows[name])) for name in active if name in largest]
+    shown += [(f"… {len(active) - _SHOWN} more",)] if len(active) > _SHOWN else []
+    made = table("energy balance in J", *columns, rows=shown)
     made.add_section()
     totals = [balance.source, balance.stored, balance.lost]
     totals += [sum(row.impact for row in balance)] if collides else []

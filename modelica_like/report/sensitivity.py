@@ -15,16 +15,12 @@ def sensitivity_report(result: Sensitivities) -> RenderableType:
     parts: list[RenderableType] = []
     for output in result.outputs:
         title = f"{output.name} = {output.value:.9g} {unit_text(output.unit)}".rstrip()
-        made = table(title, "parameter", "value>", "unit", "derivative>", "relative>")
-        ranking = result.ranking(output.name)
-        for parameter, derivative, relative in ranking[:SHOWN]:
-            unit = escape(unit_text(parameter.unit))
-            made.add_row(
-                escape(parameter.name), f"{parameter.value:.6g}", unit, f"{derivative:.6g}", relative_text(relative)
-            )
-        if len(ranking) > SHOWN:
-            made.add_row(f"… {len(ranking) - SHOWN} more")
-        parts += [made, ""]
+        rows = [
+            (one.name, f"{one.value:.6g}", unit_text(one.unit), f"{derivative:.6g}", relative_text(relative))
+            for one, derivative, relative in result.ranking(output.name)
+        ]
+        columns = "parameter", "value>", "unit", "derivative>", "relative>"
+        parts += [table(title, *columns, rows=rows, most=SHOWN), ""]
     parts += [
         f"{escape(name)}: {rows.shape[0]} times, see Sensitivities.series" for name, rows in result.series.items()
     ]

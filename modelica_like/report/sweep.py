@@ -22,17 +22,16 @@ def sweep_report(found: xarray.Dataset) -> RenderableType:
     names = [str(name) for name in found.data_vars if name != "failure"]
     told = found["failure"].to_numpy().ravel()
     failed = int(np.sum(told != ""))
-    made = table("extremes", "output", "unit", "smallest>", "at", "largest>", "at")
+    rows: list[tuple[str, ...]] = []
     for name in names:
         values = found[name]
         if not np.any(np.isfinite(values.to_numpy())):
-            made.add_row(escape(name), values.attrs["units"], "none")
+            rows.append((name, values.attrs["units"], "none"))
             continue
         low, high = values.argmin(...), values.argmax(...)
-        made.add_row(
-            escape(name), values.attrs["units"], f"{values.min().item():.6g}", _where(found, low),
-            f"{values.max().item():.6g}", _where(found, high),
-        )  # fmt: skip
+        smallest, largest = (f"{value.item():.6g}" for value in (values.min(), values.max()))
+        rows.append((name, values.attrs["units"], smallest, _where(found, low), largest, _where(found, high)))
+    made = table("extremes", "output", "unit", "smallest>", "at", "largest>", "at", rows=rows)
     parts: list[RenderableType] = [f"[bold]{escape(found.attrs['model'])}[/]  {told.size} runs", "", made]
     if failed:
         parts.append(f"{failed} runs failed:")
@@ -42,4 +41,4 @@ def sweep_report(found: xarray.Dataset) -> RenderableType:
 
 def _where(found: xarray.Dataset, place: Mapping[Any, xarray.DataArray]) -> str:
     point = found.isel({str(key): value.item() for key, value in place.items()})
-    return escape(", ".join(f"{name} = {point[name].item():.6g}" for name in point.coords))
+    return ", ".join(f"{name} = {point[name].item():.6g}" for name in point.coords)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
 from rich.console import Group, RenderableType
 from rich.markup import escape
@@ -18,20 +18,37 @@ from modelica_like.language.places import located
 from modelica_like.report.declared import Listing, Notation, declared
 
 _TERMINAL = Notation(
-    code=lambda text: f"[bold]{escape(text)}[/]",
-    text=escape,
+    code=str,
+    text=str,
     symbol=lambda _: "",
-    flow=lambda path, unit: escape(f"{path.rpartition('.')[2]} [{unit}]"),
+    flow=lambda path, unit: f"{path.rpartition('.')[2]} [{unit}]",
     missing=lambda _: "",
 )
 
 
-def table(title: str, *columns: str) -> Table:
-    """Return an empty table in the style of all reports."""
-    made = Table(title=title, title_justify="left", title_style="bold", box=None, pad_edge=False, header_style="dim")
+def table(
+    title: str, *columns: str, rows: Iterable[Sequence[str | Text]] = (), most: int = 10**9, rest: str = ""
+) -> Table:
+    """Return a table in the style of all reports.
+
+    Args:
+        title: above it.
+        columns: headings; `>` behind one: numbers, at the right; `*`: bold.
+        rows: cells, in which no text is markup; there may be fewer than columns.
+        most: how many rows are shown; a last one then tells how many more there are.
+        rest: what that adds.
+    """
+    made = Table(
+        title=escape(title), title_justify="left", title_style="bold", box=None, pad_edge=False, header_style="dim"
+    )
     for column in columns:
-        made.add_column(column, justify="right" if column.endswith(">") else "left")
-        made.columns[-1].header = column.rstrip(">")
+        justify = "right" if column.endswith(">") else "left"
+        made.add_column(Text(column.rstrip(">*")), justify=justify, style="bold" if column.endswith("*") else "")
+    known = list(rows)
+    for row in known[:most]:
+        made.add_row(*map(Text.assemble, row))
+    if len(known) > most:
+        made.add_row(f"… {len(known) - most} more{rest}")
     return made
 
 
@@ -42,9 +59,9 @@ def summary(kind: type[Component]) -> str:
 
 def library_table(types: Mapping[str, type[Component]]) -> Table:
     """Return all component types with their first sentence, sorted by module."""
-    made = table(f"{len(types)} component types", "type", "module", "what it is")
-    for name, kind in sorted(types.items(), key=lambda item: (item[1].__module__, item[0])):
-        made.add_row(f"[bold]{name}[/]", kind.__module__.rpartition(".")[2], escape(summary(kind)))
+    known = sorted(types.items(), key=lambda item: (item[1].__module__, item[0]))
+    rows = ((name, kind.__module__.rpartition(".")[2], summary(kind)) for name, kind in known)
+    made = table(f"{len(types)} component types", "type*", "module", "what it is", rows=rows)
     # One line per type, so that the list can be searched; `describe` has the whole text.
     for column in made.columns:
         column.no_wrap = True
@@ -57,26 +74,18 @@ def describe(kind: type[Component]) -> RenderableType:
     text = inspect.cleandoc(kind.__doc__ or "")
     bases = [base.__name__ for base in kind.__mro__[1:] if issubclass(base, Component) and base is not Component]
     heading = Text.assemble((kind.__name__, "bold"), f"  {kind.__module__}", f"  ({', '.join(bases)})" if bases else "")
-    sections: list[RenderableType] = [heading, Text(text), *(_listed(one) for one in declared(kind, _TERMINAL))]
+    tables = declared(kind, _TERMINAL)
     if kind._class_parts:
-        sections.append(
-            _listed(Listing("parts", ("name", "type", ""), [_part_row(kind, name) for name in kind._class_parts]))
-        )
-    sections.append(_statements(kind))
+        tables.append(Listing("parts", ("name", "type", ""), [_part_row(kind, name) for name in kind._class_parts]))
+    made = [table(title, f"{first}*", *others, rows=rows) for title, (first, *others), rows in tables]
+    sections: list[RenderableType] = [heading, Text(text), *made, _statements(kind)]
     return Group(*(Padding(section, (0, 0, 1, 0), expand=False) for section in sections))
-
-
-def _listed(listing: Listing) -> Table:
-    made = table(listing.title, *listing.head)
-    for row in listing.rows:
-        made.add_row(*row)
-    return made
 
 
 def _part_row(kind: type[Component], name: str) -> tuple[str, ...]:
     part = kind._class_parts[name]
     what = f"{len(part)} {type(part[0]).__name__}" if isinstance(part, list) else type(part).__name__
-    return f"[bold]{name}[/]", what, "replaceable" if name in kind._replaceable else ""
+    return name, what, "replaceable" if name in kind._replaceable else ""
 
 
 def _statements(kind: type[Component]) -> RenderableType:
