@@ -6,7 +6,7 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, cast, get_args
+from typing import Any, get_args
 
 import tomlkit
 
@@ -42,6 +42,8 @@ from modelica_like.netlist.document import (
 from modelica_like.netlist.locate import Lines, locate
 from modelica_like.units import parse_unit, to_si
 from modelica_like.writing import write_text
+
+_OWN_NAMES = "results keep the names that variables have in their FMUs"
 
 
 def read_toml(path: Path) -> tuple[dict[str, Any], Lines]:
@@ -153,36 +155,23 @@ _READERS: Mapping[str, Reader] = {
 
 def write_system(system: System, path: Path) -> None:
     """Write a system as TOML; the FMUs are named relative to it."""
-    document = tomlkit.document()
-    document.add("name", tomlkit.item(system.name))
-    if system.own_names:
-        document.add(tomlkit.comment("results keep the names that variables have in their FMUs"))
-        document.add("own_names", tomlkit.item(True))
-    units: dict[str, Any] = {unit.name: _unit_table(unit, path.parent) for unit in system.units}
-    ends = {link.name: [str(port) for port in (link.source, *link.targets)] for link in system.links}
     simulate = {key: value for key, value in vars(system.settings).items() if value is not None}
-    sections = {
-        "fmus": units, "connect": ends, "bonds": {bond.name: [bond.flow, bond.rate] for bond in system.bonds},
+    data: dict[str, Any] = {
+        "name": system.name,
+        "own_names": system.own_names and tomlkit.item(True).comment(_OWN_NAMES),
+        "fmus": {unit.name: _unit_table(unit, path.parent) for unit in system.units},
+        "connect": {link.name: [str(port) for port in (link.source, *link.targets)] for link in system.links},
+        "bonds": {bond.name: [bond.flow, bond.rate] for bond in system.bonds},
         "simulate": {key: f"{value!r} s" if key in ("until", "step") else value for key, value in simulate.items()},
-    }  # fmt: skip
-    for name, entries in sections.items():
-        if entries:
-            document.add(name, _table(entries))
-    write_text(path, tomlkit.dumps(document))
+    }
+    write_text(path, tomlkit.dumps({key: value for key, value in data.items() if value}))
 
 
 def _unit_table(unit: Unit, folder: Path) -> Any:
-    table = tomlkit.inline_table()
-    table.append("file", Path(os.path.relpath(unit.file, folder)).as_posix())
+    entries: dict[str, Any] = {"file": Path(os.path.relpath(unit.file, folder)).as_posix()}
     if unit.parameters:
-        inner = tomlkit.inline_table()
-        inner.update(cast("dict[str, Any]", dict(unit.parameters)))
-        table.append("parameters", inner)
-    return table
-
-
-def _table(entries: Mapping[str, Any]) -> Any:
-    table = tomlkit.table()
-    for name, entry in entries.items():
-        table.add(name, entry)
+        entries["parameters"] = tomlkit.inline_table()
+        entries["parameters"].update(dict(unit.parameters))
+    table = tomlkit.inline_table()
+    table.update(entries)
     return table

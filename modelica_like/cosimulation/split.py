@@ -73,7 +73,7 @@ def split(
         ExportError: a part cannot be exported.
         ModelicaLikeError: something is wrong with the drive.
     """
-    tell = report or _silent
+    tell = report or (lambda _: None)
     tell("compiling the drive")
     assembly = _assembly(drive)
     found = cut_netlist(assembly, [at] if isinstance(at, str) else at)
@@ -108,10 +108,6 @@ def _settings(until: float | str | None, step: float | str | None, master: str |
     settings = Settings() if master is None else Settings(master=one_of("master", master, get_args(Master)))
     given = {"until": until, "step": step}
     return replace(settings, **{name: seconds(value, name) for name, value in given.items() if value is not None})
-
-
-def _silent(_: str) -> None:
-    pass
 
 
 def _assembly(drive: Component | str | Path) -> Assembly:
