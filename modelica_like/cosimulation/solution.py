@@ -85,12 +85,11 @@ def cosim_solution(system: System, meta: dict[str, Any], table: Vector, seconds:
     """
     columns: list[RecordedVariable] = []
     constants: dict[str, float] = {}
-    counts = Counter(entry["name"] for part in meta["units"] for entry in part["columns"])
+    counts = Counter(entry["path"] for part in meta["units"] for entry in part["columns"])
     for unit, part in zip(system.units, meta["units"], strict=True):
         for entry in part["columns"]:
-            name = entry["name"] if system.own_names and counts[entry["name"]] == 1 else f"{unit.name}.{entry['name']}"
-            kind = "discrete" if entry["discrete"] else entry["causality"]
-            columns.append(RecordedVariable(name, entry["unit"], entry["description"], kind, dict(entry["items"])))
+            path = entry["path"] if system.own_names and counts[entry["path"]] == 1 else f"{unit.name}.{entry['path']}"
+            columns.append(RecordedVariable(**{**entry, "path": path, "names": dict(entry["names"])}))
         for name, value in part["constants"].items():
             constants[name if system.own_names else f"{unit.name}.{name}"] = value
     for bond in system.bonds:
@@ -109,4 +108,4 @@ def cosim_solution(system: System, meta: dict[str, Any], table: Vector, seconds:
 
 def _notice(entry: dict[str, Any]) -> str:
     unit = "" if entry["unit"] == "1" else f" {entry['unit']}"
-    return f"Nothing is connected to {entry['fmu']}.{entry['name']}: it stays at {entry['value']:g}{unit}."
+    return f"Nothing is connected to {entry['fmu']}.{entry['path']}: it stays at {entry['value']:g}{unit}."

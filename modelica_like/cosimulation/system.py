@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal, get_args
 
 from modelica_like.errors import ModelicaLikeError, NetlistError, UnknownName, did_you_mean, raise_together_or_one
 
@@ -79,13 +79,26 @@ class Settings:
             on what those before have told).
         inputs: `linear` (inputs move on straight lines where an FMU can take that) or `hold`.
         tolerance: relative tolerance of the coupling: the step varies.
+
+    Raises:
+        UnknownName: there is no such master, or no such way to give inputs.
     """
 
     until: float | None = None
     step: float | None = None
-    master: Master = "jacobi"
-    inputs: Inputs = "linear"
+    master: Master | str = "jacobi"
+    inputs: Inputs | str = "linear"
     tolerance: float | None = None
+
+    def __post_init__(self) -> None:
+        _check_word("master", self.master, get_args(Master))
+        _check_word("way to give inputs", self.inputs, get_args(Inputs))
+
+
+def _check_word(what: str, name: str, known: Sequence[str]) -> None:
+    if name not in known:
+        hint = did_you_mean(name, known) or "."
+        raise UnknownName(f"There is no {what} '{name}'{hint}", advice=f"There are {' and '.join(known)}.")
 
 
 @dataclass(frozen=True)
@@ -107,18 +120,6 @@ class System:
     def __str__(self) -> str:
         lines = [f"System {self.name}: {', '.join(unit.name for unit in self.units)}"]
         return "\n".join([*lines, *(f"  {link}" for link in self.links)])
-
-
-def one_of(what: str, name: str, known: Sequence[str]) -> Any:
-    """Return a name, if it is one of those known.
-
-    Raises:
-        UnknownName: it is not.
-    """
-    if name in known:
-        return name
-    hint = did_you_mean(name, known) or "."
-    raise UnknownName(f"There is no {what} '{name}'{hint}", advice=f"There are {' and '.join(known)}.")
 
 
 def check_system(system: System) -> None:
