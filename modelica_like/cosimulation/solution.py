@@ -3,41 +3,25 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
 
 from modelica_like.compile.compiled import Vector
-from modelica_like.cosimulation.system import System
+from modelica_like.cosimulation.system import Energies, System
 from modelica_like.solve.recorded import RecordedModel, RecordedSolution, RecordedVariable
 
 
-@dataclass(frozen=True)
-class Coupling:
+@dataclass
+class Coupling(Energies):
     """Energy at a bond over a run.
-
-    What the first FMU delivers is its flow times the rate that it was told; what the second receives is the flow that
-    it was told times its rate. The difference is energy that only the coupling has made.
 
     Attributes:
         name: of the bond.
-        delivered: by the FMU that gives the torque, force or current, in J.
-        received: by the FMU that takes it, in J.
-        throughput: integral of the magnitude of the power, in J.
-        mismatch: integral of the magnitude of the difference of both powers, in J.
     """
 
     name: str
-    delivered: float
-    received: float
-    throughput: float
-    mismatch: float
-
-    @property
-    def residual(self) -> float:
-        """Energy that the coupling has made, in J; negative if it has lost some."""
-        return self.received - self.delivered
 
     def __str__(self) -> str:
         share = self.residual / self.throughput if self.throughput else 0.0
@@ -99,7 +83,7 @@ def cosim_solution(system: System, meta: dict[str, Any], table: Vector, seconds:
     continuous = tuple(column for column, mode in zip(columns, modes, strict=True) if not mode)
     discrete = tuple(column for column, mode in zip(columns, modes, strict=True) if mode)
     couplings = tuple(
-        Coupling(bond.name, *(values[k] for k in ("delivered", "received", "throughput", "mismatch")))
+        Coupling(bond.name, **{one.name: values[one.name] for one in fields(Energies)})
         for bond, values in zip(system.bonds, meta["balances"], strict=True)
     )
     model = RecordedModel(system.name, continuous, discrete, constants)

@@ -68,6 +68,32 @@ class Bond:
     rate: str
 
 
+@dataclass(kw_only=True)
+class Energies:
+    """Energy at a bond.
+
+    What the first FMU delivers is the integral of the flow that it tells times the rate that it was told; what the
+    second receives is the flow that it was told times the rate that it tells. They would be equal if the FMUs were one:
+    the difference is energy that only the coupling has made.
+
+    Attributes:
+        delivered: by the FMU that gives the torque, force or current, in J.
+        received: by the FMU that takes it, in J.
+        throughput: integral of the magnitude of the power, in J.
+        mismatch: integral of the magnitude of the difference of both powers, in J.
+    """
+
+    delivered: float = 0.0
+    received: float = 0.0
+    throughput: float = 0.0
+    mismatch: float = 0.0
+
+    @property
+    def residual(self) -> float:
+        """Energy that the coupling has made, in J; negative if it has lost some."""
+        return self.received - self.delivered
+
+
 @dataclass(frozen=True)
 class Settings:
     """How a system is run.
