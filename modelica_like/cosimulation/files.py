@@ -31,13 +31,14 @@ from modelica_like.errors import (
 from modelica_like.netlist.document import (
     Check,
     Reader,
+    as_text,
     duration,
     each,
     options,
     parse_toml,
     read_sections,
     read_text,
-    text_of,
+    whole,
 )
 from modelica_like.netlist.locate import Lines, locate
 from modelica_like.units import parse_unit, to_si
@@ -118,7 +119,7 @@ def _name(key: str) -> str:
     return key.partition(".")[2]
 
 
-def _yes_or_no(key: str, value: Any, *_: Any) -> bool:
+def _yes_or_no(key: str, value: Any) -> bool:
     if not isinstance(value, bool):
         raise NetlistError(f"{key} must be true or false.")
     return value
@@ -148,8 +149,8 @@ _OPTIONS: Mapping[str, Check] = {
     "tolerance": _tolerance,
 }  # fmt: skip
 _READERS: Mapping[str, Reader] = {
-    "name": text_of, "own_names": _yes_or_no, "fmus": each(_unit), "connect": each(_link), "bonds": each(_bond),
-    "simulate": options(_OPTIONS),
+    "name": whole(as_text), "own_names": whole(_yes_or_no), "fmus": each(_unit), "connect": each(_link),
+    "bonds": each(_bond), "simulate": options(_OPTIONS),
 }  # fmt: skip
 
 

@@ -195,15 +195,9 @@ def _placed(error: ModelicaLikeError, source: Source) -> ModelicaLikeError:
     return error
 
 
-def text_of(key: str, value: Any, lines: Lines, errors: list[ModelicaLikeError]) -> str:
-    """Return a section that is a text.
-
-    Raises:
-        NetlistError: it is none.
-    """
-    if not isinstance(value, str):
-        raise NetlistError(f"{key} must be a text.")
-    return value
+def whole(check: Check) -> Reader:
+    """Make the reader of a section that is one entry."""
+    return lambda key, value, lines, errors: check(key, value)
 
 
 def _table(key: str, value: Any) -> dict[str, Any]:
@@ -242,7 +236,12 @@ def _value(key: str, value: Any) -> Any:
     return value
 
 
-def _name(key: str, value: Any) -> str:
+def as_text(key: str, value: Any) -> str:
+    """Return an entry that is a text.
+
+    Raises:
+        NetlistError: it is none.
+    """
     if not isinstance(value, str):
         raise NetlistError(f"{key} must be a text.")
     return value
@@ -281,10 +280,6 @@ def check_part(key: str, value: Any) -> Any:
         if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= 100_000:
             raise NetlistError(f"{key}: count = {count} must be a whole number from 1 to 100000.")
     return value
-
-
-def _free(key: str, value: Any, lines: Lines, errors: list[ModelicaLikeError]) -> list[str]:
-    return _names(key, value)
 
 
 def options(checks: Mapping[str, Check]) -> Reader:
@@ -334,15 +329,15 @@ _OPTIONS: Mapping[str, Check] = {
     "until": duration, "start": _start_kind, "rtol": _rtol, "points": _points,
 }  # fmt: skip
 _READERS: Mapping[str, Reader] = {
-    "name": text_of,
-    "description": text_of,
+    "name": whole(as_text),
+    "description": whole(as_text),
     "parameters": each(_value),
     "parts": each(check_part),
     "series": each(_ends),
     "connect": each(_ends),
     "start": each(_value, flat=True),
     "guess": each(_value, flat=True),
-    "free": _free,
-    "expose": each(_name),
+    "free": whole(_names),
+    "expose": each(as_text),
     "simulate": options(_OPTIONS),
 }

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from modelica_like.errors import ModelicaLikeError, NetlistError, Source, raise_together_or_one
-from modelica_like.netlist.document import Reader, each, parse_toml, read_sections, read_text, text_of
+from modelica_like.netlist.document import Reader, as_text, each, parse_toml, read_sections, read_text, whole
 from modelica_like.netlist.locate import Lines, locate
 
 
@@ -68,8 +68,8 @@ def _comparison(key: str, entry: Any) -> list[str]:
 
 
 _READERS: Mapping[str, Reader] = {
-    "name": text_of, "description": text_of, "parameters": each(lambda _, value: value), "checks": each(_check),
-    "compare": each(_comparison),
+    "name": whole(as_text), "description": whole(as_text), "parameters": each(lambda _, value: value),
+    "checks": each(_check), "compare": each(_comparison),
 }  # fmt: skip
 
 
