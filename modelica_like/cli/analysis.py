@@ -26,7 +26,7 @@ def modes(
         assembly = load_netlist(netlist, assignments)
         from modelica_like.analyse.linear.linearize import linearize
         from modelica_like.analyse.linear.points import when
-        from modelica_like.report.modes import modes_report
+        from modelica_like.report.analysis import modes_report
         from modelica_like.solve.plot import save_plot
 
         linear = linearize(assembly, when(at), inputs=inputs, outputs=outputs)

@@ -86,8 +86,8 @@ def cosim(
         from modelica_like.cli.outcome import Outcome
         from modelica_like.cosimulation.load import opened
         from modelica_like.cosimulation.run import cosim as run
-        from modelica_like.report.cosimulation import cosimulation_report
         from modelica_like.report.progress import Bar
+        from modelica_like.report.run import cosimulation_report
         from modelica_like.solve.plot import plot as draw
 
         with opened(system) as known, Bar(until or known.settings.until) as bar:

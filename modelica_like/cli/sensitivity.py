@@ -24,7 +24,7 @@ def sensitivity(
     with told(debug, pictures=[tornado]):
         assembly = load_netlist(netlist, assignments)
         from modelica_like.analyse.sensitivity.derivatives import sensitivities
-        from modelica_like.report.sensitivity import sensitivity_report
+        from modelica_like.report.analysis import sensitivity_report
         from modelica_like.solve.plot import save_plot
 
         result = sensitivities(assembly, of, to or (), until=until, start=start.value if start else None)

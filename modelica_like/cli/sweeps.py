@@ -30,7 +30,7 @@ def steady(
         from modelica_like.analyse.operating.curves import characteristic
         from modelica_like.analyse.operating.steady import steady as find
         from modelica_like.analyse.sweeps.ranges import read_assignment, read_range
-        from modelica_like.report.steady import curves_report, point_report
+        from modelica_like.report.analysis import curves_report, point_report
         from modelica_like.simulation import simulate
         from modelica_like.solve.plot import save_plot
 
@@ -63,11 +63,11 @@ def sweep(
         assembly = load_netlist(netlist, assignments)
         from modelica_like.analyse.sweeps.ranges import read_range
         from modelica_like.analyse.sweeps.sweep import sweep as run
+        from modelica_like.report.analysis import sweep_report
         from modelica_like.report.files import STDOUT, write_dataset
-        from modelica_like.report.progress import RunsBar
-        from modelica_like.report.sweep import sweep_report
+        from modelica_like.report.progress import Bar
 
-        with RunsBar() as bar:
+        with Bar(title="runs") as bar:
             found = run(
                 assembly, dict(read_range(text) for text in over), of, until=until, checkpoint=checkpoint,
                 processes=processes, scheduler=scheduler, progress=bar, solver=solver.value,

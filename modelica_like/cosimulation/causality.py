@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from itertools import product
 from typing import Literal
 
 from modelica_like.compile import compile
 from modelica_like.compile.compiled import CompiledDae
-from modelica_like.cosimulation.cut import Cut, CutNetlist
+from modelica_like.cosimulation.cut import Cut, CutNetlist, as_name
 from modelica_like.errors import ModelicaLikeError, NetlistError, StructureError
 from modelica_like.flatten import flatten
 from modelica_like.fmi.dependencies import Dependencies
@@ -38,18 +39,15 @@ class End:
 
 Make = Callable[[int, Sequence[End]], Assembly]
 """Makes the netlist of a group with adaptors at its open ends."""
+Objection = Callable[[int, Mapping[Cut, Takes]], str]
+"""Tells what speaks against a choice in a group, or an empty text."""
 
 
 def ends_of(cut: Cut, near_takes: Takes) -> tuple[End, End]:
     """Return both ends of a cut; the names of their adaptors are those of the ends."""
     other: Takes = "flow" if near_takes == "potential" else "potential"
     near, far = cut.near[0], cut.far[0]
-    return End(adaptor_name(near), near, near_takes), End(adaptor_name(far), far, other)
-
-
-def adaptor_name(path: str) -> str:
-    """Return the name of the adaptor at an end."""
-    return path.replace(".", "_").replace("[", "_").replace("]", "")
+    return End(as_name(near), near, near_takes), End(as_name(far), far, other)
 
 
 def orient(found: CutNetlist, make: Make) -> dict[Cut, Takes]:
@@ -64,36 +62,32 @@ def orient(found: CutNetlist, make: Make) -> dict[Cut, Takes]:
     cuts = [cut for cut in found.cuts if not cut.signal]
     if len(cuts) > _MOST:
         raise NetlistError(f"{len(cuts)} cuts at once are too many; {_MOST} are possible.")
-    trial = _Trial(found, make)
-    for choice in product(("potential", "flow"), repeat=len(cuts)):
-        chosen: dict[Cut, Takes] = dict(zip(cuts, choice, strict=True))
-        if all(not trial.objection(k, chosen) for k in range(len(found.groups))):
+    objection = _trial(found, make)
+    for chosen in _choices(cuts):
+        if all(not objection(k, chosen) for k in range(len(found.groups))):
             return chosen
-    raise _impossible(found, trial, cuts)
+    raise _impossible(found, objection, cuts)
 
 
-class _Trial:
-    """Finds out whether a group of parts can have its ends so; every case is tried once."""
+def _choices(cuts: Sequence[Cut]) -> Iterator[dict[Cut, Takes]]:
+    sides: list[Takes] = ["potential", "flow"]
+    for choice in product(sides, repeat=len(cuts)):
+        yield dict(zip(cuts, choice, strict=True))
 
-    def __init__(self, found: CutNetlist, make: Make) -> None:
-        self.found, self.make = found, make
-        self._known: dict[tuple[int, tuple[End, ...]], str] = {}
 
-    def objection(self, group: int, chosen: Mapping[Cut, Takes]) -> str:
-        """Return what speaks against it, or an empty text."""
-        ends = open_ends(self.found, group, chosen)
-        key = group, tuple(ends)
-        if key not in self._known:
-            self._known[key] = self._try(group, ends)
-        return self._known[key]
+def _trial(found: CutNetlist, make: Make) -> Objection:
+    """Return what tells why a group of parts cannot have its ends so; every case is tried once."""
 
-    def _try(self, group: int, ends: Sequence[End]) -> str:
+    @cache
+    def tried(group: int, ends: tuple[End, ...]) -> str:
         try:
-            assembly = self.make(group, ends)
+            assembly = make(group, ends)
             model = compile(reduce(flatten(assembly, open_inputs=True)))
         except StructureError as error:
             return error.what.rstrip(".")
         return next(filter(None, (_bad_end(model, assembly, end) for end in ends)), "")
+
+    return lambda group, chosen: tried(group, tuple(open_ends(found, group, chosen)))
 
 
 def open_ends(found: CutNetlist, group: int, chosen: Mapping[Cut, Takes]) -> list[End]:
@@ -131,16 +125,14 @@ def _bad_end(model: CompiledDae, assembly: Assembly, end: End) -> str:
     return ""
 
 
-def _impossible(found: CutNetlist, trial: _Trial, cuts: Sequence[Cut]) -> ModelicaLikeError:
+def _impossible(found: CutNetlist, objection: Objection, cuts: Sequence[Cut]) -> ModelicaLikeError:
     """Tell for the first cut that cannot be made in either way why."""
-    choices: list[Takes] = ["potential", "flow"]
     for cut in cuts:
         sides = [found.group_of(cut.near[0]), found.group_of(cut.far[0])]
         others = [one for one in cuts if one is not cut]
         reasons: dict[str, None] = {}
-        for choice in product(choices, repeat=len(cuts)):
-            chosen = dict(zip((cut, *others), choice, strict=True))
-            objections = [trial.objection(side, chosen) for side in sides]
+        for chosen in _choices((cut, *others)):
+            objections = [objection(side, chosen) for side in sides]
             if not any(objections):
                 break
             reasons.update(dict.fromkeys(filter(None, objections)))

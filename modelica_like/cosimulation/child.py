@@ -205,15 +205,14 @@ def open_inputs(slaves: list[Slave], job: dict[str, Any]) -> list[dict[str, Any]
 
 
 def about(variable: Any) -> dict[str, Any]:
-    """Return what is to be known about a column."""
+    """Return what is to be known about a column, by the names of `RecordedVariable`."""
     items = getattr(variable.declaredType, "items", None) or ()
     return {
-        "name": variable.name,
+        "path": variable.name,
         "unit": variable.unit or getattr(variable.declaredType, "unit", None) or "1",
         "description": variable.description or "",
-        "causality": variable.causality or "local",
-        "discrete": variable.type not in REAL,
-        "items": [(int(item.value), item.name) for item in items],
+        "kind": (variable.causality or "local") if variable.type in REAL else "discrete",
+        "names": [(int(item.value), item.name) for item in items],
     }
 
 

@@ -150,7 +150,7 @@ def _find(assembly: Assembly, wires: Sequence[Wire], name: str) -> tuple[Cut, Wi
         _check_can_open(assembly, far)
     else:
         far = tuple(end for end in wire.ends if end != near)
-    return Cut(_as_name(name), (near,), far, wire.signal, wire.source), wire
+    return Cut(as_name(name), (near,), far, wire.signal, wire.source), wire
 
 
 def _near_end(assembly: Assembly, wires: Sequence[Wire], name: str) -> str:
@@ -217,7 +217,8 @@ def _is_output(assembly: Assembly, path: str) -> bool:
     return type(assembly.find(owner).fields[name]).__name__ == "Output"
 
 
-def _as_name(text: str) -> str:
+def as_name(text: str) -> str:
+    """Return the path of an end as a name: of a cut, or of the adaptor there."""
     return text.replace(".", "_").replace("[", "_").replace("]", "")
 
 
@@ -225,21 +226,14 @@ def _as_name(text: str) -> str:
 
 
 def _groups(assembly: Assembly, wires: Iterable[Wire]) -> tuple[tuple[str, ...], ...]:
-    group = {name: name for name in assembly._parts}
-
-    def root(name: str) -> str:
-        while group[name] != name:
-            name = group[name]
-        return name
-
+    names = list(assembly._parts)
+    groups = [{name} for name in names]
     for wire in wires:
-        first, *others = (part_of(end) for end in wire.ends)
-        for other in others:
-            group[root(other)] = root(first)
-    members: dict[str, list[str]] = {}
-    for name in assembly._parts:
-        members.setdefault(root(name), []).append(name)
-    return tuple(tuple(names) for names in members.values())
+        parts = {part_of(end) for end in wire.ends}
+        groups = [one for one in groups if not one & parts] + [parts.union(*(one for one in groups if one & parts))]
+    return tuple(
+        sorted((tuple(sorted(group, key=names.index)) for group in groups), key=lambda one: names.index(one[0]))
+    )
 
 
 def _check_apart(assembly: Assembly, found: CutNetlist, cut: Cut) -> None:

@@ -76,10 +76,6 @@ class DescribedFmu:
         """Return the unit of a variable, if the FMU defines one."""
         return self.units.get(self.variables[name].unit) if name in self.variables else None
 
-    def of(self, causality: str) -> list[str]:
-        """Return the names of the variables of a causality."""
-        return [name for name, variable in self.variables.items() if variable.causality == causality]
-
 
 def described(path: Path) -> DescribedFmu:
     """Read the description of an FMU; nothing of it is run.

@@ -34,79 +34,55 @@ def tell_error(system: System, folder: Path) -> None:
     """Raise what the process has left to tell."""
     if not (folder / "error.json").exists():
         return
-    error = json.loads((folder / "error.json").read_text())
+    error: dict[str, Any] = json.loads((folder / "error.json").read_text())
     files = {unit.name: unit.file.name for unit in system.units}
-    name = error.get("unit", "")
-    raise _ERRORS[error["kind"]](system.name, f"{name} ({files[name]})" if name else "", error)
+    known, name = error.get("known", []), error.get("unit", "")
+    in_a_step = "DoStep" in error.get("text", "")
+    words = error | {
+        "system": system.name,
+        "unit": f"{name} ({files[name]})" if name else "",
+        "hint": did_you_mean(error["name"], known) or "." if known else ".",
+        "has": f"It has {', '.join(known)}." if known else "It has none.",
+        "causality": article(error.get("causality") or "local"),
+        "text": printable(error.get("text", "")).rstrip("."),
+        "said": "\n".join(f"It said: {printable(text)}" for text in error.get("messages", ())[-3:]),
+        "shorter": "If what the FMUs exchange grows without bounds, take a shorter step." if in_a_step else "",
+    }
+    too_old = error["kind"] == "no co-simulation" and error["version"] == "1.0"
+    kind, *sentences = _ERRORS["too old" if too_old else error["kind"]]
+    what, why, advice = (sentence.format(**words) for sentence in sentences)
+    raise kind(what, why=why, advice=advice)
 
 
-def _unknown(system: str, unit: str, error: dict[str, Any]) -> ModelicaLikeError:
-    hint = did_you_mean(error["name"], error["known"]) or "."
-    return UnknownName(f"{unit} has no variable '{error['name']}'{hint}")
-
-
-def _no_output(system: str, unit: str, error: dict[str, Any]) -> ModelicaLikeError:
-    hint = did_you_mean(error["name"], error["known"]) or "."
-    return UnknownName(f"{system} has no variable '{error['name']}'{hint}")
-
-
-def _no_input(system: str, unit: str, error: dict[str, Any]) -> ModelicaLikeError:
-    has = f"It has {', '.join(error['known'])}." if error["known"] else "It has none."
-    return UnknownName(f"{unit}: '{error['name']}' is no input but {article(error['causality'] or 'local')}. {has}")
-
-
-def _no_cosimulation(system: str, unit: str, error: dict[str, Any]) -> ModelicaLikeError:
-    if error["version"] == "1.0":
-        return FmuRefused(f"{unit} is an FMU of FMI 1.0.", advice="Co-simulation takes FMI 2.0 and 3.0.")
-    return FmuRefused(f"{unit} has no Co-Simulation part.", advice="Export it as a Co-Simulation FMU.")
-
-
-def _no_rollback(system: str, unit: str, error: dict[str, Any]) -> ModelicaLikeError:
-    return FmuRefused(
-        f"{unit} cannot go back to a saved state, or does not take steps of any length, so the step cannot vary.",
-        why="It has not both of canGetAndSetFMUState and canHandleVariableCommunicationStepSize.",
-        advice="Run with a fixed step, without tolerance.",
-    )
-
-
-def _not_settled(system: str, unit: str, error: dict[str, Any]) -> ModelicaLikeError:
-    return FmuFailed(
-        f"{unit}: {error['name']} does not come to rest at t = {error['time']:.6g} s when inputs follow outputs.",
-        why=f"{system} has an algebraic loop: the output follows inputs at once that follow this output at once.",
-        advice="Cut where a mass, a spring or a controller with a state is between the FMUs.",
-    )
-
-
-def _not_finite(system: str, unit: str, error: dict[str, Any]) -> ModelicaLikeError:
-    return FmuFailed(
-        f"{unit}: {error['name']} is no finite number at t = {error['time']:.6g} s.",
-        advice="If the values before it grow without bounds, take a shorter step.",
-    )
-
-
-def _step(system: str, unit: str, error: dict[str, Any]) -> ModelicaLikeError:
-    return StepFailed(
-        f"{system}: after t = {error['time']:.6g} s no step is short enough for the tolerance of the coupling.",
-        advice="Give a larger tolerance, or a fixed step.",
-    )
-
-
-def _ends(system: str, unit: str, error: dict[str, Any]) -> ModelicaLikeError:
-    return FmuFailed(f"{unit} wants to end the run after t = {error['time']:g} s.")
-
-
-def _failed(system: str, unit: str, error: dict[str, Any]) -> ModelicaLikeError:
-    said = [printable(text) for text in error["messages"]]
-    in_a_step = "DoStep" in error["text"]
-    return FmuFailed(
-        f"{unit} failed: {printable(error['text']).rstrip('.')}.",
-        why="\n".join(f"It said: {text}" for text in said[-3:]),
-        advice="If what the FMUs exchange grows without bounds, take a shorter step." if in_a_step else "",
-    )
-
-
-_ERRORS = {
-    "unknown": _unknown, "no output": _no_output, "no input": _no_input, "no co-simulation": _no_cosimulation,
-    "no rollback": _no_rollback, "not settled": _not_settled,
-    "not finite": _not_finite, "step": _step, "ends": _ends, "failed": _failed,
+_ERRORS: dict[str, tuple[type[ModelicaLikeError], str, str, str]] = {
+    "unknown": (UnknownName, "{unit} has no variable '{name}'{hint}", "", ""),
+    "no output": (UnknownName, "{system} has no variable '{name}'{hint}", "", ""),
+    "no input": (UnknownName, "{unit}: '{name}' is no input but {causality}. {has}", "", ""),
+    "too old": (FmuRefused, "{unit} is an FMU of FMI 1.0.", "", "Co-simulation takes FMI 2.0 and 3.0."),
+    "no co-simulation": (
+        FmuRefused, "{unit} has no Co-Simulation part.", "", "Export it as a Co-Simulation FMU.",
+    ),
+    "no rollback": (
+        FmuRefused,
+        "{unit} cannot go back to a saved state, or does not take steps of any length, so the step cannot vary.",
+        "It has not both of canGetAndSetFMUState and canHandleVariableCommunicationStepSize.",
+        "Run with a fixed step, without tolerance.",
+    ),
+    "not settled": (
+        FmuFailed,
+        "{unit}: {name} does not come to rest at t = {time:.6g} s when inputs follow outputs.",
+        "{system} has an algebraic loop: the output follows inputs at once that follow this output at once.",
+        "Cut where a mass, a spring or a controller with a state is between the FMUs.",
+    ),
+    "not finite": (
+        FmuFailed, "{unit}: {name} is no finite number at t = {time:.6g} s.", "",
+        "If the values before it grow without bounds, take a shorter step.",
+    ),
+    "step": (
+        StepFailed, "{system}: after t = {time:.6g} s no step is short enough for the tolerance of the coupling.", "",
+        "Give a larger tolerance, or a fixed step.",
+    ),
+    "ends": (FmuFailed, "{unit} wants to end the run after t = {time:g} s.", "", ""),
+    "failed": (FmuFailed, "{unit} failed: {text}.", "{said}", "{shorter}"),
 }  # fmt: skip
+"""What it is, and the sentences what, why and what to do, by the kind of failure."""

@@ -19,7 +19,7 @@ from modelica_like.errors import (
 from modelica_like.fmi.export import export_fmu
 from modelica_like.language import Assembly, Connector
 from modelica_like.language.fields import Input
-from modelica_like.netlist.document import Document, parse, read_text
+from modelica_like.netlist.document import Document, flattened, parse, read_text
 from modelica_like.netlist.read import FMU_PART, assemble
 from modelica_like.simulation import seconds
 from modelica_like.units import parse_unit, to_si
@@ -133,7 +133,7 @@ class _Joiner:
                 why="Its equations would need a solver, which the tool that exported it has left out.",
                 advice="Export it once more, for Co-Simulation.",
             )
-        values = _flattened({key: value for key, value in entry.items() if key not in _OWN})
+        values = flattened({key: value for key, value in entry.items() if key not in _OWN})
         return Unit(name, file, {key: self._value(name, key, value) for key, value in values.items()})
 
     def _value(self, fmu: str, key: str, value: Any) -> float:
@@ -248,11 +248,3 @@ def _part(path: str) -> str:
 
 def _spoken(end: _End) -> str:
     return str(end.port) if end.foreign else end.port.variable
-
-
-def _flattened(table: Mapping[str, Any], before: str = "") -> dict[str, Any]:
-    """Join dotted keys, which TOML reads as tables in tables."""
-    flat: dict[str, Any] = {}
-    for name, value in table.items():
-        flat.update(_flattened(value, f"{before}{name}.") if isinstance(value, dict) else {f"{before}{name}": value})
-    return flat

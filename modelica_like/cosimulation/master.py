@@ -8,6 +8,7 @@ from math import ceil, inf, isfinite
 from typing import Any, Protocol
 
 from modelica_like.cosimulation.slaves import Refused, Slave
+from modelica_like.cosimulation.system import Energies
 
 Row = Any
 Memory = list[dict[str, Any]]
@@ -58,33 +59,18 @@ class Signal:
 
 
 @dataclass
-class Balance:
-    """Energy at a bond.
-
-    What the first FMU delivers is the integral of the flow it tells times the rate it was told; what the second
-    receives is the flow it was told times the rate it tells. They would be equal if the FMUs were one.
+class Balance(Energies):
+    """Energy at a bond while it runs.
 
     Attributes:
         flow: number of the signal of the flow.
         rate: number of the signal of the rate.
-        delivered: by the first FMU, in J.
-        received: by the second, in J.
-        throughput: integral of the magnitude of the power, in J.
-        mismatch: integral of the magnitude of the residual power, in J.
+        power: at the last communication point, in W.
     """
 
     flow: int
     rate: int
-    delivered: float = 0.0
-    received: float = 0.0
-    throughput: float = 0.0
-    mismatch: float = 0.0
     power: float = 0.0
-
-    @property
-    def residual(self) -> float:
-        """Energy that the coupling has created, in J."""
-        return self.received - self.delivered
 
     def add(self, signals: Sequence[Signal], before: Sequence[float], size: float) -> None:
         """Add a step, by the trapezoidal rule."""

@@ -11,14 +11,14 @@ import time as clock
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 
 from modelica_like.cosimulation.failures import tell_error, tell_loss
 from modelica_like.cosimulation.load import opened
 from modelica_like.cosimulation.solution import CosimSolution, Coupling, cosim_solution
-from modelica_like.cosimulation.system import Inputs, Master, Settings, System, check_system, one_of
+from modelica_like.cosimulation.system import Inputs, Master, Settings, System, check_system
 from modelica_like.errors import FmuCrashed, FmuTimeout, UnknownName, ValueOutOfRange, did_you_mean
 from modelica_like.fmi.process import run_child
 from modelica_like.fmi.unpack import unpack
@@ -122,9 +122,7 @@ def _settings(
             raise ValueOutOfRange(f"The {what} must be positive, not {value:g} s.")
     if chosen is not None and not 1e-12 <= chosen <= 0.1:
         raise ValueOutOfRange(f"tolerance = {chosen:g} must be a number from 1e-12 to 0.1.")
-    chosen_master = one_of("master", master or base.master, get_args(Master))
-    way = one_of("way to give inputs", inputs or base.inputs, get_args(Inputs))
-    return Settings(end, min(size, end), chosen_master, way, chosen)
+    return Settings(end, min(size, end), master or base.master, inputs or base.inputs, chosen)
 
 
 def _inner(tolerance: float | None) -> float | None:

@@ -3,41 +3,25 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
 
 from modelica_like.compile.compiled import Vector
-from modelica_like.cosimulation.system import System
+from modelica_like.cosimulation.system import Energies, System
 from modelica_like.solve.recorded import RecordedModel, RecordedSolution, RecordedVariable
 
 
-@dataclass(frozen=True)
-class Coupling:
+@dataclass
+class Coupling(Energies):
     """Energy at a bond over a run.
-
-    What the first FMU delivers is its flow times the rate that it was told; what the second receives is the flow that
-    it was told times its rate. The difference is energy that only the coupling has made.
 
     Attributes:
         name: of the bond.
-        delivered: by the FMU that gives the torque, force or current, in J.
-        received: by the FMU that takes it, in J.
-        throughput: integral of the magnitude of the power, in J.
-        mismatch: integral of the magnitude of the difference of both powers, in J.
     """
 
     name: str
-    delivered: float
-    received: float
-    throughput: float
-    mismatch: float
-
-    @property
-    def residual(self) -> float:
-        """Energy that the coupling has made, in J; negative if it has lost some."""
-        return self.received - self.delivered
 
     def __str__(self) -> str:
         share = self.residual / self.throughput if self.throughput else 0.0
@@ -85,12 +69,11 @@ def cosim_solution(system: System, meta: dict[str, Any], table: Vector, seconds:
     """
     columns: list[RecordedVariable] = []
     constants: dict[str, float] = {}
-    counts = Counter(entry["name"] for part in meta["units"] for entry in part["columns"])
+    counts = Counter(entry["path"] for part in meta["units"] for entry in part["columns"])
     for unit, part in zip(system.units, meta["units"], strict=True):
         for entry in part["columns"]:
-            name = entry["name"] if system.own_names and counts[entry["name"]] == 1 else f"{unit.name}.{entry['name']}"
-            kind = "discrete" if entry["discrete"] else entry["causality"]
-            columns.append(RecordedVariable(name, entry["unit"], entry["description"], kind, dict(entry["items"])))
+            path = entry["path"] if system.own_names and counts[entry["path"]] == 1 else f"{unit.name}.{entry['path']}"
+            columns.append(RecordedVariable(**{**entry, "path": path, "names": dict(entry["names"])}))
         for name, value in part["constants"].items():
             constants[name if system.own_names else f"{unit.name}.{name}"] = value
     for bond in system.bonds:
@@ -100,7 +83,7 @@ def cosim_solution(system: System, meta: dict[str, Any], table: Vector, seconds:
     continuous = tuple(column for column, mode in zip(columns, modes, strict=True) if not mode)
     discrete = tuple(column for column, mode in zip(columns, modes, strict=True) if mode)
     couplings = tuple(
-        Coupling(bond.name, *(values[k] for k in ("delivered", "received", "throughput", "mismatch")))
+        Coupling(bond.name, **{one.name: values[one.name] for one in fields(Energies)})
         for bond, values in zip(system.bonds, meta["balances"], strict=True)
     )
     model = RecordedModel(system.name, continuous, discrete, constants)
@@ -109,4 +92,4 @@ def cosim_solution(system: System, meta: dict[str, Any], table: Vector, seconds:
 
 def _notice(entry: dict[str, Any]) -> str:
     unit = "" if entry["unit"] == "1" else f" {entry['unit']}"
-    return f"Nothing is connected to {entry['fmu']}.{entry['name']}: it stays at {entry['value']:g}{unit}."
+    return f"Nothing is connected to {entry['fmu']}.{entry['path']}: it stays at {entry['value']:g}{unit}."

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import get_args
 
 from modelica_like.cosimulation.causality import Takes, ends_of, open_ends, orient
 from modelica_like.cosimulation.cut import Cut, CutNetlist, cut_netlist
 from modelica_like.cosimulation.files import write_system
 from modelica_like.cosimulation.parts import Maker
-from modelica_like.cosimulation.system import POWERS, Bond, Link, Master, Port, Settings, System, Unit, one_of
+from modelica_like.cosimulation.system import POWERS, Bond, Link, Port, Settings, System, Unit
 from modelica_like.errors import DuplicateName, NetlistError
 from modelica_like.fmi.export import export_fmu
 from modelica_like.initialize import initialize
@@ -73,7 +72,7 @@ def split(
         ExportError: a part cannot be exported.
         ModelicaLikeError: something is wrong with the drive.
     """
-    tell = report or _silent
+    tell = report or (lambda _: None)
     tell("compiling the drive")
     assembly = _assembly(drive)
     found = cut_netlist(assembly, [at] if isinstance(at, str) else at)
@@ -105,13 +104,8 @@ def split(
 
 
 def _settings(until: float | str | None, step: float | str | None, master: str | None) -> Settings:
-    settings = Settings() if master is None else Settings(master=one_of("master", master, get_args(Master)))
-    given = {"until": until, "step": step}
-    return replace(settings, **{name: seconds(value, name) for name, value in given.items() if value is not None})
-
-
-def _silent(_: str) -> None:
-    pass
+    end, size = (None if value is None else seconds(value, name) for name, value in (("until", until), ("step", step)))
+    return Settings(end, size, master or "jacobi")
 
 
 def _assembly(drive: Component | str | Path) -> Assembly:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from itertools import chain, count
 from math import isfinite
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 from modelica_like.cosimulation.described import UnitDefinition, described
 from modelica_like.cosimulation.ssp_document import COSIMULATION, NAMES
@@ -26,16 +26,13 @@ from modelica_like.cosimulation.ssp_elements import (
 from modelica_like.cosimulation.ssp_values import Bound, Target, bound_values
 from modelica_like.cosimulation.system import (
     Bond,
-    Inputs,
     Link,
-    Master,
     Port,
     Settings,
     System,
     Unit,
     check_system,
     find_bonds,
-    one_of,
 )
 from modelica_like.errors import DuplicateName, NetlistError, Source
 from modelica_like.fmi.unpack import SSP
@@ -239,10 +236,7 @@ class _Reader:
         if note is None:
             return Settings(until=until)
         step, tolerance = (number(note, name) if note.get(name) else None for name in ("step", "tolerance"))
-        return Settings(
-            until, step, one_of("master", note.get("master", "jacobi"), get_args(Master)),
-            one_of("way to give inputs", note.get("inputs", "linear"), get_args(Inputs)), tolerance,
-        )  # fmt: skip
+        return Settings(until, step, note.get("master", "jacobi"), note.get("inputs", "linear"), tolerance)
 
 
 def _is_identity(transformation: Any) -> bool:

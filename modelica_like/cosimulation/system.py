@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal, get_args
 
 from modelica_like.errors import ModelicaLikeError, NetlistError, UnknownName, did_you_mean, raise_together_or_one
 
@@ -68,6 +68,32 @@ class Bond:
     rate: str
 
 
+@dataclass(kw_only=True)
+class Energies:
+    """Energy at a bond.
+
+    What the first FMU delivers is the integral of the flow that it tells times the rate that it was told; what the
+    second receives is the flow that it was told times the rate that it tells. They would be equal if the FMUs were one:
+    the difference is energy that only the coupling has made.
+
+    Attributes:
+        delivered: by the FMU that gives the torque, force or current, in J.
+        received: by the FMU that takes it, in J.
+        throughput: integral of the magnitude of the power, in J.
+        mismatch: integral of the magnitude of the difference of both powers, in J.
+    """
+
+    delivered: float = 0.0
+    received: float = 0.0
+    throughput: float = 0.0
+    mismatch: float = 0.0
+
+    @property
+    def residual(self) -> float:
+        """Energy that the coupling has made, in J; negative if it has lost some."""
+        return self.received - self.delivered
+
+
 @dataclass(frozen=True)
 class Settings:
     """How a system is run.
@@ -79,13 +105,26 @@ class Settings:
             on what those before have told).
         inputs: `linear` (inputs move on straight lines where an FMU can take that) or `hold`.
         tolerance: relative tolerance of the coupling: the step varies.
+
+    Raises:
+        UnknownName: there is no such master, or no such way to give inputs.
     """
 
     until: float | None = None
     step: float | None = None
-    master: Master = "jacobi"
-    inputs: Inputs = "linear"
+    master: Master | str = "jacobi"
+    inputs: Inputs | str = "linear"
     tolerance: float | None = None
+
+    def __post_init__(self) -> None:
+        _check_word("master", self.master, get_args(Master))
+        _check_word("way to give inputs", self.inputs, get_args(Inputs))
+
+
+def _check_word(what: str, name: str, known: Sequence[str]) -> None:
+    if name not in known:
+        hint = did_you_mean(name, known) or "."
+        raise UnknownName(f"There is no {what} '{name}'{hint}", advice=f"There are {' and '.join(known)}.")
 
 
 @dataclass(frozen=True)
@@ -107,18 +146,6 @@ class System:
     def __str__(self) -> str:
         lines = [f"System {self.name}: {', '.join(unit.name for unit in self.units)}"]
         return "\n".join([*lines, *(f"  {link}" for link in self.links)])
-
-
-def one_of(what: str, name: str, known: Sequence[str]) -> Any:
-    """Return a name, if it is one of those known.
-
-    Raises:
-        UnknownName: it is not.
-    """
-    if name in known:
-        return name
-    hint = did_you_mean(name, known) or "."
-    raise UnknownName(f"There is no {what} '{name}'{hint}", advice=f"There are {' and '.join(known)}.")
 
 
 def check_system(system: System) -> None:

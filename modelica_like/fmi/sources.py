@@ -31,6 +31,7 @@ RUNTIME = (
     "events.c",
     "rosenbrock.c",
     "integrate.c",
+    "fixed.c",
     "values.c",
     "derivatives.c",
     "taylor.c",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Literal
 
 import casadi as ca
@@ -50,6 +51,20 @@ class StartPlan:
     def own(self) -> int:
         """Number of explicit and implicit equations at the beginning of the start system."""
         return len(self.wanted) - len(self.rows) - len(self.resting)
+
+    @cached_property
+    def _part(self) -> tuple[ca.Sparsity, Any]:
+        """Pattern of the wanted rows and columns, and where its entries are among those of the system's Jacobian."""
+        pattern, places = self.system.function.sparsity_out(1).sub(list(self.wanted), list(self.columns))
+        return pattern, np.array(places, int)
+
+    def entries(self, jacobian: Vector) -> Vector:
+        """Return the nonzeros of the matrix that is solved with, from those of the whole Jacobian."""
+        return jacobian[self._part[1]]
+
+    def matrix(self, entries: Vector) -> ca.DM:
+        """Return the matrix that is solved with, sparse."""
+        return ca.DM(self._part[0], entries)
 
     def targets(self, values: Vector) -> Vector:
         """Values that the wanted rows must have.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from threading import get_ident
 from typing import Any
 
 import casadi as ca
@@ -135,12 +134,12 @@ class StartProblem:
         model = self.model
         target = plan.targets(self.given)
         point.x[list(plan.zero)] = 0.0
-        columns = list(plan.columns)
+        columns = np.array(plan.columns, int)
         y = np.zeros(plan.system.function.size1_out(0))
         nx, ny = len(model.states), len(y)
         state = np.concatenate([point.x, y, point.z])
         error, sizes = np.zeros(len(target)), np.full(len(target), -1.0)
-        system = _evaluation(model, plan)
+        system = _Evaluation(model, plan)
         for _ in range(_MAX_NEWTON):
             matrix, values = system(
                 point.t, state[:nx], state[nx : nx + ny], state[nx + ny :], model.p, model.u, point.d
@@ -199,26 +198,12 @@ class _Evaluation:
     def __init__(self, model: CompiledDae, plan: StartPlan) -> None:
         function, key = plan.system.function, f"start system {plan.kind}"
         self._fast = buffered(model._cache, key, lambda: _dense_values(function), (1, 2))
-        self._pattern = function.sparsity_out(1)
-        self._entries = self._pattern.get_triplet()
-        self._rows, self._columns = list(plan.wanted), list(plan.columns)
-        self._chosen = np.ix_(self._rows, self._columns)
+        self._plan, self._rows = plan, np.array(plan.wanted, int)
 
     def __call__(self, *arguments: Any) -> tuple[Any, Vector]:
         entries, values = self._fast(*arguments)
-        if max(self._pattern.shape) > _DENSE:
-            return ca.DM(self._pattern, entries)[self._rows, self._columns], values[self._rows]
-        whole = np.zeros(self._pattern.shape)
-        whole[self._entries] = entries
-        return whole[self._chosen], values[self._rows]
-
-
-def _evaluation(model: CompiledDae, plan: StartPlan) -> _Evaluation:
-    """Return what evaluates a plan; the last one of this thread is kept."""
-    key = "start evaluation", get_ident()
-    if key not in model._cache or model._cache[key][0] is not plan:
-        model._cache[key] = plan, _Evaluation(model, plan)
-    return model._cache[key][1]
+        matrix = self._plan.matrix(self._plan.entries(entries))
+        return matrix.full() if matrix.size1() <= _DENSE else matrix, values[self._rows]
 
 
 def _is_free_of_modes(model: CompiledDae, plan: StartPlan) -> bool:

@@ -24,6 +24,10 @@ from modelica_like.units import parse_unit, to_si
 _ENDLESS = re.compile(r"[0-9]{4301}")
 MAX_BYTES = 2_000_000
 START_KINDS = ("given", "rest", "steady")
+Check = Callable[[str, Any], Any]
+"""Returns an entry with the key `section.name`, if it has the right form."""
+Reader = Callable[[str, Any, Lines, list[ModelicaLikeError]], Any]
+"""Returns a section; errors of its entries are appended."""
 
 
 @dataclass
@@ -150,15 +154,8 @@ def _not_toml(message: str, lines: Lines) -> ModelicaLikeError:
 
 
 def _document(data: dict[str, Any], lines: Lines, errors: list[ModelicaLikeError]) -> Document:
-    document = Document(lines, Path(lines.file).stem)
-    for key, value in data.items():
-        try:
-            if key not in _READERS:
-                known = ", ".join(_READERS)
-                raise UnknownName(f"A netlist has no entry '{key}'{did_you_mean(key, _READERS) or '.'} It has {known}.")
-            setattr(document, key, _READERS[key](key, value, lines, errors))
-        except ModelicaLikeError as error:
-            errors.append(_placed(error, lines.source(key)))
+    sections = read_sections(data, "A netlist", _READERS, lines, errors)
+    document = Document(lines, **{"name": Path(lines.file).stem, **sections})
     for name in document.parts.keys() & document.parameters.keys():
         places = (lines.source("parameters", name), lines.source("parts", name))
         errors.append(DuplicateName(f"'{name}' is both a parameter and a part.", where=places))
@@ -169,15 +166,38 @@ def _document(data: dict[str, Any], lines: Lines, errors: list[ModelicaLikeError
     return document
 
 
+def read_sections(
+    data: Mapping[str, Any], what: str, readers: Mapping[str, Reader], lines: Lines, errors: list[ModelicaLikeError]
+) -> dict[str, Any]:
+    """Read the sections of a file, each by its reader.
+
+    Args:
+        data: the file's content.
+        what: what messages call it, such as `A netlist`.
+        readers: by the name of the section.
+        lines: where its keys stand.
+        errors: takes what is wrong, with its place.
+    """
+    read: dict[str, Any] = {}
+    for key, value in data.items():
+        try:
+            if key not in readers:
+                known = ", ".join(readers)
+                raise UnknownName(f"{what} has no entry '{key}'{did_you_mean(key, readers) or '.'} It has {known}.")
+            read[key] = readers[key](key, value, lines, errors)
+        except ModelicaLikeError as error:
+            errors.append(_placed(error, lines.source(key)))
+    return read
+
+
 def _placed(error: ModelicaLikeError, source: Source) -> ModelicaLikeError:
     error.where = error.where or (source,)
     return error
 
 
-def _text(key: str, value: Any, lines: Lines, errors: list[ModelicaLikeError]) -> str:
-    if not isinstance(value, str):
-        raise NetlistError(f"{key} must be a text.")
-    return value
+def whole(check: Check) -> Reader:
+    """Make the reader of a section that is one entry."""
+    return lambda key, value, lines, errors: check(key, value)
 
 
 def _table(key: str, value: Any) -> dict[str, Any]:
@@ -186,14 +206,12 @@ def _table(key: str, value: Any) -> dict[str, Any]:
     return value
 
 
-def _each(
-    check: Callable[[str, Any], Any], flat: bool = False
-) -> Callable[[str, Any, Lines, list[ModelicaLikeError]], dict[str, Any]]:
+def each(check: Check, flat: bool = False) -> Reader:
     """Make the reader of a table whose entries have one form; `flat` joins dotted keys to paths."""
 
     def read(key: str, value: Any, lines: Lines, errors: list[ModelicaLikeError]) -> dict[str, Any]:
         result: dict[str, Any] = {}
-        entries = _flattened(_table(key, value)) if flat else _table(key, value)
+        entries = flattened(_table(key, value)) if flat else _table(key, value)
         for name, entry in entries.items():
             try:
                 result[name] = check(f"{key}.{name}", entry)
@@ -204,10 +222,11 @@ def _each(
     return read
 
 
-def _flattened(table: Mapping[str, Any], before: str = "") -> dict[str, Any]:
+def flattened(table: Mapping[str, Any], before: str = "") -> dict[str, Any]:
+    """Join dotted keys, which TOML reads as tables in tables."""
     flat: dict[str, Any] = {}
     for name, value in table.items():
-        flat.update(_flattened(value, f"{before}{name}.") if isinstance(value, dict) else {f"{before}{name}": value})
+        flat.update(flattened(value, f"{before}{name}.") if isinstance(value, dict) else {f"{before}{name}": value})
     return flat
 
 
@@ -217,7 +236,12 @@ def _value(key: str, value: Any) -> Any:
     return value
 
 
-def _name(key: str, value: Any) -> str:
+def as_text(key: str, value: Any) -> str:
+    """Return an entry that is a text.
+
+    Raises:
+        NetlistError: it is none.
+    """
     if not isinstance(value, str):
         raise NetlistError(f"{key} must be a text.")
     return value
@@ -258,20 +282,25 @@ def check_part(key: str, value: Any) -> Any:
     return value
 
 
-def _free(key: str, value: Any, lines: Lines, errors: list[ModelicaLikeError]) -> list[str]:
-    return _names(key, value)
+def options(checks: Mapping[str, Check]) -> Reader:
+    """Make the reader of [simulate], each of whose entries has a form of its own."""
+
+    def check(key: str, value: Any) -> Any:
+        name = key.rpartition(".")[2]
+        if name not in checks:
+            hint = did_you_mean(name, checks) or "."
+            raise UnknownName(f"[simulate] has no '{name}'{hint} It has {', '.join(checks)}.")
+        return checks[name](key, value)
+
+    return each(check)
 
 
-def _option(key: str, value: Any) -> Any:
-    name = key.rpartition(".")[2]
-    if name not in _OPTIONS:
-        raise UnknownName(
-            f"[simulate] has no '{name}'{did_you_mean(name, _OPTIONS) or '.'} It has {', '.join(_OPTIONS)}."
-        )
-    return _OPTIONS[name](key, value)
+def duration(key: str, value: Any) -> Any:
+    """Return a time as it is written, if it is one.
 
-
-def _duration(key: str, value: Any) -> Any:
+    Raises:
+        UnitError, ValueOutOfRange, NetlistError: it is none, or not positive.
+    """
     seconds = to_si(value, parse_unit("s"), key)
     if seconds <= 0:
         raise NetlistError(f"{key} = {value} must be positive.")
@@ -296,19 +325,19 @@ def _points(key: str, value: Any) -> int:
     return value
 
 
-_OPTIONS: Mapping[str, Callable[[str, Any], Any]] = {
-    "until": _duration, "start": _start_kind, "rtol": _rtol, "points": _points,
+_OPTIONS: Mapping[str, Check] = {
+    "until": duration, "start": _start_kind, "rtol": _rtol, "points": _points,
 }  # fmt: skip
-_READERS: Mapping[str, Callable[[str, Any, Lines, list[ModelicaLikeError]], Any]] = {
-    "name": _text,
-    "description": _text,
-    "parameters": _each(_value),
-    "parts": _each(check_part),
-    "series": _each(_ends),
-    "connect": _each(_ends),
-    "start": _each(_value, flat=True),
-    "guess": _each(_value, flat=True),
-    "free": _free,
-    "expose": _each(_name),
-    "simulate": _each(_option),
+_READERS: Mapping[str, Reader] = {
+    "name": whole(as_text),
+    "description": whole(as_text),
+    "parameters": each(_value),
+    "parts": each(check_part),
+    "series": each(_ends),
+    "connect": each(_ends),
+    "start": each(_value, flat=True),
+    "guess": each(_value, flat=True),
+    "free": whole(_names),
+    "expose": each(as_text),
+    "simulate": options(_OPTIONS),
 }

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from rich.console import Group, RenderableType
-from rich.markup import escape
 from rich.table import Table
 
 from modelica_like.report.sources import trajectories
@@ -69,23 +68,24 @@ def comparison_report(comparison: Comparison) -> RenderableType:
 
 
 def _deviation_table(comparison: Comparison) -> Table:
-    made = table(
-        escape(" and ".join(comparison.labels)), "signal", "largest deviation>", "", "of the range>", "at time in s>"
-    )
-    for row in comparison.deviations[:_SHOWN]:
-        unit = "" if row.unit == "1" else row.unit
-        made.add_row(escape(row.signal), f"{row.largest:.3e}", unit, f"{row.relative:.1e}", f"{row.time:.6g}")
-    if len(comparison.deviations) > _SHOWN:
-        made.add_row(f"… {len(comparison.deviations) - _SHOWN} more, that deviate less")
-    return made
+    rows = [
+        (
+            row.signal,
+            f"{row.largest:.3e}",
+            "" if row.unit == "1" else row.unit,
+            f"{row.relative:.1e}",
+            f"{row.time:.6g}",
+        )
+        for row in comparison.deviations
+    ]
+    columns = "signal", "largest deviation>", "", "of the range>", "at time in s>"
+    return table(" and ".join(comparison.labels), *columns, rows=rows, most=_SHOWN, rest=", that deviate less")
 
 
 def _event_table(comparison: Comparison) -> Table:
-    made = table("events", "mode", "to", "first at s>", "second at s>", "difference in s>")
-    for event in comparison.events[:_SHOWN]:
+    rows: list[tuple[str, ...]] = []
+    for event in comparison.events:
         times = ("never" if t is None else f"{t:.9g}" for t in (event.first, event.second))
-        difference = "" if event.difference is None else f"{event.difference:.1e}"
-        made.add_row(escape(event.mode), event.after, *times, difference)
-    if len(comparison.events) > _SHOWN:
-        made.add_row(f"… {len(comparison.events) - _SHOWN} more")
-    return made
+        rows.append((event.mode, event.after, *times, "" if event.difference is None else f"{event.difference:.1e}"))
+    columns = "mode", "to", "first at s>", "second at s>", "difference in s>"
+    return table("events", *columns, rows=rows, most=_SHOWN)

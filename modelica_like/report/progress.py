@@ -18,19 +18,34 @@ _PATIENCE = 0.5
 _INTERVAL = 0.1
 
 
-class _LateBar:
-    """A bar on a terminal that appears when its patience is over."""
+class Bar:
+    """A bar on a terminal that appears when its patience is over; to be used as the `progress` of a run or a sweep.
 
-    def __init__(self, title: str, console: Console | None) -> None:
+    Args:
+        until: end time, a number in s or a quantity; what cannot be read is left to the simulation to tell. None where
+            the end is told with the progress.
+        console: where to show it, by default stderr; a console that is no terminal gets nothing.
+        title: what is shown before it.
+    """
+
+    def __init__(
+        self, until: float | str | None = None, console: Console | None = None, title: str = "simulating"
+    ) -> None:
         self._title = title
         self._console = Console(stderr=True) if console is None else console
         self._next = time.perf_counter() + _PATIENCE
         self._progress: Progress | None = None
+        try:
+            self._end = to_si(until, parse_unit("s"), "until")
+        except ModelicaLikeError:
+            self._end = 0.0
 
     def __enter__(self) -> Self:
         return self
 
-    def _show(self, reached: float, end: float) -> None:
+    def __call__(self, reached: float, end: float | None = None) -> None:
+        """Note the time in s, or the number of runs, that is reached."""
+        end = self._end if end is None else end
         now = time.perf_counter()
         if now < self._next or end <= 0 or not self._console.is_terminal:
             return
@@ -54,38 +69,3 @@ class _LateBar:
     ) -> None:
         if self._progress is not None:
             self._progress.stop()
-
-
-class Bar(_LateBar):
-    """Shows how far a simulation has come; to be used as its `progress`.
-
-    Args:
-        until: end time, a number in s or a quantity; what cannot be read is left to the simulation to tell.
-        console: where to show it, by default stderr; a console that is no terminal gets nothing.
-    """
-
-    def __init__(self, until: float | str | None, console: Console | None = None) -> None:
-        super().__init__("simulating", console)
-        try:
-            self._end = to_si(until, parse_unit("s"), "until")
-        except ModelicaLikeError:
-            self._end = 0.0
-
-    def __call__(self, reached: float) -> None:
-        """Note the time reached, in s."""
-        self._show(reached, self._end)
-
-
-class RunsBar(_LateBar):
-    """Shows how many runs of a sweep are done; to be used as its `progress`.
-
-    Args:
-        console: where to show it, by default stderr; a console that is no terminal gets nothing.
-    """
-
-    def __init__(self, console: Console | None = None) -> None:
-        super().__init__("runs", console)
-
-    def __call__(self, done: int, total: int) -> None:
-        """Note how many are done."""
-        self._show(done, total)

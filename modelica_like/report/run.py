@@ -1,6 +1,9 @@
-"""What a run was: events, energy balance and statistics as tables."""
+"""What a run was: events, energies and statistics as tables; of a co-simulation, also its couplings and steps."""
 
 from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
 
 from rich.console import Group, RenderableType
 from rich.markup import escape
@@ -9,6 +12,9 @@ from rich.table import Table
 from modelica_like.language.transition import NAME_IN_NOTICE
 from modelica_like.report.types import table
 from modelica_like.solve.solution import Solution
+
+if TYPE_CHECKING:
+    from modelica_like.cosimulation.solution import CosimSolution
 
 _SHOWN = 20
 
@@ -20,10 +26,7 @@ def run_report(solution: Solution, *, energy: bool = True) -> RenderableType:
         solution: the run.
         energy: False: leave out the energy balance.
     """
-    parts: list[RenderableType] = [f"[bold]{escape(solution.model.name)}[/]  {_span(solution)}"]
-    if solution.events:
-        parts += ["", events_table(solution)]
-    parts += [f"[bold]{escape(notice)}[/]" for notice in notices(solution)]
+    parts = _head(solution, notices(solution))
     if energy:
         parts += ["", energy_table(solution), f"[dim]{closure_line(solution)}[/]"]
         parts += [f"[bold]{escape(notice)}[/]" for notice in solution.energy().notices]
@@ -31,21 +34,22 @@ def run_report(solution: Solution, *, energy: bool = True) -> RenderableType:
     return Group(*parts)
 
 
-def _span(solution: Solution) -> str:
-    return f"{solution.time[0]:g} s to {solution.time[-1]:g} s"
+def _head(solution: Solution, notices: Iterable[str]) -> list[RenderableType]:
+    span = f"{solution.time[0]:g} s to {solution.time[-1]:g} s"
+    parts: list[RenderableType] = [f"[bold]{escape(solution.model.name)}[/]  {span}"]
+    parts += ["", events_table(solution)] if solution.events else []
+    return parts + [f"[bold]{escape(notice)}[/]" for notice in notices]
 
 
 def events_table(solution: Solution) -> Table:
     """Return the mode changes; of many only the first and the last."""
-    made = table(_mode_changes(len(solution.events)), "time in s>", "mode", "from", "to", "because of")
-    events = list(solution.events)
-    for k, event in enumerate(events):
-        if len(events) > _SHOWN and k == _SHOWN // 2:
-            made.add_row("…")
-        if len(events) <= _SHOWN or k < _SHOWN // 2 or k >= len(events) - _SHOWN // 2:
-            place = f"{event.source}".partition(" `")[0]
-            made.add_row(f"{event.time:.9g}", escape(event.mode), event.before, event.after, escape(place))
-    return made
+    rows = [
+        (f"{event.time:.9g}", event.mode, event.before, event.after, f"{event.source}".partition(" `")[0])
+        for event in solution.events
+    ]
+    if len(rows) > _SHOWN:
+        rows[_SHOWN // 2 : -_SHOWN // 2] = [("…", "", "", "", "")]
+    return table(_mode_changes(len(solution.events)), "time in s>", "mode", "from", "to", "because of", rows=rows)
 
 
 def notices(solution: Solution) -> list[str]:
@@ -65,16 +69,14 @@ def energy_table(solution: Solution) -> Table:
     # Where nothing collides there is no column for it.
     collides = any(row.impact for row in balance)
     columns = ["component", "in>", "from outside>", "stored>", "lost>", *["of it in impacts>"][: int(collides)]]
-    made = table("energy balance in J", *columns)
     rows = {
         row.component: (row.inflow, row.source, row.stored, row.lost, *[row.impact][: int(collides)]) for row in balance
     }
     active = [name for name, values in rows.items() if any(values)]
     largest = set(sorted(active, key=lambda name: max(map(abs, rows[name])), reverse=True)[:_SHOWN])
-    for name in (name for name in active if name in largest):
-        made.add_row(escape(name or solution.model.name), *map(_energy, rows[name]))
-    if len(active) > _SHOWN:
-        made.add_row(f"… {len(active) - _SHOWN} more")
+    shown = [(name or solution.model.name, *map(_energy, rows[name])) for name in active if name in largest]
+    shown += [(f"… {len(active) - _SHOWN} more",)] if len(active) > _SHOWN else []
+    made = table("energy balance in J", *columns, rows=shown)
     made.add_section()
     totals = [balance.source, balance.stored, balance.lost]
     totals += [sum(row.impact for row in balance)] if collides else []
@@ -103,3 +105,33 @@ def statistics_line(solution: Solution) -> str:
 
 def _mode_changes(count: int) -> str:
     return "1 mode change" if count == 1 else f"{count} mode changes"
+
+
+def cosimulation_report(solution: CosimSolution) -> RenderableType:
+    """Return mode changes, energies at the couplings and communication steps of a run."""
+    parts = _head(solution, solution.notices)
+    if solution.couplings:
+        parts += ["", couplings_table(solution)]
+    parts += ["", f"[dim]{steps_line(solution)}[/]"]
+    return Group(*parts)
+
+
+def couplings_table(solution: CosimSolution) -> Table:
+    """Return the energies at the couplings: what one FMU has sent and the other has not got, the coupling has lost."""
+    rows = [
+        (one.name, f"{one.throughput:.6g}", f"{one.residual:.3g}",
+         f"{one.residual / one.throughput:.1e}" if one.throughput else "", f"{one.mismatch:.3g}")
+        for one in solution.couplings
+    ]  # fmt: skip
+    return table(
+        "energy at the couplings in J", "coupling", "through>", "made by it>", "share>", "mismatch>", rows=rows
+    )
+
+
+def steps_line(solution: CosimSolution) -> str:
+    """Return how many communication steps it took."""
+    sizes = f"{solution.shortest:.3g} s"
+    if solution.longest > solution.shortest * (1 + 1e-6):
+        sizes += f" to {solution.longest:.3g} s"
+    back = f", {solution.rejected} taken back" if solution.rejected else ""
+    return f"{solution.steps} communication steps of {sizes}{back}, {solution.statistics.seconds:.2f} s"

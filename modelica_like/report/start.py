@@ -9,7 +9,6 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 from rich.console import RenderableType
-from rich.markup import escape
 
 from modelica_like.compile import CompiledDae
 from modelica_like.initialize import Point, StartKind, StartPlan, call, initialize, start_plan
@@ -46,10 +45,8 @@ def start_report(drive: Component, model: CompiledDae) -> RenderableType:
         MissingStart, ContradictingStart, InitializationError: there is no start.
     """
     kind: StartKind = model.settings.get("start", "given")
-    made = table(f"start values ({kind})", "variable", "value>", "unit", "where from")
-    for row in start_values(drive, model, kind):
-        made.add_row(row.path, f"{row.value:.9g}", escape(row.unit), escape(row.origin))
-    return made
+    rows = ((row.path, f"{row.value:.9g}", row.unit, row.origin) for row in start_values(drive, model, kind))
+    return table(f"start values ({kind})", "variable", "value>", "unit", "where from", rows=rows)
 
 
 def start_values(drive: Component, model: CompiledDae, kind: StartKind = "given") -> list[StartValueRow]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 
 from rich.console import Group, RenderableType
 from rich.markup import escape
@@ -34,7 +34,6 @@ def structure_report(component: Component) -> RenderableType:
 
 
 def _sizes(flat: FlatModel, reduced: ReducedDae) -> Table:
-    made = table(f"{flat.name} can be simulated", "what", "number>", "which")
     kinds = Counter(type(component).__name__ for component in flat.components.values() if not component.parts)
     equations = len(flat.linear) + len(flat.general)
     modes = [discrete.path for discrete in flat.discretes if discrete.names]
@@ -55,9 +54,8 @@ def _sizes(flat: FlatModel, reduced: ReducedDae) -> Table:
         ("index", reduced.index, ""),
         ("blocks", len(reduced.blocks), _block_sizes(reduced)),
     ]
-    for what, number, which in sizes:
-        made.add_row(what, str(number), escape(which))
-    return made
+    rows = ((what, str(number), which) for what, number, which in sizes)
+    return table(f"{flat.name} can be simulated", "what", "number>", "which", rows=rows)
 
 
 def listed(names: Iterable[str]) -> str:
@@ -73,16 +71,12 @@ def _block_sizes(reduced: ReducedDae) -> str:
 
 
 def _energy(flat: FlatModel) -> Table:
-    made = table("energy", "what", "components")
-    terms: list[tuple[str, Callable[[Component], Expr | float]]] = [
-        ("stored", lambda component: component.stored_energy()),
-        ("dissipated", lambda component: component.loss_power()),
-        ("from outside", lambda component: component.source_power()),
-    ]
+    terms = (("stored", "stored_energy"), ("dissipated", "loss_power"), ("from outside", "source_power"))
+    rows: list[tuple[str, str]] = []
     for what, term in terms:
-        names = [component.label for component in flat.components.values() if _is_there(term(component))]
-        made.add_row(what, escape(listed(names)) or "none")
-    return made
+        names = [one.label for one in flat.components.values() if _is_there(getattr(one, term)())]
+        rows.append((what, listed(names) or "none"))
+    return table("energy", "what", "components", rows=rows)
 
 
 def _is_there(term: Expr | float) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
 from rich.console import Group, RenderableType
 from rich.markup import escape
@@ -13,17 +13,42 @@ from rich.table import Table
 from rich.text import Text
 
 from modelica_like.errors import ModelicaLikeError
-from modelica_like.language import Component, Connector, Discrete, Input, Output, Parameter, Variable
-from modelica_like.language.fields import Field
+from modelica_like.language import Component
 from modelica_like.language.places import located
+from modelica_like.report.declared import Listing, Notation, declared
+
+_TERMINAL = Notation(
+    code=str,
+    text=str,
+    symbol=lambda _: "",
+    flow=lambda path, unit: f"{path.rpartition('.')[2]} [{unit}]",
+    missing=lambda _: "",
+)
 
 
-def table(title: str, *columns: str) -> Table:
-    """Return an empty table in the style of all reports."""
-    made = Table(title=title, title_justify="left", title_style="bold", box=None, pad_edge=False, header_style="dim")
+def table(
+    title: str, *columns: str, rows: Iterable[Sequence[str | Text]] = (), most: int = 10**9, rest: str = ""
+) -> Table:
+    """Return a table in the style of all reports.
+
+    Args:
+        title: above it.
+        columns: headings; `>` behind one: numbers, at the right; `*`: bold.
+        rows: cells, in which no text is markup; there may be fewer than columns.
+        most: how many rows are shown; a last one then tells how many more there are.
+        rest: what that adds.
+    """
+    made = Table(
+        title=escape(title), title_justify="left", title_style="bold", box=None, pad_edge=False, header_style="dim"
+    )
     for column in columns:
-        made.add_column(column, justify="right" if column.endswith(">") else "left")
-        made.columns[-1].header = column.rstrip(">")
+        justify = "right" if column.endswith(">") else "left"
+        made.add_column(Text(column.rstrip(">*")), justify=justify, style="bold" if column.endswith("*") else "")
+    known = list(rows)
+    for row in known[:most]:
+        made.add_row(*map(Text.assemble, row))
+    if len(known) > most:
+        made.add_row(f"… {len(known) - most} more{rest}")
     return made
 
 
@@ -34,9 +59,9 @@ def summary(kind: type[Component]) -> str:
 
 def library_table(types: Mapping[str, type[Component]]) -> Table:
     """Return all component types with their first sentence, sorted by module."""
-    made = table(f"{len(types)} component types", "type", "module", "what it is")
-    for name, kind in sorted(types.items(), key=lambda item: (item[1].__module__, item[0])):
-        made.add_row(f"[bold]{name}[/]", kind.__module__.rpartition(".")[2], escape(summary(kind)))
+    known = sorted(types.items(), key=lambda item: (item[1].__module__, item[0]))
+    rows = ((name, kind.__module__.rpartition(".")[2], summary(kind)) for name, kind in known)
+    made = table(f"{len(types)} component types", "type*", "module", "what it is", rows=rows)
     # One line per type, so that the list can be searched; `describe` has the whole text.
     for column in made.columns:
         column.no_wrap = True
@@ -49,81 +74,18 @@ def describe(kind: type[Component]) -> RenderableType:
     text = inspect.cleandoc(kind.__doc__ or "")
     bases = [base.__name__ for base in kind.__mro__[1:] if issubclass(base, Component) and base is not Component]
     heading = Text.assemble((kind.__name__, "bold"), f"  {kind.__module__}", f"  ({', '.join(bases)})" if bases else "")
-    sections: list[RenderableType] = [heading, Text(text)]
-    for title, sort in (
-        ("parameters", Parameter), ("inputs", Input), ("outputs", Output), ("variables", Variable),
-        ("discrete values", Discrete),
-    ):  # fmt: skip
-        fields = [field for field in kind._class_fields.values() if sort_of(field) is sort]
-        if fields:
-            sections.append(_fields(title, fields))
-    sections += [made for made in (_structure(kind), _connectors(kind), _modes(kind), _parts(kind)) if made.row_count]
-    sections.append(_statements(kind))
+    tables = declared(kind, _TERMINAL)
+    if kind._class_parts:
+        tables.append(Listing("parts", ("name", "type", ""), [_part_row(kind, name) for name in kind._class_parts]))
+    made = [table(title, f"{first}*", *others, rows=rows) for title, (first, *others), rows in tables]
+    sections: list[RenderableType] = [heading, Text(text), *made, _statements(kind)]
     return Group(*(Padding(section, (0, 0, 1, 0), expand=False) for section in sections))
 
 
-def sort_of(field: Field) -> type[Field]:
-    """Return the sort of a declaration: parameter, input, output, variable or discrete value."""
-    return next(sort for sort in (Parameter, Input, Output, Variable, Discrete) if isinstance(field, sort))
-
-
-def _fields(title: str, fields: Iterable[Field]) -> Table:
-    made = table(title, "name", "unit", "default", "range", "description")
-    for field in fields:
-        default = "" if field.default is None else str(field.default)
-        made.add_row(
-            f"[bold]{field.name}[/]", field.unit_text, escape(default), value_range(field), escape(field.description)
-        )
-    return made
-
-
-def value_range(field: Field) -> str:
-    """Return the permitted values, or nothing."""
-    low = "" if field.min is None else f"{field.min:g}"
-    high = "" if field.max is None else f"{field.max:g}"
-    return f"{low} … {high}".strip() if low or high else ""
-
-
-def _structure(kind: type[Component]) -> Table:
-    made = table("structure", "name", "default")
-    for name, default in kind._structural.items():
-        known = isinstance(default, bool | int | float | str | tuple | None)
-        made.add_row(f"[bold]{name}[/]", escape(str(default)) if known else "required")
-    return made
-
-
-def _connectors(kind: type[Component]) -> Table:
-    made = table("connectors", "name", "type", "potential, flow", "", "description")
-    for name, connector in kind._class_connectors.items():
-        fields = ", ".join(f"{field.name} [{field.unit_text}]" for field in connector.fields.values())
-        made.add_row(
-            f"[bold]{name}[/]",
-            type(connector).__name__,
-            escape(fields),
-            freedom(connector),
-            escape(connector.description),
-        )
-    return made
-
-
-def freedom(connector: Connector) -> str:
-    """Tell whether a connector may stay unconnected."""
-    return "optional" if connector.optional else "may be free" if connector.may_be_free else ""
-
-
-def _modes(kind: type[Component]) -> Table:
-    made = table("modes", "name", "one of", "start", "description")
-    for name, mode in kind._class_modes.items():
-        made.add_row(f"[bold]{name}[/]", ", ".join(mode.names), mode.start, escape(mode.description))
-    return made
-
-
-def _parts(kind: type[Component]) -> Table:
-    made = table("parts", "name", "type", "")
-    for name, part in kind._class_parts.items():
-        what = f"{len(part)} {type(part[0]).__name__}" if isinstance(part, list) else type(part).__name__
-        made.add_row(f"[bold]{name}[/]", what, "replaceable" if name in kind._replaceable else "")
-    return made
+def _part_row(kind: type[Component], name: str) -> tuple[str, ...]:
+    part = kind._class_parts[name]
+    what = f"{len(part)} {type(part[0]).__name__}" if isinstance(part, list) else type(part).__name__
+    return name, what, "replaceable" if name in kind._replaceable else ""
 
 
 def _statements(kind: type[Component]) -> RenderableType:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from rich.markup import escape
 from rich.table import Table
+from rich.text import Text
 
 from modelica_like.fmi.validate import FAILED, PASSED, Validation
 from modelica_like.report.types import table
@@ -13,8 +13,8 @@ _STYLES = {PASSED: "green", FAILED: "bold red"}
 
 def validation_table(validation: Validation) -> Table:
     """Return one row per check."""
-    made = table(escape(validation.fmu), "check", "verdict", "")
-    for check in validation.checks:
-        style = _STYLES.get(check.verdict, "dim")
-        made.add_row(check.name, f"[{style}]{check.verdict}[/]", escape(check.sentence))
-    return made
+    rows = (
+        (check.name, Text(check.verdict, _STYLES.get(check.verdict, "dim")), check.sentence)
+        for check in validation.checks
+    )
+    return table(validation.fmu, "check", "verdict", "", rows=rows)

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from modelica_like.errors import ModelicaLikeError, NetlistError, Source, UnknownName, did_you_mean
-from modelica_like.netlist.document import parse_toml, read_text
+from modelica_like.errors import ModelicaLikeError, NetlistError, Source, raise_together_or_one
+from modelica_like.netlist.document import Reader, as_text, each, parse_toml, read_sections, read_text, whole
 from modelica_like.netlist.locate import Lines, locate
-
-_ENTRIES = ("name", "description", "parameters", "checks", "compare")
 
 
 @dataclass
@@ -44,48 +43,34 @@ def read_document(path: Path) -> SizingDocument:
         raise NetlistError(f"The sizing file '{path}' does not exist.")
     text = read_text(path)
     lines = locate(text, str(path))
-    data = parse_toml(text, lines)
-    document = SizingDocument(lines, path.stem)
-    for key, value in data.items():
-        _entry(document, key, value)
+    errors: list[ModelicaLikeError] = []
+    sections = read_sections(parse_toml(text, lines), "A sizing file", _READERS, lines, errors)
+    if errors:
+        raise raise_together_or_one(errors)
+    document = SizingDocument(lines, **{"name": path.stem, **sections})
     if not document.checks:
         raise NetlistError(f"'{path.name}' has no checks.", where=Source(str(path)), advice="Declare them in [checks].")
     return document
 
 
-def _entry(document: SizingDocument, key: str, value: Any) -> None:
-    place = document.lines.source(key)
-    if key not in _ENTRIES:
-        hint = did_you_mean(key, _ENTRIES) or "."
-        raise UnknownName(f"A sizing file has no entry '{key}'{hint} It has {', '.join(_ENTRIES)}.", where=place)
-    kind = str if key in ("name", "description") else dict
-    if not isinstance(value, kind):
-        raise NetlistError(f"{key} must be a {'text' if kind is str else f'table: [{key}]'}.", where=place)
-    for name, entry in value.items() if isinstance(value, dict) else ():
-        _FORMS.get(key, _any)(document, name, entry)
-    setattr(document, key, value)
-
-
-def _any(document: SizingDocument, name: str, entry: Any) -> None:
-    pass
-
-
-def _check(document: SizingDocument, name: str, entry: Any) -> None:
-    place = document.lines.source("checks", name)
+def _check(key: str, entry: Any) -> dict[str, Any]:
     if not isinstance(entry, dict):
-        raise NetlistError(f"checks.{name} must be a table: [checks.{name}].", where=place)
+        raise NetlistError(f"{key} must be a table: [{key}].")
     if not isinstance(entry.get("is"), str):
-        advice = 'Say which check it is, such as is = "bearing_life".'
-        raise NetlistError(f"checks.{name} has no type.", where=place, advice=advice)
+        raise NetlistError(f"{key} has no type.", advice='Say which check it is, such as is = "bearing_life".')
+    return entry
 
 
-def _comparison(document: SizingDocument, name: str, entry: Any) -> None:
+def _comparison(key: str, entry: Any) -> list[str]:
     if not isinstance(entry, list) or not all(isinstance(check, str) for check in entry):
-        place = document.lines.source("compare", name)
-        raise NetlistError(f"compare.{name} must be a list of names of checks.", where=place)
+        raise NetlistError(f"{key} must be a list of names of checks.")
+    return entry
 
 
-_FORMS = {"checks": _check, "compare": _comparison}
+_READERS: Mapping[str, Reader] = {
+    "name": whole(as_text), "description": whole(as_text), "parameters": each(lambda _, value: value),
+    "checks": each(_check), "compare": each(_comparison),
+}  # fmt: skip
 
 
 def placed(error: ModelicaLikeError, source: Source) -> ModelicaLikeError:

@@ -10,6 +10,7 @@ from typing import Any, get_args, get_origin
 from rich.console import Group, RenderableType
 from rich.markup import escape
 from rich.table import Table
+from rich.text import Text
 
 from modelica_like.report.types import table
 from modelica_like.sizing.checks import (
@@ -37,15 +38,14 @@ def sizing_report(sizing: Sizing) -> RenderableType:
 
 
 def _check_tables(check: CheckedResult) -> Iterator[RenderableType]:
-    columns = ["line", "value>", "unit"]
+    columns = ["line*", "value>", "unit"]
     columns += ["published>", "deviation>"] if check.published else []
-    made = table(escape(f"{check.name}: {check.check}"), *columns, "verdict", "what it is")
+    cells: list[list[str | Text]] = []
     for line in check.result.lines(check.limits):
-        cells = [f"[bold]{line.name}[/]", escape(line.value), line.unit]
-        cells += _published(check, line.name) if check.published else []
+        published = _published(check, line.name) if check.published else []
         style = "red" if line.exceeded else "green" if line.verdict else "dim"
-        made.add_row(*cells, f"[{style}]{escape(line.verdict or '–')}[/]", escape(line.description))
-    yield made
+        cells.append([line.name, line.value, line.unit, *published, Text(line.verdict or "–", style), line.description])
+    yield table(f"{check.name}: {check.check}", *columns, "verdict", "what it is", rows=cells)
     if check.note:
         yield f"[dim]{escape(check.note)}[/]"
     for title, rows in check.result.tables().items():
@@ -72,10 +72,8 @@ def _rows(title: str, rows: tuple[Any, ...]) -> Table:
         corner = f"{lines[0][0].name} [{lines[0][0].unit}]" if lines[0][0].unit else lines[0][0].name
         return _side_by_side(title, corner, [(each[0].value, each[1:]) for each in lines])
     names = [f"{line.name} [{line.unit}]" if line.unit else line.name for line in lines[0]]
-    made = table(title, *(escape(f"{name}>" if k else name) for k, name in enumerate(names)))
-    for each in lines:
-        made.add_row(*(escape(line.value) for line in each))
-    return made
+    columns = (f"{name}>" if k else name for k, name in enumerate(names))
+    return table(title, *columns, rows=([line.value for line in each] for each in lines))
 
 
 def _comparison(heading: str, results: dict[str, Any]) -> Table:
@@ -83,11 +81,11 @@ def _comparison(heading: str, results: dict[str, Any]) -> Table:
 
 
 def _side_by_side(heading: str, corner: str, columns: list[tuple[str, tuple[Any, ...]]]) -> Table:
-    made = table(escape(heading), escape(corner), *(f"{escape(name)}>" for name, _ in columns), "unit", "what it is")
-    for lines in zip(*(each for _, each in columns), strict=True):
-        values = (escape(line.value) for line in lines)
-        made.add_row(f"[bold]{lines[0].name}[/]", *values, lines[0].unit, escape(lines[0].description))
-    return made
+    rows = (
+        (lines[0].name, *(line.value for line in lines), lines[0].unit, lines[0].description)
+        for lines in zip(*(each for _, each in columns), strict=True)
+    )
+    return table(heading, f"{corner}*", *(f"{name}>" for name, _ in columns), "unit", "what it is", rows=rows)
 
 
 def _whole(sizing: Sizing) -> str:
@@ -110,23 +108,22 @@ def checks_report(name: str = "") -> RenderableType:
 
 def checks_table(checks: Mapping[str, Check]) -> Table:
     """Return all design checks with their first sentence."""
-    made = table(f"{len(checks)} design checks", "check", "module", "what it does")
-    for name, check in sorted(checks.items(), key=lambda item: (item[1].__module__, item[0])):
-        what = inspect.cleandoc(check.__doc__ or "").partition("\n")[0]
-        made.add_row(f"[bold]{name}[/]", check.__module__.rpartition(".")[2], escape(what))
-    return made
+    rows = (
+        (name, check.__module__.rpartition(".")[2], inspect.cleandoc(check.__doc__ or "").partition("\n")[0])
+        for name, check in sorted(checks.items(), key=lambda item: (item[1].__module__, item[0]))
+    )
+    return table(f"{len(checks)} design checks", "check*", "module", "what it does", rows=rows)
 
 
 def check_page(name: str, check: Check) -> RenderableType:
     """Return a page about one design check: text and arguments."""
     text = inspect.cleandoc(check.__doc__ or "").partition("\nArgs:")[0].rstrip()
     meanings = dict(_meanings(inspect.cleandoc(check.__doc__ or "")))
-    made = table("arguments", "name", "unit", "default", "")
-    for argument in arguments_of(check).values():
-        default = "" if argument.required else str(argument.default)
-        made.add_row(
-            f"[bold]{argument.name}[/]", _kind(argument), escape(default), escape(meanings.get(argument.name, ""))
-        )
+    rows = (
+        (one.name, _kind(one), "" if one.required else str(one.default), meanings.get(one.name, ""))
+        for one in arguments_of(check).values()
+    )
+    made = table("arguments", "name*", "unit", "default", "", rows=rows)
     return Group(f"[bold]{name}[/]", escape(text), "", made)
 
 

@@ -52,12 +52,12 @@ class EventLoop:
         self._failed_before = start.t
         self._since = start.t
         self.progress = progress
-        self.integrator = Integrator(model, options)
         self.guards = Guards(model)
-        self.between = Between(self.integrator, self._closer)
         self.record = Recorder()
         timed = len(model.transitions) > self.guards.count
         self.pace = Pace(start.t, end, options, guarded=bool(self.guards.count), timed=timed)
+        self.integrator = Integrator(model, options, whole=self.pace.on_grid)
+        self.between = Between(self.integrator, self._closer)
         self.instants = Instants(model, options, self.guards, self.record, end - start.t)
 
     @property
@@ -140,7 +140,8 @@ class EventLoop:
     def _integrate(self, start: Point, span: float, looks: int, *, patient: bool = True) -> Looks:
         x, z = self.integrator.run(start, span, looks, patient=patient, polish=False)
         times = start.t + span * np.arange(x.shape[1] + 1) / looks
-        x, z = np.concatenate([start.x[:, None], x], axis=1), np.concatenate([start.z[:, None], z], axis=1)
+        # Row by row, as IDAS writes them.
+        x, z = np.concatenate([start.x[None], x.T]).T, np.concatenate([start.z[None], z.T]).T
         return Looks(self.integrator, self.guards, times, x, z, start.d)
 
     def _panel(self, stop: float) -> Looks:

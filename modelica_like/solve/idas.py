@@ -45,7 +45,7 @@ _PANEL_STEPS = 300
 """Steps between two results of a panel; a panel that needs more has probably run past an event, and ends there."""
 
 
-def scaled_problem(model: CompiledDae, *, gentle: bool = False) -> dict[str, Any]:
+def scaled_problem(model: CompiledDae, *, gentle: bool = False, scaled: bool = True) -> dict[str, Any]:
     """Return the equations in scaled time s in [0, 1], with parameters (t0, span, p, u, d).
 
     Besides what `casadi.integrator` takes: `inner`, the arguments of the model's functions, and `span`, dt/ds.
@@ -54,13 +54,14 @@ def scaled_problem(model: CompiledDae, *, gentle: bool = False) -> dict[str, Any
         model: the compiled model.
         gentle: t = t0 + s²·span instead of t = t0 + s·span. Time then begins to pass with a speed of zero, so slopes
             of zero at s = 0 are exact, and first steps are short whatever the span is.
+        scaled: without, t = t0 + s: rates need no factor, which is an eighth of the work of some models.
     """
-    key = "scaled", gentle
+    key = "scaled", gentle, scaled
     if key not in model._cache:
         arguments = model.arguments
         s, t0, span = ca.SX.sym("s"), ca.SX.sym("t0"), ca.SX.sym("span")
         x, z, p, u, d = (arguments[name] for name in ("x", "z", "p", "u", "d"))
-        passed, speed = (s * s * span, 2 * s * span) if gentle else (s * span, span)
+        passed, speed = (s * s * span, 2 * s * span) if gentle else (s * span, span) if scaled else (s, 1.0)
         inner = [t0 + passed, x, z, p, u, d]
         ode, alg = ca.cse([speed * model.ode(*inner), model.alg(*inner)])
         model._cache[key] = {
@@ -82,9 +83,14 @@ class Integrator:
     """Integrates a model over one interval with fixed modes; its IDAS instances are kept with the model.
 
     Time is scaled, so that one instance serves intervals of any place and length.
+
+    Args:
+        model: the compiled model.
+        options: tolerances.
+        whole: whether intervals are whole runs: then large models get an instance for each length, which is quicker.
     """
 
-    def __init__(self, model: CompiledDae, options: Options) -> None:
+    def __init__(self, model: CompiledDae, options: Options, *, whole: bool = False) -> None:
         self.model = model
         self.options = options
         self.calls = 0
@@ -94,6 +100,8 @@ class Integrator:
         self._interrupts = Interrupts()
         self._relaxed = 1.0
         self._gentle_from = np.inf
+        self._whole = whole and len(model.states) >= _SPARSE_FROM
+        self._seconds: float | None = None
         self._tail = np.concatenate([model.p, model.u])
 
     @property
@@ -113,7 +121,7 @@ class Integrator:
         return first
 
     def _instance(self, outputs: int, steps: int, gentle: bool, first: float) -> BufferedFunction:
-        key = "idas", outputs, self.rtol, self.options.atol, steps, gentle, first
+        key = "idas", outputs, self.rtol, self.options.atol, steps, gentle, first, None if gentle else self._seconds
         return buffered(self.model._cache, key, lambda: self._make(outputs, steps, gentle, first), results=(0, 1))
 
     def _first_step(self, start: Point, span: float) -> float:
@@ -129,11 +137,12 @@ class Integrator:
         return step
 
     def _make(self, outputs: int, steps: int, gentle: bool, first: float) -> ca.Function:
-        problem = dict(scaled_problem(self.model, gentle=gentle))
+        length = 1.0 if gentle or self._seconds is None else self._seconds
+        problem = dict(scaled_problem(self.model, gentle=gentle, scaled=gentle or self._seconds is None))
         del problem["inner"], problem["span"]
         grid = np.arange(1, outputs + 1) / outputs
-        grid = (np.sqrt(grid) if gentle else grid).tolist()
-        return ca.integrator("segment", "idas", problem, 0, grid, self._settings(steps, gentle, first))
+        grid = (np.sqrt(grid) if gentle else grid * length).tolist()
+        return ca.integrator("segment", "idas", problem, 0, grid, self._settings(steps, gentle, first * length))
 
     def _settings(self, steps: int, gentle: bool, first: float) -> dict[str, Any]:
         nominal = self.model.nominals
@@ -177,6 +186,7 @@ class Integrator:
         p = np.concatenate([[start.t, span], self._tail, start.d])
         steps = self.options.max_steps if patient else min(self.options.max_steps, _PANEL_STEPS)
         gentle = span >= self._gentle_from
+        self._seconds = span if self._whole else None
         x, z, why = self._call(start, p, outputs, steps, gentle)
         if why and not gentle and _at_the_start(why):
             # IDAS looks for consistent slopes at the start, and may not find them; gently there is nothing to find.
@@ -268,7 +278,8 @@ class Integrator:
     def _failed(self, start: Point, span: float, text: str, gentle: bool) -> StepFailed:
         flag = next((name for name in _FLAGS if name in text), "")
         reason = _FLAGS.get(flag, "it stopped without a known reason")
-        moment = start.t + span * _reached(text) ** (2 if gentle else 1)
+        reached = _reached(text) ** 2 if gentle else _reached(text) / (self._seconds or 1.0)
+        moment = start.t + span * reached
         speed = np.abs(call(self.model, self.model.ode, start)) / self.weights(start.x)
         worst = self.model.states[int(np.nanargmax(speed))] if np.any(np.isfinite(speed)) else self.model.states[0]
         return StepFailed(

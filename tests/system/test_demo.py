@@ -1,22 +1,40 @@
 """The demo: every number of the published start-ups, within the tolerance of its source."""
 
+import importlib.util
 import io
+import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 from rich.console import Console
+from typer.testing import CliRunner
 
-from modelica_like.demo import EXAMPLES, Case, cases, pages, run_case
-from modelica_like.errors import NetlistError
+from modelica_like.cli import app, design
 
+ROOT = Path(__file__).parents[2]
+
+
+def script() -> Any:
+    """examples/demo.py"""
+    spec = importlib.util.spec_from_file_location("demo_of_the_examples", ROOT / "examples" / "demo.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+demo = script()
 EXACT = 1e-6
 SIMULATED = 1e-3
 SETTLED = 1e-5
 
 
-@pytest.mark.parametrize("case", cases(), ids=lambda case: case.title)
-def test_numbers(case: Case) -> None:
-    runs, _ = run_case(case, EXAMPLES)
+@pytest.mark.parametrize("case", demo.cases(), ids=lambda case: case.title)
+def test_numbers(case: Any) -> None:
+    runs, _ = demo.run_case(case, demo.EXAMPLES)
     tolerance = EXACT if "formula" in case.source or "balance" in case.source else SIMULATED
     for number in case.numbers:
         limit = SETTLED if "settled" in number.name else tolerance
@@ -29,7 +47,7 @@ def test_numbers(case: Case) -> None:
 
 def test_pages_tell_everything_and_pictures_are_written(tmp_path: Path) -> None:
     console = Console(width=160, record=True, file=io.StringIO())
-    for page in pages(EXAMPLES, tmp_path):
+    for page in demo.pages(demo.EXAMPLES, tmp_path):
         console.print(page)
     text = console.export_text()
     for expected in (
@@ -45,8 +63,16 @@ def test_pages_tell_everything_and_pictures_are_written(tmp_path: Path) -> None:
 
 
 def test_without_the_examples_it_says_so(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr("modelica_like.demo.EXAMPLES", tmp_path / "nothing")
-    from modelica_like.demo import run_demo
+    monkeypatch.setattr(design, "DEMO", tmp_path / "nothing")
+    result = CliRunner().invoke(app, ["demo", "--pictures", str(tmp_path)])
+    assert result.exit_code == 2
+    assert result.stderr == "The demo needs the folder of examples.\nRun it from a copy of the source.\n"
 
-    with pytest.raises(NetlistError, match="The demo needs the folder of examples"):
-        run_demo(Console(), tmp_path)
+
+def test_the_command_runs_it(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    (tmp_path / "demo.py").write_text(
+        "def run_demo(console, pictures):\n    console.print(f'pages and {pictures.name}')\n"
+    )
+    monkeypatch.setattr(design, "DEMO", tmp_path / "demo.py")
+    result = CliRunner().invoke(app, ["demo", "--pictures", str(tmp_path / "pictures")])
+    assert (result.exit_code, result.stdout) == (0, "pages and pictures\n")

@@ -12,7 +12,7 @@ from modelica_like.errors import NetlistError
 from modelica_like.language import Component
 from modelica_like.netlist.document import parse, read_text
 from modelica_like.netlist.registry import find_type, library_types
-from modelica_like.report.component_pages.markdown import module_title, place
+from modelica_like.report.component_pages.markdown import module_title, place, table
 from modelica_like.report.component_pages.page import Example, page
 from modelica_like.report.types import summary
 from modelica_like.writing import write_text
@@ -106,5 +106,5 @@ def _index(types: Mapping[str, type[Component]]) -> str:
 
 
 def _rows(types: Mapping[str, type[Component]], members: Sequence[str]) -> str:
-    lines = [f"| [{name}]({place(types[name]).as_posix()}) | {summary(types[name])} |" for name in members]
-    return "\n".join(["| type | what it is |", "| --- | --- |", *lines])
+    rows = ((f"[{name}]({place(types[name]).as_posix()})", summary(types[name])) for name in members)
+    return table("", ("type", "what it is"), rows)

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from modelica_like.language import Component
 from modelica_like.netlist.registry import library_types
+from modelica_like.report.declared import filled
 
 
 def source_link(kind: type, file: Path) -> str:
@@ -35,12 +36,9 @@ def cell(words: str) -> str:
 
 def table(title: str, head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     """Return a table under a heading, without the columns that are empty; nothing if there are no rows."""
-    rows = list(rows)
-    if not rows:
-        return ""
-    kept = [k for k in range(len(head)) if any(row[k] for row in rows)]
-    lines = [[head[k] for k in kept], ["---"] * len(kept), *([row[k] for k in kept] for row in rows)]
-    return (f"## {title}\n\n" if title else "") + "\n".join(f"| {' | '.join(line)} |" for line in lines)
+    _, kept, filled_rows = filled(title, head, rows)
+    lines = [kept, ["---"] * len(kept), *filled_rows] if filled_rows else []
+    return (f"## {title}\n\n" if title and lines else "") + "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 
 def page_link(kind: type[Component]) -> str:

@@ -25,8 +25,19 @@ _PAIR = 2
 """Columns of a table with one column of values."""
 
 
+class _Owner:
+    """Owns symbols as a component does, without fields."""
+
+    fields: Mapping[str, Any] = {}
+    constant = False
+
+    def is_constant(self, name: str) -> bool:
+        """Tell whether its symbols have no derivative."""
+        return self.constant
+
+
 @dataclass(eq=False)
-class Call:
+class Call(_Owner):
     """What a symbol stands for that is a call of a method.
 
     Attributes:
@@ -38,27 +49,15 @@ class Call:
     name: str
     arguments: tuple[Any, ...]
     number: int = 0
-    fields: Mapping[str, Any] = field(default_factory=dict[str, Any])
     is_call = True
 
-    def is_constant(self, name: str) -> bool:
-        """Tell that it has a derivative."""
-        return False
 
-
-@dataclass(eq=False)
-class Formal:
+class Formal(_Owner):
     """Owner of the formal arguments of methods."""
 
-    fields: Mapping[str, Any] = field(default_factory=dict[str, Any])
-
-    def is_constant(self, name: str) -> bool:
-        """Tell that it varies."""
-        return False
-
 
 @dataclass(eq=False)
-class Row:
+class Row(_Owner):
     """What a symbol stands for that is a value of a table.
 
     Attributes:
@@ -72,11 +71,7 @@ class Row:
     column: int
     number: int
     begin: float
-    fields: Mapping[str, Any] = field(default_factory=dict[str, Any])
-
-    def is_constant(self, name: str) -> bool:
-        """Tell that it does not vary."""
-        return True
+    constant = True
 
 
 @dataclass(frozen=True, eq=False)

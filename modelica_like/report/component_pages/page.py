@@ -10,12 +10,13 @@ from typing import Any
 
 from modelica_like.errors import LanguageError
 from modelica_like.language import Component
-from modelica_like.report.component_pages.declarations import declarations, has_default
-from modelica_like.report.component_pages.markdown import cell, markdown, module_title, relative, source_link
+from modelica_like.report.component_pages import latex_names as names
+from modelica_like.report.component_pages.markdown import cell, markdown, module_title, relative, source_link, table
 from modelica_like.report.component_pages.named_calls import any_table
 from modelica_like.report.component_pages.sections import written
 from modelica_like.report.component_pages.statements import Statements, statements
 from modelica_like.report.component_pages.variants import value_for, variants
+from modelica_like.report.declared import Notation, declared, has_default
 
 
 @dataclass(frozen=True)
@@ -49,12 +50,22 @@ def page(kind: type[Component], file: Path, examples: Sequence[Example] = ()) ->
         f"# {kind.__name__}",
         f"[All components](../README.md) · {module_title(kind.__module__)} · {source_link(kind, file)}",
         markdown(inspect.cleandoc(kind.__doc__ or "")),
-        *declarations(kind, optional),
+        *(table(title.capitalize(), head, rows) for title, head, rows in declared(kind, _notation(optional))),
         *mathematics,
         *_example_links(examples, file),
         *_bases(kind, file),
     ]
     return "\n\n".join(section for section in sections if section) + "\n"
+
+
+def _notation(optional: Mapping[str, str]) -> Notation:
+    return Notation(
+        code=lambda text: f"`{text}`",
+        text=cell,
+        symbol=lambda path: f"${names.name(path)}$",
+        flow=lambda path, unit: f"${names.name(path)}$ in {unit}",
+        missing=lambda name: optional.get(name, "required"),
+    )
 
 
 def _said(kind: type[Component], structure: Mapping[str, Any]) -> tuple[dict[str, str], list[str]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from modelica_like.errors import LanguageError
@@ -53,13 +54,8 @@ def _difference(other: Statements, base: Statements) -> Statements:
     """Return what one has and another has not."""
     energy = {name: term for name, term in other.energy.items() if base.energy.get(name) != term}
     energy |= {name: Term(term.left, "0") for name, term in base.energy.items() if name not in other.energy}
-    return Statements(
-        tuple(one for one in other.equations if one not in base.equations),
-        tuple(one for one in other.definitions if one not in base.definitions),
-        tuple(one for one in other.events if one not in base.events),
-        energy,
-        tuple(one for one in other.connections if one not in base.connections),
-        tuple(one for one in other.parts if one not in base.parts),
-        (),
-        other.parameters,
-    )
+    rest = {
+        name: tuple(one for one in getattr(other, name) if one not in getattr(base, name))
+        for name in ("equations", "definitions", "events", "connections", "parts")
+    }
+    return replace(other, energy=energy, asked=(), **rest)

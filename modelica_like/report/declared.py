@@ -1,0 +1,129 @@
+"""What a component type declares, as tables of text: for pages in Markdown, and for a terminal."""
+
+from __future__ import annotations
+
+import ast
+import inspect
+from collections.abc import Callable, Iterable, Sequence
+from textwrap import dedent
+from typing import Any, NamedTuple
+
+from modelica_like.language import Component, Connector, Discrete, Input, Output, Parameter, Variable
+from modelica_like.language.fields import Field
+
+_SORTS = {
+    "parameters": Parameter, "inputs": Input, "outputs": Output, "variables": Variable, "discrete values": Discrete,
+}  # fmt: skip
+
+
+class Listing(NamedTuple):
+    """A table of text."""
+
+    title: str
+    head: Sequence[str]
+    rows: Sequence[Sequence[str]]
+
+
+class Notation(NamedTuple):
+    """How the cells of listings are written.
+
+    Attributes:
+        code: a name or a value as it stands in netlists.
+        text: a text.
+        symbol: a variable as mathematics, by its path.
+        flow: a variable of a connector, by its path, with its unit.
+        missing: the default of a parameter or input that has none.
+    """
+
+    code: Callable[[str], str]
+    text: Callable[[str], str]
+    symbol: Callable[[str], str]
+    flow: Callable[[str, str], str]
+    missing: Callable[[str], str]
+
+
+def filled(title: str, head: Sequence[str], rows: Iterable[Sequence[str]]) -> Listing:
+    """Return a listing without the columns that are empty."""
+    rows = list(rows)
+    kept = [k for k in range(len(head)) if any(row[k] for row in rows)]
+    return Listing(title, [head[k] for k in kept], [[row[k] for k in kept] for row in rows])
+
+
+def declared(kind: type[Component], notation: Notation) -> list[Listing]:
+    """Return listings of connectors, fields, structural fields and modes; those without rows are left out.
+
+    Args:
+        kind: the type.
+        notation: how cells are written.
+    """
+    code, text = notation.code, notation.text
+    made = [
+        filled(
+            "connectors", ("name", "type", "potential, flow", "", "description"),
+            (_connector_row(name, connector, notation) for name, connector in kind._class_connectors.items()),
+        )
+    ]  # fmt: skip
+    for title, sort in _SORTS.items():
+        fields = [field for field in kind._class_fields.values() if sort is _sort_of(field)]
+        head = ("name", "symbol", "unit", "default", "range", "description")
+        made.append(filled(title, head, (_field_row(field, notation) for field in fields)))
+    described = {name: one.description for name, one in kind._tables.items()}
+    described |= {name: words for name, words in _structure_descriptions(kind).items() if words}
+    structure = (
+        (code(name), code(str(default)) if has_default(default) else "required", text(described.get(name, "")))
+        for name, default in kind._structural.items()
+    )
+    made.append(filled("structure", ("name", "default", "description"), structure))
+    modes = (
+        (code(name), ", ".join(mode.names), mode.start, text(mode.description))
+        for name, mode in kind._class_modes.items()
+    )
+    made.append(filled("modes", ("name", "one of", "start", "description"), modes))
+    return [one for one in made if one.rows]
+
+
+def has_default(default: Any) -> bool:
+    """Tell whether a structural field has a default."""
+    return isinstance(default, bool | int | float | str | tuple | None)
+
+
+def _sort_of(field: Field) -> type[Field]:
+    return next(sort for sort in _SORTS.values() if isinstance(field, sort))
+
+
+def _connector_row(name: str, connector: Connector, notation: Notation) -> tuple[str, ...]:
+    free = "optional" if connector.optional else "may be free" if connector.may_be_free else ""
+    flows = ", ".join(notation.flow(f"{name}.{one.name}", one.unit_text) for one in connector.fields.values())
+    return notation.code(name), type(connector).__name__, flows, free, notation.text(connector.description)
+
+
+def _field_row(field: Field, notation: Notation) -> tuple[str, ...]:
+    low, high = ("" if bound is None else f"{bound:g}" for bound in (field.min, field.max))
+    if field.default is not None:
+        default = f"{field.default:.9g}" if isinstance(field.default, float) else str(field.default)
+    else:
+        default = notation.missing(field.name) if isinstance(field, Parameter | Input) else ""
+    return (
+        notation.code(field.name), notation.symbol(field.name), notation.text(field.unit_text), notation.text(default),
+        f"{low} … {high}".strip() if low or high else "", notation.text(field.description),
+    )  # fmt: skip
+
+
+def _structure_descriptions(kind: type[Component]) -> dict[str, str]:
+    """Return the texts below the structural fields in the class bodies."""
+    found: dict[str, str] = {}
+    for base in reversed(kind.__mro__):
+        if issubclass(base, Component) and base is not Component:
+            body = ast.parse(dedent(inspect.getsource(base))).body[0]
+            assert isinstance(body, ast.ClassDef)
+            for field, below in zip(body.body, body.body[1:], strict=False):
+                if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name):
+                    found[field.target.id] = _text_of(below)
+    return found
+
+
+def _text_of(statement: ast.stmt) -> str:
+    """Return the text that a statement consists of, or nothing."""
+    value = statement.value if isinstance(statement, ast.Expr) else None
+    words = value.value if isinstance(value, ast.Constant) else ""
+    return inspect.cleandoc(words) if isinstance(words, str) else ""
