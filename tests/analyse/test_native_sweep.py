@@ -173,3 +173,13 @@ def test_a_constant_torque_on_threads_with_inputs_and_limits_of_formulas():
     np.testing.assert_allclose(found["mass.w"], over["push.tau_constant"], atol=1e-12)
     # One in a hundred of 2001, and the extremes that are not among these.
     assert found.attrs["checked"] == 21
+
+
+def test_the_report_tells_what_idas_had_to_do(capsys):
+    from rich.console import Console
+
+    from modelica_like.report.analysis import sweep_report
+
+    found = sweep(build(braked()), {"mass.J": [2.0, 0.0]}, ["mass.w"], until=1.0)
+    Console(width=200).print(sweep_report(found))
+    assert "IDAS did 1 of 2 runs, which the native run-time could not do." in capsys.readouterr().out
