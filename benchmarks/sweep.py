@@ -1,66 +1,77 @@
-"""A sweep of document 000: runs per second and core, and what a second core brings.
+"""Sweeps of documents 000 and 003: runs per second by the compiled run-time and by IDAS.
 
-Run with `python benchmarks/sweep.py [RUNS]`. Ratios are measured in the same run; the baseline are bare
-calls of CasADi's IDAS on the hand-written equations, without events.
+Run with `python benchmarks/sweep.py [RUNS]`. Comparisons with IDAS are included. Per second of CPU is per core; what a
+second core brings is measured in the same round. `python benchmarks/sweep.py 1000000 FOLDER` does document 000 only,
+with a checkpoint in that folder, and says what it took.
 """
 
 from __future__ import annotations
 
 import os
+import resource
 import sys
 import time
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
-import casadi as ca
 import numpy as np
 
-from modelica_like import CompiledDae, build
+from modelica_like import build
 from modelica_like.analyse.sweeps.sweep import sweep
 
-NETLIST = Path(__file__).parents[1] / "examples" / "machine_table_geared.toml"
+EXAMPLES = Path(__file__).parents[1] / "examples"
 ROUNDS = 3
-OUTPUTS = ["table.s", "clutch.lock_time"]
+DRIVES: Mapping[str, tuple[Mapping[str, tuple[float, float]], Sequence[str], float]] = {
+    "machine_table_geared": (
+        {"table_mass": (300.0, 700.0), "load_torque": (10.0, 20.0)}, ["table.s", "clutch.lock_time"], 1.0,
+    ),
+    "machine_tool_startup": (
+        {"h1": (1.0, 10.0), "k1": (5000.0, 7000.0)}, ["max(shaft1.tau)", "clutch.lock_time", "clutch.loss_energy"], 0.1,
+    ),
+}  # fmt: skip
+"""What is varied, what is read, and how many runs for one of document 000."""
 
 
-def timed(model: CompiledDae, runs: int, processes: int) -> tuple[float, float]:
-    """Seconds of wall and of this process's CPU per run of a sweep."""
-    side = round(runs**0.5)
-    over = {"table_mass": np.linspace(300.0, 700.0, side), "load_torque": np.linspace(10.0, 20.0, side)}
+def timed(name: str, runs: float, solver: Any, processes: int, **how: Any) -> tuple[float, float]:
+    """Runs per second of wall and per second of this process's CPU."""
+    ranges, outputs, share = DRIVES[name]
+    side = max(round((runs * share) ** 0.5), 2)
+    over = {path: np.linspace(*bounds, side) for path, bounds in ranges.items()}
+    model = build(EXAMPLES / f"{name}.toml", free=over)
     begin, cpu = time.perf_counter(), time.process_time()
-    found = sweep(model, over, OUTPUTS, processes=processes, chunk=100)
+    found = sweep(model, over, outputs, processes=processes, solver=solver, **how)
     wall, cpu = time.perf_counter() - begin, time.process_time() - cpu
     assert not np.any(found["failure"].to_numpy() != "")
-    return wall / side**2, cpu / side**2
+    assert not found.attrs["notice"], found.attrs["notice"]
+    return side**2 / wall, side**2 / cpu
 
 
-def bare(runs: int) -> float:
-    """Seconds of CPU of one bare IDAS call: two inertias, one accelerated by a slipping clutch."""
-    w, p = ca.SX.sym("w", 2), ca.SX.sym("p", 2)
-    ode = ca.vertcat(0, (p[0] - p[1]) / 0.05)
-    call = ca.integrator("bare", "idas", {"x": w, "p": p, "ode": ode}, 0, np.linspace(0.004, 0.2, 50).tolist())
-    begin = time.process_time()
-    for k in range(runs):
-        call(x0=[150.0, 0.0], p=[20.0 + 1e-3 * k, 15.0])
-    return (time.process_time() - begin) / runs
+def compare(name: str, runs: int) -> None:
+    """Print what both solvers do."""
+    # In turns, so that what else the machine does meets all.
+    rounds = [
+        (timed(name, runs, "native", 1), timed(name, runs, "native", 2), timed(name, runs / 25, "idas", 1))
+        for _ in range(ROUNDS)
+    ]
+    best = [tuple(max(one[k][n] for one in rounds) for n in (0, 1)) for k in range(3)]
+    scaling = ", ".join(f"{two[0] / one[0]:.2f}" for one, two, _ in rounds)
+    print(f"{name}, best of {ROUNDS}; load of the machine {os.getloadavg()[0]:.1f}")
+    for text, (wall, cpu) in zip(("native, one thread", "native, two threads", "IDAS, one process"), best, strict=True):
+        print(f"  {text:20}{wall:9.0f} runs/s of wall {cpu:9.0f} runs/s of CPU")
+    print(f"  two threads for one in each round: {scaling}")
 
 
-def main(runs: int) -> None:
-    model = build(NETLIST)
-    timed(model, 100, 1)
-    base = bare(500)
-    # In turns, so that what else the machine does meets both.
-    rounds = [(timed(model, runs, 1), timed(model, runs, 2)) for _ in range(ROUNDS)]
-    cpu = min(one[1] for one, _ in rounds)
-    walls = [min(each[k][0] for each in rounds) for k in (0, 1)]
-    ratios = ", ".join(f"{one[0] / two[0]:.2f}" for one, two in rounds)
-    load = os.getloadavg()[0] if hasattr(os, "getloadavg") else float("nan")
-    print(f"{ROUNDS} x {runs} runs, load of the machine {load:.1f}; bare IDAS call {base * 1e3:.2f} ms of CPU")
-    print(f"one core      {1 / cpu:6.0f} runs/s of CPU, {1 / walls[0]:.0f} of wall; {cpu / base:.1f} x the bare call")
-    print(
-        f"two processes {1 / walls[1]:6.0f} runs/s of wall, {walls[0] / walls[1]:.2f} x one process "
-        f"(each round: {ratios}; start of processes included)"
-    )
+def main(runs: int, folder: str = "") -> None:
+    """Print tables, or what one large sweep took."""
+    if folder:
+        wall, cpu = timed("machine_table_geared", runs, "native", 2, checkpoint=folder)
+        memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+        print(f"{runs} runs in {runs / wall:.0f} s ({runs / cpu:.0f} s of CPU), at most {memory:.0f} MB")
+        return
+    for name in DRIVES:
+        compare(name, runs)
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else 10_000)
+    main(int(sys.argv[1]) if len(sys.argv) > 1 else 10_000, *sys.argv[2:3])

@@ -96,16 +96,10 @@ def simulate(
     model = build(drive)
     if parameters:
         model = model.with_parameters(dict(parameters))
-    settings = model.settings
-    end = seconds(until if until is not None else settings.get("until"))
-    chosen = _options(options or Options(), settings, rtol=rtol, atol=atol, points=points)
-    if end <= t0:
-        raise ValueOutOfRange(f"The end time {end:g} s is not after the start time {t0:g} s.")
-    if end - t0 < _SHORTEST * max(1.0, abs(t0)):
-        raise ValueOutOfRange(f"A run of {end - t0:g} s is too short: no times can be told apart in it.")
+    end, chosen = plan(model, until, t0=t0, rtol=rtol, atol=atol, points=points, options=options)
     make = _loop(solver)
     begin = time.perf_counter()
-    first = initialize(model, t0, start or settings.get("start", "given"))
+    first = initialize(model, t0, start or model.settings.get("start", "given"))
     loop = make(model, chosen, first, end, progress)
     try:
         loop.run()
@@ -113,6 +107,24 @@ def simulate(
         vars(error)["run"] = _solution(loop, begin) if loop.record.segments else None
         raise
     return _solution(loop, begin)
+
+
+def plan(
+    model: CompiledDae, until: float | str | None = None, *, t0: float = 0.0, options: Options | None = None,
+    **given: float | None,
+) -> tuple[float, Options]:  # fmt: skip
+    """Return the end time in s and the options of a run; the arguments are those of `simulate`.
+
+    Raises:
+        ValueOutOfRange, UnitError: there is no end time, it is not after the start, or an option is wrong.
+    """
+    end = seconds(until if until is not None else model.settings.get("until"))
+    chosen = _options(options or Options(), model.settings, **given)
+    if end <= t0:
+        raise ValueOutOfRange(f"The end time {end:g} s is not after the start time {t0:g} s.")
+    if end - t0 < _SHORTEST * max(1.0, abs(t0)):
+        raise ValueOutOfRange(f"A run of {end - t0:g} s is too short: no times can be told apart in it.")
+    return end, chosen
 
 
 def _loop(solver: str) -> Any:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import gc
+from collections.abc import Iterator
+from contextlib import contextmanager
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -49,14 +51,16 @@ def export(
     modes: Annotated[Modes, Option(help="Modes as enumeration outputs, as local ones, or as integer outputs.")] = (
         Modes.OUTPUT
     ),
+    fixed_step: Annotated[
+        str | None, Option(metavar="TIME", help="Co-Simulation in steps of this size, with bounded work: 1ms.")
+    ] = None,
     check: Annotated[bool, Option(help="Run the FMU against IDAS before it is handed over.")] = True,
     strict: Annotated[bool, Option("--strict", help="Do not write an FMU that differs from IDAS.")] = False,
     debug: Debug = False,
 ) -> None:  # fmt: skip
     """Export a netlist as an FMU: compiled C that needs no Python, and check it."""
-    with told(debug):
+    with told(debug), _no_search_for_cycles():
         assembly = load_netlist(netlist, assignments)
-        gc.disable()  # the process ends soon: looking for cycles takes a sixth of the time of a large model
         from rich.console import Console
 
         from modelica_like.fmi.export import export_fmu
@@ -65,9 +69,19 @@ def export(
             done = export_fmu(
                 assembly, output or Path(f"{netlist.stem}.fmu"), fmi, _listed(kind), _listed(platforms),
                 outputs=outputs or (), ends=ends or (), takes=takes.value, embed=embed, modes=modes.value,
-                check=check, strict=strict, report=status.update,
+                fixed_step=fixed_step, check=check, strict=strict, report=status.update,
             )  # fmt: skip
         out().print(str(done), soft_wrap=True)
+
+
+@contextmanager
+def _no_search_for_cycles() -> Iterator[None]:
+    """The process ends soon, and the search takes a sixth of the time of a large model."""
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.enable()
 
 
 def runtimes(

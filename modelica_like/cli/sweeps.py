@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Annotated
 
 from modelica_like.cli.declare import Option
+from modelica_like.cli.models import Solver
 from modelica_like.cli.shared import Assignments, Debug, Netlist, load_netlist, out, told
 
 
@@ -51,8 +52,9 @@ def sweep(
     assignments: Assignments = None, *,
     until: Annotated[str | None, Option(metavar="TIME", help="End time, e.g. 2s; else the netlist's.")] = None,
     checkpoint: Annotated[Path | None, Option(metavar="FOLDER", help="Keeps what is done.")] = None,
-    processes: Annotated[int | None, Option(metavar="N", help="Of this machine; else one per core.")] = None,
+    processes: Annotated[int | None, Option(metavar="N", help="At once on this machine; else one per core.")] = None,
     scheduler: Annotated[str | None, Option(metavar="ADDRESS", help="Dask, e.g. tcp://host:8786.")] = None,
+    solver: Annotated[Solver, Option(help="The compiled run-time of FMUs, or IDAS.")] = Solver.NATIVE,
     output: Annotated[Path | None, Option("--output", "-o", metavar="FILE", help=".csv, .parquet, .nc.")] = None,
     debug: Debug = False,
 ) -> None:  # fmt: skip
@@ -68,7 +70,7 @@ def sweep(
         with Bar(title="runs") as bar:
             found = run(
                 assembly, dict(read_range(text) for text in over), of, until=until, checkpoint=checkpoint,
-                processes=processes, scheduler=scheduler, progress=bar,
+                processes=processes, scheduler=scheduler, progress=bar, solver=solver.value,
             )  # fmt: skip
         out(stderr=output == STDOUT).print(sweep_report(found))
         if output:

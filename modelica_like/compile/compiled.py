@@ -267,7 +267,11 @@ class CompiledDae:
                 raise UnknownName(f"{self.name} has no parameter '{path}'{did_you_mean(path, known) or '.'}")
         for one, number in zip(self.flat_derived, self.derived(p).full().ravel(), strict=True):
             one.checked(float(number), f"{number:g}")
-        twin = replace(self, p=p, u=u)
+        return self.twin(p=p, u=u)
+
+    def twin(self, **changes: Any) -> CompiledDae:
+        """Return the same model with other attributes, and with what has been made of it so far."""
+        twin = replace(self, **changes)
         twin.__dict__.update({k: v for k, v in self.__dict__.items() if k not in twin.__dict__})
         return twin
 

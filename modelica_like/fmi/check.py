@@ -22,12 +22,14 @@ from modelica_like.solve.solution import Solution
 
 _PART = 0.1
 _POINTS = 50
+_RESULTS = 500
 _AGREEMENT = 1e-4
 _ALLOWANCE = 10.0
 _LEAST_RANGE = 1e-3
 _ROUNDING = 1e-10
 _TRUTH = 1e-9
 _TOLD = 5
+_LISTED = 12
 _PART_NAME = r"(?:[_a-zA-Z]\w*|'[^'\\]+')(?:\[\d+(?:,\d+)*\])?"
 _IDENTIFIER = rf"{_PART_NAME}(?:\.{_PART_NAME})*"
 _NAME = re.compile(rf"{_IDENTIFIER}|der\({_IDENTIFIER}(?:,\d+)?\)", re.ASCII)
@@ -128,6 +130,42 @@ def compare_with_idas(path: Path, model: CompiledDae, kind: Literal["me", "cs"])
     shares = ", ".join(f"{d.signal} by {d.relative:.2g}" for d in (beyond or off)[:_TOLD])
     told = f"Until t = {end:g} s the FMU differs from IDAS {reason}: {shares} of the range."
     return Check(told, curves, bool(beyond))
+
+
+def error_of_fixed_steps(path: Path, model: CompiledDae, step: float) -> Check:
+    """Run an FMU of fixed steps over its whole time, and tell how far its states are from IDAS, by variable.
+
+    Args:
+        path: the FMU.
+        model: the model in it.
+        step: size of its fixed steps in s.
+    """
+    end = seconds(model.settings.get("until", "1 s"))
+    communication = communication_step(end, step, _RESULTS)
+    points = int(end / communication * (1 + _ROUNDING))
+    names = [name for name in model.states if name in model.position]
+    if not names or not points:
+        return Check()
+    end = points * communication
+    modes = (one.path for one in model.flat_discretes if one.names)
+    try:
+        run = run_fmu(path, stop=end, kind="cs", step=communication, outputs=[*names, *modes])
+    except FmuFailed as error:
+        return Check(f"In fixed steps of {step:g} s the FMU fails. {error}", differs=True)
+    try:
+        truth = simulate(model, end, points=points, rtol=_TRUTH, atol=_TRUTH / 100)
+    except SolveError as error:
+        return Check(f"The error of fixed steps of {step:g} s is not known, as IDAS gave up: {error.what}")
+    curves = compare_solutions(truth, run, names, ("IDAS", "FMU"), _LEAST_RANGE)
+    shares = ", ".join(f"{d.signal} {d.relative:.2g}" for d in curves.deviations[:_LISTED])
+    rest = f"; {len(names) - _LISTED} others less" if len(names) > _LISTED else ""
+    told = f"Error of fixed steps of {step:g} s until t = {end:g} s, against IDAS, over the range: {shares}{rest}."
+    return Check(told, curves)
+
+
+def communication_step(end: float, step: float, points: int) -> float:
+    """Return a whole number of fixed steps, about `points` of which make a run."""
+    return step * max(1, round(end / points / step))
 
 
 def _idas(model: CompiledDae, end: float, *tolerances: float) -> Solution:

@@ -41,6 +41,7 @@ class About:
         sources: names of the C files.
         log_categories: with a description.
         tool: name and version of the exporting tool.
+        fixed_step: step size inside of Co-Simulation in s, 0 for one that accuracy asks for.
     """
 
     version: Version
@@ -53,6 +54,7 @@ class About:
     sources: tuple[str, ...]
     log_categories: dict[str, str]
     tool: str
+    fixed_step: float = 0.0
 
 
 def identifier(name: str) -> str:
@@ -214,7 +216,8 @@ class _Fmi2(_Writer):
             "providesDirectionalDerivative": True,
         }  # fmt: skip
         own = {
-            "canHandleVariableCommunicationStepSize": True, "canInterpolateInputs": True, "maxOutputDerivativeOrder": 3
+            "canHandleVariableCommunicationStepSize": not self.about.fixed_step, "canInterpolateInputs": True,
+            "maxOutputDerivativeOrder": 3,
         }  # fmt: skip
         for kind, tag, more in (("me", "ModelExchange", {}), ("cs", "CoSimulation", own)):
             if kind in self.about.kinds:
@@ -273,11 +276,13 @@ class _Fmi3(_Writer):
         }  # fmt: skip
         if "me" in self.about.kinds:
             element(top, "ModelExchange", **common, needsCompletedIntegratorStep=True)
+        fixed = self.about.fixed_step
         if "cs" in self.about.kinds:
             element(
-                top, "CoSimulation", **common, canHandleVariableCommunicationStepSize=True,
-                maxOutputDerivativeOrder=3, providesIntermediateUpdate=True, mightReturnEarlyFromDoStep=True,
-                canReturnEarlyAfterIntermediateUpdate=True, hasEventMode=True,
+                top, "CoSimulation", **common, canHandleVariableCommunicationStepSize=not fixed,
+                maxOutputDerivativeOrder=3, providesIntermediateUpdate=True, mightReturnEarlyFromDoStep=not fixed,
+                canReturnEarlyAfterIntermediateUpdate=True, hasEventMode=not fixed,
+                fixedInternalStepSize=fixed or None,
             )  # fmt: skip
 
     def _type(self, definitions: Any, title: str) -> Any:

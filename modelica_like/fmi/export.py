@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import tempfile
 import time
 from collections.abc import Callable, Collection, Sequence
@@ -13,11 +14,11 @@ from typing import get_args
 
 from modelica_like.compile import compile
 from modelica_like.compile.compiled import CompiledDae
-from modelica_like.errors import ExportError, UnknownName
+from modelica_like.errors import ExportError, UnknownName, ValueOutOfRange
 from modelica_like.flatten import flatten
 from modelica_like.flatten.model import FlatModel
 from modelica_like.fmi.build import PLATFORMS, build, chosen_platforms, native_platform
-from modelica_like.fmi.check import Check, compare_with_idas, problems
+from modelica_like.fmi.check import Check, communication_step, compare_with_idas, error_of_fixed_steps, problems
 from modelica_like.fmi.description import About, Kind, Version, build_description, identifier, model_description
 from modelica_like.fmi.documentation import Listing, index_page
 from modelica_like.fmi.icons import drive_icon, icon_name, terminal_icon
@@ -72,8 +73,8 @@ class Export:
 def export_fmu(
     drive: Model, path: str | Path, version: Version | str = "2.0", kind: Collection[Kind | str] = ("me", "cs"),
     platforms: Sequence[str] | str = "native", *, outputs: Sequence[str] = (), ends: Sequence[str] = (),
-    takes: Takes = "flow", embed: bool = False, modes: ModesAs | str = "output", check: bool = True,
-    strict: bool = False, report: Report | None = None,
+    takes: Takes = "flow", embed: bool = False, modes: ModesAs | str = "output",
+    fixed_step: float | str | None = None, check: bool = True, strict: bool = False, report: Report | None = None,
 ) -> Export:  # fmt: skip
     """Export a drive as an FMU: a model and a compiled run-time that need no Python.
 
@@ -93,6 +94,9 @@ def export_fmu(
             the binary is the run-time of all models and reads the model from `resources/`.
         modes: `output` (enumerations), `local` (enumerations that are no outputs), or `integer` (outputs): some
             importers know no enumerations.
+        fixed_step: step size of Co-Simulation in s, or a time such as "1 ms", for hardware in the loop: the work of a
+            step is bounded then, and a communication step is a whole number of them. By default steps are as long as
+            accuracy lets them be. The `check` of what is returned tells the error against IDAS over the whole run.
         check: whether to run the FMU against IDAS, where it has a binary for this machine. What it shows is told by the
             `check` of what is returned; where they differ, a picture `…_check.png` is drawn next to the FMU.
         strict: whether not to write an FMU that differs from IDAS.
@@ -113,9 +117,10 @@ def export_fmu(
     chosen, kinds, names = _version(version), _kinds(kind), chosen_platforms(platforms)
     tell("compiling the model")
     model, description, equations = _compiled(drive, ends, takes)
+    fixed = _fixed_step(fixed_step, kinds)
     variables = interface(model, outputs, _modes(modes))
     tell("writing the model")
-    files = _contents(model, variables, _about(model, chosen, kinds, description), equations, embed)
+    files = _contents(model, variables, _about(model, chosen, kinds, description, fixed), equations, embed)
     with tempfile.TemporaryDirectory(prefix="modelica_like_") as folder:
         for name in names:
             home = PLATFORMS[name].fmi2 if chosen == "2.0" else name
@@ -125,7 +130,7 @@ def export_fmu(
         write_archive(draft, files)
         tell("checking")
         _check_parts(draft)
-        checked = compare_with_idas(draft, model, kinds[-1]) if check and native_platform() in names else Check()
+        checked = _compared(draft, model, kinds, fixed) if check and native_platform() in names else Check()
         if strict and checked.differs:
             raise ExportError(checked.sentence, advice="Without `strict` it is written all the same, with a picture.")
         write_bytes(target, draft.read_bytes())
@@ -175,6 +180,20 @@ def _kinds(kind: Collection[str]) -> tuple[Kind, ...]:
     return tuple(one for one in get_args(Kind) if one in asked)
 
 
+def _fixed_step(asked: float | str | None, kinds: tuple[Kind, ...]) -> float:
+    if asked is None:
+        return 0.0
+    step = seconds(asked, "fixed_step")
+    if not 0 < step < math.inf:
+        raise ValueOutOfRange(f"The fixed step must be a positive time, not {step:g} s.")
+    if "cs" not in kinds:
+        raise ExportError(
+            "A fixed step belongs to Co-Simulation, and only Model Exchange is exported.",
+            why="In Model Exchange the importer chooses the steps.", advice="Export cs, too.",
+        )  # fmt: skip
+    return step
+
+
 # -- the model ---------------------------------------------------------------------------------------------------------
 
 
@@ -203,14 +222,16 @@ def _equations(flat: FlatModel) -> Listing:
     return found
 
 
-def _about(model: CompiledDae, version: Version, kinds: tuple[Kind, ...], description: str) -> About:
+def _about(model: CompiledDae, version: Version, kinds: tuple[Kind, ...], description: str, fixed_step: float) -> About:
     settings = model.settings
     end = seconds(settings["until"]) if "until" in settings else None
     points = int(settings.get("points", Options.points))
+    step = None if end is None else communication_step(end, fixed_step, points) if fixed_step else end / points
     return About(
         version=version, kinds=frozenset(kinds), token=_TOKEN, description=description, stop_time=end,
-        tolerance=float(settings.get("rtol", Options.rtol)), step_size=None if end is None else end / points,
+        tolerance=float(settings.get("rtol", Options.rtol)), step_size=step,
         sources=source_files(version), log_categories=LOG_CATEGORIES, tool=_tool(),
+        fixed_step=fixed_step,
     )  # fmt: skip
 
 
@@ -249,7 +270,7 @@ def _contents(
         pictures = {f"terminalsAndIcons/icon.{suffix}": drive_icon(suffix) for suffix in ("png", "svg")}
         for family in dict.fromkeys(icon_name(one.kind) for one in model.terminals):
             pictures |= {f"terminalsAndIcons/{family}.{s}": terminal_icon(family, s) for s in ("png", "svg")}
-    data = model_file(make_tables(model), variables.variables, _TOKEN, about.tolerance)
+    data = model_file(make_tables(model), variables.variables, _TOKEN, about.tolerance, about.fixed_step)
     token = _token(texts, data)
     data = with_token(data, _TOKEN, token)
     texts |= {name: text.replace(_TOKEN, token) for name, text in texts.items()}
@@ -273,6 +294,10 @@ def _check_parts(draft: Path) -> None:
         raise ExportError(
             f"The FMU does not pass its checks: {'; '.join(found[:3])}.", why="This is a fault of the export."
         )
+
+
+def _compared(draft: Path, model: CompiledDae, kinds: tuple[Kind, ...], fixed_step: float) -> Check:
+    return error_of_fixed_steps(draft, model, fixed_step) if fixed_step else compare_with_idas(draft, model, kinds[-1])
 
 
 def _draw(check: Check, target: Path) -> Check:

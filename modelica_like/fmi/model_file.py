@@ -51,7 +51,10 @@ _TAPES = (
     "start_jacobian", "derived",
 )  # fmt: skip
 SECTIONS: dict[str, Any] = {
-    "settings": _record("n_d n_y steady rates_depend_on_time", "absolute_to_relative default_tolerance"),
+    "settings": _record(
+        "n_d n_y steady rates_depend_on_time implicit_linear unused",
+        "absolute_to_relative default_tolerance fixed_step",
+    ),
     "text": _TEXT,
     "token": _TEXT,
     **dict.fromkeys(("constants", "parameters", "parameter_min", "parameter_max"), _DOUBLE),
@@ -89,7 +92,9 @@ _RESETS = ("state", "discrete", "value")
 _CODES = {name: code for code, name in enumerate(OPERATIONS)}
 
 
-def model_file(tables: Tables, variables: Sequence[FmuVariable], token: str, tolerance: float) -> bytes:
+def model_file(
+    tables: Tables, variables: Sequence[FmuVariable], token: str, tolerance: float, fixed_step: float = 0.0
+) -> bytes:
     """Write the file of a model.
 
     Args:
@@ -97,9 +102,10 @@ def model_file(tables: Tables, variables: Sequence[FmuVariable], token: str, tol
         variables: its FMI variables.
         token: GUID (2.0) or instantiation token (3.0) of the description.
         tolerance: relative tolerance of Co-Simulation where the importer gives none.
+        fixed_step: step size of Co-Simulation in s, 0 for one that accuracy asks for.
     """
     text = _Text()
-    contents = _contents(tables, variables, tolerance, text)
+    contents = _contents(tables, variables, tolerance, fixed_step, text)
     contents |= {"token": np.frombuffer(token.encode() + b"\0", _TEXT), "text": np.frombuffer(text.joined(), _TEXT)}
     entries, body = b"", bytearray()
     first = _HEADER.size + _ENTRY.size * len(SECTIONS)
@@ -149,11 +155,13 @@ class _Text:
         return b"".join(value.encode() + b"\0" for value in self.places)
 
 
-def _contents(tables: Tables, variables: Sequence[FmuVariable], tolerance: float, text: _Text) -> dict[str, Any]:
+def _contents(
+    tables: Tables, variables: Sequence[FmuVariable], tolerance: float, fixed_step: float, text: _Text
+) -> dict[str, Any]:
     model, start, sizes = tables.model, tables.start, tables.slots.sizes
-    steady, moving = int(start.steady is not None), int(tables.rates_depend_on_time)
+    flags = (int(start.steady is not None), int(tables.rates_depend_on_time), int(tables.implicit_linear), 0)
     contents: dict[str, Any] = {
-        "settings": [(sizes["d"], sizes["y"], steady, moving, ABSOLUTE_TO_RELATIVE, tolerance)],
+        "settings": [(sizes["d"], sizes["y"], *flags, ABSOLUTE_TO_RELATIVE, tolerance, fixed_step)],
         "constants": tables.slots.constants,
         "parameters": model.p,
         "parameter_min": [-math.inf if one.min is None else one.min for one in model.flat_parameters],

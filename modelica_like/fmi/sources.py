@@ -31,6 +31,7 @@ RUNTIME = (
     "events.c",
     "rosenbrock.c",
     "integrate.c",
+    "fixed.c",
     "values.c",
     "derivatives.c",
     "taylor.c",
@@ -47,7 +48,7 @@ LOG_CATEGORIES = {
 _FACES = {
     "2.0": ("fmi2.h", "fmi2.c", "fmi2_values.c"),
     "3.0": ("fmi3.h", "fmi3.c", "fmi3_values.c", "fmi3_unused.c"),
-    "native": ("native.c",),
+    "native": ("native.h", "native.c", "batch.c"),
 }
 _HEADERS = {
     "2.0": ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h"),

@@ -32,6 +32,11 @@ class Tables:
     start_pattern: QrPattern
 
     @property
+    def implicit_linear(self) -> bool:
+        """Whether the implicit equations are linear in z."""
+        return self.model.alg_jacobian.jac_sparsity(0, self.model.alg_jacobian.name_in().index("z")).nnz() == 0
+
+    @property
     def rates_depend_on_time(self) -> bool:
         """Whether time occurs in the right hand side itself."""
         return any(0 in operation[1:] for operation in self.tapes["rates"].operations)

@@ -21,6 +21,8 @@ from modelica_like.initialize.point import Point as Point
 from modelica_like.initialize.point import call as call
 from modelica_like.initialize.point import check_singular as check_singular
 from modelica_like.initialize.point import implicit_at as implicit_at
+from modelica_like.initialize.point import is_linear as is_linear
+from modelica_like.initialize.point import newton_at as newton_at
 from modelica_like.initialize.point import solve_implicit as solve_implicit
 from modelica_like.initialize.point import variable_slopes as variable_slopes
 from modelica_like.initialize.start import StartProblem

@@ -67,10 +67,11 @@ def rest(model: CompiledDae, point: Point) -> None:
 
 def holding(model: CompiledDae, point: Point) -> list[int]:
     """Positions of the motions that are held at a point."""
-    if not model.holds:
+    asked = [k for k, one in enumerate(model.holds) if point.d[one.mode] == one.number]
+    if not asked:
         return []
     gains = terms(model, point)[:, 0]
-    return [k for k, one in enumerate(model.holds) if point.d[one.mode] == one.number and gains[k] != 0.0]
+    return [k for k in asked if gains[k] != 0.0]
 
 
 # -- sharing --------------------------------------------------------------------------------------------------------
@@ -86,6 +87,9 @@ def share(model: CompiledDae, point: Point) -> None:
     if not model.circuits:
         return
     active = set(holding(model, point))
+    if not any(len(active.intersection(circuit.members)) > 1 for circuit in model.circuits):
+        _share_circuits(model, point, active, np.zeros(0))
+        return
     limits = terms(model, point)[:, 1:3]
     weights = base = 1.0 / _capacities(limits)
     best, least = point.d, np.inf
@@ -152,9 +156,10 @@ def _use(model: CompiledDae, point: Point, limits: Any) -> Vector:
 
 def _may_contradict(model: CompiledDae, members: list[int]) -> bool:
     """Whether something but states, such as a source of motion, moves what is held."""
-    rows = {model.holds[k].motion for k in members}
-    moving = (model.variables.name_in().index(name) for name in ("t", "u", "d"))
-    return any(rows & set(model.variables.jac_sparsity(0, k).row()) for k in moving)
+    if "moved" not in model._cache:
+        moving = (model.variables.name_in().index(name) for name in ("t", "u", "d"))
+        model._cache["moved"] = {row for k in moving for row in model.variables.jac_sparsity(0, k).row()}
+    return not model._cache["moved"].isdisjoint(model.holds[k].motion for k in members)
 
 
 def _yield_to_contradiction(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Literal
 
 import casadi as ca
@@ -51,6 +52,20 @@ class StartPlan:
         """Number of explicit and implicit equations at the beginning of the start system."""
         return len(self.wanted) - len(self.rows) - len(self.resting)
 
+    @cached_property
+    def _part(self) -> tuple[ca.Sparsity, Any]:
+        """Pattern of the wanted rows and columns, and where its entries are among those of the system's Jacobian."""
+        pattern, places = self.system.function.sparsity_out(1).sub(list(self.wanted), list(self.columns))
+        return pattern, np.array(places, int)
+
+    def entries(self, jacobian: Vector) -> Vector:
+        """Return the nonzeros of the matrix that is solved with, from those of the whole Jacobian."""
+        return jacobian[self._part[1]]
+
+    def matrix(self, entries: Vector) -> ca.DM:
+        """Return the matrix that is solved with, sparse."""
+        return ca.DM(self._part[0], entries)
+
     def targets(self, values: Vector) -> Vector:
         """Values that the wanted rows must have.
 
@@ -90,28 +105,34 @@ def start_plan(model: CompiledDae, kind: StartKind, point: Point) -> StartPlan:
 
 def _is_regular(model: CompiledDae, plan: StartPlan, point: Point) -> bool:
     """Tell whether the plan's matrix is far from singular; one that was found to be is not looked at again."""
-    matrix, key = _matrix(model, plan, point), ("regular start", plan.kind)
-    entries = np.array(matrix.nonzeros())
+    pattern, numbers = _pattern(model, plan)
+    function = plan.system.function
+    fast = buffered(model._cache, ("start matrix", plan.kind), lambda: function, (1,))
+    y = np.zeros(function.size1_out(0))
+    entries = fast(point.t, point.x, y, point.z, model.p, model.u, point.d)[0][numbers]
+    key = "regular start", plan.kind
     if np.array_equal(model._cache.get(key, ()), entries):
         return True
-    regular = _regular(matrix, entries)
+    regular = _regular(ca.DM(pattern, entries), entries)
     if regular:
         model._cache[key] = entries
     return regular
+
+
+def _pattern(model: CompiledDae, plan: StartPlan) -> tuple[Any, Any]:
+    """Pattern of the plan's matrix, and which entries of the start system's Jacobian it has."""
+    key = "start pattern", plan.kind
+    if key not in model._cache:
+        pattern = plan.system.function.sparsity_out(1)
+        own = ca.DM(pattern, np.arange(float(pattern.nnz())))[list(plan.wanted), list(plan.columns)]
+        model._cache[key] = own.sparsity(), np.array(own.nonzeros(), int)
+    return model._cache[key]
 
 
 def matrix_and_values(model: CompiledDae, system: StartSystem, point: Point, y: Vector) -> tuple[Any, Vector]:
     """Jacobian of the whole start system by (x, y, z), sparse, and its values."""
     _, jacobian, values = system.function(point.t, point.x, y, point.z, model.p, model.u, point.d)
     return jacobian, np.asarray(values.full()).ravel()
-
-
-def _matrix(model: CompiledDae, plan: StartPlan, point: Point) -> Any:
-    function = plan.system.function
-    fast = buffered(model._cache, ("start matrix", plan.kind), lambda: function, (1,))
-    y = np.zeros(function.size1_out(0))
-    entries = fast(point.t, point.x, y, point.z, model.p, model.u, point.d)[0]
-    return ca.DM(function.sparsity_out(1), entries)[list(plan.wanted), list(plan.columns)]
 
 
 def _regular(matrix: Any, entries: Vector) -> bool:

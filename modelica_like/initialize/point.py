@@ -17,7 +17,11 @@ from modelica_like.errors import InitializationError, SingularAtStart
 from modelica_like.initialize.singular import implicit_singular, is_regular, singular_block
 
 _MAX_NEWTON = 50
+_VANISHES = 1e-12
+"""Relative determinants below which a block is singular."""
 _ROUNDING = 1e-14
+_FEW = 3
+"""Implicit unknowns up to which a step of Newton's method is written out."""
 _WELL_CONDITIONED = 1e10
 """Bound of the condition of a matrix that is regular whatever its units are."""
 
@@ -52,19 +56,18 @@ def solve_implicit(model: CompiledDae, point: Point) -> None:
     """
     if not model.implicit:
         return
-    fast = buffered(model._cache, "residual at", lambda: implicit_at(model))
-    change, size = np.inf, len(model.implicit)
+    fast = buffered(model._cache, "newton", lambda: newton_at(model, look=True))
+    change = np.inf
     for _ in range(_MAX_NEWTON):
-        residual, entries = fast(point.t, point.x, point.z, model.p, model.u, point.d)
-        jacobian = entries.reshape(size, size).T
-        step = _newton_step(jacobian, residual)
-        if step is None:
-            raise implicit_singular(model, point.t, point.d, jacobian)
-        point.z = point.z + step
-        sizes = np.abs(step)
-        change = float((sizes / (1.0 + np.abs(point.z))).max())
+        new, condition = fast(point.t, point.x, point.z, model.p, model.u, point.d)
+        sizes = np.abs(new - point.z)
+        largest = sizes.max()
+        if not (condition[0] < _WELL_CONDITIONED and largest < np.inf):
+            _check_regular(model, point)
+        change = float((sizes / (1.0 + np.abs(new))).max())
+        point.z = new
         # What the largest unknown leaves of a small one when it is rounded does not get smaller.
-        if change < 1e-13 or sizes.max() <= _ROUNDING * np.abs(point.z).max():
+        if change < 1e-13 or largest <= _ROUNDING * np.abs(new).max():
             return
     if not change <= 1e-9:
         raise InitializationError(
@@ -80,23 +83,40 @@ def implicit_at(model: CompiledDae) -> ca.Function:
     return ca.Function("residual", arguments, both)
 
 
-def _newton_step(jacobian: Any, residual: Vector) -> Vector | None:
-    """Solve a step of Newton's method; None where its matrix is singular or something is not finite.
+def newton_at(model: CompiledDae, *, look: bool) -> ca.Function:
+    """Return z after one step of Newton's method and, to `look` at it, a bound of the condition of the Jacobian.
 
-    The inverse, which comes along, shows that most matrices are far from singular; only the others are scaled and
-    looked at closely.
+    The inverse, which comes along then, shows that most matrices are far from singular.
     """
-    size = len(residual)
-    try:
-        solved = np.linalg.solve(jacobian, np.column_stack([-residual, np.eye(size)]))
-    except np.linalg.LinAlgError:
-        return None
-    condition = size * np.abs(jacobian).max() * np.abs(solved[:, 1:]).max()
-    if not (condition < _WELL_CONDITIONED and np.isfinite(solved).all()) and (
-        not np.isfinite(residual).all() or not np.isfinite(jacobian).all() or not is_regular(jacobian)
-    ):
-        return None
-    return solved[:, 0]
+    size = len(model.implicit)
+    arguments = list(model.arguments.values()) if size <= _FEW else implicit_at(model).mx_in()
+    residual, entries = implicit_at(model)(*arguments)
+    jacobian = ca.reshape(entries, size, size)
+    right = ca.horzcat(residual, ca.DM.eye(size)) if look else residual
+    solved = ca.solve(jacobian, right) if size <= _FEW else ca.solve(jacobian, right, "qr")
+    new = arguments[2] - solved[:, 0]
+    condition = size * ca.mmax(ca.fabs(jacobian)) * ca.mmax(ca.fabs(solved[:, 1:])) if look else 0
+    return ca.Function("newton", arguments, [new, condition])
+
+
+def is_linear(model: CompiledDae) -> bool:
+    """Whether the implicit equations are linear in z: then one step of Newton's method solves them."""
+    if "linear" not in model._cache:
+        model._cache["linear"] = not model.alg_jacobian.jac_sparsity(0, model.alg_jacobian.index_in("z")).nnz()
+    return model._cache["linear"]
+
+
+def _check_regular(model: CompiledDae, point: Point) -> None:
+    """Look closely at a Jacobian that may be singular, whatever its units are.
+
+    Raises:
+        SingularAtStart: it is.
+    """
+    fast, size = buffered(model._cache, "residual at", lambda: implicit_at(model)), len(model.implicit)
+    residual, entries = fast(point.t, point.x, point.z, model.p, model.u, point.d)
+    jacobian = entries.reshape(size, size).T
+    if not (np.isfinite(residual).all() and np.isfinite(jacobian).all() and is_regular(jacobian)):
+        raise implicit_singular(model, point.t, point.d, jacobian)
 
 
 def check_singular(model: CompiledDae, point: Point) -> None:
@@ -105,17 +125,26 @@ def check_singular(model: CompiledDae, point: Point) -> None:
     Raises:
         SingularAtStart: one has not.
     """
+    fast = buffered(model._cache, "regular", lambda: _regular(model))
+    if not fast(point.t, point.x, point.z, model.p, model.u, point.d)[0][0]:
+        return
     determinants = call(model, model.determinants, point)
-    if len(determinants):
-        regular = np.isfinite(determinants) & (np.abs(determinants) >= 1e-12)
-        if not regular.all():
-            raise singular_block(model, point.t, point.d, int(np.argmin(regular)))
+    regular = np.isfinite(determinants) & (np.abs(determinants) >= _VANISHES)
+    if not regular.all():
+        raise singular_block(model, point.t, point.d, int(np.argmin(regular)))
     finite = np.isfinite(call(model, model.ode, point))
-    if not finite.all():
-        raise SingularAtStart(
-            f"The derivative of {model.states[int(np.argmin(finite))]} is not finite at t = {point.t:.9g} s.",
-            advice="Look for a mass, inertia or ratio of zero, or a function outside its domain.",
-        )
+    raise SingularAtStart(
+        f"The derivative of {model.states[int(np.argmin(finite))]} is not finite at t = {point.t:.9g} s.",
+        advice="Look for a mass, inertia or ratio of zero, or a function outside its domain.",
+    )
+
+
+def _regular(model: CompiledDae) -> ca.Function:
+    """Return the number of determinants that vanish and of derivatives that are not finite."""
+    arguments = list(model.arguments.values())
+    sizes, rates = ca.fabs(model.determinants(*arguments)), ca.fabs(model.ode(*arguments))
+    wrong = ca.vertcat(0, ca.logic_not(ca.logic_and(sizes >= _VANISHES, sizes < np.inf)), ca.logic_not(rates < np.inf))
+    return ca.Function("regular", arguments, [ca.cse(ca.densify(ca.sum1(wrong)))])
 
 
 def variable_slopes(model: CompiledDae, point: Point, nodes: list[int]) -> Vector:

@@ -75,6 +75,7 @@ class StartProblem:
     def __init__(self, model: CompiledDae, point: Point) -> None:
         self.model = model
         self.given = call(model, model.start_values, point)
+        self._solved: StartPlan | None = None
         if "start entries" not in model._cache:
             model._cache["start entries"] = _Entries(model)
         self._entries: _Entries = model._cache["start entries"]
@@ -121,8 +122,9 @@ class StartProblem:
         """
         self._entries.fixed.put(point.x, self.given)
         plan = start_plan(self.model, kind, point)
-        if plan.columns:
+        if plan.columns and not (plan is self._solved and _is_free_of_modes(self.model, plan)):
             self._solve(plan, point)
+            self._solved = plan
         solve_implicit(self.model, point)
         for number in plan.dependent:
             self._check_dependent(point, self.model.starts[number])
@@ -132,7 +134,7 @@ class StartProblem:
         model = self.model
         target = plan.targets(self.given)
         point.x[list(plan.zero)] = 0.0
-        columns = list(plan.columns)
+        columns = np.array(plan.columns, int)
         y = np.zeros(plan.system.function.size1_out(0))
         nx, ny = len(model.states), len(y)
         state = np.concatenate([point.x, y, point.z])
@@ -196,17 +198,21 @@ class _Evaluation:
     def __init__(self, model: CompiledDae, plan: StartPlan) -> None:
         function, key = plan.system.function, f"start system {plan.kind}"
         self._fast = buffered(model._cache, key, lambda: _dense_values(function), (1, 2))
-        self._pattern = function.sparsity_out(1)
-        self._entries = self._pattern.get_triplet()
-        self._rows, self._columns = list(plan.wanted), list(plan.columns)
+        self._plan, self._rows = plan, np.array(plan.wanted, int)
 
     def __call__(self, *arguments: Any) -> tuple[Any, Vector]:
         entries, values = self._fast(*arguments)
-        if max(self._pattern.shape) > _DENSE:
-            return ca.DM(self._pattern, entries)[self._rows, self._columns], values[self._rows]
-        whole = np.zeros(self._pattern.shape)
-        whole[self._entries] = entries
-        return whole[np.ix_(self._rows, self._columns)], values[self._rows]
+        matrix = self._plan.matrix(self._plan.entries(entries))
+        return matrix.full() if matrix.size1() <= _DENSE else matrix, values[self._rows]
+
+
+def _is_free_of_modes(model: CompiledDae, plan: StartPlan) -> bool:
+    key = "start free of modes", plan.kind
+    if key not in model._cache:
+        function = plan.system.function
+        values, modes = function.name_out().index("values"), function.name_in().index("d")
+        model._cache[key] = not function.jac_sparsity(values, modes).nnz()
+    return model._cache[key]
 
 
 def _dense_values(system: ca.Function) -> ca.Function:

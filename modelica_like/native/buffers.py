@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from modelica_like.compile.compiled import Vector
-from modelica_like.native.library import MORE, Run
+from modelica_like.native.library import MORE, PAUSED, Run
 from modelica_like.native.model import Instance
 
 _COUNTED = {
@@ -51,12 +51,10 @@ class Buffers:
         while True:
             arguments = self.instance.address, self.end, self.points, ctypes.byref(self.run)
             code = self.instance.library.run(*arguments)
-            if not reached(self.run.last) or code != MORE:
+            if not reached(self.run.last) or code not in (MORE, PAUSED):
                 return code
-            for counted, names in _COUNTED.items():
-                room = getattr(self.run, f"room_{counted}")
-                if 2 * getattr(self.run, f"n_{counted}") >= room:
-                    self._make_room(counted, names, 2 * room)
+            for counted, names in _COUNTED.items() if code == MORE else ():
+                self._make_room(counted, names, 2 * getattr(self.run, f"room_{counted}"))
 
     def __getitem__(self, name: str) -> Vector:
         """What was written, shape (rows, columns)."""

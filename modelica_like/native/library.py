@@ -1,4 +1,4 @@
-"""The compiled run-time as functions: what `native.c` exports, by ctypes, which lets other threads run meanwhile."""
+"""The compiled run-time as functions: what native.c and batch.c export, by ctypes, which lets other threads run."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from typing import Any
 from modelica_like.fmi.build import native_platform
 from modelica_like.fmi.runtime import runtime_library
 
-OK, FAILED, MORE = 0, 1, 2
-"""What functions return; MORE: a buffer is full, or it is time for a breath."""
+OK, FAILED, MORE, PAUSED = range(4)
+"""What functions return; runs also that a buffer is full, or that so many steps are done."""
 MESSAGE_LENGTH = 512
 
 _POINTER, _COUNT, _NUMBER, _CODE = c.c_void_p, c.c_int64, c.c_double, c.c_int
@@ -33,6 +33,17 @@ class Run(c.Structure):
     ]
 
 
+class BatchArguments(c.Structure):
+    """`NativeBatch` in batch.c."""
+
+    _fields_ = [
+        *((name, _NUMBER) for name in ("start", "end", "rtol", "atol")),
+        *((name, _COUNT) for name in ("results", "most_events", "n_runs", "n_readings")),
+        *((name, _POINTER) for name in ("readings", "parameters", "inputs", "values", "failed")),
+        ("stop", c.POINTER(c.c_int)),
+    ]
+
+
 _SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
     "open": (_POINTER, [c.c_char_p, c.c_size_t, c.c_char_p]),
     "close": (None, [_POINTER]),
@@ -52,17 +63,22 @@ _SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
     "drop": (None, [_POINTER, c.POINTER(_POINTER)]),
     "counts": (None, 2 * [_POINTER]),
     "run": (_CODE, [_POINTER, _NUMBER, _COUNT, c.POINTER(Run)]),
+    "batch": (_COUNT, [_POINTER, c.POINTER(BatchArguments)]),
 }
 
 
 @cache
 def library() -> Any:
-    """Load the run-time of this machine; its functions have the names of native.c without the prefix.
+    """Load the run-time of this machine; its functions have the names of these files without the prefix.
 
     Raises:
         ExportError: it must be compiled, and there is no compiler, or the compiler failed.
     """
-    loaded = c.CDLL(str(runtime_library(native_platform())))
+    return declared(c.CDLL(str(runtime_library(native_platform()))))
+
+
+def declared(loaded: c.CDLL) -> Any:
+    """Declare the functions of a library."""
     for name, (result, arguments) in _SIGNATURES.items():
         function = getattr(loaded, f"native_{name}")
         function.restype, function.argtypes = result, arguments

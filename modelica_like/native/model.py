@@ -6,7 +6,6 @@ import ctypes
 import re
 import weakref
 from collections.abc import Iterable
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -61,7 +60,7 @@ class NativeModel:
     """
 
     def __init__(self, model: CompiledDae, start: StartKind | None = None) -> None:
-        twin = replace(model, settings={**model.settings, **({"start": start} if start else {})})
+        twin = model.twin(settings={**model.settings, **({"start": start} if start else {})})
         variables = interface(twin).variables
         data = model_file(make_tables(twin), variables, "{native}", Options.rtol)
         self.library = library()

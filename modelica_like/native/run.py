@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, Vector
@@ -80,7 +82,7 @@ class NativeLoop:
         record, model, written = self.record, self.model, self._buffers
         times, states = written["times"][:, 0], np.ascontiguousarray(written["states"].T)
         firsts, events = written["firsts"][:, 0].astype(int), written["events"]
-        for k, (first, last) in enumerate(zip(firsts, [*firsts[1:], len(times)], strict=True)):
+        for k, (first, last) in enumerate(pairwise([*firsts, len(times)])):
             self._note(events, k)
             x, z = np.split(states[:, first:last], [len(model.states)])
             record.segments.append(Segment(times[first:last], x, z, written["modes"][k].copy()))

@@ -109,7 +109,7 @@ def sensitivity_report(result: Sensitivities) -> RenderableType:
 
 
 def sweep_report(found: xarray.Dataset) -> RenderableType:
-    """Return smallest and largest value of every output with the parameters there, and what failed."""
+    """Return smallest and largest value of every output with the parameters there, what failed, and what differs."""
     names = [str(name) for name in found.data_vars if name != "failure"]
     told = found["failure"].to_numpy().ravel()
     failed = int(np.sum(told != ""))
@@ -127,6 +127,8 @@ def sweep_report(found: xarray.Dataset) -> RenderableType:
     if failed:
         parts.append(f"{failed} runs failed:")
         parts += [f"  {escape(text.splitlines()[0])}" for text in dict.fromkeys(told[told != ""][:_FAILURES_TOLD])]
+    if found.attrs.get("notice"):
+        parts.append(escape(found.attrs["notice"]))
     return Group(*parts)
 
 

@@ -10,7 +10,8 @@ from modelica_like.compile.compiled import CompiledDae, CompiledTransition, Vect
 from modelica_like.compile.soon import TIME_RESOLUTION
 from modelica_like.errors import StepFailed
 from modelica_like.initialize import Point
-from modelica_like.solve.guards import Candidate, Guards, Located, candidates, locate
+from modelica_like.solve.between import Between
+from modelica_like.solve.guards import Candidate, Ends, Guards, Located, candidates, locate
 from modelica_like.solve.idas import Integrator
 from modelica_like.solve.instants import SAME_TIME, Instants, just_after, note_sharing
 from modelica_like.solve.looks import Cell, Looks
@@ -23,7 +24,6 @@ _NEVER = 1e-12
 _CLOSER = 8
 """Looks into an interval between two looks."""
 _DEEPEST = 10
-_MAX_HALVINGS = 30
 _MAX_FAILURES = 40
 _FEW_FAILURES = 6
 
@@ -50,15 +50,14 @@ class EventLoop:
         self.end = end
         self._failures = 0
         self._failed_before = start.t
-        self._in_sight = np.inf
         self._since = start.t
-        self._lasted: dict[bytes, float] = {}
         self.progress = progress
-        self.integrator = Integrator(model, options)
         self.guards = Guards(model)
         self.record = Recorder()
         timed = len(model.transitions) > self.guards.count
         self.pace = Pace(start.t, end, options, guarded=bool(self.guards.count), timed=timed)
+        self.integrator = Integrator(model, options, whole=self.pace.on_grid)
+        self.between = Between(self.integrator, self._closer)
         self.instants = Instants(model, options, self.guards, self.record, end - start.t)
 
     @property
@@ -78,11 +77,22 @@ class EventLoop:
             self.record.begin(self.now)
             while self.now.t < self.end:
                 self._advance(min(self.instants.next_moment(self.now), self.end))
+                if self.between.many:
+                    self._write()
                 if self.progress is not None:
                     self.progress(self.now.t)
-        finally:
             self.record.end(self.now.d)
+            self._write()
+        finally:
+            # What an error or an interrupt leaves; otherwise nothing is left.
+            self.record.end(self.now.d)
+            self._write(precisely=False)
         return self.record
+
+    def _write(self, *, precisely: bool = True) -> None:
+        """Interpolate results, and put together the segments that have ended."""
+        self.between.fill(precisely=precisely)
+        self.record.build()
 
     # -- smooth pieces -----------------------------------------------------------------------------------------------
 
@@ -90,7 +100,7 @@ class EventLoop:
         """Integrate up to `stop` at most, ending earlier at an event or at the end of a panel."""
         looks = self._panel(stop)
         if not self.guards.count:
-            self.pace.longer(looks.count)
+            self.pace.longer(looks.span, np.inf)
         if not self.guards.count or not self._search(looks):
             self._keep(looks, float(looks.times[-1]), looks.count)
             self._arrive(looks)
@@ -113,70 +123,66 @@ class EventLoop:
         if not len(times):
             return
         numbers = np.minimum(np.rint((times - looks.times[0]) / looks.width).astype(int), looks.count)
-        if np.all(np.abs(times - looks.times[numbers]) <= SAME_TIME * np.maximum(1.0, np.abs(times))):
+        same = SAME_TIME * np.maximum(1.0, np.abs(times))
+        if self.pace.on_grid and np.all(np.abs(times - looks.times[numbers]) <= same):
             self.record.add(times, looks.x[:, numbers], looks.z[:, numbers])
         else:
-            self.record.add(times, *self._between(looks, times, last))
-
-    def _between(self, looks: Looks, times: Vector, last: int, depth: int = 0) -> tuple[Vector, Vector]:
-        """Return states and implicit unknowns between looks, from closer looks where interpolation is not precise."""
-        x, z, unknown = looks.along(times, last)
-        if depth < _DEEPEST:
-            for k in unknown:
-                those = looks.intervals(times) == k
-                x[:, those], z[:, those] = self._between(self._closer(looks, int(k)), times[those], _CLOSER, depth + 1)
-        return x, z
+            piece = self.between.ask(looks, times, last)
+            self.record.add(times, piece.x, piece.z)
 
     def _closer(self, looks: Looks, k: int) -> Looks:
-        """Look into an interval between two looks."""
-        return self._integrate(looks.point(k), float(looks.times[k + 1] - looks.times[k]), _CLOSER)
+        """Look into an interval between two looks.
+
+        Beginning there anew is more precise, too: a guard may live on values that are small compared with tolerances.
+        """
+        return self._integrate(looks.point(k), float(looks.times[k + 1] - looks.times[k]), _CLOSER).every(1)
 
     def _integrate(self, start: Point, span: float, looks: int, *, patient: bool = True) -> Looks:
-        x, z = self.integrator.run(start, span, looks, patient=patient)
-        times = start.t + span * np.arange(looks + 1) / looks
-        x, z = np.concatenate([start.x[:, None], x], axis=1), np.concatenate([start.z[:, None], z], axis=1)
+        x, z = self.integrator.run(start, span, looks, patient=patient, polish=False)
+        times = start.t + span * np.arange(x.shape[1] + 1) / looks
+        # Row by row, as IDAS writes them.
+        x, z = np.concatenate([start.x[None], x.T]).T, np.concatenate([start.z[None], z.T]).T
         return Looks(self.integrator, self.guards, times, x, z, start.d)
 
     def _panel(self, stop: float) -> Looks:
         """Integrate one panel.
 
-        It may run past an event, where the equations of the old mode mean nothing and may blow up; then a shorter one
-        ends before.
+        It may run past an event, where the equations of the old mode mean nothing and may blow up; then it ends before.
         """
         while True:
-            goal = min(stop, self._in_sight) if self._in_sight > just_after(self.now.t) else stop
-            span, count = self.pace.panel(self.now.t, goal)
+            span, count = self.pace.panel(self.now.t, stop)
             before = self.integrator.steps
             try:
                 looks = self._integrate(self.now, span, count, patient=not self.guards.count)
             except StepFailed:
                 if not self._go_on(self.now.t + span):
                     raise
-                if count == 1:
-                    return self._short_piece(span)
-                self.pace.shorter(count)
+                self.pace.shorter(span, denser=True)
                 continue
-            steps = self.integrator.steps - before
-            if self.guards.count and (self._shorten(steps, looks) or self.pace.refine(steps, count)):
-                continue
-            self.pace.snap(looks.times[1:])
-            if self.now.t + span >= goal - SAME_TIME * max(1.0, abs(goal)):
-                looks.times[-1] = goal
+            if looks.count < count:
+                if not self._go_on(self.now.t + span):
+                    raise self.integrator.gave_up
+                return looks.every(1)
+            if not self.pace.on_grid:
+                stride = self.pace.stride(self.integrator.steps - before, count, looks.width)
+                if not stride:
+                    self.pace.shorter(self._in_sight(looks.every(1)))
+                    continue
+                looks = looks.every(stride)
+            else:
+                looks = looks.every(1)
+                self.pace.snap(looks.times[1:])
+            if self.now.t + span >= stop - SAME_TIME * max(1.0, abs(stop)):
+                looks.times[-1] = stop
             return looks
 
-    def _shorten(self, steps: int, looks: Looks) -> bool:
-        """Let the next panel end at the first event in sight, if this one was laborious; True if that is much sooner.
+    def _in_sight(self, looks: Looks) -> float:
+        """Time until all looks are passed, or the first event in sight.
 
         Behind an event the old mode's equations mean nothing, so what they cost tells nothing about looks at guards.
         """
-        if not self.pace.laborious(steps, looks.count):
-            return False
-        values = looks.seen[0]
-        risen = np.flatnonzero((values[self.guards.active(looks.d), 1:] > 0).any(axis=0))
-        if not len(risen) or 2 * (risen[0] + 1) > looks.count:
-            return False
-        self._in_sight = float(looks.times[risen[0] + 1])
-        return True
+        risen = (looks.seen[0][self.guards.active(looks.d), 1:] > 0).any(axis=0)
+        return looks.width * (int(np.argmax(risen)) + 1 if risen.any() else looks.count)
 
     def _go_on(self, end: float) -> bool:
         """Count failures on the way to one place: behind it is an event, or nothing; True if another try makes sense.
@@ -185,7 +191,8 @@ class EventLoop:
         """
         self._failures += 1
         self._failed_before = max(self._failed_before, end)
-        if self._failures <= (_MAX_FAILURES if self.guards.count else _FEW_FAILURES):
+        allowed = _MAX_FAILURES if self.guards.count else _FEW_FAILURES
+        if self._failures <= allowed and end > just_after(self.now.t):
             return True
         if not self.integrator.relax():
             return False
@@ -195,17 +202,6 @@ class EventLoop:
             f"instead of {self.options.rtol:g}."
         )
         return True
-
-    def _short_piece(self, span: float) -> Looks:
-        """Integrate a part of the distance to the next look, as long as possible."""
-        for halvings in range(1, _MAX_HALVINGS):
-            piece = span / 2**halvings
-            try:
-                return self._integrate(self.now, piece, 1, patient=not self.guards.count)
-            except StepFailed:
-                if not self._go_on(self.now.t + piece) or halvings + 1 == _MAX_HALVINGS:
-                    raise
-        raise AssertionError
 
     # -- events ------------------------------------------------------------------------------------------------------
 
@@ -222,53 +218,44 @@ class EventLoop:
             # What the last event left positive did not want to fire: it is on its way down.
             values[:, 0] = np.minimum(values[:, 0], 0.0)
         active = self.guards.active(looks.d)
-        found = candidates(values, rates, active, looks.width)
-        while found:
-            k = found[0].interval
-            group = [one for one in found if one.interval == k]
-            cell, located = self._locate(looks, values, rates, group, sure=depth >= _DEEPEST)
-            if cell is None:
-                return self._search_closer(looks, k, depth, begins=begins and k == 0)
-            if located is None:
-                found = [one for one in found if one.interval > k]
-                continue
-            soon = self.guards.soon(located.point)
-            wanting = [self.guards.state_events[g] for g in located.guards if soon[g] > 0]
-            if not wanting:
-                # Positive for less than the time resolution: what the last event left is on its way down.
+        for group in candidates(values, rates, active, looks.width):
+            k = group[0].interval
+            while group:
+                cell, located = self._locate(looks, values, rates, group, depth)
+                if cell is None:
+                    return self._search_closer(looks, k, depth, begins=begins and k == 0)
+                if located is None:
+                    break
+                wanting = [self.guards.state_events[g] for g in located.guards if located.soon[g] > 0]
                 late = [one.guard for one in group if not one.inside]
-                if not late:
-                    over = located.guards or [one.guard for one in group]
-                    found = [one for one in found if one.interval > k or one.guard not in over]
-                    continue
-                wanting = self._look_behind(looks, cell, located, late)
-            self._reach(looks, k, located.point, wanting)
-            return True
+                if wanting or late:
+                    # Positive for less than the time resolution: what the last event left is on its way down.
+                    self._reach(looks, k, located.point, wanting or self._look_behind(looks, cell, located, late))
+                    return True
+                over = located.guards or [one.guard for one in group]
+                group = [one for one in group if one.guard not in over]
         if depth == 0:
-            self.pace.longer(looks.count, _foreseen(values[active, -1], rates[active, -1]))
+            self.pace.longer(looks.span, _foreseen(values[active, -1], rates[active, -1]))
         return False
 
     def _locate(
-        self, looks: Looks, values: Vector, rates: Vector, group: list[Candidate], *, sure: bool
+        self, looks: Looks, values: Vector, rates: Vector, group: list[Candidate], depth: int
     ) -> tuple[Cell | None, Located | None]:
-        """Find the event in the interval of a group; no interval if its states are not known precisely enough.
-
-        With `sure`, the looks cannot be closer.
-        """
-        k = group[0].interval
-        watched = [one.guard for one in group]
-        sizes = np.abs(values[watched, k]) + np.abs(values[watched, k + 1])
-        cells = looks.cells(k, k + 1)
-        cell = next((one for one in cells if sure or looks.is_sharp(one, watched, sizes)), None)
+        """Find the event in the interval of a group; no interval if its states are not known precisely enough."""
+        k, width = group[0].interval, looks.width
+        ends: Ends = {}
+        for g in sorted({one.guard for one in group}):
+            (g0, g1), (r0, r1) = values[g, k : k + 2].tolist(), rates[g, k : k + 2].tolist()
+            ends[g] = g0, g1, r0 * width, r1 * width
+        sure, fresh = depth >= _DEEPEST, depth > 0
+        cell = next((one for one in looks.cells(k, k + 1) if sure or looks.is_sharp(one, ends, fresh=fresh)), None)
         if cell is None:
             return None, None
 
-        def trial(span: float) -> tuple[Point, Vector, Vector]:
-            point = looks.at(cell.t + span, cell)
-            return point, *self.guards.at(point)
+        def trial(span: float) -> tuple[Point, list[Vector]]:
+            return looks.at(cell.t + span, cell)
 
-        first, last = (values[:, k], rates[:, k]), (values[:, k + 1], rates[:, k + 1])
-        return cell, locate(trial, cell.width, first, last, group, cell.t)
+        return cell, locate(trial, width, ends, group, cell.t)
 
     def _search_closer(self, looks: Looks, k: int, depth: int, *, begins: bool) -> bool:
         """Search between two looks again, with closer ones; whatever is found, the run goes on from there."""
@@ -291,22 +278,20 @@ class EventLoop:
     def _look_behind(self, looks: Looks, cell: Cell, located: Located, late: list[int]) -> list[CompiledTransition]:
         """Go on by the time resolution; what is still positive there wants to fire, else the search begins anew."""
         behind = located.point.t + TIME_RESOLUTION * max(1.0, abs(located.point.t))
-        located.point = looks.at(min(behind, cell.t + cell.width), cell)
-        values, _ = self.guards.at(located.point)
-        return [self.guards.state_events[g] for g in late if values[g] > 0]
+        located.point, guards = looks.at(min(behind, cell.t + cell.width), cell)
+        return [self.guards.state_events[g] for g in late if guards[0][g] > 0]
 
     def _wanting(self) -> list[CompiledTransition]:
-        return [*self.instants.due(self.now), *self.instants.rising(self.now)]
+        return [*self.instants.due(self.now), *self.guards.wanting(self.now)]
 
     def _event(self, wanting: list[CompiledTransition]) -> None:
         """Handle an event: close the segment, change modes until nothing fires, begin the next segment."""
         self.record.end(self.now.d)
-        self._failures, self._failed_before, self._in_sight = 0, self.now.t, np.inf
-        lasted = self._lasted[self.now.d.tobytes()] = self.now.t - self._since
-        self._since = self.now.t
-        self.now = self.now.copy()
+        self._failures, self._failed_before = 0, self.now.t
+        lasted, self._since = self.now.t - self._since, self.now.t
+        before, self.now = self.now.d, self.now.copy()
         self.instants.settle(self.now, wanting)
-        self.pace.anew(self._lasted.get(self.now.d.tobytes(), lasted))
+        self.pace.anew(before, lasted, self.now.d)
         self.record.begin(self.now)
 
 

@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import functools
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
-from modelica_like.compile.buffers import BufferedFunction, buffered
-from modelica_like.compile.compiled import CompiledDae, Vector
+from modelica_like.compile.buffers import buffered
+from modelica_like.compile.compiled import CompiledDae, CompiledTransition, Vector
 from modelica_like.flatten.conditions import JUST_TRUE
-from modelica_like.initialize import Point, call
+from modelica_like.initialize import Point, is_linear, newton_at
 from modelica_like.solve.idas import along
 
 _LOCATED = 1e-13
 _NOISE = 1e-30
 """A decaying signal ends by swinging around zero with such values; that is no event."""
+_LARGE = 1e300
 _MAX_TRIALS = 60
 _GUESSING = 12
 _NEAR = 0.1
@@ -32,63 +34,86 @@ class Guards:
         self.state_events = [t for t in model.transitions if not t.timed]
         self.count = len(self.state_events)
         self.positions = {id(one): k for k, one in enumerate(self.state_events)}
-        self._mode = np.array([t.mode for t in self.state_events], int)
-        largest = max((len(one.names) for one in model.flat_discretes), default=1)
-        self._sources = np.zeros((self.count, max(largest, 1)), bool)
-        for k, transition in enumerate(self.state_events):
-            self._sources[k, list(transition.sources)] = True
-        self._rows = np.arange(self.count)
+        self._at = buffered(model._cache, "guards at", lambda: _clean(model, self.state_events))
+        self._active: dict[bytes, Any] = {}
 
     def active(self, d: Vector) -> Any:
-        """Which guards may fire, by the modes."""
-        if not self.count:
-            return np.zeros(0, bool)
-        return self._sources[self._rows, d[self._mode].astype(int)]
+        """Return the numbers of the guards that may fire, by the modes."""
+        key = d[: len(self.model.flat_discretes)].tobytes()
+        if key not in self._active:
+            may = [k for k, one in enumerate(self.state_events) if int(d[one.mode]) in one.sources]
+            self._active[key] = np.array(may, int)
+        return self._active[key]
 
-    def at(self, point: Point) -> tuple[Vector, Vector]:
-        """Guards and rates at a point."""
-        values, rates, _ = self._seen(1)(point.t, point.x, point.z, self.model.p, self.model.u, point.d)
-        return _numbers(values), _finite(rates)
+    def at(self, point: Point) -> list[Vector]:
+        """Return guards, their rates, and guards one time resolution later; those that may not fire are -1."""
+        return self._at(point.t, point.x, point.z, self.model.p, self.model.u, point.d)
+
+    def follow(self, point: Point) -> list[Vector]:
+        """Let the implicit unknowns follow the states by one or two steps of Newton's method; guards as by `at`.
+
+        Returns:
+            Guards, their rates, guards soon, and the implicit unknowns before the last step.
+        """
+        model = self.model
+        follow = buffered(model._cache, "guards follow", lambda: _following(model, self._at.function))
+        *found, point.z = follow(point.t, point.x, point.z, model.p, model.u, point.d)
+        return found
+
+    def wanting(self, point: Point) -> list[CompiledTransition]:
+        """State events that want to fire now: positive, or about to be within the time resolution."""
+        if not self.count:
+            return []
+        return [self.state_events[k] for k in (self.at(point)[2] > 0).nonzero()[0]]
 
     def along(self, times: Vector, x: Vector, z: Vector, d: Vector) -> tuple[Vector, Vector, Vector]:
         """Guards, rates and derivatives of the states at many times with the same modes.
 
         Shapes (guards, times), (guards, times), (nx, times).
         """
-        count = len(times)
-        results = self._seen(count)(times, x.ravel("F"), z.ravel("F"), self.model.p, self.model.u, d)
+        count, model = len(times), self.model
+        seen = buffered(model._cache, ("seen", count), lambda: along(_seen(model), count))
+        results = seen(times, x.ravel("F"), z.ravel("F"), model.p, model.u, d)
         values, rates, slopes = (v.reshape(count, -1).T for v in results)
-        return _numbers(values), _finite(rates), slopes
-
-    def _seen(self, count: int) -> BufferedFunction:
-        return buffered(self.model._cache, ("seen", count), lambda: along(_seen(self.model), count))
-
-    def soon(self, point: Point) -> Vector:
-        """Guards as they will be one time resolution later."""
-        return _numbers(call(self.model, self.model.guards_soon, point))
+        return values, rates, slopes
 
 
 def _seen(model: CompiledDae) -> ca.Function:
     """Guards, their rates and the states' in one function: they share most of what they compute."""
     if "seen" not in model._cache:
         arguments = list(model.arguments.values())
-        results = [model.guards(*arguments), model.guard_rates(*arguments), model.ode(*arguments)]
+        rates = model.guard_rates(*arguments)
+        rates = ca.densify(ca.if_else(ca.fabs(rates) <= _LARGE, rates, 0))
+        results = [_numbers(model.guards(*arguments)), rates, model.ode(*arguments)]
         model._cache["seen"] = ca.Function("seen", arguments, ca.cse(results))
     return model._cache["seen"]
 
 
-def _finite(rates: Vector) -> Vector:
-    return rates if np.isfinite(rates).all() else np.where(np.isfinite(rates), rates, 0.0)
+def _clean(model: CompiledDae, events: list[CompiledTransition]) -> ca.Function:
+    """Guards, rates and guards a moment later, with what the modes say."""
+    arguments, d = list(model.arguments.values()), model.arguments["d"]
+    values, rates, _ = _seen(model)(*arguments)
+    soon = _numbers(model.guards_soon(*arguments))
+    may = ca.vertcat(*(functools.reduce(ca.logic_or, [d[one.mode] == k for k in one.sources]) for one in events))
+    results = [ca.if_else(may, one, -1) if events else ca.SX(0, 1) for one in (values, soon)]
+    return ca.Function("guards_at", arguments, [ca.densify(one) for one in ca.cse([results[0], rates, results[1]])])
 
 
-def _numbers(guards: Vector) -> Vector:
+def _following(model: CompiledDae, at: ca.Function) -> ca.Function:
+    newton = newton_at(model, look=False)
+    arguments = newton.mx_in()
+    t, x, z, *rest = arguments
+    before = newton(t, x, z, *rest)[0]
+    after = before if is_linear(model) else newton(t, x, before, *rest)[0]
+    return ca.Function("guards_follow", arguments, [*at(t, x, after, *rest), before, after])
+
+
+def _numbers(guards: Any) -> Any:
     """Let a guard that is not a number be false, and what is nothing but rounding zero."""
-    sizes = np.abs(guards)
-    if not sizes.size or _NOISE <= np.minimum.reduce(sizes, None) <= np.maximum.reduce(sizes, None) < np.inf:
-        return guards
-    rounding = (sizes < _NOISE) & (sizes > JUST_TRUE)
-    guards = np.where(rounding, 0.0, guards) if rounding.any() else guards
-    return guards if sizes.max() < np.inf else np.nan_to_num(guards, nan=-1.0)
+    sizes = ca.fabs(guards)
+    rounding = ca.logic_and(sizes < _NOISE, sizes > JUST_TRUE)
+    numbers = ca.if_else(guards > _LARGE, _LARGE, ca.if_else(guards >= -_LARGE, guards, -1))
+    return ca.densify(ca.if_else(rounding, 0, numbers))
 
 
 @dataclass
@@ -100,38 +125,36 @@ class Candidate:
     inside: bool
 
 
-def candidates(values: Vector, rates: Vector, active: Any, step: float) -> list[Candidate]:
-    """Find the first interval in which active guards become positive.
+def candidates(values: Vector, rates: Vector, active: Any, step: float) -> Iterator[list[Candidate]]:
+    """Give the intervals, one after the other, in which active guards may become positive.
 
     Args:
         values: guards at successive times, shape (guards, times).
         rates: their time derivatives.
-        active: which guards count.
+        active: numbers of those that count.
         step: longest distance of two times in s.
     """
-    rows = active.nonzero()[0]
-    values, rates = values[rows], rates[rows]
-    above = values > 0
-    crossing = above[:, 1:] > above[:, :-1]
-    slow = _NOISE / step
-    humps = (rates > slow)[:, :-1] & (rates < -slow)[:, 1:]
-    if humps.any():
-        humps &= ~(above[:, :-1] | crossing)
-        places = np.nonzero(humps)
-        ends = values[:, :-1][places], values[:, 1:][places]
-        top = _peak(*ends, rates[:, :-1][places] * step, rates[:, 1:][places] * step)
-        humps[places] = top > -_NEAR * (np.abs(ends[0]) + np.abs(ends[1]))
-    found: list[Candidate] = []
-    for k in np.flatnonzero(np.any(crossing | humps, axis=0)):
-        found += [Candidate(int(rows[g]), int(k), False) for g in crossing[:, k].nonzero()[0]]
-        found += [Candidate(int(rows[g]), int(k), True) for g in humps[:, k].nonzero()[0]]
-    return found
+    values, rates = values[active], rates[active]
+    below, slow = values <= 0, _NOISE / step
+    rises = below[:, :-1] > below[:, 1:]
+    humps = rates > slow
+    humps = humps[:, :-1] > humps[:, 1:]
+    humps &= below[:, :-1]
+    humps &= below[:, 1:]
+    for k in np.flatnonzero((rises | humps).any(axis=0)):
+        group = [Candidate(int(active[g]), int(k), False) for g in rises[:, k].nonzero()[0]]
+        for g in humps[:, k].nonzero()[0]:
+            (g0, g1), (r0, r1) = values[g, k : k + 2], rates[g, k : k + 2] * step
+            if r1 < -_NOISE and _peak(g0, g1, r0, r1) > -_NEAR * (abs(g0) + abs(g1)):
+                group.append(Candidate(int(active[g]), int(k), True))
+        if group:
+            yield group
 
 
-def _peak(g0: Vector, g1: Vector, r0: Vector, r1: Vector) -> Vector:
-    """Largest value of the cubics through both ends with the given slopes (sampled)."""
-    h = _CUBIC @ np.array([g0, r0, g1, r1])
-    return np.max(h, axis=0)
+def _peak(g0: float, g1: float, r0: float, r1: float) -> float:
+    """Largest value of the cubic through both ends with the given slopes (sampled), or a bound that is negative."""
+    bound = max(g0 + r0 / 3, g1 - r1 / 3)
+    return float(np.max(_CUBIC @ np.array([g0, r0, g1, r1]))) if bound > -_NEAR * (abs(g0) + abs(g1)) else bound
 
 
 def _hermite(s: Vector) -> Vector:
@@ -141,108 +164,95 @@ def _hermite(s: Vector) -> Vector:
 
 _CUBIC = _hermite(np.linspace(0.05, 0.95, 19))
 
-Trial = Callable[[float], tuple[Point, Vector, Vector]]
-"""Integrates from the beginning of the interval by a time and gives the point there with guards and rates."""
+Trial = Callable[[float], tuple[Point, list[Vector]]]
+"""Goes from the beginning of an interval by a time, and gives the point there with guards, rates, and guards soon."""
+Ends = dict[int, tuple[float, float, float, float]]
+"""By guard: values at both ends of an interval, and changes over it by the rates at both ends."""
 
 
 @dataclass
 class Located:
-    """An event: where, and which guards are at zero there."""
+    """An event: where, which guards are at zero there, and all guards a moment later."""
 
     point: Point
     guards: list[int]
+    soon: Vector
 
 
-def locate(
-    trial: Trial,
-    span: float,
-    first: tuple[Vector, Vector],
-    last: tuple[Vector, Vector],
-    group: list[Candidate],
-    t: float,
-) -> Located | None:
+def locate(trial: Trial, span: float, ends: Ends, group: list[Candidate], t: float) -> Located | None:
     """Find the earliest time in (0, span] at which a guard of the group becomes positive.
 
-    Safeguarded Newton iterations on re-integrations from the beginning of the interval.
-
     Args:
-        trial: integrates into the interval.
+        trial: goes into the interval.
         span: length of the interval in s.
-        first: guards and rates at its beginning.
-        last: guards and rates at its end.
+        ends: guards at its ends.
         group: the guards that become positive in the interval.
         t: time of its beginning.
 
     Returns:
         The event, or None if a guard only came near zero.
     """
-    watched = np.array(sorted({one.guard for one in group}))
     low, high = 0.0, span
-    if not np.any(last[0][watched] > 0):
-        top = _positive_top(trial, span, first, last, group)
+    if not any(ends[one.guard][1] > 0 for one in group):
+        top = _positive_top(trial, span, ends, group)
         if top is None:
             return None
         high = top
     tolerance = _LOCATED * max(1.0, abs(t))
-    guess = min(_first_guess(first, last, group, span), high)
-    best: tuple[Point, Vector, Vector] | None = None
+    guess = min(_cubic(*ends[one.guard], one.inside) * span for one in group)
+    guess = min(high, max(guess, tolerance))
+    best: tuple[Point, list[Vector]] | None = None
     for _ in range(_MAX_TRIALS):
-        point, values, rates = trial(guess)
-        if np.any(values[watched] > 0):
-            high, best = guess, (point, values, rates)
+        now = trial(guess)
+        watched = [(float(now[1][0][g]), float(now[1][1][g])) for g in ends]
+        if any(value > 0 for value, _ in watched):
+            high, best = guess, now
         else:
             low = guess
-        step = _newton(values, rates, watched)
+        step = _newton(watched)
         if step is not None and abs(step) <= tolerance:
-            return _event(point, values, rates, watched, tolerance)
+            return _event(*now, ends, tolerance)
         if high - low <= tolerance:
             break
         target = guess + step if step is not None else -1.0
         guess = target if low < target < high else 0.5 * (low + high)
-    return _event(*(best or trial(high)), watched, tolerance)
+    return _event(*(best or trial(high)), ends, tolerance)
 
 
-def _positive_top(
-    trial: Trial, span: float, first: tuple[Vector, Vector], last: tuple[Vector, Vector], group: list[Candidate]
-) -> float | None:
+def _positive_top(trial: Trial, span: float, ends: Ends, group: list[Candidate]) -> float | None:
     """Look for a time at which a guard that rises and falls again is positive; None if it stays below zero."""
     for one in group:
         g, low, high = one.guard, 0.0, span
-        guess = _cubic(first[0][g], last[0][g], first[1][g] * span, last[1][g] * span, inside=True) * span
-        for _ in range(_MAX_TRIALS):
-            _, values, rates = trial(guess)
-            if values[g] > 0:
+        rising, falling = ends[g][2] / span, ends[g][3] / span
+        guess = _cubic(*ends[g], inside=True) * span
+        for number in range(_MAX_TRIALS):
+            values, rates, _ = trial(guess)[1]
+            value, rate = float(values[g]), float(rates[g])
+            if value > 0:
                 return guess
-            low, high = (guess, high) if rates[g] > 0 else (low, guess)
+            if rate > 0:
+                low, rising = guess, rate
+            else:
+                high, falling = guess, rate
             # What is left of the rise cannot reach zero any more.
-            if values[g] + abs(rates[g]) * (high - low) < 0 or high - low < 1e-12:
+            if value + abs(rate) * (high - low) < 0 or high - low < 1e-12:
                 break
-            guess = 0.5 * (low + high)
+            straight = low + (high - low) * rising / (rising - falling) if falling < 0 < rising else low
+            guess = straight if number % 3 and low < straight < high else 0.5 * (low + high)
     return None
 
 
-def _event(point: Point, values: Vector, rates: Vector, watched: Any, tolerance: float) -> Located:
-    near = [int(g) for g in watched if values[g] > 0 or (rates[g] > 0 and -values[g] <= 10 * tolerance * rates[g])]
-    return Located(point, near)
+def _event(point: Point, guards: list[Vector], watched: Ends, tolerance: float) -> Located:
+    values, rates, soon = guards
+    near = [g for g in watched if values[g] > 0 or (rates[g] > 0 and -values[g] <= 10 * tolerance * rates[g])]
+    return Located(point, near, soon)
 
 
-def _newton(values: Vector, rates: Vector, watched: Any) -> float | None:
+def _newton(watched: list[tuple[float, float]]) -> float | None:
     """Newton step to the earliest zero of the rising guards; None where one has risen before, and falls again."""
-    if np.any((values[watched] > 0) & (rates[watched] <= 0)):
+    if any(value > 0 and rate <= 0 for value, rate in watched):
         return None
-    steps = [float(-values[g] / rates[g]) for g in watched if rates[g] > 0]
-    return min(steps) if steps else None
-
-
-def _first_guess(
-    first: tuple[Vector, Vector], last: tuple[Vector, Vector], group: list[Candidate], span: float
-) -> float:
-    guesses: list[float] = []
-    for one in group:
-        g = one.guard
-        roots = _cubic(first[0][g], last[0][g], first[1][g] * span, last[1][g] * span, one.inside)
-        guesses.append(roots * span)
-    return min(guesses)
+    return min((-value / rate for value, rate in watched if rate > 0), default=None)
 
 
 def _cubic(g0: float, g1: float, r0: float, r1: float, inside: bool) -> float:
@@ -255,7 +265,9 @@ def _cubic(g0: float, g1: float, r0: float, r1: float, inside: bool) -> float:
             if abs(s.imag) < 1e-12 and 0 < s.real < 1 and 6 * a * s.real + 2 * b < 0
         ]
         return min(tops, default=0.5)
-    if not g0 <= 0 < g1 or (g0 == 0 and c >= 0):
+    if g0 == 0 and c >= 0:
+        return 0.0
+    if not g0 <= 0 < g1:
         return 0.5
     low, high, s = 0.0, 1.0, 0.5
     for _ in range(_GUESSING):

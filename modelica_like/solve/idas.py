@@ -11,9 +11,10 @@ import casadi as ca
 import numpy as np
 
 from modelica_like.compile.buffers import BufferedFunction, buffered
+from modelica_like.compile.buffers import along as every_along
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import StepFailed
-from modelica_like.initialize import Point, call, implicit_at
+from modelica_like.initialize import Point, call, is_linear, newton_at
 from modelica_like.solve.interrupts import Interrupts
 from modelica_like.solve.options import Options
 
@@ -31,19 +32,20 @@ _FLAGS = {
     "IDA_ILL_INPUT": "an input was not acceptable to it",
 }
 
-_FIRST_STEP = 1e-4
+_FIRST_STEP = 1e-5
+"""In scaled time. The first steps have a low order: longer ones leave errors of some tolerances at every event."""
 _SHORTENED = 1e-6
 """IDAS shortens its first step at most so much before it gives up."""
 _SPARSE_FROM = 50
 """Unknowns from which CSparse is quicker."""
 _POLISHING = 8
-_POLISHED = 1e-8
+POLISHED = 1e-8
 _RELAXATION = 10.0
-_PANEL_STEPS = 5000
-"""Steps between two results of a panel; a panel that needs more has probably run past an event, and is divided."""
+_PANEL_STEPS = 300
+"""Steps between two results of a panel; a panel that needs more has probably run past an event, and ends there."""
 
 
-def scaled_problem(model: CompiledDae, *, gentle: bool = False) -> dict[str, Any]:
+def scaled_problem(model: CompiledDae, *, gentle: bool = False, scaled: bool = True) -> dict[str, Any]:
     """Return the equations in scaled time s in [0, 1], with parameters (t0, span, p, u, d).
 
     Besides what `casadi.integrator` takes: `inner`, the arguments of the model's functions, and `span`, dt/ds.
@@ -52,13 +54,14 @@ def scaled_problem(model: CompiledDae, *, gentle: bool = False) -> dict[str, Any
         model: the compiled model.
         gentle: t = t0 + s²·span instead of t = t0 + s·span. Time then begins to pass with a speed of zero, so slopes
             of zero at s = 0 are exact, and first steps are short whatever the span is.
+        scaled: without, t = t0 + s: rates need no factor, which is an eighth of the work of some models.
     """
-    key = "scaled", gentle
+    key = "scaled", gentle, scaled
     if key not in model._cache:
         arguments = model.arguments
         s, t0, span = ca.SX.sym("s"), ca.SX.sym("t0"), ca.SX.sym("span")
         x, z, p, u, d = (arguments[name] for name in ("x", "z", "p", "u", "d"))
-        passed, speed = (s * s * span, 2 * s * span) if gentle else (s * span, span)
+        passed, speed = (s * s * span, 2 * s * span) if gentle else (s * span, span) if scaled else (s, 1.0)
         inner = [t0 + passed, x, z, p, u, d]
         ode, alg = ca.cse([speed * model.ode(*inner), model.alg(*inner)])
         model._cache[key] = {
@@ -80,17 +83,25 @@ class Integrator:
     """Integrates a model over one interval with fixed modes; its IDAS instances are kept with the model.
 
     Time is scaled, so that one instance serves intervals of any place and length.
+
+    Args:
+        model: the compiled model.
+        options: tolerances.
+        whole: whether intervals are whole runs: then large models get an instance for each length, which is quicker.
     """
 
-    def __init__(self, model: CompiledDae, options: Options) -> None:
+    def __init__(self, model: CompiledDae, options: Options, *, whole: bool = False) -> None:
         self.model = model
         self.options = options
         self.calls = 0
         self.steps = 0
         self.evaluations = 0
+        self.gave_up: StepFailed
         self._interrupts = Interrupts()
         self._relaxed = 1.0
         self._gentle_from = np.inf
+        self._whole = whole and len(model.states) >= _SPARSE_FROM
+        self._seconds: float | None = None
         self._tail = np.concatenate([model.p, model.u])
 
     @property
@@ -110,7 +121,7 @@ class Integrator:
         return first
 
     def _instance(self, outputs: int, steps: int, gentle: bool, first: float) -> BufferedFunction:
-        key = "idas", outputs, self.rtol, self.options.atol, steps, gentle, first
+        key = "idas", outputs, self.rtol, self.options.atol, steps, gentle, first, None if gentle else self._seconds
         return buffered(self.model._cache, key, lambda: self._make(outputs, steps, gentle, first), results=(0, 1))
 
     def _first_step(self, start: Point, span: float) -> float:
@@ -126,11 +137,12 @@ class Integrator:
         return step
 
     def _make(self, outputs: int, steps: int, gentle: bool, first: float) -> ca.Function:
-        problem = dict(scaled_problem(self.model, gentle=gentle))
+        length = 1.0 if gentle or self._seconds is None else self._seconds
+        problem = dict(scaled_problem(self.model, gentle=gentle, scaled=gentle or self._seconds is None))
         del problem["inner"], problem["span"]
         grid = np.arange(1, outputs + 1) / outputs
-        grid = (np.sqrt(grid) if gentle else grid).tolist()
-        return ca.integrator("segment", "idas", problem, 0, grid, self._settings(steps, gentle, first))
+        grid = (np.sqrt(grid) if gentle else grid * length).tolist()
+        return ca.integrator("segment", "idas", problem, 0, grid, self._settings(steps, gentle, first * length))
 
     def _settings(self, steps: int, gentle: bool, first: float) -> dict[str, Any]:
         nominal = self.model.nominals
@@ -148,15 +160,18 @@ class Integrator:
             "linear_solver": linear_solver(len(self.model.states) + len(self.model.implicit)),
         }
 
-    def run(self, start: Point, span: float, outputs: int = 1, *, patient: bool = True) -> tuple[Vector, Vector]:
+    def run(
+        self, start: Point, span: float, outputs: int = 1, *, patient: bool = True, polish: bool = True
+    ) -> tuple[Vector, Vector]:
         """Integrate from `start` over `span` seconds.
 
         Args:
             start: consistent start.
             span: length of the interval in s.
             outputs: number of equidistant results.
-            patient: allow all steps between two results, not only as many as usual: False where a shorter piece can be
-                tried instead.
+            patient: allow all steps between two results, not only as many as usual. Without, fewer results are an
+                answer, too: those before IDAS gave up.
+            polish: whether the implicit unknowns are solved for precisely.
 
         Returns:
             States and implicit unknowns at `outputs` equidistant times, the last at the end; shapes (nx, outputs),
@@ -171,38 +186,45 @@ class Integrator:
         p = np.concatenate([[start.t, span], self._tail, start.d])
         steps = self.options.max_steps if patient else min(self.options.max_steps, _PANEL_STEPS)
         gentle = span >= self._gentle_from
-        said = self._call(start, p, outputs, steps, gentle)
-        if isinstance(said, str) and not gentle and _at_the_start(said):
+        self._seconds = span if self._whole else None
+        x, z, why = self._call(start, p, outputs, steps, gentle)
+        if why and not gentle and _at_the_start(why):
             # IDAS looks for consistent slopes at the start, and may not find them; gently there is nothing to find.
             self._gentle_from = min(span, self._gentle_from)
             gentle = True
-            said = self._call(start, p, outputs, steps, gentle)
-        if isinstance(said, str):
-            raise self._failed(start, span, said, gentle)
-        x, z = said[0].reshape(outputs, -1).T, said[1].reshape(outputs, -1).T
-        if not np.all(np.isfinite(x[:, -1])):
-            raise self._failed(start, span, "IDA_REP_RES_ERR", gentle)
-        times = start.t + span * np.arange(1, outputs + 1) / outputs
-        return x, self.polished(times, x, z, start.d)
+            x, z, why = self._call(start, p, outputs, steps, gentle)
+        if why or not np.isfinite(x[:, -1]).all():
+            finite = np.isfinite(x).all(axis=0)
+            done = 0 if patient else int(np.argmin(finite))
+            self.gave_up = self._failed(start, span, why or "IDA_REP_RES_ERR", gentle)
+            if not done:
+                raise self.gave_up
+            x, z = x[:, :done], z[:, :done]
+        times = start.t + span * np.arange(1, x.shape[1] + 1) / outputs
+        return x, self.polished(times, x, z, start.d) if polish else z
 
-    def _call(self, start: Point, p: Vector, outputs: int, steps: int, gentle: bool) -> list[Vector] | str:
-        """Return what IDAS computes, or what it says where it gives up: that belongs into the error, not on the screen.
+    def _call(self, start: Point, p: Vector, outputs: int, steps: int, gentle: bool) -> tuple[Vector, Vector, str]:
+        """Return what IDAS computes, and what it says where it gives up: that is for the error, not for the screen.
 
         Raises:
             KeyboardInterrupt: it was interrupted; IDAS takes that for an error in the equations.
         """
         first = self._first_step(start, p[1]) if gentle else _FIRST_STEP
         instance = self._instance(outputs, steps, gentle, first)
+        instance.forget()
         screen, sys.stderr = sys.stderr, io.StringIO()
+        why = ""
         try:
             with self._interrupts:
-                found = instance(start.x, start.z, p)
+                x, z = instance(start.x, start.z, p)
         except RuntimeError as error:
-            return f"{sys.stderr.getvalue()} {error}"
+            why = f"{sys.stderr.getvalue()} {error}"
+            x, z = instance.latest()
         finally:
             sys.stderr = screen
-        self._count(instance.statistics())
-        return found
+        if not why:
+            self._count(instance.statistics())
+        return x.reshape(outputs, -1).T, z.reshape(outputs, -1).T, why
 
     def polished(self, times: Vector, x: Vector, z: Vector, d: Vector) -> Vector:
         """Solve for the implicit unknowns by Newton's method: IDAS gives them within its tolerance only.
@@ -213,25 +235,28 @@ class Integrator:
             times: shape (n,), in s.
             x: states, shape (nx, n).
             z: guesses, shape (nz, n).
-            d: modes and discrete values.
+            d: modes and discrete values, shape (nd,), or (nd, n) if they are not the same everywhere.
         """
         if not self.model.implicit:
             return z
-        model, outputs = self.model, x.shape[1]
-        fast = buffered(model._cache, ("residual", outputs), lambda: along(implicit_at(model), outputs))
         for _ in range(_POLISHING):
-            residual, jacobian = (
-                v.reshape(outputs, len(z), -1) for v in fast(times, x.ravel("F"), z.ravel("F"), model.p, model.u, d)
-            )
-            try:
-                step = np.linalg.solve(jacobian.transpose(0, 2, 1), residual)[:, :, 0].T
-            except np.linalg.LinAlgError:
+            new = self._newton(times, x, z, d)
+            step = new - z
+            if not np.isfinite(step).all():
                 return z
-            z = z - step
+            z = new
             # What is left after a step of Newton's method is about its square.
-            if not np.max(np.abs(step) - _POLISHED * np.abs(z)) > _POLISHED:
+            if is_linear(self.model) or not np.max(np.abs(step) - POLISHED * np.abs(z)) > POLISHED:
                 break
         return z
+
+    def _newton(self, times: Vector, x: Vector, z: Vector, d: Vector) -> Vector:
+        model, count = self.model, len(times)
+        if d.ndim > 1:
+            everywhere = every_along(model._cache, "newton", lambda: newton_at(model, look=False))
+            return everywhere(times, x, z, model.p, model.u, d)[0]
+        fast = buffered(model._cache, ("newton", count), lambda: along(newton_at(model, look=False), count))
+        return fast(times, x.ravel("F"), z.ravel("F"), model.p, model.u, d)[0].reshape(count, -1).T
 
     def _count(self, statistics: dict[str, Any]) -> None:
         self.steps += int(statistics["nsteps"])
@@ -253,7 +278,8 @@ class Integrator:
     def _failed(self, start: Point, span: float, text: str, gentle: bool) -> StepFailed:
         flag = next((name for name in _FLAGS if name in text), "")
         reason = _FLAGS.get(flag, "it stopped without a known reason")
-        moment = start.t + span * _reached(text) ** (2 if gentle else 1)
+        reached = _reached(text) ** 2 if gentle else _reached(text) / (self._seconds or 1.0)
+        moment = start.t + span * reached
         speed = np.abs(call(self.model, self.model.ode, start)) / self.weights(start.x)
         worst = self.model.states[int(np.nanargmax(speed))] if np.any(np.isfinite(speed)) else self.model.states[0]
         return StepFailed(

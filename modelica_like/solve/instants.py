@@ -82,13 +82,6 @@ class Instants:
         moments = call(self.model, self.model.moments, now)
         return [t for t in self._timed if _is_source(now, t) and moments[t.index] <= just_after(now.t)]
 
-    def rising(self, now: Point) -> list[CompiledTransition]:
-        """State events that want to fire now: positive, or about to be within the time resolution."""
-        if not self.guards.count:
-            return []
-        wants = self.guards.active(now.d) & (self.guards.soon(now) > 0)
-        return [self.guards.state_events[k] for k in wants.nonzero()[0]]
-
     def settle(self, now: Point, wanting: list[CompiledTransition]) -> None:
         """Fire transitions until none wants to fire any more; `now` becomes the point after.
 
@@ -115,7 +108,7 @@ class Instants:
             solve_implicit(self.model, now)
             check_singular(self.model, now)
             self._stop_motions(now, before)
-            wanting = [*self.due(now), *self.rising(now)]
+            wanting = [*self.due(now), *self.guards.wanting(now)]
         else:
             raise self._chattering(f"Modes still switch after {alone} rounds at one instant")
         note_sharing(self.record, self.model, now)
@@ -128,11 +121,11 @@ class Instants:
 
     def _share_anew(self, now: Point, wanting: list[CompiledTransition]) -> list[CompiledTransition]:
         """Before one of several that hold a motion gives way, let the others take more; what still wants to fire."""
-        if not self.model.circuits:
+        if not any(now.d[one.first : one.first + len(one.members)].any() for one in self.model.circuits):
             return wanting
         share(self.model, now)
         solve_implicit(self.model, now)
-        soon = self.guards.soon(now)
+        soon = self.guards.at(now)[2]
         positions = self.guards.positions
         return [one for one in wanting if one.timed or soon[positions[id(one)]] > 0]
 

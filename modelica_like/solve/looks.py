@@ -10,8 +10,8 @@ import numpy as np
 
 from modelica_like.compile.compiled import Vector
 from modelica_like.initialize import Point
-from modelica_like.solve.guards import Guards
-from modelica_like.solve.idas import Integrator
+from modelica_like.solve.guards import Ends, Guards
+from modelica_like.solve.idas import POLISHED, Integrator
 
 PRECISE = 1.0
 """Difference of two degrees, in tolerances, up to which a polynomial counts as the solution."""
@@ -19,10 +19,12 @@ _SHARP = 1e-4
 """Difference of a guard by two degrees, relative to its values at both looks, up to which it is located."""
 _TERMS = 8
 _ROUNDING = 1e-12
-_EXPONENTS = np.arange(float(_TERMS))
+_FEWEST = 4
+"""Looks between two others that are worth using."""
+EXPONENTS = np.arange(float(_TERMS))
 
 
-class _Scheme:
+class Scheme:
     """A polynomial of degree seven through looks around an interval, and one of degree five that tells its precision.
 
     Args:
@@ -39,7 +41,7 @@ class _Scheme:
         self.precise = np.array([self._basis(0, nodes, cell) for cell in cells])
         self.coarse = np.array([self._basis(start, fewer, cell) for start, cell in zip(starts, cells, strict=True)])
         # The middle tells for the whole interval: near a look both agree with it, however wrong its slope is.
-        self.doubt = 0.5**_EXPONENTS @ (self.precise - self.coarse)
+        self.doubt = 0.5**EXPONENTS @ (self.precise - self.coarse)
 
     def _basis(self, first: int, count: int, cell: int) -> Vector:
         """Coefficients, in powers of the share of a cell that has passed, of what each datum adds; (powers, data).
@@ -56,12 +58,12 @@ class _Scheme:
         basis[: len(powers), columns] = np.linalg.inv(np.concatenate(rows))
         return np.where(np.abs(basis) < _ROUNDING, 0.0, basis)
 
-    def first(self, k: Any, last: int) -> Any:
+    def first(self, k: Any, last: Any) -> Any:
         """Return the first look of the polynomials for intervals k, if possible none behind look `last`."""
         return np.maximum(np.minimum(k - (self.nodes // 2 - 1), last - self.nodes + 1), 0)
 
 
-_SCHEMES = _Scheme(4, slopes=True), _Scheme(8, slopes=False)
+SCHEMES = Scheme(4, slopes=True), Scheme(8, slopes=False)
 
 
 class Cell:
@@ -77,23 +79,21 @@ class Cell:
         data: values relative to `base`, and perhaps slopes times `width`, shape (8, nx).
     """
 
-    def __init__(
-        self, scheme: _Scheme, t: float, width: float, k: int, number: int, base: Vector, data: Vector
-    ) -> None:
+    def __init__(self, scheme: Scheme, t: float, width: float, k: int, number: int, base: Vector, data: Vector) -> None:
         self.t, self.width, self.k, self._base = t, width, k, base
         self._precise, self._coarse = scheme.precise[number] @ data, scheme.coarse[number] @ data
 
     def _powers(self, t: float) -> Vector:
-        return ((t - self.t) / self.width) ** _EXPONENTS
+        return ((t - self.t) / self.width) ** EXPONENTS
 
     def states(self, t: float) -> Vector:
         """Return the states at a time in it, by the polynomial of degree seven; shape (nx,)."""
         return self._base + self._powers(t) @ self._precise if t > self.t else self._base.copy()
 
-    def both(self, t: float) -> Vector:
-        """Return the states at a time in it by the polynomials of both degrees, shape (nx, 2)."""
+    def both(self, t: float) -> tuple[Vector, Vector]:
+        """Return the states at a time in it by the polynomials of both degrees, shapes (nx,)."""
         powers = self._powers(t)
-        return np.array([self._base + powers @ self._precise, self._base + powers @ self._coarse]).T
+        return self._base + powers @ self._precise, self._base + powers @ self._coarse
 
 
 class Looks:
@@ -106,12 +106,35 @@ class Looks:
         x: states, shape (nx, n + 1).
         z: implicit unknowns, shape (nz, n + 1).
         d: modes and discrete values.
+        all: looks of which these are every so many-th.
     """
 
-    def __init__(self, integrator: Integrator, guards: Guards, times: Vector, x: Vector, z: Vector, d: Vector) -> None:
+    def __init__(
+        self, integrator: Integrator, guards: Guards, times: Vector, x: Vector, z: Vector, d: Vector,
+        all: Looks | None = None,
+    ) -> None:  # fmt: skip
         self.integrator, self.guards, self.times, self.x, self.z, self.d = integrator, guards, times, x, z, d
         self.count = len(times) - 1
-        self.width = float(times[-1] - times[0]) / self.count
+        self.span = float(times[-1] - times[0])
+        self.width = self.span / self.count
+        self._all = all
+
+    def every(self, stride: int) -> Looks:
+        """Return looks with so many times the distance; their implicit unknowns are polished."""
+        return self._some(slice(None, None, stride), self if stride >= _FEWEST else None)
+
+    def within(self, k: int) -> Looks | None:
+        """Return the looks between look k and the next that were left out, if they are enough."""
+        if self._all is None:
+            return None
+        stride = self._all.count // self.count
+        return self._all._some(slice(k * stride, (k + 1) * stride + 1))
+
+    def _some(self, which: slice, all: Looks | None = None) -> Looks:
+        times, x, z = self.times[which].copy(), self.x[:, which], self.z[:, which]
+        if len(z):
+            z = np.concatenate([z[:, :1], self.integrator.polished(times[1:], x[:, 1:], z[:, 1:], self.d)], axis=1)
+        return Looks(self.integrator, self.guards, times, x, z, self.d, all)
 
     @cached_property
     def seen(self) -> tuple[Vector, Vector, Vector]:
@@ -134,7 +157,7 @@ class Looks:
             last: the last look that means something, because of an event before the next.
         """
         base = self.x[:, k].copy()
-        for scheme in _SCHEMES:
+        for scheme in SCHEMES:
             if scheme.nodes > self.count + 1:
                 continue
             first = int(scheme.first(k, max(last, scheme.nodes - 1)))
@@ -144,59 +167,35 @@ class Looks:
                 data = np.concatenate([data, self.width * self.seen[2][:, nodes].T])
             yield Cell(scheme, float(self.times[k]), self.width, k, k - first, base, data)
 
-    def at(self, t: float, cell: Cell) -> Point:
-        """Return the point at a time in an interval; the implicit unknowns follow from its states."""
-        x = cell.states(t)
+    def at(self, t: float, cell: Cell, x: Vector | None = None) -> tuple[Point, list[Vector]]:
+        """Return the point at a time in an interval, and the guards there; implicit unknowns follow from the states."""
+        x = cell.states(t) if x is None else x
         if not len(self.z):
-            return Point(t, x, self.z[:, 0], self.d)
-        return Point(t, x, self._implicit(np.array([t]), np.array([cell.k]), x[:, None])[:, 0], self.d)
+            point = Point(t, x, self.z[:, 0], self.d)
+            return point, self.guards.at(point)
+        begin, end = self.z[:, cell.k], self.z[:, cell.k + 1]
+        point = Point(t, x, begin + (t - cell.t) / cell.width * (end - begin), self.d)
+        *guards, before = self.guards.follow(point)
+        if not (np.abs(point.z - before) <= POLISHED * (1.0 + np.abs(point.z))).all():
+            point.z = self.integrator.polished(np.array([t]), x[:, None], before[:, None], self.d)[:, 0]
+            guards = self.guards.at(point)
+        return point, guards
 
-    def is_sharp(self, cell: Cell, guards: list[int], sizes: Vector) -> bool:
-        """Whether interpolated states are precise, and precise enough for guards of given sizes, in the middle.
+    def is_sharp(self, cell: Cell, ends: Ends, *, fresh: bool) -> bool:
+        """Whether interpolated states are precise, and precise enough for guards with these values, in the middle.
 
-        A state may be small compared with its tolerance, and a guard live on such values all the same.
+        A state may be small compared with its tolerance, and a guard live on such values all the same: it is trusted
+        only where the integrator has begun just before (`fresh`).
         """
-        times = np.full(2, cell.t + 0.5 * cell.width)
-        x = cell.both(float(times[0]))
-        if not (np.abs(x[:, 0] - x[:, 1]) <= PRECISE * self.integrator.weights(x[:, 0])).all():
+        t = cell.t + 0.5 * cell.width
+        precise, coarse = cell.both(t)
+        weights = self.integrator.weights(precise)
+        if not (np.abs(precise - coarse) <= PRECISE * weights).all():
             return False
-        values = self.guards.along(times, x, self._implicit(times, np.full(2, cell.k), x), self.d)[0][guards]
-        return bool((np.abs(values[:, 0] - values[:, 1]) <= _SHARP * sizes).all())
-
-    def along(self, times: Vector, last: int) -> tuple[Vector, Vector, Any]:
-        """Return states and implicit unknowns at times, and the intervals in which they are not precise.
-
-        Shapes (nx, n), (nz, n), (intervals,).
-
-        Args:
-            times: between the looks, shape (n,).
-            last: the last look that means something.
-        """
-        k = self.intervals(times)
-        x, left = np.zeros((len(self.x), len(times))), np.ones(len(times), bool)
-        for scheme in _SCHEMES:
-            if left.any() and scheme.nodes <= self.count + 1:
-                those = np.flatnonzero(left)
-                x[:, those], left[those] = self._by(scheme, times[those], k[those], last)
-        return x, self._implicit(times, k, x), np.unique(k[left])
-
-    def _by(self, scheme: _Scheme, times: Vector, k: Any, last: int) -> tuple[Vector, Any]:
-        """Return states at times in intervals k, and where they are not precise."""
-        first = scheme.first(k, max(last, scheme.nodes - 1))
-        nodes = first[:, None] + np.arange(scheme.nodes)
-        base = self.x[:, k]
-        data = self.x[:, nodes] - base[:, :, None]
-        if scheme.slopes:
-            data = np.concatenate([data, self.width * self.seen[2][:, nodes]], axis=2)
-        powers = ((times - self.times[k]) / self.width)[:, None] ** _EXPONENTS
-        precise = np.einsum("np,npk->nk", powers, scheme.precise[k - first])
-        error = np.abs(np.einsum("ink,nk->in", data, scheme.doubt[k - first]))
-        x = base + np.einsum("ink,nk->in", data, precise)
-        return x, ~np.all(error <= PRECISE * self.integrator.weights(base), axis=0)
-
-    def _implicit(self, times: Vector, k: Any, x: Vector) -> Vector:
-        if not len(self.z):
-            return np.zeros((0, len(times)))
-        share = (times - self.times[k]) / self.width
-        guess = self.z[:, k] + share * (self.z[:, k + 1] - self.z[:, k])
-        return self.integrator.polished(times, x, guess, self.d)
+        others = [(coarse, _SHARP)] if fresh else [(coarse, _SHARP), (precise + weights, 1.0)]
+        here = self.at(t, cell, precise)[1][0]
+        for x, allowed in others:
+            there = self.at(t, cell, x)[1][0]
+            if any(abs(here[g] - there[g]) > allowed * (abs(g0) + abs(g1)) for g, (g0, g1, *_) in ends.items()):
+                return False
+        return True

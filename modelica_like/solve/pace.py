@@ -11,115 +11,136 @@ from modelica_like.compile.compiled import Vector
 from modelica_like.solve.instants import SAME_TIME
 from modelica_like.solve.options import Options
 
-_SIZES = (8, 32, 128, 512, 2048)
+_SIZES = tuple(2**k for k in range(3, 12))
 """Looks of one call: few different numbers, for each is an instance of IDAS."""
 _LARGEST = 4096
 """Results of one call without events: memory, not time, bounds them."""
 _ROOM = 1.5
-_STEPS_PER_CHECK = 6
-"""Guards are looked at about as often as the integrator needs steps: what oscillates between results is not missed."""
-_DENSE = 1.5
-"""Steps between two looks from which results beside the looks ask for more of them."""
-_FINER = 4
+_FIRST = 32
+"""Results that the first panel spans."""
+_FEWEST = 0.25
+"""Looks at guards per result at least: what oscillates so that results show it is not missed."""
+_SPARE = 2.0
+"""Looks of a panel per look at guards that is expected: nobody knows before how many steps there will be."""
+_STEPS_PER_LOOK = 2.0
+_DENSE = 3.0
+"""Steps between two looks from which on something may be missed between them."""
 _STEPS_TO_START = 30
-_MAX_CHECKS = 2**16
+_COST = 100.0
+"""What a panel costs besides its steps, in steps."""
+_GROWTH = 8
 _ON_GRID = 1e-7
 
 
 class Pace:
     """Chooses panels: pieces of a smooth segment that are integrated in one call.
 
+    Without events, looks are results. With events, panels are as long as segments are expected to be, with about one
+    look for each step of the integrator; results lie between.
+
     Args:
         begin: start of the run in s.
         end: its end.
         options: number of results.
-        guarded: whether there may be state events: then panels are as long as segments are expected to be.
+        guarded: whether there may be state events.
         timed: whether there may be time events.
     """
 
     def __init__(self, begin: float, end: float, options: Options, *, guarded: bool, timed: bool) -> None:
         self.begin, self.end, self.points = begin, end, options.points
         self.step = (end - begin) / options.points
-        self.checks = 1
-        self.finer = 1
-        self.guarded, self.eventful = guarded, guarded or timed
-        even = -(-options.points // -(-options.points // _LARGEST))
-        self.longest = _SIZES[-1] if guarded or timed else even
-        self.size = _SIZES[1] if guarded else self.longest
-
-    @property
-    def look(self) -> float:
-        """Distance of looks at guards in s."""
-        return self.step / self.checks
+        self.on_grid = not (guarded or timed)
+        self._even = -(-options.points // -(-options.points // _LARGEST))
+        self._density = 1 / self.step / _SPARE
+        self._span = _FIRST * self.step if guarded else np.inf
+        self._known: dict[bytes, tuple[float, float]] = {}
 
     def panel(self, t: float, stop: float) -> tuple[float, int]:
-        """Return length in s and number of looks of the next panel.
-
-        It ends on the grid of looks or at `stop`. Behind an event its looks lie beside the results, which are
-        interpolated.
-        """
-        position = float(t - self.begin) / self.look
-        whole = math.floor(position + _ON_GRID)
-        span = self.begin + (whole + self.size) * self.look - t
-        beside = abs(position - round(position)) > _ON_GRID
+        """Return length in s and number of looks of the next panel."""
+        if not self.on_grid:
+            density = max(_SPARE * self._density, 1 / self.step)
+            # Most of a panel may lie behind an event; a beginning costs some steps, too.
+            span = min(self._span, _SIZES[-1] / density)
+            if self._density:
+                span = min(span, max(math.sqrt(_COST * self._span / self._density), _COST / self._density))
+            if t + 1.1 * span >= stop:
+                span = stop - t
+            return span, next((size for size in _SIZES if size >= span * density), _SIZES[-1])
+        whole = math.floor(float(t - self.begin) / self.step + _ON_GRID)
+        span = self.begin + (whole + self._even) * self.step - t
         if t + span < stop - SAME_TIME * max(1.0, abs(stop)):
-            return span, _at_least(self.size * self.finer) if beside and self.eventful else self.size
-        left = max(math.ceil(float(stop - t) / self.look - _ON_GRID), 1)
-        return stop - t, left if not self.eventful else _at_least(left * self.finer)
+            return span, self._even
+        return stop - t, max(math.ceil(float(stop - t) / self.step - _ON_GRID), 1)
 
     def snap(self, times: Vector) -> None:
         """Put times exactly on the regular grid, so that they do not collect rounding errors."""
-        grid = self._at(np.rint((times - self.begin) / self.look), self.points * self.checks)
+        grid = self._at(np.rint((times - self.begin) / self.step))
         on_grid = np.abs(times - grid) <= self._same(grid)
         times[on_grid] = grid[on_grid]
 
-    def _at(self, numbers: Vector, count: int) -> Vector:
-        return self.begin + (self.end - self.begin) * (numbers / count)
+    def _at(self, numbers: Vector) -> Vector:
+        return self.begin + (self.end - self.begin) * (numbers / self.points)
 
     def _same(self, times: Any) -> Any:
         """Distance of times that are the same, and surely of no others on the grid."""
-        return np.minimum(_ON_GRID * self.look, SAME_TIME * np.maximum(1.0, np.abs(times)))
+        return np.minimum(_ON_GRID * self.step, SAME_TIME * np.maximum(1.0, np.abs(times)))
 
     def results(self, first: float, last: float) -> Vector:
         """Return the times of results after `first` up to `last`, both with a little room."""
         low = math.floor(float(first + self._same(first) - self.begin) / self.step) + 1
         high = math.floor(float(last + self._same(last) - self.begin) / self.step)
-        return self._at(np.arange(low, high + 1, dtype=float), self.points)
+        return self._at(np.arange(low, high + 1, dtype=float))
 
     def before(self, t: float) -> float:
         """Return the latest time of results that lie before an event."""
         return t - 2 * _ON_GRID * self.step
 
-    def refine(self, steps: int, looks: int) -> bool:
-        """Adapt the number of looks per result to the integrator's steps; True if it was too small."""
+    def stride(self, steps: int, looks: int, width: float) -> int:
+        """Choose, by the integrator's steps in a panel, how many looks a look at guards goes on.
+
+        Zero if there are too few looks; the next panel has more.
+        """
         each = max(steps - _STEPS_TO_START, 0) / looks
-        self.finer = _FINER if each * self.finer > _DENSE else 1
-        if each > _STEPS_PER_CHECK and self.checks < _MAX_CHECKS:
-            self.checks = min(self.checks << int(np.ceil(np.log2(each / _STEPS_PER_CHECK))), _MAX_CHECKS)
-            return True
-        if looks > _SIZES[0] and each < _STEPS_PER_CHECK / 8:
-            self.checks = max(self.checks // 2, 1)
-        return False
+        self._density = each / width
+        if each > _DENSE:
+            return 0
+        stride = 1
+        while (
+            looks >= 2 * stride * _SIZES[0]
+            and 2 * stride * each <= _STEPS_PER_LOOK
+            and 2 * stride * width <= self.step / _FEWEST
+        ):
+            stride *= 2
+        return stride
 
-    def laborious(self, steps: int, looks: int) -> bool:
-        """Whether a panel took more steps than its looks are made for."""
-        return looks > 1 and steps > _STEPS_PER_CHECK * looks
+    def shorter(self, span: float, *, denser: bool = False) -> None:
+        """Let the next panel be not longer than so many s; with `denser`, looks come closer as it becomes shorter."""
+        if denser:
+            self.on_grid = False
+            span /= _GROWTH
+            self._density = max(self._density, 1 / self.step / _SPARE) * _GROWTH
+        self._span = span
 
-    def shorter(self, looks: int) -> None:
-        """Let the next panel be shorter than one of so many looks."""
-        self.size = max([size for size in _SIZES if size < looks], default=1)
+    def longer(self, span: float, ahead: float) -> None:
+        """Let the next panel be longer than one of so many s, but not much longer than what is ahead, in s."""
+        if span > 0.9 * self._span:
+            self._span = min(_GROWTH * self._span, max(_ROOM * ahead, self._shortest()))
 
-    def longer(self, looks: int, ahead: float = np.inf) -> None:
-        """Let the next panel be longer than one of so many looks, but not much longer than what is ahead, in s."""
-        if looks >= self.size:
-            expected = max(_at_least(_ROOM * ahead / self.look), _SIZES[1])
-            self.size = min(_at_least(self.size + 1), expected, self.longest)
+    def anew(self, before: Vector, lasted: float, after: Vector) -> None:
+        """Begin a segment.
 
-    def anew(self, span: float) -> None:
-        """Begin a segment that is expected to last so long, in s: as the last one with the same modes."""
-        if self.guarded:
-            self.size = _at_least(_ROOM * span / self.look)
+        It is expected to last as long as the last one with the same modes, or as the one before.
 
+        Args:
+            before: modes and discrete values of the segment before.
+            lasted: its duration in s.
+            after: modes and discrete values now.
+        """
+        self._known[before.tobytes()] = lasted, self._density
+        expected, self._density = self._known.get(after.tobytes(), (lasted, self._density))
+        if self._span < np.inf:
+            self._span = max(_ROOM * expected, self._shortest())
 
-def _at_least(looks: float) -> int:
-    return next((size for size in _SIZES if size >= looks), _SIZES[-1])
+    def _shortest(self) -> float:
+        """A panel that costs little more than its beginning."""
+        return _STEPS_TO_START / max(self._density, 1 / self.step)

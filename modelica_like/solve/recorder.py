@@ -65,6 +65,9 @@ class Segment:
         return Point(float(self.times[k]), self.x[:, k].copy(), self.z[:, k].copy(), self.d)
 
 
+Points = tuple[Vector, Vector, Vector]
+
+
 @dataclass
 class Recorder:
     """Collects points into segments, events, and what impacts dissipate; `notices` are sentences for the report."""
@@ -73,7 +76,8 @@ class Recorder:
     events: list[Event] = field(default_factory=list)
     impacts: list[Impact] = field(default_factory=list)
     notices: list[str] = field(default_factory=list)
-    _open: list[tuple[Vector, Vector, Vector]] = field(default_factory=list)
+    _open: list[Points] = field(default_factory=list)
+    _closed: list[tuple[list[Points], Vector]] = field(default_factory=list)
 
     def begin(self, point: Point) -> None:
         """Begin a segment at a point."""
@@ -81,7 +85,7 @@ class Recorder:
         self.add(np.array([point.t]), point.x[:, None], point.z[:, None])
 
     def add(self, times: Vector, x: Vector, z: Vector) -> None:
-        """Append at least one point; shapes (n,), (nx, n), (nz, n)."""
+        """Append at least one point; shapes (n,), (nx, n), (nz, n). They may be filled in later, up to `build`."""
         # At once: an interrupt comes before or after it.
         self._open.append((times, x, z))
 
@@ -100,13 +104,18 @@ class Recorder:
         known = transition
         if known < 0:
             known = next(k for k, one in enumerate(model.transitions) if one.mode == number)
-        source = model.transitions[known].source
-        self.events.append(Event(time, mode.path, before, after, source, transition, len(self.segments), round))
+        source, segment = model.transitions[known].source, len(self.segments) + len(self._closed)
+        self.events.append(Event(time, mode.path, before, after, source, transition, segment, round))
 
     def end(self, d: Vector) -> None:
         """Close the segment, if one is open."""
-        if not self._open:
-            return
-        times, x, z = (np.concatenate(parts, axis=-1) for parts in zip(*self._open, strict=True))
-        self.segments.append(Segment(times, x, z, d.copy()))
-        self._open = []
+        if self._open:
+            self._closed.append((self._open, d.copy()))
+            self._open = []
+
+    def build(self) -> None:
+        """Put together the segments that have ended."""
+        for parts, d in self._closed:
+            times, x, z = (np.concatenate(part, axis=-1) for part in zip(*parts, strict=True))
+            self.segments.append(Segment(times, x, z, d))
+        self._closed = []

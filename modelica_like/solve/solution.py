@@ -69,6 +69,10 @@ class Values(Mapping[str, float]):
         if self._point is not None and (name := differentiated(path)):
             now = self._point
             return float(rate_along(model, name, np.array([now.t]), *(v[:, None] for v in (now.x, now.z, now.d)))[0])
+        owner, _, term = path.rpartition(".")
+        if self._point is not None and term in ENERGY_TERMS and owner in model.components:
+            terms = model.energy(self._point.t, self._point.x, self._point.z, model.p, model.u, self._point.d)
+            return float(terms[model.components.index(owner), ENERGY_TERMS.index(term)])
         return float(self._solution[path][0])
 
     def __iter__(self) -> Iterator[str]:

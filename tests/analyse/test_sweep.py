@@ -98,7 +98,7 @@ def test_checkpoint_goes_on_where_it_stopped(model, tmp_path):
 
     over = {"torque.tau_constant": np.linspace(1.0, 5.0, 11)}
     with pytest.raises(Stopped):
-        sweep(model, over, ["mass.w"], until=3.0, chunk=2, checkpoint=path, progress=stop)
+        sweep(model, over, ["mass.w"], until=3.0, chunk=2, checkpoint=path, progress=stop, processes=1)
     assert seen == [(2, 11), (4, 11)]
     seen.clear()
     found = sweep(
@@ -109,6 +109,7 @@ def test_checkpoint_goes_on_where_it_stopped(model, tmp_path):
         chunk=2,
         checkpoint=path,
         progress=lambda done, total: seen.append((done, total)),
+        processes=1,
     )
     assert seen == [(6, 11), (8, 11), (10, 11), (11, 11)]
     np.testing.assert_allclose(found["mass.w"], final_speed(over["torque.tau_constant"], 4.0), rtol=1e-7)

@@ -1,5 +1,6 @@
 """`modelica-like export`: the file it writes and the line it prints."""
 
+import zipfile
 from pathlib import Path
 
 import fmpy
@@ -7,6 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from modelica_like.cli import app
+from modelica_like.fmi.build import PLATFORMS, native_platform
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 NETLIST = str(EXAMPLES / "two_mass.toml")
@@ -44,3 +46,26 @@ def test_mistakes_are_told(tmp_path: Path) -> None:
     result = CliRunner().invoke(app, ["export", NETLIST, "-o", str(tmp_path / "x.fmu"), "--fmi", "1.0"])
     assert result.exit_code == 2
     assert result.stderr == "FMI 1.0 is not supported.\nThere are 2.0 and 3.0.\n"
+
+
+def test_a_model_that_is_compiled_in(tmp_path: Path) -> None:
+    path = tmp_path / "x.fmu"
+    assert CliRunner().invoke(app, ["export", NETLIST, "-o", str(path), "--embed", "--no-check"]).exit_code == 0
+    with zipfile.ZipFile(path) as archive:
+        names = archive.namelist()
+    assert "resources/model.bin" not in names
+    assert [name for name in names if name.startswith("binaries/")]
+
+
+def test_run_times_are_listed_and_compiled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("MODELICA_LIKE_CACHE", str(tmp_path))
+    monkeypatch.setattr("modelica_like.fmi.runtime.SHIPPED", tmp_path / "none")
+    before = CliRunner().invoke(app, ["runtimes"]).stdout.splitlines()
+    assert [line.split(maxsplit=1)[0] for line in before] == list(PLATFORMS)
+    assert all(line.endswith("not compiled") for line in before)
+    after = CliRunner().invoke(app, ["runtimes", "--platforms", "native"]).stdout
+    assert f"{native_platform():16}{tmp_path}" in after
+    assert after.count("not compiled") == len(PLATFORMS) - 1
+    wrong = CliRunner().invoke(app, ["runtimes", "--platforms", "x86_64-linus"])
+    assert wrong.exit_code == 2
+    assert wrong.stderr.startswith("There is no platform 'x86_64-linus'; did you mean 'x86_64-linux'?")

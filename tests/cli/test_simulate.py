@@ -210,3 +210,15 @@ def test_the_module_is_the_command() -> None:
     )
     assert result.returncode == 2
     assert result.stderr.startswith("There is no component type 'Nothing'.")
+
+
+def test_the_native_solver(run: CliRunner, tmp_path: Path) -> None:
+    table = tmp_path / "run.csv"
+    result = run.invoke(app, ["simulate", DIRECT, "--solver", "native", "--csv", str(table)])
+    assert result.exit_code == 0
+    assert "1 mode change" in result.output
+    rows = list(csv.DictReader(table.read_text().splitlines()))
+    final = simulate(DIRECT, solver="native").final
+    assert float(rows[-1]["table.s"]) == final["table.s"]
+    refused = run.invoke(app, ["simulate", DIRECT, "--solver", "euler"])
+    assert refused.exit_code == 2

@@ -72,7 +72,7 @@ def exported(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Exported
     """Lay out a netlist of examples/ or a component as an unpacked FMU, once per run of the tests."""
 
     @cache
-    def make(drive: Any, version: str = "2.0") -> Exported:
+    def make(drive: Any, version: str = "2.0", fixed_step: float = 0.0) -> Exported:
         model = build(EXAMPLES / drive if isinstance(drive, str) else drive)
         face = interface(model)
         folder = tmp_path_factory.mktemp("fmu")
@@ -81,7 +81,7 @@ def exported(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Exported
         place.mkdir(parents=True)
         shutil.copy(runtime_library(native.name), place / f"model{native.suffix}")
         (folder / MODEL).parent.mkdir()
-        (folder / MODEL).write_bytes(model_file(make_tables(model), face.variables, TOKEN, 1e-7))
+        (folder / MODEL).write_bytes(model_file(make_tables(model), face.variables, TOKEN, 1e-7, fixed_step))
         return Exported(model, face, folder, version)
 
     return make

@@ -207,7 +207,8 @@ def test_one_library_has_the_functions_of_both_versions_and_of_native_runs_only(
     for v in "23":
         declared |= set(re.findall(rf"FMI{v}_Export \w+\s+(fmi\w+);", sources[f"fmi{v}Functions.h"]))
     assert len(declared) == 44 + 75
-    declared |= set(re.findall(r"^EXPORTED .*?\b(native_\w+)\(", sources["native.c"], re.MULTILINE))
+    for name in ("native.c", "batch.c"):
+        declared |= set(re.findall(r"^EXPORTED .*?\b(native_\w+)\(", sources[name], re.MULTILINE))
     assert {line.split()[-1] for line in listed.splitlines()} == declared
     needed = re.findall(rb"GLIBC_(\d+)\.(\d+)", library.read_bytes())
     assert max((int(a), int(b)) for a, b in needed) <= (2, 17)

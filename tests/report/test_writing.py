@@ -271,5 +271,5 @@ def test_json_of_failures_is_whole(tmp_path: Path) -> None:
     over = {"J1.J": [0.01, -1.0]}
     path = tmp_path / "sweep.zarr"
     sweep(DRIVE, over, ["J2.w"], until=0.001, checkpoint=path)
-    told = json.loads((path / "failures-0.json").read_text())
+    told = json.loads((path / "told-0.json").read_text())["failures"]
     assert told == {"1": "J1.J = -1.0 is out of range: it must be at least 0 kg.m2."}

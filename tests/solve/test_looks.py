@@ -5,6 +5,7 @@ from typing import cast
 import numpy as np
 import pytest
 
+from modelica_like.solve.between import Piece, interpolate
 from modelica_like.solve.guards import Guards
 from modelica_like.solve.idas import Integrator
 from modelica_like.solve.looks import Looks
@@ -22,6 +23,9 @@ class Known:
     def weights(self, x: np.ndarray) -> np.ndarray:
         return np.full_like(x, 1e-9)
 
+    def polished(self, times: np.ndarray, x: np.ndarray, z: np.ndarray, d: np.ndarray) -> np.ndarray:
+        return z
+
     def along(self, times: np.ndarray, *_: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         return np.zeros((0, len(times))), np.zeros((0, len(times))), self.slopes
 
@@ -32,36 +36,43 @@ def looks(values: np.ndarray, slopes: np.ndarray) -> Looks:
     return Looks(cast(Integrator, known), cast(Guards, known), TIMES, values[None, :], nothing, np.zeros(0))
 
 
+def between(seen: Looks) -> tuple[np.ndarray, set[int]]:
+    """States between looks, and the intervals in which they are not precise."""
+    piece = Piece(seen, BETWEEN, 8, np.zeros((1, len(BETWEEN))), np.zeros((0, len(BETWEEN))))
+    unknown = interpolate(seen.integrator, [piece])
+    return piece.x, {interval for _, interval in unknown}
+
+
 @pytest.mark.parametrize("degree", range(6))
 def test_polynomials_up_to_degree_five_are_exact_and_precise(degree: int) -> None:
-    x, _, unknown = looks(TIMES**degree, degree * TIMES ** max(degree - 1, 0)).along(BETWEEN, 8)
+    x, unknown = between(looks(TIMES**degree, degree * TIMES ** max(degree - 1, 0)))
     np.testing.assert_allclose(x[0], BETWEEN**degree, rtol=1e-13)
     assert len(unknown) == 0
 
 
 def test_degree_seven_is_exact_but_not_known_to_be() -> None:
-    x, _, unknown = looks(TIMES**7, 7 * TIMES**6).along(BETWEEN, 8)
+    x, unknown = between(looks(TIMES**7, 7 * TIMES**6))
     np.testing.assert_allclose(x[0], BETWEEN**7, rtol=1e-12)
-    assert set(unknown) == {0, 1, 3, 5, 7}
+    assert unknown == {0, 1, 3, 5, 7}
 
 
 def test_slopes_that_are_nothing_but_rounding_are_left_out() -> None:
     """A stiff state: its values are smooth, its slopes are errors times a large number."""
     noise = 1e3 * np.random.default_rng(1).normal(size=len(TIMES))
-    x, _, unknown = looks(TIMES**5, noise).along(BETWEEN, 8)
+    x, unknown = between(looks(TIMES**5, noise))
     np.testing.assert_allclose(x[0], BETWEEN**5, rtol=1e-12)
     assert len(unknown) == 0
 
 
 def test_a_kink_between_looks_is_noticed() -> None:
     values, slopes = np.maximum(TIMES - 2.9, 0.0), np.where(TIMES > 2.9, 1.0, 0.0)
-    _, _, unknown = looks(values, slopes).along(BETWEEN, 8)
+    _, unknown = between(looks(values, slopes))
     assert 3 in unknown
 
 
 def test_what_rests_rests_exactly_and_beginnings_keep_their_relative_precision() -> None:
     rest = looks(np.full(9, 1 / 3), np.zeros(9))
-    assert np.all(rest.along(BETWEEN, 8)[0] == 1 / 3)
+    assert np.all(between(rest)[0] == 1 / 3)
     start = looks(1e-3 * (TIMES - 2) ** 3 + 5, 3e-3 * (TIMES - 2) ** 2)
     (cell, *_) = start.cells(0, 8)
     assert cell.states(2 + 1e-9)[0] - 5 == 0.0

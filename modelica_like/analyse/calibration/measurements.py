@@ -13,6 +13,7 @@ import numpy as np
 from modelica_like.analyse.operating.steady import OperatingPoint, steady, steady_slopes
 from modelica_like.analyse.sensitivity.derivatives import sensitivities
 from modelica_like.analyse.sensitivity.outputs import read_output
+from modelica_like.analyse.sensitivity.runs import quick_run
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import NetlistError, UnknownName, ValueOutOfRange, did_you_mean
 from modelica_like.units import Unit, coherent, parse_unit, to_si
@@ -63,7 +64,8 @@ class Numbers(Measurement):
         sizes = np.array(
             [_uncertainty(self.uncertainty, o.name, o.unit, w) for o, w in zip(outputs, wanted, strict=True)]
         )
-        found = sensitivities(model, list(self.values), names, until=self.until, parameters=self.parameters)
+        run = quick_run(model, until=self.until, parameters=self.parameters)
+        found = sensitivities(run, list(self.values), names)
         now = np.array([one.value for one in found.outputs])
         return (now - wanted) / sizes, found.derivatives / sizes[:, None]
 
@@ -133,7 +135,8 @@ class Trajectories(Measurement):
         sizes = [_column_uncertainty(model, self.uncertainty, name, columns[name]) for name in columns]
         wanted = [f"at({name}, {float(t)!r})" for name in columns for t in times]
         end = float(times.max())
-        found = sensitivities(model, wanted, names, until=end, parameters=self.parameters, method="forward")
+        run = quick_run(model, until=end, parameters=self.parameters)
+        found = sensitivities(run, wanted, names, method="forward")
         scale = np.repeat(sizes, len(times))
         now = np.array([one.value for one in found.outputs])
         return (now - np.concatenate(list(columns.values()))) / scale, found.derivatives / scale[:, None]

@@ -67,13 +67,14 @@ def _ties(chain: Replay) -> list[Edge]:
     guards, found = Guards(model), list[Edge]()
     if not guards.count:
         return found
-    values, rates = np.array([guards.at(node) for node in chain.nodes]).transpose(1, 0, 2)
+    # Those that may not fire are -1.
+    values, rates = np.array([guards.at(node)[:2] for node in chain.nodes]).transpose(1, 0, 2)
     near = _STILL * np.maximum(1.0, np.abs(values).max(axis=0))
     still_at = (np.abs(values) <= near) & (np.abs(rates) * (chain.nodes[-1].t - chain.nodes[0].t) <= near)
     first = 0
     for last in [*(k for k, _ in chain.jumps), len(chain.nodes) - 1]:
-        here, lasts = chain.nodes[first], chain.nodes[last].t > chain.nodes[first].t
-        still = guards.active(here.d) & np.all(still_at[first : last + 1], axis=0)
+        lasts = chain.nodes[last].t > chain.nodes[first].t
+        still = np.all(still_at[first : last + 1], axis=0)
         if isinstance(move := chain.moves[last] if last < len(chain.moves) else None, Jump):
             # What fires at the end of the segment was on its way.
             fired = [model.transitions[one.transition] for one in move.events if one.transition >= 0 and not one.round]
@@ -83,7 +84,7 @@ def _ties(chain: Replay) -> list[Edge]:
         first = last + 1
     # What fires just at the end of the run does so only on one side.
     last = len(chain.nodes) - 1
-    fires = guards.active(chain.nodes[last].d) & (np.abs(values[last]) <= near) & ~still_at[last] & (rates[last] > 0.0)
+    fires = (np.abs(values[last]) <= near) & ~still_at[last] & (rates[last] > 0.0)
     return found + [_tie(chain, guards, int(k), last, last) for k in np.flatnonzero(fires)]
 
 

@@ -2,24 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, TypeVar
 
 import casadi as ca
 import numpy as np
 
 from modelica_like.analyse.sensitivity.derivatives import Sensitivities, sensitivities
 from modelica_like.analyse.sensitivity.formulas import free_formulas
-from modelica_like.analyse.sensitivity.outputs import listed
+from modelica_like.analyse.sensitivity.outputs import listed, read_output
+from modelica_like.analyse.sensitivity.readings import read
+from modelica_like.analyse.sensitivity.runs import quick_run
 from modelica_like.compile.buffers import Vector
 from modelica_like.errors import LanguageError, ModelicaLikeError, NoGradient
 from modelica_like.initialize import StartKind
-from modelica_like.simulation import Model, simulate
+from modelica_like.simulation import Model, plan
 from modelica_like.solve.options import Options
 from modelica_like.solve.recorder import Event
 from modelica_like.solve.solution import Solution
 
+Found = TypeVar("Found")
+
 _TOGETHER = 1e-9
+_PLAIN = ("end", "at", "time")
+"""Outputs that a run gives as precisely as its replay; peaks and integrals of a run are those of its results."""
+_FINER = 1e-2
+"""Tolerance of a run in that of its replay, so that both give the same."""
 
 
 class SimulationFunction(ca.Callback):
@@ -51,8 +59,13 @@ class SimulationFunction(ca.Callback):
         self._precision = precision
         self._nan_where_refused = nan_where_refused
         self._last: tuple[bytes, Sensitivities] | None = None
+        self._simulated: tuple[bytes, Solution] | None = None
         self._sequence: list[tuple[str, str, str]] | None = None
-        solution = simulate(self._model, **self._run)
+        self._plain = all(one.kind in _PLAIN for one in (read_output(self._model, name) for name in outputs))
+        end, chosen = plan(self._model, run["until"], options=run["options"])
+        rtol = min(chosen.rtol, precision * _FINER)
+        self._tight = {"until": end, "rtol": rtol, "atol": min(chosen.atol, rtol / 100)}
+        solution = quick_run(self._model, **{**self._run, **self._tight})
         first = self._differentiate(solution)
         self.start_values = np.array([one.value for one in first.parameters])
         self._sequence = None if any_sequence else mode_sequence(solution.events)
@@ -74,12 +87,33 @@ class SimulationFunction(ca.Callback):
         values = np.asarray(p, float).ravel()
         key = values.tobytes()
         if self._last is None or self._last[0] != key:
+            self._last = key, self._differentiate(self._simulate(values))
+        return self._last[1]
+
+    def values_at(self, p: Vector | Sequence[float]) -> list[float]:
+        """Return the outputs alone: read off the run, or where that is too coarse off its replay.
+
+        Raises:
+            NoGradient: as in `at`.
+            UnknownName: a mode change does not happen.
+            ModelicaLikeError: the simulation fails.
+        """
+        values = np.asarray(p, float).ravel()
+        if not self._plain or (self._last is not None and self._last[0] == values.tobytes()):
+            return [one.value for one in self.at(values).outputs]
+        solution = self._simulate(values)
+        return [read(solution, read_output(solution.model, name)) for name in self.outputs]
+
+    def _simulate(self, values: Vector) -> Solution:
+        """Simulate at parameter values; kept until the next ones."""
+        key = values.tobytes()
+        if self._simulated is None or self._simulated[0] != key:
             given = {**self._run["parameters"], **dict(zip(self.inputs, map(float, values), strict=True))}
             self.runs += 1
-            solution = simulate(self._model, **{**self._run, "parameters": given})
+            solution = quick_run(self._model, **{**self._run, **self._tight, "parameters": given})
             self._check_sequence(solution)
-            self._last = key, self._differentiate(solution)
-        return self._last[1]
+            self._simulated = key, solution
+        return self._simulated[1]
 
     def _check_sequence(self, solution: Solution) -> None:
         if self._sequence is None:
@@ -112,11 +146,11 @@ class SimulationFunction(ca.Callback):
         """Return the shape of a result."""
         return ca.Sparsity.dense(len(self.outputs))
 
-    def attempt(self, p: Any) -> Sensitivities | None:
+    def attempt(self, what: Callable[[Vector], Found], p: Any) -> Found | None:
         """Simulate for CasADi; what goes wrong is kept in `refusal`, and raised unless nan is wanted."""
         self.refusal = None
         try:
-            return self.at(np.array(p))
+            return what(np.array(p))
         except ModelicaLikeError as error:
             self.refusal = error
             if self._nan_where_refused:
@@ -125,8 +159,8 @@ class SimulationFunction(ca.Callback):
 
     def eval(self, arg: Any) -> list[Any]:
         """Simulate."""
-        made = self.attempt(arg[0])
-        return [ca.DM([np.nan] * len(self.outputs) if made is None else [one.value for one in made.outputs])]
+        made = self.attempt(self.values_at, arg[0])
+        return [ca.DM([np.nan] * len(self.outputs) if made is None else made)]
 
     def has_jacobian(self) -> bool:
         """Tell CasADi that the derivatives are known."""
@@ -165,7 +199,7 @@ class _Jacobian(ca.Callback):
         return ca.Sparsity.dense(*self._size)
 
     def eval(self, arg: Any) -> list[Any]:
-        made = self._simulation.attempt(arg[0])
+        made = self._simulation.attempt(self._simulation.at, arg[0])
         return [ca.DM(np.full(self._size, np.nan) if made is None else made.derivatives)]
 
 

@@ -63,19 +63,19 @@ class Checkpoint:
 
     def keep(self, done: Done) -> None:
         """Write the results of a chunk."""
-        first, values, failures = done
-        self._group["values"][first : first + len(values)] = np.array(values)
-        number = first // self._size
-        told = {str(first + k): text for k, text in enumerate(failures) if text}
-        write_text(self.path / f"failures-{number}.json", json.dumps(told))
+        self._group["values"][done.first : done.first + len(done.values)] = done.values
+        number = done.first // self._size
+        told = {name: value for name, value in vars(done).items() if name not in ("first", "values")}
+        write_text(self.path / f"told-{number}.json", json.dumps(told))
         self._group["done"][number] = True
 
-    def results(self) -> tuple[Any, dict[int, str]]:
-        """Return values, shape (runs, outputs), and the failures by run."""
-        failures: dict[int, str] = {}
-        for file in sorted(self.path.glob("failures-*.json")):
-            failures.update({int(k): text for k, text in json.loads(file.read_text(encoding="utf-8")).items()})
-        return self._group["values"][:], failures
+    def results(self) -> Done:
+        """Return all that is done."""
+        found = Done(0, self._group["values"][:])
+        for number in np.flatnonzero(self._group["done"][:]):
+            told = json.loads((self.path / f"told-{number}.json").read_text(encoding="utf-8"))
+            found.add(Done(0, None, **told))
+        return found
 
 
 def _made(folder: Path) -> Path:

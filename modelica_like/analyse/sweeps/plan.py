@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -124,7 +123,7 @@ def make_plan(model: CompiledDae, over: Mapping[str, Iterable[Any]], sampling: S
     if sampling is None:
         if math.prod(len(numbers) for numbers in values.values()) > MOST_RUNS:
             raise too_many(" × ".join(names))
-        points = np.array(list(itertools.product(*values.values())), float)
+        points = np.stack(np.meshgrid(*values.values(), indexing="ij"), axis=-1).reshape(-1, len(names))
         return Plan(names, texts, points, tuple(values.values()))
     low, high = np.array(list(values.values())).T
     return Plan(names, texts, low + (high - low) * sampling.unit_cube(len(names)))

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
+from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,15 +13,30 @@ import numpy as np
 from modelica_like.analyse.sensitivity.outputs import read_output
 from modelica_like.analyse.sweeps.checkpoint import Checkpoint
 from modelica_like.analyse.sweeps.plan import Plan, Sampling, make_plan
-from modelica_like.analyse.sweeps.workers import Chunk, Done, Job, cores, in_processes, in_this_process, on_cluster
+from modelica_like.analyse.sweeps.workers import (
+    ONE_IN,
+    Chunk,
+    Done,
+    Job,
+    Reference,
+    cores,
+    in_processes,
+    in_this_process,
+    in_threads,
+    on_cluster,
+)
 from modelica_like.compile.compiled import CompiledDae
-from modelica_like.errors import ValueOutOfRange, missing_extra
-from modelica_like.simulation import Model, build
+from modelica_like.errors import ModelicaLikeError, ValueOutOfRange, missing_extra
+from modelica_like.simulation import Model, Solver, build
 
 if TYPE_CHECKING:
     import xarray
 
-_CHUNK = 25
+_CHUNK = 25, 1000
+"""Smallest and largest number of runs in a chunk."""
+_PARTS = 200
+"""Chunks of a sweep, if these are neither too small nor too large."""
+_TOLD = 3
 _WORTH_PROCESSES = 100
 """Fewer runs are done before processes have started."""
 _POINTS = 50
@@ -32,7 +49,8 @@ def sweep(
     drive: Model, over: Mapping[str, Iterable[Any]], outputs: Sequence[str], *,
     sampling: Sampling | None = None, until: float | str | None = None,
     parameters: Mapping[str, Any] | None = None, processes: int | None = None, scheduler: str | None = None,
-    checkpoint: str | Path | None = None, progress: Told | None = None, chunk: int = _CHUNK, **settings: Any,
+    checkpoint: str | Path | None = None, progress: Told | None = None, chunk: int | None = None,
+    solver: Solver = "native", **settings: Any,
 ) -> xarray.Dataset:  # fmt: skip
     """Simulate a drive over values of its parameters; it is compiled once.
 
@@ -45,16 +63,20 @@ def sweep(
         sampling: `LatinHypercube(count, seed)` or `Sobol(count, seed)` instead of the grid.
         until: end time.
         parameters: other values, the same for all runs.
-        processes: how many of this machine; by default one per core, or none beside this one for few runs.
-        scheduler: address of a Dask scheduler (`tcp://…`), instead of processes of this machine.
+        processes: how many runs go on at once on this machine, native ones in threads; by default one per core (with
+            IDAS only where there are enough runs).
+        scheduler: address of a Dask scheduler (`tcp://…`), instead of this machine.
         checkpoint: a folder (Zarr) that keeps what is done: the same sweep goes on where it was stopped.
         progress: called after each chunk of runs.
-        chunk: runs that a worker does at a time.
+        chunk: runs that a worker does at a time; by default as many as make 200 chunks, 25 to 1000.
+        solver: `native`, the compiled run-time, or `idas`. IDAS does what the run-time cannot do. For comparison it
+            does the first run, one in a hundred and those with the smallest and largest outputs once more.
         settings: further arguments of `simulate`, such as rtol, points or start.
 
     Returns:
         A dataset over the parameters (a grid) or over `sample`: the outputs with their units, and `failure`, the
-        sentence of each run that failed (empty for the others).
+        sentence of each run that failed (empty for the others). Its attribute `solver` is what did the runs, `checked`
+        the number of those that IDAS did for comparison, and `notice` says what differs and what IDAS had to do.
 
     Raises:
         UnknownName: a name is not known.
@@ -67,20 +89,64 @@ def sweep(
     if parameters:
         model = model.with_parameters(dict(parameters))
     plan = make_plan(model, over, sampling)
-    if not outputs or (processes is not None and processes < 1) or chunk < 1:
+    if not outputs or (processes is not None and processes < 1) or (chunk is not None and chunk < 1):
         raise ValueOutOfRange(
             "A sweep needs at least one output, and positive numbers of processes and runs in a chunk."
         )
     read = [read_output(model, name) for name in outputs]
-    job = Job.of(model, plan.names, outputs, {"until": until, "points": _POINTS, **settings})
-    chunks: list[Chunk] = [(first, plan.points[first : first + chunk]) for first in range(0, len(plan), chunk)]
-    values, failures = _collect(job, plan, chunks, checkpoint, progress, _workers(job, processes, scheduler, len(plan)))
-    return _dataset(model, plan, {one.name: str(one.unit) for one in read}, values, failures)
+    count = chunk or min(max(len(plan) // _PARTS, _CHUNK[0]), _CHUNK[1])
+    chunks: list[Chunk] = [(first, plan.points[first : first + count]) for first in range(0, len(plan), count)]
+    job = Job.of(model, plan.names, outputs, {"until": until, "points": _POINTS, **settings, "solver": solver})
+    job, why = _solvable(job) if scheduler is None else (job, "")
+    done = _collect(job, plan, chunks, checkpoint, progress, _workers(job, processes, scheduler, len(plan)))
+    if job.settings["solver"] == "native":
+        _check_extremes(job, plan, done)
+    found = _dataset(model, plan, {one.name: str(one.unit) for one in read}, done.values, done.failures)
+    return found.assign_attrs(
+        solver=job.settings["solver"], checked=done.checked, notice="\n".join(filter(None, [why, *_notices(done)]))
+    )
 
 
-def _workers(job: Job, processes: int | None, scheduler: str | None, runs: int) -> Callable[..., Iterator[Done]]:
+def _solvable(job: Job) -> tuple[Job, str]:
+    """Return a job that IDAS does if the run-time cannot do it, and why."""
+    if job.settings["solver"] != "native":
+        return job, ""
+    try:
+        Reference(job).native()
+    except ModelicaLikeError as error:
+        return replace(job, settings={**job.settings, "solver": "idas"}), f"IDAS did all runs: {error.what}"
+    return job, ""
+
+
+def _check_extremes(job: Job, plan: Plan, done: Done) -> None:
+    """Compare the runs with the smallest and the largest outputs."""
+    wanted: set[int] = set()
+    for column in done.values.T:
+        known = np.flatnonzero(np.isfinite(column))
+        if len(known):
+            wanted |= {int(known[np.argmin(column[known])]), int(known[np.argmax(column[known])])}
+    Reference(job).compare(done, plan.points, sorted(k for k in wanted if k % ONE_IN))
+
+
+def _notices(done: Done) -> list[str]:
+    """Return what has to be said about native runs."""
+    told: list[str] = []
+    if done.by_idas:
+        told.append(f"IDAS did {done.by_idas} of {len(done.values)} runs, which the native run-time could not do.")
+    if done.differences:
+        listed = [f"  run {k}: {done.differences[k]}" for k in sorted(done.differences)[:_TOLD]]
+        told.append(
+            f"{len(done.differences)} of {done.checked} runs that IDAS did once more are others with it:\n"
+            + "\n".join(listed)
+        )
+    return told
+
+
+def _workers(job: Job, processes: int | None, scheduler: str | None, runs: int) -> Callable[..., Generator[Done]]:
     if scheduler is not None:
         return lambda chunks: on_cluster(job, chunks, scheduler)
+    if job.settings["solver"] == "native":
+        return lambda chunks: in_threads(job, chunks, processes or cores())
     count = processes if processes is not None else cores() if runs >= _WORTH_PROCESSES else 1
     return (
         (lambda chunks: in_processes(job, chunks, count))
@@ -91,29 +157,29 @@ def _workers(job: Job, processes: int | None, scheduler: str | None, runs: int) 
 
 def _collect(
     job: Job, plan: Plan, chunks: list[Chunk], checkpoint: str | Path | None, progress: Told | None,
-    workers: Callable[..., Iterator[Done]],
-) -> tuple[Any, dict[int, str]]:  # fmt: skip
+    workers: Callable[..., Generator[Done]],
+) -> Done:  # fmt: skip
     """Have all chunks done, and keep what they give."""
     total = len(plan)
     kept = Checkpoint(checkpoint, job, plan, len(chunks[0][1])) if checkpoint is not None else None
     left = kept.left(chunks) if kept is not None else chunks
     count = total - sum(len(points) for _, points in left)
-    values, failures = np.full((total, len(job.outputs)), np.nan), {}
+    found = Done(0, np.full((total, len(job.outputs)), np.nan))
     try:
-        for done in workers(left):
-            first, numbers, told = done
-            if kept is not None:
-                kept.keep(done)
-            values[first : first + len(numbers)] = numbers
-            failures.update({first + k: text for k, text in enumerate(told) if text})
-            count += len(numbers)
-            if progress is not None:
-                progress(count, total)
+        with closing(workers(left)) as working:
+            for done in working:
+                if kept is not None:
+                    kept.keep(done)
+                found.values[done.first : done.first + len(done.values)] = done.values
+                found.add(done)
+                count += len(done.values)
+                if progress is not None:
+                    progress(count, total)
     except KeyboardInterrupt as error:
         where = f"in {kept.path}: the same sweep goes on there" if kept is not None else "lost without a checkpoint"
         error.add_note(f"{count} of {total} runs are {where}.")
         raise
-    return kept.results() if kept is not None else (values, failures)
+    return kept.results() if kept is not None else found
 
 
 def _dataset(
@@ -123,7 +189,9 @@ def _dataset(
         import xarray
     except ImportError:
         raise missing_extra("xarray", "data") from None
-    told = np.array([failures.get(k, "") for k in range(len(plan))], dtype=str)
+    # Not as long as the longest sentence for each of many runs.
+    told = np.full(len(plan), "", object)
+    told[list(failures)] = list(failures.values())
     data: dict[str, Any] = {
         name: (plan.dims, values[:, k].reshape(plan.shape), {"units": unit})
         for k, (name, unit) in enumerate(units.items())

@@ -1,30 +1,40 @@
-"""Who does the runs of a sweep: this process, processes of this machine, or a Dask cluster."""
+"""Who does the runs of a sweep: threads of this process, processes of this machine, or a Dask cluster."""
 
 from __future__ import annotations
 
+import ctypes
 import multiprocessing
 import os
 import pickle
 import signal
 import threading
-from collections.abc import Iterator, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from collections.abc import Generator, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, ThreadPoolExecutor, as_completed, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import lru_cache
+from itertools import islice
 from typing import Any
 
+import numpy as np
+
 from modelica_like.analyse.sensitivity.outputs import read_output
-from modelica_like.analyse.sweeps.readings import read_all
+from modelica_like.analyse.sensitivity.readings import read_all
+from modelica_like.analyse.sweeps.native_runs import NativeRuns
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import ModelicaLikeError, WorkersLost, missing_extra
-from modelica_like.simulation import simulate
+from modelica_like.simulation import plan, simulate
 
 _RESTARTS = 3
 _DEAF = signal.SIGINT, signal.SIG_IGN
 _PATIENCE = 10.0
 """Seconds to wait for a scheduler."""
+_PLANNED = ("until", "t0", "rtol", "atol", "points", "options")
+_AGREE = 1e3
+"""Difference between solvers, in tolerances of their steps, from which on it is told."""
+ONE_IN = 100
+"""Native runs of which one is compared with IDAS."""
 
 
 @dataclass(frozen=True)
@@ -55,25 +65,111 @@ class Job:
 Chunk = tuple[int, Any]
 """Number of the first run, and the points, shape (runs, names)."""
 
-Done = tuple[int, list[list[float]], list[str]]
-"""Number of the first run, the values of every run, and what went wrong (empty if nothing)."""
+
+@dataclass
+class Done:
+    """What some runs gave.
+
+    Attributes:
+        first: number of the first run.
+        values: shape (runs, outputs).
+        failures: what went wrong, by run.
+        by_idas: number of native runs that failed, which IDAS has done again.
+        checked: number of native runs that IDAS has done for comparison.
+        differences: where it came to something else, by run.
+    """
+
+    first: int
+    values: Any
+    failures: dict[int, str] = field(default_factory=dict)
+    by_idas: int = 0
+    checked: int = 0
+    differences: dict[int, str] = field(default_factory=dict)
+
+    def add(self, other: Done) -> None:
+        """Add what was told of others; their numbers may be texts, as JSON has them."""
+        self.failures.update({int(k): text for k, text in other.failures.items()})
+        self.differences.update({int(k): text for k, text in other.differences.items()})
+        self.by_idas += other.by_idas
+        self.checked += other.checked
 
 
 def run_chunk(job: Job, first: int, points: Any) -> Done:
     """Do some runs one after the other; one that fails is told, not fatal."""
-    model = _model(job.payload)
-    outputs = [read_output(model, name) for name in job.outputs]
-    values: list[list[float]] = []
-    failures: list[str] = []
-    for point in points:
+    reference, left = Reference(job), 0
+    if job.settings["solver"] == "native":
         try:
-            given = dict(zip(job.names, map(float, point), strict=True))
-            values.append(read_all(simulate(model, parameters=given, **job.settings), outputs))
-            failures.append("")
+            return reference.review(points, first, *reference.native().run(points))
+        except ModelicaLikeError:
+            # This machine has no library.
+            left = len(points)
+    done = Done(first, np.full((len(points), len(job.outputs)), np.nan), by_idas=left)
+    for k, point in enumerate(points):
+        reference.run(done, k, point)
+    return done
+
+
+class Reference:
+    """Runs by IDAS: those of a sweep that asks for it, and what has to be said about native ones.
+
+    Args:
+        job: what the runs have in common.
+    """
+
+    def __init__(self, job: Job) -> None:
+        self._job, self._model = job, _model(job.payload)
+        self._outputs = [read_output(self._model, name) for name in job.outputs]
+        _, options = plan(self._model, **{k: v for k, v in job.settings.items() if k in _PLANNED})
+        # Of the largest value, and what counts as nothing.
+        self._relative = _AGREE * options.rtol
+        nominal = {one.path: abs(one.nominal) for one in self._model.flat_variables}
+        self._absolute = np.array([_AGREE * options.atol * nominal.get(one.path, 1.0) for one in self._outputs])
+
+    def native(self) -> NativeRuns:
+        """Return the same runs by the compiled run-time."""
+        job = self._job
+        return NativeRuns(self._model, job.names, self._outputs, job.settings)
+
+    def run(self, done: Done, k: int, point: Any) -> None:
+        """Do one run, and note what it gives."""
+        given = dict(zip(self._job.names, map(float, point), strict=True))
+        try:
+            run = simulate(self._model, parameters=given, **{**self._job.settings, "solver": "idas"})
+            done.values[k] = read_all(run, self._outputs)
         except ModelicaLikeError as error:
-            values.append([float("nan")] * len(outputs))
-            failures.append(str(error))
-    return first, values, failures
+            done.failures[done.first + k] = str(error)
+
+    def review(self, points: Any, first: int, values: Any, refused: dict[int, str], failed: list[int]) -> Done:
+        """Do again what failed, and compare one in a hundred."""
+        done = Done(first, values, {first + k: text for k, text in refused.items()}, len(failed))
+        for k in failed:
+            self.run(done, k, points[k])
+        sample = [k for k in range(-first % ONE_IN, len(points), ONE_IN) if k not in refused and k not in failed]
+        self.compare(done, points, sample)
+        return done
+
+    def compare(self, done: Done, points: Any, sample: Sequence[int]) -> None:
+        """Do runs once more by IDAS, and note where they differ."""
+        largest = np.max(np.abs(done.values), axis=0, where=np.isfinite(done.values), initial=0.0)
+        for k in sample:
+            other = Done(0, np.full_like(done.values, np.nan))
+            self.run(other, k, points[k])
+            done.checked += 1
+            text = other.failures.get(k, "").partition("\n")[0] or self._difference(
+                done.values[k], other.values[k], largest
+            )
+            if text:
+                done.differences[done.first + k] = text
+
+    def _difference(self, native: Any, idas: Any, largest: Any) -> str:
+        allowed = self._relative * np.maximum(largest, np.nan_to_num(np.abs(idas))) + self._absolute
+        # Two that do not happen are the same.
+        same = (np.abs(native - idas) <= allowed) | (np.isnan(native) & np.isnan(idas))
+        return ", ".join(
+            f"{name} = {a:.9g} instead of {b:.9g}"
+            for name, a, b, equal in zip(self._job.outputs, native, idas, same, strict=True)
+            if not equal
+        )
 
 
 @lru_cache(maxsize=1)
@@ -82,13 +178,33 @@ def _model(payload: bytes) -> CompiledDae:
     return pickle.loads(payload)
 
 
-def in_this_process(job: Job, chunks: Sequence[Chunk]) -> Iterator[Done]:
+def in_this_process(job: Job, chunks: Sequence[Chunk]) -> Generator[Done]:
     """Do the runs here."""
     for first, points in chunks:
         yield run_chunk(job, first, points)
 
 
-def in_processes(job: Job, chunks: Sequence[Chunk], count: int) -> Iterator[Done]:
+def in_threads(job: Job, chunks: Sequence[Chunk], count: int) -> Generator[Done]:
+    """Do native runs in threads of this process; what IDAS has to do is done here meanwhile."""
+    reference, stop = Reference(job), ctypes.c_int(0)
+    runs, left, waiting = reference.native(), iter(chunks), dict[Future[Any], Chunk]()
+    with ThreadPoolExecutor(count) as pool:
+        try:
+            while True:
+                for first, points in islice(left, 2 * count - len(waiting)):
+                    waiting[pool.submit(runs.run, points, stop)] = first, points
+                if not waiting:
+                    return
+                done = wait(waiting, return_when=FIRST_COMPLETED).done
+                for future in [one for one in waiting if one in done]:
+                    first, points = waiting.pop(future)
+                    yield reference.review(points, first, *future.result())
+        finally:
+            # Nobody waits for what they are at.
+            stop.value = 1
+
+
+def in_processes(job: Job, chunks: Sequence[Chunk], count: int) -> Generator[Done]:
     """Do the runs in processes of this machine; what a process that dies was at is done again.
 
     Raises:
@@ -104,7 +220,7 @@ def in_processes(job: Job, chunks: Sequence[Chunk], count: int) -> Iterator[Done
             try:
                 for future in as_completed(futures):
                     done = future.result()
-                    del left[done[0]]
+                    del left[done.first]
                     yield done
             except BrokenProcessPool:
                 continue
@@ -136,7 +252,7 @@ def _deaf() -> Iterator[None]:
             signal.signal(signal.SIGINT, before)
 
 
-def on_cluster(job: Job, chunks: Sequence[Chunk], scheduler: str) -> Iterator[Done]:
+def on_cluster(job: Job, chunks: Sequence[Chunk], scheduler: str) -> Generator[Done]:
     """Do the runs on a Dask cluster; Dask itself does again what a lost worker was at.
 
     Raises:
@@ -161,7 +277,7 @@ def on_cluster(job: Job, chunks: Sequence[Chunk], scheduler: str) -> Iterator[Do
         try:
             for future in as_completed(futures, loop=client.loop):
                 done = future.result()
-                del left[done[0]]
+                del left[done.first]
                 yield done
         except KilledWorker as error:
             raise _lost(left, f"Dask gave up: {error}") from None

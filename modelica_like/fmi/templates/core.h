@@ -53,6 +53,7 @@ typedef struct { /* an accepted integrator step: its first and last point, and t
 typedef struct { /* what changes; arrays of the model's sizes stand behind it, see `Instance` */
     double t, u_time;
     int phase, solved, z_valid, inputs_changed, piece_valid, event_pending, at_event;
+    int looked;                                        /* the guards are known from the end of the last fixed step */
     double tolerance, absolute, start_time, stop_time; /* absolute: in nominal values */
     int stop_time_defined;
     double step;            /* next step size, 0: choose one */
@@ -154,6 +155,7 @@ typedef struct Instance {
     unsigned char *start_given, *mode_given;
     unsigned char *wanting; /* transitions that fire at the end of the piece */
     Piece *piece;
+    double *end_look; /* guards and their rates at the end of the last fixed step */
     Work work;
     char *name;
     void *environment;
@@ -169,6 +171,8 @@ typedef struct Instance {
     int co_simulation, event_mode_used, early_return_allowed, inputs_move;
     Allocate allocate;
     Release release;
+    int bounded;         /* the work of a step is bounded: iterations end early */
+    int budget;          /* rounds of events and further pieces that are left of a bounded step */
     int variables_valid; /* which values belong to the present point, see values.c */
     int look_valid;      /* the last look at the guards was at the present point */
 } Instance;
@@ -214,6 +218,7 @@ void choose_modes(Instance *c, unsigned char *decided);
 void hold_terms(Instance *c, Terms *terms);
 void mark_held(Instance *c, const Terms *terms, unsigned char *held);
 double largest_like(const Model *m, const double *values, int node);
+int anything_shared(const Instance *c);
 void share(Instance *c);
 void rest(Instance *c);
 void rest_rates(Instance *c, double *rates);
@@ -247,6 +252,13 @@ Arrival integrate_to(Instance *c, double target, int stop_at_events);
 void leave_piece(Instance *c);
 Result handle_event(Instance *c);
 Result check_step(Instance *c, double point, double size, double *target);
+double cubic_guess(double g0, double r0, double g1, double r1);
+Result move_to(Instance *c, double t);
+Result take_changes(Instance *c, int *event);
+int is_due(Instance *c);
+
+/* fixed.c */
+Arrival step_fixed(Instance *c, double target);
 
 /* values.c */
 const Variable *find_variable(const Model *m, uint32_t reference);
@@ -267,7 +279,7 @@ Result directional(Instance *c, const uint32_t *unknowns, size_t n_unknowns, con
     const double *seed, double *result);
 Result adjoint(Instance *c, const uint32_t *unknowns, size_t n_unknowns, const uint32_t *knowns, size_t n_knowns,
     const double *seed, double *result);
-void adjoint_of_node(Instance *c, int node, double *by_state);
+void slope_of_node(Instance *c, int node, int again, double *by_state);
 Result factor_implicit(Instance *c, int *order);
 size_t dependencies(Instance *c, uint32_t unknown, uint32_t *knowns, size_t capacity, Result *result);
 

@@ -105,12 +105,9 @@ static Result start_tangent(Instance *c, const uint32_t *knowns, size_t n, const
     Work *w = &c->work;
     State *s = &c->state;
     double *dots = w->dots, *starts = w->start_values;
-    int shared = m->settings->steady;
     s->solved = 0;
     if (start_solve(c) != RESULT_OK) return RESULT_ERROR;
-    for (int i = 0; i < m->n_circuits; i++)
-        for (int k = 0; k < m->circuits[i].n_members; k++) shared |= c->d[m->circuits[i].first + k] != 0;
-    if (shared)
+    if (m->settings->steady || anything_shared(c))
         return report(c, LOG_ERROR, RESULT_ERROR,
             "A steady start, and one at which parts share a load, have derivatives after the initialization only.");
     memset(dots, 0, m->slot_results * sizeof(double));
@@ -227,15 +224,15 @@ Result adjoint(Instance *c, const uint32_t *unknowns, size_t n_unknowns, const u
 }
 
 /* Total derivative of a variable by the states, z following them. Reactions whose split is undetermined make the
- * equations for z singular; what depends on them is left out. */
-void adjoint_of_node(Instance *c, int node, double *by_state) {
+ * equations for z singular; what depends on them is left out. `again`: at the same point as the call before. */
+void slope_of_node(Instance *c, int node, int again, double *by_state) {
     const Model *m = c->model;
     Work *w = &c->work;
     State *s = &c->state;
     int *order = w->order, follows = 0;
     memset(w->dots, 0, m->slot_results * sizeof(double));
     c->variables_valid = 0;
-    evaluate(c, &m->tapes.variables, s->t, c->x, c->z, w->variables);
+    if (!again) evaluate(c, &m->tapes.variables, s->t, c->x, c->z, w->variables);
     memset(w->variables, 0, m->n_nodes * sizeof(double));
     w->variables[node] = 1;
     tape_adjoint(&m->tapes.variables, w->slots, w->dots, w->variables);
@@ -243,6 +240,7 @@ void adjoint_of_node(Instance *c, int node, double *by_state) {
     if (follows) {
         evaluate(c, &m->tapes.alg_jacobian, s->t, c->x, c->z, w->dense_matrix);
         adjoint_of_implicit(c, lu_factor(m->n_z, w->dense_matrix, order) ? order : NULL);
+        evaluate(c, &m->tapes.variables, s->t, c->x, c->z, w->variables);
     }
     memcpy(by_state, w->dots + m->slot_x, m->n_x * sizeof(double));
 }

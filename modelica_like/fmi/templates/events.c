@@ -73,9 +73,8 @@ int find_wanting(Instance *c, unsigned char *wanting, int guards_too) {
 static void drop_balanced(Instance *c, unsigned char *wanting) {
     const Model *m = c->model;
     State *s = &c->state;
-    double *soon = c->work.guards, *now = c->work.guards_before;
+    double *soon = c->work.guards /* from find_wanting */, *now = c->work.guards_before;
     if (m->n_guards == 0) return;
-    evaluate(c, &m->tapes.guards_soon, s->t, c->x, c->z, soon);
     evaluate(c, &m->tapes.guards, s->t, c->x, c->z, now);
     for (int k = 0; k < m->n_guards; k++)
         if (number_or_false(now[k]) < 0 && number_or_false(soon[k]) <= BALANCED * fabs(now[k]))
@@ -88,7 +87,7 @@ void move_states(Instance *c, const int *nodes, const double *values, int count)
     double *slopes = c->work.square, *change = c->work.start_residual, *step = c->work.point;
     evaluate(c, &m->tapes.variables, c->state.t, c->x, c->z, c->work.variables);
     for (int k = 0; k < count; k++) change[k] = (values ? values[k] : 0) - c->work.variables[nodes[k]];
-    for (int k = 0; k < count; k++) adjoint_of_node(c, nodes[k], slopes + (size_t)k * m->n_x);
+    for (int k = 0; k < count; k++) slope_of_node(c, nodes[k], k > 0, slopes + (size_t)k * m->n_x);
     least_squares(count, m->n_x, slopes, change, step);
     for (int k = 0; k < m->n_x; k++) c->x[k] += step[k];
 }
@@ -156,7 +155,7 @@ static Result share_anew(Instance *c, unsigned char *wanting) {
     const Model *m = c->model;
     State *s = &c->state;
     double *soon = c->work.guards;
-    if (m->n_circuits == 0) return RESULT_OK;
+    if (m->n_circuits == 0 || (c->bounded && !anything_shared(c))) return RESULT_OK;
     share(c);
     c->variables_valid = 0;
     if (solve_implicit(c, s->t, c->x, c->z, 0) != RESULT_OK) return RESULT_ERROR;
@@ -184,6 +183,10 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
             any |= wanting[k];
         }
         if (!any) return RESULT_OK;
+        if (c->bounded && --c->budget < 1) {
+            s->at_event = 1; /* the rest comes at the beginning of the next step */
+            return RESULT_OK;
+        }
         c->round = round;
         memcpy(before, c->d, (size_t)m->n_d * sizeof(double));
         fire(c, wanting, impacts);
@@ -193,8 +196,7 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
             check_singular(c) != RESULT_OK)
             return RESULT_ERROR;
         memset(wanting, 0, m->n_transitions);
-        find_wanting(c, wanting, 1);
-        drop_balanced(c, wanting);
+        if (find_wanting(c, wanting, 1) && !c->bounded) drop_balanced(c, wanting);
     }
     return report(c, LOG_ERROR, RESULT_ERROR,
         "Modes still switch after %d rounds at t = %.12g s. Give the switching a hysteresis, or smooth what drives it.",

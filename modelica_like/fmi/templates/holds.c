@@ -119,7 +119,7 @@ static int dependences(Instance *c, const int *member, int n, double *silent) {
     memset(turns, 0, (size_t)n * (size_t)n * sizeof(double));
     for (int i = 0; i < n; i++) {
         double *slope = slopes + (size_t)i * m->n_x, sum = 0;
-        adjoint_of_node(c, m->holds[member[i]].motion, slope);
+        slope_of_node(c, m->holds[member[i]].motion, i > 0, slope);
         for (int k = 0; k < m->n_x; k++) sum += slope[k] * slope[k];
         sizes[i] = sum > 0 ? sqrt(sum) : 1;
         for (int k = 0; k < m->n_x; k++) slope[k] /= sizes[i];
@@ -142,6 +142,13 @@ static int shares_in(const Instance *c, const Circuit *one, int place) {
     for (int row = 0; row < one->n_members; row++)
         if (shares[row * one->n_members + place] != 0) return 1;
     return 0;
+}
+
+int anything_shared(const Instance *c) {
+    int any = 0;
+    for (int i = 0; i < c->model->n_circuits; i++)
+        for (int k = 0; k < c->model->circuits[i].n_members; k++) any |= c->d[c->model->circuits[i].first + k] != 0;
+    return any;
 }
 
 /* Let a motion that cannot be held by all, because it is prescribed, raise the reactions until one gives way: a
@@ -235,6 +242,7 @@ void share(Instance *c) {
         int shared = 0;
         double worst;
         for (int i = 0; i < m->n_circuits; i++) shared |= share_circuit(c, &m->circuits[i], held, weights);
+        if (c->bounded) return; /* the split by capacities, without asking whether all can bear it */
         worst = shared ? use_of(c, terms, use) : 0;
         if (worst < least || trial == 0) memcpy(best, c->d, (size_t)m->n_d * sizeof(double));
         if (worst < least) least = worst;

@@ -14,15 +14,16 @@ static const double *motions(Instance *c) {
     return c->work.variables;
 }
 
-/* Rates and reactions at the present point, with or without the approaches. */
-static Result ask(Instance *c, const Strike *strike, int approaching, double *rates, double *reactions) {
+/* Rates, and reactions where they matter, at the present point, with or without the approaches. */
+static Result ask(Instance *c, const Strike *strike, int approaching, int unsolved, double *rates, double *reactions) {
     const Model *m = c->model;
     State *s = &c->state;
     const double *values;
     for (int k = 0; k < m->n_holds; k++) c->d[m->holds[k].approach] = approaching ? strike->approach[k] : 0;
-    if (solve_implicit(c, s->t, c->x, c->z, 0) != RESULT_OK) return RESULT_ERROR;
+    if (unsolved && solve_implicit(c, s->t, c->x, c->z, 0) != RESULT_OK) return RESULT_ERROR;
     evaluate(c, &m->tapes.rates, s->t, c->x, c->z, c->work.rhs);
     memcpy(rates, c->work.rhs, m->n_x * sizeof(double));
+    if (!strike->hard) return RESULT_OK;
     values = motions(c);
     for (int k = 0; k < m->n_holds; k++) reactions[k] = strike->held[k] ? values[m->holds[k].reaction] : 0;
     return RESULT_OK;
@@ -33,17 +34,18 @@ static Result respond(Instance *c, Strike *strike) {
     const Model *m = c->model;
     Terms *terms = c->work.terms;
     double *d = c->work.respond_d, *z = c->work.respond_z, *rates = c->work.rates;
+    int any = 0;
     Result result;
     memcpy(d, c->d, (size_t)m->n_d * sizeof(double));
     memcpy(z, c->z, (size_t)m->n_z * sizeof(double));
     for (int k = 0; k < m->n_holds; k++)
         if (strike->loose[k]) c->d[m->holds[k].mode] = m->holds[k].loose;
-    share(c);
-    hold_terms(c, terms);
-    mark_held(c, terms, strike->held);
+    for (int k = 0; k < m->n_holds; k++) any |= strike->loose[k];
+    if (any || !c->bounded) share(c); /* else it has just been done, with the implicit equations solved */
+    if (strike->hard) hold_terms(c, terms), mark_held(c, terms, strike->held);
     for (int k = 0; k < m->n_holds; k++) strike->held[k] &= !strike->loose[k] && m->holds[k].reaction >= 0;
-    result = ask(c, strike, 0, rates, strike->reaction);
-    if (result == RESULT_OK) result = ask(c, strike, 1, strike->jump, strike->impulse);
+    result = ask(c, strike, 0, any || !c->bounded, rates, strike->reaction);
+    if (result == RESULT_OK) result = ask(c, strike, 1, 1, strike->jump, strike->impulse);
     for (int k = 0; k < m->n_x; k++) strike->jump[k] = INSTANT * (strike->jump[k] - rates[k]);
     for (int k = 0; k < m->n_holds; k++) strike->impulse[k] = INSTANT * (strike->impulse[k] - strike->reaction[k]);
     memcpy(c->d, d, (size_t)m->n_d * sizeof(double));
@@ -74,6 +76,9 @@ static int put_back_approaching(Instance *c, Strike *strike, const Terms *terms)
     double *x = c->work.x_kept;
     const double *after;
     int any = 0;
+    for (int k = 0; k < m->n_holds; k++) any |= strike->loose[k];
+    if (!any) return 0;
+    any = 0;
     memcpy(x, c->x, (size_t)m->n_x * sizeof(double));
     for (int k = 0; k < m->n_x; k++) c->x[k] += strike->jump[k];
     after = motions(c);
@@ -125,8 +130,9 @@ static Result carry_out(Instance *c, Strike *strike, int first) {
     const Model *m = c->model;
     State *s = &c->state;
     Terms *terms = c->work.strike_terms;
-    hold_terms(c, terms);
-    for (int trial = 0; trial < TRIALS; trial++) {
+    if (strike->hard) hold_terms(c, terms);
+    for (int trial = 0; trial < TRIALS && !(trial > 0 && c->bounded && c->budget < 1); trial++) {
+        c->budget--;
         for (int k = 0; k < m->n_holds; k++)
             strike->approach[k] = strike->entering[k] && !strike->loose[k]
                                       ? -(1 + terms[k].restitution) * strike->before[k] / INSTANT

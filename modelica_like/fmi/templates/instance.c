@@ -91,6 +91,7 @@ static uint64_t place_state(Instance *c, double *memory) {
     const Room rooms[] = {{m->n_x, 8, {&c->x}}, {m->n_z, 8, {&c->z}}, {m->n_p, 8, {&c->p}},
         {m->n_u, 8, {&c->u, &c->u_rate}}, {n_d, 8, {&c->d}}, {n_d, 1, {&c->mode_given}},
         {n_starts, 8, {&c->start_value}}, {n_starts, 1, {&c->start_given}}, {2 + 5 * n, 8, {&c->piece}},
+        {m->settings->fixed_step > 0 ? 2 * (uint64_t)m->n_guards : 0, 8, {&c->end_look}},
         {m->n_transitions, 1, {&c->wanting}}};
     return PLACE(rooms, memory);
 }

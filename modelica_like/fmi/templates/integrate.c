@@ -15,6 +15,7 @@
 #define MAX_REJECTIONS 60
 #define NEAR 0.1
 #define SAME_POINT 1e-9 /* rounding of the importer's communication points */
+#define SAME_PART 1e-6  /* of a fixed step */
 #define LEAST_STEPS 50  /* per run, where time itself is in the equations: a pulse could hide between longer ones */
 
 typedef struct { /* guards and their rates at a time within a step */
@@ -27,7 +28,7 @@ static void clear_pending(Instance *c) {
 }
 
 void leave_piece(Instance *c) {
-    c->state.piece_valid = c->look_valid = 0;
+    c->state.piece_valid = c->state.looked = c->look_valid = 0;
     clear_pending(c);
 }
 
@@ -44,7 +45,7 @@ static int look_at(Instance *c, double t, double *point, Look *look) {
     return 1;
 }
 
-static double cubic(double s, double g0, double r0, double g1, double r1) {
+static inline double cubic(double s, double g0, double r0, double g1, double r1) {
     double r = 1 - s;
     return g0 * (1 + 2 * s) * r * r + r0 * s * r * r + g1 * s * s * (3 - 2 * s) + r1 * s * s * (s - 1);
 }
@@ -58,7 +59,7 @@ static int is_hump(double g0, double r0, double g1, double r1) {
 }
 
 /* First zero of the cubic, or its top. */
-static double cubic_guess(double g0, double r0, double g1, double r1) {
+double cubic_guess(double g0, double r0, double g1, double r1) {
     double best = -INFINITY, place = 0.5;
     for (int k = 1; k <= 40; k++) {
         double value = cubic(k / 40.0, g0, r0, g1, r1);
@@ -239,7 +240,7 @@ static int behave(const Instance *c, const Look *before, const Look *middle, con
     for (int g = 0; g < c->model->n_guards; g++) {
         double g0 = before->values[g], g1 = after->values[g], value = middle->values[g];
         double size = fmax(fabs(value), fmax(fabs(g0), fabs(g1)));
-        if (!guard_active(c, g) || g0 > 0 || g1 > 0 || value > 0) continue;
+        if (!guard_active(c, g)) continue;
         if (fabs(value - cubic(MIDDLE, g0, before->rates[g] * h, g1, after->rates[g] * h)) > BEHAVES * size) return 0;
     }
     return 1;
@@ -345,7 +346,7 @@ static Result take_step(Instance *c, double limit) {
 }
 
 /* Makes a point of the piece the present one. */
-static Result move_to(Instance *c, double t) {
+Result move_to(Instance *c, double t) {
     const Model *m = c->model;
     State *s = &c->state;
     double *point = c->work.vector + m->n_z;
@@ -359,7 +360,7 @@ static Result move_to(Instance *c, double t) {
 }
 
 /* Inputs, parameters or states moved from outside: go on from the present point. */
-static Result take_changes(Instance *c, int *event) {
+Result take_changes(Instance *c, int *event) {
     State *s = &c->state;
     *event = 0;
     if (!s->inputs_changed) return RESULT_OK;
@@ -387,18 +388,24 @@ Result handle_event(Instance *c) {
     return RESULT_OK;
 }
 
-static int is_due(Instance *c) { return c->model->n_moments > 0 && find_wanting(c, nothing_wanting(c), 0); }
+int is_due(Instance *c) { return c->model->n_moments > 0 && find_wanting(c, nothing_wanting(c), 0); }
 
 /* Checks what the importer asks for and says where the step ends. */
 Result check_step(Instance *c, double point, double size, double *target) {
     State *s = &c->state;
-    double slack = SAME_POINT * fmax(1, fabs(s->t));
+    double slack = SAME_POINT * fmax(1, fabs(s->t)), fixed = c->model->settings->fixed_step;
     *target = point + size;
     if (!isfinite(point) || fabs(point - s->t) > slack)
         return report(c, LOG_ERROR, RESULT_ERROR,
             "The communication point is %.12g s, but the instance stands at %.12g s.", point, s->t);
     if (!(size > 0) || !isfinite(*target))
         return report(c, LOG_ERROR, RESULT_ERROR, "The communication step size %g s is not positive.", size);
+    if (fixed > 0 && !(fabs(size / fixed - floor(size / fixed + 0.5)) <= SAME_PART && size > 0.5 * fixed))
+        return report(c, LOG_ERROR, RESULT_ERROR,
+            "The communication step size %.9g s is not a whole number of fixed steps of %.9g s, for which the model "
+            "was "
+            "exported.",
+            size, fixed);
     if (!s->stop_time_defined || *target <= s->stop_time) return RESULT_OK;
     if (*target > s->stop_time + slack)
         return report(c, LOG_ERROR, RESULT_ERROR, "The step to %.12g s goes beyond the stop time %.12g s.", *target,
@@ -411,6 +418,7 @@ Result check_step(Instance *c, double point, double size, double *target) {
 Arrival integrate_to(Instance *c, double target, int stop_at_events) {
     State *s = &c->state;
     int held = 0, event;
+    if (c->model->settings->fixed_step > 0) return step_fixed(c, target);
     if (s->at_event && handle_event(c) != RESULT_OK) return FAILED;
     for (;;) {
         held |= s->inputs_changed;

@@ -92,7 +92,9 @@ typedef struct {
 } StartRow;
 typedef struct {
     int n_d, n_y, steady, rates_depend_on_time;
+    int implicit_linear, unused; /* the implicit equations are linear in z */
     double absolute_to_relative, default_tolerance;
+    double fixed_step; /* 0: as accuracy asks for */
 } Settings;
 
 typedef struct Model { /* tables lie in the bytes of the file; texts are offsets in `text` */

@@ -1,29 +1,24 @@
 /* Whole runs and single steps for programs that load this library: Python through ctypes, a page in a browser.
  *
- * Open a model from the bytes of its file once; make as many handles of it as there are threads. A handle is begun
- * (native_begin finds the start itself, native_begin_at takes one), then it steps, or runs into buffers of the caller.
- * Functions return NATIVE_OK, NATIVE_FAILED (native_message tells why) or NATIVE_MORE. Variables go by their value
- * references. A handle belongs to one thread at a time; handles share nothing that changes.
+ * Open a model from the bytes of its file; make a handle of it for every thread, reset it, set what is to be other than
+ * in the model, begin, then step, or run into buffers. Functions return NATIVE_OK or NATIVE_FAILED (native_message
+ * tells why), runs also NATIVE_MORE or NATIVE_PAUSED. Variables go by value references. Handles share nothing that
+ * changes.
  */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include "core.h"
+#include "native.h"
 
-#ifdef _WIN32
-#define EXPORTED __declspec(dllexport)
-#else
-#define EXPORTED __attribute__((visibility("default")))
-#endif
-
-enum { NATIVE_OK, NATIVE_FAILED, NATIVE_MORE };
+enum { NATIVE_OK, NATIVE_FAILED, NATIVE_MORE, NATIVE_PAUSED };
 #define NEAR_EVENT 2e-7 /* of the distance of results: nearer to an event, its left side stands for the result */
 #define SAME 1e-12
 
-/* What a run writes, by rows; NULL: it is not wanted. Where room ends, or `steps` are done (0: any number), a run
- * returns NATIVE_MORE, and goes on from there when it is called again. Points are results and both sides of every
- * event. */
+/* What a run writes, by rows; NULL: it is not wanted. Where room ends it returns NATIVE_MORE, where `steps` are done
+ * (0: any number) NATIVE_PAUSED; called again, it goes on from there. Points are results and both sides of every event.
+ */
 typedef struct {
     double *times, *states, *outputs; /* by point: time; states and implicit unknowns; outputs */
     double *modes, *firsts;           /* by segment: d (modes, discrete values, what holds need); its first point */
@@ -42,7 +37,7 @@ typedef struct {
     NativeRun *run;
     void *before;    /* state before an instant for whose events there may be no room */
     int64_t strikes; /* impacts before the present instant */
-    double pause;
+    double pause;    /* number of steps at which to pause */
     char message[MESSAGE_LENGTH];
 } Native;
 
@@ -73,12 +68,12 @@ EXPORTED Native *native_new(const Model *m) {
     Native *n = calloc(1, sizeof *n);
     if (n == NULL) return NULL;
     n->c = instance_new(m, "native", m->token, calloc, free, keep_message, NULL, n, 0);
-    if (n->c == NULL) {
-        free(n);
-        return NULL;
+    if (n->c != NULL) {
+        n->c->co_simulation = 1;
+        return n;
     }
-    n->c->co_simulation = 1;
-    return n;
+    free(n);
+    return NULL;
 }
 
 EXPORTED void native_free(Native *n) {
@@ -89,8 +84,7 @@ EXPORTED void native_free(Native *n) {
 
 EXPORTED const char *native_message(const Native *n) { return n->message; }
 
-/* Begins anew: start time, end (infinite: unknown), relative tolerance, absolute one in nominal values. All values are
- * those of the model. */
+/* Back to the model's values; start and end (infinite: unknown) in s, relative tolerance, absolute one in nominals. */
 EXPORTED int native_reset(Native *n, double start, double stop, double rtol, double atol) {
     Result result;
     instance_reset(n->c);
@@ -101,38 +95,39 @@ EXPORTED int native_reset(Native *n, double start, double stop, double rtol, dou
 
 /* ---- values ----------------------------------------------------------------------------------------------------- */
 
+static int is_mode(const Instance *c, uint32_t reference) {
+    const Variable *v = find_variable(c->model, reference);
+    return v != NULL && v->type == TYPE_ENUMERATION;
+}
+
 /* Before the begin: parameters, inputs and start values; later: inputs, and parameters that are tunable. */
 EXPORTED int native_set(Native *n, int64_t count, const uint32_t *references, const double *values) {
-    for (int64_t k = 0; k < count; k++) {
-        const Variable *v = find_variable(n->c->model, references[k]);
-        Result result = v != NULL && v->type == TYPE_ENUMERATION ? set_mode(n->c, references[k], (int64_t)values[k])
-                                                                 : set_float(n->c, references[k], values[k]);
-        if (result != RESULT_OK) return NATIVE_FAILED;
-    }
-    return NATIVE_OK;
-}
-
-static int read_values(Instance *c, int64_t count, const uint32_t *references, double *values) {
-    for (int64_t k = 0; k < count; k++) {
-        const Variable *v = find_variable(c->model, references[k]);
-        int mode = 0;
-        if (v != NULL && v->type == TYPE_ENUMERATION) {
-            if (get_mode(c, references[k], &mode) != RESULT_OK) return NATIVE_FAILED;
-            values[k] = mode;
-        } else if (get_float(c, references[k], &values[k]) != RESULT_OK) return NATIVE_FAILED;
-    }
-    return NATIVE_OK;
-}
-
-EXPORTED int native_get(Native *n, int64_t count, const uint32_t *references, double *values) {
-    if (n->c->state.at_event && handle_event(n->c) != RESULT_OK) return NATIVE_FAILED;
-    return read_values(n->c, count, references, values);
+    Result result = RESULT_OK;
+    for (int64_t k = 0; k < count && result == RESULT_OK; k++)
+        result = is_mode(n->c, references[k]) ? set_mode(n->c, references[k], (int64_t)values[k])
+                                              : set_float(n->c, references[k], values[k]);
+    return code(result);
 }
 
 /* All parameters and inputs at once, in the order of the model's tables and unchecked. */
 EXPORTED void native_set_all(Native *n, const double *parameters, const double *inputs) {
     memcpy(n->c->p, parameters, (size_t)n->c->model->n_p * sizeof(double));
     memcpy(n->c->u, inputs, (size_t)n->c->model->n_u * sizeof(double));
+}
+
+static int read_values(Instance *c, int64_t count, const uint32_t *references, double *values) {
+    Result result = RESULT_OK;
+    for (int64_t k = 0; k < count && result == RESULT_OK; k++) {
+        int mode = 0;
+        if (!is_mode(c, references[k])) result = get_float(c, references[k], &values[k]);
+        else if ((result = get_mode(c, references[k], &mode)) == RESULT_OK) values[k] = mode;
+    }
+    return code(result);
+}
+
+EXPORTED int native_get(Native *n, int64_t count, const uint32_t *references, double *values) {
+    if (n->c->state.at_event && handle_event(n->c) != RESULT_OK) return NATIVE_FAILED;
+    return read_values(n->c, count, references, values);
 }
 
 /* ---- start, steps, copies --------------------------------------------------------------------------------------- */
@@ -161,7 +156,7 @@ EXPORTED int native_begin_at(Native *n, const double *x, const double *z, const 
     return begun(n);
 }
 
-/* Sets, goes to a time through all events, gets: a control loop's step. */
+/* A control loop's step: sets, goes to a time through all events, gets. */
 EXPORTED int native_step(Native *n, double time, int64_t n_set, const uint32_t *set, const double *given, int64_t n_get,
     const uint32_t *get, double *values) {
     if (native_set(n, n_set, set, given) != NATIVE_OK || integrate_to(n->c, time, 0) == FAILED) return NATIVE_FAILED;
@@ -170,18 +165,16 @@ EXPORTED int native_step(Native *n, double time, int64_t n_set, const uint32_t *
 
 EXPORTED double native_time(const Native *n) { return n->c->state.t; }
 
-/* Copies of the state, to come back to; *copy is NULL or a copy to be written over. */
+/* Copies of the state, to come back to; *copy is NULL, or a copy to be written over. */
 EXPORTED int native_copy(Native *n, void **copy) { return code(state_copy_out(n->c, copy)); }
 EXPORTED int native_restore(Native *n, const void *copy) { return code(state_copy_in(n->c, copy)); }
 EXPORTED void native_drop(Native *n, void **copy) { state_release(n->c, copy); }
 
-/* What the handle has done so far: steps, rejected steps, evaluations of the equations, mode changes. */
+/* Since the reset: steps, rejected steps, evaluations of the equations, mode changes. */
 EXPORTED void native_counts(const Native *n, double *counts) {
     const State *s = &n->c->state;
-    counts[0] = s->n_steps;
-    counts[1] = s->n_rejected;
-    counts[2] = s->n_evaluations;
-    counts[3] = s->n_events;
+    const double found[] = {s->n_steps, s->n_rejected, s->n_evaluations, s->n_events};
+    memcpy(counts, found, sizeof found);
 }
 
 /* ---- runs ------------------------------------------------------------------------------------------------------- */
@@ -216,18 +209,15 @@ static void note_impact(Instance *c, int held, double energy, int first) {
 static int write_point(Native *n, NativeRun *r) {
     const Instance *c = n->c;
     const Model *m = c->model;
-    double *states = r->states == NULL ? NULL : r->states + r->n_points * m->n_unknowns;
-    if (r->times != NULL) r->times[r->n_points] = c->state.t;
-    if (states != NULL) {
-        memcpy(states, c->x, (size_t)m->n_x * sizeof(double));
-        memcpy(states + m->n_x, c->z, (size_t)m->n_z * sizeof(double));
-    }
-    if (r->outputs != NULL &&
-        read_values(n->c, r->n_outputs, r->references, r->outputs + r->n_points * r->n_outputs) != NATIVE_OK)
-        return NATIVE_FAILED;
+    int64_t k = r->n_points++;
     r->last = c->state.t;
-    r->n_points++;
-    return NATIVE_OK;
+    if (r->times != NULL) r->times[k] = c->state.t;
+    if (r->states != NULL) {
+        memcpy(r->states + k * m->n_unknowns, c->x, (size_t)m->n_x * sizeof(double));
+        memcpy(r->states + k * m->n_unknowns + m->n_x, c->z, (size_t)m->n_z * sizeof(double));
+    }
+    if (r->outputs == NULL) return NATIVE_OK;
+    return read_values(n->c, r->n_outputs, r->references, r->outputs + k * r->n_outputs);
 }
 
 /* The left side of an event, the event, its right side, which begins a segment. */
@@ -256,33 +246,32 @@ static int instant(Native *n, NativeRun *r, double width) {
 }
 
 static double pause_after(Instance *c) {
-    Native *n = c->environment;
-    return c->state.n_steps >= n->pause ? c->state.t : INFINITY;
+    return c->state.n_steps >= ((Native *)c->environment)->pause ? c->state.t : INFINITY;
 }
 
 static int run_on(Native *n, double end, int64_t results, NativeRun *r) {
-    Instance *c = n->c;
-    State *s = &c->state;
+    State *s = &n->c->state;
     double width = (end - r->begin) / (double)results;
-    while (s->t < end || s->at_event) {
+    while (s->t < end || s->at_event || r->n_segments == 0) {
         double t = r->begin + (end - r->begin) * ((double)r->next / (double)results);
-        int result;
-        if (r->n_segments == 0 || s->at_event) {
+        int result = NATIVE_OK;
+        if (s->at_event || r->n_segments == 0) {
             result = instant(n, r, width);
             if (result != NATIVE_OK) return result;
             continue;
         }
-        if (r->n_points == r->room_points || s->n_steps >= n->pause) return NATIVE_MORE;
-        if (r->next < results && t <= s->t + fmin(0.5 * NEAR_EVENT * width, SAME * fmax(1, fabs(s->t)))) {
-            r->next++;
-            continue;
-        }
-        switch (integrate_to(c, r->next < results ? t : end, 1)) {
+        if (s->n_steps >= n->pause) return NATIVE_PAUSED;
+        if (r->n_points == r->room_points) return NATIVE_MORE;
+        if (r->next++ < results && t <= s->t + fmin(0.5 * NEAR_EVENT * width, SAME * fmax(1, fabs(s->t)))) continue;
+        t = r->next <= results ? t : end;
+        switch (integrate_to(n->c, t, 1)) {
             case FAILED: return NATIVE_FAILED;
-            case AT_EVENT: continue;
-            case REACHED:
-                if (s->t < t) return NATIVE_MORE;
-                r->next++;
+            case AT_EVENT: r->next--; continue;
+            case REACHED: break;
+        }
+        if (s->t < t) {
+            r->next--;
+            return NATIVE_PAUSED;
         }
         if (write_point(n, r) != NATIVE_OK) return NATIVE_FAILED;
     }

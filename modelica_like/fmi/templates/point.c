@@ -4,6 +4,8 @@
 #include "core.h"
 
 #define MAX_NEWTON 50
+#define BOUNDED_NEWTON 3 /* iterations where the work is bounded; the next step takes up what they leave */
+#define SOLVED 1e-8      /* of the residual before an iteration: they are piecewise linear, and solved */
 
 double input_at(const Instance *c, int k, double t) { return c->u[k] + c->u_rate[k] * (t - c->state.u_time); }
 
@@ -38,13 +40,21 @@ static Result singular(Instance *c, double t, const char *names) {
         t, names);
 }
 
+static inline double largest_of(int n, const double *values) {
+    double largest = 0;
+    for (int k = 0; k < n; k++) largest = fmax(largest, fabs(values[k]));
+    return largest;
+}
+
 Result solve_implicit(Instance *c, double t, const double *x, double *z, int quiet) {
     const Model *m = c->model;
-    double *step = c->work.vector, *matrix = c->work.dense_matrix, change = INFINITY;
-    int *order = c->work.order;
+    double *step = c->work.vector, *matrix = c->work.dense_matrix, change = INFINITY, residual = 0;
+    int *order = c->work.order, rounds = !c->bounded ? MAX_NEWTON : m->settings->implicit_linear ? 1 : BOUNDED_NEWTON;
     if (m->n_z == 0) return RESULT_OK;
-    for (int round = 0; round < MAX_NEWTON; round++) {
+    for (int round = 0; round < rounds; round++) {
         evaluate_special(c, SPECIAL_ALG, t, x, z, step);
+        if (c->bounded && round > 0 && largest_of(m->n_z, step) <= SOLVED * residual) return RESULT_OK;
+        residual = largest_of(m->n_z, step);
         run_special(c, SPECIAL_ALG_JACOBIAN, matrix);
         for (int k = 0; k < m->n_z; k++)
             if (!isfinite(step[k])) return quiet ? RESULT_ERROR : singular(c, t, text_of(m, m->implicit_names[k]));
@@ -60,9 +70,9 @@ Result solve_implicit(Instance *c, double t, const double *x, double *z, int qui
             largest = fmax(largest, fabs(z[k]));
         }
         /* What the largest unknown leaves of a small one when it is rounded does not get smaller. */
-        if (change < 1e-13 || moved <= 1e-14 * largest) return RESULT_OK;
+        if (change < (c->bounded ? 1e-4 : 1e-13) || moved <= 1e-14 * largest) return RESULT_OK;
     }
-    if (change <= 1e-9) return RESULT_OK;
+    if (change <= 1e-9 || c->bounded) return RESULT_OK;
     return quiet ? RESULT_ERROR
                  : report(c, LOG_ERROR, RESULT_ERROR, "The equations for %s were not solved at t = %.9g s.",
                        text_of(m, m->implicit_names[0]), t);
@@ -75,6 +85,7 @@ Result check_singular(Instance *c) {
     evaluate(c, &m->tapes.determinants, s->t, c->x, c->z, values);
     for (int k = 0; k < m->n_determinants; k++)
         if (!isfinite(values[k]) || fabs(values[k]) < 1e-12) return singular(c, s->t, text_of(m, m->singular_names[k]));
+    if (c->bounded) return RESULT_OK; /* the next step tells */
     tape_run(&m->tapes.rates, c->work.slots, values);
     for (int k = 0; k < m->n_x; k++)
         if (!isfinite(values[k]))

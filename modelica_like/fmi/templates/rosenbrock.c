@@ -45,26 +45,21 @@ static const double DENSE[3][STAGES] = {
         -59.78993625266729, -0.15582684282751913, 4.883087185713722},
 };
 
-static void evaluate_jacobian(Instance *c, double t, const double *y) {
-    const Model *m = c->model;
-    Work *w = &c->work;
-    evaluate_special(c, SPECIAL_RATES, t, y, y + m->n_x, w->first_rates);
-    run_special(c, SPECIAL_JACOBIAN, w->jacobian);
-}
-
-/* Partial derivative of the right hand side by time, with inputs on their straight lines. */
-static void evaluate_time_slope(Instance *c, double t, const double *y, double *slope) {
+/* The right hand side, its partial derivatives by time, with inputs on their straight lines, and its Jacobian. */
+static void linearize(Instance *c, double t, const double *y, double *slope) {
     const Model *m = c->model;
     Work *w = &c->work;
     int moving = m->settings->rates_depend_on_time;
     for (int k = 0; k < m->n_u; k++) moving |= c->u_rate[k] != 0;
     memset(slope, 0, (size_t)m->n_unknowns * sizeof(double));
-    if (!moving) return;
-    evaluate(c, &m->tapes.rates, t, y, y + m->n_x, w->rhs);
-    memset(w->dots, 0, m->slot_results * sizeof(double));
-    w->dots[0] = 1;
-    for (int k = 0; k < m->n_u; k++) w->dots[m->slot_u + k] = c->u_rate[k];
-    tape_tangent(&m->tapes.rates, w->slots, w->dots, slope);
+    if (moving) {
+        evaluate(c, &m->tapes.rates, t, y, y + m->n_x, w->first_rates);
+        memset(w->dots, 0, m->slot_results * sizeof(double));
+        w->dots[0] = 1;
+        for (int k = 0; k < m->n_u; k++) w->dots[m->slot_u + k] = c->u_rate[k];
+        tape_tangent(&m->tapes.rates, w->slots, w->dots, slope);
+    } else evaluate_special(c, SPECIAL_RATES, t, y, y + m->n_x, w->first_rates);
+    run_special(c, SPECIAL_JACOBIAN, w->jacobian);
 }
 
 /* M/(h gamma) - J, factorised. */
@@ -100,10 +95,7 @@ int rosenbrock_step(
     piece->begin = t;
     piece->end = t + h;
     memcpy(piece->points, first, size);
-    if (!keep_jacobian) {
-        evaluate_time_slope(c, t, first, slope);
-        evaluate_jacobian(c, t, first);
-    }
+    if (!keep_jacobian) linearize(c, t, first, slope);
     if (!factor(c, h)) return 0;
     c->state.n_evaluations += STAGES - keep_jacobian;
     for (int i = 0; i < STAGES; i++) {

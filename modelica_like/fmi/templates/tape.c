@@ -5,6 +5,15 @@
 
 static double sign(double a) { return a < 0 ? -1 : a > 0 ? 1 : a; }
 
+/* a ? b : 0 without a branch: which one is taken cannot be foreseen where a tape has not run for some time. */
+static inline double if_else_zero(double a, double b) {
+    uint64_t bits;
+    memcpy(&bits, &b, sizeof bits);
+    bits &= 0 - (uint64_t)(a != 0);
+    memcpy(&b, &bits, sizeof b);
+    return b;
+}
+
 /* Results of one run of equal operations. */
 static void run_one(int operation, const Operands *operand, int count, const double *slots, double *result) {
 #define EACH(name, expression)                                              \
@@ -48,7 +57,7 @@ static void run_one(int operation, const Operands *operand, int count, const dou
         EACH(FABS, fabs(a))
         EACH(SIGN, sign(a))
         EACH(COPYSIGN, copysign(a, b))
-        EACH(IF_ELSE_ZERO, a ? b : 0)
+        EACH(IF_ELSE_ZERO, if_else_zero(a, b))
         EACH(ERF, erf(a))
         EACH(FMIN, fmin(a, b))
         EACH(FMAX, fmax(a, b))

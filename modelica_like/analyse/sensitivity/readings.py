@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from modelica_like.analyse.sensitivity.outputs import Output
+from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import UnknownName
-from modelica_like.solve.solution import Solution
+from modelica_like.solve.solution import ENERGY_TERMS, Solution
 
 
 def read(solution: Solution, output: Output) -> float:
@@ -20,20 +22,27 @@ def read(solution: Solution, output: Output) -> float:
     owner, _, last = output.path.rpartition(".")
     match output.kind:
         case "end":
-            return solution.final[output.path]
+            return _value(solution.model, solution.final, output.path)
         case "at":
-            return solution.at(output.moment)[output.path]
+            return _value(solution.model, solution.at(output.moment), output.path)
         case "max":
-            return float(np.max(solution[output.path]))
+            return float(np.max(_value(solution.model, solution, output.path)))
         case "min":
-            return float(np.min(solution[output.path]))
+            return float(np.min(_value(solution.model, solution, output.path)))
         case "time":
             return _time(solution, output)
         case _ if last in ("loss_energy", "source_energy"):
             rows = [row for row in solution.energy() if owner in ("", row.component)]
             return sum(row.lost if last == "loss_energy" else row.source for row in rows)
         case _:
-            return float(np.trapezoid(solution[output.path], solution.time))
+            return float(np.trapezoid(_value(solution.model, solution, output.path), solution.time))
+
+
+def _value(model: CompiledDae, values: Any, path: str) -> Any:
+    """Return a value or a trajectory; the model's energies and powers are those of all its components."""
+    if path not in ENERGY_TERMS:
+        return values[path]
+    return sum(values[f"{one}.{path}" if one else path] for one in model.components)
 
 
 def _time(solution: Solution, output: Output) -> float:

@@ -1,0 +1,94 @@
+"""Many runs of one model that leave numbers only, at the speed of C: what sweeps are made of."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from modelica_like.compile.compiled import CompiledDae, Vector
+from modelica_like.initialize import StartKind
+from modelica_like.native.library import BatchArguments
+from modelica_like.native.model import NativeModel
+from modelica_like.solve.options import Options
+
+Kind = Literal["end", "at", "max", "min", "area", "work", "change", "impact"]
+_KINDS: tuple[Kind, ...] = ("end", "at", "max", "min", "area", "work", "change", "impact")
+_RECORD = np.dtype(
+    [*((name, np.int32) for name in ("kind", "place", "before", "after", "number", "unused")), ("moment", float)]
+)
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A number that is read off a run.
+
+    Attributes:
+        kind: value at the end or at a moment, largest and smallest result, integral over the results (`area`) or over
+            the integrator's steps (`work`), time of a mode change, energy in J that impacts take.
+        place: position of the variable, of the mode, or of the motion that is held.
+        change: numbers of the modes before and after (-1: any), and which of several such changes.
+        moment: in s.
+    """
+
+    kind: Kind
+    place: int
+    change: tuple[int, int, int] = (-1, -1, 1)
+    moment: float = 0.0
+
+
+class Batch:
+    """Runs of a model that differ in parameters and inputs; may be used by several threads at once.
+
+    Args:
+        model: the compiled model.
+        readings: what is read off every run.
+        options: tolerances, number of results and largest number of events.
+        span: start and end time in s.
+        start: kind of start; by default as the netlist says.
+
+    Raises:
+        MissingStart, ContradictingStart: the start values do not determine all states.
+        ExportError: there is no library, and none can be compiled.
+        LanguageError: a function has no counterpart in C.
+    """
+
+    def __init__(
+        self, model: CompiledDae, readings: Sequence[Reading], options: Options, span: tuple[float, float],
+        start: StartKind | None = None,
+    ) -> None:  # fmt: skip
+        self._native = NativeModel.of(model, start)
+        self._options, self._span = options, span
+        rows = [(_KINDS.index(one.kind), one.place, *one.change, 0, one.moment) for one in readings]
+        self._readings = np.array(rows, _RECORD)
+
+    def run(self, parameters: Vector, inputs: Vector, stop: ctypes.c_int | None = None) -> tuple[Vector, Any]:
+        """Do runs one after the other, without holding up other threads.
+
+        Args:
+            parameters: in the order of `model.p`, unchecked, shape (runs, parameters).
+            inputs: in the order of `model.u`, shape (runs, inputs).
+            stop: not zero as soon as nobody waits for them any more.
+
+        Returns:
+            Numbers, shape (runs, readings), and which runs failed, shape (runs,). What does not happen is nan.
+        """
+        runs, options = len(parameters), self._options
+        values, failed = np.empty((runs, len(self._readings))), np.ones(runs, np.uint8)
+        numbers = [np.ascontiguousarray(one, float) for one in (parameters, inputs)]
+        places = (one.ctypes.data for one in (self._readings, *numbers, values, failed))
+        counts = options.points, options.max_events, runs, len(self._readings)
+        arguments = BatchArguments(
+            *self._span,
+            options.rtol,
+            options.atol,
+            *counts,
+            *places,
+            ctypes.pointer(ctypes.c_int(0) if stop is None else stop),
+        )
+        if self._native.library.batch(self._native.address, ctypes.byref(arguments)) < 0:
+            raise MemoryError(f"There is no memory for runs of {self._native.name}.")
+        return values, failed.astype(bool)

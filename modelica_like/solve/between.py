@@ -1,0 +1,141 @@
+"""Results between looks: interpolated for many panels at once, as precisely as IDAS computed the looks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from modelica_like.compile.compiled import Vector
+from modelica_like.solve.idas import Integrator
+from modelica_like.solve.looks import EXPONENTS, PRECISE, SCHEMES, Looks
+
+_TOGETHER = 64
+_DEEPEST = 10
+
+
+@dataclass
+class Piece:
+    """Results between the looks of one panel.
+
+    Attributes:
+        looks: the panel.
+        times: shape (n,), in s.
+        last: the last look that means something, because of an event before the next.
+        x: states, shape (nx, n), to be filled in.
+        z: implicit unknowns, shape (nz, n).
+    """
+
+    looks: Looks
+    times: Vector
+    last: int
+    x: Vector
+    z: Vector
+
+
+class Between:
+    """Collects results that are wanted, and fills them in later.
+
+    Args:
+        integrator: tells tolerances, and solves for implicit unknowns.
+        closer: looks into an interval of some looks, where interpolation is not precise.
+    """
+
+    def __init__(self, integrator: Integrator, closer: Callable[[Looks, int], Looks]) -> None:
+        self._integrator, self._closer = integrator, closer
+        self._pieces: list[Piece] = []
+
+    @property
+    def many(self) -> bool:
+        """Whether results should be filled in before more come."""
+        return len(self._pieces) >= _TOGETHER
+
+    def ask(self, looks: Looks, times: Vector, last: int) -> Piece:
+        """Return arrays for results at times between looks, which `fill` fills in."""
+        x, z = (np.empty((len(part), len(times))) for part in (looks.x, looks.z))
+        self._pieces.append(Piece(looks, times, last, x, z))
+        return self._pieces[-1]
+
+    def fill(self, *, precisely: bool = True) -> None:
+        """Fill in all results; not `precisely`, nothing is integrated again.
+
+        Raises:
+            StepFailed: where interpolation is not precise, IDAS gave up.
+        """
+        self._fill(self._pieces, 0 if precisely else _DEEPEST)
+        self._pieces = []
+
+    def _fill(self, pieces: list[Piece], depth: int) -> None:
+        if not pieces:
+            return
+        parts: list[tuple[Piece, Any, Piece]] = []
+        for number, k in interpolate(self._integrator, pieces) if depth < _DEEPEST else ():
+            whole = pieces[number]
+            those = whole.looks.intervals(whole.times) == k
+            looks = whole.looks.within(k) or self._closer(whole.looks, k)
+            part = Piece(looks, whole.times[those], looks.count, whole.x[:, those], whole.z[:, those])
+            parts.append((whole, those, part))
+        if depth == _DEEPEST:
+            interpolate(self._integrator, pieces)
+        self._fill([part for *_, part in parts], depth + 1)
+        for whole, those, part in parts:
+            whole.x[:, those], whole.z[:, those] = part.x, part.z
+
+
+def interpolate(integrator: Integrator, pieces: list[Piece]) -> list[tuple[int, int]]:
+    """Fill in results; return where they are not precise, as numbers of pieces and intervals."""
+    looks, lengths = [one.looks for one in pieces], [len(one.times) for one in pieces]
+    counts = np.array([one.count for one in looks])
+    owner = np.repeat(np.arange(len(pieces)), lengths)
+    times, x = np.concatenate([one.times for one in pieces]), np.concatenate([one.x for one in looks], axis=1)
+    z, begins = (np.concatenate(part, axis=-1) for part in ([p.z for p in looks], [p.times for p in looks]))
+    k: Any = np.concatenate([one.looks.intervals(one.times) for one in pieces])
+    place: Any = (np.cumsum(counts + 1) - counts - 1)[owner] + k
+    share = (times - begins[place]) / np.array([one.width for one in looks])[owner]
+    new = np.diff(place, prepend=-1) > 0
+    cell: Any = np.cumsum(new) - 1
+    changes, left = _cells(integrator, pieces, x, owner[new], k[new])
+    powers = np.vander(share, len(EXPONENTS), increasing=True)
+    found = x[:, place] + np.einsum("np,inp->in", powers, changes[:, cell])
+    guess = z[:, place] + share * (z[:, place + 1] - z[:, place])
+    implicit = integrator.polished(times, found, guess, np.array([one.d for one in looks])[owner].T)
+    for piece, end, length in zip(pieces, np.cumsum(lengths), lengths, strict=True):
+        piece.x[:], piece.z[:] = found[:, end - length : end], implicit[:, end - length : end]
+    return list(zip(owner[new][left].tolist(), k[new][left].tolist(), strict=True))
+
+
+def _cells(integrator: Integrator, pieces: list[Piece], x: Vector, owner: Any, k: Any) -> tuple[Vector, Any]:
+    """Return polynomials for the changes of states since the beginnings of intervals, and which are not precise.
+
+    Args:
+        integrator: tells the tolerances.
+        pieces: all of them.
+        x: states at all looks of all pieces, shape (nx, looks).
+        owner: pieces of the intervals, shape (intervals,).
+        k: their numbers there.
+    """
+    looks = [one.looks for one in pieces]
+    slopes = np.concatenate([one.seen[2] for one in looks], axis=1)
+    counts, widths = (np.array(part) for part in ([one.count for one in looks], [one.width for one in looks]))
+    offset: Any = (np.cumsum(counts + 1) - counts - 1)[owner]
+    last = np.array([one.last for one in pieces])[owner]
+    base = x[:, offset + k]
+    changes, left = np.zeros((*base.shape, len(EXPONENTS))), np.ones(len(k), bool)
+    changes[:, :, 1] = x[:, offset + k + 1] - base
+    for scheme in SCHEMES:
+        those = np.flatnonzero(left & (counts[owner] + 1 >= scheme.nodes))
+        if not len(those):
+            continue
+        first = scheme.first(k[those], np.maximum(last[those], scheme.nodes - 1))
+        nodes: Any = (offset[those] + first)[:, None] + np.arange(scheme.nodes)
+        data = np.take(x, nodes, axis=1) - base[:, those, None]
+        if scheme.slopes:
+            data = np.concatenate([data, widths[owner[those], None] * np.take(slopes, nodes, axis=1)], axis=2)
+        number = k[those] - first
+        for one in range(scheme.nodes - 1):
+            changes[:, those[number == one]] = data[:, number == one] @ scheme.precise[one].T
+        doubt = np.abs(np.einsum("ink,nk->in", data, scheme.doubt[number]))
+        left[those] = ~(doubt <= PRECISE * integrator.weights(base[:, those])).all(axis=0)
+    return changes, left
