@@ -36,14 +36,14 @@ class RuntimeHook(BuildHookInterface):  # pyright: ignore[reportMissingTypeArgum
         """Compile, and tell hatch what to take along."""
         sys.path.insert(0, self.root)
         from modelica_like.errors import ModelicaLikeError
-        from modelica_like.fmi.build import PLATFORMS, native_platform
+        from modelica_like.fmi.build import BROWSER, RUNTIMES, native_platform
         from modelica_like.fmi.runtime import SHIPPED, build_runtime
 
         asked = os.environ.get("MODELICA_LIKE_PLATFORMS", "")
         shutil.rmtree(SHIPPED, ignore_errors=True)
         try:
             named = asked or native_platform()
-            names = () if named == "none" else tuple(PLATFORMS) if named == "all" else tuple(named.split(","))
+            names = () if named == "none" else tuple(RUNTIMES) if named == "all" else tuple(named.split(","))
             built = [build_runtime(name, SHIPPED / name) for name in names]
         except ModelicaLikeError as error:
             if asked:
@@ -51,8 +51,9 @@ class RuntimeHook(BuildHookInterface):  # pyright: ignore[reportMissingTypeArgum
             self.app.display_warning(f"The run-time of FMUs is not compiled now, but at first use. {error}")
             built = []
         if built:
-            tags = (wheel_tag(library) for library in built)
-            build_data.update(pure_python=False, tag=f"py3-none-{'.'.join(tags)}")
+            tags = [wheel_tag(library) for library in built if library.parent.name != BROWSER.name]
+            if tags:
+                build_data.update(pure_python=False, tag=f"py3-none-{'.'.join(tags)}")
             build_data["artifacts"].append("modelica_like/fmi/runtimes/*/*")
 
 

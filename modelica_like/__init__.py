@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from modelica_like.language import Assembly as Assembly
     from modelica_like.language import Component as Component
     from modelica_like.native.handle import Native as Native
+    from modelica_like.native.page import export_html as export_html
     from modelica_like.netlist import load as load
     from modelica_like.report.compare import compare as compare
     from modelica_like.simulation import build as build
@@ -52,6 +53,7 @@ _HOME = {
     "compare": "modelica_like.report.compare",
     "cosim": "modelica_like.cosimulation.run",
     "export_fmu": "modelica_like.fmi.export",
+    "export_html": "modelica_like.native.page",
     "importance": "modelica_like.analyse.sweeps.importance",
     "linearize": "modelica_like.analyse.linear.linearize",
     "load": "modelica_like.netlist",
@@ -80,6 +82,7 @@ __all__ = [
     "compare",
     "cosim",
     "export_fmu",
+    "export_html",
     "importance",
     "linearize",
     "load",

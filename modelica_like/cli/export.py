@@ -33,13 +33,16 @@ def export(
     output: Annotated[
         Path | None, Option("-o", "--output", metavar="FILE", help="The FMU; else named after the netlist.")
     ] = None,
+    html: Annotated[
+        Path | None, Option(metavar="FILE", help="A page that simulates in a browser; with -o besides the FMU.")
+    ] = None,
     fmi: Annotated[str, Option(metavar="VERSION", help="FMI version: 2.0 or 3.0.")] = "2.0",
     kind: Annotated[str, Option(metavar="KINDS", help="me, cs, or both: me,cs.")] = "me,cs",
     platforms: Annotated[
         str, Option(metavar="NAMES", help="native, all, none, or names such as x86_64-windows, with commas.")
     ] = "native",
     outputs: Annotated[
-        list[str] | None, Option("--show", metavar="PATTERN", help="Further outputs, e.g. '*.w'.")
+        list[str] | None, Option("--show", metavar="PATTERN", help="Further outputs, e.g. '*.w'; a page's curves.")
     ] = None,
     ends: Annotated[
         list[str] | None, Option("--open", metavar="PATH", help="A free connector that is open, e.g. J.flange_b.")
@@ -58,7 +61,7 @@ def export(
     strict: Annotated[bool, Option("--strict", help="Do not write an FMU that differs from IDAS.")] = False,
     debug: Debug = False,
 ) -> None:  # fmt: skip
-    """Export a netlist as an FMU: compiled C that needs no Python, and check it."""
+    """Export a netlist as an FMU: compiled C that needs no Python, and check it; or as a page for a browser."""
     with told(debug), _no_search_for_cycles():
         assembly = load_netlist(netlist, assignments)
         from rich.console import Console
@@ -66,6 +69,13 @@ def export(
         from modelica_like.fmi.export import export_fmu
 
         with Console(stderr=True).status("loading") as status:
+            if html is not None:
+                from modelica_like.native.page import export_html
+
+                page = export_html(assembly, html, show=outputs or (), report=status.update)
+                out().print(str(page), soft_wrap=True)
+            if html is not None and output is None:
+                return
             done = export_fmu(
                 assembly, output or Path(f"{netlist.stem}.fmu"), fmi, _listed(kind), _listed(platforms),
                 outputs=outputs or (), ends=ends or (), takes=takes.value, embed=embed, modes=modes.value,
@@ -94,13 +104,13 @@ def runtimes(
     with told(debug):
         from rich.console import Console
 
-        from modelica_like.fmi.build import PLATFORMS, chosen_platforms
+        from modelica_like.fmi.build import RUNTIMES, chosen_platforms
         from modelica_like.fmi.runtime import found_runtime, runtime_library
 
         with Console(stderr=True).status("loading") as status:
-            for name in chosen_platforms(_listed(platforms)):
+            for name in chosen_platforms(_listed(platforms), RUNTIMES):
                 runtime_library(name, status.update)
-        for name in PLATFORMS:
+        for name in RUNTIMES:
             library = found_runtime(name)
             out().print(f"{name:16}{library or 'not compiled'}", soft_wrap=True)
 

@@ -47,15 +47,30 @@ PLATFORMS = {
     )
 }
 """All platforms by FMI 3.0's names."""
+BROWSER = Platform("wasm32", "", "wasm32-wasi", ".wasm")
+"""WebAssembly, for pages; FMUs have no binaries for it."""
+RUNTIMES = {**PLATFORMS, BROWSER.name: BROWSER}
+"""What the run-time is compiled for."""
 
 # -O1 runs as fast as -O2 here and compiles in two thirds of the time. Changed flags make zig compile its C runtime
 # again, which takes minutes for Windows.
-FLAGS = (
-    "-std=c99", "-O1", "-ffp-contract=off", "-fvisibility=hidden", "-shared", "-s", "-Wall", "-Wextra", "-DOLD_GLIBC",
+_FLAGS = (
+    "-std=c99", "-O1", "-ffp-contract=off", "-fvisibility=hidden", "-s", "-Wall", "-Wextra", "-DOLD_GLIBC",
 )  # fmt: skip
+_LINKING = {
+    # The caller's buffers lie in the module's memory. It needs nothing from outside.
+    ".wasm": ("-mexec-model=reactor", "-Wl,--export-dynamic,--export=realloc"),
+    ".dll": ("-shared",),  # Windows has the mathematical functions in its C runtime
+}
+_SHARED = ("-shared", "-fPIC")
 _COMPILERS = ("cc", "gcc", "clang")
 _SYSTEMS = {"Linux": "linux", "Windows": "windows", "Darwin": "darwin"}
 _MACHINES = {"x86_64": "x86_64", "AMD64": "x86_64", "aarch64": "aarch64", "arm64": "aarch64", "ARM64": "aarch64"}
+
+
+def flags(platform: str) -> tuple[str, ...]:
+    """Return the compiler's flags for a platform, a key of `RUNTIMES`."""
+    return (*_FLAGS, *_LINKING.get(RUNTIMES[platform].suffix, _SHARED))
 
 
 def native_platform() -> str:
@@ -72,8 +87,8 @@ def native_platform() -> str:
     return name
 
 
-def chosen_platforms(platforms: Sequence[str] | str) -> tuple[str, ...]:
-    """Return the names of platforms that are asked for by names, `native` or `all`.
+def chosen_platforms(platforms: Sequence[str] | str, there: Iterable[str] = PLATFORMS) -> tuple[str, ...]:
+    """Return the names of platforms, out of those that are there, that are asked for by names, `native` or `all`.
 
     Raises:
         UnknownName: there is no such platform.
@@ -82,13 +97,13 @@ def chosen_platforms(platforms: Sequence[str] | str) -> tuple[str, ...]:
     asked = (platforms,) if isinstance(platforms, str) else tuple(platforms)
     found: list[str] = []
     for one in asked:
-        if one not in ("native", "all", *PLATFORMS):
-            known = ["native", "all", *PLATFORMS]
+        known = ["native", "all", *there]
+        if one not in known:
             raise UnknownName(
                 f"There is no platform '{one}'{did_you_mean(one, known) or '.'}",
                 advice=f"There are {', '.join(known)}.",
             )
-        found += PLATFORMS if one == "all" else [native_platform() if one == "native" else one]
+        found += there if one == "all" else [native_platform() if one == "native" else one]
     return tuple(dict.fromkeys(found))
 
 
@@ -100,7 +115,7 @@ def build(sources: Mapping[str, str], platform: str, output_dir: Path, identifie
 
     Args:
         sources: file name to text, as `generate` returns them.
-        platform: a key of `PLATFORMS`.
+        platform: a key of `RUNTIMES`.
         output_dir: folder of the library.
         identifier: name of the library without suffix.
 
@@ -112,12 +127,12 @@ def build(sources: Mapping[str, str], platform: str, output_dir: Path, identifie
         MissingExtra: zig is needed and not installed.
         ExportError: there is no compiler, or the compiler failed.
     """
-    if platform not in PLATFORMS:
+    if platform not in RUNTIMES:
         raise UnknownName(
-            f"There is no platform '{platform}'{did_you_mean(platform, PLATFORMS) or '.'}",
-            advice=f"There are {', '.join(PLATFORMS)}.",
+            f"There is no platform '{platform}'{did_you_mean(platform, RUNTIMES) or '.'}",
+            advice=f"There are {', '.join(RUNTIMES)}.",
         )
-    chosen = PLATFORMS[platform]
+    chosen = RUNTIMES[platform]
     library = Path(output_dir) / f"{identifier}{chosen.suffix}"
     command = compiler_command(platform)
     with tempfile.TemporaryDirectory(prefix="modelica_like_") as folder:
@@ -126,11 +141,9 @@ def build(sources: Mapping[str, str], platform: str, output_dir: Path, identifie
         wholes = _wholes(name for name in sources if name.endswith(".c"))
         for name, content in wholes.items():
             (Path(folder) / name).write_text(content, encoding="utf-8")
-        position = [] if chosen.suffix == ".dll" else ["-fPIC"]
-        # Windows has the mathematical functions in its C runtime.
-        libraries = [] if chosen.suffix == ".dll" else ["-lm"]
+        libraries = [] if chosen.suffix in _LINKING else ["-lm"]
         built = Path(folder) / f"{identifier}{chosen.suffix}"
-        _run([*command, *FLAGS, *position, "-o", str(built), *wholes, *libraries], folder, platform)
+        _run([*command, *flags(platform), "-o", str(built), *wholes, *libraries], folder, platform)
         with replacing(library) as draft:
             shutil.copyfile(built, draft)
     return library
@@ -160,7 +173,7 @@ def compiler_command(platform: str) -> list[str]:
         if given or found:
             return given or [str(found)]
     if find_spec("ziglang") is not None:
-        return [sys.executable, "-m", "ziglang", "cc", "-target", PLATFORMS[platform].target]
+        return [sys.executable, "-m", "ziglang", "cc", "-target", RUNTIMES[platform].target]
     if native:
         raise ExportError(
             "There is no C compiler.", advice="Install cc, gcc or clang, or zig by `pip install modelica-like[cross]`."

@@ -145,10 +145,10 @@ def _silent(_: str) -> None:
 # -- what is asked for -------------------------------------------------------------------------------------------------
 
 
-def _target(path: str | Path) -> Path:
+def _target(path: str | Path, ending: str = ".fmu", what: str = "An FMU") -> Path:
     target = Path(path)
-    if target.suffix != ".fmu":
-        raise ExportError(f"An FMU is a file with the ending .fmu, not '{target.name}'.")
+    if target.suffix != ending:
+        raise ExportError(f"{what} is a file with the ending {ending}, not '{target.name}'.")
     if not target.absolute().parent.is_dir():
         raise ExportError(f"There is no folder '{target.parent}' for {target.name}.", advice="Make it first.")
     check_writable(target)

@@ -12,23 +12,28 @@ from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from modelica_like.fmi.build import FLAGS, PLATFORMS, build
+from modelica_like.fmi.build import BROWSER, RUNTIMES, build, flags
 from modelica_like.fmi.sources import Face, own_sources, runtime_sources
 from modelica_like.writing import write_bytes
 
-_FACES: tuple[Face, ...] = ("2.0", "3.0", "native")
 SHIPPED = Path(__file__).parent / "runtimes"
 """Libraries of the package, one folder per platform."""
 
 
+def _faces(platform: str) -> tuple[Face, ...]:
+    return ("native",) if platform == BROWSER.name else ("2.0", "3.0", "native")
+
+
 def runtime_library(platform: str, report: Callable[[str], None] = lambda _: None) -> Path:
-    """Return the compiled run-time for a platform; it has the functions of FMI 2.0 and 3.0 and reads its model.
+    """Return the compiled run-time for a platform, which reads its model.
+
+    It has the functions of FMI 2.0 and 3.0 and those of native.c; for a browser the latter only.
 
     A library belongs to its sources by a checksum in its name. The package's own one is taken, or one that was built
     before; else it is built and kept in the user's cache.
 
     Args:
-        platform: a key of `PLATFORMS`.
+        platform: a key of `RUNTIMES`.
         report: called with what is being done, where it takes time.
 
     Raises:
@@ -53,13 +58,13 @@ def build_runtime(platform: str, folder: Path) -> Path:
     """Compile the run-time for a platform into a folder; a library that others may be reading is replaced at once."""
     library = folder / _library_name(platform)
     with TemporaryDirectory(prefix="modelica_like_") as place:
-        write_bytes(library, build(runtime_sources(_FACES), platform, Path(place)).read_bytes())
+        write_bytes(library, build(runtime_sources(_faces(platform)), platform, Path(place)).read_bytes())
     return library
 
 
 def _library_name(platform: str) -> str:
-    total = hashlib.sha256(repr((own_sources(_FACES), FLAGS)).encode()).hexdigest()
-    return f"runtime-{total[:16]}{PLATFORMS[platform].suffix}"
+    total = hashlib.sha256(repr((own_sources(_faces(platform)), flags(platform))).encode()).hexdigest()
+    return f"runtime-{total[:16]}{RUNTIMES[platform].suffix}"
 
 
 def cache_folder() -> Path:

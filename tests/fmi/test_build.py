@@ -62,7 +62,8 @@ def test_a_wrong_compiler_is_told(monkeypatch, tmp_path):
 def test_an_unknown_platform_is_told(tmp_path):
     assert told(UnknownName, lambda: build(TINY, "x86_64-linus", tmp_path)) == (
         "There is no platform 'x86_64-linus'; did you mean 'x86_64-linux'?\n"
-        "There are x86_64-linux, aarch64-linux, x86_64-windows, aarch64-windows, x86_64-darwin, aarch64-darwin."
+        "There are x86_64-linux, aarch64-linux, x86_64-windows, aarch64-windows, x86_64-darwin, aarch64-darwin, "
+        "wasm32."
     )
 
 

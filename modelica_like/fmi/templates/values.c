@@ -138,8 +138,8 @@ static Result set_parameter(Instance *c, const Variable *v, double value) {
     if (v->tunable && s->phase == PHASE_CONTINUOUS)
         return refuse_value(c, v, "tunable parameters change in event mode only.");
     if (value < low || value > high)
-        return report(c, LOG_ERROR, RESULT_ERROR, "%s = %g is out of range: it must be between %g and %g.",
-            text_of(m, v->name), value, low, high);
+        return report(c, LOG_ERROR, RESULT_ERROR, "%s = %g is out of range: it must be at %s %g.", text_of(m, v->name),
+            value, value < low ? "least" : "most", value < low ? low : high);
     if (c->p[v->index] != value) touch(c);
     if (c->p[v->index] != value && !before_start(s) && !c->work.tuned[v->index]) {
         c->work.tuned[v->index] = 1;

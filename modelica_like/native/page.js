@@ -1,0 +1,338 @@
+"use strict";
+/* A drive as a page. PAGE (see page.py) has the compiled run-time, the model, what can be set and what can be shown. */
+const PAGE = JSON.parse(document.getElementById("page").textContent);
+const MODES = PAGE.modes.filter((one) => one.names); // the others are discrete values
+const OK = 0, FAILED = 1, MORE = 2, MOST_MARKS = 40; // more events are not marked
+const BREATH = 1000, PATIENCE = 40; // steps between two looks at the clock; ms until the page answers again
+const at = (id) => document.getElementById(id);
+const escaped = (text) => text.replace(/[&<>"]/g, (letter) => `&#${letter.charCodeAt(0)};`);
+
+async function bytes(text) {
+  const packed = new Blob([Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0))]);
+  const stream = packed.stream().pipeThrough(new DecompressionStream("gzip"));
+  return new Uint8Array(await new Response(stream).arrayBuffer());
+}
+
+/* ---- the compiled run-time: native.c tells what its functions do ---- */
+
+class Drive {
+  constructor(library, file) {
+    [this.c, this.places] = [library, {}];
+    library._initialize();
+    const why = this.room("message", PAGE.message_length);
+    const model = library.native_open(this.put("file", file), file.length, why);
+    this.handle = model === 0 ? 0 : library.native_new(model);
+    if (this.handle === 0) throw new Error(model === 0 ? this.text(why) : "There is not enough memory.");
+    this.run = this.room("run", PAGE.layout.size);
+  }
+
+  /* Returns the address of room that is kept by a name, and grows. */
+  room(name, size) {
+    this.places[name] = this.c.realloc(this.places[name] ?? 0, Math.max(size, 8));
+    if (this.places[name] === 0) throw new Error("There is not enough memory.");
+    return this.places[name];
+  }
+
+  put(name, numbers) {
+    const place = this.room(name, numbers.byteLength);
+    new numbers.constructor(this.c.memory.buffer, place, numbers.length).set(numbers);
+    return place;
+  }
+
+  text(place) {
+    const found = new Uint8Array(this.c.memory.buffer, place, PAGE.message_length);
+    return new TextDecoder().decode(found.slice(0, found.indexOf(0)));
+  }
+
+  field(name, value) {
+    const view = new DataView(this.c.memory.buffer, this.run), place = PAGE.layout[name];
+    if (value !== undefined) view.setInt32(place, value, true);
+    return view.getInt32(place, true);
+  }
+
+  /* Runs with [reference, SI value] pairs. Returns what was written, with a message where it could not go on, or null
+   * where it is no longer wanted. */
+  async simulate(values, references, until, wanted) {
+    const widths = { points: { times: 1, outputs: references.length }, events: { events: 7 } };
+    const rooms = { points: PAGE.points + 64, events: 64 };
+    new Uint8Array(this.c.memory.buffer, this.run, PAGE.layout.size).fill(0);
+    const fields = { n_outputs: references.length, steps: BREATH };
+    fields.references = this.put("references", Uint32Array.from(references));
+    for (const name in fields) this.field(name, fields[name]);
+    this.make(widths, rooms);
+    let code = this.begin(values, until), message = "", clock = performance.now();
+    for (let go = code === OK; go; go = code === MORE && message === "") {
+      code = this.c.native_run(this.handle, until, BigInt(PAGE.points), this.run);
+      if (this.field("n_events") > PAGE.most_events) message = `There were more than ${PAGE.most_events} events.`;
+      if (code !== MORE) break;
+      for (const counted in rooms) if (2 * this.field(`n_${counted}`) >= rooms[counted]) rooms[counted] *= 2;
+      this.make(widths, rooms);
+      if (performance.now() - clock < PATIENCE) continue;
+      await new Promise((later) => setTimeout(later));
+      if (!wanted()) return null;
+      clock = performance.now();
+    }
+    if (code === FAILED) message = this.text(this.c.native_message(this.handle));
+    return this.written(widths, rooms, message);
+  }
+
+  make(widths, rooms) {
+    for (const [counted, arrays] of Object.entries(widths)) {
+      this.field(`room_${counted}`, rooms[counted]);
+      for (const name in arrays) this.field(name, this.room(name, 8 * arrays[name] * rooms[counted]));
+    }
+  }
+
+  begin(values, until) {
+    const c = this.c, references = this.put("set", Uint32Array.from(values, (pair) => pair[0]));
+    const numbers = this.put("numbers", Float64Array.from(values, (pair) => pair[1]));
+    return c.native_reset(this.handle, 0, until, PAGE.rtol, PAGE.atol) ||
+      c.native_set(this.handle, BigInt(values.length), references, numbers) || c.native_begin(this.handle);
+  }
+
+  written(widths, rooms, message) {
+    const counts = this.room("counts", 32), found = { message };
+    const read = (place, size) => new Float64Array(this.c.memory.buffer, place, size).slice();
+    for (const [counted, arrays] of Object.entries(widths))
+      for (const name in arrays)
+        found[name] = read(this.places[name], arrays[name] * Math.min(this.field(`n_${counted}`), rooms[counted]));
+    this.c.native_counts(this.handle, counts);
+    return Object.assign(found, { steps: read(counts, 1)[0] });
+  }
+}
+
+/* ---- controls: values are in the shown unit, positions from 0 to 1 ---- */
+
+function element(tag, properties, ...children) {
+  const made = Object.assign(document.createElement(tag), properties);
+  made.append(...children);
+  return made;
+}
+
+function grouped(list, key) {
+  const groups = new Map();
+  for (const one of list) groups.set(key(one), [...(groups.get(key(one)) ?? []), one]);
+  return groups;
+}
+
+function short(value, digits = 5) {
+  const size = Math.abs(value), plain = size === 0 || (size < 1e6 && size >= 1e-4);
+  return plain ? String(Number(value.toPrecision(digits))) : value.toExponential(digits - 2).replace(/\.?0+e/, "e");
+}
+
+const valueAt = (one, p) => one.log ? one.low * (one.high / one.low) ** p : one.low + p * (one.high - one.low);
+const positionOf = (one, value) =>
+  one.log ? Math.log(value / one.low) / Math.log(one.high / one.low) : (value - one.low) / (one.high - one.low);
+
+function control(one) {
+  const range = element("input", { type: "range", min: 0, max: 1, step: "any", ariaLabel: one.name });
+  const number = element("input", { type: "number", step: "any", ariaLabel: `${one.name} in ${one.unit}` });
+  const title = [one.name, one.description].filter(Boolean).join(": ");
+  const label = element("label", { title }, one.name.slice(one.group ? one.group.length + 1 : 0));
+  const row = element("div", { className: "control" }, label, number, element("span", {}, one.unit), range);
+  one.put = (value, from) => {
+    one.now = value;
+    if (from !== range) range.value = positionOf(one, value);
+    if (from !== number) number.value = short(value, 7);
+    row.classList.toggle("changed", value !== one.value);
+    ask();
+  };
+  range.oninput = () => one.put(Number(valueAt(one, range.valueAsNumber).toPrecision(5)), range);
+  range.ondblclick = () => one.put(one.value);
+  number.oninput = () => number.value === "" || one.put(number.valueAsNumber, number);
+  one.put(one.value);
+  return row;
+}
+
+/* The drive's own parameters stand open; those of parts under the parts' names. */
+function controls() {
+  const panel = at("top").parentNode, groups = grouped(PAGE.sliders, (one) => one.group);
+  panel.append(...groups.get("").map(control));
+  groups.delete("");
+  for (const [name, members] of groups)
+    panel.append(element("details", { open: groups.size < 3 }, element("summary", {}, name), ...members.map(control)));
+}
+
+/* ---- pictures ---- */
+
+const LEFT = 58, RIGHT = 14, TOP = 6, BOTTOM = 20, HEIGHT = 165, ROW = 36, COLOURS = 7;
+
+function ticks(low, high, count) {
+  const raw = (high - low) / count, power = 10 ** Math.floor(Math.log10(raw));
+  const step = power * [1, 2, 5, 10].find((k) => k * power >= raw * (1 - 1e-9));
+  const first = Math.ceil(low / step - 1e-9), length = Math.floor(high / step + 1e-9) - first + 1;
+  return Array.from({ length }, (_, k) => Number(((first + k) * step).toPrecision(12)));
+}
+
+/* What a run has for a variable, in its shown unit. */
+function values(result, variable) {
+  const width = asked.length, column = asked.indexOf(variable.reference), unit = PAGE.units[variable.unit];
+  return result.times.map((_, k) => (result.outputs[k * width + column] - unit.offset) / unit.factor);
+}
+
+function range(curves) {
+  let [low, high] = [Infinity, -Infinity];
+  for (const curve of curves)
+    for (const value of curve) if (Number.isFinite(value)) [low, high] = [Math.min(low, value), Math.max(high, value)];
+  return low <= high ? [low, high] : [0, 1];
+}
+
+class Picture {
+  constructor(result, original) {
+    Object.assign(this, { result, original, times: result.times, end: until.now, width: at("curves").clientWidth });
+    this.x = (t) => LEFT + (t / this.end) * (this.width - LEFT - RIGHT);
+    const instants = new Map();
+    for (let k = 0; k < result.events.length; k += 7) {
+      const mode = PAGE.modes[result.events[k + 2]];
+      if (mode) instants.set(result.events[k], `${mode.name}: ${mode.names[result.events[k + 4]]}`);
+    }
+    this.instants = [...instants];
+    this.draw();
+  }
+
+  svg(height, inside) {
+    const upright = (t, kind) =>
+      `<line class="${kind}" x1="${this.x(t)}" x2="${this.x(t)}" y1="${TOP}" y2="${height - BOTTOM}"/>`;
+    const steps = ticks(0, this.end, this.width / 110).map((t) => upright(t, "grid") +
+      `<text x="${this.x(t)}" y="${height - 6}" text-anchor="${t === 0 ? "start" : "middle"}">${short(t)} s</text>`);
+    const marks = this.instants.length > MOST_MARKS ? [] : this.instants.map(([t]) => upright(t, "event"));
+    const all = [...steps, ...marks, inside, upright(0, "cursor")].join("");
+    return `<svg viewBox="0 0 ${this.width} ${height}">${all}</svg>`;
+  }
+
+  path(times, curve, y, attributes) {
+    let line = "", pen = "M";
+    for (let k = 0; k < times.length && times[k] <= this.end; k++) {
+      if (Number.isFinite(curve[k])) line += `${pen}${this.x(times[k]).toFixed(1)} ${y(curve[k]).toFixed(1)}`;
+      pen = Number.isFinite(curve[k]) ? "L" : "M";
+    }
+    return `<path d="${line}" ${attributes}/>`;
+  }
+
+  panel(variables) {
+    const unit = PAGE.units[variables[0].unit], stroke = (k) => `stroke="var(--c${k % COLOURS})"`;
+    const curves = variables.map((one) => values(this.result, one));
+    const before = this.original === null ? [] : variables.map((one) => values(this.original, one));
+    let [low, high] = range([...curves, ...before]);
+    const margin = 0.05 * (high - low) || 0.1 * Math.abs(high) || 1;
+    [low, high] = [low - margin, high + margin];
+    const y = (value) => TOP + ((high - value) / (high - low)) * (HEIGHT - TOP - BOTTOM);
+    const grid = ticks(low, high, 5).map((value) =>
+      `<line class="grid" x1="${LEFT}" x2="${this.width - RIGHT}" y1="${y(value)}" y2="${y(value)}"/>` +
+      `<text x="${LEFT - 6}" y="${y(value) + 4}" text-anchor="end">${short(value)}</text>`);
+    const paths = [...before.map((one, k) => this.path(this.original.times, one, y, `class="before" ${stroke(k)}`)),
+      ...curves.map((one, k) => this.path(this.times, one, y, `class="${k < COLOURS ? "" : "more"}" ${stroke(k)}`))];
+    const legend = variables.map((one, k) => {
+      const value = element("b"), mark = element("i");
+      mark.style.background = `var(--c${k % COLOURS})`;
+      this.readers.push((n) => value.textContent = n === null ? "" : `\u2002${short(curves[k][n])}`);
+      const about = { title: `${one.description || one.name}; a click takes it away` };
+      about.onclick = () => (shown.delete(one), ask());
+      return element("button", about, mark, one.name, value);
+    });
+    const title = element("span", {}, [unit.quantity, unit.text].filter(Boolean).join(" in "));
+    const made = element("figure", { innerHTML: this.svg(HEIGHT, grid.join("") + paths.join("")) });
+    made.prepend(element("figcaption", {}, title, ...legend));
+    return made;
+  }
+
+  /* Modes as bands, one row each. */
+  bands() {
+    const rows = MODES.map((mode, row) => {
+      const curve = values(this.result, mode), top = TOP + row * ROW + 14;
+      let pieces = "", first = 0;
+      for (let k = 1; k < curve.length; k++) {
+        const [x, next] = [this.x(this.times[first]), this.x(this.times[k])], last = k + 1 === curve.length;
+        if (!last && (curve[k] === curve[first] || next - x < 0.4)) continue;
+        const name = escaped(mode.names[curve[first]]), colour = `var(--c${curve[first] % COLOURS})`;
+        pieces += `<rect class="band" x="${x}" y="${top}" width="${next - x}" height="18" fill="${colour}"/>`;
+        if (next - x > 7 * name.length) pieces += `<text class="name" x="${x + 4}" y="${top + 13}">${name}</text>`;
+        first = k;
+      }
+      this.modes.push((n) => `${mode.name} ${mode.names[curve[n]]}`);
+      return `<text x="${LEFT}" y="${top - 3}">${escaped(mode.name)}</text>${pieces}`;
+    });
+    return element("figure", { innerHTML: rows.length && this.svg(TOP + BOTTOM + rows.length * ROW, rows.join("")) });
+  }
+
+  draw() {
+    [this.readers, this.modes] = [[], []];
+    const figures = [...grouped(shown, (one) => one.unit).values()].map((one) => this.panel(one));
+    at("curves").replaceChildren(...figures, this.bands());
+  }
+
+  /* Values at a place of the pointer in the page; null: it has left. */
+  read(place) {
+    const left = at("curves").getBoundingClientRect().left;
+    const t = place === null ? NaN : ((place - left - LEFT) / (this.width - LEFT - RIGHT)) * this.end;
+    let n = t >= 0 && t <= this.times.at(-1) ? this.times.findIndex((one) => one >= t) : null;
+    if (n > 0 && t - this.times[n - 1] < this.times[n] - t) n -= 1;
+    this.readers.forEach((one) => one(n));
+    const x = n === null ? 0 : this.x(this.times[n]);
+    at("curves").style = `--x: ${x - LEFT}px; --cursor: ${n === null ? "hidden" : "visible"}`;
+    const near = n === null ? [] : this.instants.filter(([time]) => Math.abs(this.x(time) - x) < 3);
+    at("readout").textContent = n === null ? "" : [`t = ${short(this.times[n])} s`, ...this.modes.map((one) => one(n)),
+      ...near.slice(-1).map(([time, what]) => `event at ${short(time)} s: ${what}`)].join(" · ");
+  }
+}
+
+/* ---- what is asked for, and what comes ---- */
+
+const until = PAGE.sliders.find((one) => one.reference === null);
+const shown = new Set(PAGE.variables.filter((one) => one.shown));
+let drive = null, picture = null, original = null, asked = [], turn = 0, waiting = false;
+
+function ask() {
+  turn += 1;
+  if (drive === null || waiting) return;
+  waiting = true;
+  requestAnimationFrame(() => (waiting = false, update().catch(tell)));
+}
+
+const tell = (error) => at("said").textContent = `The page has failed: ${error.message}`;
+
+async function update() {
+  const mine = turn, wanted = () => mine === turn, begin = performance.now();
+  const references = [...shown, ...MODES].map((one) => one.reference);
+  const changed = PAGE.sliders.filter((one) => one.reference !== null && one.now !== one.value);
+  if (references.join() !== asked.join()) original = null;
+  const given = changed.map((one) => [one.reference, one.now * one.factor + one.offset]);
+  const result = await drive.simulate(given, references, until.now, wanted);
+  if (result === null) return;
+  const computed = performance.now();
+  asked = references;
+  if (original === null) original = changed.length ? await drive.simulate([], references, PAGE.until, wanted) : result;
+  if (!wanted()) return;
+  at("said").textContent = result.message;
+  at("curves").classList.toggle("stale", result.times.length < 2);
+  if (result.times.length >= 2) picture = new Picture(result, changed.length ? original : null);
+  const events = result.events.length / 7, drawn = performance.now();
+  at("status").textContent = `${result.steps} steps, ${events} mode change${events === 1 ? "" : "s"}; the run took ` +
+    `${(computed - begin).toFixed(1)} ms, the picture ${(drawn - computed).toFixed(1)} ms. Made by ${PAGE.tool}.`;
+  Object.assign(at("status").dataset, { turn: mine, run: computed - begin, draw: drawn - computed });
+}
+
+async function begin() {
+  const { instance } = await WebAssembly.instantiate(await bytes(PAGE.runtime), {});
+  drive = new Drive(instance.exports, await bytes(PAGE.model));
+  ask();
+}
+
+function listen() {
+  at("names").append(...PAGE.variables.map((one) => element("option", { value: one.name })));
+  at("add").onchange = () => {
+    const found = PAGE.variables.find((one) => one.name === at("add").value);
+    if (found === undefined) return;
+    at("add").value = "";
+    shown.add(found);
+    ask();
+  };
+  at("reset").onclick = () => PAGE.sliders.forEach((one) => one.put(one.value));
+  at("curves").onpointermove = (event) => picture?.read(event.clientX);
+  at("curves").onpointerleave = () => picture?.read(null);
+  new ResizeObserver(() => picture && picture.width !== at("curves").clientWidth && ask()).observe(at("curves"));
+}
+
+controls();
+listen();
+begin().catch(tell);

@@ -1,0 +1,226 @@
+"""A drive as one page for a browser: the compiled run-time, the model, sliders and curves, without a server."""
+
+from __future__ import annotations
+
+import base64
+import ctypes
+import gzip
+import json
+import re
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from modelica_like.compile.compiled import CompiledDae
+from modelica_like.flatten.model import FlatParameter
+from modelica_like.fmi.build import BROWSER
+from modelica_like.fmi.export import Report, _compiled, _silent, _target, _tool
+from modelica_like.fmi.interface import FmuVariable, interface
+from modelica_like.fmi.model_file import model_file
+from modelica_like.fmi.runtime import runtime_library
+from modelica_like.fmi.tables import make_tables
+from modelica_like.native.library import MESSAGE_LENGTH, Run
+from modelica_like.simulation import Model, seconds, simulate
+from modelica_like.solve.options import Options
+from modelica_like.solve.plot import _QUANTITIES, chosen
+from modelica_like.units import ANY, ONE, Unit, coherent
+from modelica_like.writing import write_bytes
+
+_SPREAD = 5.0
+"""Sliders without bounds go from the value over this to the value times this."""
+_POINTER_SIZE = 4
+_HIGH = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+@dataclass(frozen=True)
+class Page:
+    """What was written.
+
+    Attributes:
+        path: the page.
+        sliders: how many parameters and inputs can be changed, besides the end time.
+        curves: how many curves are shown at first.
+        size: of the file in bytes.
+        seconds: how long it took.
+    """
+
+    path: Path
+    sliders: int
+    curves: int
+    size: int
+    seconds: float
+
+    def __str__(self) -> str:
+        counts = f"{self.sliders} sliders, {self.curves} curves"
+        return f"{self.path}: {counts}, {self.size / 1000:.0f} kB, {self.seconds:.1f} s"
+
+
+@dataclass(frozen=True)
+class _Slider:
+    """A value that the page changes, in the shown unit, from which SI values follow by factor and offset."""
+
+    name: str
+    group: str
+    reference: int | None
+    description: str
+    unit: str
+    factor: float
+    offset: float
+    value: float
+    low: float
+    high: float
+    log: bool
+
+
+def export_html(
+    drive: Model, path: str | Path, until: float | str | None = None, *, show: Sequence[str] = (),
+    report: Report = _silent,
+) -> Page:  # fmt: skip
+    """Write a drive as a page that simulates it in a browser: one file that asks for nothing else.
+
+    It has a slider for every tunable parameter and for every input without a value, and curves over time by unit, with
+    modes and events. Sliders go from min to max where both are declared, else from a fifth of the value to five times
+    it. The drive is run once by IDAS first, which chooses the curves.
+
+    Args:
+        drive: a component, a netlist file, or a compiled model.
+        path: the page to write, with the ending .html.
+        until: end time, a number in s or a quantity; by default what the netlist says.
+        show: patterns of what is drawn at first, such as `*.w`; by default speeds, torques and forces of the parts.
+        report: called with what is being done.
+
+    Raises:
+        ExportError: it cannot be exported, or the run-time cannot be compiled.
+        MissingExtra: the run-time must be compiled, and zig is not installed.
+        UnknownName: nothing fits a pattern.
+        ModelicaLikeError: something is wrong with the model, or it has no end time, or it cannot be simulated.
+    """
+    begin = time.perf_counter()
+    target = _target(path, ".html", "A page")
+    report("compiling the model")
+    model, description, _ = _compiled(drive, (), "flow")
+    report("simulating")
+    end = seconds(until if until is not None else model.settings.get("until"))
+    solution = simulate(model, end)
+    content = _content(model, chosen(solution, show), end, solution.options)
+    report("writing the page")
+    content["runtime"] = _text(runtime_library(BROWSER.name, report).read_bytes())
+    write_bytes(target, _page(model.name, description, content).encode())
+    shown = sum(one["shown"] for one in content["variables"])
+    size, elapsed = target.stat().st_size, time.perf_counter() - begin
+    return Page(target, len(content["sliders"]) - 1, shown, size, elapsed)
+
+
+def _page(name: str, description: str, content: dict[str, Any]) -> str:
+    folder = Path(__file__).parent
+    # No text inside may end the script.
+    data = json.dumps(content, ensure_ascii=False, separators=(",", ":")).replace("<", "\\u003c")
+    parts = {
+        "name": escape(name), "description": escape(description), "page": data,
+        "script": (folder / "page.js").read_text(encoding="utf-8").rstrip(),
+    }  # fmt: skip
+    page = (folder / "page.html").read_text(encoding="utf-8")
+    return re.sub(r"\{\{(\w+)\}\}", lambda found: parts[found[1]], page)
+
+
+def _content(model: CompiledDae, names: Sequence[str], until: float, options: Options) -> dict[str, Any]:
+    """Return what the script reads, but for the run-time."""
+    variables = interface(model)
+    end = _Slider("end time", "", None, "", "s", 1.0, 0.0, until, until / _SPREAD, until * _SPREAD, True)
+    units = _Units()
+    return {
+        "model": _text(model_file(make_tables(model), variables.variables, "{page}", options.rtol)),
+        "layout": _layout(), "message_length": MESSAGE_LENGTH, "tool": _tool(), "until": until,
+        "rtol": options.rtol, "atol": options.atol, "points": options.points, "most_events": options.max_events,
+        "sliders": [asdict(end), *(asdict(one) for one in _sliders(model, variables.by_name))],
+        "variables": list(_variables(model, variables.by_name, set(names), units)),
+        "modes": [
+            {
+                "name": one.path, "reference": variables.by_name[one.path].reference, "names": one.names or None,
+                "unit": units.number(ONE),
+            }
+            for one in model.flat_discretes
+        ],
+        "units": units.rows,
+    }  # fmt: skip
+
+
+def _text(data: bytes) -> str:
+    return base64.b64encode(gzip.compress(data, mtime=0)).decode()
+
+
+def _layout() -> dict[str, int]:
+    """Places of the fields of `NativeRun` where pointers have four bytes."""
+    places: dict[str, int] = {}
+    place = 0
+    for field in Run._fields_:
+        size = _POINTER_SIZE if field[1] is ctypes.c_void_p else ctypes.sizeof(field[1])
+        places[field[0]] = place + -place % size
+        place = places[field[0]] + size
+    return places | {"size": place}
+
+
+class _Units:
+    """Shown units, each once."""
+
+    def __init__(self) -> None:
+        self.rows: list[dict[str, Any]] = []
+        self._numbers: dict[Unit, int] = {}
+
+    def number(self, unit: Unit) -> int:
+        """Return the position of a unit."""
+        if unit not in self._numbers:
+            self._numbers[unit] = len(self.rows)
+            quantity = _QUANTITIES.get(str(coherent(unit)), "value")
+            row = {"text": _spelled(unit), "factor": unit.factor, "offset": unit.offset, "quantity": quantity}
+            self.rows.append(row)
+        return self._numbers[unit]
+
+
+def _spelled(unit: Unit) -> str:
+    """Write a unit as it is printed: `kg·m²`."""
+    if unit in (ONE, ANY):
+        return ""
+    text = "°" if str(unit) == "deg" else str(unit).replace(".", "·")
+    return re.sub(r"(?<=[A-Za-z])\d+", lambda found: found[0].translate(_HIGH), text)
+
+
+def _variables(
+    model: CompiledDae, known: dict[str, FmuVariable], names: set[str], units: _Units
+) -> Iterator[dict[str, Any]]:
+    for one in model.flat_variables:
+        if one.path in known and (one.path in names or one.kind in ("local", "output")):
+            yield {
+                "name": one.path, "reference": known[one.path].reference, "description": one.description,
+                "unit": units.number(one.unit), "shown": one.path in names,
+            }  # fmt: skip
+
+
+def _sliders(model: CompiledDae, known: dict[str, FmuVariable]) -> Iterator[_Slider]:
+    inputs = (model.flat_variables[k] for k in model.inputs)
+    for one in (*model.flat_parameters, *inputs):
+        if isinstance(one, FlatParameter) and not one.tunable:
+            continue
+        about, unit = known[one.path], one.unit
+        value, low, high = (
+            None if si is None else (si - unit.offset) / unit.factor for si in (about.start, one.min, one.max)
+        )
+        yield _Slider(
+            one.path, one.path.rpartition(".")[0], about.reference, one.description, _spelled(unit), unit.factor,
+            unit.offset, value or 0.0, *_span(value or 0.0, low, high),
+        )  # fmt: skip
+
+
+def _span(value: float, low: float | None, high: float | None) -> tuple[float, float, bool]:
+    """Return where a slider begins and ends, and whether in equal ratios."""
+    if low is not None and high is not None:
+        return low, high, False
+    first, last = sorted((value / _SPREAD, value * _SPREAD)) if value else (-1.0, 1.0)
+    if low is not None:
+        first = max(first, low)
+    if high is not None:
+        last = min(last, high)
+    return first, last, first * last > 0.0
