@@ -28,7 +28,7 @@ def press(self, reached, *of):
     if reached >= moment and not pressed:
         pressed.append(reached)
         os.killpg(os.getpgrp(), signal.SIGINT)
-progress.Bar.__call__ = progress.RunsBar.__call__ = press
+progress.Bar.__call__ = press
 from modelica_like.cli import main
 main()
 """
