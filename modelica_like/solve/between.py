@@ -59,12 +59,17 @@ class Between:
         return self._pieces[-1]
 
     def fill(self, *, precisely: bool = True) -> None:
-        """Fill in all results; not `precisely`, nothing is integrated again.
+        """Fill in all results; not `precisely`, nothing is integrated again, and what is not known becomes nan.
 
         Raises:
             StepFailed: where interpolation is not precise, IDAS gave up.
         """
-        self._fill(self._pieces, 0 if precisely else _DEEPEST)
+        if precisely:
+            self._fill(self._pieces, 0)
+        elif self._pieces:
+            for number, k in interpolate(self._integrator, self._pieces):
+                piece = self._pieces[number]
+                piece.x[:, piece.looks.intervals(piece.times) == k] = np.nan
         self._pieces = []
 
     def _fill(self, pieces: list[Piece], depth: int) -> None:

@@ -114,8 +114,11 @@ class Recorder:
             self._open = []
 
     def build(self) -> None:
-        """Put together the segments that have ended."""
+        """Put together the segments that have ended, of points that are known."""
         for parts, d in self._closed:
             times, x, z = (np.concatenate(part, axis=-1) for part in zip(*parts, strict=True))
+            known = ~np.isnan(x).any(axis=0)
+            if not known.all():
+                times, x, z = times[known], x[:, known], z[:, known]
             self.segments.append(Segment(times, x, z, d))
         self._closed = []
