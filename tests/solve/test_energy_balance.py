@@ -83,7 +83,8 @@ def test_a_drive_that_idas_gives_up_at_a_higher_precision_has_a_balance(tmp_path
     for points in (1, 500):
         balance = simulate(load(file), points=points).energy()
         assert balance["gear"].lost == pytest.approx(0.1545424, rel=1e-5)
-        assert balance.notices == ()
+        # What is told is at most how much the run itself drifts.
+        assert all("drifts" in notice for notice in balance.notices)
 
 
 @pytest.mark.parametrize("points", [1, 3, 500])
@@ -98,7 +99,11 @@ def test_powers_along_straight_lines_are_no_straight_lines(points: int) -> None:
 def test_a_power_that_is_over_at_once_does_not_widen_tolerances() -> None:
     """Contacts begin with 250 N.s/m: their power lasts a microsecond, the first interval of results 0.2 s."""
     run = simulate(load(EXAMPLES / "msl/translational/PreLoad.toml"))
-    assert run.energy().drift <= 10 * run.options.rtol
+    work = powers.Powers(run.model, run.options, len(run.time))
+    for every in powers.results(run.model, run.segments):
+        work.integrals(every)
+    # 250 N.s/m for 0.2 s would be a hundred times as much.
+    assert work.moved < 10 * run.energy().throughput
 
 
 def test_a_drift_that_adds_up_is_told() -> None:
