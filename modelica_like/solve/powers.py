@@ -38,6 +38,8 @@ _FEW = 4
 """Intervals of a smooth piece up to which slopes of the powers are taken."""
 _BESIDE = np.array([[1 / 2, 1 / 2], [2 / 3, 1 / 3], [1 / 2, 1 / 2]])
 """Weights of the powers at both ends of an interval, beside slopes at both and at the first, and without any."""
+_NOTHING = 1e-15
+"""Energy, in J, below which nothing moves: what is left at rest is rounding, and no rule follows it."""
 _CLOSE = 0.1
 """Distance of two results, as part of the next one, up to which one of them is left out."""
 
@@ -118,7 +120,7 @@ class Powers:
     def __init__(self, model: CompiledDae, options: Options, count: int) -> None:
         self.model, self.options = model, options
         self._share = min(_SHARE, _ALL / count)
-        self.stored, self.moved = 0.0, 0.0
+        self.stored, self.moved = 0.0, _NOTHING
 
     def integrals(self, every: Results) -> Vector:
         """Integrate all powers over some results; shape (4, components), in J."""
@@ -237,7 +239,7 @@ class _Work(Integrator):
         rtol = min(options.rtol, max(finer * options.rtol, _FINEST))
         super().__init__(model, replace(options, rtol=rtol, atol=options.atol * rtol / options.rtol))
         # IDAS has one absolute tolerance for all.
-        self._scale = self._settings(1, False, 1.0)["abstol"] / (rtol * (moved or 1.0))
+        self._scale = self._settings(1, False, 1.0)["abstol"] / (rtol * moved)
         self._tail = np.concatenate([[self._scale], self._tail])
 
     def over(self, start: Point, span: float) -> Vector | None:
