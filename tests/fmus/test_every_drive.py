@@ -12,6 +12,7 @@ import fmpy
 import pytest
 
 from modelica_like import build, simulate
+from modelica_like.compile.soon import TIME_RESOLUTION
 from modelica_like.fmi.validate import validate_fmu
 from modelica_like.initialize import initialize
 
@@ -93,9 +94,9 @@ def test_starts_in_the_states_and_modes_of_a_simulation(
     # Before its events the mode of two parts at the same speed hangs on the last bit of that speed.
     (fmu.newDiscreteStates if version == "2.0" else fmu.updateDiscreteStates)()
     settled = (fmu.getInteger if version == "2.0" else fmu.getInt64)([references[path] for path in modes])
-    assert {path: names[m] for (path, names), m in zip(modes.items(), settled, strict=True)} == {
-        path: names[int(run[path][run.time == 0.0][-1])] for path, names in modes.items()
-    }
+    for (path, names), mode in zip(modes.items(), settled, strict=True):
+        # Events that are closer are at one instant in one of the two, and follow each other in the other.
+        assert names[mode] in {names[int(k)] for k in run[path][run.time <= TIME_RESOLUTION]}, path
     fmu.terminate()
     fmu.freeInstance()
 
