@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from modelica_like.compile.compiled import Vector
+from modelica_like.errors import StepFailed
 from modelica_like.solve.idas import Integrator
 from modelica_like.solve.looks import EXPONENTS, PRECISE, SCHEMES, Looks
 
@@ -59,7 +60,7 @@ class Between:
         return self._pieces[-1]
 
     def fill(self, *, precisely: bool = True) -> None:
-        """Fill in all results; not `precisely`, nothing is integrated again, and what is not known becomes nan.
+        """Fill in all results; not `precisely`, those that IDAS does not reach a second time become nan.
 
         Raises:
             StepFailed: where interpolation is not precise, IDAS gave up.
@@ -69,7 +70,12 @@ class Between:
         elif self._pieces:
             for number, k in interpolate(self._integrator, self._pieces):
                 piece = self._pieces[number]
-                piece.x[:, piece.looks.intervals(piece.times) == k] = np.nan
+                try:
+                    _, those, part = self._part(piece, k)
+                    self._fill([part], 1)
+                    piece.x[:, those], piece.z[:, those] = part.x, part.z
+                except StepFailed:
+                    piece.x[:, piece.looks.intervals(piece.times) == k] = np.nan
         self._pieces = []
 
     def _fill(self, pieces: list[Piece], depth: int) -> None:
@@ -77,16 +83,18 @@ class Between:
             return
         parts: list[tuple[Piece, Any, Piece]] = []
         for number, k in interpolate(self._integrator, pieces) if depth < _DEEPEST else ():
-            whole = pieces[number]
-            those = whole.looks.intervals(whole.times) == k
-            looks = whole.looks.within(k) or self._closer(whole.looks, k)
-            part = Piece(looks, whole.times[those], looks.count, whole.x[:, those], whole.z[:, those])
-            parts.append((whole, those, part))
+            parts.append(self._part(pieces[number], k))
         if depth == _DEEPEST:
             interpolate(self._integrator, pieces)
         self._fill([part for *_, part in parts], depth + 1)
         for whole, those, part in parts:
             whole.x[:, those], whole.z[:, those] = part.x, part.z
+
+    def _part(self, whole: Piece, k: int) -> tuple[Piece, Any, Piece]:
+        """Return a piece, which of its results lie in interval k, and these with closer looks."""
+        those = whole.looks.intervals(whole.times) == k
+        looks = whole.looks.within(k) or self._closer(whole.looks, k)
+        return whole, those, Piece(looks, whole.times[those], looks.count, whole.x[:, those], whole.z[:, those])
 
 
 def interpolate(integrator: Integrator, pieces: list[Piece]) -> list[tuple[int, int]]:
