@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+import sksundae.cvode as sundae
 
 from modelica_like import simulate
 
-sundae: Any = pytest.importorskip("sksundae.cvode")
 DRIVES = [
     "machine_table_direct", "machine_table_geared", "machine_tool_startup", "ravigneaux", "lepelletier", "dc_bench",
     "stick_slip", "two_mass", "msl/rotational/CoupledClutches", "msl/rotational/LossyGearDemo1",

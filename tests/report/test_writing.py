@@ -11,7 +11,9 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
+import pyarrow.parquet as parquet
 import pytest
+import xarray
 
 from modelica_like import Solution, build, load, simulate
 from modelica_like.analyse.sweeps.sweep import sweep
@@ -253,7 +255,6 @@ def test_the_command_names_the_file(tmp_path: Path) -> None:
 
 
 def test_tables_by_their_ending(run: Solution, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    xarray = pytest.importorskip("xarray")
     write_solution(run, tmp_path / "run.nc")
     with xarray.open_dataset(tmp_path / "run.nc") as read:
         np.testing.assert_array_equal(read["J2.w"], run["J2.w"])
@@ -261,7 +262,6 @@ def test_tables_by_their_ending(run: Solution, tmp_path: Path, capsys: pytest.Ca
     write_solution(run, tmp_path / "run.csv")
     write_solution(run, Path("-"))
     assert capsys.readouterr().out == (tmp_path / "run.csv").read_bytes().decode()
-    parquet = pytest.importorskip("pyarrow.parquet")
     write_solution(run, tmp_path / "run.parquet")
     np.testing.assert_array_equal(parquet.read_table(tmp_path / "run.parquet")["J2.w"], run["J2.w"])
 
