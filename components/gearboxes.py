@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from components import icons
 from components.interfaces import Flange
 from components.lossy_gears import LossRows, LossyGear
 from components.springs import ElastoBacklash, SpringDamper
@@ -23,6 +24,7 @@ class Gearbox(Component):
     Modelica Standard Library, Rotational.Gearbox. The inertia of the input wheel belongs to the shaft at flange_a.
     """
 
+    icon = icons.GEARBOX
     flange_a = Flange("input shaft")
     flange_b = Flange("output shaft")
     support = Flange("housing", optional=True)

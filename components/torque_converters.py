@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from components import icons
 from components.interfaces import TwoFlanges
 from components.thermal import Lossy
 from modelica_like.language import (
@@ -40,6 +41,7 @@ class TorqueConverter(Lossy, TwoFlanges):
     With the torque ratio 1 throughout it is a hydrodynamic coupling. VDI 2153.
     """
 
+    icon = icons.CONVERTER
     capacity: Rows = rows(column("speed ratio", rising=True), column("capacity", scale="C_scale"))
     """Rows of speed ratio and capacity in C_scale, which should end with zero at the speed ratio 1."""
     torque_ratio: Rows = rows(
