@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from modelica_like.compile.compiled import CompiledDae
+    from modelica_like.solve.recorded import RecordedModel
 
 _QUANTITIES = {
     "rad/s": "speed", "N.m": "torque", "m/s": "velocity", "N": "force", "rad": "angle", "m": "position", "W": "power",
@@ -99,7 +100,7 @@ def chosen(solution: Trajectories, patterns: Sequence[str]) -> list[str]:
     return matching(solution.model, patterns) if patterns else _usual(solution)
 
 
-def matching(model: CompiledDae, patterns: Sequence[str]) -> list[str]:
+def matching(model: CompiledDae | RecordedModel, patterns: Sequence[str]) -> list[str]:
     """Return the variables and modes of a model that fit patterns, before it is run.
 
     Raises:

@@ -103,3 +103,11 @@ def test_a_signal_is_cut_at_its_output(tmp_path: Path) -> None:
     )
     run = cosim(split(drive, "wire", tmp_path, check=False).path, step=0.5)
     assert run["double.y"] == pytest.approx([6.0, 6.0, 6.0])
+
+
+def test_a_folder_that_cannot_be_written_is_told_before_anything_is_compiled(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("here already")
+    told: list[str] = []
+    with pytest.raises(NotADirectoryError):
+        split(EXAMPLES / "two_mass.toml", "shaft", tmp_path / "file", report=told.append)
+    assert told == []
