@@ -10,7 +10,7 @@ from modelica_like.cosimulation.causality import Takes, ends_of, open_ends, orie
 from modelica_like.cosimulation.cut import Cut, CutNetlist, cut_netlist
 from modelica_like.cosimulation.files import write_system
 from modelica_like.cosimulation.parts import Maker
-from modelica_like.cosimulation.system import POWERS, Bond, Link, Port, Settings, System, Unit
+from modelica_like.cosimulation.system import Bond, Link, Port, Settings, System, Unit
 from modelica_like.errors import DuplicateName, NetlistError
 from modelica_like.fmi.export import export_fmu
 from modelica_like.initialize import initialize
@@ -163,9 +163,9 @@ def _couplings(
             giver, taker = (moved, moving) if name == flow else (moving, moved)
             ends = [Port(titles[maker.found.group_of(end.path)], f"{end.adaptor}.{name}") for end in (giver, taker)]
             links.append(Link(f"{cut.name}_{name}", ends[0], (ends[1],)))
-        rate = next((rate for name, rate in POWERS if name == flow and rate in motions), None)
-        if rate is not None:
-            bonds.append(Bond(cut.name, f"{cut.name}_{flow}", f"{cut.name}_{rate}"))
+        terminal = maker.adaptor(moved)[0].terminal
+        if terminal and terminal.power:
+            bonds.append(Bond(cut.name, *(f"{cut.name}_{name}" for name in terminal.power)))
     return tuple(links), tuple(bonds)
 
 
