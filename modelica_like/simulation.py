@@ -18,7 +18,8 @@ from modelica_like.initialize import StartKind, initialize
 from modelica_like.language import Component
 from modelica_like.solve.events import EventLoop, Progress
 from modelica_like.solve.options import Options
-from modelica_like.solve.solution import Solution, Statistics
+from modelica_like.solve.solution import Solution
+from modelica_like.solve.trajectories import Statistics, Trajectories, needs_equations
 from modelica_like.structure import reduce
 from modelica_like.units import parse_unit, to_si
 
@@ -42,6 +43,8 @@ def build(drive: Model, free: Iterable[str] = ()) -> CompiledDae:
     """
     if isinstance(drive, CompiledDae):
         return drive
+    if isinstance(drive, Trajectories):
+        raise needs_equations(drive)
     if isinstance(drive, str | Path):
         from modelica_like.netlist import load
 
