@@ -17,9 +17,9 @@ import numpy as np
 
 from modelica_like.analyse.replay.jumps import Jump, Work, event_time, make_jump
 from modelica_like.analyse.replay.kinks import Kinks
-from modelica_like.analyse.replay.slopes import Sizes
-from modelica_like.analyse.replay.start import StartSlopes
+from modelica_like.analyse.replay.start import start_slopes
 from modelica_like.analyse.replay.steps import StepFunctions
+from modelica_like.analyse.slopes import Sizes
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import LanguageError, StepFailed, ValueOutOfRange
@@ -178,14 +178,14 @@ class _Maker:
         size = Sizes.of(self.model)
         t0 = float(self.solution.segments[0].times[0])
         point = initialize(self.model, t0, kind) if self.events[0] else self.solution.segments[0].start
-        begin = StartSlopes(self.model, point, kind)
-        whole = np.concatenate([begin.x, np.eye(size.fixed), begin.d])
+        begin_x, begin_d = start_slopes(self.model, point, kind)
+        whole = np.concatenate([begin_x, np.eye(size.fixed), begin_d])
         work = Work.at(self.model, point)
         work.share()
-        self.start_x, self.start_d = begin.x, work.d @ whole
+        self.start_x, self.start_d = begin_x, work.d @ whole
         if self.events[0]:
             jump = make_jump(self.model, point, tuple(self.events[0]), point, self.functions.integrands, first=True)
-            whole = np.concatenate([begin.x, np.eye(size.fixed), self.start_d])
+            whole = np.concatenate([begin_x, np.eye(size.fixed), self.start_d])
             self.start_x, self.start_d = jump.x @ whole, jump.d @ whole
             point = jump.after
         self.nodes.append(point)

@@ -9,8 +9,8 @@ import numpy as np
 
 from modelica_like.analyse.replay.chain import Replay
 from modelica_like.analyse.replay.jumps import Jump
-from modelica_like.analyse.replay.slopes import slopes
 from modelica_like.analyse.replay.sweeps import Reading
+from modelica_like.analyse.slopes import slopes
 from modelica_like.errors import NoGradient
 from modelica_like.solve.guards import Guards
 

@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 
 from modelica_like.analyse.replay.holds import impact, share_slopes
-from modelica_like.analyse.replay.slopes import _NONE, Sizes, slopes
+from modelica_like.analyse.slopes import _NONE, Sizes, slopes
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae, CompiledTransition
 from modelica_like.errors import NoGradient

@@ -9,7 +9,7 @@ import numpy as np
 
 from modelica_like.analyse.replay.chain import Replay, Step
 from modelica_like.analyse.replay.jumps import Jump
-from modelica_like.analyse.replay.slopes import Sizes
+from modelica_like.analyse.slopes import Sizes
 from modelica_like.compile.buffers import Vector
 
 _NONE = np.zeros(0)

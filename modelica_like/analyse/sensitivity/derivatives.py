@@ -10,10 +10,10 @@ import numpy as np
 
 from modelica_like.analyse.replay.chain import Replay, Tolerances, replay
 from modelica_like.analyse.replay.edges import edges
-from modelica_like.analyse.replay.slopes import Sizes
 from modelica_like.analyse.replay.sweeps import adjoint, forward
 from modelica_like.analyse.sensitivity.formulas import Freed, bound_by_formula, equal_to, free_formulas
 from modelica_like.analyse.sensitivity.outputs import Output, listed, quadratures, read_off, read_output, value_at
+from modelica_like.analyse.slopes import Sizes
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import LanguageError, UnknownName, did_you_mean, missing_extra

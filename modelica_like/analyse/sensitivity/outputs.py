@@ -11,9 +11,9 @@ import casadi as ca
 import numpy as np
 
 from modelica_like.analyse.replay.chain import Replay, Step
-from modelica_like.analyse.replay.slopes import slopes
 from modelica_like.analyse.replay.sweeps import Reading
 from modelica_like.analyse.sensitivity.peaks import peak
+from modelica_like.analyse.slopes import slopes
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import NoGradient, UnknownName, ValueOutOfRange, did_you_mean
 from modelica_like.solve.recorder import Event

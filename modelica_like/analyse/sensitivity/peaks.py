@@ -11,7 +11,7 @@ import numpy as np
 
 from modelica_like.analyse.replay.chain import Replay, Step
 from modelica_like.analyse.replay.jumps import Jump
-from modelica_like.analyse.replay.slopes import slopes
+from modelica_like.analyse.slopes import slopes
 from modelica_like.compile.buffers import Vector, buffered
 from modelica_like.initialize import Point
 
