@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from threading import get_ident
@@ -62,6 +62,11 @@ class Slopes:
     theta: Vector
 
     @cached_property
+    def by(self) -> Vector:
+        """Derivatives by (x, theta), shape (rows, nx + ntheta)."""
+        return np.hstack([self.x, self.theta])
+
+    @cached_property
     def rate(self) -> Vector:
         """Change over time along the motion, shape (rows,)."""
         return self.t + self.x @ slopes(self.model, self.point, "ode").value
@@ -88,18 +93,29 @@ class _Partials:
 
 
 def slopes(
-    model: CompiledDae, point: Point, name: str, expression: Callable[..., Any] | None = None, constants: Vector = _NONE
-) -> Slopes:
+    model: CompiledDae, point: Point, name: str, rows: Sequence[int] | None = None,
+    expression: Callable[..., Any] | None = None, constants: Vector = _NONE,
+) -> Slopes:  # fmt: skip
     """Differentiate a function of the model.
 
     Args:
         model: the compiled model.
         point: where.
         name: name of one of its functions, or of `expression` in the cache.
+        rows: which results of the function; by default all.
         expression: makes an SX column in the model's arguments, of the symbols of `constants` if there are some.
         constants: numbers in the expression that are not differentiated.
     """
-    value, x, z, t, theta = _partials(model, name, expression, len(constants))(model, point, constants)
+
+    def make() -> _Partials:
+        numbers = ca.SX.sym("constants", len(constants))
+        given = [numbers] if len(constants) else []
+        value = getattr(model, name)(*model.arguments.values()) if expression is None else expression(*given)
+        return _Partials(model, value if rows is None else value[list(rows)], numbers)
+
+    chosen = None if rows is None else tuple(rows)
+    partials = model.once(("slopes of", name, chosen, get_ident()), make)
+    value, x, z, t, theta = partials(model, point, constants)
     if np.any(z):
         z_x, z_t, z_theta = implicit_slopes(model, point)
         x, t, theta = x + z @ z_x, t + z @ z_t, theta + z @ z_theta
@@ -108,15 +124,11 @@ def slopes(
 
 def implicit_slopes(model: CompiledDae, point: Point) -> tuple[Vector, Vector, Vector]:
     """Derivatives of z by x, t and theta; shapes (nz, nx), (nz, 1), (nz, ntheta)."""
-    _, x, z, t, theta = _partials(model, "alg", None, 0)(model, point)
+    make = lambda: _Partials(model, model.alg(*model.arguments.values()), ca.SX(0, 1))  # noqa: E731
+    _, x, z, t, theta = model.once(("slopes of z", get_ident()), make)(model, point)
     solved = np.asarray(-np.linalg.solve(z, np.hstack([x, t, theta])), np.float64)
     columns = x.shape[1]
     return solved[:, :columns], solved[:, columns : columns + 1], solved[:, columns + 1 :]
-
-
-def slopes_of_variables(model: CompiledDae, point: Point, nodes: list[int]) -> Slopes:
-    """Differentiate some variables of the model, given by their positions."""
-    return slopes(model, point, f"variables {nodes}", lambda: model.variables(*model.arguments.values())[nodes])
 
 
 def nodes_of(model: CompiledDae, names: Iterable[str]) -> list[int]:
@@ -157,18 +169,8 @@ def steady_change(model: CompiledDae, point: Point, theta: Vector, guess: Vector
     change = np.zeros((len(rates.x), theta.shape[1])) if guess is None else guess.copy()
     inner = rates.x[np.ix_(moving, moving)]
     kept = find_kept(model, point, moving, inner)
-    held = slopes_of_variables(model, point, list(kept.held))
+    held = slopes(model, point, "variables", kept.held)
     right = rates.theta[moving] @ theta + inner @ change[moving]
     of_held = held.theta @ theta + held.x[:, moving] @ change[moving]
     change[moving] += solve_kept(kept, inner, -right, -of_held)
     return change
-
-
-def _partials(model: CompiledDae, name: str, expression: Callable[..., Any] | None, constants: int) -> _Partials:
-    def make() -> _Partials:
-        numbers = ca.SX.sym("constants", constants)
-        given = [numbers] if constants else []
-        value = getattr(model, name)(*model.arguments.values()) if expression is None else expression(*given)
-        return _Partials(model, value, numbers)
-
-    return model.once(("slopes of", name, get_ident()), make)

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from modelica_like.analyse.linear.held import free_motions
 from modelica_like.analyse.linear.model import LinearModel
 from modelica_like.analyse.linear.points import At, Drive, point_of
-from modelica_like.analyse.slopes import columns_of, nodes_of, slopes, slopes_of_variables
+from modelica_like.analyse.slopes import columns_of, nodes_of, slopes
 
 
 def linearize(
@@ -33,7 +33,7 @@ def linearize(
     top = (one.path for one in model.flat_variables if one.kind == "output" and "." not in one.path)
     y_names = (tuple(top) or model.states) if outputs is None else tuple(outputs)
     columns, nodes = columns_of(model, u_names), nodes_of(model, y_names)
-    rates, found = slopes(model, point, "ode"), slopes_of_variables(model, point, nodes)
+    rates, found = slopes(model, point, "ode"), slopes(model, point, "variables", nodes)
     a, b, c, d = rates.x, rates.theta[:, columns], found.x, found.theta[:, columns]
     motions = free_motions(model, point)
     keep, shape = motions.keep, motions.shape

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from modelica_like.analyse.slopes import Sizes, columns_of, nodes_of, slopes_of_variables, steady_change
+from modelica_like.analyse.slopes import Sizes, columns_of, nodes_of, slopes, steady_change
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import InitializationError, UnknownName, ValueOutOfRange, did_you_mean
 from modelica_like.initialize import Point, call, holding, initialize
@@ -211,7 +211,7 @@ class _Target:
 
 def steady_slopes(model: CompiledDae, point: Point, paths: Sequence[str], free: Sequence[str]) -> Vector:
     """Total derivative of variables of steady states by parameters, shape (variables, parameters)."""
-    variables = slopes_of_variables(model, point, nodes_of(model, paths))
+    variables = slopes(model, point, "variables", nodes_of(model, paths))
     theta = np.eye(Sizes.of(model).theta)[:, columns_of(model, free)]
     return variables.x @ steady_change(model, point, theta) + variables.theta @ theta
 
