@@ -6,13 +6,24 @@ import copy
 import gc
 import time
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from typing import Any, Literal, get_args
 
 from modelica_like.compile import compile
 from modelica_like.compile.compiled import CompiledDae
-from modelica_like.errors import SolveError, UnitError, UnknownName, ValueOutOfRange, did_you_mean
+from modelica_like.errors import (
+    ExportError,
+    LanguageError,
+    SolveError,
+    StepFailed,
+    UnitError,
+    UnknownName,
+    ValueOutOfRange,
+    did_you_mean,
+)
 from modelica_like.flatten import flatten
 from modelica_like.initialize import StartKind, initialize
 from modelica_like.language import Component
@@ -90,7 +101,8 @@ def simulate(
         points: number of equal intervals of the results.
         options: all options together; the arguments before win.
         progress: called with the time reached.
-        solver: `idas`, the reference, or `native`: the compiled run-time of FMUs, several times as fast.
+        solver: `idas`, the reference, or `native`: the compiled run-time of FMUs, several times as fast. Where IDAS
+            gives up, the run is done by the compiled run-time, if there is one and it succeeds; a notice tells so.
 
     Raises:
         ModelicaLikeError: the model or a value is wrong, or the simulation cannot go on.
@@ -108,6 +120,12 @@ def simulate(
         loop.run()
     except (SolveError, KeyboardInterrupt) as error:
         vars(error)["run"] = _solution(loop, begin) if loop.record.segments else None
+        if solver == "idas" and isinstance(error, StepFailed):
+            # Where there is no run-time, or it fails, too, what IDAS says stands.
+            with suppress(SolveError, ExportError, LanguageError):
+                run = simulate(model, end, start=start, t0=t0, options=chosen, progress=progress, solver="native")
+                told = f"{error.what} The whole run was done by the compiled run-time instead (solver native)."
+                return replace(run, notices=(told, *run.notices))
         raise
     return _solution(loop, begin)
 
