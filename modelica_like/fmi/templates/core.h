@@ -178,9 +178,12 @@ typedef struct Instance {
 } Instance;
 
 /* tape.c */
+/* What does not count is not multiplied: an inactive branch may be infinite. */
+static inline double product(double a, double b) { return a == 0 || b == 0 ? 0 : a * b; }
 void tape_run(const Tape *tape, double *slots, double *outputs);
 void tape_tangent(const Tape *tape, const double *slots, double *dots, double *output_dots);
 void tape_adjoint(const Tape *tape, const double *slots, double *bars, const double *output_bars);
+void slopes(int operation, double a, double b, double f, double *by_left, double *by_right);
 void tape_reaches(const Tape *tape, double *marks, const double *output_marks);
 
 /* linear.c */
