@@ -46,8 +46,8 @@ LOG_CATEGORIES = {
 """Log categories of every FMU with a description; errors are always reported."""
 
 _FACES = {
-    "2.0": ("fmi2.h", "fmi2.c", "fmi2_values.c"),
-    "3.0": ("fmi3.h", "fmi3.c", "fmi3_values.c", "fmi3_unused.c"),
+    "2.0": ("fmi.h", "fmi2.c"),
+    "3.0": ("fmi.h", "fmi3.c"),
     "native": ("native.h", "native.c", "batch.c"),
 }
 _HEADERS = {

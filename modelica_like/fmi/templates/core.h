@@ -184,7 +184,6 @@ void tape_run(const Tape *tape, double *slots, double *outputs);
 void tape_tangent(const Tape *tape, const double *slots, double *dots, double *output_dots);
 void tape_adjoint(const Tape *tape, const double *slots, double *bars, const double *output_bars);
 void slopes(int operation, double a, double b, double f, double *by_left, double *by_right);
-void tape_reaches(const Tape *tape, double *marks, const double *output_marks);
 
 /* linear.c */
 int qr_factor(const QrPattern *pattern, const double *values, Work *work);
@@ -267,7 +266,7 @@ Arrival step_fixed(Instance *c, double target);
 const Variable *find_variable(const Model *m, uint32_t reference);
 const Variable *known_variable(Instance *c, uint32_t reference, ValueType type);
 Result get_float(Instance *c, uint32_t reference, double *value);
-Result get_mode(Instance *c, uint32_t reference, int *value);
+int get_mode(Instance *c, uint32_t reference);
 Result set_float(Instance *c, uint32_t reference, double value);
 Result set_mode(Instance *c, uint32_t reference, int64_t value);
 Result set_input_rate(Instance *c, uint32_t reference, double rate);
@@ -284,7 +283,6 @@ Result adjoint(Instance *c, const uint32_t *unknowns, size_t n_unknowns, const u
     const double *seed, double *result);
 void slope_of_node(Instance *c, int node, int again, double *by_state);
 Result factor_implicit(Instance *c, int *order);
-size_t dependencies(Instance *c, uint32_t unknown, uint32_t *knowns, size_t capacity, Result *result);
 
 /* taylor.c */
 Result output_rate(Instance *c, uint32_t reference, int order, double *value);

@@ -118,9 +118,8 @@ EXPORTED void native_set_all(Native *n, const double *parameters, const double *
 static int read_values(Instance *c, int64_t count, const uint32_t *references, double *values) {
     Result result = RESULT_OK;
     for (int64_t k = 0; k < count && result == RESULT_OK; k++) {
-        int mode = 0;
         if (!is_mode(c, references[k])) result = get_float(c, references[k], &values[k]);
-        else if ((result = get_mode(c, references[k], &mode)) == RESULT_OK) values[k] = mode;
+        else if ((values[k] = get_mode(c, references[k])) < 0) result = RESULT_ERROR;
     }
     return code(result);
 }

@@ -89,15 +89,3 @@ void tape_adjoint(const Tape *tape, const double *slots, double *bars, const dou
         k = first;
     }
 }
-
-/* Marks all slots on which marked outputs depend, whatever the values. */
-void tape_reaches(const Tape *tape, double *marks, const double *output_marks) {
-    memset(marks + tape->first_result, 0, (size_t)tape->n_operations * sizeof(double));
-    for (int n = 0; n < tape->n_outputs; n++)
-        if (output_marks[n] != 0) marks[tape->outputs[n]] = 1;
-    for (int k = tape->n_operations - 1; k >= 0; k--) {
-        if (marks[tape->first_result + k] == 0) continue;
-        marks[tape->operands[k].left] = 1;
-        marks[tape->operands[k].right] = 1;
-    }
-}

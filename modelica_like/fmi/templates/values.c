@@ -108,11 +108,10 @@ void get_indicators(Instance *c, double *indicators) {
     }
 }
 
-Result get_mode(Instance *c, uint32_t reference, int *value) {
+/* The number of the mode, -1 if there is none. */
+int get_mode(Instance *c, uint32_t reference) {
     const Variable *v = known_variable(c, reference, TYPE_ENUMERATION);
-    if (v == NULL || make_ready(c, v) != RESULT_OK) return RESULT_ERROR;
-    *value = (int)c->d[v->index];
-    return RESULT_OK;
+    return v == NULL || make_ready(c, v) != RESULT_OK ? -1 : (int)c->d[v->index];
 }
 
 static Result refuse_value(Instance *c, const Variable *v, const char *why) {
