@@ -157,7 +157,7 @@ typedef struct Instance {
     Piece *piece;
     double *end_look; /* guards and their rates at the end of the last fixed step */
     Work work;
-    char *name;
+    const char *name;
     void *environment;
     AnyFunction logger, intermediate_update;
     LogFunction log;
@@ -204,7 +204,9 @@ void ask_for(Instance *c, int node);
 /* point.c */
 void load(Instance *c, double t, const double *x, const double *z);
 void evaluate(Instance *c, const Tape *tape, double t, const double *x, const double *z, double *outputs);
+void evaluate_now(Instance *c, const Tape *tape, double *outputs); /* at the present point */
 Result solve_implicit(Instance *c, double t, const double *x, double *z, int quiet);
+Result solve_now(Instance *c, int quiet);
 Result check_singular(Instance *c);
 Result settle(Instance *c);
 double input_at(const Instance *c, int k, double t);
@@ -288,10 +290,8 @@ Result factor_implicit(Instance *c, int *order);
 Result output_rate(Instance *c, uint32_t reference, int order, double *value);
 
 /* instance.c */
-Instance *instance_new(const Model *model, const char *name, const char *token, Allocate allocate, Release release,
-    LogFunction log, AnyFunction logger, void *environment, int logging);
-Instance *instance_open(const char *location, const char *name, const char *token, Allocate allocate, Release release,
-    LogFunction log, AnyFunction logger, void *environment, int logging);
+Instance *instance_new(Instance bare, const char *token);
+Instance *instance_open(Instance bare, const char *token, const char *location);
 void instance_free(Instance *c);
 void instance_reset(Instance *c);
 Result set_experiment(

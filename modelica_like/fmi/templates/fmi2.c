@@ -29,16 +29,15 @@ const char *fmi2GetVersion(void) { return fmi2Version; }
 fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2String fmuGUID,
     fmi2String fmuResourceLocation, const fmi2CallbackFunctions *functions, fmi2Boolean visible,
     fmi2Boolean loggingOn) {
-    Instance *c;
-    int own_memory;
+    Instance bare = {.name = instanceName, .log_enabled = loggingOn, .co_simulation = fmuType == fmi2CoSimulation};
     (void)visible;
     if (functions == NULL || (fmuType != fmi2ModelExchange && fmuType != fmi2CoSimulation)) return NULL;
-    own_memory = functions->allocateMemory == NULL || functions->freeMemory == NULL;
-    c = instance_open(fmuResourceLocation, instanceName, fmuGUID, own_memory ? calloc : functions->allocateMemory,
-        own_memory ? free : functions->freeMemory, functions->logger ? log_fmi2 : NULL, (AnyFunction)functions->logger,
-        functions->componentEnvironment, loggingOn);
-    if (c != NULL) c->co_simulation = fmuType == fmi2CoSimulation;
-    return c;
+    bare.environment = functions->componentEnvironment;
+    bare.logger = (AnyFunction)functions->logger;
+    bare.log = functions->logger ? log_fmi2 : NULL;
+    bare.allocate = functions->allocateMemory && functions->freeMemory ? functions->allocateMemory : calloc;
+    bare.release = functions->allocateMemory && functions->freeMemory ? functions->freeMemory : free;
+    return instance_open(bare, fmuGUID, fmuResourceLocation);
 }
 
 fmi2Status fmi2SetupExperiment(fmi2Component instance, fmi2Boolean toleranceDefined, fmi2Real tolerance,

@@ -20,9 +20,15 @@ const char *fmi3GetVersion(void) { return fmi3Version; }
 fmi3Instance fmi3InstantiateModelExchange(fmi3String instanceName, fmi3String instantiationToken,
     fmi3String resourcePath, fmi3Boolean visible, fmi3Boolean loggingOn, fmi3InstanceEnvironment instanceEnvironment,
     fmi3LogMessageCallback logMessage) {
+    const Instance bare = {.name = instanceName,
+        .log_enabled = loggingOn,
+        .environment = instanceEnvironment,
+        .logger = (AnyFunction)logMessage,
+        .log = logMessage ? log_fmi3 : NULL,
+        .allocate = calloc,
+        .release = free};
     (void)visible;
-    return instance_open(resourcePath, instanceName, instantiationToken, calloc, free, logMessage ? log_fmi3 : NULL,
-        (AnyFunction)logMessage, instanceEnvironment, loggingOn);
+    return instance_open(bare, instantiationToken, resourcePath);
 }
 
 /* Tells the importer that an internal step is done; returns until when it wants to go on. */

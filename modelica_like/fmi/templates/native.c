@@ -67,11 +67,15 @@ EXPORTED void native_close(Model *m) { model_free(m); }
 EXPORTED Native *native_new(const Model *m) {
     Native *n = calloc(1, sizeof *n);
     if (n == NULL) return NULL;
-    n->c = instance_new(m, "native", m->token, calloc, free, keep_message, NULL, n, 0);
-    if (n->c != NULL) {
-        n->c->co_simulation = 1;
-        return n;
-    }
+    n->c = instance_new((Instance){.model = m,
+                            .name = "native",
+                            .log = keep_message,
+                            .environment = n,
+                            .co_simulation = 1,
+                            .allocate = calloc,
+                            .release = free},
+        m->token);
+    if (n->c != NULL) return n;
     free(n);
     return NULL;
 }

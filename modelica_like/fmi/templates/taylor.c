@@ -129,10 +129,9 @@ static void extend(int operation, const Series a, const Series b, Series f) {
 /* Evaluates a tape, then its coefficients behind the first: coefficient n of slot k is terms[(n - 1) * n_slots + k]. */
 static void run_series(Instance *c, const Tape *tape, int order, double *outputs) {
     const Model *m = c->model;
-    State *s = &c->state;
     double *slots = c->work.slots, *terms = c->work.dots;
     int k = 0;
-    evaluate(c, tape, s->t, c->x, c->z, outputs);
+    evaluate_now(c, tape, outputs);
     for (int r = 0; r < tape->n_runs; r++)
         for (int end = k + tape->runs[r].count; k < end; k++) {
             int left = tape->operands[k].left, right = tape->operands[k].right, slot = m->slot_results + k;
