@@ -77,7 +77,8 @@ def runtime_sources(faces: Iterable[Face]) -> dict[str, str]:
 
 def own_sources(faces: Iterable[Face]) -> dict[str, str]:
     """Read the same without the headers of the standard."""
-    names = ("core.h", "model.h", "operations.h", "model_data.c", *RUNTIME, *(name for face in faces for name in _FACES[face]))
+    own = (name for face in faces for name in _FACES[face])
+    names = ("core.h", "model.h", "operations.h", "model_data.c", *RUNTIME, *own)
     return {name: (_TEMPLATES / name).read_text(encoding="utf-8") for name in names}
 
 

@@ -275,6 +275,7 @@ Result set_input_rate(Instance *c, uint32_t reference, double rate);
 Result set_time(Instance *c, double time);
 Result set_states(Instance *c, const double *x);
 Result make_consistent(Instance *c);
+Result check_tables(Instance *c);
 void get_derivatives(Instance *c, double *derivatives);
 void get_indicators(Instance *c, double *indicators);
 

@@ -206,6 +206,7 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
 Result update_discrete(Instance *c, int *restart, double *next) {
     double before = c->state.n_events;
     *restart = c->state.inputs_changed;
+    if (*restart && check_tables(c) != RESULT_OK) return RESULT_ERROR;
     c->state.inputs_changed = 0;
     if (handle_event(c) != RESULT_OK) return RESULT_ERROR;
     *restart |= c->state.n_events != before;

@@ -94,16 +94,28 @@ fmi3Status fmi3ExitConfigurationMode(fmi3Instance instance) {
 
 /* ---- values ----------------------------------------------------------------------------------------------------- */
 
+/* Values of arrays lie one behind the other. */
+static size_t elements(const Instance *c, fmi3ValueReference reference, fmi3ValueReference *first) {
+    const Variable *v = find_variable(c->model, reference);
+    int array = v != NULL && v->type == TYPE_ARRAY;
+    *first = array ? (fmi3ValueReference)v->start : reference;
+    return array ? (size_t)v->count : 1;
+}
+
 #define REFERENCES fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences
-#define VALUES(name, phases, type, done)                               \
-    fmi3Status fmi3##name(REFERENCES, type values[], size_t nValues) { \
-        ENTER(name, phases);                                           \
-        NEED_SIZE(nValues, nValueReferences, "values");                \
-        NEED(valueReferences, nValues);                                \
-        NEED(values, nValues);                                         \
-        for (size_t k = 0; k < nValues; k++)                           \
-            if (!(done)) return fmi3Error;                             \
-        return fmi3OK;                                                 \
+#define VALUES(name, phases, type, done)                                                            \
+    fmi3Status fmi3##name(REFERENCES, type values[], size_t nValues) {                              \
+        fmi3ValueReference r;                                                                       \
+        size_t count = 0;                                                                           \
+        ENTER(name, phases);                                                                        \
+        NEED(valueReferences, nValueReferences);                                                    \
+        for (size_t k = 0; k < nValueReferences; k++) count += elements(c, valueReferences[k], &r); \
+        NEED_SIZE(nValues, count, "values");                                                        \
+        NEED(values, nValues);                                                                      \
+        for (size_t k = 0; k < nValueReferences; k++)                                               \
+            for (count = elements(c, valueReferences[k], &r); count > 0; count--, r++, values++)    \
+                if (!(done)) return fmi3Error;                                                      \
+        return fmi3OK;                                                                              \
     }
 
 static int is_mode(int mode, fmi3Int64 *value) {
@@ -111,10 +123,10 @@ static int is_mode(int mode, fmi3Int64 *value) {
     return mode >= 0;
 }
 
-VALUES(GetFloat64, READABLE, fmi3Float64, get_float(c, valueReferences[k], &values[k]) == RESULT_OK)
-VALUES(SetFloat64, SETTABLE, const fmi3Float64, set_float(c, valueReferences[k], values[k]) == RESULT_OK)
-VALUES(GetInt64, READABLE, fmi3Int64, is_mode(get_mode(c, valueReferences[k]), &values[k]))
-VALUES(SetInt64, SETTABLE, const fmi3Int64, set_mode(c, valueReferences[k], values[k]) == RESULT_OK)
+VALUES(GetFloat64, READABLE, fmi3Float64, get_float(c, r, values) == RESULT_OK)
+VALUES(SetFloat64, SETTABLE, const fmi3Float64, set_float(c, r, *values) == RESULT_OK)
+VALUES(GetInt64, READABLE, fmi3Int64, is_mode(get_mode(c, r), values))
+VALUES(SetInt64, SETTABLE, const fmi3Int64, set_mode(c, r, *values) == RESULT_OK)
 
 /* Functions for what no model has: other types, clocks, parts. They refuse every call that asks for something. */
 #define NOTHING(name, phases, what, unused, ...)                                          \

@@ -363,6 +363,7 @@ Result take_changes(Instance *c, int *event) {
     State *s = &c->state;
     *event = 0;
     if (!s->inputs_changed) return RESULT_OK;
+    if (check_tables(c) != RESULT_OK) return RESULT_ERROR;
     s->inputs_changed = 0;
     leave_piece(c);
     s->z_valid = 0;

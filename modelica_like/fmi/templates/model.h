@@ -44,15 +44,20 @@ typedef enum {
     KIND_GUARD,
     N_KINDS
 } Kind;
-typedef enum { TYPE_FLOAT64, TYPE_ENUMERATION, N_TYPES } ValueType;
+typedef enum { TYPE_FLOAT64, TYPE_ENUMERATION, TYPE_ARRAY, N_TYPES } ValueType;
 
 typedef struct {
     uint32_t reference;
     int type, kind, index;
-    int start;   /* start value that determines it, or -1 */
+    int start;   /* start value that determines it, or -1; of an array: reference of its first element */
     int tunable; /* a parameter that may change during a run */
     int name;
-} Variable; /* sorted by reference */
+    int count; /* elements of an array, whose references follow each other */
+} Variable;    /* sorted by reference */
+
+typedef struct {
+    int below, above, below_name, above_name;
+} Rising; /* parameters of which the second must exceed the first */
 
 typedef enum { RESET_STATE, RESET_DISCRETE, RESET_VALUE, N_RESET_KINDS } ResetKind;
 typedef struct {
@@ -93,10 +98,11 @@ typedef struct {
 typedef struct Model { /* tables lie in the bytes of the file; texts are offsets in `text` */
     const Settings *settings;
     const char *text, *token;
-    int n_settings, n_text, n_token, n_x, n_z, n_p, n_u, n_constants, n_variables;
+    int n_settings, n_text, n_token, n_x, n_z, n_p, n_u, n_constants, n_variables, n_rising;
     const double *constants, *parameters, *parameter_min, *parameter_max, *inputs, *guesses, *z_guesses, *nominals;
     const int *state_names, *implicit_names, *singular_names;
     const Variable *variables;
+    const Rising *rising;
 
     int n_transitions, n_guards, n_resets, n_reset_nodes, n_modes, n_mode_names;
     const Transition *transitions; /* in the order in which they are declared */

@@ -233,6 +233,7 @@ Result start_solve(Instance *c) {
     State *s = &c->state;
     double *begun = c->work.begun;
     int round;
+    if (check_tables(c) != RESULT_OK) return RESULT_ERROR;
     memcpy(c->x, m->guesses, m->n_x * sizeof(double));
     memcpy(c->z, m->z_guesses, m->n_z * sizeof(double));
     memset(c->d, 0, m->n_d * sizeof(double));

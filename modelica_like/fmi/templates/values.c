@@ -144,6 +144,19 @@ static Result set_parameter(Instance *c, const Variable *v, double value) {
     return RESULT_OK;
 }
 
+/* Columns of tables must rise; they are set number by number, so this is asked where they are needed. */
+Result check_tables(Instance *c) {
+    const Model *m = c->model;
+    for (int k = 0; k < m->n_rising; k++) {
+        const Rising *one = &m->rising[k];
+        if (!(c->p[one->below] < c->p[one->above]))
+            return report(c, LOG_ERROR, RESULT_ERROR,
+                "%s = %g is not above %s = %g: this column of the table must rise.", text_of(m, one->above_name),
+                c->p[one->above], text_of(m, one->below_name), c->p[one->below]);
+    }
+    return RESULT_OK;
+}
+
 static Result set_start(Instance *c, const Variable *v, double value) {
     State *s = &c->state;
     if (!before_start(s))
