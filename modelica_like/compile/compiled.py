@@ -43,6 +43,7 @@ class CompiledTransition:
         timed: whether `index` is a position in the moments rather than in the guards.
         resets: what else changes.
         notice: what the user is told when it happens.
+        fails: whether the run ends there, with an error.
     """
 
     mode: int
@@ -53,6 +54,7 @@ class CompiledTransition:
     resets: tuple[Reset, ...]
     source: Source
     notice: str = ""
+    fails: bool = False
 
 
 @dataclass(frozen=True)
