@@ -71,7 +71,7 @@ class AngleToTorqueAdaptor(Component):
     """
 
     icon = icons.BOUNDARY
-    terminal = Terminal(ROTATIONAL, takes="potential", rates=(("phi", "w"), ("w", "a")))
+    terminal = Terminal(ROTATIONAL, takes="potential", rates=(("phi", "w"), ("w", "a")), power=("tau", "w"))
     flange = Flange("shaft end")
     phi: Input = signal_in("rad", "angle of the shaft")
     w: Input = signal_in("rad/s", "speed of the shaft", default=0.0)
@@ -123,7 +123,7 @@ class PositionToForceAdaptor(Component):
     """Slide end of a part that is moved, and answers with a force; see `AngleToTorqueAdaptor`."""
 
     icon = icons.BOUNDARY
-    terminal = Terminal(TRANSLATIONAL, takes="potential", rates=(("s", "v"), ("v", "a")))
+    terminal = Terminal(TRANSLATIONAL, takes="potential", rates=(("s", "v"), ("v", "a")), power=("f", "v"))
     flange = LinearFlange("slide end")
     s: Input = signal_in("m", "position of the slide")
     v: Input = signal_in("m/s", "velocity of the slide", default=0.0)
@@ -159,7 +159,7 @@ class VoltageToCurrentAdaptor(Component):
     """Pin of a circuit whose potential is given, and that answers with a current."""
 
     icon = icons.BOUNDARY
-    terminal = Terminal(ELECTRICAL, takes="potential")
+    terminal = Terminal(ELECTRICAL, takes="potential", power=("i", "v"))
     pin = Pin("open end of the circuit")
     v: Input = signal_in("V", "potential of the pin")
     i: Output = signal_out("A", "current into the other part")
