@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from modelica_like.language.icon import Icon, Stroke
+from modelica_like.language import Icon, Stroke
 
 SHAFT = Stroke("shaft", "#1f2937", "#d7dde6", 3.5, weight=10)
 SLIDE = Stroke("slide", "#15803d", "#4ade80", 3.5, weight=10)
@@ -94,13 +94,14 @@ STOP = Icon(50, 36, lines="M-25 0 h15 M25 0 h-15 M-10 -12 v24 M10 -12 v24 M-10 -
 SLIDEWAY = Icon(48, 30, lines=f"M-24 -2 h48 {_hatch(-20, 8, 40)}", heavy="M-20 4 h40")
 SLIDE_BRAKE = replace(SLIDEWAY, solid=_rect(10, 5, 0, -12), ports={"f_normalized": "N"})
 VEHICLE = Icon(64, 36, paper="M-31 6 v-8 l8 -3 l8 -10 h22 l9 10 l14 3 v8 Z",
-               solid=f"{_circle(-17, 8, 7)} {_circle(17, 8, 7)}", key=("m",))  # fmt: skip
+               solid=f"{_circle(-17, 8, 7)} {_circle(17, 8, 7)}", key=("m",),
+               ports=dict.fromkeys(("Cr", "inclination", "v_wind"), "N"))  # fmt: skip
 
 # -- sources and loads -----------------------------------------------------------------------------------------------
 
 _SOURCE = Icon(44, 44, paper=_circle(0, 0, 21), ports={
     "flange": "E", "tau": "N", "f": "N", "w_ref": "N", "v_ref": ("N", 8), "phi_ref": ("N", -8), "s_ref": ("N", -8),
-    "a_ref": "N", "excitation": "N",
+    "a_ref": ("N", 16), "excitation": "N",
 })  # fmt: skip
 TORQUE = replace(_SOURCE, text="τ", key=("tau_constant", "tau", "height"))
 FORCE = replace(_SOURCE, text="F", key=("f_constant", "f", "height"))

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from importlib.util import find_spec
 from pathlib import Path
+from typing import TYPE_CHECKING, cast
 
 from modelica_like.draw.diagram import diagram
 from modelica_like.draw.sheet import Sheet, sheet
@@ -15,6 +16,9 @@ from modelica_like.draw.svg import svg
 from modelica_like.errors import NetlistError, missing_extra
 from modelica_like.language.component import Component
 from modelica_like.writing import check_writable, write_bytes
+
+if TYPE_CHECKING:
+    from reportlab.graphics.shapes import Drawing
 
 _PACKAGES = {".pdf": "svglib", ".png": "resvg_py"}
 FORMATS = (".pdf", ".png", ".svg")
@@ -94,4 +98,4 @@ def _pdf(text: str) -> bytes:
     from reportlab.graphics import renderPDF
     from svglib.svglib import svg2rlg
 
-    return renderPDF.drawToString(svg2rlg(StringIO(text)))
+    return cast("bytes", renderPDF.drawToString(cast("Drawing", svg2rlg(StringIO(text)))))

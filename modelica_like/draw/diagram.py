@@ -125,8 +125,9 @@ def diagram(component: Component, depth: int) -> Diagram:
     for node in kept:
         if node.icon is None:
             _box(node)
-        _spread(node)
     _orient(made)
+    for node in kept:
+        _spread(node)
     for node in outer.values():
         (port,) = node.ports.values()
         node.border = _OPPOSITE[port.side]
@@ -229,15 +230,10 @@ def _orient(made: Diagram) -> None:
         for port in net.ports:
             nets_of[port.node].append(net)
     known = set[Node]()
-    # Outside comes first, then sources: they only have an east.
     for node in made.nodes:
         for port in node.ports.values() if node.component is None else ():
             port.side = _OPPOSITE[port.side]
-
-    def rank(node: Node) -> int:
-        return 0 if node.component is None else 2 if any(one.side != "E" for one in _ends(node)) else 1
-
-    for first in sorted(made.nodes, key=rank):
+    for first in sorted(made.nodes, key=_rank):
         if first in known or (first.component is None and any(one.side == "W" for one in _ends(first))):
             continue
         known.add(first)
@@ -252,6 +248,14 @@ def _orient(made: Diagram) -> None:
                         other.node.turn()
                     known.add(other.node)
                     pending.append(other.node)
+
+
+def _rank(node: Node) -> int:
+    """Outside comes first, then sources: all their connectors are in the east."""
+    if node.component is None:
+        return 0
+    sides = {_place(node.icon, name, 0)[0] for name in node.component.connectors} - {"N", "S"}
+    return 1 if sides == {"E"} else 2
 
 
 def _ends(node: Node) -> list[Port]:

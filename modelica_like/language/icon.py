@@ -37,7 +37,7 @@ class Icon:
     lines: str = ""
     heavy: str = ""
     text: str = ""
-    ports: Mapping[str, Side | tuple[Side, float]] = field(default_factory=dict)
+    ports: Mapping[str, Side | tuple[Side, float]] = field(default_factory=dict[str, Side | tuple[Side, float]])
     key: tuple[str, ...] = ()
     named: bool = False
     at_ports: bool = False
