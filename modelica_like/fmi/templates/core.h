@@ -255,6 +255,7 @@ typedef enum { REACHED, AT_EVENT, FAILED } Arrival;
 Arrival integrate_to(Instance *c, double target, int stop_at_events);
 void leave_piece(Instance *c);
 Result handle_event(Instance *c);
+Result check_whole(Instance *c, double size);
 Result check_step(Instance *c, double point, double size, double *target);
 double cubic_guess(double g0, double r0, double g1, double r1);
 Result move_to(Instance *c, double t);

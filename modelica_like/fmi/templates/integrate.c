@@ -390,22 +390,27 @@ Result handle_event(Instance *c) {
 
 int is_due(Instance *c) { return c->model->n_moments > 0 && find_wanting(c, nothing_wanting(c), 0); }
 
+/* Fixed steps go to whole numbers of them only. */
+Result check_whole(Instance *c, double size) {
+    double fixed = c->model->settings->fixed_step;
+    if (!(fixed > 0) || (fabs(size / fixed - floor(size / fixed + 0.5)) <= SAME_PART && size > 0.5 * fixed))
+        return RESULT_OK;
+    return report(c, LOG_ERROR, RESULT_ERROR,
+        "The step of %.9g s is not a whole number of fixed steps of %.9g s, for which the model was made.", size,
+        fixed);
+}
+
 /* Checks what the importer asks for and says where the step ends. */
 Result check_step(Instance *c, double point, double size, double *target) {
     State *s = &c->state;
-    double slack = SAME_POINT * fmax(1, fabs(s->t)), fixed = c->model->settings->fixed_step;
+    double slack = SAME_POINT * fmax(1, fabs(s->t));
     *target = point + size;
     if (!isfinite(point) || fabs(point - s->t) > slack)
         return report(c, LOG_ERROR, RESULT_ERROR,
             "The communication point is %.12g s, but the instance stands at %.12g s.", point, s->t);
     if (!(size > 0) || !isfinite(*target))
         return report(c, LOG_ERROR, RESULT_ERROR, "The communication step size %g s is not positive.", size);
-    if (fixed > 0 && !(fabs(size / fixed - floor(size / fixed + 0.5)) <= SAME_PART && size > 0.5 * fixed))
-        return report(c, LOG_ERROR, RESULT_ERROR,
-            "The communication step size %.9g s is not a whole number of fixed steps of %.9g s, for which the model "
-            "was "
-            "exported.",
-            size, fixed);
+    if (check_whole(c, size) != RESULT_OK) return RESULT_ERROR;
     if (!s->stop_time_defined || *target <= s->stop_time) return RESULT_OK;
     if (*target > s->stop_time + slack)
         return report(c, LOG_ERROR, RESULT_ERROR, "The step to %.12g s goes beyond the stop time %.12g s.", *target,
