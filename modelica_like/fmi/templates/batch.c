@@ -65,7 +65,7 @@ static const double *variables_in_piece(Batch *b, double t) {
     return variables_at(b, t, point);
 }
 
-static const double *variables_now(Batch *b) {
+static const double *variables_here(Batch *b) {
     Instance *c = b->c;
     double *point = c->work.vector + c->model->n_z;
     memcpy(point, c->x, (size_t)c->model->n_x * sizeof(double));
@@ -207,13 +207,13 @@ static int run_to_end(Batch *b) {
                 case REACHED:
                     if (s->t < b->asked->end) continue;
             }
-        if (b->sampled) take_result(b, s->t, variables_now(b));
+        if (b->sampled) take_result(b, s->t, variables_here(b));
     }
     return !b->failed;
 }
 
 static void read_end(Batch *b) {
-    const double *variables = variables_now(b);
+    const double *variables = variables_here(b);
     for (int64_t k = 0; k < b->asked->n_readings; k++) {
         const Reading *one = &b->asked->readings[k];
         if (one->kind == READ_END || (one->kind == READ_AT && one->moment >= b->asked->end))

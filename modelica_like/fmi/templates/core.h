@@ -205,6 +205,9 @@ void ask_for(Instance *c, int node);
 void load(Instance *c, double t, const double *x, const double *z);
 void evaluate(Instance *c, const Tape *tape, double t, const double *x, const double *z, double *outputs);
 void evaluate_now(Instance *c, const Tape *tape, double *outputs); /* at the present point */
+const double *variables_now(Instance *c);
+double largest_of(int n, const double *values);
+int any_of(const unsigned char *marks, int n);
 Result solve_implicit(Instance *c, double t, const double *x, double *z, int quiet);
 Result solve_now(Instance *c, int quiet);
 Result check_singular(Instance *c);
@@ -219,8 +222,8 @@ void choose_modes(Instance *c, unsigned char *decided);
 /* holds.c */
 #define UNLIMITED 1e30
 #define ROUNDING 1e-10 /* relative size of a motion that is nothing but rounding */
-void hold_terms(Instance *c, Terms *terms);
-void mark_held(Instance *c, const Terms *terms, unsigned char *held);
+void mark_held(const Instance *c, const Terms *terms, unsigned char *held);
+void find_held(Instance *c, Terms *terms, unsigned char *held);
 double largest_like(const Model *m, const double *values, int node);
 int anything_shared(const Instance *c);
 void share(Instance *c);

@@ -84,7 +84,7 @@ static void drop_balanced(Instance *c, unsigned char *wanting) {
 void move_states(Instance *c, const int *nodes, const double *values, int count) {
     const Model *m = c->model;
     double *slopes = c->work.square, *change = c->work.start_residual, *step = c->work.point;
-    evaluate_now(c, &m->tapes.variables, c->work.variables);
+    variables_now(c);
     for (int k = 0; k < count; k++) change[k] = (values ? values[k] : 0) - c->work.variables[nodes[k]];
     for (int k = 0; k < count; k++) slope_of_node(c, nodes[k], k > 0, slopes + (size_t)k * m->n_x);
     least_squares(count, m->n_x, slopes, change, step);

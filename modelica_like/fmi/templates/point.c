@@ -37,6 +37,17 @@ void evaluate_now(Instance *c, const Tape *tape, double *outputs) {
     evaluate(c, tape, c->state.t, c->x, c->z, outputs);
 }
 
+const double *variables_now(Instance *c) {
+    evaluate_now(c, &c->model->tapes.variables, c->work.variables);
+    return c->work.variables;
+}
+
+int any_of(const unsigned char *marks, int n) {
+    int any = 0;
+    for (int k = 0; k < n; k++) any |= marks[k];
+    return any;
+}
+
 static Result singular(Instance *c, double t, const char *names) {
     return report(c, LOG_ERROR, RESULT_ERROR,
         "The Jacobian is singular at t = %.9g s in the equations for %s. Where two frictions stick on the "
@@ -44,7 +55,7 @@ static Result singular(Instance *c, double t, const char *names) {
         t, names);
 }
 
-static inline double largest_of(int n, const double *values) {
+double largest_of(int n, const double *values) {
     double largest = 0;
     for (int k = 0; k < n; k++) largest = fmax(largest, fabs(values[k]));
     return largest;

@@ -92,7 +92,7 @@ static Result solve_start_system(Instance *c, const double *values) {
 static Result check_dependent(Instance *c, const double *values) {
     const Model *m = c->model;
     if (m->n_start_dependent == 0) return RESULT_OK;
-    evaluate_now(c, &m->tapes.variables, c->work.variables);
+    variables_now(c);
     for (int k = 0; k < m->n_start_dependent; k++) {
         double value = values[m->start_dependent[k].start], actual = c->work.variables[m->start_dependent[k].node];
         if (!(fabs(actual - value) <= CONSISTENT * (1 + fabs(value))))
@@ -168,7 +168,7 @@ static int choose_start_modes(Instance *c, const double *begun) {
     memcpy(w->decided, c->mode_given, (size_t)m->n_d);
     memcpy(w->d_before, c->d, (size_t)m->n_d * sizeof(double));
     choose_modes(c, w->decided);
-    if (begun) evaluate_now(c, &m->tapes.variables, w->variables);
+    if (begun) variables_now(c);
     for (int k = 0; k < m->n_holds && begun; k++) {
         const Held *one = &m->holds[k];
         if (begun[k] * w->variables[one->motion] < 0 && c->d[one->mode] != w->d_before[one->mode])
@@ -200,9 +200,8 @@ static Result find_steady(Instance *c, double *begun) {
     int count = 0;
     apply_defaults(c, w->start_values);
     if (apply_direct(c, w->start_values) != RESULT_OK) return RESULT_ERROR;
-    if (m->n_holds > 0) hold_terms(c, w->terms);
-    mark_held(c, w->terms, w->held);
-    evaluate_now(c, &m->tapes.variables, w->variables);
+    if (m->n_holds > 0) find_held(c, w->terms, w->held);
+    variables_now(c);
     for (int k = 0; k < m->n_holds; k++) {
         begun[k] = w->variables[m->holds[k].motion];
         if (w->held[k]) w->standing[count++] = m->holds[k].motion;
