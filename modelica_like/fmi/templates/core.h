@@ -149,8 +149,8 @@ typedef struct Instance {
     State state;
     double *numbers; /* the rest of the state: the arrays that follow */
     size_t n_numbers;
-    double *x, *z, *p, *u, *d;
-    double *u_rate; /* inputs are u + u_rate * (t - u_time) */
+    double *x, *z, *p, *u, *d; /* z stands behind x: together they are a point */
+    double *u_rate;            /* inputs are u + u_rate * (t - u_time) */
     double *start_value;
     unsigned char *start_given, *mode_given;
     unsigned char *wanting; /* transitions that fire at the end of the piece */
@@ -198,17 +198,17 @@ void keeping_least_squares(int n, int states, double *a, double *turns, double *
 /* special.c */
 const Tape *full_tape(const Model *m, SpecialTape which);
 void run_special(Instance *c, SpecialTape which, double *outputs);
-void evaluate_special(Instance *c, SpecialTape which, double t, const double *x, const double *z, double *outputs);
+void evaluate_special(Instance *c, SpecialTape which, double t, const double *point, double *outputs);
 void ask_for(Instance *c, int node);
 
 /* point.c */
-void load(Instance *c, double t, const double *x, const double *z);
-void evaluate(Instance *c, const Tape *tape, double t, const double *x, const double *z, double *outputs);
+void load(Instance *c, double t, const double *point);
+void evaluate(Instance *c, const Tape *tape, double t, const double *point, double *outputs);
 void evaluate_now(Instance *c, const Tape *tape, double *outputs); /* at the present point */
 const double *variables_now(Instance *c);
 double largest_of(int n, const double *values);
 int any_of(const unsigned char *marks, int n);
-Result solve_implicit(Instance *c, double t, const double *x, double *z, int quiet);
+Result solve_implicit(Instance *c, double t, double *point, int quiet);
 Result solve_now(Instance *c, int quiet);
 Result check_singular(Instance *c);
 Result settle(Instance *c);
@@ -308,6 +308,7 @@ size_t state_size(const Instance *c);
 Result state_write(Instance *c, const void *copy, unsigned char *bytes, size_t size);
 Result state_read(Instance *c, const unsigned char *bytes, size_t size, void **copy);
 Result report(Instance *c, LogCategory category, Result result, const char *format, ...);
+#define fail(c, ...) report(c, LOG_ERROR, RESULT_ERROR, __VA_ARGS__)
 Result set_log_category(Instance *c, const char *category, int on);
 Result allowed(Instance *c, const char *function, int phases);
 

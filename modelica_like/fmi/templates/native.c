@@ -221,8 +221,7 @@ static int write_point(Native *n, NativeRun *r) {
     r->last = c->state.t;
     if (r->times != NULL) r->times[k] = c->state.t;
     if (r->states != NULL) {
-        memcpy(r->states + k * m->n_unknowns, c->x, (size_t)m->n_x * sizeof(double));
-        memcpy(r->states + k * m->n_unknowns + m->n_x, c->z, (size_t)m->n_z * sizeof(double));
+        memcpy(r->states + k * m->n_unknowns, c->x, (size_t)m->n_unknowns * sizeof(double));
     }
     if (r->outputs == NULL) return NATIVE_OK;
     return read_values(n->c, r->n_outputs, r->references, r->outputs + k * r->n_outputs);
