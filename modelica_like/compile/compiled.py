@@ -13,7 +13,7 @@ import casadi as ca
 from modelica_like.compile.buffers import BufferedFunction, buffered
 from modelica_like.compile.buffers import Vector as Vector
 from modelica_like.compile.start_system import StartSystem as StartSystem
-from modelica_like.errors import LanguageError, Source, UnknownName, did_you_mean
+from modelica_like.errors import LanguageError, Source, UnknownName, ValueOutOfRange, did_you_mean
 from modelica_like.flatten.model import FlatDiscrete, FlatParameter, FlatVariable, Origin
 from modelica_like.structure.holds import Circuit as Circuit
 from modelica_like.units import Unit, coherent, to_si
@@ -43,6 +43,7 @@ class CompiledTransition:
         timed: whether `index` is a position in the moments rather than in the guards.
         resets: what else changes.
         notice: what the user is told when it happens.
+        fails: whether the run ends there, with an error.
     """
 
     mode: int
@@ -53,6 +54,7 @@ class CompiledTransition:
     resets: tuple[Reset, ...]
     source: Source
     notice: str = ""
+    fails: bool = False
 
 
 @dataclass(frozen=True)
@@ -251,6 +253,11 @@ class CompiledDae:
         """Fresh symbols for the arguments of the functions."""
         return {name: ca.SX.sym(name, self.ode.size1_in(k)) for k, name in enumerate(self.ode.name_in())}
 
+    @cached_property
+    def rising(self) -> tuple[tuple[int, int], ...]:
+        """Positions of pairs of parameters of which the second must exceed the first: columns of tables that rise."""
+        return tuple((k - one.above, k) for k, one in enumerate(self.flat_parameters) if one.above)
+
     def with_parameters(self, values: dict[str, Any]) -> CompiledDae:
         """Return the same model with other parameter values; nothing is compiled again.
 
@@ -280,6 +287,10 @@ class CompiledDae:
             else:
                 known = [*self.parameter_position, *inputs]
                 raise UnknownName(f"{self.name} has no parameter '{path}'{did_you_mean(path, known) or '.'}")
+        for below, above in self.rising:
+            if not p[below] < p[above]:
+                names = [f"{self.flat_parameters[k].path} = {p[k]:g}" for k in (above, below)]
+                raise ValueOutOfRange(f"{' is not above '.join(names)}: this column of the table must rise.")
         for one, number in zip(self.flat_derived, self.derived(p).full().ravel(), strict=True):
             one.checked(float(number), f"{number:g}")
         return self.twin(p=p, u=u)

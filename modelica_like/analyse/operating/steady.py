@@ -14,7 +14,7 @@ from modelica_like.errors import InitializationError, UnknownName, ValueOutOfRan
 from modelica_like.initialize import Point, call, holding, initialize
 from modelica_like.initialize.steady import check_modes_hold, solve_steady
 from modelica_like.simulation import Model, build
-from modelica_like.solve.solution import Solution
+from modelica_like.solve.trajectories import Trajectories
 from modelica_like.units import to_si
 
 _MAX_NEWTON = 40
@@ -89,7 +89,7 @@ class OperatingPoint(Mapping[str, float]):
 
 def steady(
     drive: Model, hold: Mapping[str, Any] | None = None, by: Sequence[str] | str = (), *,
-    parameters: Mapping[str, Any] | None = None, near: OperatingPoint | Solution | None = None,
+    parameters: Mapping[str, Any] | None = None, near: OperatingPoint | Trajectories | None = None,
 ) -> OperatingPoint:  # fmt: skip
     """Find a steady state of a drive: all derivatives zero, except of states that nothing depends on.
 
@@ -116,7 +116,7 @@ def steady(
     target = _Target(model, hold or {}, free)
     if isinstance(near, OperatingPoint) and free:
         model = model.with_parameters({name: near[name] for name in free})
-    begin = near.point(float(near.time[-1])) if isinstance(near, Solution) else near.point if near else None
+    begin = near.point(float(near.time[-1])) if isinstance(near, Trajectories) else near.point if near else None
     point = _settle(model, begin)
     if free:
         model, point = target.reach(model, point)

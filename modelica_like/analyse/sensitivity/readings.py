@@ -10,7 +10,8 @@ import numpy as np
 from modelica_like.analyse.sensitivity.outputs import Output
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import UnknownName
-from modelica_like.solve.solution import ENERGY_TERMS, Solution
+from modelica_like.solve.solution import Solution
+from modelica_like.solve.trajectories import ENERGY_TERMS
 
 
 def read(solution: Solution, output: Output) -> float:
