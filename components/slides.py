@@ -203,9 +203,7 @@ class MassWithStopAndFriction(SlideSticking, DryFriction):
     F_Stribeck: Parameter = param("N", "what friction at rest has in excess", default=0.0, min=0)
     fexp: Parameter = param("s/m", "inverse of the velocity at which the excess has fallen to 1/e", default=1.0, min=0)
     peak: Parameter = param("1", "static friction over sliding friction at standstill", default=1.001, min=1)
-    e: Parameter = param(
-        "1", "restitution of the stops: speed after over before an impact", default=0.0, min=0, max=1
-    )
+    e: Parameter = param("1", "restitution of the stops: speed after over before an impact", default=0.0, min=0, max=1)
     v_rest: Parameter = param("m/s", "velocity from which on it comes to rest at a stop", default=1e-3, min=0)
     s: Variable = var("m", "position of the centre of mass", state="always")
     v: Variable = var("m/s", "velocity", state="always")
