@@ -71,9 +71,11 @@ def shift_report(
     for first, last in pairwise([*begins, len(time)]):
         # The results have both sides of the instant at which the next shift begins.
         begin, end = float(time[first]), float(time[last - 1])
-        balance = run.energy(begin, end) if end > begin else None
+        if end <= begin:
+            continue
+        balance = run.energy(begin, end)
         name = _NAMES.get(float(gear[first]), f"{gear[first]:g}")
-        for element in elements if balance else ():
+        for element in elements:
             path = f"{box}.{element}"
             slipping, torque = _slip(run, path, slice(first, last))
             if slipping:

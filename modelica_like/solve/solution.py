@@ -157,11 +157,10 @@ class Solution(Trajectories):
         if key not in self._cache:
             first, last = (self.time[k] if t is None else float(t) for k, t in ((0, begin), (-1, end)))
             segments = self.segments if (begin, end) == (None, None) else tuple(self._part(first, last))
-            within = [
-                [one for one in all_ if first <= one.time and (one.time < last or last == self.time[-1])]
-                for all_ in (self.events, self.impacts)
-            ]
-            self._cache[key] = energy_balance(self.model, segments, self.options, *within)
+            until = np.inf if last == self.time[-1] else last
+            events = [one for one in self.events if first <= one.time < until]
+            impacts = [one for one in self.impacts if first <= one.time < until]
+            self._cache[key] = energy_balance(self.model, segments, self.options, events, impacts)
         return self._cache[key]
 
     def _part(self, begin: float, end: float) -> Iterator[Segment]:
