@@ -48,4 +48,5 @@ class LuGreFriction(Lossy, ShaftInHousing):
         return 0.5 * self.sigma_0 * self.z**2
 
     def dissipation(self) -> Expr:
-        return self.tau * self.w - self.sigma_0 * self.z * der(self.z)
+        slipping = self.sigma_0 * self.z**2 * self.sigma_0 * absolute(self.w) / self.steady()
+        return slipping + self.damping() * der(self.z) * self.w + self.sigma_2 * self.w**2
