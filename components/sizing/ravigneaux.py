@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from components.sizing.maths import absolute, floor
-from components.sizing.quantities import Power, Ratio, Speed, Teeth, Torque
 from components.sizing.ravigneaux_shafts import (
     CARRIER,
     LARGE_SUN,
@@ -20,7 +19,8 @@ from components.sizing.ravigneaux_shafts import (
     shaft_speeds,
     shaft_torques,
 )
-from components.sizing.result import Result, line
+from modelica_like.language.quantities import Power, Ratio, Speed, Teeth, Torque
+from modelica_like.language.results import Result, line
 
 
 @dataclass(frozen=True)

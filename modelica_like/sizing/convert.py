@@ -17,7 +17,7 @@ from modelica_like.errors import (
     UnknownName,
     did_you_mean,
 )
-from modelica_like.sizing.checks import arguments_of, unit_of_kind, without_none
+from modelica_like.sizing.checks import arguments_of, is_result, unit_of_kind, without_none
 from modelica_like.sizing.document import placed
 from modelica_like.sizing.formulas import Lookup, Value, read_value
 from modelica_like.units import Unit, coherent, read_quantity, same_dimension, to_si
@@ -95,7 +95,7 @@ class Converter:
         if not isinstance(result, kind):
             raise NetlistError(
                 f"{where} must be a table: {{ {_example(kind)} }}.",
-                advice=f"Or name a check whose result is a {kind.__name__}." if hasattr(kind, "lines") else "",
+                advice=f"Or name a check whose result is a {kind.__name__}." if is_result(kind) else "",
             )
         return result
 
