@@ -24,6 +24,7 @@ from modelica_like.language.expr import TIME, Symbol, flagged_motion, is_express
 from modelica_like.language.fields import Parameter, Variable
 from modelica_like.language.places import located
 from modelica_like.language.transition import StartMode, Transition, as_event
+from modelica_like.language.tunable import symbols_in_tables
 from modelica_like.units import ANY, Unit
 
 
@@ -159,7 +160,8 @@ def template_of(component: Component) -> Template:
         LanguageError, UnitMismatch, ComponentUnbalanced: the class is declared wrongly.
     """
     if component.parts or component.fields is not component._class_fields:
-        return _build(component)
+        with symbols_in_tables(component):
+            return _build(component)
     cache: dict[Any, Template] = _class_cache(type(component))
     key = _structural_key(component)
     if key not in cache:

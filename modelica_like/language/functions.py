@@ -9,7 +9,16 @@ from typing import Any, cast
 import casadi as ca
 
 from modelica_like.errors import LanguageError
-from modelica_like.language.expr import TIME, Expr, Scalar, Symbol, flag_name, symbol_of, symbols_in
+from modelica_like.language.expr import (
+    TIME,
+    Expr,
+    Scalar,
+    Symbol,
+    flag_name,
+    is_expression,
+    symbol_of,
+    symbols_in,
+)
 
 
 def _sx(value: Scalar) -> Any:
@@ -154,7 +163,8 @@ def interpolate(x: Scalar, xs: Sequence[float], ys: Sequence[float], smooth: boo
     Raises:
         LanguageError: lengths differ, or `xs` does not increase.
     """
-    if len(xs) != len(ys) or not xs or any(b <= a for a, b in itertools.pairwise(xs)):
+    known = not any(is_expression(x) for x in xs)
+    if len(xs) != len(ys) or not xs or (known and any(b <= a for a, b in itertools.pairwise(xs))):
         raise LanguageError(
             f"A table has the abscissae {list(xs)} and the values {list(ys)}.",
             advice="Give both the same length, and let the abscissae increase strictly.",
@@ -173,7 +183,7 @@ def interpolate(x: Scalar, xs: Sequence[float], ys: Sequence[float], smooth: boo
     return result
 
 
-def _piece(x: Any, xs: Sequence[float], ys: Sequence[float], slopes: list[float] | None, k: int) -> Any:
+def _piece(x: Any, xs: Sequence[float], ys: Sequence[float], slopes: list[Any] | None, k: int) -> Any:
     width = xs[k + 1] - xs[k]
     rise = ys[k + 1] - ys[k]
     if slopes is None:
@@ -183,12 +193,17 @@ def _piece(x: Any, xs: Sequence[float], ys: Sequence[float], slopes: list[float]
     return ys[k] + s * (a + s * (3 * rise - 2 * a - b + s * (a + b - 2 * rise)))
 
 
-def _monotone_slopes(xs: Sequence[float], ys: Sequence[float]) -> list[float]:
+def _monotone_slopes(xs: Sequence[float], ys: Sequence[float]) -> list[Any]:
     """Slopes after Fritsch and Butland (1984): the weighted harmonic mean of the neighbouring secants."""
     widths = [b - a for a, b in itertools.pairwise(xs)]
     secants = [(d - c) / h for c, d, h in zip(ys, ys[1:], widths, strict=False)]
-    slopes = [secants[0]]
+    slopes: list[Any] = [secants[0]]
     for (h0, h1), (s0, s1) in zip(itertools.pairwise(widths), itertools.pairwise(secants), strict=True):
         weight0, weight1 = 2 * h1 + h0, h1 + 2 * h0
-        slopes.append(0.0 if s0 * s1 <= 0 else (weight0 + weight1) / (weight0 / s0 + weight1 / s1))
+        mean = _ratio(weight0 + weight1, _ratio(weight0, s0) + _ratio(weight1, s1))
+        slopes.append(where(s0 * s1 > 0, mean, 0.0) if is_expression(mean) else mean if s0 * s1 > 0 else 0.0)
     return [*slopes, secants[-1]]
+
+
+def _ratio(over: Any, under: Any) -> Any:
+    return over / under if is_expression(under) or under else 0.0

@@ -102,6 +102,8 @@ class Converter:
     def quantity(self, unit: Unit, value: Any, where: str) -> Any:
         """Return a number, or an array from a list, in SI."""
         if isinstance(value, list):
+            if not value or any(isinstance(item, list) for item in value):
+                raise NetlistError(f"{where} must be a list of numbers, neither empty nor of lists.")
             return np.array([self.quantity(unit, item, f"{where}[{k}]") for k, item in enumerate(value)], dtype=float)
         if isinstance(value, dict):
             return _fitting(self.simulated(value, where), unit, where)
