@@ -16,7 +16,7 @@ from modelica_like.report.types import table
 if TYPE_CHECKING:
     import xarray
 
-    from modelica_like.analyse.linear.modes import Mode, Modes
+    from modelica_like.analyse.linear.model import Mode, Modes
     from modelica_like.analyse.operating.curves import Curves
     from modelica_like.analyse.operating.steady import OperatingPoint
     from modelica_like.analyse.sensitivity.derivatives import Sensitivities
