@@ -270,7 +270,8 @@ def _contents(
         pictures = {f"terminalsAndIcons/icon.{suffix}": drive_icon(suffix) for suffix in ("png", "svg")}
         for family in dict.fromkeys(icon_name(one.kind) for one in model.terminals):
             pictures |= {f"terminalsAndIcons/{family}.{s}": terminal_icon(family, s) for s in ("png", "svg")}
-    data = model_file(make_tables(model), variables.variables, _TOKEN, about.tolerance, about.fixed_step)
+    tables = make_tables(model, variables.start)
+    data = model_file(tables, variables.variables, _TOKEN, about.tolerance, about.fixed_step)
     token = _token(texts, data)
     data = with_token(data, _TOKEN, token)
     texts |= {name: text.replace(_TOKEN, token) for name, text in texts.items()}

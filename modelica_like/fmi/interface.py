@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -27,8 +27,7 @@ SlotKind = Literal["time", "state", "der", "variable", "parameter", "derived", "
 _SECOND = parse_unit("s")
 
 
-@dataclass(frozen=True)
-class FmuVariable:
+class FmuVariable(NamedTuple):
     """One variable of the description.
 
     Attributes:
@@ -70,6 +69,8 @@ class Interface:
         states, derivatives: value references in the order of x.
         outputs: value references of continuous and discrete outputs.
         indicators: value references of the event indicators, in the order of the guards.
+        start: what start values determine.
+        reach: what the variables depend on at once.
     """
 
     name: str
@@ -78,6 +79,8 @@ class Interface:
     derivatives: tuple[int, ...]
     outputs: tuple[int, ...]
     indicators: tuple[int, ...]
+    start: StartTables
+    reach: Reach
 
     @cached_property
     def by_name(self) -> dict[str, FmuVariable]:
@@ -122,7 +125,8 @@ class _Builder:
         self.derivatives: dict[int, int] = {}
         self.wanted = _matcher(model, outputs)
         self.starts = _Starts(model)
-        self.depends = _dependence(model)
+        self.reach = Reach(model.variables)
+        self.depends = _dependence(self.reach, model.variables)
         self.add("time", "Float64", "independent", "continuous", None, ("time", 0), unit=_SECOND, description="time")
 
     def add(self, name: str, kind: Any, causality: Any, variability: Any, initial: Any, slot: Any, **rest: Any) -> int:
@@ -240,6 +244,8 @@ class _Builder:
             tuple(self.derivatives[k] for k in range(count)),
             tuple(one.reference for one in self.found if one.causality == "output"),
             tuple(self.indicators[k] for k in sorted(self.indicators)),
+            self.starts.tables,
+            self.reach,
         )
 
 
@@ -275,15 +281,11 @@ def _literal_brackets(pattern: str) -> str:
     return re.sub(r"\[", "[[]", pattern)
 
 
-def _dependence(model: CompiledDae) -> list[Variability]:
+def _dependence(reach: Reach, variables: Any) -> list[Variability]:
     """How each variable changes: with time, at events only, or with parameters only."""
-    reach = Reach(model.variables)
-    moving = reach.mask(*(name for name in model.variables.name_in() if name not in ("p", "d")))
+    moving = reach.mask(*(name for name in variables.name_in() if name not in ("p", "d")))
     switching = reach.mask("d")
-    return [
-        "continuous" if row & moving else "discrete" if row & switching else "tunable"
-        for row in reach.rows[: len(model.flat_variables)]
-    ]
+    return ["continuous" if row & moving else "discrete" if row & switching else "tunable" for row in reach.rows]
 
 
 class _Starts:
