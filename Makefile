@@ -1,5 +1,7 @@
 # make demo   the machine-table and machine-tool start-ups, computed against published values
 # make test   everything that continuous integration runs
+# make docs   the pages of all component types
+# make release   the wheel for all platforms and the sdist, in dist/, tried in a new environment
 # make fmus   the reference FMUs, from their C sources, to build/fmus
 # make benchmark   times as ratios to hand-written baselines of the same run
 
@@ -13,7 +15,7 @@ PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constr
 COMPILED := ls modelica_like/fmi/runtimes/* >/dev/null 2>&1 || echo "No C compiler was found: the run-time of FMUs is \
 compiled at first use. Install cc, gcc or clang, or zig by $(BIN)/pip install 'modelica-like[cross]'."
 
-.PHONY: demo test lint types layers pytest benchmark fmus format clean
+.PHONY: demo test lint types layers pytest benchmark docs release fmus format clean
 
 demo: .venv/installed
 	$(BIN)/modelica-like demo
@@ -44,6 +46,14 @@ benchmark: .venv/installed-dev
 	$(BIN)/python benchmarks/gradient.py
 	$(BIN)/python benchmarks/linearize.py 100 1000
 	$(BIN)/python benchmarks/sweep.py 900
+
+docs: .venv/installed
+	$(BIN)/modelica-like docs -o docs/components --examples examples
+
+release: .venv/installed-dev
+	rm -rf dist
+	MODELICA_LIKE_PLATFORMS=all $(BIN)/python -m build
+	MODELICA_LIKE_PLATFORMS=all MODELICA_LIKE_WHEEL=$$(ls dist/*.whl) $(BIN)/python -m pytest -q -n 0 -m wheel
 
 fmus: .venv/installed
 	$(BIN)/python fmus/build.py
