@@ -1,56 +1,61 @@
-"""Runs a system of FMUs in a process of its own: python child.py FOLDER."""
+"""Runs a system of FMUs in a process of its own: python child.py FOLDER.
+
+What comes out is left in the folder as it comes: before the first step `columns.json`, which becomes `meta.json` at the
+end; `rows`, doubles of the time, the columns, the energies and the counts.
+"""
 
 from __future__ import annotations
 
 import sys
+from array import array
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from modelica_like.cosimulation.master import Balance, Counts, Master, Signal
+from modelica_like.cosimulation.master import Balance, Master, Signal
 from modelica_like.cosimulation.slaves import Slave
 from modelica_like.fmi.inside import Job, Messages, Refused, about
 
 
 class Recorder:
-    """Keeps rows of all variables and of the energies at the bonds.
+    """Writes rows of all variables, of the energies at the bonds and of the counts, so that no failure loses them.
 
     Args:
         slaves: whose variables.
         outputs: names of each.
-        balances: energies.
+        master: whose energies and counts.
         interval: shortest time between two rows, in s.
+        file: where to write.
     """
 
     def __init__(
-        self, slaves: list[Slave], outputs: list[list[str]], balances: list[Balance], interval: float, job: Job
+        self, slaves: list[Slave], outputs: list[list[str]], master: Master, interval: float, job: Job, file: Path
     ) -> None:
         self._readers = [slave.reader(names) for slave, names in zip(slaves, outputs, strict=True)]
-        self._balances, self._interval, self._job = balances, interval, job
-        self.rows: list[list[float]] = []
+        self._master, self._interval, self._job, self._last = master, interval, job, -float("inf")
+        self._file = file.open("wb", buffering=0)
 
     def look(self, time: float) -> list[float]:
-        """Read a row."""
-        if self.rows and time - self.rows[-1][0] < self._interval * (1 - 1e-6):
+        """Read a row; nothing but the time where the one before is nearer than the interval."""
+        if time - self._last < self._interval * (1 - 1e-6):
             return [time]
         row = [time]
         for read in self._readers:
             row += read()
-        for balance in self._balances:
-            row += [balance.power, balance.residual]
+        for balance in self._master.balances:
+            row += balance.told()
         return row
 
     def keep(self, row: list[float]) -> None:
-        """Keep a row, unless it is nearer to the one before than the interval."""
+        """Keep a row."""
         self._job.reach(row[0])
         if len(row) > 1:
-            self.rows.append(row)
+            self._last = row[0]
+            self._file.write(array("d", [*row, *vars(self._master.counts).values()]))
 
     def close(self, time: float) -> None:
         """Keep the end, however near it is to the row before."""
-        if self.rows[-1][0] != time:
+        if self._last != time:
             self._interval = 0.0
             self.keep(self.look(time))
 
@@ -127,36 +132,32 @@ def start(slaves: list[Slave], master: Master, job: dict[str, Any]) -> None:
 
 def run(job: Job) -> None:
     """Run the job of a folder."""
-    asked, slaves = job.asked, open_slaves(job)
+    asked, slaves, folder = job.asked, open_slaves(job), job.folder
     outputs = choose(slaves, asked["outputs"], own_names=asked["own_names"])
     master = connect(slaves, asked)
     start(slaves, master, asked)
-    recorder = Recorder(slaves, outputs, master.balances, asked["interval"], job)
+    recorder = Recorder(slaves, outputs, master, asked["interval"], job, folder / "rows")
     recorder.keep(recorder.look(asked["start"]))
+    width = (folder / "rows").stat().st_size // 8
+    known = {"units": columns_of(slaves, outputs), "open": open_inputs(slaves, asked), "width": width}
+    columns = job.leave(known, "columns.json")
     span = asked["start"], asked["until"], asked["step"]
     if asked["tolerance"] is None:
         master.run_fixed(*span, recorder)
     else:
         master.run_variable(*span, asked["tolerance"], recorder)
     recorder.close(asked["until"])
-    meta = result(slaves, outputs, master) | {"open": open_inputs(slaves, asked)}
     for slave in slaves:
         slave.close()
-    np.save(job.folder / "result.npy", np.array(recorder.rows))
-    job.leave(meta)
+    columns.rename(folder / "meta.json")
 
 
-def result(slaves: list[Slave], outputs: list[list[str]], master: Master) -> dict[str, Any]:
-    """Return what is to be known about the columns and the run."""
-    counts: Counts = master.counts
-    return {
-        "units": [
-            {"columns": [about(slave.all[name]) for name in names], "constants": constants(slave)}
-            for slave, names in zip(slaves, outputs, strict=True)
-        ],
-        "balances": [vars(balance) for balance in master.balances],
-        "counts": vars(counts),
-    }
+def columns_of(slaves: list[Slave], outputs: list[list[str]]) -> list[dict[str, Any]]:
+    """Return what is to be known about the columns and parameters of each FMU."""
+    return [
+        {"columns": [about(slave.all[name]) for name in names], "constants": constants(slave)}
+        for slave, names in zip(slaves, outputs, strict=True)
+    ]
 
 
 def open_inputs(slaves: list[Slave], job: dict[str, Any]) -> list[dict[str, Any]]:

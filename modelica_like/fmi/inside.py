@@ -1,8 +1,8 @@
 """What processes that run foreign FMUs have in common, seen from inside.
 
 A folder holds `job.json` and unpacked FMUs. What came out is left there: `result.npy` and `meta.json`, or `error.json`;
-`progress` holds the time reached, `calling` the number of the FMU that was called last. The process starts fast:
-nothing else of the package is imported here.
+`progress` holds the time reached and the number of the FMU that was called last. The process starts fast: nothing else
+of the package is imported here.
 """
 
 from __future__ import annotations
@@ -18,6 +18,8 @@ from typing import Any
 REAL = ("Real", "Float32", "Float64")
 WHOLE = ("Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64")
 DISCRETE = ("Integer", "Enumeration", "Boolean", *WHOLE)
+PLACE = struct.Struct("dq")
+"""What `progress` holds."""
 _MESSAGES = 20
 
 
@@ -54,25 +56,22 @@ class Job:
         self.unit = ""
         sys.excepthook = self._report
         self.asked: dict[str, Any] = json.loads((folder / "job.json").read_text())
-        self._time, self._calling = (self._shared(folder / name) for name in ("progress", "calling"))
-
-    @staticmethod
-    def _shared(path: Path) -> mmap.mmap:
-        with path.open("r+b") as file:
-            return mmap.mmap(file.fileno(), 8)
+        with (folder / "progress").open("r+b") as file:
+            self._place = mmap.mmap(file.fileno(), PLACE.size)
 
     def reach(self, time: float) -> None:
         """Tell the time reached."""
-        self._time[:8] = struct.pack("d", time)
+        self._place[:8] = struct.pack("d", time)
 
     def call(self, number: int, unit: str) -> None:
         """Tell which FMU is called now."""
         self.unit = unit
-        self._calling[:8] = struct.pack("q", number)
+        self._place[8:] = struct.pack("q", number)
 
-    def leave(self, meta: dict[str, Any]) -> None:
-        """Leave what came out: the end of the work."""
-        (self.folder / "meta.json").write_text(json.dumps(meta))
+    def leave(self, meta: dict[str, Any], name: str = "meta.json") -> Path:
+        """Leave what is to be known, whole or not at all; `meta.json` is the end of the work."""
+        (self.folder / "draft").write_text(json.dumps(meta))
+        return (self.folder / "draft").rename(self.folder / name)
 
     def _report(self, kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
         messages = self.messages.get(self.unit, [])

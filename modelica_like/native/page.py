@@ -101,7 +101,7 @@ def export_html(
     begin = time.perf_counter()
     target = _target(path, ".html", "A page")
     report("compiling the model")
-    model, description, _ = _compiled(drive, (), "flow")
+    model, description, _ = _compiled(drive, (), "flow", ())
     report("simulating")
     end = seconds(until if until is not None else model.settings.get("until"))
     solution = simulate(model, end)
