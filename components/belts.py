@@ -69,10 +69,10 @@ class TimingBelt(Lossy, TwoFlanges):
 
     def events(self) -> Events:
         if self.given("mu"):
-            yield self.grip.go("sticking", "forward", when=self.f > self.slip_force)
-            yield self.grip.go("sticking", "backward", when=self.f < -self.slip_force)
-            yield self.grip.go("forward", "sticking", when=self.v_rel < der(self.x))
-            yield self.grip.go("backward", "sticking", when=self.v_rel > der(self.x))
+            yield self.grip.go("sticking", "forward", when=self.f > self.slip_force, because="slip force exceeded")
+            yield self.grip.go("sticking", "backward", when=self.f < -self.slip_force, because="slip force exceeded")
+            yield self.grip.go("forward", "sticking", when=self.v_rel < der(self.x), because="slip reached zero")
+            yield self.grip.go("backward", "sticking", when=self.v_rel > der(self.x), because="slip reached zero")
 
     def stored_energy(self) -> Expr:
         return self.c * self.x**2

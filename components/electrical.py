@@ -6,6 +6,7 @@ from components.thermal import Lossy
 from modelica_like.language import (
     Component,
     Connector,
+    Domain,
     Equations,
     Events,
     Expr,
@@ -27,6 +28,7 @@ from modelica_like.language import (
 class Pin(Connector):
     """Electrical terminal: potential, and the current into the component."""
 
+    domain = Domain("current", "voltage", "a resistor", reference="Ground")
     v: Variable = var("V", "potential")
     i: Variable = flow("A", "current, positive into the component")
 

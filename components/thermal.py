@@ -5,6 +5,7 @@ from __future__ import annotations
 from modelica_like.language import (
     Component,
     Connector,
+    Domain,
     Equations,
     Expr,
     Output,
@@ -23,6 +24,7 @@ _ROOM = 293.15
 class HeatPort(Connector):
     """Where heat enters: temperature, and the heat flow into the component."""
 
+    domain = Domain("heat flow", "temperature", "a thermal conductor")
     T: Variable = var("K", "temperature", guess=_ROOM, nominal=300.0)
     Q_flow: Variable = flow("W", "heat flow, positive into the component")
 

@@ -95,8 +95,8 @@ def find_atom(name: str) -> Atom:
     """
     if name in ATOMS:
         return ATOMS[name]
-    if name == "Nm":
-        raise UnitError("Unknown unit 'Nm'; did you mean 'N.m'?")
+    if name in ("Nm", "Nms"):  # pint takes the first for a number of threads
+        raise UnitError(f"Unknown unit '{name}'{_suggestion(name)}")
     return _ask_pint(name)
 
 

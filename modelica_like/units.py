@@ -159,7 +159,9 @@ def _check_name(name: str, text: str) -> None:
     except UnitError as error:
         if name == text:
             raise
-        raise UnitError(error.what.replace(f"'{name}'", f"'{name}' in '{text}'", 1)) from None
+        what = error.what.replace(f"'{name}'", f"'{name}' in '{text}'", 1)
+        meant = re.sub(r"mean '(.*)'", lambda match: f"mean '{text.replace(name, match[1], 1)}'", what)
+        raise UnitError(meant) from None
 
 
 class _Parser:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Annotated
 
 from modelica_like.cli.declare import Argument, Option, WrongUse
-from modelica_like.cli.shared import Assignments, Debug, Netlist, load_netlist, out, told
+from modelica_like.cli.shared import Assignments, Debug, Netlist, load_netlist, say, told
 
 
 class MasterName(StrEnum):
@@ -57,7 +57,7 @@ def split(
                 )
             else:
                 done = run(assembly, at, output, names=names or (), version=fmi, check=check, report=status.update)
-        out().print(str(done), soft_wrap=True)
+        say(str(done))
 
 
 def cosim(

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Annotated
 
 from modelica_like.cli.declare import Option
-from modelica_like.cli.shared import Assignments, Debug, Netlist, load_netlist, out, told
+from modelica_like.cli.shared import Assignments, Debug, Netlist, load_netlist, say, told
 
 
 class Takes(StrEnum):
@@ -73,7 +73,7 @@ def export(
                 from modelica_like.native.page import export_html
 
                 page = export_html(assembly, html, show=outputs or (), report=status.update)
-                out().print(str(page), soft_wrap=True)
+                say(str(page))
             if html is not None and output is None:
                 return
             done = export_fmu(
@@ -81,7 +81,7 @@ def export(
                 outputs=outputs or (), ends=ends or (), takes=takes.value, embed=embed, modes=modes.value,
                 fixed_step=fixed_step, check=check, strict=strict, report=status.update,
             )  # fmt: skip
-        out().print(str(done), soft_wrap=True)
+        say(str(done))
 
 
 @contextmanager
@@ -112,7 +112,7 @@ def runtimes(
                 runtime_library(name, status.update)
         for name in RUNTIMES:
             library = found_runtime(name)
-            out().print(f"{name:16}{library or 'not compiled'}", soft_wrap=True)
+            say(f"{name:16}{library or 'not compiled'}")
 
 
 def _listed(text: str) -> tuple[str, ...]:

@@ -77,6 +77,6 @@ def simulate(
                 lambda: run(model, until, start=begin, points=points, progress=bar, solver=solver.value), debug=debug
             )
         energy = energy and made.stopped is None and made.attempt("The energy balance", made.solution.energy)
-        made.tell(lambda one: run_report(one, energy=energy), csv)
+        made.tell(lambda one: run_report(one, energy=energy, debug=debug), csv)
         pictures = (plot, lambda one: draw(one, show or ())), (sankey, lambda one: one.energy().sankey(model.name))
         made.write(csv, units=units, pictures=pictures)

@@ -40,6 +40,7 @@ class CompiledTransition:
         timed: whether `index` is a position in the moments rather than in the guards.
         resets: what else changes.
         notice: what the user is told when it happens.
+        because: why it happens, in words.
     """
 
     mode: int
@@ -49,7 +50,8 @@ class CompiledTransition:
     index: int
     resets: tuple[Reset, ...]
     source: Source
-    notice: str = ""
+    notice: str
+    because: str
 
 
 @dataclass(frozen=True)

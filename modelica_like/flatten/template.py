@@ -62,6 +62,7 @@ class TransitionForm:
         index: position in the guards, or in the moments.
         resets: pairs of what is reset (slot path) and the position in the resets.
         notice: what the user is told when it happens.
+        because: why it happens, in words.
     """
 
     mode: str
@@ -72,6 +73,7 @@ class TransitionForm:
     resets: tuple[tuple[str, int], ...]
     source: Source
     notice: str
+    because: str
 
 
 @dataclass(frozen=True)
@@ -248,18 +250,10 @@ def _transition_forms(component: Component, transitions: list[Transition]) -> tu
             symbol = symbols_in(target)[0]
             resets.append((relative_path(symbol.owner, component, symbol.name), position))
             position += 1
-        numbers = tuple(t.mode.mode.number(name) for name in t.sources)
+        numbers, target = tuple(t.mode.mode.number(name) for name in t.sources), t.mode.mode.number(t.target)
+        words = t.source, t.notice, t.reason()
         forms.append(
-            TransitionForm(
-                _mode_path(component, t),
-                numbers,
-                t.mode.mode.number(t.target),
-                t.at is not None,
-                index,
-                tuple(resets),
-                t.source,
-                t.notice,
-            )
+            TransitionForm(_mode_path(component, t), numbers, target, t.at is not None, index, tuple(resets), *words)
         )
     return tuple(forms)
 

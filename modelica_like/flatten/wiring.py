@@ -7,11 +7,12 @@ from dataclasses import dataclass, field
 
 from modelica_like.errors import FreeFlange, ModelicaLikeError, Source, WrongConnection
 from modelica_like.flatten.checks import unit_of_field
+from modelica_like.language.assembly import Assembly
 from modelica_like.language.component import Component
 from modelica_like.language.declared import Connector, Declared
 from modelica_like.language.equation import Connection, FreeEnd
 from modelica_like.language.expr import Symbol
-from modelica_like.language.fields import Input, Output, Variable
+from modelica_like.language.fields import Input, Output
 from modelica_like.units import Unit, same_dimension
 
 End = tuple[int, bool]
@@ -160,14 +161,14 @@ class Wiring:
         for name, connector in component.connectors.items():
             if connector.may_be_free or self.is_connected(connector) or id(connector) in self.freed:
                 continue
-            flows = [n for n, f in connector.fields.items() if isinstance(f, Variable) and f.is_flow]
-            carries = "torque" if "tau" in flows else "force" if "f" in flows else "flow"
-            label = component.label
+            label, end, flow = component.label, f"{component._name}.{name}", connector.domain.flow
+            listed = isinstance(component._owner, Assembly)
+            say = f'list it: free = ["{end}"]' if listed else f"yield free(self.{end})"
             self.errors.append(
                 FreeFlange(
-                    f"{label}.{name} is free, so {label} ({type(component).__name__}) carries no {carries}.",
+                    f"{label}.{name} is free, so {label} ({type(component).__name__}) carries no {flow}.",
                     where=component.place_of(),
-                    advice=f"Connect it, or say free({label}.{name}).",
+                    advice=f"Connect it, or {say}." if component._owner else "Connect it in a drive.",
                 )
             )
 
@@ -191,10 +192,8 @@ def _name(symbol: Symbol) -> str:
 
 def _different_kinds(first: Connector, second: Connector, source: Source) -> WrongConnection:
     kinds = [f"{type(c).__name__} ({', '.join(f.unit_text for f in c.fields.values())})" for c in (first, second)]
-    names = {type(first).__name__, type(second).__name__}
-    between = (
-        "A spindle or rack goes between." if names == {"Flange", "LinearFlange"} else "Join connectors of one kind."
-    )
+    converter = first.domain.converters.get(type(second).__name__)
+    between = f"{converter} goes between." if converter else "Join connectors of one kind."
     article = "An" if kinds[0][0] in "AEIOU" else "A"
     return WrongConnection(
         f"connect({first.label}, {second.label}): {article.lower()} {kinds[0]} cannot join a {kinds[1]}. {between}",

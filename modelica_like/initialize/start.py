@@ -11,7 +11,7 @@ from modelica_like.compile.buffers import buffered
 from modelica_like.compile.compiled import CompiledDae, StartEntry, Vector
 from modelica_like.errors import ContradictingStart, InitializationError
 from modelica_like.initialize.plan import StartKind, StartPlan, start_name, start_plan
-from modelica_like.initialize.point import Point, call, solve_implicit
+from modelica_like.initialize.point import Point, call, check_singular, solve_implicit
 
 _CONSISTENT = 1e-8
 _MAX_NEWTON = 50
@@ -157,7 +157,9 @@ class StartProblem:
         point.x, point.z = state[:nx], state[nx + ny :]
 
     def _not_found(self, plan: StartPlan, point: Point) -> InitializationError:
-        solve_implicit(self.model, point)  # where the implicit equations are singular, that is the reason
+        # Where the equations are singular, that is the reason.
+        solve_implicit(self.model, point)
+        check_singular(self.model, point)
         given = [start_name(self.model, self.model.starts[k]) for k in plan.rows]
         resting = [self.model.flat_variables[k].path for k in plan.resting if k < len(self.model.flat_variables)]
         have = f"{', '.join(given[:6])} {'have' if len(given) > 1 else 'has'} the value asked for" if given else ""

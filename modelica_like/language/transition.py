@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -50,6 +51,7 @@ class Transition:
         at: time of a time event in s, or None.
         reset: new values of states and discrete values.
         notice: what the user is told when it happens, without the name of the component.
+        because: why it happens, in a few words.
     """
 
     mode: ModeOf
@@ -60,6 +62,18 @@ class Transition:
     reset: Mapping[Expr, Any]
     source: Source = NOWHERE
     notice: str = ""
+    because: str = ""
+
+    def reason(self) -> str:
+        """Return in words why it happens: as declared, or the condition as it is written."""
+        if self.because or self.at is not None:
+            return self.because or "its time has come"
+        try:
+            call: Any = ast.parse(self.source.text.removeprefix("yield ").strip(), mode="eval").body
+            written = next(one.value for one in call.keywords if one.arg == "when")
+        except (SyntaxError, AttributeError, StopIteration):  # not written as one call
+            return ""
+        return ast.unparse(written).replace("self.", "")
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from modelica_like.errors import Overdetermined
+from modelica_like.structure.diagnose import doubly_fixed
 from modelica_like.structure.system import System
 
 _TINY = 1e-9
@@ -86,9 +87,5 @@ def _reduce(vector: dict[int, float], reduced: dict[int, dict[int, float]]) -> d
 def _dependent(system: System, equations: list[int]) -> Overdetermined:
     origins = [system.origins[e] for e in equations]
     places = ", ".join(dict.fromkeys(o.path or o.kind for o in origins))
-    return Overdetermined(
-        f"The motion is constrained twice: the constraint of {places} follows from others.",
-        where=[o.source for o in origins],
-        why="Rigid parts form a loop, or two parts fix the same speed.",
-        advice="Remove one, or put a spring or clutch between.",
-    )
+    what = f"The motion is constrained twice: the constraint of {places} follows from others."
+    return doubly_fixed(system.model, origins, what, "Rigid parts form a loop, or two parts fix the same {potential}.")
