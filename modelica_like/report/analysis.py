@@ -10,7 +10,7 @@ from rich.console import Group, RenderableType
 from rich.markup import escape
 from rich.table import Table
 
-from modelica_like.analyse.sensitivity.report import SHOWN, relative_text, unit_text
+from modelica_like.analyse.sensitivity.report import SHOWN, left_out, relative_text, unit_text
 from modelica_like.report.types import table
 
 if TYPE_CHECKING:
@@ -104,6 +104,7 @@ def sensitivity_report(result: Sensitivities) -> RenderableType:
     parts += [
         f"{escape(name)}: {rows.shape[0]} times, see Sensitivities.series" for name, rows in result.series.items()
     ]
+    parts += [escape(sentence) for sentence in left_out(result)]
     parts.append(f"[dim]derivatives in SI units; relative: percent per percent; {result.method} method[/]")
     return Group(*parts)
 

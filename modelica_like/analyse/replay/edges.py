@@ -6,11 +6,13 @@ from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from modelica_like.analyse.replay.chain import Replay
 from modelica_like.analyse.replay.jumps import Jump
 from modelica_like.analyse.replay.slopes import slopes
 from modelica_like.analyse.replay.sweeps import Reading
+from modelica_like.compile.buffers import Vector
 from modelica_like.errors import NoGradient
 from modelica_like.solve.guards import Guards
 
@@ -33,17 +35,13 @@ class Edge:
     least: float
     error: NoGradient
 
-    def check(self, change: float) -> None:
-        """Raise the error if a relative change of a parameter leads away from the edge.
+    def moved_by(self, changes: Vector) -> NDArray[np.bool_]:
+        """Return which parameters lead away from the edge, so that there is no derivative by them.
 
         Args:
-            change: largest change of the reading per relative change of a parameter.
-
-        Raises:
-            NoGradient: it does.
+            changes: changes of the reading per relative change of each parameter, shape (parameters,).
         """
-        if change > self.least and abs(self.reading.value) <= _STILL * change:
-            raise self.error
+        return (changes > self.least) & (abs(self.reading.value) <= _STILL * changes)
 
 
 def edges(chain: Replay, timed: Collection[int | None]) -> list[Edge]:

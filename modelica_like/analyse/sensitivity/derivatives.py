@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 import numpy as np
 
 from modelica_like.analyse.replay.chain import Replay, Tolerances, replay
-from modelica_like.analyse.replay.edges import edges
+from modelica_like.analyse.replay.edges import Edge, edges
 from modelica_like.analyse.replay.slopes import Sizes
 from modelica_like.analyse.replay.sweeps import adjoint, forward
 from modelica_like.analyse.sensitivity.formulas import Freed, bound_by_formula, equal_to, free_formulas
 from modelica_like.analyse.sensitivity.outputs import Output, listed, quadratures, read_off, read_output, value_at
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae
-from modelica_like.errors import LanguageError, UnknownName, did_you_mean, missing_extra
+from modelica_like.errors import LanguageError, NoGradient, UnknownName, did_you_mean, missing_extra
 from modelica_like.initialize import StartKind
 from modelica_like.simulation import Model, simulate
 from modelica_like.solve.options import Options
@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Method = Literal["auto", "forward", "adjoint"]
+_NAMED = 3
+"""Largest number of parameters that an error names."""
 
 
 @dataclass(frozen=True)
@@ -51,6 +53,7 @@ class Sensitivities:
         method: `forward` or `adjoint`.
         time: times of the series in s, both sides of events included; empty without series.
         series: of each series its derivatives over time, shape (times, parameters).
+        left_out: parameters nobody named, by which there is no derivative, with the reasons.
     """
 
     model: str
@@ -60,6 +63,7 @@ class Sensitivities:
     method: str
     time: Vector = field(default_factory=lambda: np.zeros(0))
     series: Mapping[str, Vector] = field(default_factory=dict)
+    left_out: Mapping[str, str] = field(default_factory=dict)
 
     def __getitem__(self, key: tuple[str, str]) -> float:
         """Derivative of an output by a parameter.
@@ -143,8 +147,8 @@ def sensitivities(
         of: final values (`table.s`), `max(shaft.tau)`, `min(…)`, `at(table.s, 0.3 s)`, `integral(…)`, `series(…)`; of
             components `clutch.loss_energy`, `source_energy`, `lock_time`, `unlock_time`; times of mode changes
             `time(clutch.mode: forward -> stuck)`, the second one with `, 2`.
-        to: parameters and inputs; by default all that can change. One with a formula moves on its own, from the
-            formula's value; moved by another one it follows its formula.
+        to: parameters and inputs; by default all that can change and have a derivative (`left_out` has the others). One
+            with a formula moves on its own, from the formula's value; moved by another one it follows its formula.
         until: end time, as in `simulate`.
         parameters: other values of parameters, as in `simulate`.
         method: `forward` (cost grows with the parameters), `adjoint` (with the outputs), or what is cheaper.
@@ -153,7 +157,7 @@ def sensitivities(
         precision: relative tolerance of the steps of the replay.
 
     Raises:
-        NoGradient: a derivative does not exist; the message says at which event.
+        NoGradient: a derivative does not exist; the message says at which event, and by what.
         UnknownName: an output, a parameter or the method does not exist.
         ValueOutOfRange: there is no output, or no such precision.
         LanguageError: a parameter follows from others, and the drive is compiled already.
@@ -176,7 +180,7 @@ def sensitivities(
     column, name = quadratures(model, outputs)
     stops = solution.time if any(one.kind == "series" for one in outputs) else ()
     chain = replay(solution, column, name, start=start, stops=stops, tolerances=Tolerances(precision))
-    return _differentiate(solution, chain, outputs, chosen, method, freed)
+    return _differentiate(solution, chain, outputs, chosen, method, freed, named=bool(to))
 
 
 def _chosen(model: CompiledDae, names: Sequence[str]) -> list[tuple[int, Quantity]]:
@@ -208,7 +212,7 @@ def _chosen(model: CompiledDae, names: Sequence[str]) -> list[tuple[int, Quantit
 
 def _differentiate(
     solution: Solution, chain: Replay, outputs: list[Output], chosen: list[tuple[int, Quantity]], method: Method,
-    freed: Freed,
+    freed: Freed, *, named: bool,
 ) -> Sensitivities:  # fmt: skip
     size = Sizes.of(chain.model)
     plain = [one for one in outputs if one.kind != "series"]
@@ -227,10 +231,9 @@ def _differentiate(
         directions = np.zeros((size.fixed, len(positions)))
         directions[positions, range(len(positions))] = 1.0
         derivatives = forward(chain, total, directions)
-    changes = np.abs(derivatives) * [abs(quantity.value) or 1.0 for _, quantity in chosen]
-    for edge, change in zip(on_edge, changes[len(total) - len(on_edge) :], strict=True):
-        edge.check(float(change.max(initial=0.0)))
-    derivatives = derivatives[: len(total) - len(on_edge)]
+    # By parameters that nobody named the others are answered all the same.
+    kept, left_out = _by_existence(on_edge, derivatives[len(total) - len(on_edge) :], [one for _, one in chosen], named)
+    derivatives, chosen = derivatives[: len(total) - len(on_edge), kept], [chosen[k] for k in kept]
     if freed.slopes:
         derivatives = derivatives @ freed.taken_along([quantity.name for _, quantity in chosen])
     count = len(plain)
@@ -243,4 +246,23 @@ def _differentiate(
         way,
         np.array([chain.nodes[k].t for k in nodes]),
         {one.name: table for one, table in zip(series, rows, strict=True)},
+        left_out,
     )
+
+
+def _by_existence(
+    on_edge: list[Edge], derivatives: Vector, chosen: list[Quantity], named: bool
+) -> tuple[list[int], dict[str, str]]:
+    """Positions of the parameters by which there are derivatives, and of the others names and reasons."""
+    weights = [abs(one.value) or 1.0 for one in chosen]
+    reasons: dict[str, str] = {}
+    for edge, row in zip(on_edge, derivatives, strict=True):
+        moving = [chosen[k].name for k in np.flatnonzero(edge.moved_by(np.abs(row) * weights))]
+        error = edge.error
+        if moving and (named or len(reasons.keys() | moving) == len(chosen)):
+            raise NoGradient(
+                error.what, where=error.where, why=error.why,
+                advice=f"Leave out {' and '.join(moving[:_NAMED])} or move the parameters away from this limit.",
+            )  # fmt: skip
+        reasons |= dict.fromkeys(moving, error.what)
+    return [k for k, one in enumerate(chosen) if one.name not in reasons], reasons

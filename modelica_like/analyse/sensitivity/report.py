@@ -33,7 +33,12 @@ def text(result: Sensitivities) -> str:
         blocks.append("\n".join(lines))
     for name, table in result.series.items():
         blocks.append(f"{name}: derivatives at {table.shape[0]} times by {table.shape[1]} parameters")
-    return "\n\n".join(blocks)
+    return "\n\n".join([*blocks, *left_out(result)])
+
+
+def left_out(result: Sensitivities) -> list[str]:
+    """Return a sentence about each parameter that was left out."""
+    return [f"{name} is left out. {reason}" for name, reason in result.left_out.items()]
 
 
 def unit_text(unit: Any) -> str:
