@@ -6,7 +6,6 @@ import copy
 import gc
 import time
 from collections.abc import Iterable, Mapping
-from importlib import import_module
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -21,6 +20,7 @@ from modelica_like.solve.options import Options
 from modelica_like.solve.solution import Solution, Statistics
 from modelica_like.structure import reduce
 from modelica_like.units import parse_unit, to_si
+from modelica_like.upper import upper
 
 _SECOND = parse_unit("s")
 _SHORTEST = 1e-12
@@ -132,8 +132,7 @@ def _loop(solver: str) -> Any:
     if solver == "idas":
         return EventLoop
     if solver == "native":
-        # It stands above this layer.
-        return import_module("modelica_like.native.run").NativeLoop
+        return upper("NativeLoop")
     raise UnknownName(
         f"There is no solver '{solver}'{did_you_mean(solver, get_args(Solver)) or '.'}",
         advice="There are idas (the reference) and native (the compiled run-time of FMUs).",

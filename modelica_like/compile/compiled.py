@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from importlib import import_module
 from typing import Any
 
 import casadi as ca
@@ -16,6 +15,7 @@ from modelica_like.errors import LanguageError, Source, UnknownName, did_you_mea
 from modelica_like.flatten.model import FlatDiscrete, FlatParameter, FlatVariable, Origin
 from modelica_like.structure.holds import Circuit as Circuit
 from modelica_like.units import coherent, to_si
+from modelica_like.upper import upper
 
 
 @dataclass(frozen=True)
@@ -285,8 +285,7 @@ class CompiledDae:
             outputs: numbers read off the run.
             run: further arguments of `modelica_like.simulation_function`, which says more.
         """
-        # Analysis stands above this layer: only the face of the package knows where.
-        return import_module("modelica_like").simulation_function(self, inputs, outputs, **run)
+        return upper("simulation_function")(self, inputs, outputs, **run)
 
     def native(self, inputs: Sequence[str] = (), outputs: Sequence[str] = (), **how: Any) -> Any:
         """Return a handle for control loops: an instance that steps at the speed of C.
@@ -296,7 +295,7 @@ class CompiledDae:
             outputs: variables and modes that its steps read.
             how: further arguments of `modelica_like.Native`, which says more.
         """
-        return import_module("modelica_like").Native(self, inputs, outputs, **how)
+        return upper("Native")(self, inputs, outputs, **how)
 
     def __getstate__(self) -> dict[str, Any]:
         if self._make_energy is not None:

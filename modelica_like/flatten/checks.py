@@ -7,12 +7,12 @@ from typing import Any, cast
 import casadi as ca
 
 from modelica_like.errors import ComponentUnbalanced, ModelicaLikeError, raise_together_or_one
+from modelica_like.flatten.dimensions import Dimensions, check_equation, check_expression
 from modelica_like.language.component import Component
 from modelica_like.language.declared import Declared
 from modelica_like.language.equation import Equation
 from modelica_like.language.expr import TIME, symbols_in
 from modelica_like.language.fields import Field, Input, Parameter, Variable
-from modelica_like.unitcheck import Dimensions, check_equation, check_expression
 from modelica_like.units import ANY, ONE, Unit, parse_unit
 
 _SECOND = parse_unit("s")

@@ -4,12 +4,14 @@ import ast
 import os
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 
 import pytest
 
 import components
+import modelica_like
 from components import Clutch
 from modelica_like.errors import NetlistError, UnknownName
 from modelica_like.language import Component
@@ -25,6 +27,14 @@ def test_the_stub_tells_type_checkers_what_the_library_has():
     assert sorted(told) == components.__all__
     assert set(components.__all__) <= set(dir(components))
     assert all(getattr(components, name).__name__ == name for name in components.__all__)
+
+
+def test_the_contract_of_libraries_forbids_all_but_the_language():
+    root = Path(modelica_like.__file__).parent
+    contracts = tomllib.loads((root.parent / "pyproject.toml").read_text())["tool"]["importlinter"]["contracts"]
+    forbidden = next(one for one in contracts if one["name"] == "libraries use the language only")["forbidden_modules"]
+    every = {file.stem for file in root.iterdir() if file.suffix == ".py" or (file / "__init__.py").is_file()}
+    assert {f"modelica_like.{name}" for name in every - {"__init__", "__main__", "language"}} == set(forbidden)
 
 
 def test_a_name_or_module_that_the_library_has_not_is_an_attribute_error():

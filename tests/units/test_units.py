@@ -13,8 +13,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from modelica_like.errors import UnitError, ValueOutOfRange
-from modelica_like.unit_atoms import ATOMS, BASE, PINT_NAMES, find_atom, pint_registry
 from modelica_like.units import ANY, ONE, Unit, coherent, in_unit, parse_unit, read_quantity, same_dimension, to_si
+from modelica_like.units.atoms import ATOMS, BASE, PINT_NAMES, find_atom, pint_registry
 
 NAMES = st.sampled_from(["kg", "m", "s", "A", "K", "rad", "N", "J", "W", "V", "Ohm", "mm", "min", "rpm", "deg", "%"])
 EXPONENTS = st.one_of(

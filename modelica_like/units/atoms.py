@@ -105,7 +105,8 @@ def pint_registry() -> Any:
     """Return pint's registry of units; it is created by the first call, in about half a second."""
     import pint
 
-    return pint.get_application_registry().get()
+    found: Any = pint.get_application_registry
+    return found().get()
 
 
 def _ask_pint(name: str) -> Atom:
