@@ -13,8 +13,8 @@ import numpy as np
 from modelica_like.compile.buffers import buffered
 from modelica_like.compile.compiled import CompiledDae, StartEntry, StartSystem, Vector
 from modelica_like.errors import MissingStart
-from modelica_like.initialize.matching import Elimination, Matching
 from modelica_like.initialize.point import Point
+from modelica_like.structure.matching import Elimination, Matching
 
 StartKind = Literal["given", "rest", "steady"]
 _DENSE = 100

@@ -19,13 +19,6 @@ from modelica_like.structure.states import select_states
 from modelica_like.structure.system import System, build_system
 
 
-@dataclass(frozen=True)
-class Notice:
-    """Something worth knowing about the structure that is not an error."""
-
-    text: str
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class ReducedDae:
     """Index-1 system: der(x) = ode(x, z, p, d, t), 0 = alg(x, z, p, d, t).
@@ -108,19 +101,14 @@ class ReducedDae:
         )
 
     @property
-    def notices(self) -> tuple[Notice, ...]:
+    def notices(self) -> tuple[str, ...]:
         """What a reader should know: a high index and the states that were kept."""
         if not self.differentiated:
             return ()
-        places = list(dict.fromkeys(o.path or o.kind for o in self.differentiated))
-        couple = "couples" if len(places) == 1 else "couple"
-        count = len(self.differentiated)
-        return (
-            Notice(
-                f"Index {self.index}: {' and '.join(places[:4])}{' …' if len(places) > 4 else ''} {couple} motions. "
-                f"{count} constraint{'s' if count > 1 else ''} differentiated; states kept: {', '.join(self.states)}."
-            ),
-        )
+        places, count = list(dict.fromkeys(o.path or o.kind for o in self.differentiated)), len(self.differentiated)
+        named = f"{' and '.join(places[:4])}{' …' if len(places) > 4 else ''} couple{'s' if len(places) == 1 else ''}"
+        text = f"{count} constraint{'s' if count > 1 else ''} differentiated; states kept: {', '.join(self.states)}."
+        return (f"Index {self.index}: {named} motions. {text}",)
 
 
 def reduce(flat: FlatModel) -> ReducedDae:
@@ -143,12 +131,12 @@ def reduce(flat: FlatModel) -> ReducedDae:
     unknowns = _unknowns(system, states)
     if flags.settle(residual, unknowns):
         residual, origins = _differentiate(system, counts)
-    solved = BlockSolver(residual, _column(system, unknowns), _volatile(system)).run()
+    solved = BlockSolver(residual, system.column(unknowns), _volatile(system)).run()
     order = [(system.symbols[unknowns[k]], expression) for k, expression in solved.order]
     circuits = find_circuits(system, holds, order, states)
     if circuits:
         residual = share_reactions(system, holds, circuits, residual)
-        solved = BlockSolver(residual, _column(system, unknowns), _volatile(system)).run()
+        solved = BlockSolver(residual, system.column(unknowns), _volatile(system)).run()
     reduced = _assemble(system, counts, states, unknowns, origins, solved)
     return replace(reduced, holds=holds, circuits=tuple(circuits))
 
@@ -165,17 +153,13 @@ def _check_input_rates(system: System) -> None:
             )
 
 
-def _column(system: System, levels: list[int]) -> Any:
-    return system.column(levels)
-
-
 def _volatile(system: System) -> Any:
-    return ca.vertcat(_column(system, list(range(len(system.symbols)))), system.model.d, system.model.time)
+    return ca.vertcat(system.everything, system.model.d, system.model.time)
 
 
 def _incidence(system: System) -> list[list[int]]:
     """Level numbers in each residual."""
-    symbols = _column(system, list(range(len(system.symbols))))
+    symbols = system.everything
     function = ca.Function("residual", [symbols, system.model.p, system.model.d, system.model.time], [system.residual])
     rows: list[list[int]] = [[] for _ in range(system.residual.numel())]
     for row, column in zip(*function.jac_sparsity(0, 0).get_triplet(), strict=True):
@@ -190,7 +174,7 @@ def _top_slopes(system: System, counts: list[int]) -> list[dict[int, float]]:
     if not rows:
         return slopes
     model = system.model
-    symbols = _column(system, list(range(len(system.symbols))))
+    symbols = system.everything
     # d e^(c) / d v^(d) equals d e / d v^(d - c), so the original equations are enough.
     jacobian = ca.jacobian(system.residual[rows], symbols)
     function = ca.Function("slopes", [symbols, model.p, model.d, model.time], [jacobian])
@@ -218,9 +202,9 @@ def _differentiate(system: System, counts: list[int]) -> tuple[Any, list[Origin]
         current, rows = current[keep], [rows[k] for k in keep]
         _check_inputs(system, current, rows)
         moving = [n for n in range(len(system.levels)) if system.derivative(n) is not None]
-        rates = _column(system, [number for n in moving if (number := system.derivative(n)) is not None])
+        rates = system.column([number for n in moving if (number := system.derivative(n)) is not None])
         by_time = ca.jtimes(current, model.time, ca.SX(1))
-        current = ca.jtimes(current, _column(system, moving), rates) + by_time
+        current = ca.jtimes(current, system.column(moving), rates) + by_time
         residuals.append(current)
         origins += [system.origins[row] for row in rows]
         times += 1
@@ -231,7 +215,7 @@ def _check_inputs(system: System, equations: Any, rows: list[int]) -> None:
     unknown_rates = [level for level in system.inputs if system.derivative(level) is None]
     if not unknown_rates:
         return
-    inputs = _column(system, unknown_rates)
+    inputs = system.column(unknown_rates)
     for place, depends in enumerate(ca.which_depends(equations, inputs, 1, True)):
         if depends:
             origin = system.origins[rows[place]]
@@ -254,7 +238,7 @@ def _assemble(
     model, levels = system.model, system.levels
     symbols = [system.symbols[unknowns[k]] for k, _ in solved.order]
     determinants = [expression for _, expression in solved.determinants]
-    everything = _column(system, list(range(len(levels))))
+    everything = system.everything
     results: list[Any] = [everything, *solved.alg, *determinants]
     if symbols:
         _, results = ca.substitute_inplace(symbols, [e for _, e in solved.order], results, False)
@@ -272,9 +256,9 @@ def _assemble(
         flat=model,
         states=tuple(levels[s].name for s in states),
         implicit=tuple(levels[n].name for n in z_levels),
-        x=_column(system, states),
-        z=_column(system, z_levels),
-        u=_column(system, system.inputs),
+        x=system.column(states),
+        z=system.column(z_levels),
+        u=system.column(system.inputs),
         ode=ca.vertcat(*rates) if rates else ca.SX(0, 1),
         alg=ca.vertcat(*alg) if alg else ca.SX(0, 1),
         values=place(level_values, model.p),

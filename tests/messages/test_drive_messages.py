@@ -354,9 +354,9 @@ a speed; an operating point can begin from the end of a run, too.""",
 
 
 def test_a_high_index_is_a_notice():
-    assert [notice.text for notice in reduce(flatten(Geared())).notices] == [
-        "Index 3: gear couples motions. 1 constraint differentiated; states kept: a.phi, a.w."
-    ]
+    assert reduce(flatten(Geared())).notices == (
+        "Index 3: gear couples motions. 1 constraint differentiated; states kept: a.phi, a.w.",
+    )
 
 
 @pytest.mark.parametrize("name", CASES)
