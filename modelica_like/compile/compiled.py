@@ -14,6 +14,7 @@ from modelica_like.compile.start_system import StartSystem as StartSystem
 from modelica_like.errors import LanguageError, Source, UnknownName, did_you_mean
 from modelica_like.flatten.model import FlatDiscrete, FlatParameter, FlatVariable, Origin
 from modelica_like.structure.holds import Circuit as Circuit
+from modelica_like.structure.holds import HeldMotion as HeldMotion
 from modelica_like.units import coherent, to_si
 from modelica_like.upper import upper
 
@@ -61,31 +62,6 @@ class StartEntry:
     node: int
     state: tuple[int, float] | None
     strength: str
-
-
-@dataclass(frozen=True)
-class CompiledHold:
-    """A motion that a mode holds at zero.
-
-    Attributes:
-        component: path of the component.
-        mode: position of the mode in d.
-        number: number of the mode that holds.
-        loose: number of a mode that does not, or -1.
-        motion: variable that is held.
-        state: (state, factor) if it is one.
-        reaction: variable that holds it, or -1.
-        approach: position in d of the derivative that the motion is to have; zero but in impacts.
-    """
-
-    component: str
-    mode: int
-    number: int
-    loose: int
-    motion: int
-    state: tuple[int, float] | None
-    reaction: int
-    approach: int
 
 
 @dataclass(frozen=True)
@@ -156,7 +132,7 @@ class CompiledDae:
     transitions: tuple[CompiledTransition, ...]
     start_modes: tuple[tuple[int, int, Source], ...]
     starts: tuple[StartEntry, ...]
-    holds: tuple[CompiledHold, ...]
+    holds: tuple[HeldMotion, ...]
     circuits: tuple[Circuit, ...]
     singular: tuple[tuple[tuple[str, ...], tuple[Origin, ...]], ...]
     differentiated: tuple[Origin, ...]

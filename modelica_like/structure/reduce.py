@@ -138,7 +138,8 @@ def reduce(flat: FlatModel) -> ReducedDae:
         residual = share_reactions(system, holds, circuits, residual)
         solved = BlockSolver(residual, system.column(unknowns), _volatile(system)).run()
     reduced = _assemble(system, counts, states, unknowns, origins, solved)
-    return replace(reduced, holds=holds, circuits=tuple(circuits))
+    held = tuple(replace(one, state=reduced.node_states[one.motion]) for one in holds)
+    return replace(reduced, holds=held, circuits=tuple(circuits))
 
 
 def _check_input_rates(system: System) -> None:
@@ -235,23 +236,26 @@ def _unknowns(system: System, states: list[int]) -> list[int]:
 def _assemble(
     system: System, counts: list[int], states: list[int], unknowns: list[int], origins: list[Origin], solved: Solved
 ) -> ReducedDae:
+    """Put the parts of the reduced system together.
+
+    Args:
+        system: the equations over levels.
+        counts: how often each of them is differentiated.
+        states: levels that are states.
+        unknowns: levels that were solved for; positions in `solved` are positions in this list.
+        origins: of all equations, differentiated ones included; positions in blocks are positions in this list.
+        solved: the blocks.
+    """
     model, levels = system.model, system.levels
-    symbols = [system.symbols[unknowns[k]] for k, _ in solved.order]
-    determinants = [expression for _, expression in solved.determinants]
-    everything = system.everything
-    results: list[Any] = [everything, *solved.alg, *determinants]
-    if symbols:
-        _, results = ca.substitute_inplace(symbols, [e for _, e in solved.order], results, False)
-    level_values = results[0]
-    alg = results[1 : 1 + len(solved.alg)]
-    place = ca.Function("nodes", [everything, model.p], [system.node_values])
+    level_values, alg, determinants = _written_out(system, unknowns, solved)
+    place = ca.Function("nodes", [system.everything, model.p], [system.node_values])
     z_levels = [unknowns[k] for k in solved.z]
     rates = [level_values[n] for s in states if (n := system.derivative(s)) is not None]
-    blocks = solved.blocks
     told = [
         (tuple(levels[unknowns[k]].name for k in block.unknowns), tuple(origins[k] for k in block.equations))
-        for block in blocks
+        for block in solved.blocks
     ]
+    numbers = [number for number, _ in solved.determinants]
     return ReducedDae(
         flat=model,
         states=tuple(levels[s].name for s in states),
@@ -266,17 +270,25 @@ def _assemble(
         guesses=tuple(levels[s].guess for s in states),
         nominals=tuple(levels[s].nominal for s in states),
         z_guesses=tuple(levels[n].guess for n in z_levels),
-        blocks=tuple(blocks),
-        determinants=tuple(
-            (*told[number], results[1 + len(solved.alg) + k]) for k, (number, _) in enumerate(solved.determinants)
-        ),
+        blocks=tuple(solved.blocks),
+        determinants=tuple((*told[number], one) for number, one in zip(numbers, determinants, strict=True)),
         index=max(counts, default=0) + 1,
         differentiated=tuple(system.origins[k] for k, count in enumerate(counts) if count),
         system=system,
-        implicit_blocks=tuple(pair for pair, block in zip(told, blocks, strict=True) if block.kind == "implicit"),
+        implicit_blocks=tuple(pair for pair, one in zip(told, solved.blocks, strict=True) if one.kind == "implicit"),
         level_values=level_values,
         explicit=tuple((unknowns[k], expression) for k, expression in solved.order),
     )
+
+
+def _written_out(system: System, unknowns: list[int], solved: Solved) -> tuple[Any, list[Any], list[Any]]:
+    """Values of all levels, residuals of z and determinants, in states, z and inputs instead of explicit unknowns."""
+    results: list[Any] = [system.everything, *solved.alg, *(expression for _, expression in solved.determinants)]
+    if solved.order:
+        symbols, expressions = [system.symbols[unknowns[k]] for k, _ in solved.order], [e for _, e in solved.order]
+        _, results = ca.substitute_inplace(symbols, expressions, results, False)
+    end = 1 + len(solved.alg)
+    return results[0], results[1:end], results[end:]
 
 
 def _node_states(system: System, states: list[int]) -> tuple[tuple[int, float] | None, ...]:

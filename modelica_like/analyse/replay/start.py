@@ -14,7 +14,6 @@ from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.initialize import Point, StartKind, start_plan
 from modelica_like.initialize.kept import find_kept, solve_kept
-from modelica_like.initialize.start import StartProblem
 from modelica_like.initialize.steady import moving_states
 
 _MAX_NEWTON = 50
@@ -46,9 +45,7 @@ class StartSlopes:
         self.moved = list(moved)
         starts, values = (np.asarray(one[:, self.moved].full()) for one in jacobians[:2])
         self.starts, self.values = starts, values
-        problem = StartProblem(model, point.copy())
-        self.rows = {id(entry): k for k, entry in enumerate(model.starts)}
-        states = self._steady(problem, given) if start == "steady" else self._given(problem)
+        states = self._steady(given) if start == "steady" else self._given()
         self.x, self.d = np.zeros((self.size.x, self.size.fixed)), np.zeros((self.size.d, self.size.fixed))
         self.x[:, self.moved], self.d[:, self.moved] = states, starts
 
@@ -63,18 +60,22 @@ class StartSlopes:
             model._cache[key] = ca.Function("slopes", list(arguments.values()), [ca.jacobian(value, fixed)])
         return model._cache[key](*given)
 
-    def _direct(self, problem: StartProblem) -> Vector:
+    def _direct(self) -> Vector:
         """Derivatives of the states that have start values of their own."""
         slopes = np.zeros((self.size.x, len(self.moved)))
-        for position, entry in problem.direct.items():
-            assert entry.state is not None
-            slopes[position] = self.values[self.rows[id(entry)]] / entry.state[1]
+        for _, number in self.plan.direct:
+            self._take(slopes, number)
         return slopes
 
-    def _given(self, problem: StartProblem) -> Vector:
+    def _take(self, slopes: Vector, number: int) -> None:
+        state = self.model.starts[number].state
+        assert state is not None
+        slopes[state[0]] = self.values[number] / state[1]
+
+    def _given(self) -> Vector:
         """Implicit function theorem on the start system."""
         size, plan = self.size, self.plan
-        slopes = self._direct(problem)
+        slopes = self._direct()
         if not plan.columns or not self.moved:
             return slopes
         wanted, columns = list(plan.wanted), list(plan.columns)
@@ -119,13 +120,14 @@ class StartSlopes:
                 break
         return y
 
-    def _steady(self, problem: StartProblem, given: Any) -> Vector:
+    def _steady(self, given: Any) -> Vector:
         """Implicit function theorem on the steady state; what that leaves open is held, or keeps to the guess."""
         model, size = self.model, self.size
-        guess = self._direct(problem)
-        for entry in model.starts:
-            if entry.strength == "default" and entry.state is not None and entry.state[0] not in problem.direct:
-                guess[entry.state[0]] = self.values[self.rows[id(entry)]] / entry.state[1]
+        guess = self._direct()
+        fixed = {state for state, _ in self.plan.direct}
+        for number, entry in enumerate(model.starts):
+            if entry.strength == "default" and entry.state is not None and entry.state[0] not in fixed:
+                self._take(guess, number)
         arguments = model.arguments
         x, z = arguments["x"], arguments["z"]
         symbols = list(arguments.values())
