@@ -68,7 +68,7 @@ class AngleToTorqueAdaptor(Component):
     derivatives of each other, which is up to the one who gives them.
     """
 
-    terminal = Terminal(ROTATIONAL, takes="potential", rates=(("phi", "w"), ("w", "a")))
+    terminal = Terminal(ROTATIONAL, takes="potential", rates=(("phi", "w"), ("w", "a")), power=("tau", "w"))
     flange = Flange("shaft end")
     phi: Input = signal_in("rad", "angle of the shaft")
     w: Input = signal_in("rad/s", "speed of the shaft", default=0.0)
@@ -118,7 +118,7 @@ class ForceToPositionAdaptor(Component):
 class PositionToForceAdaptor(Component):
     """Slide end of a part that is moved, and answers with a force; see `AngleToTorqueAdaptor`."""
 
-    terminal = Terminal(TRANSLATIONAL, takes="potential", rates=(("s", "v"), ("v", "a")))
+    terminal = Terminal(TRANSLATIONAL, takes="potential", rates=(("s", "v"), ("v", "a")), power=("f", "v"))
     flange = LinearFlange("slide end")
     s: Input = signal_in("m", "position of the slide")
     v: Input = signal_in("m/s", "velocity of the slide", default=0.0)
@@ -152,7 +152,7 @@ class CurrentToVoltageAdaptor(Component):
 class VoltageToCurrentAdaptor(Component):
     """Pin of a circuit whose potential is given, and that answers with a current."""
 
-    terminal = Terminal(ELECTRICAL, takes="potential")
+    terminal = Terminal(ELECTRICAL, takes="potential", power=("i", "v"))
     pin = Pin("open end of the circuit")
     v: Input = signal_in("V", "potential of the pin")
     i: Output = signal_out("A", "current into the other part")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from components.interfaces import CompliantWithRelativeStates, ShaftInHousing
+from components.tabulated import Tabulated
 from components.thermal import Lossy
 from modelica_like.language import (
     Equations,
@@ -19,7 +20,6 @@ from modelica_like.language import (
     all_of,
     column,
     der,
-    interpolate,
     maximum,
     negate,
     param,
@@ -200,7 +200,7 @@ class ShaftFriction(ShaftSticking, DryFriction, partial=True):
     """Dry friction between turning parts."""
 
 
-class PressedFriction(ShaftFriction, partial=True):
+class PressedFriction(Tabulated, ShaftFriction, partial=True):
     """Friction surfaces pressed together by a normal force.
 
     Friction torque cgeo·mu(slip)·fn with the normal force fn = fn_max·f_normalized. For N surfaces with the radii r_i
@@ -213,11 +213,9 @@ class PressedFriction(ShaftFriction, partial=True):
     cgeo: Parameter = param("m", "friction radius times number of friction surfaces", default=1.0, min=0)
     mu_pos: Rows = rows(
         column("slip speed", scale="w_scale", rising=True),
-        column("sliding friction coefficient"),
+        column("sliding friction coefficient", min=0),
         default=((0.0, 0.5),),
     )
-    smooth: bool = False
-    """Interpolate mu_pos with a continuous slope."""
     w_scale: Parameter = param("rad/s", "slip speed that counts as 1 in mu_pos", default=1.0)
     capacity: Parameter = param(
         "N.m", "sliding torque at f_normalized = 1; replaces fn_max, cgeo and mu_pos", default=None, min=0
@@ -226,13 +224,22 @@ class PressedFriction(ShaftFriction, partial=True):
 
     def mu(self, speed: Expr | float) -> Expr | float:
         """Return the coefficient of sliding friction."""
-        speeds, values = zip(*self.mu_pos, strict=True)
-        return interpolate(speed / self.w_scale, speeds, values, smooth=self.smooth)
+        return self.look_up(speed / self.w_scale, self.mu_pos)
 
     def sliding_friction(self, speed: Expr | float) -> Expr:
         if self.given("capacity"):
             return self.capacity * self.f_normalized + self.tau_drag
         return self.cgeo * self.mu(speed) * (self.fn_max * self.f_normalized) + self.tau_drag
+
+    def events(self) -> Events:
+        yield from super().events()
+        yield from self.measured()
+
+    def measured(self) -> Events:
+        """Yield the event that tells that the slip leaves mu_pos while the surfaces are pressed together."""
+        if not self.given("capacity"):
+            speed = absolute(self.slip) / self.w_scale
+            yield from self.leaving("mu_pos", speed, self.mu_pos, self.f_normalized > 0)
 
 
 class Clutch(PressedFriction, CompliantWithRelativeStates):
@@ -269,6 +276,9 @@ class MultiPlateClutch(Clutch):
         below = self.w_min - speed
         return self.mu_min + where(below > 0, self.curvature * below**3, -self.slope * below)
 
+    def measured(self) -> Events:
+        return iter(())
+
     def static_friction(self) -> Expr:
         return self.cgeo * self.mu_static * (self.fn_max * self.f_normalized) + self.tau_drag
 
@@ -287,16 +297,14 @@ class Brake(PressedFriction, ShaftInHousing):
         return self.tau
 
 
-class BearingFriction(ShaftFriction, ShaftInHousing):
+class BearingFriction(Tabulated, ShaftFriction, ShaftInHousing):
     """Friction of a bearing: a torque against the rotation that depends on the speed, with stiction."""
 
     w: Variable = var("rad/s", "speed of the shaft relative to the housing", state="always")
     tau_pos: Rows = rows(
-        column("speed", scale="w_scale", rising=True), column("friction torque", scale="tau_scale"),
+        column("speed", scale="w_scale", rising=True), column("friction torque", scale="tau_scale", min=0),
         default=((0.0, 1.0),),
     )  # fmt: skip
-    smooth: bool = False
-    """Interpolate tau_pos with a continuous slope."""
     w_scale: Parameter = param("rad/s", "speed that counts as 1 in tau_pos", default=1.0)
     tau_scale: Parameter = param("N.m", "torque that counts as 1 in tau_pos", default=1.0)
 
@@ -309,5 +317,8 @@ class BearingFriction(ShaftFriction, ShaftInHousing):
         return self.tau
 
     def sliding_friction(self, speed: Expr | float) -> Expr:
-        speeds, torques = zip(*self.tau_pos, strict=True)
-        return self.tau_scale * interpolate(speed / self.w_scale, speeds, torques, smooth=self.smooth)
+        return self.tau_scale * self.look_up(speed / self.w_scale, self.tau_pos)
+
+    def events(self) -> Events:
+        yield from super().events()
+        yield from self.leaving("tau_pos", absolute(self.w) / self.w_scale, self.tau_pos)

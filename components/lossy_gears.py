@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from components.friction import ShaftSticking
 from components.interfaces import TwoFlanges
+from components.tabulated import Tabulated
 from modelica_like.language import (
     Equations,
     Events,
@@ -14,7 +15,6 @@ from modelica_like.language import (
     absolute,
     column,
     der,
-    interpolate,
     maximum,
     minimum,
     param,
@@ -102,7 +102,7 @@ class MeshWithFriction(ShaftSticking, TwoFlanges, partial=True):
         yield from super().events()
 
 
-class LossyGear(MeshWithFriction):
+class LossyGear(Tabulated, MeshWithFriction):
     """Gear with the loss table of the Modelica Standard Library, Rotational.LossyGear.
 
     -flange_b.tau = ratio·(eta_mf·flange_a.tau - tau_bf), where eta_mf is eta_mf1 while flange_a drives and 1/eta_mf2
@@ -110,14 +110,15 @@ class LossyGear(MeshWithFriction):
     """
 
     loss_table: LossRows = rows(
-        column("speed |w_a|", scale="w_scale", rising=True), column("eta_mf1"), column("eta_mf2"),
+        column("speed |w_a|", scale="w_scale", rising=True),
+        column("eta_mf1", min=1e-3, max=1), column("eta_mf2", max=1),
         column("|tau_bf1|", scale="tau_scale"), column("|tau_bf2|", scale="tau_scale"),
     )  # fmt: skip
     w_scale: Parameter = param("rad/s", "speed that counts as 1 in loss_table", default=1.0)
     tau_scale: Parameter = param("N.m", "torque that counts as 1 in loss_table", default=1.0)
 
     def _column(self, speed: Expr | float, column: int) -> Expr:
-        return interpolate(speed / self.w_scale, [r[0] for r in self.loss_table], [r[column] for r in self.loss_table])
+        return self.look_up(speed / self.w_scale, self.loss_table, column)
 
     def efficiencies(self, speed: Expr | float) -> tuple[Expr | float, Expr | float]:
         return self._column(speed, 1), self._column(speed, 2)
@@ -127,6 +128,10 @@ class LossyGear(MeshWithFriction):
         eta_a, eta_b = self.efficiencies(speed)
         tau_a, tau_b = (self.tau_scale * absolute(self._column(speed, k)) for k in (3, 4))
         return tau_a / eta_a, tau_b * eta_b
+
+    def events(self) -> Events:
+        yield from super().events()
+        yield from self.leaving("loss_table", absolute(self.w_a) / self.w_scale, self.loss_table)
 
 
 class ConstantEfficiencyGear(MeshWithFriction):

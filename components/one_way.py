@@ -91,6 +91,7 @@ class OneWayClutch(Clutch):
         yield mode.go("start_forward", "forward", when=w > 0, because="slip begins")
         yield mode.go("start_forward", "stuck", when=der(w) < 0, because="no slip follows")
         yield mode.go("forward", "stuck", when=w < 0, because="slip reached zero")
+        yield from self.measured()
 
 
 class TorqueLimiter(ShaftFriction, CompliantWithRelativeStates):

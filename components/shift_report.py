@@ -7,8 +7,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from components.sizing.quantities import Energy, Time, Torque
-from components.sizing.result import Result, line
+from modelica_like.language.quantities import Energy, Time, Torque
+from modelica_like.language.results import Result, line
 
 _ELEMENTS = ("clutch_a", "clutch_b", "brake_c", "brake_d", "clutch_e")
 _ROUNDING = 1e-9

@@ -6,6 +6,7 @@ Where a signal jumps or has a kink there is a time event, so that the solver nev
 from __future__ import annotations
 
 from math import pi
+from typing import Literal
 
 from modelica_like.language import (
     Component,
@@ -36,6 +37,7 @@ from modelica_like.language import (
 )
 
 _NEVER = 1e30
+_ROUNDING = 1e-9
 
 
 class Constant(Component):
@@ -255,13 +257,16 @@ class Rowwise(Component, partial=True):
 
 
 class Table(Rowwise):
-    """Signal that interpolates in a table of time and value; beyond its ends the last slope goes on."""
+    """Signal that interpolates in a table of time and value."""
 
     table: tuple[tuple[float, float], ...] = rows(
         column("time", scale="time_scale", rising=True), column("value", scale="scale")
     )
     smooth: bool = False
     """Interpolate with a continuous slope instead of straight lines."""
+    extrapolate: Literal["linear", "hold", "error"] = "linear"
+    """Beyond the ends let the last slope go on (`linear`), `hold` the last value, or end the run (`error`)."""
+    end = Mode("ahead", "passed", description="whether the table has ended")
     scale: Parameter = param("*", "what counts as 1 in the values", default=1.0)
 
     def moments(self) -> tuple[float, ...]:
@@ -269,8 +274,15 @@ class Table(Rowwise):
 
     def equations(self) -> Equations:
         times, values = zip(*self.table, strict=True)
-        yield self.y == self.scale * interpolate(self.time / self.time_scale, times, values, smooth=self.smooth)
+        yield self.y == self.scale * interpolate(
+            self.time / self.time_scale, times, values, self.smooth, self.extrapolate
+        )
 
     def events(self) -> Events:
         if not self.smooth:
             yield from super().events()
+        if self.extrapolate == "error":
+            # A run may end where the table does.
+            begin, end = self.table[0][0], self.table[-1][0]
+            over = self.time / self.time_scale > end + _ROUNDING * (end - begin)
+            yield self.end.go("ahead", "passed", when=over, notice="has no more rows", fails=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from components.friction import DryFriction, Rows, Sticking
 from components.interfaces import LinearCompliantWithRelativeStates, LinearFlange, SlideInHousing
+from components.tabulated import Tabulated
 from components.thermal import Lossy
 from modelica_like.language import (
     UNLIMITED,
@@ -15,12 +16,12 @@ from modelica_like.language import (
     Mode,
     Parameter,
     Variable,
+    absolute,
     all_of,
     any_of,
     column,
     der,
     exp,
-    interpolate,
     maximum,
     negate,
     param,
@@ -127,21 +128,22 @@ class SlideFriction(SlideSticking, DryFriction, SlideInHousing, partial=True):
         return self.f
 
 
-class SupportFriction(SlideFriction):
+class SupportFriction(Tabulated, SlideFriction):
     """Friction of a slideway: a force against the motion that depends on the velocity, with stiction."""
 
     f_pos: Rows = rows(
-        column("velocity", scale="v_scale", rising=True), column("friction force", scale="f_scale"),
+        column("velocity", scale="v_scale", rising=True), column("friction force", scale="f_scale", min=0),
         default=((0.0, 1.0),),
     )  # fmt: skip
-    smooth: bool = False
-    """Interpolate f_pos with a continuous slope."""
     v_scale: Parameter = param("m/s", "velocity that counts as 1 in f_pos", default=1.0)
     f_scale: Parameter = param("N", "force that counts as 1 in f_pos", default=1.0)
 
     def sliding_friction(self, speed: Expr | float) -> Expr:
-        speeds, forces = zip(*self.f_pos, strict=True)
-        return self.f_scale * interpolate(speed / self.v_scale, speeds, forces, smooth=self.smooth)
+        return self.f_scale * self.look_up(speed / self.v_scale, self.f_pos)
+
+    def events(self) -> Events:
+        yield from super().events()
+        yield from self.leaving("f_pos", absolute(self.v) / self.v_scale, self.f_pos)
 
 
 class StribeckFriction(SlideFriction):
@@ -159,7 +161,7 @@ class StribeckFriction(SlideFriction):
         return self.F_prop * speed + self.F_Coulomb + self.F_Stribeck * exp(-self.fexp * speed)
 
 
-class TranslationalBrake(SlideFriction):
+class TranslationalBrake(Tabulated, SlideFriction):
     """Friction brake between a slide and the housing: friction force cgeo·mu(v)·fn, fn = fn_max·f_normalized."""
 
     f_normalized: Input = signal_in("1", "normal force over fn_max; the brake is free at 0", default=1.0)
@@ -167,17 +169,18 @@ class TranslationalBrake(SlideFriction):
     cgeo: Parameter = param("1", "number of friction surfaces", default=1.0, min=0)
     mu_pos: Rows = rows(
         column("velocity", scale="v_scale", rising=True),
-        column("sliding friction coefficient"),
+        column("sliding friction coefficient", min=0),
         default=((0.0, 0.5),),
     )
-    smooth: bool = False
-    """Interpolate mu_pos with a continuous slope."""
     v_scale: Parameter = param("m/s", "velocity that counts as 1 in mu_pos", default=1.0)
 
     def sliding_friction(self, speed: Expr | float) -> Expr:
-        speeds, values = zip(*self.mu_pos, strict=True)
-        mu = interpolate(speed / self.v_scale, speeds, values, smooth=self.smooth)
+        mu = self.look_up(speed / self.v_scale, self.mu_pos)
         return self.cgeo * mu * (self.fn_max * self.f_normalized)
+
+    def events(self) -> Events:
+        yield from super().events()
+        yield from self.leaving("mu_pos", absolute(self.v) / self.v_scale, self.mu_pos, self.f_normalized > 0)
 
 
 class MassWithStopAndFriction(SlideSticking, DryFriction):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import pi
+from typing import Literal
 
 from components.signals import Periodic, Started, Table
 from modelica_like.language import (
@@ -153,11 +154,18 @@ class CombiTable(Component):
     )
     smooth: bool = False
     """Interpolate with a continuous slope instead of straight lines."""
+    extrapolate: Literal["linear", "hold", "error"] = "linear"
+    """Beyond the ends let the last slopes go on (`linear`), `hold` the last values, or end the run (`error`)."""
     time_scale: Parameter = param("s", "what counts as 1 in the times", default=1.0)
 
     def build(self) -> None:
         times, *columns = zip(*self.table, strict=True)
         self.columns = [
-            Table(table=tuple(zip(times, column, strict=True)), smooth=self.smooth, time_scale="time_scale")
+            Table(
+                table=tuple(zip(times, column, strict=True)),
+                smooth=self.smooth,
+                extrapolate=self.extrapolate,
+                time_scale="time_scale",
+            )
             for column in columns
         ]

@@ -183,6 +183,10 @@ class Chattering(SolveError):
     """Modes switch without end."""
 
 
+class LimitPassed(SolveError):
+    """Something happened that a component says must end the run."""
+
+
 class StepFailed(SolveError):
     """The integrator gave up."""
 

@@ -4,20 +4,34 @@ from __future__ import annotations
 
 import copy
 import gc
+import math
 import time
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal, get_args
 
 from modelica_like.compile import compile
 from modelica_like.compile.compiled import CompiledDae
-from modelica_like.errors import SolveError, UnitError, UnknownName, ValueOutOfRange, did_you_mean
+from modelica_like.errors import (
+    ExportError,
+    LanguageError,
+    SolveError,
+    StepFailed,
+    UnitError,
+    UnknownName,
+    ValueOutOfRange,
+    did_you_mean,
+)
 from modelica_like.flatten import flatten
 from modelica_like.initialize import StartKind, initialize
 from modelica_like.language import Component
+from modelica_like.language.tunable import with_tunable_tables
 from modelica_like.solve.events import EventLoop, Progress
 from modelica_like.solve.options import Options
-from modelica_like.solve.solution import Solution, Statistics
+from modelica_like.solve.solution import Solution
+from modelica_like.solve.trajectories import Statistics, Trajectories, needs_equations
 from modelica_like.structure import reduce
 from modelica_like.units import parse_unit, to_si
 from modelica_like.upper import upper
@@ -29,23 +43,32 @@ Solver = Literal["idas", "native"]
 Model = Component | CompiledDae | str | Path
 
 
-def build(drive: Model, free: Iterable[str] = ()) -> CompiledDae:
+def build(drive: Model, free: Iterable[str] = (), *, tables: Iterable[str] = ()) -> CompiledDae:
     """Compile a component tree or a netlist file; a compiled model is returned as it is.
 
     Args:
         drive: the model.
         free: parameters that shall be independent: what follows from others by a formula keeps the formula's value,
             but can be varied on its own. Not possible in a compiled model.
+        tables: patterns of tables whose numbers shall be parameters, such as `clutch.mu_pos`: see
+            `with_tunable_tables`. Not possible in a compiled model.
 
     Raises:
+        LanguageError: tables of a compiled model are asked for.
         ModelicaLikeError: something is wrong with the model; the message says what, where and what to do.
     """
     if isinstance(drive, CompiledDae):
+        if tables:
+            raise LanguageError("Tables of a compiled model stay what they are.", advice="Build it with `tables`.")
         return drive
+    if isinstance(drive, Trajectories):
+        raise needs_equations(drive)
     if isinstance(drive, str | Path):
         from modelica_like.netlist import load
 
         drive = load(drive)
+    if tables:
+        drive = with_tunable_tables(drive, tables)
     model = _compiled(drive)
     bound = [name for name in free if name in model.derived_position]
     if not bound:
@@ -87,7 +110,8 @@ def simulate(
         points: number of equal intervals of the results.
         options: all options together; the arguments before win.
         progress: called with the time reached.
-        solver: `idas`, the reference, or `native`: the compiled run-time of FMUs, several times as fast.
+        solver: `idas`, the reference, or `native`: the compiled run-time of FMUs, several times as fast. Where IDAS
+            gives up, the run is done by the compiled run-time, if there is one and it succeeds; a notice tells so.
 
     Raises:
         ModelicaLikeError: the model or a value is wrong, or the simulation cannot go on.
@@ -105,6 +129,12 @@ def simulate(
         loop.run()
     except (SolveError, KeyboardInterrupt) as error:
         vars(error)["run"] = _solution(loop, begin) if loop.record.segments else None
+        if solver == "idas" and isinstance(error, StepFailed):
+            # Where there is no run-time, or it fails, too, what IDAS says stands.
+            with suppress(SolveError, ExportError, LanguageError):
+                run = simulate(model, end, start=start, t0=t0, options=chosen, progress=progress, solver="native")
+                told = f"{error.what} The whole run was done by the compiled run-time instead (solver native)."
+                return replace(run, notices=(told, *run.notices))
         raise
     return _solution(loop, begin)
 
@@ -162,6 +192,18 @@ def seconds(until: float | str | None, name: str = "until") -> float:
     except UnitError as error:
         error.advice = error.advice or f'Give seconds or a time, e.g. {name}="2 s".'
         raise
+
+
+def positive_step(asked: float | str | None) -> float:
+    """Return a fixed step in s, 0 for None.
+
+    Raises:
+        ValueOutOfRange: it is not positive and finite.
+    """
+    step = 0.0 if asked is None else seconds(asked, "fixed_step")
+    if asked is not None and not 0 < step < math.inf:
+        raise ValueOutOfRange(f"The fixed step must be a positive time, not {step:g} s.")
+    return step
 
 
 def _options(base: Options, settings: Mapping[str, Any], **given: float | None) -> Options:

@@ -1,7 +1,8 @@
 """Runs a system of FMUs in a process of its own: python -m modelica_like.cosimulation.child FOLDER.
 
-The folder holds `job.json` and the unpacked FMUs in `0`, `1`, … What came out is left there: `result.npy` and
-`meta.json`, or `error.json`; `progress` holds the time reached, `calling` the number of the FMU that was called last.
+The folder holds `job.json` and the unpacked FMUs in `0`, `1`, … What comes out is left there as it comes: before the
+first step `columns.json`, which becomes `meta.json` at the end; `rows`, doubles of the time, the columns, the energies
+and the counts; or `error.json`. `progress` holds the time reached and the number of the FMU that was called last.
 """
 
 from __future__ import annotations
@@ -10,75 +11,76 @@ import json
 import mmap
 import struct
 import sys
+from array import array
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from modelica_like.cosimulation.master import Balance, Counts, Master, Signal
+from modelica_like.cosimulation.master import Balance, Master, Signal
 from modelica_like.cosimulation.slaves import REAL, Refused, Slave
+
+PLACE = struct.Struct("dq")
+"""The time reached and the number of an FMU, as they stand in `progress`."""
 
 
 class Board:
     """Tells outside how far the run is, and which FMU it is in."""
 
     def __init__(self, folder: Path) -> None:
-        self._time, self._unit = (self._shared(folder / name) for name in ("progress", "calling"))
+        with (folder / "progress").open("r+b") as file:
+            file.truncate(PLACE.size)
+            self._shared = mmap.mmap(file.fileno(), PLACE.size)
         self.unit = 0
-
-    @staticmethod
-    def _shared(path: Path) -> mmap.mmap:
-        with path.open("r+b") as file:
-            return mmap.mmap(file.fileno(), 8)
 
     def reach(self, time: float) -> None:
         """Tell the time reached."""
-        self._time[:8] = struct.pack("d", time)
+        self._shared[:8] = struct.pack("d", time)
 
     def call(self, unit: int) -> None:
         """Tell which FMU is called now."""
         self.unit = unit
-        self._unit[:8] = struct.pack("q", unit)
+        self._shared[8:] = struct.pack("q", unit)
 
 
 class Recorder:
-    """Keeps rows of all variables and of the energies at the bonds.
+    """Writes rows of all variables, of the energies at the bonds and of the counts, so that no failure loses them.
 
     Args:
         slaves: whose variables.
         outputs: names of each.
-        balances: energies.
+        master: whose energies and counts.
         interval: shortest time between two rows, in s.
+        file: where to write.
     """
 
     def __init__(
-        self, slaves: list[Slave], outputs: list[list[str]], balances: list[Balance], interval: float, board: Board
+        self, slaves: list[Slave], outputs: list[list[str]], master: Master, interval: float, board: Board, file: Path
     ) -> None:
         self._readers = [slave.reader(names) for slave, names in zip(slaves, outputs, strict=True)]
-        self._balances, self._interval, self._board = balances, interval, board
-        self.rows: list[list[float]] = []
+        self._master, self._interval, self._board, self._last = master, interval, board, -float("inf")
+        self._file = file.open("wb", buffering=0)
 
     def look(self, time: float) -> list[float]:
-        """Read a row."""
-        if self.rows and time - self.rows[-1][0] < self._interval * (1 - 1e-6):
+        """Read a row; nothing but the time where the one before is nearer than the interval."""
+        if time - self._last < self._interval * (1 - 1e-6):
             return [time]
         row = [time]
         for read in self._readers:
             row += read()
-        for balance in self._balances:
-            row += [balance.power, balance.residual]
+        for balance in self._master.balances:
+            row += balance.told()
         return row
 
     def keep(self, row: list[float]) -> None:
-        """Keep a row, unless it is nearer to the one before than the interval."""
+        """Keep a row."""
         self._board.reach(row[0])
         if len(row) > 1:
-            self.rows.append(row)
+            self._last = row[0]
+            self._file.write(array("d", [*row, *vars(self._master.counts).values()]))
 
     def close(self, time: float) -> None:
         """Keep the end, however near it is to the row before."""
-        if self.rows[-1][0] != time:
+        if self._last != time:
             self._interval = 0.0
             self.keep(self.look(time))
 
@@ -161,32 +163,29 @@ def run(folder: Path) -> None:
     outputs = choose(slaves, job["outputs"], own_names=job["own_names"])
     master = connect(slaves, job)
     start(slaves, master, job)
-    recorder = Recorder(slaves, outputs, master.balances, job["interval"], board)
+    recorder = Recorder(slaves, outputs, master, job["interval"], board, folder / "rows")
     recorder.keep(recorder.look(job["start"]))
+    width = (folder / "rows").stat().st_size // 8
+    known = {"units": columns_of(slaves, outputs), "open": open_inputs(slaves, job), "width": width}
+    (folder / "draft").write_text(json.dumps(known))
+    columns = (folder / "draft").rename(folder / "columns.json")
     span = job["start"], job["until"], job["step"]
     if job["tolerance"] is None:
         master.run_fixed(*span, recorder)
     else:
         master.run_variable(*span, job["tolerance"], recorder)
     recorder.close(job["until"])
-    meta = result(slaves, outputs, master) | {"open": open_inputs(slaves, job)}
     for slave in slaves:
         slave.close()
-    np.save(folder / "result.npy", np.array(recorder.rows))
-    (folder / "meta.json").write_text(json.dumps(meta))
+    columns.rename(folder / "meta.json")
 
 
-def result(slaves: list[Slave], outputs: list[list[str]], master: Master) -> dict[str, Any]:
-    """Return what is to be known about the columns and the run."""
-    counts: Counts = master.counts
-    return {
-        "units": [
-            {"columns": [about(slave.all[name]) for name in names], "constants": constants(slave)}
-            for slave, names in zip(slaves, outputs, strict=True)
-        ],
-        "balances": [vars(balance) for balance in master.balances],
-        "counts": vars(counts),
-    }
+def columns_of(slaves: list[Slave], outputs: list[list[str]]) -> list[dict[str, Any]]:
+    """Return what is to be known about the columns and parameters of each FMU."""
+    return [
+        {"columns": [about(slave.all[name]) for name in names], "constants": constants(slave)}
+        for slave, names in zip(slaves, outputs, strict=True)
+    ]
 
 
 def open_inputs(slaves: list[Slave], job: dict[str, Any]) -> list[dict[str, Any]]:

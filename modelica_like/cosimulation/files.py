@@ -41,7 +41,7 @@ from modelica_like.netlist.document import (
     whole,
 )
 from modelica_like.netlist.locate import Lines, locate
-from modelica_like.units import parse_unit, to_si
+from modelica_like.units import ONE, parse_unit, to_si
 from modelica_like.writing import write_text
 
 _OWN_NAMES = "results keep the names that variables have in their FMUs"
@@ -92,7 +92,8 @@ def _unit(key: str, entry: Any) -> Unit:
     parameters = table.get("parameters", {})
     if not isinstance(parameters, dict) or not all(isinstance(v, int | float) for v in parameters.values()):
         raise NetlistError(f"{key}.parameters must be a table of numbers, in the FMU's units.")
-    return Unit(name, Path(table["file"]), {key: float(value) for key, value in parameters.items()})
+    values = {one: to_si(value + 0, ONE, f"{key}.{one}") for one, value in parameters.items()}
+    return Unit(name, Path(table["file"]), values)
 
 
 def _link(key: str, entry: Any) -> Link:

@@ -22,7 +22,7 @@ from modelica_like.language.fields import Input
 from modelica_like.netlist.document import Document, flattened, parse, read_text
 from modelica_like.netlist.read import FMU_PART, assemble
 from modelica_like.simulation import seconds
-from modelica_like.units import parse_unit, to_si
+from modelica_like.units import ONE, parse_unit, to_si
 
 _OWN = ("is", "file")
 _ONLY_SIGNALS = "An FMU has signals only: join its inputs and outputs in [connect]."
@@ -138,12 +138,12 @@ class _Joiner:
 
     def _value(self, fmu: str, key: str, value: Any) -> float:
         variable = self._variable(fmu, key)
-        if isinstance(value, str):
-            unit = parse_unit(variable.unit or "1")
-            return (to_si(value, unit, f"{fmu}.{key}") - unit.offset) / unit.factor
-        if not isinstance(value, int | float):
+        if not isinstance(value, str | int | float):
             raise NetlistError(f'{fmu}.{key} must be a number or a text with a unit, such as "10 N.m".')
-        return float(value)
+        if not isinstance(value, str):
+            return to_si(value + 0, ONE, f"{fmu}.{key}")  # true is 1
+        unit = parse_unit(variable.unit or "1")
+        return (to_si(value, unit, f"{fmu}.{key}") - unit.offset) / unit.factor
 
     def _variable(self, fmu: str, name: str) -> Any:
         known = self.about[fmu].variables

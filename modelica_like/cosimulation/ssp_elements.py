@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from math import isfinite
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote, urlsplit
@@ -132,15 +133,18 @@ def number(xml: Any, attribute: str, default: float | None = None) -> float:
     """Return a number.
 
     Raises:
-        NetlistError: it is not there, or is none.
+        NetlistError: it is not there, or is no finite number.
     """
     text = xml.get(attribute)
     if text is None and default is not None:
         return default
     try:
-        return float(needed(xml, attribute))
+        value = float(needed(xml, attribute))
     except ValueError:
         raise NetlistError(f"{local(xml)}: {attribute} = '{text}' is no number.", where=place(xml)) from None
+    if not isfinite(value):
+        raise NetlistError(f"{local(xml)}: {attribute} = '{text}' is not finite.", where=place(xml))
+    return value
 
 
 def unit_definitions(top: Any) -> dict[str, UnitDefinition]:

@@ -19,6 +19,7 @@ from modelica_like.language.expr import TIME, Symbol, flagged_motion, is_express
 from modelica_like.language.fields import Parameter, Variable
 from modelica_like.language.places import located
 from modelica_like.language.transition import EventStatement, StartMode, Transition, as_event
+from modelica_like.language.tunable import symbols_in_tables
 from modelica_like.units import ANY, Unit
 
 
@@ -58,6 +59,7 @@ class TransitionForm:
         resets: pairs of what is reset (slot path) and the position in the resets.
         notice: what the user is told when it happens.
         because: why it happens, in words.
+        fails: whether the run ends there, with an error.
     """
 
     mode: str
@@ -69,6 +71,7 @@ class TransitionForm:
     source: Source
     notice: str
     because: str
+    fails: bool
 
 
 @dataclass(frozen=True)
@@ -165,7 +168,8 @@ def template_of(component: Component) -> Template:
         LanguageError, UnitMismatch, ComponentUnbalanced: the class is declared wrongly.
     """
     if component.parts or component.fields is not component._class_fields:
-        return _build(component)
+        with symbols_in_tables(component):
+            return _build(component)
     cache: dict[Any, Template] = _class_cache(type(component))
     key = _structural_key(component)
     if key not in cache:
@@ -273,7 +277,7 @@ class _Changes:
             resets = tuple((path, position + k) for k, path in enumerate(paths))
             position += len(paths)
             numbers, target = tuple(t.mode.mode.number(name) for name in t.sources), t.mode.mode.number(t.target)
-            words = t.source, t.notice, t.reason()
+            words = t.source, t.notice, t.reason(), t.fails
             forms.append(TransitionForm(self._mode(t), numbers, target, t.at is not None, index, resets, *words))
         return tuple(forms)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -113,10 +113,14 @@ class _Writer(ABC):
         self.log_categories(top)
         self.default_experiment(top)
         listed = element(top, "ModelVariables")
-        for one in self.variables:
+        for one in self.listed():
             self._variable(listed, one)
         self._structure(element(top, "ModelStructure"))
         return top
+
+    def listed(self) -> Iterable[FmuVariable]:
+        """Variables in the order of the description."""
+        return self.variables
 
     @abstractmethod
     def _attributes(self) -> dict[str, Any]: ...
@@ -288,15 +292,28 @@ class _Fmi3(_Writer):
     def _type(self, definitions: Any, title: str) -> Any:
         return element(definitions, "EnumerationType", name=title)
 
+    def listed(self) -> Iterable[FmuVariable]:
+        inside = {k for array in self.interface.arrays for k in array.elements}
+        return (one for one in (*self.variables, *self.interface.arrays) if one.reference not in inside)
+
+    def known(self, one: FmuVariable, initial: bool = False) -> list[int] | None:
+        arrays = {k: array.reference for array in self.interface.arrays for k in array.elements}
+        found = super().known(one, initial)
+        return found if found is None or not arrays else list(dict.fromkeys(arrays.get(k, k) for k in found))
+
     def _variable(self, listed: Any, one: FmuVariable) -> None:
         attributes = self.attributes(one)
         if one.type != "Float64":
             del attributes["unit"], attributes["displayUnit"], attributes["nominal"]
-        element(
+        if one.elements:
+            attributes["start"] = [self.variables[k].start for k in one.elements]
+        written = element(
             listed, one.type, name=one.name, valueReference=one.reference, description=one.description or None,
             causality=one.causality, variability=one.variability, initial=one.initial,
             declaredType=self.types.get(one.modes), **attributes, derivative=one.derivative_of,
         )  # fmt: skip
+        for size in one.dimensions:
+            element(written, "Dimension", start=size)
 
     def _structure(self, structure: Any) -> None:
         interface = self.interface

@@ -12,6 +12,8 @@ from pathlib import Path, PurePosixPath
 from modelica_like.errors import FmuRefused
 
 _ENCRYPTED = 0x1
+_LONGEST, _LONGEST_PART = 500, 255
+"""Characters of a path inside, bytes of a name: what lies 1,500 folders deep can be neither made nor removed."""
 
 
 @dataclass(frozen=True)
@@ -117,6 +119,8 @@ def _objection(member: zipfile.ZipInfo, seen: set[str]) -> str:
         return "is an absolute path"
     if ".." in PurePosixPath(inside.replace("\\", "/")).parts:
         return "leads out of the archive"
+    if len(inside) > _LONGEST or any(len(part.encode(errors="replace")) > _LONGEST_PART for part in inside.split("/")):
+        return "has a longer name than file systems take"
     if "\\" in inside:
         return "has a backslash where the standard asks for a slash"
     if kind == stat.S_IFLNK:

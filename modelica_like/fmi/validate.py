@@ -22,7 +22,7 @@ from modelica_like.fmi.run import TIMEOUT, Kind, Solver, run_fmu
 from modelica_like.fmi.unpack import unpack
 from modelica_like.solve.ranges import ranges
 from modelica_like.solve.recorded import RecordedSolution
-from modelica_like.solve.solution import Values
+from modelica_like.solve.trajectories import Values
 
 PASSED, FAILED, ABSENT = "passed", "failed", "–"
 _STEPS = 500
@@ -224,12 +224,12 @@ def _run_check(name: str, subject: _Subject, kind: Kind, solver: Solver, runs: d
         expected = before and subject.at(stop, before)
     except ModelicaLikeError as error:
         return Check(name, FAILED, str(error).replace("\n", " "))
-    values = np.array([run[name] for name in run.recorded.position])
+    values = np.array([run[name] for name in run.model.position])
     if not np.all(np.isfinite(values)):
         return Check(name, FAILED, "There are values that are not finite.")
     if solver != "Euler":
         runs[name] = run
-    return _agreement(name, before, expected, {n: run[n][-1] for n in run.recorded.position}, stop)
+    return _agreement(name, before, expected, {n: run[n][-1] for n in run.model.position}, stop)
 
 
 def _importer_check(name: str, importer: str, subject: _Subject, known: RecordedSolution | None) -> Check:

@@ -130,7 +130,7 @@ class BoundMode:
 
     def go(
         self, source: str | tuple[str, ...], target: str, *, when: Expr | None = None, at: Scalar | None = None,
-        reset: Mapping[Expr, Scalar] | None = None, notice: str = "", because: str = "",
+        reset: Mapping[Expr, Scalar] | None = None, notice: str = "", because: str = "", fails: bool = False,
     ) -> Transition:  # fmt: skip
         """Declare a transition: a state event (`when`) or a time event (`at`).
 
@@ -143,6 +143,7 @@ class BoundMode:
             notice: what the report of a run says, such as "exceeds {w_max} rad/s": the name of the component comes
                 first, and values of its parameters stand for their names.
             because: why it happens, in a few words, such as "slip reached zero"; else the condition as it is written.
+            fails: the run ends there, with the notice as an error.
 
         Raises:
             UnknownName: a mode does not exist.
@@ -154,7 +155,7 @@ class BoundMode:
         if (when is None) == (at is None):
             raise LanguageError(f"{self.mode.label}.go(…, '{target}') needs either `when=` or `at=`.")
         moment = None if at is None else cast(Expr, ca.SX(cast(Any, at)))
-        return Transition(self, sources, target, when, moment, dict(reset or {}), NOWHERE, notice, because)
+        return Transition(self, sources, target, when, moment, dict(reset or {}), NOWHERE, notice, because, fails)
 
     def initially(self, target: str, *, when: Expr) -> StartMode:
         """Declare the mode at the start, if the condition holds there."""

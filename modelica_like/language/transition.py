@@ -33,6 +33,7 @@ class Transition:
         reset: new values of states and discrete values.
         notice: what the user is told when it happens, without the name of the component.
         because: why it happens, in a few words.
+        fails: the run ends there, with an error.
     """
 
     mode: BoundMode
@@ -44,6 +45,7 @@ class Transition:
     source: Source = NOWHERE
     notice: str = ""
     because: str = ""
+    fails: bool = False
 
     def reason(self) -> str:
         """Return in words why it happens: as declared, or the condition as it is written."""

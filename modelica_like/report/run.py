@@ -12,7 +12,7 @@ from rich.table import Table
 from modelica_like.language.transition import NAME_IN_NOTICE
 from modelica_like.report.types import table
 from modelica_like.solve.recorder import Event
-from modelica_like.solve.solution import Solution
+from modelica_like.solve.trajectories import Trajectories
 
 if TYPE_CHECKING:
     from modelica_like.cosimulation.solution import CosimSolution
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 _SHOWN = 20
 
 
-def run_report(solution: Solution, *, energy: bool = True, debug: bool = False) -> RenderableType:
+def run_report(solution: Trajectories, *, energy: bool = True, debug: bool = False) -> RenderableType:
     """Return events, energy balance and statistics of a run.
 
     Args:
@@ -36,14 +36,14 @@ def run_report(solution: Solution, *, energy: bool = True, debug: bool = False) 
     return Group(*parts)
 
 
-def _head(solution: Solution, notices: Iterable[str], *, debug: bool = False) -> list[RenderableType]:
+def _head(solution: Trajectories, notices: Iterable[str], *, debug: bool = False) -> list[RenderableType]:
     span = f"{solution.time[0]:g} s to {solution.time[-1]:g} s"
     parts: list[RenderableType] = [f"[bold]{escape(solution.model.name)}[/]  {span}"]
     parts += ["", events_table(solution, debug=debug)] if solution.events else []
     return parts + [f"[bold]{escape(notice)}[/]" for notice in notices]
 
 
-def events_table(solution: Solution, *, debug: bool = False) -> Table:
+def events_table(solution: Trajectories, *, debug: bool = False) -> Table:
     """Return the mode changes; of many only the first and the last. `debug` names the lines of their transitions."""
     columns = 6 if debug else 5
     rows = [_event_row(solution, event)[:columns] for event in solution.events]
@@ -53,12 +53,12 @@ def events_table(solution: Solution, *, debug: bool = False) -> Table:
     return table(_mode_changes(len(solution.events)), *heads, rows=rows)
 
 
-def _event_row(solution: Solution, event: Event) -> tuple[str, ...]:
+def _event_row(solution: Trajectories, event: Event) -> tuple[str, ...]:
     reason = "an impact" if event.transition < 0 else solution.model.transitions[event.transition].because
     return f"{event.time:.9g}", event.mode, event.before, event.after, reason, f"{event.source}".partition(" `")[0]
 
 
-def notices(solution: Solution) -> list[str]:
+def notices(solution: Trajectories) -> list[str]:
     """Return what a run and its events have to say: one sentence for each kind of event, with the time of the first."""
     told: dict[tuple[str, str], str] = {}
     for event in (one for one in solution.events if one.transition >= 0):
@@ -69,7 +69,7 @@ def notices(solution: Solution) -> list[str]:
     return [*solution.notices, *told.values()]
 
 
-def energy_table(solution: Solution) -> Table:
+def energy_table(solution: Trajectories) -> Table:
     """Return the energy balance in J; of many components only those that exchanged most."""
     balance = solution.energy()
     # Where nothing collides there is no column for it.
@@ -90,7 +90,7 @@ def energy_table(solution: Solution) -> Table:
     return made
 
 
-def closure_line(solution: Solution) -> str:
+def closure_line(solution: Trajectories) -> str:
     """Return how well the energy balance closes."""
     balance = solution.energy()
     return f"The energy balance closes to {balance.closure:.1e} of {balance.throughput:.6g} J."
@@ -100,7 +100,7 @@ def _energy(value: float) -> str:
     return f"{value:.4f}" if abs(value) < 1e7 else f"{value:.6g}"
 
 
-def statistics_line(solution: Solution) -> str:
+def statistics_line(solution: Trajectories) -> str:
     """Return steps, evaluations, events and seconds in one sentence."""
     counts = solution.statistics
     return (

@@ -2,93 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, Vector
-from modelica_like.errors import UnknownName, ValueOutOfRange, did_you_mean, missing_extra
+from modelica_like.errors import UnknownName, did_you_mean
 from modelica_like.initialize import Impact, Point
-from modelica_like.language.expr import Symbol
-from modelica_like.language.mode import BoundMode
 from modelica_like.solve.energy import EnergyBalance, energy_balance
 from modelica_like.solve.idas import Integrator
 from modelica_like.solve.options import Options
 from modelica_like.solve.rates import differentiated, rate_along
 from modelica_like.solve.reading import TOGETHER, blocks, energy_term, variables
 from modelica_like.solve.recorder import Event, Segment
-
-if TYPE_CHECKING:
-    import pandas
-    import xarray
-    from matplotlib.figure import Figure
-
-ENERGY_TERMS = ("stored_energy", "loss_power", "source_power")
-
-
-@dataclass(frozen=True)
-class Statistics:
-    """What a run took.
-
-    Attributes:
-        steps: integrator steps.
-        evaluations: evaluations of the equations.
-        integrations: calls of the integrator (panels and event locations).
-        events: mode changes.
-        seconds: wall time of initialisation and integration.
-    """
-
-    steps: int
-    evaluations: int
-    integrations: int
-    events: int
-    seconds: float
-
-
-class Values(Mapping[str, float]):
-    """All variables at one instant, by path."""
-
-    def __init__(
-        self, solution: Solution, time: float, column: Vector, discrete: Vector, point: Point | None = None
-    ) -> None:
-        self.time = time
-        self._point = point
-        self._solution = solution
-        self._column = column
-        self._discrete = discrete
-
-    def __getitem__(self, key: str | Any) -> float:
-        path = self._solution.path(key)
-        model = self._solution.model
-        if path in model.position:
-            return float(self._column[model.position[path]])
-        if path in model.discrete_position:
-            return float(self._discrete[model.discrete_position[path]])
-        if self._point is not None and (name := differentiated(path)):
-            now = self._point
-            return float(rate_along(model, name, np.array([now.t]), *(v[:, None] for v in (now.x, now.z, now.d)))[0])
-        owner, _, term = path.rpartition(".")
-        if self._point is not None and term in ENERGY_TERMS and owner in model.components:
-            terms = model.energy(self._point.t, self._point.x, self._point.z, model.p, model.u, self._point.d)
-            return float(terms[model.components.index(owner), ENERGY_TERMS.index(term)])
-        return float(self._solution[path][0])
-
-    def __iter__(self) -> Iterator[str]:
-        model = self._solution.model
-        yield from model.position
-        yield from model.discrete_position
-
-    def __len__(self) -> int:
-        return len(self._solution.model.flat_variables) + len(self._solution.model.flat_discretes)
-
-    def __repr__(self) -> str:
-        return f"<{len(self)} values at t = {self.time:g} s>"
+from modelica_like.solve.trajectories import ENERGY_TERMS, Statistics, Trajectories, Values
 
 
 @dataclass(eq=False)
-class Solution:
+class Solution(Trajectories):
     """Trajectories of all variables of the unreduced model, in SI units.
 
     Attributes:
@@ -116,16 +48,6 @@ class Solution:
         if "time" not in self._cache:
             self._cache["time"] = np.concatenate([s.times for s in self.segments])
         return self._cache["time"]
-
-    def path(self, key: Any) -> str:
-        """Return the path of a variable given by its path, as `drive.clutch.tau` or `drive.clutch.mode`."""
-        if isinstance(key, BoundMode):
-            key = key.symbol
-        if isinstance(key, Symbol):
-            owner = key.owner.path
-            name = f"{owner}.{key.name}" if owner else key.name
-            return f"{'der(' * key.order}{name}{')' * key.order}"
-        return str(key)
 
     def __getitem__(self, key: str | Any) -> Vector:
         """Return a trajectory, shape (len(time),).
@@ -166,11 +88,6 @@ class Solution:
         return any(path in one for one in known) or differentiated(path) in model.position
 
     @property
-    def names(self) -> tuple[str, ...]:
-        """Paths of all variables, modes and discrete values."""
-        return (*self.model.position, *self.model.discrete_position)
-
-    @property
     def _small(self) -> bool:
         return len(self.time) * len(self.model.flat_variables) <= TOGETHER
 
@@ -190,11 +107,6 @@ class Solution:
         rows = [self.model.position[path] for path in found]
         known = dict(zip(found, variables(self.model, self.segments, rows), strict=True)) if found else {}
         return {path: known[path] if path in known else self[path] for path in paths}
-
-    def _check_within(self, t: float) -> None:
-        first, last = float(self.time[0]), float(self.time[-1])
-        if not first <= t <= last:
-            raise ValueOutOfRange(f"t = {t:g} s is not within the run, {first:g} s to {last:g} s.")
 
     def at(self, t: float) -> Values:
         """Return all variables at a time, integrated there from the result before (right side of an event).
@@ -235,50 +147,6 @@ class Solution:
         if "balance" not in self._cache:
             self._cache["balance"] = energy_balance(self.model, self.segments, self.options, self.events, self.impacts)
         return self._cache["balance"]
-
-    def plot(self, *patterns: str, title: str = "") -> Figure:
-        """Draw trajectories over time, one panel per unit, with events as dotted lines.
-
-        Args:
-            patterns: names or patterns (`*.w`) of what to draw; by default speeds, torques and forces of the parts.
-            title: heading; by default the name of the model.
-
-        Raises:
-            UnknownName: nothing fits a pattern.
-        """
-        from modelica_like.solve.plot import plot
-
-        return plot(self, patterns, title=title)
-
-    def to_pandas(self) -> pandas.DataFrame:
-        """Return a table with time as index and one column per variable.
-
-        Raises:
-            MissingExtra: pandas is not installed.
-        """
-        try:
-            import pandas
-        except ImportError:
-            raise missing_extra("pandas", "data") from None
-        columns = self.together(*self.names)
-        return pandas.DataFrame(columns, index=pandas.Index(self.time, name="time"))
-
-    def to_xarray(self) -> xarray.Dataset:
-        """Return a dataset over time, with units and descriptions as attributes.
-
-        Raises:
-            MissingExtra: xarray is not installed.
-        """
-        try:
-            import xarray
-        except ImportError:
-            raise missing_extra("xarray", "data") from None
-        info = {
-            v.path: {"units": str(v.unit), "long_name": v.description}
-            for v in (*self.model.flat_variables, *self.model.flat_discretes)
-        }
-        arrays = {name: ("time", values, info[name]) for name, values in self.together(*self.names).items()}
-        return xarray.Dataset(arrays, coords={"time": ("time", self.time, {"units": "s"})})
 
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "_cache": {}}

@@ -13,8 +13,9 @@ from modelica_like.cosimulation.files import write_system
 from modelica_like.cosimulation.load import load_system
 from modelica_like.cosimulation.run import cosim
 from modelica_like.cosimulation.split import Split, split
-from modelica_like.cosimulation.system import find_bonds
-from modelica_like.netlist import loads
+from modelica_like.cosimulation.system import Bond, Link, Port, find_bonds
+from modelica_like.language import Component, Terminal
+from modelica_like.netlist import loads, registry
 from modelica_like.report.compare import compare
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -62,6 +63,18 @@ def test_bonds_follow_from_names(oscillator: Split) -> None:
     assert (found.flow, found.rate) == (given_bond.flow, given_bond.rate)
 
 
+def test_a_library_declares_which_signals_make_a_power(monkeypatch: pytest.MonkeyPatch) -> None:
+    class PressureToFlow(Component):
+        terminal = Terminal("org.my_company.pipe", takes="potential", power=("q", "p"))
+
+    links = [
+        Link("q", Port("a", "pipe.q"), (Port("b", "in.q"),)), Link("p", Port("b", "in.p"), (Port("a", "pipe.p"),)),
+    ]  # fmt: skip
+    assert find_bonds(links) == ()
+    monkeypatch.setattr(registry, "library_types", lambda: {"PressureToFlow": PressureToFlow})
+    assert find_bonds(links) == (Bond("pipe", "q", "p"),)
+
+
 def test_a_system_is_compared_with_its_drive(oscillator: Split) -> None:
     """A thousandth of 0.1 s is a four-hundredth of the period: an error of second order is far below 1e-3."""
     comparison = compare(EXAMPLES / "two_mass.toml", oscillator.path, signals=["J?.w"], until=0.1)
@@ -103,3 +116,11 @@ def test_a_signal_is_cut_at_its_output(tmp_path: Path) -> None:
     )
     run = cosim(split(drive, "wire", tmp_path, check=False).path, step=0.5)
     assert run["double.y"] == pytest.approx([6.0, 6.0, 6.0])
+
+
+def test_a_folder_that_cannot_be_written_is_told_before_anything_is_compiled(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("here already")
+    told: list[str] = []
+    with pytest.raises(NotADirectoryError):
+        split(EXAMPLES / "two_mass.toml", "shaft", tmp_path / "file", report=told.append)
+    assert told == []

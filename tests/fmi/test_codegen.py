@@ -30,6 +30,10 @@ Model *read_model(void) {
     return model_read((const unsigned char *)model_data, model_data_size, calloc, free, message);
 }
 const Tape *tape(const Model *m, int k) { return (const Tape *)(const void *)&m->tapes + k; }
+
+Instance *made(const Model *m) {
+    return instance_new((Instance){.model = m, .name = "one", .allocate = calloc, .release = free}, m->token);
+}
 """
 TAPES = [name.split(".")[1] for name in SECTIONS if name.startswith("tapes.") and name.endswith(".runs")]
 
@@ -51,7 +55,7 @@ class Inside:
         files = ["inside.c", "model_data.c", *RUNTIME]
         subprocess.run([*command, "-o", "inside.so", *files, "-lm"], cwd=folder, check=True)
         self.library = ctypes.CDLL(str(folder / "inside.so"))
-        for name in ("read_model", "tape", "instance_new"):
+        for name in ("read_model", "tape", "made"):
             getattr(self.library, name).restype = ctypes.c_void_p
         self.read = ctypes.c_void_p(self.library.read_model())
         assert self.read.value
@@ -202,9 +206,7 @@ def test_the_integrator_has_order_five_and_dense_output_of_order_four(inside):
     code = inside(Circle())
     library = code.library
     assert code.model.implicit == ("z",)
-    libc = ctypes.CDLL(None)
-    new = library.instance_new(code.read, b"one", b"{t}", libc.calloc, libc.free, None, None, None, 0)
-    c = ctypes.c_void_p(new)
+    c = ctypes.c_void_p(library.made(code.read))
     library.rosenbrock_step.argtypes = [
         ctypes.c_void_p, ctypes.c_double, DOUBLES, ctypes.c_double, ctypes.c_int, ctypes.c_void_p, DOUBLES
     ]  # fmt: skip

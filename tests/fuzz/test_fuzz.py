@@ -1,5 +1,6 @@
 """No input ends in anything but a sentence; what the fuzzer has found stays found."""
 
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -7,9 +8,12 @@ import pytest
 from fuzzer import attempt
 
 from modelica_like import simulate
-from modelica_like.errors import ModelicaLikeError
+from modelica_like.cosimulation.described import described
+from modelica_like.cosimulation.load import load_system
+from modelica_like.errors import FmuRefused, ModelicaLikeError
 from modelica_like.netlist import loads
 from modelica_like.netlist.write import dumps
+from modelica_like.sizing import size
 
 BATCHES = 6
 INPUTS = 3000
@@ -55,6 +59,66 @@ def test_found_by_the_fuzzer(name: str) -> None:
     with pytest.raises(ModelicaLikeError) as caught:
         act()
     assert caught.value.what.startswith(told)
+
+
+LIFE = """[checks.k]
+is = "bearing_life"
+radial_load = "150 N"
+speed = "1333 rpm"
+dynamic_rating = "2600 N"
+static_rating = "1060 N"
+"""
+RING = """[checks.k]
+is = "ravigneaux_gear"
+input_speed = "1000 rpm"
+input_torque = "100 N.m"
+teeth = { small_sun = 21, large_sun = 39, short_planet = 13, long_planet = 10, ring = 3 }
+"""
+SIZINGS = {
+    "a published list": (LIFE + 'published = { life = ["1 h"] }\n', "checks.k.published.life compares one number"),
+    "a limit that is a list": (LIFE + "limits = { life = { min = [[0, 1]] } }\n", "checks.k.limits.life compares"),
+    "a list of lists": (LIFE.replace('"150 N"', '["1 N", ["2 N"]]'), "checks.k.radial_load must be a list of numbers"),
+    "a ring inside of its planets": (RING, "checks.k cannot be worked out: A ring of 3 teeth cannot hold planets of"),
+    "teeth without the ring": (RING.replace(", ring = 3", ""), "checks.k.teeth needs ring."),
+    "a list without numbers": (LIFE.replace('"150 N"', "[]"), "checks.k.radial_load must be a list of numbers"),
+    "an array in published": (LIFE + "published = [1, 2]\n", "checks.k.published must be a table by line"),
+}
+
+
+@pytest.mark.parametrize("name", SIZINGS)
+def test_sizing_files_found_by_the_fuzzer(name: str, tmp_path: Path) -> None:
+    text, told = SIZINGS[name]
+    (tmp_path / "bad.toml").write_text(text)
+    with pytest.raises(ModelicaLikeError) as caught:
+        size(tmp_path / "bad.toml")
+    assert caught.value.what.startswith(told)
+
+
+SYSTEM = """name = "two"
+[fmus]
+a = {{ file = "a.fmu", parameters = {{ J = {} }} }}
+"""
+LARGE = "1" + 400 * "0"
+
+
+@pytest.mark.parametrize(("given", "told"), [(LARGE, "is larger than any number that"), ("nan", "must be a finite")])
+def test_values_of_fmus_are_finite_numbers(given: str, told: str, tmp_path: Path) -> None:
+    (tmp_path / "two.toml").write_text(SYSTEM.format(given))
+    with pytest.raises(ModelicaLikeError) as caught:
+        load_system(tmp_path / "two.toml", tmp_path)
+    assert caught.value.what.startswith(f"fmus.a.J {told}")
+
+
+DEEP = {"1,500 folders": "a/" * 1500 + "b", "a name of 300 letters": "a" * 300, "700 letters": "a/" * 350}
+
+
+@pytest.mark.parametrize("name", DEEP)
+def test_names_that_no_file_system_takes(name: str, tmp_path: Path) -> None:
+    with zipfile.ZipFile(tmp_path / "deep.fmu", "w") as archive:
+        archive.writestr("modelDescription.xml", "<fmiModelDescription/>")
+        archive.writestr(DEEP[name], "")
+    with pytest.raises(FmuRefused, match="has a longer name than file systems take"):
+        described(tmp_path / "deep.fmu")
 
 
 @pytest.mark.parametrize("name", ["description", "simulate", "origin"])

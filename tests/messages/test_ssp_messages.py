@@ -199,7 +199,7 @@ SYSTEMS: dict[str, tuple[str, str, str]] = {
     ),
     "not finite": (
         values('<ssv:Parameter name="J"><ssv:Real value="INF"/></ssv:Parameter>'), "",
-        f"a.J = inf is not finite.\n  in {IN_SYSTEM}:4 `<Parameter name=\"J\">`",
+        f"Real: value = 'INF' is not finite.\n  in {IN_SYSTEM}:4 `<Real value=\"INF\">`",
     ),
     "start time": (
         elements(A), '<ssd:DefaultExperiment startTime="5"/>',

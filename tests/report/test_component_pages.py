@@ -225,7 +225,7 @@ def test_a_clutch_names_its_friction_and_its_table() -> None:
         r"\mu_{\text{pos}}\left(\frac{\text{speed}}{\omega_{\text{scale}}}\right)"
     )
     assert said[r"\text{loss power}"] == r"\tau \cdot \omega_{\text{rel}}"
-    assert r"\tau -\text{sliding friction}\left(0\right) & \text{start forward}" in said["0"]
+    assert r"\tau -\text{sliding friction}\left(0\right) & \text{mode: start forward}" in said["0"]
 
 
 def test_columns_of_a_table_are_functions() -> None:
@@ -260,9 +260,13 @@ def test_events_have_times_and_new_values() -> None:
 
 
 def test_what_stands_in_a_table_can_only_be_looked_up() -> None:
+    class Squared(BearingFriction):
+        def sliding_friction(self, speed: Expr | float) -> Expr:
+            return self.tau_scale * self.tau_pos[1][1] ** 2
+
     with pytest.raises(LanguageError) as caught:
-        statements(BearingFriction, {"smooth": True})
-    assert str(caught.value) == "BearingFriction does not look up `tau_pos` along straight lines."
+        statements(Squared, {})
+    assert str(caught.value) == "Squared does not look up `tau_pos` along straight lines."
 
 
 def test_a_property_that_calls_a_table_is_one_definition() -> None:

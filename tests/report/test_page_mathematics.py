@@ -4,7 +4,7 @@ import random
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from math import pi
 from pathlib import Path
 from typing import Any
@@ -265,15 +265,21 @@ class Numbers:
 
     def lookups(self) -> dict[str, Callable[[float], float]]:
         found: dict[str, Callable[[float], float]] = {}
+        holds = getattr(self.component, "extrapolate", "linear") == "hold"
         for name, (first, second) in self.tables.items():
             latex = "".join(tokens_of(latex_names.name(name)))
             for column in range(1, len(first)):
-                slope = (second[column] - first[column]) / (second[0] - first[0])
                 number = f"_{{{column + 1}}}" if len(first) > 2 else ""
-                found[latex + number] = lambda x, a=first[0], y=first[column], s=slope: y + s * (x - a)
-            if len(first) == 2:
-                self.known |= {f"{latex}_{{1}}": first[0], f"{latex}_{{2}}": second[0]}
+                found[latex + number] = partial(value_between, first, second, column, holds)
+            for end, row in (("first", first), ("last", second)):
+                self.known["".join(tokens_of(latex_names.text(f"{end} of {name}")))] = row[0]
         return found
+
+
+def value_between(first: Any, second: Any, column: int, holds: bool, x: float) -> float:
+    if holds:
+        x = min(max(x, first[0]), second[0])
+    return first[column] + (second[column] - first[column]) * (x - first[0]) / (second[0] - first[0])
 
 
 def same(ours: Any, theirs: Any) -> bool:

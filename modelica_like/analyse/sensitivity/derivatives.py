@@ -10,10 +10,11 @@ import numpy as np
 
 from modelica_like.analyse.replay.chain import Replay, Tolerances, replay
 from modelica_like.analyse.replay.edges import Edge, edges
-from modelica_like.analyse.replay.slopes import Sizes
 from modelica_like.analyse.replay.sweeps import adjoint, forward
 from modelica_like.analyse.sensitivity.formulas import Freed, bound_by_formula, equal_to, free_formulas
-from modelica_like.analyse.sensitivity.outputs import Output, listed, quadratures, read_off, read_output, value_at
+from modelica_like.analyse.sensitivity.outputs import Output, listed, quadratures, read_output
+from modelica_like.analyse.sensitivity.replayed import read_off, value_at
+from modelica_like.analyse.slopes import Sizes
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import LanguageError, NoGradient, UnknownName, did_you_mean, missing_extra
@@ -178,7 +179,8 @@ def sensitivities(
     outputs = [read_output(model, name) for name in of]
     chosen = _chosen(model, to)
     column, name = quadratures(model, outputs)
-    stops = solution.time if any(one.kind == "series" for one in outputs) else ()
+    moments = [one.moment for one in outputs if one.kind == "at"]
+    stops = [*moments, *solution.time] if any(one.kind == "series" for one in outputs) else moments
     chain = replay(solution, column, name, start=start, stops=stops, tolerances=Tolerances(precision))
     return _differentiate(solution, chain, outputs, chosen, method, freed, named=bool(to))
 
@@ -217,10 +219,10 @@ def _differentiate(
     size = Sizes.of(chain.model)
     plain = [one for one in outputs if one.kind != "series"]
     series = [one for one in outputs if one.kind == "series"]
+    nodes = [*chain.nodes] if series else []
     readings = read_off(solution, chain, plain)
-    nodes = range(len(chain.nodes)) if series else range(0)
-    over_time = [value_at(chain, one.path, k) for one in series for k in nodes]
-    on_edge = edges(chain, {reading.jump for reading in readings})
+    over_time = [value_at(chain, one.path, node) for one in series for node in nodes]
+    on_edge = edges(chain, readings)
     total = [*readings, *over_time, *(edge.reading for edge in on_edge)]
     positions = [k for k, _ in chosen]
     # A column costs about the same in both directions.
@@ -244,7 +246,7 @@ def _differentiate(
         tuple(quantity for _, quantity in chosen),
         derivatives[:count],
         way,
-        np.array([chain.nodes[k].t for k in nodes]),
+        np.array([node.t for node in nodes]),
         {one.name: table for one, table in zip(series, rows, strict=True)},
         left_out,
     )

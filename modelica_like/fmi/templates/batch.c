@@ -224,12 +224,17 @@ static void read_end(Batch *b) {
 static int begin_batch(Batch *b, const Model *m) {
     const NativeBatch *a = b->asked;
     b->kept = calloc((size_t)a->n_readings + 1, sizeof(double));
-    b->c = instance_new(m, "batch", m->token, calloc, free, NULL, NULL, b, 0);
+    b->c = instance_new((Instance){.model = m,
+                            .name = "batch",
+                            .environment = b,
+                            .co_simulation = 1,
+                            .allocate = calloc,
+                            .release = free,
+                            .noted = count_change,
+                            .struck = add_impact,
+                            .step_finished = after_step},
+        m->token);
     if (b->kept == NULL || b->c == NULL) return 0;
-    b->c->co_simulation = 1;
-    b->c->noted = count_change;
-    b->c->struck = add_impact;
-    b->c->step_finished = after_step;
     for (int64_t k = 0; k < a->n_readings; k++) {
         int kind = a->readings[k].kind;
         b->in_steps |= 1 << kind;

@@ -157,7 +157,7 @@ typedef struct Instance {
     Piece *piece;
     double *end_look; /* guards and their rates at the end of the last fixed step */
     Work work;
-    char *name;
+    const char *name;
     void *environment;
     AnyFunction logger, intermediate_update;
     LogFunction log;
@@ -178,10 +178,12 @@ typedef struct Instance {
 } Instance;
 
 /* tape.c */
+/* What does not count is not multiplied: an inactive branch may be infinite. */
+static inline double product(double a, double b) { return a == 0 || b == 0 ? 0 : a * b; }
 void tape_run(const Tape *tape, double *slots, double *outputs);
 void tape_tangent(const Tape *tape, const double *slots, double *dots, double *output_dots);
 void tape_adjoint(const Tape *tape, const double *slots, double *bars, const double *output_bars);
-void tape_reaches(const Tape *tape, double *marks, const double *output_marks);
+void slopes(int operation, double a, double b, double f, double *by_left, double *by_right);
 
 /* linear.c */
 int qr_factor(const QrPattern *pattern, const double *values, Work *work);
@@ -202,7 +204,9 @@ void ask_for(Instance *c, int node);
 /* point.c */
 void load(Instance *c, double t, const double *x, const double *z);
 void evaluate(Instance *c, const Tape *tape, double t, const double *x, const double *z, double *outputs);
+void evaluate_now(Instance *c, const Tape *tape, double *outputs); /* at the present point */
 Result solve_implicit(Instance *c, double t, const double *x, double *z, int quiet);
+Result solve_now(Instance *c, int quiet);
 Result check_singular(Instance *c);
 Result settle(Instance *c);
 double input_at(const Instance *c, int k, double t);
@@ -264,13 +268,14 @@ Arrival step_fixed(Instance *c, double target);
 const Variable *find_variable(const Model *m, uint32_t reference);
 const Variable *known_variable(Instance *c, uint32_t reference, ValueType type);
 Result get_float(Instance *c, uint32_t reference, double *value);
-Result get_mode(Instance *c, uint32_t reference, int *value);
+int get_mode(Instance *c, uint32_t reference);
 Result set_float(Instance *c, uint32_t reference, double value);
 Result set_mode(Instance *c, uint32_t reference, int64_t value);
 Result set_input_rate(Instance *c, uint32_t reference, double rate);
 Result set_time(Instance *c, double time);
 Result set_states(Instance *c, const double *x);
 Result make_consistent(Instance *c);
+Result check_tables(Instance *c);
 void get_derivatives(Instance *c, double *derivatives);
 void get_indicators(Instance *c, double *indicators);
 
@@ -281,16 +286,13 @@ Result adjoint(Instance *c, const uint32_t *unknowns, size_t n_unknowns, const u
     const double *seed, double *result);
 void slope_of_node(Instance *c, int node, int again, double *by_state);
 Result factor_implicit(Instance *c, int *order);
-size_t dependencies(Instance *c, uint32_t unknown, uint32_t *knowns, size_t capacity, Result *result);
 
 /* taylor.c */
 Result output_rate(Instance *c, uint32_t reference, int order, double *value);
 
 /* instance.c */
-Instance *instance_new(const Model *model, const char *name, const char *token, Allocate allocate, Release release,
-    LogFunction log, AnyFunction logger, void *environment, int logging);
-Instance *instance_open(const char *location, const char *name, const char *token, Allocate allocate, Release release,
-    LogFunction log, AnyFunction logger, void *environment, int logging);
+Instance *instance_new(Instance bare, const char *token);
+Instance *instance_open(Instance bare, const char *token, const char *location);
 void instance_free(Instance *c);
 void instance_reset(Instance *c);
 Result set_experiment(

@@ -12,10 +12,7 @@
 #define SPLITS 20     /* trials to find a split that all can bear */
 #define TURNED 100.0
 
-void hold_terms(Instance *c, Terms *terms) {
-    State *s = &c->state;
-    evaluate(c, &c->model->tapes.hold_terms, s->t, c->x, c->z, (double *)terms);
-}
+void hold_terms(Instance *c, Terms *terms) { evaluate_now(c, &c->model->tapes.hold_terms, (double *)terms); }
 
 /* Marks the motions that are held. */
 void mark_held(Instance *c, const Terms *terms, unsigned char *held) {
@@ -34,14 +31,13 @@ double largest_like(const Model *m, const double *values, int node) {
 /* Put held motions that are zero but for rounding at zero, where they are states. */
 void rest(Instance *c) {
     const Model *m = c->model;
-    State *s = &c->state;
     Terms *terms = c->work.terms;
     unsigned char *held = c->work.held;
     const double *values = c->work.variables;
     if (m->n_holds == 0) return;
     hold_terms(c, terms);
     mark_held(c, terms, held);
-    evaluate(c, &m->tapes.variables, s->t, c->x, c->z, c->work.variables);
+    evaluate_now(c, &m->tapes.variables, c->work.variables);
     for (int k = 0; k < m->n_holds; k++) {
         const Held *one = &m->holds[k];
         if (!held[k] || one->state < 0) continue;
@@ -155,7 +151,6 @@ int anything_shared(const Instance *c) {
  * switched equation says sum(share * reaction) = stiff * inertia * der(motion). */
 static void yield_to_contradiction(Instance *c, const Circuit *one) {
     const Model *m = c->model;
-    State *s = &c->state;
     const int *member = m->members + one->first_member;
     double *z = c->work.kept_z, *reaction = c->work.reactions, inertia = 0, stiff;
     unsigned char *other = c->work.other;
@@ -165,8 +160,8 @@ static void yield_to_contradiction(Instance *c, const Circuit *one) {
     for (int asked = 0; asked < 2; asked++) {
         for (int k = 0; k < one->n_members; k++)
             if (other[k]) c->d[m->holds[member[k]].approach] = asked;
-        solved = solved && solve_implicit(c, s->t, c->x, c->z, 1) == RESULT_OK;
-        evaluate(c, &m->tapes.variables, s->t, c->x, c->z, c->work.variables);
+        solved = solved && solve_now(c, 1) == RESULT_OK;
+        evaluate_now(c, &m->tapes.variables, c->work.variables);
         for (int k = 0; k < one->n_members; k++) {
             double now = c->work.variables[m->holds[member[k]].reaction];
             if (asked && other[k]) inertia = fmax(inertia, fabs(now - reaction[k]));
@@ -205,12 +200,11 @@ static int share_circuit(Instance *c, const Circuit *one, const unsigned char *h
 /* Reactions over what can be borne, of the elements that share; returns the largest. */
 static double use_of(Instance *c, const Terms *terms, double *use) {
     const Model *m = c->model;
-    State *s = &c->state;
     double *z = c->work.kept_z, worst = 0;
     memset(use, 0, m->n_holds * sizeof(double));
     memcpy(z, c->z, (size_t)m->n_z * sizeof(double));
-    if (solve_implicit(c, s->t, c->x, c->z, 1) != RESULT_OK) worst = INFINITY;
-    evaluate(c, &m->tapes.variables, s->t, c->x, c->z, c->work.variables);
+    if (solve_now(c, 1) != RESULT_OK) worst = INFINITY;
+    evaluate_now(c, &m->tapes.variables, c->work.variables);
     for (int i = 0; i < m->n_circuits; i++)
         for (int place = 0; place < m->circuits[i].n_members; place++) {
             int k = m->members[m->circuits[i].first_member + place];

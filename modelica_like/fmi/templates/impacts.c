@@ -9,19 +9,17 @@
 #define FELT 1e-9 /* change of a motion, relative to the largest one, from which on it is no rounding */
 
 static const double *motions(Instance *c) {
-    State *s = &c->state;
-    evaluate(c, &c->model->tapes.variables, s->t, c->x, c->z, c->work.variables);
+    evaluate_now(c, &c->model->tapes.variables, c->work.variables);
     return c->work.variables;
 }
 
 /* Rates, and reactions where they matter, at the present point, with or without the approaches. */
 static Result ask(Instance *c, const Strike *strike, int approaching, int unsolved, double *rates, double *reactions) {
     const Model *m = c->model;
-    State *s = &c->state;
     const double *values;
     for (int k = 0; k < m->n_holds; k++) c->d[m->holds[k].approach] = approaching ? strike->approach[k] : 0;
-    if (unsolved && solve_implicit(c, s->t, c->x, c->z, 0) != RESULT_OK) return RESULT_ERROR;
-    evaluate(c, &m->tapes.rates, s->t, c->x, c->z, c->work.rhs);
+    if (unsolved && solve_now(c, 0) != RESULT_OK) return RESULT_ERROR;
+    evaluate_now(c, &m->tapes.rates, c->work.rhs);
     memcpy(rates, c->work.rhs, m->n_x * sizeof(double));
     if (!strike->hard) return RESULT_OK;
     values = motions(c);
@@ -128,7 +126,6 @@ static void book(Instance *c, const Strike *strike, int first) {
 /* Carries out the impact; `loose` then tells what was knocked loose, bounces, or was moved in passing. */
 static Result carry_out(Instance *c, Strike *strike, int first) {
     const Model *m = c->model;
-    State *s = &c->state;
     Terms *terms = c->work.strike_terms;
     if (strike->hard) hold_terms(c, terms);
     for (int trial = 0; trial < TRIALS && !(trial > 0 && c->bounded && c->budget < 1); trial++) {
@@ -148,7 +145,7 @@ static Result carry_out(Instance *c, Strike *strike, int first) {
         if (strike->entering[k] && !strike->loose[k] && one->state >= 0)
             c->x[one->state] = -terms[k].restitution * strike->before[k] / one->factor;
     }
-    if (solve_implicit(c, s->t, c->x, c->z, 0) != RESULT_OK) return RESULT_ERROR;
+    if (solve_now(c, 0) != RESULT_OK) return RESULT_ERROR;
     if (strike->hard && c->struck != NULL) book(c, strike, first);
     if (strike->hard) mark_moved(c, strike, terms);
     return RESULT_OK;
@@ -157,12 +154,11 @@ static Result carry_out(Instance *c, Strike *strike, int first) {
 /* What the impact knocks loose takes the mode that its start would take. */
 static void choose_again(Instance *c, const Strike *strike) {
     const Model *m = c->model;
-    State *s = &c->state;
     double *d = c->work.respond_d;
     unsigned char *decided = c->work.decided;
     memcpy(d, c->d, (size_t)m->n_d * sizeof(double));
     memset(decided, 1, (size_t)m->n_d);
-    evaluate(c, &m->tapes.discrete_starts, s->t, c->x, c->z, c->work.guards);
+    evaluate_now(c, &m->tapes.discrete_starts, c->work.guards);
     for (int k = 0; k < m->n_holds; k++) {
         int mode = m->holds[k].mode;
         if (!strike->loose[k]) continue;
@@ -182,7 +178,6 @@ static void choose_again(Instance *c, const Strike *strike) {
 /* Close what finite forces have opened since the first impact at this instant: they come after it. */
 static Result hold_again(Instance *c, const unsigned char *entered) {
     const Model *m = c->model;
-    State *s = &c->state;
     for (int k = 0; k < m->n_holds; k++) {
         const Held *one = &m->holds[k];
         if (!entered[k] || c->d[one->mode] == one->number) continue;
@@ -190,7 +185,7 @@ static Result hold_again(Instance *c, const unsigned char *entered) {
         c->d[one->mode] = one->number;
     }
     share(c);
-    return solve_implicit(c, s->t, c->x, c->z, 0);
+    return solve_now(c, 0);
 }
 
 /* Speeds before an impact, and whether it is one. Friction stops nothing at once; where an importer lets it overrun
@@ -213,7 +208,6 @@ static void begin_strike(Instance *c, Strike *strike, const Terms *terms) {
  * instant are one, from the speeds before the first. */
 Result stop_motions(Instance *c, const double *before, Impacts *impacts) {
     const Model *m = c->model;
-    State *s = &c->state;
     Strike *strike = &c->work.strike;
     Terms *terms = c->work.strike_terms;
     int any = 0, first = !impacts->struck;
@@ -242,5 +236,5 @@ Result stop_motions(Instance *c, const double *before, Impacts *impacts) {
     if (!any) return RESULT_OK;
     choose_again(c, strike);
     share(c);
-    return solve_implicit(c, s->t, c->x, c->z, 0);
+    return solve_now(c, 0);
 }

@@ -184,71 +184,55 @@ void instance_reset(Instance *c) {
 
 static Instance *instance_make(const Instance *bare) {
     const Model *m = bare->model;
-    size_t length = strlen(bare->name);
-    Instance measured = *bare, *c = bare->allocate(1, sizeof *c);
+    size_t length = strlen(bare->name) + 1;
+    Instance measured = *bare, *c = bare->allocate(1, sizeof *c + length);
     uint64_t size = lay_out(&measured, NULL);
-    if (c == NULL) return NULL;
-    *c = *bare;
-    c->numbers = size > SIZE_MAX / sizeof(double) ? NULL : bare->allocate((size_t)size, sizeof(double));
-    c->name = bare->allocate(length + 1, 1);
-    if (c->numbers == NULL || c->name == NULL) {
-        if (c->numbers != NULL) bare->release(c->numbers);
-        if (c->name != NULL) bare->release(c->name);
-        bare->release(c);
+    double *numbers = size > SIZE_MAX / sizeof(double) ? NULL : bare->allocate((size_t)size, sizeof(double));
+    if (c == NULL || numbers == NULL) {
+        if (c != NULL) bare->release(c);
+        if (numbers != NULL) bare->release(numbers);
         return NULL;
     }
-    memcpy(c->name, bare->name, length + 1);
-    lay_out(c, c->numbers);
+    *c = *bare;
+    c->name = memcpy(c + 1, bare->name, length);
+    c->numbers = numbers;
+    lay_out(c, numbers);
     share_out_specials(c);
     memcpy(c->work.slots + m->slot_constants, m->constants, (size_t)m->n_constants * sizeof(double));
     instance_reset(c);
     return c;
 }
 
-/* An instance of a model, which must outlive it; NULL, with a message in the log, if there is none. */
-Instance *instance_new(const Model *model, const char *name, const char *token, Allocate allocate, Release release,
-    LogFunction log, AnyFunction logger, void *environment, int logging) {
-    Instance bare = {0}, *c;
-    bare.model = model;
-    bare.log = log;
-    bare.logger = logger;
-    bare.environment = environment;
-    bare.name = (char *)(name == NULL || *name == 0 ? "?" : name);
-    bare.allocate = allocate;
-    bare.release = release;
-    bare.log_enabled = logging ? LOG_ERROR | LOG_WARNING | LOG_EVENTS : LOG_ERROR;
-    if (name == NULL || *name == 0) {
-        report(&bare, LOG_ERROR, RESULT_ERROR, "The instance needs a name.");
-        return NULL;
-    }
-    if (token == NULL || strcmp(token, model->token) != 0) {
+/* An instance of a model, which must outlive it; NULL, with a message in the log, if there is none. `bare` has the
+ * model, a name, and what belongs to the caller; log_enabled tells whether there is to be logged more than errors. */
+Instance *instance_new(Instance bare, const char *token) {
+    Instance *c = NULL;
+    const char *name = bare.name;
+    if (name == NULL || *name == 0) bare.name = "?";
+    bare.log_enabled = bare.log_enabled ? LOG_ERROR | LOG_WARNING | LOG_EVENTS : LOG_ERROR;
+    if (name != bare.name) report(&bare, LOG_ERROR, RESULT_ERROR, "The instance needs a name.");
+    else if (token == NULL || strcmp(token, bare.model->token) != 0)
         report(&bare, LOG_ERROR, RESULT_ERROR, "The instantiation token is that of another export of the model.");
-        return NULL;
-    }
-    c = instance_make(&bare);
-    if (c == NULL) report(&bare, LOG_ERROR, RESULT_ERROR, "There is not enough memory.");
+    else if ((c = instance_make(&bare)) == NULL) report(&bare, LOG_ERROR, RESULT_ERROR, "There is not enough memory.");
     return c;
 }
 
 /* The same with a model of its own: the one that is compiled in, or else the one in the folder of resources. */
-Instance *instance_open(const char *location, const char *name, const char *token, Allocate allocate, Release release,
-    LogFunction log, AnyFunction logger, void *environment, int logging) {
+Instance *instance_open(Instance bare, const char *token, const char *location) {
     char message[MESSAGE_LENGTH];
-    Instance bare = {0}, *c;
-    Model *model = model_data_size > 0
-                       ? model_read((const unsigned char *)model_data, model_data_size, allocate, release, message)
-                       : model_open(location, allocate, release, message);
-    bare.log = log;
-    bare.logger = logger;
-    bare.environment = environment;
-    bare.name = (char *)(name == NULL || *name == 0 ? "?" : name);
-    if (model == NULL) {
+    Instance *c;
+    Model *own = model_data_size > 0 ? model_read((const unsigned char *)model_data, model_data_size, bare.allocate,
+                                           bare.release, message)
+                                     : model_open(location, bare.allocate, bare.release, message);
+    if (own == NULL) {
+        if (bare.name == NULL) bare.name = "?";
         report(&bare, LOG_ERROR, RESULT_ERROR, "%s", message);
         return NULL;
     }
-    c = instance_new(model, name, token, allocate, release, log, logger, environment, logging);
-    if (c == NULL) model_free(model);
-    else c->own_model = model;
+    bare.model = own;
+    c = instance_new(bare, token);
+    if (c == NULL) model_free(own);
+    else c->own_model = own;
     return c;
 }
 
@@ -256,7 +240,6 @@ void instance_free(Instance *c) {
     Release release = c->release;
     if (c->own_model != NULL) model_free(c->own_model);
     release(c->numbers);
-    release(c->name);
     release(c);
 }
 
@@ -298,9 +281,14 @@ static Header header_of(const Instance *c, const void *copy) {
     return h;
 }
 
-Result state_copy_out(Instance *c, void **copy) {
+static Result room_for_copy(Instance *c, void **copy) {
     if (*copy == NULL) *copy = c->allocate(1, copy_size(c));
-    if (*copy == NULL) return report(c, LOG_ERROR, RESULT_ERROR, "There is not enough memory for a copy of the state.");
+    if (*copy != NULL) return RESULT_OK;
+    return report(c, LOG_ERROR, RESULT_ERROR, "There is not enough memory for a copy of the state.");
+}
+
+Result state_copy_out(Instance *c, void **copy) {
+    if (room_for_copy(c, copy) != RESULT_OK) return RESULT_ERROR;
     memcpy(*copy, &c->state, sizeof(State));
     memcpy((char *)*copy + sizeof(State), c->numbers, c->n_numbers * sizeof(double));
     return RESULT_OK;
@@ -338,8 +326,8 @@ Result state_read(Instance *c, const unsigned char *bytes, size_t size, void **c
     if (memcmp(&h, &expected, sizeof h) != 0)
         return report(c, LOG_ERROR, RESULT_ERROR,
             "These bytes are no state of this model: it is another model's, or they are damaged.");
-    *copy = c->allocate(1, copy_size(c));
-    if (*copy == NULL) return report(c, LOG_ERROR, RESULT_ERROR, "There is not enough memory for a copy of the state.");
+    *copy = NULL;
+    if (room_for_copy(c, copy) != RESULT_OK) return RESULT_ERROR;
     memcpy(*copy, bytes + sizeof h, copy_size(c));
     return RESULT_OK;
 }

@@ -348,14 +348,13 @@ static Result take_step(Instance *c, double limit) {
 /* Makes a point of the piece the present one. */
 Result move_to(Instance *c, double t) {
     const Model *m = c->model;
-    State *s = &c->state;
     double *point = c->work.vector + m->n_z;
     piece_at(m, c->piece, t, point);
-    s->t = t;
+    c->state.t = t;
     memcpy(c->x, point, m->n_x * sizeof(double));
     memcpy(c->z, point + m->n_x, m->n_z * sizeof(double));
     c->variables_valid = 0;
-    s->z_valid = 0;
+    c->state.z_valid = 0;
     return settle(c);
 }
 
@@ -364,6 +363,7 @@ Result take_changes(Instance *c, int *event) {
     State *s = &c->state;
     *event = 0;
     if (!s->inputs_changed) return RESULT_OK;
+    if (check_tables(c) != RESULT_OK) return RESULT_ERROR;
     s->inputs_changed = 0;
     leave_piece(c);
     s->z_valid = 0;

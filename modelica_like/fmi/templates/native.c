@@ -67,11 +67,15 @@ EXPORTED void native_close(Model *m) { model_free(m); }
 EXPORTED Native *native_new(const Model *m) {
     Native *n = calloc(1, sizeof *n);
     if (n == NULL) return NULL;
-    n->c = instance_new(m, "native", m->token, calloc, free, keep_message, NULL, n, 0);
-    if (n->c != NULL) {
-        n->c->co_simulation = 1;
-        return n;
-    }
+    n->c = instance_new((Instance){.model = m,
+                            .name = "native",
+                            .log = keep_message,
+                            .environment = n,
+                            .co_simulation = 1,
+                            .allocate = calloc,
+                            .release = free},
+        m->token);
+    if (n->c != NULL) return n;
     free(n);
     return NULL;
 }
@@ -118,9 +122,8 @@ EXPORTED void native_set_all(Native *n, const double *parameters, const double *
 static int read_values(Instance *c, int64_t count, const uint32_t *references, double *values) {
     Result result = RESULT_OK;
     for (int64_t k = 0; k < count && result == RESULT_OK; k++) {
-        int mode = 0;
         if (!is_mode(c, references[k])) result = get_float(c, references[k], &values[k]);
-        else if ((result = get_mode(c, references[k], &mode)) == RESULT_OK) values[k] = mode;
+        else if ((values[k] = get_mode(c, references[k])) < 0) result = RESULT_ERROR;
     }
     return code(result);
 }

@@ -33,6 +33,10 @@ void evaluate(Instance *c, const Tape *tape, double t, const double *x, const do
     tape_run(tape, c->work.slots, outputs);
 }
 
+void evaluate_now(Instance *c, const Tape *tape, double *outputs) {
+    evaluate(c, tape, c->state.t, c->x, c->z, outputs);
+}
+
 static Result singular(Instance *c, double t, const char *names) {
     return report(c, LOG_ERROR, RESULT_ERROR,
         "The Jacobian is singular at t = %.9g s in the equations for %s. Where two frictions stick on the "
@@ -78,11 +82,13 @@ Result solve_implicit(Instance *c, double t, const double *x, double *z, int qui
                        text_of(m, m->implicit_names[0]), t);
 }
 
+Result solve_now(Instance *c, int quiet) { return solve_implicit(c, c->state.t, c->x, c->z, quiet); }
+
 Result check_singular(Instance *c) {
     const Model *m = c->model;
     State *s = &c->state;
     double *values = c->work.rhs;
-    evaluate(c, &m->tapes.determinants, s->t, c->x, c->z, values);
+    evaluate_now(c, &m->tapes.determinants, values);
     for (int k = 0; k < m->n_determinants; k++)
         if (!isfinite(values[k]) || fabs(values[k]) < 1e-12) return singular(c, s->t, text_of(m, m->singular_names[k]));
     if (c->bounded) return RESULT_OK; /* the next step tells */
@@ -98,7 +104,7 @@ Result check_singular(Instance *c) {
 /* Bring the implicit unknowns up to date with time, states, parameters and inputs. */
 Result settle(Instance *c) {
     if (c->state.z_valid) return RESULT_OK;
-    if (solve_implicit(c, c->state.t, c->x, c->z, 0) != RESULT_OK) return RESULT_ERROR;
+    if (solve_now(c, 0) != RESULT_OK) return RESULT_ERROR;
     c->state.z_valid = 1;
     return RESULT_OK;
 }

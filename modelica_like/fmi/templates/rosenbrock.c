@@ -146,12 +146,11 @@ void piece_at(const Model *m, const Piece *piece, double t, double *point) {
  * rounding tell nothing about it. */
 double first_step(Instance *c) {
     const Model *m = c->model;
-    const State *s = &c->state;
     double size, speed, *rates = c->work.rhs;
-    evaluate(c, &m->tapes.rates, s->t, c->x, c->z, rates);
+    evaluate_now(c, &m->tapes.rates, rates);
     size = error_norm(c, c->x, c->x, c->x);
     speed = error_norm(c, c->x, c->x, rates);
     if (!isfinite(speed) || m->n_x == 0) return 1e-3;
     if (size < 1e-5 || speed < 1e-5) return 1e-6;
-    return fmax(0.01 * size / speed, TIME_RESOLUTION * fmax(1, fabs(s->t)));
+    return fmax(0.01 * size / speed, TIME_RESOLUTION * fmax(1, fabs(c->state.t)));
 }

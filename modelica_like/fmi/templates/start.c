@@ -19,8 +19,7 @@ void start_defaults(Instance *c) {
 /* Start values as the model says, or as they were given. */
 static const double *start_values(Instance *c) {
     const Model *m = c->model;
-    const State *s = &c->state;
-    evaluate(c, &m->tapes.start_values, s->t, c->x, c->z, c->work.start_values);
+    evaluate_now(c, &m->tapes.start_values, c->work.start_values);
     for (int k = 0; k < m->n_starts; k++)
         if (c->start_given[k]) c->work.start_values[k] = c->start_value[k];
     return c->work.start_values;
@@ -59,13 +58,12 @@ static double *start_unknown(Instance *c, int column) {
 /* Newton's method on the equations between free states, the variables that follow from them, and start values. */
 static Result solve_start_system(Instance *c, const double *values) {
     const Model *m = c->model;
-    State *s = &c->state;
     double *residual = c->work.start_residual, *step = c->work.start_unknowns, error = 0;
     memset(c->work.slots + m->slot_y, 0, m->n_y * sizeof(double));
     for (int k = 0; k < m->n_start_zero; k++) c->x[m->start_zero[k]] = 0;
     for (int round = 0; round < MAX_NEWTON; round++) {
         double change = 0;
-        evaluate(c, &m->tapes.start_system, s->t, c->x, c->z, residual);
+        evaluate_now(c, &m->tapes.start_system, residual);
         tape_run(&m->tapes.start_jacobian, c->work.slots, c->work.jacobian);
         error = 0;
         for (int k = 0; k < m->n_start_unknowns; k++) {
@@ -93,9 +91,8 @@ static Result solve_start_system(Instance *c, const double *values) {
 
 static Result check_dependent(Instance *c, const double *values) {
     const Model *m = c->model;
-    State *s = &c->state;
     if (m->n_start_dependent == 0) return RESULT_OK;
-    evaluate(c, &m->tapes.variables, s->t, c->x, c->z, c->work.variables);
+    evaluate_now(c, &m->tapes.variables, c->work.variables);
     for (int k = 0; k < m->n_start_dependent; k++) {
         double value = values[m->start_dependent[k].start], actual = c->work.variables[m->start_dependent[k].node];
         if (!(fabs(actual - value) <= CONSISTENT * (1 + fabs(value))))
@@ -106,11 +103,10 @@ static Result check_dependent(Instance *c, const double *values) {
 }
 
 static Result solve_states(Instance *c) {
-    State *s = &c->state;
     const double *values = c->work.start_values;
     if (apply_direct(c, values) != RESULT_OK) return RESULT_ERROR;
     if (c->model->n_start_unknowns > 0 && solve_start_system(c, values) != RESULT_OK) return RESULT_ERROR;
-    if (solve_implicit(c, s->t, c->x, c->z, 0) != RESULT_OK) return RESULT_ERROR;
+    if (solve_now(c, 0) != RESULT_OK) return RESULT_ERROR;
     return check_dependent(c, values);
 }
 
@@ -122,7 +118,7 @@ static Result solve_steady(Instance *c) {
     double *rates = c->work.rhs, *a = c->work.square, *step = c->work.point, residual = INFINITY;
     for (int round = 0; round < MAX_NEWTON && n > 0; round++) {
         double change = 0;
-        evaluate(c, &m->tapes.rates, s->t, c->x, c->z, rates);
+        evaluate_now(c, &m->tapes.rates, rates);
         tape_run(&m->tapes.jacobian, c->work.slots, c->work.jacobian);
         memset(c->work.matrix, 0, (size_t)m->step.n_nonzeros * sizeof(double));
         for (int k = 0; k < m->n_jacobian; k++) c->work.matrix[m->jacobian_to_step[k]] = c->work.jacobian[k];
@@ -155,7 +151,7 @@ static Result solve_steady(Instance *c) {
 void choose_modes(Instance *c, unsigned char *decided) {
     const Model *m = c->model;
     double *holds = c->work.guards;
-    evaluate(c, &m->tapes.start_conditions, c->state.t, c->x, c->z, holds);
+    evaluate_now(c, &m->tapes.start_conditions, holds);
     for (int k = 0; k < m->n_start_modes; k++) {
         const StartMode *one = &m->start_modes[k];
         if (holds[k] == 0 || decided[one->mode]) continue;
@@ -172,7 +168,7 @@ static int choose_start_modes(Instance *c, const double *begun) {
     memcpy(w->decided, c->mode_given, (size_t)m->n_d);
     memcpy(w->d_before, c->d, (size_t)m->n_d * sizeof(double));
     choose_modes(c, w->decided);
-    if (begun) evaluate(c, &m->tapes.variables, c->state.t, c->x, c->z, w->variables);
+    if (begun) evaluate_now(c, &m->tapes.variables, w->variables);
     for (int k = 0; k < m->n_holds && begun; k++) {
         const Held *one = &m->holds[k];
         if (begun[k] * w->variables[one->motion] < 0 && c->d[one->mode] != w->d_before[one->mode])
@@ -183,9 +179,8 @@ static int choose_start_modes(Instance *c, const double *begun) {
 
 static void start_discretes(Instance *c) {
     const Model *m = c->model;
-    State *s = &c->state;
     double *values = c->work.guards;
-    evaluate(c, &m->tapes.discrete_starts, s->t, c->x, c->z, values);
+    evaluate_now(c, &m->tapes.discrete_starts, values);
     for (int k = 0; k < m->n_d; k++)
         if (!c->mode_given[k]) c->d[k] = values[k];
 }
@@ -207,7 +202,7 @@ static Result find_steady(Instance *c, double *begun) {
     if (apply_direct(c, w->start_values) != RESULT_OK) return RESULT_ERROR;
     if (m->n_holds > 0) hold_terms(c, w->terms);
     mark_held(c, w->terms, w->held);
-    evaluate(c, &m->tapes.variables, c->state.t, c->x, c->z, w->variables);
+    evaluate_now(c, &m->tapes.variables, w->variables);
     for (int k = 0; k < m->n_holds; k++) {
         begun[k] = w->variables[m->holds[k].motion];
         if (w->held[k]) w->standing[count++] = m->holds[k].motion;
@@ -222,7 +217,7 @@ static Result check_modes_hold(Instance *c) {
     const State *s = &c->state;
     double *guards = c->work.guards;
     if (m->n_guards == 0) return RESULT_OK;
-    evaluate(c, &m->tapes.guards, s->t, c->x, c->z, guards);
+    evaluate_now(c, &m->tapes.guards, guards);
     for (int k = 0; k < m->n_guards; k++) {
         const Transition *one = &m->transitions[m->guard_transition[k]];
         if (guard_active(c, k) && guards[k] > 0)
@@ -238,6 +233,7 @@ Result start_solve(Instance *c) {
     State *s = &c->state;
     double *begun = c->work.begun;
     int round;
+    if (check_tables(c) != RESULT_OK) return RESULT_ERROR;
     memcpy(c->x, m->guesses, m->n_x * sizeof(double));
     memcpy(c->z, m->z_guesses, m->n_z * sizeof(double));
     memset(c->d, 0, m->n_d * sizeof(double));
@@ -260,7 +256,7 @@ Result start_solve(Instance *c) {
         return report(c, LOG_ERROR, RESULT_ERROR,
             "The modes at the start do not settle: they and the start values change each other in a circle.");
     rest(c);
-    if (solve_implicit(c, s->t, c->x, c->z, 0) != RESULT_OK || check_singular(c) != RESULT_OK) return RESULT_ERROR;
+    if (solve_now(c, 0) != RESULT_OK || check_singular(c) != RESULT_OK) return RESULT_ERROR;
     if (m->settings->steady && check_modes_hold(c) != RESULT_OK) return RESULT_ERROR;
     s->z_valid = s->solved = 1;
     s->piece_valid = s->event_pending = 0;

@@ -234,7 +234,9 @@ def _shifted(distance: Any, begin: float) -> Any:
     if distance.is_constant():
         return ca.SX(round(float(distance) + begin, 12))
     if distance.op() == ca.OP_SUB and distance.dep(1).is_constant():
-        return distance.dep(0)
+        x = distance.dep(0)
+        # Beyond the rows it may be held at the ends; that is what the field `extrapolate` tells.
+        return x.dep(0).dep(0) if x.op() == ca.OP_FMIN and x.dep(0).op() == ca.OP_FMAX else x
     if distance.op() == ca.OP_NEG and distance.dep(0).op() == ca.OP_ADD:
         inner = distance.dep(0)
         return -(inner.dep(1) if inner.dep(0).is_constant() else inner.dep(0))

@@ -133,9 +133,9 @@ class _Page:
         self.referenced: dict[tuple[str, int], None] = {}
         self.parameters: set[str] = set()
         self.abscissae = {
-            row[0]: f"{names.name(name)}_{{{number}}}"
+            row[0]: names.text(f"{end} of {name}")
             for name, rows in any_table(type(component)).items()
-            for number, row in enumerate(rows, 1)
+            for end, row in zip(("first", "last"), rows, strict=True)
         }
         self.writer = Writer(self._symbol, _mode_names, self._special)
 

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Annotated, Any, dataclass_transform, get_args, get_origin, get_type_hints
+from typing import Any, cast, dataclass_transform, get_type_hints
 
 import numpy as np
 
-from components.sizing.maths import Number, is_symbolic
-from components.sizing.quantities import Quantity, Ratio
+from modelica_like.language.quantities import Number, Quantity, is_symbolic
 
 _ROUNDING = 1e-9
 _WIDE = 9
@@ -66,35 +65,24 @@ class Result:
         Args:
             limits: smallest and largest values in SI by name of the line, beside those of the check itself.
         """
-        return tuple(self._line(field, (limits or {}).get(field.name)) for field in self._fields())
+        chosen = (field for field in _fields(type(self)) if not is_rows(getattr(self, field.name)))
+        return tuple(self._line(field, (limits or {}).get(field.name, (None, None))) for field in chosen)
 
     def tables(self) -> dict[str, tuple[Result, ...]]:
         """Return the parts of the result that are rows of a table, by description."""
-        values = {field: getattr(self, field.name) for field in _fields_of(type(self))}
-        return {field.metadata["description"]: value for field, value in values.items() if is_rows(value)}
+        values = {field.metadata["description"]: getattr(self, field.name) for field in _fields(type(self))}
+        return {description: value for description, value in values.items() if is_rows(value)}
 
-    def _fields(self) -> list[dataclasses.Field[Any]]:
-        return [field for field in _fields_of(type(self)) if not is_rows(getattr(self, field.name))]
-
-    def _line(self, field: dataclasses.Field[Any], limit: tuple[Number | None, Number | None] | None) -> Line:
-        value, quantity = getattr(self, field.name), quantity_of(type(self), field.name)
-        verdicts = [_required(value)] if field.metadata["required"] else []
-        for bound, sort in self._bounds(field, limit):
-            verdicts.append(_verdict(value, bound, quantity, above=sort == "at_most"))
+    def _line(self, field: dataclasses.Field[Any], limit: tuple[Number | None, Number | None]) -> Line:
+        value, quantity, about = getattr(self, field.name), quantity_of(type(self), field.name), field.metadata
+        verdicts = [_required(value)] if about["required"] else []
+        for sort, other in zip(("at_least", "at_most"), limit, strict=True):
+            bounds = [getattr(self, about[sort])] if about[sort] else []
+            for bound in [*bounds, *([] if other is None else [other])]:
+                verdicts.append(_verdict(value, bound, quantity, above=sort == "at_most"))
         missed = [text for text in verdicts if text not in ("", "ok")]
         verdict = "; ".join(missed) or next(filter(None, verdicts), "")
-        return Line(
-            field.name, shown(value, quantity), quantity.shown, field.metadata["description"], verdict, bool(missed)
-        )
-
-    def _bounds(
-        self, field: dataclasses.Field[Any], limit: tuple[Number | None, Number | None] | None
-    ) -> Iterable[tuple[Number, str]]:
-        for sort, other in zip(("at_least", "at_most"), limit or (None, None), strict=True):
-            if field.metadata[sort]:
-                yield getattr(self, field.metadata[sort]), sort
-            if other is not None:
-                yield other, sort
+        return Line(field.name, shown(value, quantity), quantity.shown, about["description"], verdict, bool(missed))
 
     def __str__(self) -> str:
         text = _aligned([(line.name, line.value, line.unit, line.description, line.verdict) for line in self.lines()])
@@ -106,23 +94,27 @@ class Result:
 
 def is_rows(value: object) -> bool:
     """Tell whether a value is a tuple of results."""
-    return isinstance(value, tuple) and bool(value) and all(isinstance(row, Result) for row in value)
+    return isinstance(value, tuple) and isinstance(next(iter(cast("tuple[Any, ...]", value)), None), Result)
 
 
-def _fields_of(kind: Any) -> tuple[dataclasses.Field[Any], ...]:
+def _fields(kind: Any) -> tuple[dataclasses.Field[Any], ...]:
     return dataclasses.fields(kind)
 
 
-@lru_cache(maxsize=256)
-def _hints(kind: type) -> dict[str, Any]:
+@lru_cache(maxsize=512)
+def hints(kind: Any) -> dict[str, Any]:
+    """Return the annotations of a function or a dataclass, with what they are annotated with."""
     return get_type_hints(kind, include_extras=True)
+
+
+def quantity(hint: Any) -> Quantity | None:
+    """Return what a number of an annotation measures, None if it says nothing."""
+    return next((extra for extra in getattr(hint, "__metadata__", ()) if isinstance(extra, Quantity)), None)
 
 
 def quantity_of(kind: type, name: str) -> Quantity:
     """Return what a field of a dataclass measures; a text or a truth value is a plain number here."""
-    hint = _hints(kind)[name]
-    hint = hint if get_origin(hint) is Annotated else Ratio
-    return next(extra for extra in get_args(hint)[1:] if isinstance(extra, Quantity))
+    return quantity(hints(kind).get(name)) or Quantity("1", "")
 
 
 def shown(value: Any, quantity: Quantity) -> str:
@@ -132,7 +124,7 @@ def shown(value: Any, quantity: Quantity) -> str:
     if isinstance(value, str) or is_symbolic(value):
         return str(value)
     if isinstance(value, tuple):
-        return ", ".join(shown(item, quantity) for item in value)
+        return ", ".join(shown(item, quantity) for item in cast("tuple[Any, ...]", value))
     numbers = np.ravel(np.asarray(value, dtype=float)) / quantity.factor + 0.0
     return ", ".join(f"{number:.6g}" for number in numbers)
 

@@ -4,9 +4,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Any
 
-from components.sizing.maths import Number
+import casadi as ca
+
+Number = Any
+"""A float, a numpy array (all arrays of one call fit each other by broadcasting) or a CasADi SX, MX or DM."""
+
+
+def is_symbolic(*values: Number) -> bool:
+    """Tell whether any of the values belongs to CasADi."""
+    return any(isinstance(value, ca.SX | ca.MX | ca.DM) for value in values)
 
 
 @dataclass(frozen=True, slots=True)
