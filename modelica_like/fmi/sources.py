@@ -30,6 +30,7 @@ RUNTIME = (
     "impacts.c",
     "events.c",
     "rosenbrock.c",
+    "locate.c",
     "integrate.c",
     "fixed.c",
     "values.c",

@@ -252,15 +252,18 @@ size_t piece_size(const Model *m);
 void piece_at(const Model *m, const Piece *piece, double t, double *point);
 double first_step(Instance *c);
 
-/* integrate.c */
+/* locate.c */
 #define MOST_LOOKS 9 /* at guards, that there is room for */
+double cubic_guess(double g0, double r0, double g1, double r1);
+int search_events(Instance *c);
+
+/* integrate.c */
 typedef enum { REACHED, AT_EVENT, FAILED } Arrival;
 Arrival integrate_to(Instance *c, double target, int stop_at_events);
 void leave_piece(Instance *c);
 Result handle_event(Instance *c);
 Result check_whole(Instance *c, double size);
 Result check_step(Instance *c, double point, double size, double *target);
-double cubic_guess(double g0, double r0, double g1, double r1);
 Result move_to(Instance *c, double t);
 Result take_changes(Instance *c, int *event);
 int is_due(Instance *c);
