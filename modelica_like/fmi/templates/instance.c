@@ -116,7 +116,7 @@ static void share_out_specials(Instance *c) {
 
 /* Tapes, equations and the integrator. */
 static uint64_t place_work(const Model *m, Work *w, double *memory) {
-    uint64_t n = m->n_unknowns, n_z = m->n_z, steady = m->n_steady + n_z;
+    uint64_t n = m->n_unknowns, n_z = m->n_z, steady = m->n_steady;
     uint64_t members = m->most_members, n_guards = m->n_guards, n_x = m->n_x;
     uint64_t resets = larger(larger(m->n_resets, m->n_reset_values), m->n_holds);
     uint64_t small = larger(larger(n_guards, m->n_moments), larger(larger(m->n_start_modes, m->n_d), m->n_derived));
