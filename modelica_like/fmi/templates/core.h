@@ -11,6 +11,13 @@
 
 #include "model.h"
 
+/* What programs see that load this library. */
+#ifdef _WIN32
+#define EXPORTED __declspec(dllexport)
+#else
+#define EXPORTED __attribute__((visibility("default")))
+#endif
+
 /* Compiled on a new Linux, the FMU is to run on an old one: these functions have got new versions since glibc 2.17.
    Versions can only be told to a linker that is given libm. */
 #if defined(OLD_GLIBC) && defined(__GLIBC__) && defined(__x86_64__)

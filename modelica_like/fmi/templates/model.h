@@ -150,6 +150,7 @@ typedef void *(*Allocate)(size_t count, size_t size);
 typedef void (*Release)(void *memory);
 Model *model_read(const unsigned char *bytes, size_t size, Allocate allocate, Release release, char *message);
 void model_free(Model *m);
+uint32_t crc32_of(const unsigned char *bytes, size_t size);
 static inline const char *text_of(const Model *m, int place) { return m->text + place; }
 
 /* model_check.c */

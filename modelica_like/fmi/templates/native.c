@@ -10,7 +10,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include "core.h"
-#include "native.h"
 
 enum { NATIVE_OK, NATIVE_FAILED, NATIVE_MORE, NATIVE_PAUSED };
 #define NEAR_EVENT 2e-7 /* of the distance of results: nearer to an event, its left side stands for the result */

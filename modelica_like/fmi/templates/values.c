@@ -120,6 +120,13 @@ static void touch(Instance *c) {
     c->variables_valid = 0;
 }
 
+/* Their lines begin anew at the present time. */
+static void touch_inputs(Instance *c) {
+    for (int k = 0; k < c->model->n_u; k++) c->u[k] = input_at(c, k, c->state.t);
+    c->state.u_time = c->state.t;
+    touch(c);
+}
+
 static int before_start(const State *s) {
     return s->phase == PHASE_INSTANTIATED || s->phase == PHASE_INITIALIZATION || s->phase == PHASE_CONFIGURATION;
 }
@@ -173,31 +180,25 @@ static Result set_start(Instance *c, const Variable *v, double value) {
 
 Result set_float(Instance *c, uint32_t reference, double value) {
     const Variable *v = known_variable(c, reference, TYPE_FLOAT64);
-    State *s = &c->state;
     if (v == NULL) return RESULT_ERROR;
     if (!isfinite(value)) return refuse_value(c, v, "the value is not a finite number.");
     if (v->kind == KIND_PARAMETER) return set_parameter(c, v, value);
     if (v->kind != KIND_INPUT) return set_start(c, v, value);
-    if (input_at(c, v->index, s->t) == value) return RESULT_OK;
-    for (int k = 0; k < c->model->n_u; k++) c->u[k] = input_at(c, k, s->t);
-    s->u_time = s->t;
+    if (input_at(c, v->index, c->state.t) == value) return RESULT_OK;
+    touch_inputs(c);
     c->u[v->index] = value; /* its rate stays, in whatever order an importer gives the two */
-    touch(c);
     return RESULT_OK;
 }
 
 /* From now on the input moves with this rate. */
 Result set_input_rate(Instance *c, uint32_t reference, double rate) {
     const Variable *v = known_variable(c, reference, TYPE_FLOAT64);
-    State *s = &c->state;
     if (v == NULL) return RESULT_ERROR;
     if (v->kind != KIND_INPUT) return refuse_value(c, v, "it is no input, so it has no input derivative.");
     if (!isfinite(rate)) return refuse_value(c, v, "the derivative is not a finite number.");
     if (c->u_rate[v->index] == rate) return RESULT_OK;
-    for (int k = 0; k < c->model->n_u; k++) c->u[k] = input_at(c, k, s->t);
-    s->u_time = s->t;
+    touch_inputs(c);
     c->u_rate[v->index] = rate;
-    touch(c);
     return RESULT_OK;
 }
 
