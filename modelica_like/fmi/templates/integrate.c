@@ -23,11 +23,9 @@ void leave_piece(Instance *c) {
 }
 
 static double largest_step(const Instance *c) {
-    const Model *m = c->model;
-    const State *s = &c->state;
-    double span = s->stop_time - s->start_time;
-    if (m->n_x > 0 && !m->settings->rates_depend_on_time) return INFINITY;
-    if (!s->stop_time_defined || !(span > 0)) return m->n_x == 0 ? 1e-3 : INFINITY;
+    double span = c->state.stop_time - c->state.start_time;
+    if (c->model->n_x > 0 && !c->model->settings->rates_depend_on_time) return INFINITY;
+    if (!c->state.stop_time_defined || !(span > 0)) return c->model->n_x == 0 ? 1e-3 : INFINITY;
     return span / LEAST_STEPS;
 }
 
@@ -36,12 +34,11 @@ static double least_step(const State *s) { return 1e-15 * fmax(1, fabs(s->t)); }
 
 /* Takes one step from the present point towards `limit`, shorter where accuracy or an event asks for it. */
 static Result take_step(Instance *c, double limit) {
-    const Model *m = c->model;
     State *s = &c->state;
     double *first = c->work.first, wished = s->step > 0 ? s->step : first_step(c);
     double least = least_step(s);
     int rejected = 0;
-    memcpy(first, c->x, m->n_unknowns * sizeof(double));
+    memcpy(first, c->x, c->model->n_unknowns * sizeof(double));
     wished = fmin(wished, largest_step(c));
     for (int n = 0; n < MAX_REJECTIONS; n++) {
         double error = 0, factor, h = wished;
@@ -58,8 +55,8 @@ static Result take_step(Instance *c, double limit) {
             wished = h * fmax(0.1, factor);
             continue;
         }
-        if (solve_implicit(c, c->piece->end, last_of(m, c->piece), 1) != RESULT_OK ||
-            (m->n_guards > 0 && !search_events(c))) {
+        if (solve_implicit(c, c->piece->end, last_of(c->model, c->piece), 1) != RESULT_OK ||
+            (c->model->n_guards > 0 && !search_events(c))) {
             rejected++;
             s->n_rejected++;
             wished = 0.25 * h;
@@ -91,13 +88,12 @@ Result move_to(Instance *c, double t) {
 
 /* Inputs, parameters or states moved from outside: go on from the present point. */
 Result take_changes(Instance *c, int *event) {
-    State *s = &c->state;
     *event = 0;
-    if (!s->inputs_changed) return RESULT_OK;
+    if (!c->state.inputs_changed) return RESULT_OK;
     if (check_tables(c) != RESULT_OK) return RESULT_ERROR;
-    s->inputs_changed = 0;
+    c->state.inputs_changed = 0;
     leave_piece(c);
-    s->z_valid = 0;
+    c->state.z_valid = 0;
     c->variables_valid = 0;
     if (settle(c) != RESULT_OK) return RESULT_ERROR;
     *event = find_wanting(c, nothing_wanting(c), 1);

@@ -21,11 +21,10 @@ static Look room_for_look(const Instance *c, int number) {
 }
 
 static int look_at(Instance *c, double t, double *point, Look *look) {
-    const Model *m = c->model;
     if (solve_implicit(c, t, point, 1) != RESULT_OK) return 0;
     evaluate_special(c, SPECIAL_GUARDS, t, point, look->values);
     look->t = t;
-    for (int g = 0; g < m->n_guards; g++) {
+    for (int g = 0; g < c->model->n_guards; g++) {
         look->values[g] = number_or_false(look->values[g]);
         if (!isfinite(look->rates[g])) look->rates[g] = 0;
     }
@@ -41,15 +40,14 @@ static int look_inside(Instance *c, double t, Look *look) {
 
 /* By a step again from the beginning of the whole one, which becomes the piece. */
 static int step_to(Instance *c, double t, Look *look) {
-    const Model *m = c->model;
     const Piece *whole = c->work.whole;
     double ignored;
     if (t <= whole->begin) {
-        memcpy(c->piece, whole, piece_size(m));
-        memcpy(last_of(m, c->piece), whole->points, (size_t)m->n_unknowns * sizeof(double));
+        memcpy(c->piece, whole, piece_size(c->model));
+        memcpy(last_of(c->model, c->piece), whole->points, (size_t)c->model->n_unknowns * sizeof(double));
     } else if (!rosenbrock_step(c, whole->begin, whole->points, t - whole->begin, 1, c->piece, &ignored)) return 0;
     c->piece->end = t;
-    return look_at(c, t, last_of(m, c->piece), look);
+    return look_at(c, t, last_of(c->model, c->piece), look);
 }
 
 static inline double cubic(double s, double g0, double r0, double g1, double r1) {
@@ -178,11 +176,10 @@ typedef enum { NOTHING, ENDED, TOO_LONG } Found;
 
 /* Go on by the time resolution; what crossed and is still positive there wants to fire, else the search begins anew. */
 static Found look_behind(Instance *c, double end, Look *look) {
-    const Model *m = c->model;
     if (!step_to(c, fmin(c->piece->end + TIME_RESOLUTION * fmax(1, fabs(c->piece->end)), end), look)) return TOO_LONG;
-    for (int g = 0; g < m->n_guards; g++)
+    for (int g = 0; g < c->model->n_guards; g++)
         if (c->work.kinds[g] == CROSSING && look->values[g] > 0)
-            c->state.event_pending = c->wanting[m->guard_transition[g]] = 1;
+            c->state.event_pending = c->wanting[c->model->guard_transition[g]] = 1;
     return ENDED;
 }
 
@@ -227,18 +224,17 @@ static Found look_into(Instance *c, const Look *before, const Look *after, int d
 
 /* Looks for events in an accepted step; shortens it to the first. Returns 0 if the step must be shorter. */
 int search_events(Instance *c) {
-    const Model *m = c->model;
     Look before = room_for_look(c, 0), after = room_for_look(c, 1);
-    const Piece *whole = memcpy(c->work.whole, c->piece, piece_size(m));
+    const Piece *whole = memcpy(c->work.whole, c->piece, piece_size(c->model));
     Found found;
     if (!c->look_valid && !look_inside(c, whole->begin, &before)) return 0;
     c->look_valid = 1;
     before.t = whole->begin;
     /* What the last event left positive did not want to fire: it is on its way down. */
-    for (int g = 0; g < m->n_guards; g++) before.values[g] = fmin(before.values[g], 0);
+    for (int g = 0; g < c->model->n_guards; g++) before.values[g] = fmin(before.values[g], 0);
     if (!look_inside(c, whole->end, &after)) return 0;
     found = look_into(c, &before, &after, DEPTH);
-    if (found == NOTHING) memcpy(before.values, after.values, 2 * (size_t)m->n_guards * sizeof(double));
+    if (found == NOTHING) memcpy(before.values, after.values, 2 * (size_t)c->model->n_guards * sizeof(double));
     else if (found == ENDED) c->look_valid = 0;
     return found != TOO_LONG;
 }

@@ -215,12 +215,11 @@ static void note_impact(Instance *c, int held, double energy, int first) {
 
 static int write_point(Native *n, NativeRun *r) {
     const Instance *c = n->c;
-    const Model *m = c->model;
     int64_t k = r->n_points++;
     r->last = c->state.t;
     if (r->times != NULL) r->times[k] = c->state.t;
     if (r->states != NULL) {
-        memcpy(r->states + k * m->n_unknowns, c->x, (size_t)m->n_unknowns * sizeof(double));
+        memcpy(r->states + k * c->model->n_unknowns, c->x, (size_t)c->model->n_unknowns * sizeof(double));
     }
     if (r->outputs == NULL) return NATIVE_OK;
     return read_values(n->c, r->n_outputs, r->references, r->outputs + k * r->n_outputs);

@@ -17,9 +17,8 @@ void start_defaults(Instance *c) {
 
 /* Start values as the model says, or as they were given. */
 static void start_values(Instance *c) {
-    const Model *m = c->model;
-    evaluate_now(c, &m->tapes.start_values, c->work.start_values);
-    for (int k = 0; k < m->n_starts; k++)
+    evaluate_now(c, &c->model->tapes.start_values, c->work.start_values);
+    for (int k = 0; k < c->model->n_starts; k++)
         if (c->start_given[k]) c->work.start_values[k] = c->start_value[k];
 }
 
@@ -135,11 +134,10 @@ static Result solve_steady(Instance *c) {
 
 /* Choose modes that are not decided by their start conditions: the first that holds wins. */
 void choose_modes(Instance *c, unsigned char *decided) {
-    const Model *m = c->model;
     double *holds = c->work.guards;
-    evaluate_now(c, &m->tapes.start_conditions, holds);
-    for (int k = 0; k < m->n_start_modes; k++) {
-        const StartMode *one = &m->start_modes[k];
+    evaluate_now(c, &c->model->tapes.start_conditions, holds);
+    for (int k = 0; k < c->model->n_start_modes; k++) {
+        const StartMode *one = &c->model->start_modes[k];
         if (holds[k] == 0 || decided[one->mode]) continue;
         decided[one->mode] = 1;
         c->d[one->mode] = one->target;
@@ -164,10 +162,9 @@ static int choose_start_modes(Instance *c, const double *begun) {
 }
 
 static void start_discretes(Instance *c) {
-    const Model *m = c->model;
     double *values = c->work.guards;
-    evaluate_now(c, &m->tapes.discrete_starts, values);
-    for (int k = 0; k < m->n_d; k++)
+    evaluate_now(c, &c->model->tapes.discrete_starts, values);
+    for (int k = 0; k < c->model->n_d; k++)
         if (!c->mode_given[k]) c->d[k] = values[k];
 }
 
@@ -207,7 +204,6 @@ static Result check_modes_hold(Instance *c) {
 /* States from parameters and start values; events at the start have not happened yet. */
 Result start_solve(Instance *c) {
     const Model *m = c->model;
-    State *s = &c->state;
     double *begun = c->work.begun;
     int round;
     if (check_tables(c) != RESULT_OK) return RESULT_ERROR;
@@ -234,8 +230,8 @@ Result start_solve(Instance *c) {
     rest(c);
     if (solve_now(c, 0) != RESULT_OK || check_singular(c) != RESULT_OK) return RESULT_ERROR;
     if (m->settings->steady && check_modes_hold(c) != RESULT_OK) return RESULT_ERROR;
-    s->z_valid = s->solved = 1;
-    s->piece_valid = s->event_pending = 0;
+    c->state.z_valid = c->state.solved = 1;
+    c->state.piece_valid = c->state.event_pending = 0;
     c->variables_valid = 0;
     return RESULT_OK;
 }

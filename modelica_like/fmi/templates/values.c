@@ -28,7 +28,6 @@ const Variable *known_variable(Instance *c, uint32_t reference, ValueType type) 
 
 /* Values that a tape gives, each computed once per point; NULL if there are none. */
 static const double *seen(Instance *c, const Variable *v) {
-    const Model *m = c->model;
     Work *w = &c->work;
     const double *values = v->kind == KIND_DERIVED      ? w->seen_derived
                            : v->kind == KIND_DERIVATIVE ? w->seen_rates
@@ -38,10 +37,10 @@ static const double *seen(Instance *c, const Variable *v) {
     if (c->variables_valid & 1 << v->kind) return values;
     if (v->kind != KIND_DERIVED && settle(c) != RESULT_OK) return NULL;
     switch (v->kind) {
-        case KIND_DERIVED: evaluate_now(c, &m->tapes.derived, w->seen_derived); break;
+        case KIND_DERIVED: evaluate_now(c, &c->model->tapes.derived, w->seen_derived); break;
         case KIND_DERIVATIVE:
             evaluate_special(c, SPECIAL_RATES, c->state.t, c->x, w->rhs);
-            memcpy(w->seen_rates, w->rhs, (size_t)m->n_x * sizeof(double));
+            memcpy(w->seen_rates, w->rhs, (size_t)c->model->n_x * sizeof(double));
             break;
         case KIND_GUARD: get_indicators(c, w->seen_indicators); break;
         default: evaluate_special(c, SPECIAL_VARIABLES, c->state.t, c->x, w->variables);
@@ -83,9 +82,8 @@ Result make_consistent(Instance *c) {
 }
 
 void get_derivatives(Instance *c, double *derivatives) {
-    const Model *m = c->model;
-    evaluate_now(c, &m->tapes.rates, c->work.rhs);
-    memcpy(derivatives, c->work.rhs, m->n_x * sizeof(double));
+    evaluate_now(c, &c->model->tapes.rates, c->work.rhs);
+    memcpy(derivatives, c->work.rhs, c->model->n_x * sizeof(double));
     rest_rates(c, derivatives);
 }
 
@@ -95,10 +93,9 @@ void get_derivatives(Instance *c, double *derivatives) {
  * an offset. It shifts no event, as it is gone above zero; its size is that of rounding, and products of it do not
  * underflow, by whose sign root finders judge. */
 void get_indicators(Instance *c, double *indicators) {
-    const Model *m = c->model;
     double *values = c->work.guards_before;
-    evaluate_now(c, &m->tapes.guards_soon, values);
-    for (int k = 0; k < m->n_guards; k++) {
+    evaluate_now(c, &c->model->tapes.guards_soon, values);
+    for (int k = 0; k < c->model->n_guards; k++) {
         double value = guard_active(c, k) ? number_or_false(values[k]) : -1;
         indicators[k] = value > 0 ? value : value - OFFSET;
     }
@@ -132,15 +129,14 @@ static int before_start(const State *s) {
 }
 
 static Result set_parameter(Instance *c, const Variable *v, double value) {
-    const Model *m = c->model;
     State *s = &c->state;
-    double low = m->parameter_min[v->index], high = m->parameter_max[v->index];
+    double low = c->model->parameter_min[v->index], high = c->model->parameter_max[v->index];
     if (!v->tunable && !before_start(s))
         return refuse_value(c, v, "it is a fixed parameter. Set it before the end of the initialization.");
     if (v->tunable && s->phase == PHASE_CONTINUOUS)
         return refuse_value(c, v, "tunable parameters change in event mode only.");
     if (value < low || value > high)
-        return fail(c, "%s = %g is out of range: it must be at %s %g.", text_of(m, v->name), value,
+        return fail(c, "%s = %g is out of range: it must be at %s %g.", text_of(c->model, v->name), value,
             value < low ? "least" : "most", value < low ? low : high);
     if (c->p[v->index] != value) touch(c);
     if (c->p[v->index] != value && !before_start(s) && !c->work.tuned[v->index]) {
@@ -203,13 +199,12 @@ Result set_input_rate(Instance *c, uint32_t reference, double rate) {
 }
 
 Result set_mode(Instance *c, uint32_t reference, int64_t value) {
-    const Model *m = c->model;
     const Variable *v = known_variable(c, reference, TYPE_ENUMERATION);
     if (v == NULL) return RESULT_ERROR;
     if (v->kind != KIND_DISCRETE) return refuse_value(c, v, "it is calculated.");
-    if (value < 0 || value >= m->modes[v->index].n_names)
-        return fail(c, "%s has no mode %lld: they are 0 to %d.", text_of(m, v->name), (long long)value,
-            m->modes[v->index].n_names - 1);
+    if (value < 0 || value >= c->model->modes[v->index].n_names)
+        return fail(c, "%s has no mode %lld: they are 0 to %d.", text_of(c->model, v->name), (long long)value,
+            c->model->modes[v->index].n_names - 1);
     return set_start(c, v, (double)value);
 }
 
