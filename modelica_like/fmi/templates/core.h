@@ -281,10 +281,9 @@ Arrival step_fixed(Instance *c, double target);
 /* values.c */
 const Variable *find_variable(const Model *m, uint32_t reference);
 const Variable *known_variable(Instance *c, uint32_t reference, ValueType type);
-Result get_float(Instance *c, uint32_t reference, double *value);
-int get_mode(Instance *c, uint32_t reference);
-Result set_float(Instance *c, uint32_t reference, double value);
-Result set_mode(Instance *c, uint32_t reference, int64_t value);
+#define ANY_TYPE N_TYPES
+Result get_value(Instance *c, const Variable *v, double *value);
+Result set_value(Instance *c, const Variable *v, double value);
 Result set_input_rate(Instance *c, uint32_t reference, double rate);
 Result set_time(Instance *c, double time);
 Result set_states(Instance *c, const double *x);

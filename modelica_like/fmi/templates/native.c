@@ -98,18 +98,12 @@ EXPORTED int native_reset(Native *n, double start, double stop, double rtol, dou
 
 /* ---- values ----------------------------------------------------------------------------------------------------- */
 
-static int is_mode(const Instance *c, uint32_t reference) {
-    const Variable *v = find_variable(c->model, reference);
-    return v != NULL && v->type == TYPE_ENUMERATION;
-}
-
 /* Before the begin: parameters, inputs and start values; later: inputs, and parameters that are tunable. */
 EXPORTED int native_set(Native *n, int64_t count, const uint32_t *references, const double *values) {
-    Result result = RESULT_OK;
-    for (int64_t k = 0; k < count && result == RESULT_OK; k++)
-        result = is_mode(n->c, references[k]) ? set_mode(n->c, references[k], (int64_t)values[k])
-                                              : set_float(n->c, references[k], values[k]);
-    return code(result);
+    for (int64_t k = 0; k < count; k++)
+        if (set_value(n->c, known_variable(n->c, references[k], ANY_TYPE), values[k]) != RESULT_OK)
+            return NATIVE_FAILED;
+    return NATIVE_OK;
 }
 
 /* All parameters and inputs at once, in the order of the model's tables and unchecked. */
@@ -119,12 +113,9 @@ EXPORTED void native_set_all(Native *n, const double *parameters, const double *
 }
 
 static int read_values(Instance *c, int64_t count, const uint32_t *references, double *values) {
-    Result result = RESULT_OK;
-    for (int64_t k = 0; k < count && result == RESULT_OK; k++) {
-        if (!is_mode(c, references[k])) result = get_float(c, references[k], &values[k]);
-        else if ((values[k] = get_mode(c, references[k])) < 0) result = RESULT_ERROR;
-    }
-    return code(result);
+    for (int64_t k = 0; k < count; k++)
+        if (get_value(c, known_variable(c, references[k], ANY_TYPE), &values[k]) != RESULT_OK) return NATIVE_FAILED;
+    return NATIVE_OK;
 }
 
 /* Has an event to be handled before anything else? What a fixed step has left is taken by the next one. */

@@ -18,10 +18,11 @@ const Variable *find_variable(const Model *m, uint32_t reference) {
 
 const Variable *known_variable(Instance *c, uint32_t reference, ValueType type) {
     const Variable *v = find_variable(c->model, reference);
-    if (v != NULL && v->type == (int)type) return v;
+    if (v != NULL && (v->type == (int)type || type == ANY_TYPE)) return v;
     fail(c,
-        v == NULL ? "There is no variable with value reference %u."
-                  : "The variable with value reference %u is not of type %s.",
+        v == NULL               ? "There is no variable with value reference %u."
+        : v->type == TYPE_ARRAY ? "The variable with value reference %u is an array: it has no derivatives."
+                                : "The variable with value reference %u is not of type %s.",
         (unsigned)reference, type == TYPE_FLOAT64 ? "Real (Float64)" : "Enumeration (Integer, Int64)");
     return NULL;
 }
@@ -57,8 +58,8 @@ static Result make_ready(Instance *c, const Variable *v) {
     return start_solve(c);
 }
 
-Result get_float(Instance *c, uint32_t reference, double *value) {
-    const Variable *v = known_variable(c, reference, TYPE_FLOAT64);
+/* Of a variable that is known, or NULL: then its reference was wrong. */
+Result get_value(Instance *c, const Variable *v, double *value) {
     if (v == NULL || make_ready(c, v) != RESULT_OK) return RESULT_ERROR;
     switch (v->kind) {
         case KIND_TIME: *value = c->state.t; return RESULT_OK;
@@ -99,12 +100,6 @@ void get_indicators(Instance *c, double *indicators) {
         double value = guard_active(c, k) ? number_or_false(values[k]) : -1;
         indicators[k] = value > 0 ? value : value - OFFSET;
     }
-}
-
-/* The number of the mode, -1 if there is none. */
-int get_mode(Instance *c, uint32_t reference) {
-    const Variable *v = known_variable(c, reference, TYPE_ENUMERATION);
-    return v == NULL || make_ready(c, v) != RESULT_OK ? -1 : (int)c->d[v->index];
 }
 
 static Result refuse_value(Instance *c, const Variable *v, const char *why) {
@@ -174,12 +169,16 @@ static Result set_start(Instance *c, const Variable *v, double value) {
     return RESULT_OK;
 }
 
-Result set_float(Instance *c, uint32_t reference, double value) {
-    const Variable *v = known_variable(c, reference, TYPE_FLOAT64);
+/* As get_value; modes by their numbers. */
+Result set_value(Instance *c, const Variable *v, double value) {
+    const Model *m = c->model;
     if (v == NULL) return RESULT_ERROR;
     if (!isfinite(value)) return refuse_value(c, v, "the value is not a finite number.");
+    if (v->type == TYPE_ENUMERATION && (value < 0 || value >= m->modes[v->index].n_names))
+        return fail(
+            c, "%s has no mode %.0f: they are 0 to %d.", text_of(m, v->name), value, m->modes[v->index].n_names - 1);
     if (v->kind == KIND_PARAMETER) return set_parameter(c, v, value);
-    if (v->kind != KIND_INPUT) return set_start(c, v, value);
+    if (v->kind != KIND_INPUT) return set_start(c, v, v->type == TYPE_ENUMERATION ? floor(value) : value);
     if (input_at(c, v->index, c->state.t) == value) return RESULT_OK;
     touch_inputs(c);
     c->u[v->index] = value; /* its rate stays, in whatever order an importer gives the two */
@@ -196,16 +195,6 @@ Result set_input_rate(Instance *c, uint32_t reference, double rate) {
     touch_inputs(c);
     c->u_rate[v->index] = rate;
     return RESULT_OK;
-}
-
-Result set_mode(Instance *c, uint32_t reference, int64_t value) {
-    const Variable *v = known_variable(c, reference, TYPE_ENUMERATION);
-    if (v == NULL) return RESULT_ERROR;
-    if (v->kind != KIND_DISCRETE) return refuse_value(c, v, "it is calculated.");
-    if (value < 0 || value >= c->model->modes[v->index].n_names)
-        return fail(c, "%s has no mode %lld: they are 0 to %d.", text_of(c->model, v->name), (long long)value,
-            c->model->modes[v->index].n_names - 1);
-    return set_start(c, v, (double)value);
 }
 
 Result set_time(Instance *c, double time) {
