@@ -63,6 +63,7 @@ class TransitionForm:
         index: position in the guards, or in the moments.
         resets: pairs of what is reset (slot path) and the position in the resets.
         notice: what the user is told when it happens.
+        fails: whether the run ends there, with an error.
     """
 
     mode: str
@@ -73,6 +74,7 @@ class TransitionForm:
     resets: tuple[tuple[str, int], ...]
     source: Source
     notice: str
+    fails: bool
 
 
 @dataclass(frozen=True)
@@ -261,6 +263,7 @@ def _transition_forms(component: Component, transitions: list[Transition]) -> tu
                 tuple(resets),
                 t.source,
                 t.notice,
+                t.fails,
             )
         )
     return tuple(forms)

@@ -148,7 +148,13 @@ def negate(condition: Expr) -> Expr:
     return ca.logic_not(condition)
 
 
-def interpolate(x: Scalar, xs: Sequence[float], ys: Sequence[float], smooth: bool = False) -> Expr:
+BEYOND = ("hold", "linear", "error")
+"""What may be beyond the ends of a table."""
+
+
+def interpolate(
+    x: Scalar, xs: Sequence[float], ys: Sequence[float], smooth: bool = False, extrapolate: str = "linear"
+) -> Expr:
     """Interpolate in a table.
 
     Args:
@@ -157,13 +163,15 @@ def interpolate(x: Scalar, xs: Sequence[float], ys: Sequence[float], smooth: boo
         ys: values at the abscissae.
         smooth: False: piecewise linear. True: continuous slope (cubic Hermite with Fritsch-Carlson slopes, no
             overshoot).
-
-    Beyond the ends the last slope goes on.
+        extrapolate: beyond the ends `hold`: the last value; `linear`: the last slope goes on; `error`: the last value,
+            too: that a run must end there, an event of the component says.
 
     Raises:
-        LanguageError: lengths differ, or `xs` does not increase.
+        LanguageError: lengths differ, `xs` does not increase, or `extrapolate` is none of the three.
     """
     known = not any(is_expression(x) for x in xs)
+    if extrapolate not in BEYOND:
+        raise LanguageError(f"A table has extrapolate = '{extrapolate}', which is not {', '.join(BEYOND)}.")
     if len(xs) != len(ys) or not xs or (known and any(b <= a for a, b in itertools.pairwise(xs))):
         raise LanguageError(
             f"A table has the abscissae {list(xs)} and the values {list(ys)}.",
@@ -171,13 +179,13 @@ def interpolate(x: Scalar, xs: Sequence[float], ys: Sequence[float], smooth: boo
         )
     if len(xs) == 1:
         return _sx(ys[0])
-    slopes = _monotone_slopes(xs, ys) if smooth else None
-    x = _sx(x)
+    slopes = _monotone_slopes(xs, ys) if smooth and len(xs) > 2 else None
+    x = _sx(x) if extrapolate == "linear" else ca.fmin(ca.fmax(_sx(x), xs[0]), xs[-1])
     pieces = [_piece(x, xs, ys, slopes, k) for k in range(len(xs) - 1)]
     result: Any = pieces[0]
     for start, piece in zip(xs[1:-1], pieces[1:], strict=True):
         result = ca.if_else(x < start, result, piece)
-    if slopes is not None:
+    if slopes is not None and extrapolate == "linear":
         result = ca.if_else(x < xs[0], ys[0] + slopes[0] * (x - xs[0]), result)
         result = ca.if_else(x > xs[-1], ys[-1] + slopes[-1] * (x - xs[-1]), result)
     return result

@@ -285,11 +285,11 @@ FAILURES: dict[str, tuple[dict[str, Any], str]] = {
         "b (b.fmu): 'w' is no input but an output. It has none.",
     ),
     "FMI 1.0": (
-        {"kind": "no co-simulation", "unit": "a", "version": "1.0"},
+        {"kind": "too old", "unit": "a"},
         "a (a.fmu) is an FMU of FMI 1.0.\nCo-simulation takes FMI 2.0 and 3.0.",
     ),
     "model exchange": (
-        {"kind": "no co-simulation", "unit": "a", "version": "2.0"},
+        {"kind": "no co-simulation", "unit": "a"},
         "a (a.fmu) has no Co-Simulation part.\nExport it as a Co-Simulation FMU.",
     ),
     "no rollback": (

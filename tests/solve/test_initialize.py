@@ -268,7 +268,7 @@ def test_the_steady_state_depends_on_the_mode_the_guess_chooses(start):
         push, rotor, bearing = (
             ConstantTorque(tau_constant=5.0),
             Inertia(J=1.0),
-            BearingFriction(tau_pos=((0, 1), (1, 2))),
+            BearingFriction(tau_pos=((0, 1), (1, 2)), extrapolate="linear"),
         )
 
         def equations(self) -> Equations:

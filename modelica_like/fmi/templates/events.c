@@ -84,7 +84,7 @@ static void drop_balanced(Instance *c, unsigned char *wanting) {
 void move_states(Instance *c, const int *nodes, const double *values, int count) {
     const Model *m = c->model;
     double *slopes = c->work.square, *change = c->work.start_residual, *step = c->work.point;
-    evaluate_now(c, &m->tapes.variables, c->work.variables);
+    variables_now(c);
     for (int k = 0; k < count; k++) change[k] = (values ? values[k] : 0) - c->work.variables[nodes[k]];
     for (int k = 0; k < count; k++) slope_of_node(c, nodes[k], k > 0, slopes + (size_t)k * m->n_x);
     least_squares(count, m->n_x, slopes, change, step);
@@ -104,8 +104,8 @@ void note_change(Instance *c, int name, int transition, int mode, int target) {
             text_of(m, names[(int)before]), text_of(m, names[target]));
 }
 
-/* Carry out transitions together; of one mode only the one declared first. */
-static void fire(Instance *c, const unsigned char *wanting, Impacts *impacts) {
+/* Carry out transitions together; of one mode only the one declared first. An error if one of them ends the run. */
+static Result fire(Instance *c, const unsigned char *wanting, Impacts *impacts) {
     const Model *m = c->model;
     State *s = &c->state;
     Work *w = &c->work;
@@ -119,6 +119,7 @@ static void fire(Instance *c, const unsigned char *wanting, Impacts *impacts) {
         if (!wanting[k] || changed[one->mode]) continue;
         changed[one->mode] = 1;
         note_change(c, one->name, k, one->mode, one->target);
+        if (one->fails) return report(c, LOG_ERROR, RESULT_ERROR, "t = %.9g s: %s", s->t, text_of(m, one->notice));
         if (*text_of(m, one->notice))
             report(c, LOG_WARNING, RESULT_OK, "t = %.9g s: %s", s->t, text_of(m, one->notice));
         d[one->mode] = one->target;
@@ -136,6 +137,7 @@ static void fire(Instance *c, const unsigned char *wanting, Impacts *impacts) {
     }
     memcpy(c->d, d, (size_t)m->n_d * sizeof(double));
     if (count > 0) move_states(c, w->targets, w->target_values, count);
+    return RESULT_OK;
 }
 
 /* Notes an instant; an error where the last ones came ever faster. */
@@ -145,8 +147,8 @@ static Result crowded(Instance *c) {
     double first = s->instants[s->n_instants % CROWD]; /* CROWD instants ago, once there were so many */
     s->instants[s->n_instants % CROWD] = s->t;
     if (++s->n_instants <= CROWD || s->t - first >= CROWDED * span) return RESULT_OK;
-    return report(c, LOG_ERROR, RESULT_ERROR,
-        "Events follow each other ever faster at t = %.12g s. Give the switching a hysteresis, or smooth it.", s->t);
+    return fail(
+        c, "Events follow each other ever faster at t = %.12g s. Give the switching a hysteresis, or smooth it.", s->t);
 }
 
 /* Before one of several that hold a motion gives way, let the others take more. */
@@ -187,7 +189,7 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
         }
         c->round = round;
         memcpy(before, c->d, (size_t)m->n_d * sizeof(double));
-        fire(c, wanting, impacts);
+        if (fire(c, wanting, impacts) != RESULT_OK) return RESULT_ERROR;
         share(c);
         c->variables_valid = 0;
         if (solve_now(c, 0) != RESULT_OK || stop_motions(c, before, impacts) != RESULT_OK ||
@@ -196,7 +198,7 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
         memset(wanting, 0, m->n_transitions);
         if (find_wanting(c, wanting, 1) && !c->bounded) drop_balanced(c, wanting);
     }
-    return report(c, LOG_ERROR, RESULT_ERROR,
+    return fail(c,
         "Modes still switch after %d rounds at t = %.12g s. Give the switching a hysteresis, or smooth what drives it.",
         ROUNDS + ALONE * m->n_holds, s->t);
 }
