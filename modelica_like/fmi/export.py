@@ -9,7 +9,7 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
 from modelica_like.compile import compile
 from modelica_like.compile.compiled import CompiledDae
@@ -150,7 +150,7 @@ def _silent(_: str) -> None:
 
 def _target(path: str | Path, ending: str = ".fmu", what: str = "An FMU") -> Path:
     target = Path(path)
-    if target.suffix != ending:
+    if target.suffix.lower() != ending:
         raise ExportError(f"{what} is a file with the ending {ending}, not '{target.name}'.")
     if not target.absolute().parent.is_dir():
         raise ExportError(f"There is no folder '{target.parent}' for {target.name}.", advice="Make it first.")
@@ -158,11 +158,12 @@ def _target(path: str | Path, ending: str = ".fmu", what: str = "An FMU") -> Pat
     return target
 
 
-def _version(asked: str) -> Version:
-    for one in get_args(Version):
-        if asked == one:
-            return one
-    raise UnknownName(f"FMI {asked} is not supported.", advice="There are 2.0 and 3.0.")
+def _version(asked: str, standard: str = "FMI", kind: Any = Version) -> Any:
+    """Return a version of a standard that is supported."""
+    known = get_args(kind)
+    if asked not in known:
+        raise UnknownName(f"{standard} {asked} is not supported.", advice=f"There are {' and '.join(known)}.")
+    return asked
 
 
 def _modes(asked: str) -> ModesAs:

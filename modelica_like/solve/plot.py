@@ -13,7 +13,6 @@ import numpy as np
 from modelica_like.errors import NetlistError, UnknownName, did_you_mean
 from modelica_like.solve.recorder import Event
 from modelica_like.solve.style import COLOURS, STYLE, headline, panels, with_unit
-from modelica_like.solve.trajectories import Trajectories
 from modelica_like.writing import check_writable, write_bytes
 
 if TYPE_CHECKING:
@@ -22,6 +21,7 @@ if TYPE_CHECKING:
 
     from modelica_like.compile.compiled import CompiledDae
     from modelica_like.solve.recorded import RecordedModel
+    from modelica_like.solve.trajectories import Trajectories
 
 _QUANTITIES = {
     "rad/s": "speed", "N.m": "torque", "m/s": "velocity", "N": "force", "rad": "angle", "m": "position", "W": "power",

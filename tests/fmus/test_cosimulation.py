@@ -111,7 +111,7 @@ def test_what_is_no_number_stops_the_run(hostile: Path, reference_fmus: Built) -
     link = Link("noise", Port("bad", "x"), (Port("good", "motor.tau"),))
     with pytest.raises(FmuFailed) as told:
         cosim(System("bench", units, (link,)), until=1.0, step=1e-2)
-    assert str(told.value).startswith(f"{BAD}: x is no finite number at t = 0.5 s.\n")
+    assert str(told.value).startswith(f"{BAD}: x is not finite at t = 0.5 s.\n")
 
 
 def test_an_input_to_which_nothing_is_connected_is_told(reference_fmus: Built) -> None:
