@@ -16,7 +16,7 @@ from modelica_like.compile.start_system import StartSystem as StartSystem
 from modelica_like.errors import LanguageError, Source, UnknownName, ValueOutOfRange, did_you_mean
 from modelica_like.flatten.model import FlatDiscrete, FlatParameter, FlatVariable, Origin
 from modelica_like.structure.holds import Circuit as Circuit
-from modelica_like.units import coherent, to_si
+from modelica_like.units import to_si
 
 Made = TypeVar("Made")
 
@@ -272,10 +272,10 @@ class CompiledDae:
                     raise LanguageError(
                         f"{path} cannot change after compilation.", advice="Set it in the model and build that again."
                     )
-                p[self.parameter_position[path]] = one.checked(to_si(value, coherent(one.unit), path), value)
+                p[self.parameter_position[path]] = one.checked(to_si(value, one.unit, path), value)
             elif path in inputs:
                 unit = self.flat_variables[self.inputs[inputs[path]]].unit
-                u[inputs[path]] = to_si(value, coherent(unit), path)
+                u[inputs[path]] = to_si(value, unit, path)
             elif path in self.derived_position:
                 raise LanguageError(f"{path} follows from other parameters.", advice="Set those.")
             else:

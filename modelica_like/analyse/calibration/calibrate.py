@@ -19,7 +19,7 @@ from modelica_like.errors import (
     missing_extra,
 )
 from modelica_like.simulation import Model, build
-from modelica_like.units import coherent, to_si
+from modelica_like.units import to_si
 
 __all__ = ["Calibration", "Numbers", "OperatingPoints", "Trajectories", "calibrate"]
 
@@ -155,7 +155,7 @@ class _Problem:
         self, model: CompiledDae, data: Sequence[Measurement], parameters: Mapping[str, tuple[Any, Any]]
     ) -> None:
         self.model, self.data, self.names = model, data, tuple(parameters)
-        units = {one.path: coherent(one.unit) for one in model.flat_parameters}
+        units = {one.path: one.unit for one in model.flat_parameters}
         for name in self.names:
             # Tells what is wrong with a name.
             model.with_parameters({name: parameters[name][0]})

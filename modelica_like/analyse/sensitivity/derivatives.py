@@ -22,7 +22,7 @@ from modelica_like.initialize import StartKind
 from modelica_like.simulation import Model, simulate
 from modelica_like.solve.options import Options
 from modelica_like.solve.solution import Solution
-from modelica_like.units import Unit, coherent
+from modelica_like.units import Unit
 
 if TYPE_CHECKING:
     import pandas
@@ -208,7 +208,7 @@ def _chosen(model: CompiledDae, names: Sequence[str]) -> list[tuple[int, Quantit
                 f"{name} cannot change after compilation, so nothing can be differentiated by it.",
                 advice="Compare runs of models that were built with other values.",
             )
-        found.append((k, Quantity(name, float(values[k]), coherent(units[k]))))
+        found.append((k, Quantity(name, float(values[k]), units[k])))
     return found
 
 

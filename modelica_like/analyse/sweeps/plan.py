@@ -12,7 +12,7 @@ import numpy as np
 from modelica_like.analyse.sweeps.ranges import MOST_RUNS, too_many
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import LanguageError, UnknownName, ValueOutOfRange, did_you_mean, missing_extra
-from modelica_like.units import Unit, coherent, to_si
+from modelica_like.units import Unit, to_si
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,7 +136,7 @@ def _unit(model: CompiledDae, name: str) -> Unit:
         raise LanguageError(f"{name} follows from other parameters.", advice="Vary those, or sweep the netlist itself.")
     if name not in known:
         raise UnknownName(f"{model.name} has no parameter '{name}'{did_you_mean(name, known) or '.'}")
-    return coherent(known[name])
+    return known[name]
 
 
 def _qmc() -> Any:
