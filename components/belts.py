@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from components import icons
 from components.interfaces import TwoFlanges
 from components.thermal import Lossy
 from modelica_like.language import (
@@ -33,6 +34,7 @@ class TimingBelt(Lossy, TwoFlanges):
     F = 2·F_0·tanh(mu·wrap_angle/2); then no strand ever gets slack.
     """
 
+    icon = icons.BELT
     r_a: Parameter = param("m", "radius of the pulley at flange_a", min=1e-12)
     r_b: Parameter = param("m", "radius of the pulley at flange_b", min=1e-12)
     c: Parameter = param("N/m", "stiffness of one strand", min=1e-12)
@@ -87,10 +89,10 @@ class TimingBelt(Lossy, TwoFlanges):
 
     def events(self) -> Events:
         if self.given("mu"):
-            yield self.grip.go("sticking", "forward", when=self.f > self.slip_force)
-            yield self.grip.go("sticking", "backward", when=self.f < -self.slip_force)
-            yield self.grip.go("forward", "sticking", when=self.v_rel < der(self.x))
-            yield self.grip.go("backward", "sticking", when=self.v_rel > der(self.x))
+            yield self.grip.go("sticking", "forward", when=self.f > self.slip_force, because="slip force exceeded")
+            yield self.grip.go("sticking", "backward", when=self.f < -self.slip_force, because="slip force exceeded")
+            yield self.grip.go("forward", "sticking", when=self.v_rel < der(self.x), because="slip reached zero")
+            yield self.grip.go("backward", "sticking", when=self.v_rel > der(self.x), because="slip reached zero")
         else:
             least = self.F_0 - absolute(self.c * self.x + self.d * der(self.x))
             notice = "has a slack strand: its pre-tension is too small for the torque"

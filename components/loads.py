@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from components import icons
 from components.friction import ShaftFriction
 from components.interfaces import OneFlange
 from modelica_like.language import Equations, Expr, Parameter, Variable, der, maximum, param, var, where
@@ -16,6 +17,7 @@ class SpeedDependentLoad(ShaftFriction, OneFlange):
     fan or pump.
     """
 
+    icon = icons.LOAD
     a: Parameter = param("N.m", "constant part", default=0.0, min=0)
     b: Parameter = param("N.m", "speed-dependent part at the speed w_ref", default=0.0, min=0)
     w_ref: Parameter = param("rad/s", "reference speed", default=1.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from components import icons
 from components.friction import DryFriction, Rows, Sticking
 from components.interfaces import LinearCompliantWithRelativeStates, LinearFlange, SlideInHousing
 from components.tabulated import Tabulated
@@ -36,6 +37,7 @@ from modelica_like.language import (
 class Rod(Component):
     """Rigid rod without mass."""
 
+    icon = icons.ROD
     flange_a = LinearFlange("left end")
     flange_b = LinearFlange("right end")
     L: Parameter = param("m", "length, flange_b.s - flange_a.s", default=0.0)
@@ -54,6 +56,7 @@ class ElastoGap(Lossy, LinearCompliantWithRelativeStates):
     Library, Translational.ElastoGap.
     """
 
+    icon = icons.STOP
     c: Parameter = param("N/m", "stiffness in contact; for n above 1 the secant stiffness at s_ref", min=0)
     d: Parameter = param("N.s/m", "damping coefficient in contact", default=0.0, min=0)
     s_rel0: Parameter = param("m", "distance at which the bodies touch", default=0.0)
@@ -118,6 +121,7 @@ class SlideSticking(Sticking, partial=True):
 class SlideFriction(SlideSticking, DryFriction, SlideInHousing, partial=True):
     """Dry friction between a slide and the housing."""
 
+    icon = icons.SLIDEWAY
     v: Variable = var("m/s", "velocity of the slide relative to the housing", state="always")
 
     @property
@@ -165,6 +169,7 @@ class StribeckFriction(SlideFriction):
 class TranslationalBrake(Tabulated, SlideFriction):
     """Friction brake between a slide and the housing: friction force cgeo·mu(v)·fn, fn = fn_max·f_normalized."""
 
+    icon = icons.SLIDE_BRAKE
     f_normalized: Input = signal_in("1", "normal force over fn_max; the brake is free at 0", default=1.0)
     fn_max: Parameter = param("N", "normal force at f_normalized = 1", min=0)
     cgeo: Parameter = param("1", "number of friction surfaces", default=1.0, min=0)
@@ -192,6 +197,7 @@ class MassWithStopAndFriction(SlideSticking, DryFriction):
     Translational.MassWithStopAndFriction, where e is 0.
     """
 
+    icon = icons.TABLE
     flange_a = LinearFlange("left end", free=True)
     flange_b = LinearFlange("right end", free=True)
     m: Parameter = param("kg", "mass", min=0)
@@ -265,11 +271,15 @@ class MassWithStopAndFriction(SlideSticking, DryFriction):
             yield mode.initially("stuck", when=there)
             yield stop.initially(side, when=there)
             moving = ("free", "start_forward", "start_backward", "forward", "backward")
-            yield mode.go(moving, "stuck", when=beyond, reset={self.s: end})
-            yield stop.go("none", side, when=beyond)
+            yield mode.go(moving, "stuck", when=beyond, reset={self.s: end}, because="end stop reached")
+            yield stop.go("none", side, when=beyond, because="end stop reached")
         # While it is held, its velocity is nothing but rounding.
-        yield stop.go("left", "none", when=all_of(negate(mode.is_("stuck")), self.v > 0))
-        yield stop.go("right", "none", when=all_of(negate(mode.is_("stuck")), self.v < 0))
+        yield stop.go(
+            "left", "none", when=all_of(negate(mode.is_("stuck")), self.v > 0), because="moves away from the stop"
+        )
+        yield stop.go(
+            "right", "none", when=all_of(negate(mode.is_("stuck")), self.v < 0), because="moves away from the stop"
+        )
         yield from super().events()
 
     def stored_energy(self) -> Expr:

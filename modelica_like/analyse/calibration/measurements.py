@@ -194,10 +194,10 @@ def _in_si(model: CompiledDae, columns: Columns) -> dict[str, Matrix]:
 
 
 def _unit(model: CompiledDae, name: str) -> Unit:
-    known = {one.path: one.unit for one in (*model.flat_variables, *model.flat_parameters)}
-    if name not in known:
-        raise UnknownName(f"{model.name} has no variable or parameter '{name}'{did_you_mean(name, known) or '.'}")
-    return known[name]
+    if name not in model.units:
+        near = did_you_mean(name, model.units)
+        raise UnknownName(f"{model.name} has no variable or parameter '{name}'{near or '.'}")
+    return model.units[name]
 
 
 def _column_uncertainty(model: CompiledDae, stated: Mapping[str, Any], name: str, values: Iterable[float]) -> float:

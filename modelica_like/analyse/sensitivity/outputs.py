@@ -134,7 +134,7 @@ def expression_of(model: CompiledDae, path: str) -> tuple[Callable[[], Any], Uni
     arguments = model.arguments.values()
     if path in model.position:
         k = model.position[path]
-        return lambda: model.variables(*arguments)[k], model.flat_variables[k].unit
+        return lambda: model.variables(*arguments)[k], model.units[path]
     owner, _, last = path.rpartition(".")
     columns = _POWERS | _ENERGY
     if last in columns and owner in model.components:
