@@ -17,7 +17,7 @@ from modelica_like.errors import UnknownName, did_you_mean
 from modelica_like.flatten.model import FlatDiscrete, FlatParameter, FlatVariable
 from modelica_like.fmi.reach import Reach
 from modelica_like.fmi.start_tables import StartTables, start_tables
-from modelica_like.units import ONE, Unit, coherent, parse_unit
+from modelica_like.units import ONE, Unit, parse_unit
 
 Causality = Literal["independent", "parameter", "calculatedParameter", "input", "output", "local"]
 Variability = Literal["fixed", "tunable", "discrete", "continuous"]
@@ -202,20 +202,20 @@ class _Builder:
             below = self.states[model.states.index(base)]
             self.states[k] = self.add(
                 fmi_name(model.states[k]), "Float64", "local", "continuous", "calculated", ("state", k),
-                unit=coherent(unit), derivative_of=below, nominal=float(model.nominals[k]),
+                unit=unit, derivative_of=below, nominal=float(model.nominals[k]),
             )  # fmt: skip
             self.derivatives[model.states.index(base)] = self.states[k]
         for k, name in enumerate(model.states):
             if k not in self.derivatives:
                 self.derivatives[k] = self.add(
                     fmi_name(f"der({name})"), "Float64", "local", "continuous", "calculated", ("der", k),
-                    unit=coherent(units[name] / _SECOND), derivative_of=self.states[k],
+                    unit=units[name] / _SECOND, derivative_of=self.states[k],
                 )  # fmt: skip
 
     def discretes(self, modes: ModesAs) -> None:
         """Modes, and other discrete values, which are local."""
         for k, one in enumerate(self.model.flat_discretes):
-            slot, about = ("discrete", k), {"unit": coherent(one.unit), "description": _mode_text(one)}
+            slot, about = ("discrete", k), {"unit": one.unit, "description": _mode_text(one)}
             if one.names:
                 kind, names = ("Int64", ()) if modes == "integer" else ("Enumeration", one.names)
                 causality = "local" if modes == "local" else "output"
@@ -282,7 +282,7 @@ def fmi_name(name: str) -> str:
 
 
 def _about(one: FlatVariable | FlatParameter) -> dict[str, Any]:
-    about: dict[str, Any] = {"unit": coherent(one.unit), "description": one.description, "min": one.min, "max": one.max}
+    about: dict[str, Any] = {"unit": one.unit, "description": one.description, "min": one.min, "max": one.max}
     if isinstance(one, FlatVariable) and one.nominal != 1.0:
         about["nominal"] = abs(one.nominal)
     return about
