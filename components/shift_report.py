@@ -74,8 +74,11 @@ def _element(run: Run, path: str, window: slice, head: tuple[str, float, str]) -
     if not np.any(power):
         return []
     time, torque, slips = run["time"][window], run[f"{path}.tau"][window], power > 0
-    slipping = float(np.sum(np.diff(time)[slips[1:] | slips[:-1]]))
-    return [ElementShift(*head, slipping, float(np.max(np.abs(torque[slips]))), _integral(time, power))]
+    between = (slips[1:] | slips[:-1]) & (np.diff(time) > 0)
+    slipping = float(np.sum(np.diff(time)[between]))
+    # The torque at which slip begins or ends counts, too.
+    ends = np.append(between, False) | np.append(False, between)
+    return [ElementShift(*head, slipping, float(np.max(np.abs(torque[ends]))), _integral(time, power))]
 
 
 def _integral(time: Any, power: Any) -> float:
