@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from components import icons
 from components.interfaces import CompliantWithRelativeStates, ShaftInHousing
 from components.tabulated import Tabulated
 from components.thermal import Lossy
@@ -244,6 +245,7 @@ class PressedFriction(Tabulated, ShaftFriction, partial=True):
 class Clutch(PressedFriction, CompliantWithRelativeStates):
     """Friction clutch between two shafts."""
 
+    icon = icons.CLUTCH
     # No torque depends on the angle by which a clutch has slipped.
     phi_rel: Variable = var("rad", "relative angle, flange_b.phi - flange_a.phi", state="prefer", default=0)
     w_rel: Variable = var("rad/s", "slip speed", state="always")
@@ -265,6 +267,7 @@ class MultiPlateClutch(Clutch):
     Politechnika Szczecińska, after K. Marchelek: Dynamika obrabiarek, 4.4.2).
     """
 
+    icon = icons.MULTI_PLATE
     mu_min: Parameter = param("1", "smallest coefficient of sliding friction", min=0)
     w_min: Parameter = param("rad/s", "slip speed there", min=0)
     curvature: Parameter = param("s3/rad3", "factor of the cube below w_min", min=0)
@@ -285,6 +288,7 @@ class MultiPlateClutch(Clutch):
 class Brake(PressedFriction, ShaftInHousing):
     """Friction brake: a clutch between a shaft and the housing."""
 
+    icon = icons.BRAKE
     w: Variable = var("rad/s", "speed of the shaft relative to the housing", state="always")
 
     @property
@@ -299,6 +303,7 @@ class Brake(PressedFriction, ShaftInHousing):
 class BearingFriction(Tabulated, ShaftFriction, ShaftInHousing):
     """Friction of a bearing: a torque against the rotation that depends on the speed, with stiction."""
 
+    icon = icons.BEARING
     w: Variable = var("rad/s", "speed of the shaft relative to the housing", state="always")
     tau_pos: Rows = rows(
         column("speed", scale="w_scale", rising=True), column("friction torque", scale="tau_scale", min=0),

@@ -30,6 +30,7 @@ class End:
     Attributes:
         adaptor: name of the adaptor that is added for it.
         path: of a connector at the cut.
+        takes: what comes from the other side.
     """
 
     adaptor: str
@@ -46,7 +47,7 @@ Objection = Callable[[int, Mapping[Cut, Takes]], str]
 def ends_of(cut: Cut, near_takes: Takes) -> tuple[End, End]:
     """Return both ends of a cut; the names of their adaptors are those of the ends."""
     other: Takes = "flow" if near_takes == "potential" else "potential"
-    near, far = cut.near[0], cut.far[0]
+    near, far = cut.near, cut.far[0]
     return End(as_name(near), near, near_takes), End(as_name(far), far, other)
 
 
@@ -128,7 +129,7 @@ def _bad_end(model: CompiledDae, assembly: Assembly, end: End) -> str:
 def _impossible(found: CutNetlist, objection: Objection, cuts: Sequence[Cut]) -> ModelicaLikeError:
     """Tell for the first cut that cannot be made in either way why."""
     for cut in cuts:
-        sides = [found.group_of(cut.near[0]), found.group_of(cut.far[0])]
+        sides = [found.group_of(cut.near), found.group_of(cut.far[0])]
         others = [one for one in cuts if one is not cut]
         reasons: dict[str, None] = {}
         for chosen in _choices((cut, *others)):

@@ -16,7 +16,7 @@ import numpy as np
 
 from modelica_like.cosimulation.child import PLACE
 from modelica_like.cosimulation.failures import tell_error, tell_loss
-from modelica_like.cosimulation.load import opened
+from modelica_like.cosimulation.files import opened
 from modelica_like.cosimulation.solution import CosimSolution, Coupling
 from modelica_like.cosimulation.system import Inputs, Master, Settings, System, check_system
 from modelica_like.errors import FmuCrashed, FmuTimeout, SolveError, UnknownName, ValueOutOfRange, did_you_mean

@@ -52,10 +52,10 @@ BROWSER = Platform("wasm32", "", "wasm32-wasi", ".wasm")
 RUNTIMES = {**PLATFORMS, BROWSER.name: BROWSER}
 """What the run-time is compiled for."""
 
-# -O1 runs as fast as -O2 here and compiles in two thirds of the time. Changed flags make zig compile its C runtime
-# again, which takes minutes for Windows.
+# Runs take a tenth less time than with -O1; compiling takes 3.6 s of CPU instead of 2.0 s. Changed flags make zig
+# compile its C runtime again, which takes minutes for Windows.
 _FLAGS = (
-    "-std=c99", "-O1", "-ffp-contract=off", "-fvisibility=hidden", "-s", "-Wall", "-Wextra", "-DOLD_GLIBC",
+    "-std=c99", "-O2", "-ffp-contract=off", "-fvisibility=hidden", "-s", "-Wall", "-Wextra", "-DOLD_GLIBC",
 )  # fmt: skip
 _LINKING = {
     # The caller's buffers lie in the module's memory. It needs nothing from outside.

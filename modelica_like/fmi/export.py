@@ -197,7 +197,7 @@ def _fixed_step(asked: float | str | None, kinds: tuple[Kind, ...]) -> float:
 
 
 def _compiled(
-    drive: Model, ends: Sequence[str], takes: Takes, tables: Sequence[str]
+    drive: Model, ends: Sequence[str], takes: Takes, tables: Sequence[str] = ()
 ) -> tuple[CompiledDae, str, Listing]:
     """Return the compiled model, its description and its equations."""
     if isinstance(drive, CompiledDae):

@@ -13,7 +13,7 @@ from components import Inertia
 from modelica_like import simulate
 from modelica_like.analyse.sweeps.ranges import read_range
 from modelica_like.cosimulation.described import described
-from modelica_like.cosimulation.load import load_system
+from modelica_like.cosimulation.files import load_system
 from modelica_like.errors import FmuRefused, ModelicaLikeError
 from modelica_like.netlist import loads
 from modelica_like.netlist.write import dumps

@@ -8,7 +8,7 @@ import pytest
 
 from modelica_like.cosimulation.cut import cut_netlist
 from modelica_like.cosimulation.failures import tell_error
-from modelica_like.cosimulation.load import load_system
+from modelica_like.cosimulation.files import load_system
 from modelica_like.cosimulation.run import cosim
 from modelica_like.cosimulation.split import split
 from modelica_like.cosimulation.system import Link, Port, Settings, System, Unit, check_system
