@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from components import icons
 from components.interfaces import TwoFlanges
 from components.thermal import Lossy
 from modelica_like.language import (
@@ -33,6 +34,7 @@ class TimingBelt(Lossy, TwoFlanges):
     F = 2·F_0·tanh(mu·wrap_angle/2); then no strand ever gets slack.
     """
 
+    icon = icons.BELT
     r_a: Parameter = param("m", "radius of the pulley at flange_a", min=1e-12)
     r_b: Parameter = param("m", "radius of the pulley at flange_b", min=1e-12)
     c: Parameter = param("N/m", "stiffness of one strand", min=1e-12)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from components import icons
 from components.interfaces import CompliantWithRelativeStates, ShaftInHousing
 from components.tabulated import Tabulated
 from components.thermal import Lossy
@@ -188,8 +189,10 @@ class DryFriction(Sticking, partial=True):
         yield mode.initially("forward", when=all_of(pressed, slip > 0))
         yield mode.initially("backward", when=all_of(pressed, slip < 0))
         yield mode.initially("stuck", when=pressed)
-        sliding = ("start_forward", "start_backward", "forward", "backward")
-        yield mode.go(("stuck", *sliding), "free", when=negate(pressed), because="no pressure")
+        yield mode.go(
+            ("stuck", "start_forward", "start_backward", "forward", "backward"), "free", when=negate(pressed),
+            because="no pressure",
+        )  # fmt: skip
         yield mode.go("free", "forward", when=all_of(pressed, slip > 0), because="pressed while slipping")
         yield mode.go("free", "backward", when=all_of(pressed, slip < 0), because="pressed while slipping")
         yield mode.go("free", "stuck", when=pressed, because="pressed without slip")
@@ -245,6 +248,7 @@ class PressedFriction(Tabulated, ShaftFriction, partial=True):
 class Clutch(PressedFriction, CompliantWithRelativeStates):
     """Friction clutch between two shafts."""
 
+    icon = icons.CLUTCH
     # No torque depends on the angle by which a clutch has slipped.
     phi_rel: Variable = var("rad", "relative angle, flange_b.phi - flange_a.phi", state="prefer", default=0)
     w_rel: Variable = var("rad/s", "slip speed", state="always")
@@ -266,6 +270,7 @@ class MultiPlateClutch(Clutch):
     Politechnika Szczecińska, after K. Marchelek: Dynamika obrabiarek, 4.4.2).
     """
 
+    icon = icons.MULTI_PLATE
     mu_min: Parameter = param("1", "smallest coefficient of sliding friction", min=0)
     w_min: Parameter = param("rad/s", "slip speed there", min=0)
     curvature: Parameter = param("s3/rad3", "factor of the cube below w_min", min=0)
@@ -286,6 +291,7 @@ class MultiPlateClutch(Clutch):
 class Brake(PressedFriction, ShaftInHousing):
     """Friction brake: a clutch between a shaft and the housing."""
 
+    icon = icons.BRAKE
     w: Variable = var("rad/s", "speed of the shaft relative to the housing", state="always")
 
     @property
@@ -300,6 +306,7 @@ class Brake(PressedFriction, ShaftInHousing):
 class BearingFriction(Tabulated, ShaftFriction, ShaftInHousing):
     """Friction of a bearing: a torque against the rotation that depends on the speed, with stiction."""
 
+    icon = icons.BEARING
     w: Variable = var("rad/s", "speed of the shaft relative to the housing", state="always")
     tau_pos: Rows = rows(
         column("speed", scale="w_scale", rising=True), column("friction torque", scale="tau_scale", min=0),

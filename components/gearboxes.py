@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
+from components import icons
 from components.interfaces import Flange
 from components.lossy_gears import LossRows, LossyGear
 from components.springs import ElastoBacklash, SpringDamper
@@ -25,6 +26,7 @@ class Gearbox(Component):
     Modelica Standard Library, Rotational.Gearbox. The inertia of the input wheel belongs to the shaft at flange_a.
     """
 
+    icon = icons.GEARBOX
     flange_a = Flange("input shaft")
     flange_b = Flange("output shaft")
     support = Flange("housing", optional=True)

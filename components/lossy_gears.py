@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from components import icons
 from components.friction import ShaftSticking
 from components.interfaces import TwoFlanges
 from components.tabulated import Tabulated
@@ -40,6 +41,7 @@ class MeshWithFriction(ShaftSticking, TwoFlanges, partial=True):
     A subclass gives the efficiencies and the friction of the bearings at a speed.
     """
 
+    icon = icons.GEAR
     ratio: Parameter = param("1", "transmission ratio, speed of flange_a over speed of flange_b")
     phi_a: Variable = var("rad", "angle of flange_a relative to the housing")
     w_a: Variable = var("rad/s", "speed of flange_a relative to the housing", state="always")
@@ -142,6 +144,7 @@ class ConstantEfficiencyGear(MeshWithFriction):
     flange_b can turn it, only a drive at flange_a.
     """
 
+    icon = icons.WORM
     efficiency: Parameter = param("1", "power out at flange_b over power in at flange_a", min=1e-3, max=1)
     efficiency_back: Parameter = param(
         "1", "power out at flange_a over power in at flange_b; not above 0: none", default=None, max=1

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from components import icons
 from components.friction import Clutch, ShaftFriction
 from components.interfaces import CompliantWithRelativeStates
 from modelica_like.language import (
@@ -28,6 +29,7 @@ class Freewheel(CompliantWithRelativeStates):
     overrunning speed and the driving torque at most one is not zero, and none is negative.
     """
 
+    icon = icons.FREEWHEEL
     # No torque depends on the angle by which a freewheel has overrun.
     phi_rel: Variable = var("rad", "relative angle, flange_b.phi - flange_a.phi", state="prefer", default=0)
     w_rel: Variable = var("rad/s", "overrunning speed", state="always")
@@ -61,6 +63,8 @@ class OneWayClutch(Clutch):
     One element, because the torque would not be unique between a freewheel and a clutch that both hold. Modelica
     Standard Library, Rotational.OneWayClutch.
     """
+
+    icon = icons.ONE_WAY_CLUTCH
 
     def sliding_friction(self, speed: Expr | float) -> Expr:
         return where(self.f_normalized > 0, super().sliding_friction(speed), self.tau_drag)
@@ -97,6 +101,7 @@ class OneWayClutch(Clutch):
 class TorqueLimiter(ShaftFriction, CompliantWithRelativeStates):
     """Slipping coupling that protects a drive: rigid up to tau_max·peak, then it slips at tau_max."""
 
+    icon = icons.LIMITER_CLUTCH
     tau_max: Parameter = param("N.m", "torque at which it slips", min=0)
     phi_rel: Variable = var("rad", "relative angle, flange_b.phi - flange_a.phi", state="prefer", default=0)
     w_rel: Variable = var("rad/s", "slip speed", state="always")

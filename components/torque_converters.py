@@ -5,6 +5,7 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import Any
 
+from components import icons
 from components.interfaces import TwoFlanges
 from components.tabulated import Tabulated
 from components.thermal import Lossy
@@ -40,6 +41,7 @@ class TorqueConverter(Tabulated, Lossy, TwoFlanges):
     the torque ratio 1 throughout it is a hydrodynamic coupling. VDI 2153.
     """
 
+    icon = icons.CONVERTER
     capacity: Rows = rows(column("speed ratio", rising=True), column("capacity", scale="C_scale", min=0))
     """Rows of speed ratio and capacity in C_scale, which should end with zero at the speed ratio 1."""
     torque_ratio: Rows = rows(

@@ -74,7 +74,7 @@ def cosim(
     """Run a system of FMUs together: mode changes, energies at the couplings, results as table and picture."""
     with told(debug, tables=[csv], pictures=[plot]):
         from modelica_like.cli.outcome import Outcome
-        from modelica_like.cosimulation.load import opened
+        from modelica_like.cosimulation.files import opened
         from modelica_like.cosimulation.run import cosim as run
         from modelica_like.cosimulation.solution import described_model
         from modelica_like.report.progress import Bar

@@ -16,7 +16,7 @@ from modelica_like.errors import LanguageError, Source, UnknownName, ValueOutOfR
 from modelica_like.flatten.model import FlatDiscrete, FlatParameter, FlatVariable, Origin
 from modelica_like.structure.holds import Circuit as Circuit
 from modelica_like.structure.holds import HeldMotion as HeldMotion
-from modelica_like.units import coherent, to_si
+from modelica_like.units import Unit, coherent, to_si
 from modelica_like.upper import upper
 
 Made = TypeVar("Made")
@@ -183,6 +183,12 @@ class CompiledDae:
         """Position in (p, u) of every independent parameter and input by its path."""
         inputs = {self.flat_variables[k].path: len(self.p) + n for n, k in enumerate(self.inputs)}
         return {**self.parameter_position, **inputs}
+
+    @cached_property
+    def units(self) -> dict[str, Unit]:
+        """Coherent SI unit of every variable, parameter, mode and discrete value by its path."""
+        named = (*self.flat_discretes, *self.flat_variables, *self.flat_derived, *self.flat_parameters)
+        return {one.path: coherent(one.unit) for one in named}
 
     @cached_property
     def derived_position(self) -> dict[str, int]:

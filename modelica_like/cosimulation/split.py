@@ -91,19 +91,22 @@ def split(
     notes: list[str] = []
     for k, title in enumerate(titles):
         tell(f"exporting {title}")
-        ends = open_ends(found, k, chosen)
-        part = maker.started(k, ends, values)
-        part.__dict__["_name"] = title
-        save(part, target / f"{title}.toml")
-        done = export_fmu(part, target / f"{title}.fmu", version, {"cs"}, check=check)
-        notes += [f"{title}: {done.check.sentence}"] if done.check.sentence else []
-        units.append(Unit(title, target / f"{title}.fmu", maker.not_passed_on(ends)))
+        ends, file = open_ends(found, k, chosen), target / f"{title}.fmu"
+        note = _export(maker.started(k, ends, values), title, file, version, check=check)
+        notes += [f"{title}: {note}"] if note else []
+        units.append(Unit(title, file, maker.not_passed_on(ends)))
     links, bonds = _couplings(maker, chosen, titles)
     system = System(assembly._name, tuple(units), links, bonds, settings, own_names=True)
-    path = target / _SYSTEM
-    write_system(system, path)
+    write_system(system, target / _SYSTEM)
     taken: dict[str, Takes] = {end.path: end.takes for cut, takes in chosen.items() for end in ends_of(cut, takes)}
-    return Split(system, path, taken, tuple(notes))
+    return Split(system, target / _SYSTEM, taken, tuple(notes))
+
+
+def _export(part: Assembly, title: str, file: Path, version: str, *, check: bool) -> str:
+    """Write a part as a netlist and as an FMU, and return what its check has told."""
+    part.__dict__["_name"] = title
+    save(part, file.with_suffix(".toml"))
+    return export_fmu(part, file, version, {"cs"}, check=check).check.sentence
 
 
 def _settings(until: float | str | None, step: float | str | None, master: str | None) -> Settings:
@@ -170,7 +173,7 @@ def _couplings(
 
 
 def _signal(found: CutNetlist, cut: Cut, titles: Sequence[str]) -> Link:
-    source, home = cut.near[0], found.group_of(cut.near[0])
+    source, home = cut.near, found.group_of(cut.near)
     ends = (source, *(end for end in cut.far if found.group_of(end) != home))
     ports = [Port(titles[found.group_of(end)], end) for end in ends]
     return Link(cut.name, ports[0], tuple(ports[1:]))

@@ -197,7 +197,7 @@ def _fixed_step(asked: float | str | None, kinds: tuple[Kind, ...]) -> float:
 
 
 def _compiled(
-    drive: Model, ends: Sequence[str], takes: Takes, tables: Sequence[str]
+    drive: Model, ends: Sequence[str], takes: Takes, tables: Sequence[str] = ()
 ) -> tuple[CompiledDae, str, Listing]:
     """Return the compiled model, its description and its equations."""
     if isinstance(drive, CompiledDae):
@@ -273,7 +273,7 @@ def _contents(
         for family in dict.fromkeys(icon_name(one.kind) for one in model.terminals):
             pictures |= {f"terminalsAndIcons/{family}.{s}": terminal_icon(family, s) for s in ("png", "svg")}
     seen = variables.variables + (variables.arrays if about.version == "3.0" else ())
-    data = model_file(make_tables(model), seen, _TOKEN, about.tolerance, about.fixed_step)
+    data = model_file(make_tables(model, variables.start), seen, _TOKEN, about.tolerance, about.fixed_step)
     token = _token(texts, data)
     data = with_token(data, _TOKEN, token)
     texts |= {name: text.replace(_TOKEN, token) for name, text in texts.items()}

@@ -10,7 +10,7 @@ from typing import Any
 from modelica_like.errors import FmuFailed, FmuRefused, ModelicaLikeError, UnknownName, did_you_mean
 from modelica_like.fmi.unpack import printable
 
-Failures = Mapping[str, tuple[type[ModelicaLikeError], str, str, str]]
+Failures = dict[str, tuple[type[ModelicaLikeError], str, str, str]]
 """What it is, and the sentences what, why and what to do, by the kind of failure."""
 
 FAILURES: Failures = {
@@ -40,17 +40,15 @@ def tell_error(folder: Path, units: Mapping[str, str], failures: Failures = FAIL
     error: dict[str, Any] = json.loads((folder / "error.json").read_text())
     known = error.get("known", [])
     causality = error.get("causality") or "local"
-    told = error | {
-        "shorter": "", **words,
+    told = error | words | {
         "unit": units.get(error.get("unit", ""), ""),
         "hint": did_you_mean(error["name"], known) or "." if known else ".",
         "has": f"It has {', '.join(known)}." if known else "It has none.",
         "causality": f"{'an' if causality[0] in 'aeiou' else 'a'} {causality}",
         "text": printable(error.get("text", "")).strip().rstrip("."),
+        "shorter": words.get("shorter", "") if "DoStep" in error.get("text", "") else "",  # advice for steps only
         "said": "\n".join(f"It said: {printable(text)}" for text in error.get("messages", ())[-3:]),
     }  # fmt: skip
-    if "DoStep" not in error.get("text", ""):
-        told["shorter"] = ""
     kind, *sentences = failures[error["kind"]]
     what, why, advice = (sentence.format(**told) for sentence in sentences)
     raise kind(what, why=why, advice=advice)

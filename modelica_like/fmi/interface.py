@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from functools import cached_property
 from itertools import groupby
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -28,8 +28,7 @@ SlotKind = Literal["time", "state", "der", "variable", "parameter", "derived", "
 _SECOND = parse_unit("s")
 
 
-@dataclass(frozen=True)
-class FmuVariable:
+class FmuVariable(NamedTuple):
     """One variable of the description.
 
     Attributes:
@@ -75,6 +74,8 @@ class Interface:
         states, derivatives: value references in the order of x.
         outputs: value references of continuous and discrete outputs.
         indicators: value references of the event indicators, in the order of the guards.
+        start: what start values determine.
+        reach: what the variables depend on at once.
         arrays: tables whose numbers are parameters, as FMI 3 knows them; their references follow those of variables.
     """
 
@@ -84,6 +85,8 @@ class Interface:
     derivatives: tuple[int, ...]
     outputs: tuple[int, ...]
     indicators: tuple[int, ...]
+    start: StartTables
+    reach: Reach
     arrays: tuple[FmuVariable, ...] = ()
 
     @cached_property
@@ -129,7 +132,8 @@ class _Builder:
         self.derivatives: dict[int, int] = {}
         self.wanted = _matcher(model, outputs)
         self.starts = _Starts(model)
-        self.depends = _dependence(model)
+        self.reach = Reach(model.variables)
+        self.depends = _dependence(self.reach, model.variables)
         self.add("time", "Float64", "independent", "continuous", None, ("time", 0), unit=_SECOND, description="time")
 
     def add(self, name: str, kind: Any, causality: Any, variability: Any, initial: Any, slot: Any, **rest: Any) -> int:
@@ -247,6 +251,8 @@ class _Builder:
             tuple(self.derivatives[k] for k in range(count)),
             tuple(one.reference for one in self.found if one.causality == "output"),
             tuple(self.indicators[k] for k in sorted(self.indicators)),
+            self.starts.tables,
+            self.reach,
             tuple(self.arrays()),
         )
 
@@ -301,15 +307,11 @@ def _literal_brackets(pattern: str) -> str:
     return re.sub(r"\[", "[[]", pattern)
 
 
-def _dependence(model: CompiledDae) -> list[Variability]:
+def _dependence(reach: Reach, variables: Any) -> list[Variability]:
     """How each variable changes: with time, at events only, or with parameters only."""
-    reach = Reach(model.variables)
-    moving = reach.mask(*(name for name in model.variables.name_in() if name not in ("p", "d")))
+    moving = reach.mask(*(name for name in variables.name_in() if name not in ("p", "d")))
     switching = reach.mask("d")
-    return [
-        "continuous" if row & moving else "discrete" if row & switching else "tunable"
-        for row in reach.rows[: len(model.flat_variables)]
-    ]
+    return ["continuous" if row & moving else "discrete" if row & switching else "tunable" for row in reach.rows]
 
 
 class _Starts:

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from modelica_like.errors import FmuCrashed, FmuTimeout
+from modelica_like.fmi.inside import PLACE
 from modelica_like.fmi.unpack import unpack
 
 _PACKAGES = Path(__file__).parents[2]
@@ -35,8 +36,7 @@ def workplace(job: Mapping[str, Any], fmus: Sequence[Path] = ()) -> Iterator[Pat
             (folder / str(k)).mkdir()
             unpack(fmu, folder / str(k))
         (folder / "job.json").write_text(json.dumps(job))
-        (folder / "progress").write_bytes(struct.pack("d", nan))
-        (folder / "calling").write_bytes(struct.pack("q", 0))
+        (folder / "progress").write_bytes(PLACE.pack(nan, 0))
         yield folder
 
 

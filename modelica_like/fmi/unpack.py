@@ -9,6 +9,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
+import lxml.etree as etree
+
 from modelica_like.errors import FmuRefused
 
 _ENCRYPTED = 0x1
@@ -72,6 +74,8 @@ def unpack(path: Path, target: Path, limits: Limits = LIMITS, kind: Kind = FMU) 
         raise FmuRefused(
             f"{path.name} is no {kind.name}: it is not a sound zip archive.", why=_sentence(error)
         ) from None
+    except (IsADirectoryError, NotADirectoryError, FileExistsError):
+        raise FmuRefused(f"{path.name} is refused: a file in it has the name of a folder.") from None
     refuse_document_type(path.name, target / kind.description)
     return target
 
@@ -82,7 +86,13 @@ def refuse_document_type(name: str, file: Path) -> None:
     Raises:
         FmuRefused: it does.
     """
-    if b"<!DOCTYPE" in file.read_bytes():
+    # In UTF-16 or UTF-7 no search for bytes would find it.
+    parser = etree.XMLParser(resolve_entities=False, no_network=True)
+    try:
+        declared = etree.parse(file, parser).docinfo.internalDTD is not None
+    except etree.XMLSyntaxError:  # who reads it will tell
+        declared = b"<!DOCTYPE" in file.read_bytes()
+    if declared:
         raise FmuRefused(
             f"{name} is refused: its {file.name} declares a document type.",
             why="A model description needs none; it can make a small file enormous, or read other files.",

@@ -11,6 +11,7 @@ from modelica_like.errors import DuplicateName, LanguageError, ModelicaLikeError
 from modelica_like.language.declared import Connector, Declared, unknown
 from modelica_like.language.expr import TIME, Expr
 from modelica_like.language.fields import Discrete, Field, Input, Output, Parameter, Value, param, require_identifier
+from modelica_like.language.icon import Icon
 from modelica_like.language.mode import Mode
 from modelica_like.language.places import NOWHERE, caller
 from modelica_like.language.tables import REQUIRED, Rows, both_given, frozen_rows, rows
@@ -32,6 +33,7 @@ class Component(Declared):
     inlet: ClassVar[str] = ""
     outlet: ClassVar[str] = ""
     terminal: ClassVar[Terminal | None] = None
+    icon: ClassVar[Icon | None] = None
     _partial: ClassVar[bool] = True
     _class_connectors: ClassVar[dict[str, Connector]] = {}
     _class_parts: ClassVar[dict[str, Component | list[Component]]] = {}

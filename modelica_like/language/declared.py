@@ -9,6 +9,7 @@ from typing import Any, ClassVar, Self
 from modelica_like.errors import UnknownName, did_you_mean
 from modelica_like.language.expr import Expr
 from modelica_like.language.fields import Field
+from modelica_like.language.icon import Stroke
 
 
 class Declared:
@@ -99,6 +100,8 @@ class Connector(Declared):
     """
 
     domain: ClassVar[Domain] = Domain()
+    stroke: ClassVar[Stroke | None] = None
+    """How its connections are drawn."""
 
     def __init__(self, description: str = "", *, free: bool = False, optional: bool = False) -> None:
         self.description = description

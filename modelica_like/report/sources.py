@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from modelica_like.cosimulation.load import describes_system
+from modelica_like.cosimulation.files import describes_system
 from modelica_like.cosimulation.run import cosim
 from modelica_like.errors import NetlistError
 from modelica_like.fmi.run import run_fmu

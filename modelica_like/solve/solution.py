@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -40,7 +41,7 @@ class Solution(Trajectories):
     statistics: Statistics
     impacts: tuple[Impact, ...] = ()
     notices: tuple[str, ...] = ()
-    _cache: dict[str, Any] = field(default_factory=dict, repr=False)
+    _cache: dict[Any, Any] = field(default_factory=dict, repr=False)
 
     @property
     def time(self) -> Vector:
@@ -142,11 +143,37 @@ class Solution(Trajectories):
         column = np.array(self.model.variables(t, x, z, self.model.p, self.model.u, d)).ravel()
         return Values(self, t, column, d, Point(t, np.ravel(x), np.ravel(z), d))
 
-    def energy(self) -> EnergyBalance:
-        """Return the energy balance of every component over the run."""
-        if "balance" not in self._cache:
-            self._cache["balance"] = energy_balance(self.model, self.segments, self.options, self.events, self.impacts)
-        return self._cache["balance"]
+    def energy(self, begin: float | None = None, end: float | None = None) -> EnergyBalance:
+        """Return the energy balance of every component over the run, or over a part of it.
+
+        Args:
+            begin: time in s; what happens at once at that time counts.
+            end: time in s; what happens at once at that time does not, unless the run ends there.
+
+        Raises:
+            ValueOutOfRange: a time is not within the run.
+        """
+        key = "balance", begin, end
+        if key not in self._cache:
+            first, last = (self.time[k] if t is None else float(t) for k, t in ((0, begin), (-1, end)))
+            segments = self.segments if (begin, end) == (None, None) else tuple(self._part(first, last))
+            until = np.inf if last == self.time[-1] else last
+            events = [one for one in self.events if first <= one.time < until]
+            impacts = [one for one in self.impacts if first <= one.time < until]
+            self._cache[key] = energy_balance(self.model, segments, self.options, events, impacts)
+        return self._cache[key]
+
+    def _part(self, begin: float, end: float) -> Iterator[Segment]:
+        """Go through the segments between two times."""
+        edges = {t: self.point(t) for t in (begin, end)}
+        for one in self.segments:
+            inside = (one.times >= begin) & (one.times <= end)
+            cuts = [edges[t] for t in (begin, end) if one.times[0] < t < one.times[-1] and t not in one.times[inside]]
+            times = np.concatenate([one.times[inside], [cut.t for cut in cuts]])
+            order = np.argsort(times, kind="stable")
+            if len(order) > 1:
+                x, z = (np.column_stack([getattr(one, n)[:, inside], *(getattr(c, n) for c in cuts)]) for n in "xz")
+                yield Segment(times[order], x[:, order], z[:, order], one.d)
 
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "_cache": {}}

@@ -13,7 +13,7 @@ from modelica_like.units.atoms import BASE
 from modelica_like.units.unit import ANY, Unit, coherent, parse_unit, same_dimension
 
 _NUMBER = re.compile(
-    r"\s*([+-]?(?:(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?|(?:nan|inf)(?![A-Za-z0-9_.])))\s*(.*?)\s*", re.DOTALL
+    r"([+-]?(?:(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?|(?:nan|inf)(?![A-Za-z0-9_.])))\s*(.*)", re.DOTALL
 )
 
 
@@ -27,7 +27,7 @@ def read_quantity(text: str) -> tuple[float, Unit] | None:
     Raises:
         UnitError: a number is followed by something that should be a unit and is none.
     """
-    match = _NUMBER.fullmatch(text)
+    match = _NUMBER.fullmatch(text.strip())
     if match is None:
         return None
     number, unit = match.groups()
@@ -89,7 +89,7 @@ def _text_quantity(text: str, unit: Unit, name: str) -> tuple[float, Unit]:
         raise UnitError(f"{name} = '{text}': {error.what}", advice=error.advice) from None
     if read is None:
         raise UnitError(f"{name} expects {unit}; '{text}' is not a quantity.")
-    match = _NUMBER.fullmatch(text)
+    match = _NUMBER.fullmatch(text.strip())
     return read if match is not None and match.group(2) else (read[0], unit)
 
 

@@ -23,7 +23,7 @@ from inputs import PIECES, STRANGE, document, mutated_text, mutated_tree
 from rich.console import Console
 
 from modelica_like.cosimulation.described import described
-from modelica_like.cosimulation.load import load_system
+from modelica_like.cosimulation.files import load_system
 from modelica_like.cosimulation.run import cosim
 from modelica_like.cosimulation.split import split
 from modelica_like.cosimulation.ssp import write_ssp

@@ -1,15 +1,19 @@
 """No input ends in anything but a sentence; what the fuzzer has found stays found."""
 
+import contextlib
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
+from time import process_time
 
 import pytest
 from fuzzer import attempt
 
+from components import Inertia
 from modelica_like import simulate
+from modelica_like.analyse.sweeps.ranges import read_range
 from modelica_like.cosimulation.described import described
-from modelica_like.cosimulation.load import load_system
+from modelica_like.cosimulation.files import load_system
 from modelica_like.errors import FmuRefused, ModelicaLikeError
 from modelica_like.netlist import loads
 from modelica_like.netlist.write import dumps
@@ -94,6 +98,29 @@ def test_sizing_files_found_by_the_fuzzer(name: str, tmp_path: Path) -> None:
     assert caught.value.what.startswith(told)
 
 
+MANY = 100_000
+LONG = {
+    "a sum": "+".join(MANY // 2 * ["1"]), "names": "a." * (MANY // 2) + "b", "brackets": "(" * MANY + "1" + ")" * MANY,
+    "spaces in a unit": "1 N.m" + " " * MANY + "x", "spaces behind": "1 kg.m2" + " " * MANY + "\t",
+    "units": "1 " + "kg." * MANY + "kg", "digits": "1" * MANY, "an exponent": "1 m^" + "9" * MANY, "dots": "1." * MANY,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", LONG)
+def test_long_texts_take_no_time(name: str) -> None:
+    """Spaces within a unit took time with the square of their number: 41 s for these."""
+    begin = process_time()
+    with contextlib.suppress(ModelicaLikeError):
+        Inertia(J=LONG[name])
+    assert process_time() - begin < 1.0
+
+
+def test_ranges_are_refused_before_anything_is_built() -> None:
+    with pytest.raises(ModelicaLikeError) as caught:
+        read_range("J2.J=0:1:99999999999")
+    assert caught.value.what == "J2.J: a sweep has at most 10000000 runs."
+
+
 SYSTEM = """name = "two"
 [fmus]
 a = {{ file = "a.fmu", parameters = {{ J = {} }} }}
@@ -119,6 +146,15 @@ def test_names_that_no_file_system_takes(name: str, tmp_path: Path) -> None:
         archive.writestr(DEEP[name], "")
     with pytest.raises(FmuRefused, match="has a longer name than file systems take"):
         described(tmp_path / "deep.fmu")
+
+
+@pytest.mark.parametrize("name", [".", "modelDescription.xml/a"])
+def test_a_file_with_the_name_of_a_folder(name: str, tmp_path: Path) -> None:
+    with zipfile.ZipFile(tmp_path / "odd.fmu", "w") as archive:
+        archive.writestr("modelDescription.xml", "<fmiModelDescription/>")
+        archive.writestr(name, "")
+    with pytest.raises(FmuRefused, match=r"^odd\.fmu is refused: a file in it has the name of a folder\.$"):
+        described(tmp_path / "odd.fmu")
 
 
 @pytest.mark.parametrize("name", ["description", "simulate", "origin"])

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from modelica_like.cosimulation.load import load_system
+from modelica_like.cosimulation.files import load_system
 from modelica_like.cosimulation.ssp import write_ssp
 from modelica_like.cosimulation.ssp_document import NAMES
 from modelica_like.cosimulation.system import Link, Port, System, Unit

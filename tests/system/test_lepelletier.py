@@ -260,6 +260,19 @@ def test_torques_of_the_shifts(report: ShiftReport) -> None:
         assert 0 < row.slipping < 1.5
 
 
+def test_a_report_needs_no_close_results(model: CompiledDae, report: ShiftReport) -> None:
+    """What opens slips first where it breaks away: with its capacity times the pressure that falls there in 0.8 s."""
+    run = simulate(model)
+    coarse = shift_report(run)
+    for ours, theirs in zip(coarse.shifts, report.shifts, strict=True):
+        assert (ours.element, ours.slipping) == (theirs.element, pytest.approx(theirs.slipping, rel=1e-4))
+        assert ours.work == pytest.approx(theirs.work, rel=1e-4, abs=1e-7 * report.work)
+        assert ours.torque == pytest.approx(theirs.torque, rel=1e-4)
+    opening = next(row for row in coarse.shifts if row.element == "brake_d")
+    begins = next(one.time for one in run.events if (one.mode, one.before) == ("box.brake_d.mode", "stuck"))
+    assert opening.torque == pytest.approx(900.0 * (1 - (begins - 3.2) / 0.8), rel=1e-9)
+
+
 def test_launch_work_exceeds_what_the_car_gets(report: ShiftReport, run: Solution) -> None:
     """While a clutch brings a mass at rest to speed it dissipates as much as the mass gets, at constant torques."""
     launch = report.shifts[0]

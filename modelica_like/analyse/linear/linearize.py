@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from modelica_like.analyse.linear.held import free_motions
 from modelica_like.analyse.linear.model import LinearModel
 from modelica_like.analyse.linear.points import At, Drive, point_of
 from modelica_like.analyse.slopes import columns_of, nodes_of, slopes
+from modelica_like.compile.compiled import CompiledDae
 
 
 def linearize(
@@ -42,11 +43,10 @@ def linearize(
     kept = set(keep)
     names = tuple(model.states[k] for k in keep)
     held = tuple(name for k, name in enumerate(model.states) if k not in kept)
-    known = {one.path: str(one.unit) for one in (*model.flat_variables, *model.flat_parameters)}
-    units = {name: _unit(known, name) for name in (*model.states, *u_names, *y_names)}
+    units = {name: _unit(model, name) for name in (*model.states, *u_names, *y_names)}
     return LinearModel(model, point, a, b, c, d, names, held, u_names, y_names, units, shape)
 
 
-def _unit(variables: Mapping[str, str], name: str) -> str:
+def _unit(model: CompiledDae, name: str) -> str:
     """Return the unit of a variable, or of the derivative `der(x)` of one."""
-    return variables[name] if name in variables else f"{_unit(variables, name[4:-1])}/s"
+    return str(model.units[name]) if name in model.units else f"{_unit(model, name[4:-1])}/s"

@@ -11,7 +11,7 @@ import numpy as np
 
 from modelica_like.analyse.slopes import implicit_slopes, nodes_of
 from modelica_like.compile.compiled import CompiledDae, Vector
-from modelica_like.errors import missing_extra
+from modelica_like.errors import extra_module
 from modelica_like.initialize import Point, variable_slopes
 from modelica_like.solve.style import COLOURS, picture
 
@@ -130,11 +130,7 @@ class LinearModel:
         Raises:
             MissingExtra: scipy is not installed.
         """
-        try:
-            from scipy.signal import StateSpace
-        except ImportError:
-            raise missing_extra("scipy", "analyse") from None
-        return StateSpace(self.A, self.B, self.C, self.D)
+        return extra_module("scipy.signal", "analyse").StateSpace(self.A, self.B, self.C, self.D)
 
     def to_control(self) -> Any:
         """Return a state space of python-control, with the names of its signals.
@@ -142,10 +138,7 @@ class LinearModel:
         Raises:
             MissingExtra: python-control is not installed.
         """
-        try:
-            import control
-        except ImportError:
-            raise missing_extra("control", "analyse") from None
+        control = extra_module("control", "analyse")
         # python-control reserves dots for signals of interconnected systems.
         plain = {k: [name.replace(".", "_") for name in getattr(self, k)] for k in ("states", "inputs", "outputs")}
         return control.ss(self.A, self.B, self.C, self.D, name=self.model.name.replace(".", "_"), **plain)

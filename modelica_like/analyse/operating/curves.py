@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from modelica_like.analyse.operating.steady import OperatingPoint, steady
-from modelica_like.errors import InitializationError, ValueOutOfRange
+from modelica_like.errors import InitializationError, UnknownName, ValueOutOfRange, did_you_mean
 from modelica_like.simulation import Model, build
 from modelica_like.solve.solution import Solution
 from modelica_like.solve.style import COLOURS, picture, with_unit
@@ -54,12 +54,16 @@ class Curves:
         return figure
 
     def unit(self, path: str) -> str:
-        """Return the coherent SI unit of a column."""
+        """Return the coherent SI unit of a column.
+
+        Raises:
+            UnknownName: there is no such column.
+        """
         if path in ("efficiency", "loss"):
             return "1" if path == "efficiency" else "W"
-        model = self.points[0].model
-        known = (*model.flat_variables, *model.flat_parameters, *model.flat_derived, *model.flat_discretes)
-        return next(str(one.unit) for one in known if one.path == path)
+        if path not in (known := self.points[0].model.units):
+            raise UnknownName(f"There is no '{path}' in these curves{did_you_mean(path, known) or '.'}")
+        return str(known[path])
 
     def __len__(self) -> int:
         return len(self.points)

@@ -153,10 +153,8 @@ class _Target:
             )
         self.paths, self.free = list(hold), list(free)
         self.rows = nodes_of(model, self.paths)
-        variables = [model.flat_variables[row] for row in self.rows]
-        given = zip(hold.values(), variables, self.paths, strict=True)
-        self.wanted = np.array([to_si(value, one.unit, path) for value, one, path in given])
-        self.sizes = np.array([one.nominal for one in variables]) + np.abs(self.wanted)
+        self.wanted = np.array([to_si(value, model.units[path], path) for path, value in hold.items()])
+        self.sizes = np.array([model.flat_variables[row].nominal for row in self.rows]) + np.abs(self.wanted)
 
     def reach(self, model: CompiledDae, point: Point) -> tuple[CompiledDae, Point]:
         """Newton's method on the parameters, each step to a steady state, halved while it gets worse."""

@@ -12,7 +12,7 @@ import casadi as ca
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import UnknownName, ValueOutOfRange, did_you_mean
 from modelica_like.solve.recorder import Event
-from modelica_like.units import Unit, coherent, parse_unit, to_si
+from modelica_like.units import Unit, parse_unit, to_si
 
 _CALL = re.compile(r"\s*(max|min|integral|at|series|time)\s*\((.*)\)\s*$")
 _CHANGE = re.compile(
@@ -134,7 +134,7 @@ def expression_of(model: CompiledDae, path: str) -> tuple[Callable[[], Any], Uni
     arguments = model.arguments.values()
     if path in model.position:
         k = model.position[path]
-        return lambda: model.variables(*arguments)[k], coherent(model.flat_variables[k].unit)
+        return lambda: model.variables(*arguments)[k], model.units[path]
     owner, _, last = path.rpartition(".")
     columns = _POWERS | _ENERGY
     if last in columns and owner in model.components:

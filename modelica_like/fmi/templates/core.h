@@ -149,8 +149,8 @@ typedef struct Instance {
     State state;
     double *numbers; /* the rest of the state: the arrays that follow */
     size_t n_numbers;
-    double *x, *z, *p, *u, *d;
-    double *u_rate; /* inputs are u + u_rate * (t - u_time) */
+    double *x, *z, *p, *u, *d; /* z stands behind x: together they are a point */
+    double *u_rate;            /* inputs are u + u_rate * (t - u_time) */
     double *start_value;
     unsigned char *start_given, *mode_given;
     unsigned char *wanting; /* transitions that fire at the end of the piece */
@@ -198,14 +198,17 @@ void keeping_least_squares(int n, int states, double *a, double *turns, double *
 /* special.c */
 const Tape *full_tape(const Model *m, SpecialTape which);
 void run_special(Instance *c, SpecialTape which, double *outputs);
-void evaluate_special(Instance *c, SpecialTape which, double t, const double *x, const double *z, double *outputs);
+void evaluate_special(Instance *c, SpecialTape which, double t, const double *point, double *outputs);
 void ask_for(Instance *c, int node);
 
 /* point.c */
-void load(Instance *c, double t, const double *x, const double *z);
-void evaluate(Instance *c, const Tape *tape, double t, const double *x, const double *z, double *outputs);
+void load(Instance *c, double t, const double *point);
+void evaluate(Instance *c, const Tape *tape, double t, const double *point, double *outputs);
 void evaluate_now(Instance *c, const Tape *tape, double *outputs); /* at the present point */
-Result solve_implicit(Instance *c, double t, const double *x, double *z, int quiet);
+const double *variables_now(Instance *c);
+double largest_of(int n, const double *values);
+int any_of(const unsigned char *marks, int n);
+Result solve_implicit(Instance *c, double t, double *point, int quiet);
 Result solve_now(Instance *c, int quiet);
 Result check_singular(Instance *c);
 Result settle(Instance *c);
@@ -219,8 +222,8 @@ void choose_modes(Instance *c, unsigned char *decided);
 /* holds.c */
 #define UNLIMITED 1e30
 #define ROUNDING 1e-10 /* relative size of a motion that is nothing but rounding */
-void hold_terms(Instance *c, Terms *terms);
-void mark_held(Instance *c, const Terms *terms, unsigned char *held);
+void mark_held(const Instance *c, const Terms *terms, unsigned char *held);
+void find_held(Instance *c, Terms *terms, unsigned char *held);
 double largest_like(const Model *m, const double *values, int node);
 int anything_shared(const Instance *c);
 void share(Instance *c);
@@ -255,6 +258,7 @@ typedef enum { REACHED, AT_EVENT, FAILED } Arrival;
 Arrival integrate_to(Instance *c, double target, int stop_at_events);
 void leave_piece(Instance *c);
 Result handle_event(Instance *c);
+Result check_whole(Instance *c, double size);
 Result check_step(Instance *c, double point, double size, double *target);
 double cubic_guess(double g0, double r0, double g1, double r1);
 Result move_to(Instance *c, double t);
@@ -304,6 +308,7 @@ size_t state_size(const Instance *c);
 Result state_write(Instance *c, const void *copy, unsigned char *bytes, size_t size);
 Result state_read(Instance *c, const unsigned char *bytes, size_t size, void **copy);
 Result report(Instance *c, LogCategory category, Result result, const char *format, ...);
+#define fail(c, ...) report(c, LOG_ERROR, RESULT_ERROR, __VA_ARGS__)
 Result set_log_category(Instance *c, const char *category, int on);
 Result allowed(Instance *c, const char *function, int phases);
 

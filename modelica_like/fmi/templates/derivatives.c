@@ -26,8 +26,7 @@ static Result check_knowns(Instance *c, const uint32_t *knowns, size_t n) {
         const Variable *v = known_variable(c, knowns[k], TYPE_FLOAT64);
         if (v == NULL) return RESULT_ERROR;
         if (is_start(c, v) ? v->start < 0 || v->start >= m->n_starts : known_slot(m, v) < 0)
-            return report(c, LOG_ERROR, RESULT_ERROR, "Derivatives by %s are not available: it is neither %s.",
-                text_of(m, v->name),
+            return fail(c, "Derivatives by %s are not available: it is neither %s.", text_of(m, v->name),
                 is_start(c, v) ? "a start value, input nor parameter" : "state, input nor parameter");
     }
     return RESULT_OK;
@@ -38,8 +37,7 @@ static Result check_unknowns(Instance *c, const uint32_t *unknowns, size_t n) {
         const Variable *v = known_variable(c, unknowns[k], TYPE_FLOAT64);
         if (v == NULL) return RESULT_ERROR;
         if (v->kind == KIND_DISCRETE)
-            return report(c, LOG_ERROR, RESULT_ERROR, "%s changes at events only: it has no derivatives.",
-                text_of(c->model, v->name));
+            return fail(c, "%s changes at events only: it has no derivatives.", text_of(c->model, v->name));
     }
     return RESULT_OK;
 }
@@ -51,7 +49,7 @@ Result factor_implicit(Instance *c, int *order) {
     if (settle(c) != RESULT_OK) return RESULT_ERROR;
     evaluate_now(c, &m->tapes.alg_jacobian, c->work.dense_matrix);
     if (!lu_factor(m->n_z, c->work.dense_matrix, order))
-        return report(c, LOG_ERROR, RESULT_ERROR, "The implicit equations are singular at t = %.9g s.", s->t);
+        return fail(c, "The implicit equations are singular at t = %.9g s.", s->t);
     return RESULT_OK;
 }
 
@@ -84,8 +82,7 @@ static Result start_system_tangent(Instance *c, const double *start_dots) {
     double *step = w->start_unknowns;
     evaluate_now(c, &m->tapes.start_system, w->start_residual);
     tape_run(&m->tapes.start_jacobian, w->slots, w->jacobian);
-    if (!qr_factor(&m->start, w->jacobian, w))
-        return report(c, LOG_ERROR, RESULT_ERROR, "The start equations are singular at t = %.9g s.", s->t);
+    if (!qr_factor(&m->start, w->jacobian, w)) return fail(c, "The start equations are singular at t = %.9g s.", s->t);
     evaluate_now(c, &m->tapes.start_system, w->start_residual);
     tape_tangent(&m->tapes.start_system, w->slots, w->dots, w->start_residual);
     for (int k = 0; k < m->n_start_unknowns; k++) {
@@ -107,8 +104,8 @@ static Result start_tangent(Instance *c, const uint32_t *knowns, size_t n, const
     s->solved = 0;
     if (start_solve(c) != RESULT_OK) return RESULT_ERROR;
     if (m->settings->steady || anything_shared(c))
-        return report(c, LOG_ERROR, RESULT_ERROR,
-            "A steady start, and one at which parts share a load, have derivatives after the initialization only.");
+        return fail(
+            c, "A steady start, and one at which parts share a load, have derivatives after the initialization only.");
     memset(dots, 0, m->slot_results * sizeof(double));
     seed_knowns(c, knowns, n, seed);
     evaluate_now(c, &m->tapes.discrete_starts, w->guards);

@@ -84,7 +84,7 @@ static void drop_balanced(Instance *c, unsigned char *wanting) {
 void move_states(Instance *c, const int *nodes, const double *values, int count) {
     const Model *m = c->model;
     double *slopes = c->work.square, *change = c->work.start_residual, *step = c->work.point;
-    evaluate_now(c, &m->tapes.variables, c->work.variables);
+    variables_now(c);
     for (int k = 0; k < count; k++) change[k] = (values ? values[k] : 0) - c->work.variables[nodes[k]];
     for (int k = 0; k < count; k++) slope_of_node(c, nodes[k], k > 0, slopes + (size_t)k * m->n_x);
     least_squares(count, m->n_x, slopes, change, step);
@@ -147,8 +147,8 @@ static Result crowded(Instance *c) {
     double first = s->instants[s->n_instants % CROWD]; /* CROWD instants ago, once there were so many */
     s->instants[s->n_instants % CROWD] = s->t;
     if (++s->n_instants <= CROWD || s->t - first >= CROWDED * span) return RESULT_OK;
-    return report(c, LOG_ERROR, RESULT_ERROR,
-        "Events follow each other ever faster at t = %.12g s. Give the switching a hysteresis, or smooth it.", s->t);
+    return fail(
+        c, "Events follow each other ever faster at t = %.12g s. Give the switching a hysteresis, or smooth it.", s->t);
 }
 
 /* Before one of several that hold a motion gives way, let the others take more. */
@@ -198,7 +198,7 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
         memset(wanting, 0, m->n_transitions);
         if (find_wanting(c, wanting, 1) && !c->bounded) drop_balanced(c, wanting);
     }
-    return report(c, LOG_ERROR, RESULT_ERROR,
+    return fail(c,
         "Modes still switch after %d rounds at t = %.12g s. Give the switching a hysteresis, or smooth what drives it.",
         ROUNDS + ALONE * m->n_holds, s->t);
 }

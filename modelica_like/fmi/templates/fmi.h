@@ -22,13 +22,16 @@
     Instance *c = instance; \
     if (c == NULL || allowed(c, TEXT(FMI(name)), phases) != RESULT_OK) return FMI(Error)
 
-/* Refuses arguments. */
-#define NEED(pointer, n) \
-    if ((n) > 0 && (pointer) == NULL) return refuse(c, "The argument " TEXT(pointer) " is a null pointer.")
+/* Refuses arguments: null pointers where n > 0, wrong sizes. */
+#define NEED(n, ...)                                                                                    \
+    do {                                                                                                \
+        const void *const given[] = {__VA_ARGS__};                                                      \
+        if ((n) > 0 && refuse_null(c, given, sizeof given / sizeof given[0], TEXT((__VA_ARGS__))) != 0) \
+            return FMI(Error);                                                                          \
+    } while (0)
 #define NEED_SIZE(n, wanted, what) \
     if ((n) != (size_t)(wanted))   \
-    return status(                 \
-        report(c, LOG_ERROR, RESULT_ERROR, "There must be %zu %s, not %zu.", (size_t)(wanted), what, (size_t)(n)))
+    return status(fail(c, "There must be %zu %s, not %zu.", (size_t)(wanted), what, (size_t)(n)))
 
 typedef FMI(Status) Status;
 
@@ -37,8 +40,17 @@ static inline Status status(Result result) {
     return result == RESULT_DISCARD ? FMI(Discard) : FMI(Error);
 }
 
-static inline Status refuse(Instance *c, const char *why) {
-    return status(report(c, LOG_ERROR, RESULT_ERROR, "%s", why));
+static inline Status refuse(Instance *c, const char *why) { return status(fail(c, "%s", why)); }
+
+/* Names which of the arguments is a null pointer; `names`: (a, b, c). */
+static inline int refuse_null(Instance *c, const void *const *given, size_t count, const char *names) {
+    for (size_t k = 0; k < count; k++) {
+        size_t length = strcspn(++names, ",)");
+        if (given[k] == NULL)
+            return fail(c, "The argument %.*s is a null pointer.", (int)length, names) == RESULT_ERROR;
+        names += length + strspn(names + length, ", ") - 1;
+    }
+    return 0;
 }
 
 static inline Status failed(Instance *c) {
@@ -56,7 +68,7 @@ Status FMI(SetDebugLogging)(
     void *instance, FMI(Boolean) loggingOn, size_t nCategories, const FMI(String) categories[]) {
     Result result = RESULT_OK;
     ENTER(SetDebugLogging, ANY_PHASE);
-    NEED(categories, nCategories);
+    NEED(nCategories, categories);
     if (nCategories == 0) result = set_log_category(c, NULL, loggingOn);
     for (size_t k = 0; k < nCategories; k++)
         if (set_log_category(c, categories[k], loggingOn) != RESULT_OK) result = RESULT_ERROR;
@@ -97,8 +109,7 @@ Status FMI(CompletedIntegratorStep)(void *instance, FMI(Boolean) noSetFMUStatePr
     FMI(Boolean) * enterEventMode, FMI(Boolean) * terminateSimulation) {
     ENTER(CompletedIntegratorStep, PHASE_CONTINUOUS);
     (void)noSetFMUStatePriorToCurrentPoint;
-    NEED(enterEventMode, 1);
-    NEED(terminateSimulation, 1);
+    NEED(1, enterEventMode, terminateSimulation);
     if (settle(c) != RESULT_OK) return FMI(Error);
     *enterEventMode = find_wanting(c, nothing_wanting(c), 1) != 0;
     *terminateSimulation = 0;
@@ -113,7 +124,7 @@ Status FMI(SetTime)(void *instance, double time) {
 Status FMI(SetContinuousStates)(void *instance, const double x[], size_t nx) {
     ENTER(SetContinuousStates, PHASE_EVENT | PHASE_CONTINUOUS);
     NEED_SIZE(nx, c->model->n_x, "continuous states");
-    NEED(x, nx);
+    NEED(nx, x);
     return status(set_states(c, x));
 }
 
@@ -121,7 +132,7 @@ Status FMI(SetContinuousStates)(void *instance, const double x[], size_t nx) {
     Status FMI(name)(void *instance, double array[], size_t n) {                         \
         ENTER(name, phases);                                                             \
         NEED_SIZE(n, count, what);                                                       \
-        NEED(array, n);                                                                  \
+        NEED(n, array);                                                                  \
         if ((phases) != ANY_PHASE && make_consistent(c) != RESULT_OK) return FMI(Error); \
         action;                                                                          \
         return FMI(OK);                                                                  \
@@ -137,13 +148,13 @@ GET_ALL(GetEventIndicators, indicators, READABLE, c->model->n_guards, "event ind
 
 Status FMI(JOIN(Get, FMUState))(void *instance, void **FMUState) {
     ENTER(JOIN(Get, FMUState), ANY_PHASE);
-    NEED(FMUState, 1);
+    NEED(1, FMUState);
     return status(state_copy_out(c, FMUState));
 }
 
 Status FMI(JOIN(Set, FMUState))(void *instance, void *FMUState) {
     ENTER(JOIN(Set, FMUState), ANY_PHASE);
-    NEED(FMUState, 1);
+    NEED(1, FMUState);
     return status(state_copy_in(c, FMUState));
 }
 
@@ -155,24 +166,21 @@ Status FMI(JOIN(Free, FMUState))(void *instance, void **FMUState) {
 
 Status FMI(SerializedSize)(void *instance, void *FMUState, size_t *size) {
     ENTER(SerializedSize, ANY_PHASE);
-    NEED(FMUState, 1);
-    NEED(size, 1);
+    NEED(1, FMUState, size);
     *size = state_size(c);
     return FMI(OK);
 }
 
 Status FMI(JOIN(Serialize, FMUState))(void *instance, void *FMUState, FMI(Byte) serializedState[], size_t size) {
     ENTER(JOIN(Serialize, FMUState), ANY_PHASE);
-    NEED(FMUState, 1);
-    NEED(serializedState, 1);
+    NEED(1, FMUState, serializedState);
     return status(state_write(c, FMUState, (unsigned char *)serializedState, size));
 }
 
 Status FMI(JOIN(Deserialize, FMUState))(
     void *instance, const FMI(Byte) serializedState[], size_t size, void **FMUState) {
     ENTER(JOIN(Deserialize, FMUState), ANY_PHASE);
-    NEED(FMUState, 1);
-    NEED(serializedState, 1);
+    NEED(1, FMUState, serializedState);
     return status(state_read(c, (const unsigned char *)serializedState, size, FMUState));
 }
 

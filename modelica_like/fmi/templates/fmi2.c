@@ -58,8 +58,7 @@ fmi2Status fmi2EnterInitializationMode(fmi2Component instance) {
 #define VALUES(name, phases, type, done)              \
     fmi2Status fmi2##name(REFERENCES, type value[]) { \
         ENTER(name, phases);                          \
-        NEED(vr, nvr);                                \
-        NEED(value, nvr);                             \
+        NEED(nvr, vr, value);                         \
         for (size_t k = 0; k < nvr; k++)              \
             if (!(done)) return fmi2Error;            \
         return fmi2OK;                                \
@@ -89,10 +88,8 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component instance, const fmi2ValueR
     size_t nUnknown, const fmi2ValueReference vKnown_ref[], size_t nKnown, const fmi2Real dvKnown[],
     fmi2Real dvUnknown[]) {
     ENTER(GetDirectionalDerivative, READABLE);
-    NEED(vUnknown_ref, nUnknown);
-    NEED(dvUnknown, nUnknown);
-    NEED(vKnown_ref, nKnown);
-    NEED(dvKnown, nKnown);
+    NEED(nUnknown, vUnknown_ref, dvUnknown);
+    NEED(nKnown, vKnown_ref, dvKnown);
     return status(directional(c, vUnknown_ref, nUnknown, vKnown_ref, nKnown, dvKnown, dvUnknown));
 }
 
@@ -108,7 +105,7 @@ fmi2Status fmi2NewDiscreteStates(fmi2Component instance, fmi2EventInfo *eventInf
     double next;
     int restart;
     ENTER(NewDiscreteStates, PHASE_EVENT);
-    NEED(eventInfo, 1);
+    NEED(1, eventInfo);
     if (update_discrete(c, &restart, &next) != RESULT_OK) return failed(c);
     eventInfo->newDiscreteStatesNeeded = fmi2False;
     eventInfo->terminateSimulation = fmi2False;
@@ -123,9 +120,7 @@ fmi2Status fmi2NewDiscreteStates(fmi2Component instance, fmi2EventInfo *eventInf
 
 fmi2Status fmi2SetRealInputDerivatives(REFERENCES, const fmi2Integer order[], const fmi2Real value[]) {
     ENTER(SetRealInputDerivatives, PHASE_INITIALIZATION | PHASE_STEP);
-    NEED(vr, nvr);
-    NEED(order, nvr);
-    NEED(value, nvr);
+    NEED(nvr, vr, order, value);
     for (size_t k = 0; k < nvr; k++) {
         if (order[k] != 1) return refuse(c, "Inputs have derivatives of order 1 only.");
         if (set_input_rate(c, vr[k], value[k]) != RESULT_OK) return fmi2Error;
@@ -135,9 +130,7 @@ fmi2Status fmi2SetRealInputDerivatives(REFERENCES, const fmi2Integer order[], co
 
 fmi2Status fmi2GetRealOutputDerivatives(REFERENCES, const fmi2Integer order[], fmi2Real value[]) {
     ENTER(GetRealOutputDerivatives, PHASE_STEP | PHASE_TERMINATED);
-    NEED(vr, nvr);
-    NEED(order, nvr);
-    NEED(value, nvr);
+    NEED(nvr, vr, order, value);
     for (size_t k = 0; k < nvr; k++)
         if (output_rate(c, vr[k], order[k], &value[k]) != RESULT_OK) return fmi2Error;
     return fmi2OK;
@@ -161,7 +154,7 @@ fmi2Status fmi2CancelStep(fmi2Component instance) {
 #define GET_STATUS(name, type, told, answer)                                                                       \
     fmi2Status fmi2##name(fmi2Component instance, const fmi2StatusKind kind, type *value) {                        \
         ENTER(name, PHASE_STEP | PHASE_TERMINATED | PHASE_FAILED);                                                 \
-        NEED(value, 1);                                                                                            \
+        NEED(1, value);                                                                                            \
         *value = answer;                                                                                           \
         if (kind == (told)) return fmi2OK;                                                                         \
         return status(report(c, LOG_WARNING, RESULT_DISCARD, "The last step was neither pending nor discarded.")); \

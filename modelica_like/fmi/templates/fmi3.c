@@ -108,10 +108,10 @@ static size_t elements(const Instance *c, fmi3ValueReference reference, fmi3Valu
         fmi3ValueReference r;                                                                       \
         size_t count = 0;                                                                           \
         ENTER(name, phases);                                                                        \
-        NEED(valueReferences, nValueReferences);                                                    \
+        NEED(nValueReferences, valueReferences);                                                    \
         for (size_t k = 0; k < nValueReferences; k++) count += elements(c, valueReferences[k], &r); \
         NEED_SIZE(nValues, count, "values");                                                        \
-        NEED(values, nValues);                                                                      \
+        NEED(nValues, values);                                                                      \
         for (size_t k = 0; k < nValueReferences; k++)                                               \
             for (count = elements(c, valueReferences[k], &r); count > 0; count--, r++, values++)    \
                 if (!(done)) return fmi3Error;                                                      \
@@ -198,10 +198,8 @@ fmi3Status fmi3GetDirectionalDerivative(fmi3Instance instance, const fmi3ValueRe
     ENTER(GetDirectionalDerivative, READABLE);
     NEED_SIZE(nSeed, nKnowns, "seeds, one per known");
     NEED_SIZE(nSensitivity, nUnknowns, "sensitivities, one per unknown");
-    NEED(unknowns, nUnknowns);
-    NEED(knowns, nKnowns);
-    NEED(seed, nSeed);
-    NEED(sensitivity, nSensitivity);
+    NEED(nUnknowns, unknowns, sensitivity);
+    NEED(nKnowns, knowns, seed);
     return status(directional(c, unknowns, nUnknowns, knowns, nKnowns, seed, sensitivity));
 }
 
@@ -211,10 +209,8 @@ fmi3Status fmi3GetAdjointDerivative(fmi3Instance instance, const fmi3ValueRefere
     ENTER(GetAdjointDerivative, PHASE_EVENT | PHASE_CONTINUOUS | PHASE_STEP | PHASE_TERMINATED);
     NEED_SIZE(nSeed, nUnknowns, "seeds, one per unknown");
     NEED_SIZE(nSensitivity, nKnowns, "sensitivities, one per known");
-    NEED(unknowns, nUnknowns);
-    NEED(knowns, nKnowns);
-    NEED(seed, nSeed);
-    NEED(sensitivity, nSensitivity);
+    NEED(nUnknowns, unknowns, seed);
+    NEED(nKnowns, knowns, sensitivity);
     return status(adjoint(c, unknowns, nUnknowns, knowns, nKnowns, seed, sensitivity));
 }
 
@@ -239,12 +235,8 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discrete
     double next;
     int restart;
     ENTER(UpdateDiscreteStates, PHASE_EVENT);
-    NEED(discreteStatesNeedUpdate, 1);
-    NEED(terminateSimulation, 1);
-    NEED(nominalsOfContinuousStatesChanged, 1);
-    NEED(valuesOfContinuousStatesChanged, 1);
-    NEED(nextEventTimeDefined, 1);
-    NEED(nextEventTime, 1);
+    NEED(1, discreteStatesNeedUpdate, terminateSimulation, nominalsOfContinuousStatesChanged,
+        valuesOfContinuousStatesChanged, nextEventTimeDefined, nextEventTime);
     if (update_discrete(c, &restart, &next) != RESULT_OK) return failed(c);
     *discreteStatesNeedUpdate = *terminateSimulation = *nominalsOfContinuousStatesChanged = fmi3False;
     *valuesOfContinuousStatesChanged = restart != 0;
@@ -257,14 +249,14 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discrete
 
 fmi3Status fmi3GetNumberOfEventIndicators(fmi3Instance instance, size_t *nEventIndicators) {
     ENTER(GetNumberOfEventIndicators, ANY_PHASE);
-    NEED(nEventIndicators, 1);
+    NEED(1, nEventIndicators);
     *nEventIndicators = c->model->n_guards;
     return fmi3OK;
 }
 
 fmi3Status fmi3GetNumberOfContinuousStates(fmi3Instance instance, size_t *nContinuousStates) {
     ENTER(GetNumberOfContinuousStates, ANY_PHASE);
-    NEED(nContinuousStates, 1);
+    NEED(1, nContinuousStates);
     *nContinuousStates = c->model->n_x;
     return fmi3OK;
 }
@@ -282,9 +274,7 @@ fmi3Status fmi3GetOutputDerivatives(fmi3Instance instance, const fmi3ValueRefere
     size_t nValueReferences, const fmi3Int32 orders[], fmi3Float64 values[], size_t nValues) {
     ENTER(GetOutputDerivatives, PHASE_STEP | PHASE_TERMINATED);
     NEED_SIZE(nValues, nValueReferences, "values");
-    NEED(valueReferences, nValues);
-    NEED(orders, nValues);
-    NEED(values, nValues);
+    NEED(nValues, valueReferences, orders, values);
     for (size_t k = 0; k < nValues; k++) {
         if (output_rate(c, valueReferences[k], orders[k], &values[k]) != RESULT_OK) return fmi3Error;
     }
@@ -298,10 +288,7 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
     Arrival arrival;
     ENTER(DoStep, PHASE_STEP);
     (void)noSetFMUStatePriorToCurrentPoint;
-    NEED(eventHandlingNeeded, 1);
-    NEED(terminateSimulation, 1);
-    NEED(earlyReturn, 1);
-    NEED(lastSuccessfulTime, 1);
+    NEED(1, eventHandlingNeeded, terminateSimulation, earlyReturn, lastSuccessfulTime);
     *eventHandlingNeeded = *terminateSimulation = *earlyReturn = fmi3False;
     *lastSuccessfulTime = c->state.t;
     if (check_step(c, currentCommunicationPoint, communicationStepSize, &target) != RESULT_OK) return fmi3Error;

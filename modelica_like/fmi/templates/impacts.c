@@ -8,11 +8,6 @@
 #define TRIALS 50
 #define FELT 1e-9 /* change of a motion, relative to the largest one, from which on it is no rounding */
 
-static const double *motions(Instance *c) {
-    evaluate_now(c, &c->model->tapes.variables, c->work.variables);
-    return c->work.variables;
-}
-
 /* Rates, and reactions where they matter, at the present point, with or without the approaches. */
 static Result ask(Instance *c, const Strike *strike, int approaching, int unsolved, double *rates, double *reactions) {
     const Model *m = c->model;
@@ -22,7 +17,7 @@ static Result ask(Instance *c, const Strike *strike, int approaching, int unsolv
     evaluate_now(c, &m->tapes.rates, c->work.rhs);
     memcpy(rates, c->work.rhs, m->n_x * sizeof(double));
     if (!strike->hard) return RESULT_OK;
-    values = motions(c);
+    values = variables_now(c);
     for (int k = 0; k < m->n_holds; k++) reactions[k] = strike->held[k] ? values[m->holds[k].reaction] : 0;
     return RESULT_OK;
 }
@@ -30,17 +25,15 @@ static Result ask(Instance *c, const Strike *strike, int approaching, int unsolv
 /* Jump of the states, impulses and finite reactions of all that holds, with what is loose let go. */
 static Result respond(Instance *c, Strike *strike) {
     const Model *m = c->model;
-    Terms *terms = c->work.terms;
     double *d = c->work.respond_d, *z = c->work.respond_z, *rates = c->work.rates;
-    int any = 0;
+    int any = any_of(strike->loose, m->n_holds);
     Result result;
     memcpy(d, c->d, (size_t)m->n_d * sizeof(double));
     memcpy(z, c->z, (size_t)m->n_z * sizeof(double));
     for (int k = 0; k < m->n_holds; k++)
         if (strike->loose[k]) c->d[m->holds[k].mode] = m->holds[k].loose;
-    for (int k = 0; k < m->n_holds; k++) any |= strike->loose[k];
     if (any || !c->bounded) share(c); /* else it has just been done, with the implicit equations solved */
-    if (strike->hard) hold_terms(c, terms), mark_held(c, terms, strike->held);
+    if (strike->hard) find_held(c, c->work.terms, strike->held);
     for (int k = 0; k < m->n_holds; k++) strike->held[k] &= !strike->loose[k] && m->holds[k].reaction >= 0;
     result = ask(c, strike, 0, any || !c->bounded, rates, strike->reaction);
     if (result == RESULT_OK) result = ask(c, strike, 1, 1, strike->jump, strike->impulse);
@@ -74,12 +67,10 @@ static int put_back_approaching(Instance *c, Strike *strike, const Terms *terms)
     double *x = c->work.x_kept;
     const double *after;
     int any = 0;
-    for (int k = 0; k < m->n_holds; k++) any |= strike->loose[k];
-    if (!any) return 0;
-    any = 0;
+    if (!any_of(strike->loose, m->n_holds)) return 0;
     memcpy(x, c->x, (size_t)m->n_x * sizeof(double));
     for (int k = 0; k < m->n_x; k++) c->x[k] += strike->jump[k];
-    after = motions(c);
+    after = variables_now(c);
     for (int k = 0; k < m->n_holds; k++) {
         double motion = after[m->holds[k].motion];
         double against = motion > 0 ? terms[k].forward : terms[k].backward;
@@ -96,14 +87,13 @@ static int put_back_approaching(Instance *c, Strike *strike, const Terms *terms)
 static void mark_moved(Instance *c, Strike *strike, const Terms *terms) {
     const Model *m = c->model;
     unsigned char *held = c->work.held;
-    const double *after = motions(c);
+    const double *after = variables_now(c);
     double largest = 0;
     mark_held(c, terms, held);
     for (int k = 0; k < m->n_holds; k++) largest = fmax(largest, fabs(after[m->holds[k].motion] - strike->before[k]));
     for (int k = 0; k < m->n_holds; k++) {
         double now = after[m->holds[k].motion];
-        int stays = held[k] && !strike->loose[k] && now == 0;
-        if (stays) continue;
+        if (held[k] && !strike->loose[k] && now == 0) continue; /* it stays */
         if (fabs(now - strike->before[k]) > FELT * largest || (strike->approach[k] != 0 && now != 0))
             strike->loose[k] = 1;
     }
@@ -112,7 +102,7 @@ static void mark_moved(Instance *c, Strike *strike, const Terms *terms) {
 /* Tells what the impact has cost. */
 static void book(Instance *c, const Strike *strike, int first) {
     const Model *m = c->model;
-    const double *after = motions(c);
+    const double *after = variables_now(c);
     int any = 0;
     for (int k = 0; k < m->n_holds; k++) {
         double energy = 0.5 * (strike->before[k] + after[m->holds[k].motion]) * strike->impulse[k];
@@ -127,7 +117,7 @@ static void book(Instance *c, const Strike *strike, int first) {
 static Result carry_out(Instance *c, Strike *strike, int first) {
     const Model *m = c->model;
     Terms *terms = c->work.strike_terms;
-    if (strike->hard) hold_terms(c, terms);
+    if (strike->hard) find_held(c, terms, c->work.held);
     for (int trial = 0; trial < TRIALS && !(trial > 0 && c->bounded && c->budget < 1); trial++) {
         c->budget--;
         for (int k = 0; k < m->n_holds; k++)
@@ -192,7 +182,7 @@ static Result hold_again(Instance *c, const unsigned char *entered) {
  * standstill, that is none. */
 static void begin_strike(Instance *c, Strike *strike, const Terms *terms) {
     const Model *m = c->model;
-    const double *values = motions(c);
+    const double *values = variables_now(c);
     strike->hard = 0;
     for (int k = 0; k < m->n_holds; k++) {
         const Held *one = &m->holds[k];
@@ -210,16 +200,12 @@ Result stop_motions(Instance *c, const double *before, Impacts *impacts) {
     const Model *m = c->model;
     Strike *strike = &c->work.strike;
     Terms *terms = c->work.strike_terms;
-    int any = 0, first = !impacts->struck;
+    int first = !impacts->struck;
     if (m->n_holds == 0) return RESULT_OK;
     memset(strike->loose, 0, (size_t)m->n_holds);
-    hold_terms(c, terms);
-    mark_held(c, terms, strike->entering);
-    for (int k = 0; k < m->n_holds; k++) {
-        if (before[m->holds[k].mode] == m->holds[k].number) strike->entering[k] = 0;
-        any |= strike->entering[k];
-    }
-    if (!any) return RESULT_OK;
+    find_held(c, terms, strike->entering);
+    for (int k = 0; k < m->n_holds; k++) strike->entering[k] &= before[m->holds[k].mode] != m->holds[k].number;
+    if (!any_of(strike->entering, m->n_holds)) return RESULT_OK;
     begin_strike(c, strike, terms);
     if (strike->hard) {
         for (int k = 0; k < m->n_holds; k++) strike->entering[k] = impacts->entered[k] |= strike->entering[k];
@@ -231,9 +217,7 @@ Result stop_motions(Instance *c, const double *before, Impacts *impacts) {
     }
     if (carry_out(c, strike, first) != RESULT_OK) return RESULT_ERROR;
     for (int k = 0; k < m->n_holds; k++) impacts->entered[k] &= !strike->knocked[k];
-    any = 0;
-    for (int k = 0; k < m->n_holds; k++) any |= strike->loose[k];
-    if (!any) return RESULT_OK;
+    if (!any_of(strike->loose, m->n_holds)) return RESULT_OK;
     choose_again(c, strike);
     share(c);
     return solve_now(c, 0);

@@ -53,12 +53,12 @@ static void linearize(Instance *c, double t, const double *y, double *slope) {
     for (int k = 0; k < m->n_u; k++) moving |= c->u_rate[k] != 0;
     memset(slope, 0, (size_t)m->n_unknowns * sizeof(double));
     if (moving) {
-        evaluate(c, &m->tapes.rates, t, y, y + m->n_x, w->first_rates);
+        evaluate(c, &m->tapes.rates, t, y, w->first_rates);
         memset(w->dots, 0, m->slot_results * sizeof(double));
         w->dots[0] = 1;
         for (int k = 0; k < m->n_u; k++) w->dots[m->slot_u + k] = c->u_rate[k];
         tape_tangent(&m->tapes.rates, w->slots, w->dots, slope);
-    } else evaluate_special(c, SPECIAL_RATES, t, y, y + m->n_x, w->first_rates);
+    } else evaluate_special(c, SPECIAL_RATES, t, y, w->first_rates);
     run_special(c, SPECIAL_JACOBIAN, w->jacobian);
 }
 
@@ -104,7 +104,7 @@ int rosenbrock_step(
         for (int j = 0; j < i; j++)
             for (int k = 0; k < n; k++) y[k] += A[i][j] * w->stages[j * n + k];
         if (i == 0) memcpy(stage, w->first_rates, size);
-        else evaluate_special(c, SPECIAL_RATES, t + C_TIME[i] * h, y, y + m->n_x, stage);
+        else evaluate_special(c, SPECIAL_RATES, t + C_TIME[i] * h, y, stage);
         for (int j = 0; j < i; j++)
             for (int k = 0; k < m->n_x; k++) stage[k] += C[i][j] / h * w->stages[j * n + k];
         for (int k = 0; k < n; k++) {

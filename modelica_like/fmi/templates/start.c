@@ -33,7 +33,7 @@ static Result apply_direct(Instance *c, const double *values) {
         const StartOf *one = &m->start_direct[k];
         double value = values[one->start] / one->factor;
         if (known[one->position] && fabs(value - x[one->position]) > CONSISTENT * (1 + fabs(x[one->position])))
-            return report(c, LOG_ERROR, RESULT_ERROR, "Two start values of %s contradict each other: %.9g and %.9g.",
+            return fail(c, "Two start values of %s contradict each other: %.9g and %.9g.",
                 text_of(m, m->state_names[one->position]), x[one->position], value);
         if (!known[one->position]) x[one->position] = value;
         known[one->position] = 1;
@@ -85,19 +85,17 @@ static Result solve_start_system(Instance *c, const double *values) {
         if (change < 1e-13) break;
     }
     if (error <= CONSISTENT) return RESULT_OK;
-    return report(c, LOG_ERROR, RESULT_ERROR,
-        "No start was found that meets all start values. Give others, or start values of states.");
+    return fail(c, "No start was found that meets all start values. Give others, or start values of states.");
 }
 
 static Result check_dependent(Instance *c, const double *values) {
     const Model *m = c->model;
     if (m->n_start_dependent == 0) return RESULT_OK;
-    evaluate_now(c, &m->tapes.variables, c->work.variables);
+    variables_now(c);
     for (int k = 0; k < m->n_start_dependent; k++) {
         double value = values[m->start_dependent[k].start], actual = c->work.variables[m->start_dependent[k].node];
         if (!(fabs(actual - value) <= CONSISTENT * (1 + fabs(value))))
-            return report(c, LOG_ERROR, RESULT_ERROR,
-                "A start value of %.9g cannot be met: the variable follows to be %.9g.", value, actual);
+            return fail(c, "A start value of %.9g cannot be met: the variable follows to be %.9g.", value, actual);
     }
     return RESULT_OK;
 }
@@ -144,7 +142,7 @@ static Result solve_steady(Instance *c) {
         if (change < 1e-13) break;
     }
     if (n == 0 || residual <= 1e-6) return RESULT_OK;
-    return report(c, LOG_ERROR, RESULT_ERROR, "No steady state was found at t = %.9g s.", s->t);
+    return fail(c, "No steady state was found at t = %.9g s.", s->t);
 }
 
 /* Choose modes that are not decided by their start conditions: the first that holds wins. */
@@ -168,7 +166,7 @@ static int choose_start_modes(Instance *c, const double *begun) {
     memcpy(w->decided, c->mode_given, (size_t)m->n_d);
     memcpy(w->d_before, c->d, (size_t)m->n_d * sizeof(double));
     choose_modes(c, w->decided);
-    if (begun) evaluate_now(c, &m->tapes.variables, w->variables);
+    if (begun) variables_now(c);
     for (int k = 0; k < m->n_holds && begun; k++) {
         const Held *one = &m->holds[k];
         if (begun[k] * w->variables[one->motion] < 0 && c->d[one->mode] != w->d_before[one->mode])
@@ -200,9 +198,8 @@ static Result find_steady(Instance *c, double *begun) {
     int count = 0;
     apply_defaults(c, w->start_values);
     if (apply_direct(c, w->start_values) != RESULT_OK) return RESULT_ERROR;
-    if (m->n_holds > 0) hold_terms(c, w->terms);
-    mark_held(c, w->terms, w->held);
-    evaluate_now(c, &m->tapes.variables, w->variables);
+    if (m->n_holds > 0) find_held(c, w->terms, w->held);
+    variables_now(c);
     for (int k = 0; k < m->n_holds; k++) {
         begun[k] = w->variables[m->holds[k].motion];
         if (w->held[k]) w->standing[count++] = m->holds[k].motion;
@@ -221,8 +218,8 @@ static Result check_modes_hold(Instance *c) {
     for (int k = 0; k < m->n_guards; k++) {
         const Transition *one = &m->transitions[m->guard_transition[k]];
         if (guard_active(c, k) && guards[k] > 0)
-            return report(c, LOG_ERROR, RESULT_ERROR,
-                "No steady state was found at t = %.9g s: %s does not stay in its mode.", s->t, text_of(m, one->name));
+            return fail(c, "No steady state was found at t = %.9g s: %s does not stay in its mode.", s->t,
+                text_of(m, one->name));
     }
     return RESULT_OK;
 }
@@ -253,8 +250,8 @@ Result start_solve(Instance *c) {
         share(c);
     }
     if (round == MODE_ROUNDS)
-        return report(c, LOG_ERROR, RESULT_ERROR,
-            "The modes at the start do not settle: they and the start values change each other in a circle.");
+        return fail(
+            c, "The modes at the start do not settle: they and the start values change each other in a circle.");
     rest(c);
     if (solve_now(c, 0) != RESULT_OK || check_singular(c) != RESULT_OK) return RESULT_ERROR;
     if (m->settings->steady && check_modes_hold(c) != RESULT_OK) return RESULT_ERROR;

@@ -156,11 +156,9 @@ Result output_rate(Instance *c, uint32_t reference, int order, double *value) {
     double *terms = w->dots, factorial = 1;
     int *pivots = w->order;
     if (v == NULL) return RESULT_ERROR;
-    if (order < 1 || order >= ORDERS)
-        return report(c, LOG_ERROR, RESULT_ERROR, "Outputs have derivatives of order 1 to %d only.", ORDERS - 1);
+    if (order < 1 || order >= ORDERS) return fail(c, "Outputs have derivatives of order 1 to %d only.", ORDERS - 1);
     if (v->kind != KIND_VARIABLE && v->kind != KIND_STATE)
-        return report(
-            c, LOG_ERROR, RESULT_ERROR, "%s has no time derivative: it is not a variable.", text_of(m, v->name));
+        return fail(c, "%s has no time derivative: it is not a variable.", text_of(m, v->name));
     if (factor_implicit(c, pivots) != RESULT_OK) return RESULT_ERROR;
     for (int n = 1; n < ORDERS; n++) memset(terms + (n - 1) * m->n_slots, 0, m->slot_results * sizeof(double));
     terms[0] = 1;

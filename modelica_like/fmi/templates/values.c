@@ -19,7 +19,7 @@ const Variable *find_variable(const Model *m, uint32_t reference) {
 const Variable *known_variable(Instance *c, uint32_t reference, ValueType type) {
     const Variable *v = find_variable(c->model, reference);
     if (v != NULL && v->type == (int)type) return v;
-    report(c, LOG_ERROR, RESULT_ERROR,
+    fail(c,
         v == NULL ? "There is no variable with value reference %u."
                   : "The variable with value reference %u is not of type %s.",
         (unsigned)reference, type == TYPE_FLOAT64 ? "Real (Float64)" : "Enumeration (Integer, Int64)");
@@ -40,11 +40,11 @@ static const double *seen(Instance *c, const Variable *v) {
     switch (v->kind) {
         case KIND_DERIVED: evaluate_now(c, &m->tapes.derived, w->seen_derived); break;
         case KIND_DERIVATIVE:
-            evaluate_special(c, SPECIAL_RATES, c->state.t, c->x, c->z, w->rhs);
+            evaluate_special(c, SPECIAL_RATES, c->state.t, c->x, w->rhs);
             memcpy(w->seen_rates, w->rhs, (size_t)m->n_x * sizeof(double));
             break;
         case KIND_GUARD: get_indicators(c, w->seen_indicators); break;
-        default: evaluate_special(c, SPECIAL_VARIABLES, c->state.t, c->x, c->z, w->variables);
+        default: evaluate_special(c, SPECIAL_VARIABLES, c->state.t, c->x, w->variables);
     }
     c->variables_valid |= 1 << v->kind;
     return values;
@@ -111,7 +111,7 @@ int get_mode(Instance *c, uint32_t reference) {
 }
 
 static Result refuse_value(Instance *c, const Variable *v, const char *why) {
-    return report(c, LOG_ERROR, RESULT_ERROR, "%s cannot be set: %s", text_of(c->model, v->name), why);
+    return fail(c, "%s cannot be set: %s", text_of(c->model, v->name), why);
 }
 
 static void touch(Instance *c) {
@@ -133,8 +133,8 @@ static Result set_parameter(Instance *c, const Variable *v, double value) {
     if (v->tunable && s->phase == PHASE_CONTINUOUS)
         return refuse_value(c, v, "tunable parameters change in event mode only.");
     if (value < low || value > high)
-        return report(c, LOG_ERROR, RESULT_ERROR, "%s = %g is out of range: it must be at %s %g.", text_of(m, v->name),
-            value, value < low ? "least" : "most", value < low ? low : high);
+        return fail(c, "%s = %g is out of range: it must be at %s %g.", text_of(m, v->name), value,
+            value < low ? "least" : "most", value < low ? low : high);
     if (c->p[v->index] != value) touch(c);
     if (c->p[v->index] != value && !before_start(s) && !c->work.tuned[v->index]) {
         c->work.tuned[v->index] = 1;
@@ -150,9 +150,8 @@ Result check_tables(Instance *c) {
     for (int k = 0; k < m->n_rising; k++) {
         const Rising *one = &m->rising[k];
         if (!(c->p[one->below] < c->p[one->above]))
-            return report(c, LOG_ERROR, RESULT_ERROR,
-                "%s = %g is not above %s = %g: this column of the table must rise.", text_of(m, one->above_name),
-                c->p[one->above], text_of(m, one->below_name), c->p[one->below]);
+            return fail(c, "%s = %g is not above %s = %g: this column of the table must rise.",
+                text_of(m, one->above_name), c->p[one->above], text_of(m, one->below_name), c->p[one->below]);
     }
     return RESULT_OK;
 }
@@ -208,13 +207,13 @@ Result set_mode(Instance *c, uint32_t reference, int64_t value) {
     if (v == NULL) return RESULT_ERROR;
     if (v->kind != KIND_DISCRETE) return refuse_value(c, v, "it is calculated.");
     if (value < 0 || value >= m->modes[v->index].n_names)
-        return report(c, LOG_ERROR, RESULT_ERROR, "%s has no mode %lld: they are 0 to %d.", text_of(m, v->name),
-            (long long)value, m->modes[v->index].n_names - 1);
+        return fail(c, "%s has no mode %lld: they are 0 to %d.", text_of(m, v->name), (long long)value,
+            m->modes[v->index].n_names - 1);
     return set_start(c, v, (double)value);
 }
 
 Result set_time(Instance *c, double time) {
-    if (!isfinite(time)) return report(c, LOG_ERROR, RESULT_ERROR, "The time is not a finite number.");
+    if (!isfinite(time)) return fail(c, "The time is not a finite number.");
     c->state.t = time;
     c->state.z_valid = c->variables_valid = 0;
     return RESULT_OK;
@@ -224,8 +223,7 @@ Result set_states(Instance *c, const double *x) {
     const Model *m = c->model;
     for (int k = 0; k < m->n_x; k++)
         if (!isfinite(x[k]))
-            return report(c, LOG_ERROR, RESULT_ERROR, "%s cannot be set: the value is not a finite number.",
-                text_of(m, m->state_names[k]));
+            return fail(c, "%s cannot be set: the value is not a finite number.", text_of(m, m->state_names[k]));
     memcpy(c->x, x, m->n_x * sizeof(double));
     c->state.z_valid = c->variables_valid = 0;
     return RESULT_OK;
