@@ -94,7 +94,7 @@ def cosim(
 
 
 def _so_far(system: System, folder: Path, begin: float) -> CosimSolution | None:
-    """Return what a run has come to that has not come to its end, if it has made a step."""
+    """Return what an unfinished run has computed, if it has made a step."""
     if not (folder / "columns.json").exists():
         return None
     columns, table = _left(folder, "columns.json")

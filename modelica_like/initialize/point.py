@@ -119,7 +119,7 @@ def check_singular(model: CompiledDae, point: Point) -> None:
     """Check that every block has a unique solution.
 
     Raises:
-        SingularAtStart: one has not.
+        SingularAtStart: one does not have one.
     """
     fast = model.fast("regular", lambda: _regular(model))
     if not fast(point.t, point.x, point.z, model.p, model.u, point.d)[0][0]:

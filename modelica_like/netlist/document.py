@@ -61,7 +61,7 @@ def read_text(path: Path) -> str:
     """Return the text of a netlist file.
 
     Raises:
-        NetlistError: the file is missing, is no text, or is too large.
+        NetlistError: the file is missing, is not text, or is too large.
     """
     try:
         if not path.is_file():
@@ -98,7 +98,7 @@ def parse(text: str, file: str) -> Document:
         file: path of the file, for messages.
 
     Raises:
-        NetlistError: the text is not TOML, or has not the form of a netlist.
+        NetlistError: the text is not TOML, or does not have the form of a netlist.
         DuplicateName: a name is used twice.
         WiringErrors: several errors.
     """
@@ -268,7 +268,7 @@ def check_part(key: str, value: Any) -> Any:
     """Return the table of a part, or of several, if it has the form of one.
 
     Raises:
-        NetlistError: it has not.
+        NetlistError: it does not.
     """
     tables = value if isinstance(value, list) and value else [value]
     for table in tables:
