@@ -103,10 +103,12 @@ def interpolate(integrator: Integrator, pieces: list[Piece]) -> list[tuple[int, 
     counts = np.array([one.count for one in looks])
     owner = np.repeat(np.arange(len(pieces)), lengths)
     times, x = np.concatenate([one.times for one in pieces]), np.concatenate([one.x for one in looks], axis=1)
-    z, begins = (np.concatenate(part, axis=-1) for part in ([p.z for p in looks], [p.times for p in looks]))
-    k: Any = np.concatenate([one.looks.intervals(one.times) for one in pieces])
+    z = np.concatenate([one.z for one in looks], axis=1)
+    begins, widths = np.array([(one.times[0], one.width) for one in looks]).T
+    passed = (times - begins[owner]) / widths[owner]
+    k: Any = np.minimum(passed.astype(int), counts[owner] - 1)
     place: Any = (np.cumsum(counts + 1) - counts - 1)[owner] + k
-    share = (times - begins[place]) / np.array([one.width for one in looks])[owner]
+    share = passed - k
     new = np.diff(place, prepend=-1) > 0
     cell: Any = np.cumsum(new) - 1
     changes, left = _cells(integrator, pieces, x, owner[new], k[new])
