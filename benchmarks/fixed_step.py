@@ -14,7 +14,7 @@ from pathlib import Path
 
 from modelica_like.compile import compile
 from modelica_like.flatten import flatten
-from modelica_like.fmi.build import FLAGS, compiler_command, native_platform
+from modelica_like.fmi.build import compiler_command, flags, native_platform
 from modelica_like.fmi.codegen import generate
 from modelica_like.fmi.interface import interface
 from modelica_like.netlist import load
@@ -41,9 +41,9 @@ def timed(netlist: Path, steps: float) -> tuple[float, ...]:
         for name, text in sources.items():
             (Path(folder) / name).write_text(text, encoding="utf-8")
         files = [name for name in sources if name.endswith(".c")]
-        flags = [flag for flag in FLAGS if flag not in ("-shared", "-fvisibility=hidden")]
+        chosen = [flag for flag in flags(native_platform()) if flag not in ("-shared", "-fPIC", "-fvisibility=hidden")]
         token = f'-DTOKEN="{TOKEN}"'
-        command = [*compiler_command(native_platform()), *flags, token, "-I.", *files, str(HERE / "fixed_step.c")]
+        command = [*compiler_command(native_platform()), *chosen, token, "-I.", *files, str(HERE / "fixed_step.c")]
         subprocess.run([*command, "-o", "timed", "-lm"], cwd=folder, check=True)
         given = [f"{STEP}", f"{seconds(model.settings['until'])}", f"{steps}", f"{REPEATS}"]
         told = subprocess.run([f"{folder}/timed", *given], capture_output=True, text=True, check=True).stdout

@@ -43,7 +43,7 @@ def measure(
     precision = options.pop("precision", 1e-8)
     run = simulate(model, **options)
     one = best(lambda: simulate(model, **options), repeats)
-    names = [parameter.path for parameter in model.flat_parameters if parameter.tunable]
+    names = [parameter.name for parameter in sensitivities(run, [output], precision=precision).parameters]
     parts = [f"{name:32} simulation {one * 1e3:8.1f} ms"]
     for method in ("adjoint", "forward"):
         for number in sorted({min(number, len(names)) for number in numbers}):

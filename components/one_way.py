@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from components import icons
 from components.friction import Clutch, ShaftFriction
 from components.interfaces import CompliantWithRelativeStates
 from modelica_like.language import (
@@ -28,6 +29,7 @@ class Freewheel(CompliantWithRelativeStates):
     overrunning speed and the driving torque at most one is not zero, and none is negative.
     """
 
+    icon = icons.FREEWHEEL
     # No torque depends on the angle by which a freewheel has overrun.
     phi_rel: Variable = var("rad", "relative angle, flange_b.phi - flange_a.phi", state="prefer", default=0)
     w_rel: Variable = var("rad/s", "overrunning speed", state="always")
@@ -62,6 +64,8 @@ class OneWayClutch(Clutch):
     Standard Library, Rotational.OneWayClutch.
     """
 
+    icon = icons.ONE_WAY_CLUTCH
+
     def sliding_friction(self, speed: Expr | float) -> Expr:
         return where(self.f_normalized > 0, super().sliding_friction(speed), self.tau_drag)
 
@@ -91,11 +95,13 @@ class OneWayClutch(Clutch):
         yield mode.go("start_forward", "forward", when=w > 0)
         yield mode.go("start_forward", "stuck", when=der(w) < 0)
         yield mode.go("forward", "stuck", when=w < 0)
+        yield from self.measured()
 
 
 class TorqueLimiter(ShaftFriction, CompliantWithRelativeStates):
     """Slipping coupling that protects a drive: rigid up to tau_max·peak, then it slips at tau_max."""
 
+    icon = icons.LIMITER_CLUTCH
     tau_max: Parameter = param("N.m", "torque at which it slips", min=0)
     phi_rel: Variable = var("rad", "relative angle, flange_b.phi - flange_a.phi", state="prefer", default=0)
     w_rel: Variable = var("rad/s", "slip speed", state="always")

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from modelica_like.simulation import simulate as simulate
     from modelica_like.solve.options import Options as Options
     from modelica_like.solve.solution import Solution as Solution
+    from modelica_like.solve.trajectories import Trajectories as Trajectories
 
 __version__ = "0.1.0"
 
@@ -46,6 +47,7 @@ _HOME = {
     "Native": "modelica_like.native.handle",
     "Options": "modelica_like.solve.options",
     "Solution": "modelica_like.solve.solution",
+    "Trajectories": "modelica_like.solve.trajectories",
     "build": "modelica_like.simulation",
     "calibrate": "modelica_like.analyse.calibration.calibrate",
     "campbell": "modelica_like.analyse.linear.campbell",
@@ -75,6 +77,7 @@ __all__ = [
     "Native",
     "Options",
     "Solution",
+    "Trajectories",
     "build",
     "calibrate",
     "campbell",

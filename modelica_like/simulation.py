@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import gc
+import math
 import time
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
@@ -27,9 +28,11 @@ from modelica_like.errors import (
 from modelica_like.flatten import flatten
 from modelica_like.initialize import StartKind, initialize
 from modelica_like.language import Component
+from modelica_like.language.tunable import with_tunable_tables
 from modelica_like.solve.events import EventLoop, Progress
 from modelica_like.solve.options import Options
-from modelica_like.solve.solution import Solution, Statistics
+from modelica_like.solve.solution import Solution
+from modelica_like.solve.trajectories import Statistics, Trajectories, needs_equations
 from modelica_like.structure import reduce
 from modelica_like.units import parse_unit, to_si
 
@@ -40,23 +43,32 @@ Solver = Literal["idas", "native"]
 Model = Component | CompiledDae | str | Path
 
 
-def build(drive: Model, free: Iterable[str] = ()) -> CompiledDae:
+def build(drive: Model, free: Iterable[str] = (), *, tables: Iterable[str] = ()) -> CompiledDae:
     """Compile a component tree or a netlist file; a compiled model is returned as it is.
 
     Args:
         drive: the model.
         free: parameters that shall be independent: what follows from others by a formula keeps the formula's value,
             but can be varied on its own. Not possible in a compiled model.
+        tables: patterns of tables whose numbers shall be parameters, such as `clutch.mu_pos`: see
+            `with_tunable_tables`. Not possible in a compiled model.
 
     Raises:
+        LanguageError: tables of a compiled model are asked for.
         ModelicaLikeError: something is wrong with the model; the message says what, where and what to do.
     """
     if isinstance(drive, CompiledDae):
+        if tables:
+            raise LanguageError("Tables of a compiled model stay what they are.", advice="Build it with `tables`.")
         return drive
+    if isinstance(drive, Trajectories):
+        raise needs_equations(drive)
     if isinstance(drive, str | Path):
         from modelica_like.netlist import load
 
         drive = load(drive)
+    if tables:
+        drive = with_tunable_tables(drive, tables)
     model = _compiled(drive)
     bound = [name for name in free if name in model.derived_position]
     if not bound:
@@ -181,6 +193,18 @@ def seconds(until: float | str | None, name: str = "until") -> float:
     except UnitError as error:
         error.advice = error.advice or f'Give seconds or a time, e.g. {name}="2 s".'
         raise
+
+
+def positive_step(asked: float | str | None) -> float:
+    """Return a fixed step in s, 0 for None.
+
+    Raises:
+        ValueOutOfRange: it is not positive and finite.
+    """
+    step = 0.0 if asked is None else seconds(asked, "fixed_step")
+    if asked is not None and not 0 < step < math.inf:
+        raise ValueOutOfRange(f"The fixed step must be a positive time, not {step:g} s.")
+    return step
 
 
 def _options(base: Options, settings: Mapping[str, Any], **given: float | None) -> Options:

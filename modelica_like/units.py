@@ -241,7 +241,7 @@ def _plain(text: str) -> str:
 # --- quantities -----------------------------------------------------------------------------------------------------
 
 _NUMBER = re.compile(
-    r"\s*([+-]?(?:(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?|(?:nan|inf)(?![A-Za-z0-9_.])))\s*(.*?)\s*", re.DOTALL
+    r"([+-]?(?:(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?|(?:nan|inf)(?![A-Za-z0-9_.])))\s*(.*)", re.DOTALL
 )
 
 
@@ -255,7 +255,7 @@ def read_quantity(text: str) -> tuple[float, Unit] | None:
     Raises:
         UnitError: a number is followed by something that should be a unit and is none.
     """
-    match = _NUMBER.fullmatch(text)
+    match = _NUMBER.fullmatch(text.strip())
     if match is None:
         return None
     number, unit = match.groups()
@@ -331,7 +331,7 @@ def _text_quantity(text: str, unit: Unit, name: str) -> tuple[float, Unit]:
         raise UnitError(f"{name} = '{text}': {error.what}", advice=error.advice) from None
     if read is None:
         raise UnitError(f"{name} expects {unit}; '{text}' is not a quantity.")
-    match = _NUMBER.fullmatch(text)
+    match = _NUMBER.fullmatch(text.strip())
     return read if match is not None and match.group(2) else (read[0], unit)
 
 

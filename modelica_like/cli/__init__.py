@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 # Modules and their commands, in the order in which the help lists them.
 _GROUPS = {
     "models": ("check", "simulate"),
+    "pictures": ("draw",),
     "analysis": ("modes",),
     "sweeps": ("steady", "sweep"),
     "sensitivity": ("sensitivity",),

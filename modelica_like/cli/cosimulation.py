@@ -84,17 +84,22 @@ def cosim(
     """Run a system of FMUs together: mode changes, energies at the couplings, results as table and picture."""
     with told(debug, tables=[csv], pictures=[plot]):
         from modelica_like.cli.outcome import Outcome
-        from modelica_like.cosimulation.load import opened
+        from modelica_like.cosimulation.files import opened
         from modelica_like.cosimulation.run import cosim as run
+        from modelica_like.cosimulation.solution import described_model
         from modelica_like.report.progress import Bar
         from modelica_like.report.run import cosimulation_report
+        from modelica_like.solve.plot import matching
         from modelica_like.solve.plot import plot as draw
 
+        values = _numbers(assignments or ())
         with opened(system) as known, Bar(until or known.settings.until) as bar:
+            if show:
+                matching(described_model(known), show)
             made = Outcome(
                 lambda: run(
                     known, until, step=step, master=master, inputs=inputs, tolerance=tolerance,
-                    parameters=_numbers(assignments or ()), timeout=timeout, progress=bar,
+                    parameters=values, timeout=timeout, progress=bar,
                 ), debug=debug,
             )  # fmt: skip
         made.tell(cosimulation_report, csv)

@@ -57,6 +57,9 @@ def export(
     fixed_step: Annotated[
         str | None, Option(metavar="TIME", help="Co-Simulation in steps of this size, with bounded work: 1ms.")
     ] = None,
+    tables: Annotated[
+        list[str] | None, Option(metavar="PATTERN", help="Tables whose numbers are tunable, e.g. '*.mu_pos'.")
+    ] = None,
     check: Annotated[bool, Option(help="Run the FMU against IDAS before it is handed over.")] = True,
     strict: Annotated[bool, Option("--strict", help="Do not write an FMU that differs from IDAS.")] = False,
     debug: Debug = False,
@@ -79,7 +82,7 @@ def export(
             done = export_fmu(
                 assembly, output or Path(f"{netlist.stem}.fmu"), fmi, _listed(kind), _listed(platforms),
                 outputs=outputs or (), ends=ends or (), takes=takes.value, embed=embed, modes=modes.value,
-                fixed_step=fixed_step, check=check, strict=strict, report=status.update,
+                fixed_step=fixed_step, tables=tables or (), check=check, strict=strict, report=status.update,
             )  # fmt: skip
         out().print(str(done), soft_wrap=True)
 

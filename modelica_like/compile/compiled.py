@@ -6,16 +6,19 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from importlib import import_module
-from typing import Any
+from typing import Any, TypeVar
 
 import casadi as ca
 
+from modelica_like.compile.buffers import BufferedFunction, buffered
 from modelica_like.compile.buffers import Vector as Vector
 from modelica_like.compile.start_system import StartSystem as StartSystem
-from modelica_like.errors import LanguageError, Source, UnknownName, did_you_mean
+from modelica_like.errors import LanguageError, Source, UnknownName, ValueOutOfRange, did_you_mean
 from modelica_like.flatten.model import FlatDiscrete, FlatParameter, FlatVariable, Origin
 from modelica_like.structure.holds import Circuit as Circuit
-from modelica_like.units import coherent, to_si
+from modelica_like.units import Unit, coherent, to_si
+
+Made = TypeVar("Made")
 
 
 @dataclass(frozen=True)
@@ -40,6 +43,7 @@ class CompiledTransition:
         timed: whether `index` is a position in the moments rather than in the guards.
         resets: what else changes.
         notice: what the user is told when it happens.
+        fails: whether the run ends there, with an error.
     """
 
     mode: int
@@ -50,6 +54,7 @@ class CompiledTransition:
     resets: tuple[Reset, ...]
     source: Source
     notice: str = ""
+    fails: bool = False
 
 
 @dataclass(frozen=True)
@@ -196,6 +201,18 @@ class CompiledDae:
         return {parameter.path: k for k, parameter in enumerate(self.flat_parameters)}
 
     @cached_property
+    def fixed_position(self) -> dict[str, int]:
+        """Position in (p, u) of every independent parameter and input by its path."""
+        inputs = {self.flat_variables[k].path: len(self.p) + n for n, k in enumerate(self.inputs)}
+        return {**self.parameter_position, **inputs}
+
+    @cached_property
+    def units(self) -> dict[str, Unit]:
+        """Coherent SI unit of every variable, parameter, mode and discrete value by its path."""
+        named = (*self.flat_discretes, *self.flat_variables, *self.flat_derived, *self.flat_parameters)
+        return {one.path: coherent(one.unit) for one in named}
+
+    @cached_property
     def derived_position(self) -> dict[str, int]:
         """Position of every parameter that follows from others by its path."""
         return {parameter.path: k for k, parameter in enumerate(self.flat_derived)}
@@ -236,6 +253,11 @@ class CompiledDae:
         """Fresh symbols for the arguments of the functions."""
         return {name: ca.SX.sym(name, self.ode.size1_in(k)) for k, name in enumerate(self.ode.name_in())}
 
+    @cached_property
+    def rising(self) -> tuple[tuple[int, int], ...]:
+        """Positions of pairs of parameters of which the second must exceed the first: columns of tables that rise."""
+        return tuple((k - one.above, k) for k, one in enumerate(self.flat_parameters) if one.above)
+
     def with_parameters(self, values: dict[str, Any]) -> CompiledDae:
         """Return the same model with other parameter values; nothing is compiled again.
 
@@ -265,6 +287,10 @@ class CompiledDae:
             else:
                 known = [*self.parameter_position, *inputs]
                 raise UnknownName(f"{self.name} has no parameter '{path}'{did_you_mean(path, known) or '.'}")
+        for below, above in self.rising:
+            if not p[below] < p[above]:
+                names = [f"{self.flat_parameters[k].path} = {p[k]:g}" for k in (above, below)]
+                raise ValueOutOfRange(f"{' is not above '.join(names)}: this column of the table must rise.")
         for one, number in zip(self.flat_derived, self.derived(p).full().ravel(), strict=True):
             one.checked(float(number), f"{number:g}")
         return self.twin(p=p, u=u)
@@ -274,6 +300,16 @@ class CompiledDae:
         twin = replace(self, **changes)
         twin.__dict__.update({k: v for k, v in self.__dict__.items() if k not in twin.__dict__})
         return twin
+
+    def once(self, key: Any, make: Callable[[], Made]) -> Made:
+        """Return what `make` gives: made on first use, and kept with the model and its twins."""
+        if key not in self._cache:
+            self._cache[key] = make()
+        return self._cache[key]
+
+    def fast(self, key: Any, make: Callable[[], ca.Function]) -> BufferedFunction:
+        """Return this thread's buffered function for a key, made on first use, and kept with the model."""
+        return buffered(self._cache, key, make)
 
     def function(self, inputs: Sequence[str], outputs: Sequence[str], **run: Any) -> ca.Function:
         """Return the whole simulation as a differentiable CasADi function of parameters.

@@ -187,7 +187,7 @@ class _Builder:
     ) -> CompiledTransition:
         return CompiledTransition(
             self.place[prefix + form.mode], form.sources, form.target, form.timed, index, resets, form.source,
-            form.notice,
+            form.notice, form.fails,
         )  # fmt: skip
 
     def _reset(self, path: str, value: int, targets: list[int]) -> Reset:

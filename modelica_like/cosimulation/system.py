@@ -12,8 +12,13 @@ from modelica_like.errors import ModelicaLikeError, NetlistError, UnknownName, d
 Master = Literal["jacobi", "gauss-seidel"]
 Inputs = Literal["hold", "linear"]
 
-POWERS = (("tau", "w"), ("f", "v"), ("i", "v"))
-"""Last names of a flow and of the rate or potential that make a power together."""
+
+def powers() -> tuple[tuple[str, str], ...]:
+    """Return names of a flow and of the rate or potential that make a power together, as adaptors declare them."""
+    from modelica_like.netlist.registry import library_types  # the process of the FMUs needs no library
+
+    terminals = (kind.terminal for kind in library_types().values())
+    return tuple(dict.fromkeys(one.power for one in terminals if one and one.power))
 
 
 @dataclass(frozen=True)
@@ -180,10 +185,11 @@ def check_system(system: System) -> None:
 
 def find_bonds(links: Iterable[Link]) -> tuple[Bond, ...]:
     """Return the bonds that follow from names: `a.x.tau` to `b.y.tau`, and `b.y.w` back to `a.x.w`."""
+    known = powers()
     by_ends = {(link.source, target): link for link in links for target in link.targets}
     bonds: list[Bond] = []
     for (source, target), link in by_ends.items():
-        for flow, rate in POWERS:
+        for flow, rate in known:
             stem, _, last = source.variable.rpartition(".")
             other, _, its_last = target.variable.rpartition(".")
             if last != flow or its_last != flow:

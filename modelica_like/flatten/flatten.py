@@ -65,8 +65,9 @@ class _Flattener:
 
     def run(self) -> FlatModel:
         templates = self._elaborate()
+        used = {self._owner(component, name) for component, template in templates for name in template.discretes}
         for component, _ in templates:
-            self._declare(component)
+            self._declare(component, used)
         self.nodes = [(k, 0) for k in range(len(self.variables))]
         instances = [self._instance(component, template) for component, template in templates]
         self._connect()
@@ -108,7 +109,7 @@ class _Flattener:
 
     # -- declarations ------------------------------------------------------------------------------------------------
 
-    def _declare(self, component: Component) -> None:
+    def _declare(self, component: Component, used: set[tuple[int, str]]) -> None:
         path = component.path
         prefix = f"{path}." if path else ""
         for name, field in component.fields.items():
@@ -119,7 +120,8 @@ class _Flattener:
                 self._declare_discrete(component, name, prefix + name, field)
             elif isinstance(field, Parameter):
                 self.parameters.declare(component, name, prefix + name)
-        for name, mode in component.modes.items():
+        # What nothing asks for and nothing changes, as where a table has one row only, is no part of the model.
+        for name, mode in ((n, m) for n, m in component.modes.items() if (id(component), n) in used):
             self.discrete_of[id(component), name] = len(self.discretes)
             start = mode.number(component.start_mode(name))
             self.discretes.append(FlatDiscrete(prefix + name, ONE, mode.description, start, mode.names))

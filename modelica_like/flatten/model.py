@@ -32,7 +32,7 @@ class FlatVariable:
 
 @dataclass(frozen=True, slots=True)
 class FlatParameter:
-    """A parameter with its value in SI units."""
+    """A parameter with its value in SI units; it must exceed the one that stands `above` places before it, if any."""
 
     path: str
     unit: Unit
@@ -41,6 +41,7 @@ class FlatParameter:
     min: float | None
     max: float | None
     tunable: bool
+    above: int = 0
 
     def checked(self, number: float, given: object) -> float:
         """Return the number if it is finite and within min and max.

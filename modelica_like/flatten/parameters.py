@@ -64,9 +64,9 @@ class Parameters:
         symbol = ca.SX.sym(path)
         self._by_leaf[leaf_id(symbol)] = len(self.flat)
         unit = unit_of_field(component, name)
-        tunable = field.tunable if isinstance(field, Parameter) else True
+        tunable, above = (field.tunable, field.above) if isinstance(field, Parameter) else (True, 0)
         number = value.number if value.number is not None else 0.0
-        self.flat.append(FlatParameter(path, unit, field.description, number, field.min, field.max, tunable))
+        self.flat.append(FlatParameter(path, unit, field.description, number, field.min, field.max, tunable, above))
         self._symbols.append(symbol)
         return symbol
 

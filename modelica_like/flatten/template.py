@@ -24,6 +24,7 @@ from modelica_like.language.expr import TIME, Symbol, flagged_motion, is_express
 from modelica_like.language.fields import Parameter, Variable
 from modelica_like.language.places import located
 from modelica_like.language.transition import StartMode, Transition, as_event
+from modelica_like.language.tunable import symbols_in_tables
 from modelica_like.units import ANY, Unit
 
 
@@ -62,6 +63,7 @@ class TransitionForm:
         index: position in the guards, or in the moments.
         resets: pairs of what is reset (slot path) and the position in the resets.
         notice: what the user is told when it happens.
+        fails: whether the run ends there, with an error.
     """
 
     mode: str
@@ -72,6 +74,7 @@ class TransitionForm:
     resets: tuple[tuple[str, int], ...]
     source: Source
     notice: str
+    fails: bool
 
 
 @dataclass(frozen=True)
@@ -159,7 +162,8 @@ def template_of(component: Component) -> Template:
         LanguageError, UnitMismatch, ComponentUnbalanced: the class is declared wrongly.
     """
     if component.parts or component.fields is not component._class_fields:
-        return _build(component)
+        with symbols_in_tables(component):
+            return _build(component)
     cache: dict[Any, Template] = _class_cache(type(component))
     key = _structural_key(component)
     if key not in cache:
@@ -259,6 +263,7 @@ def _transition_forms(component: Component, transitions: list[Transition]) -> tu
                 tuple(resets),
                 t.source,
                 t.notice,
+                t.fails,
             )
         )
     return tuple(forms)

@@ -52,10 +52,10 @@ BROWSER = Platform("wasm32", "", "wasm32-wasi", ".wasm")
 RUNTIMES = {**PLATFORMS, BROWSER.name: BROWSER}
 """What the run-time is compiled for."""
 
-# -O1 runs as fast as -O2 here and compiles in two thirds of the time. Changed flags make zig compile its C runtime
-# again, which takes minutes for Windows.
+# Runs take a tenth less time than with -O1; compiling takes 3.6 s of CPU instead of 2.0 s. Changed flags make zig
+# compile its C runtime again, which takes minutes for Windows.
 _FLAGS = (
-    "-std=c99", "-O1", "-ffp-contract=off", "-fvisibility=hidden", "-s", "-Wall", "-Wextra", "-DOLD_GLIBC",
+    "-std=c99", "-O2", "-ffp-contract=off", "-fvisibility=hidden", "-s", "-Wall", "-Wextra", "-DOLD_GLIBC",
 )  # fmt: skip
 _LINKING = {
     # The caller's buffers lie in the module's memory. It needs nothing from outside.
@@ -182,7 +182,9 @@ def compiler_command(platform: str) -> list[str]:
 
 
 def _run(command: list[str], folder: str, platform: str) -> None:
-    result = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    # What is compiled on a Mac runs on older ones, too, as its wheel says.
+    environment = {**os.environ, "MACOSX_DEPLOYMENT_TARGET": "11.0"}
+    result = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
     if result.returncode != 0:
         lines = [line for line in result.stderr.splitlines() if "error" in line] or result.stderr.splitlines()
         raise ExportError(

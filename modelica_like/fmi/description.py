@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.fmi.dependencies import Dependencies
 from modelica_like.fmi.interface import FmuVariable, Interface
-from modelica_like.fmi.xml import document, element, number, root, unit_name
+from modelica_like.fmi.xml import Element, document, element, number, unit_name
 from modelica_like.units import Unit, parse_unit
 
 Version = Literal["2.0", "3.0"]
@@ -76,7 +76,7 @@ def model_description(model: CompiledDae, variables: Interface, about: About) ->
 
 def build_description(name: str, sources: Sequence[str]) -> str:
     """Write buildDescription.xml: which C files make the binary."""
-    top = root("fmiBuildDescription", fmiVersion="3.0")
+    top = Element("fmiBuildDescription", {"fmiVersion": "3.0"})
     configuration = element(top, "BuildConfiguration", modelIdentifier=identifier(name))
     files = element(configuration, "SourceFileSet", language="C99", compilerOptions="-O2 -ffp-contract=off")
     for source in sources:
@@ -95,13 +95,14 @@ class _Writer(ABC):
         self.dependencies = Dependencies(model, variables)
         self.types = {names: f"Mode_{k}_{'_'.join(names)}"[:120] for k, names in enumerate(self._mode_names(), 1)}
 
-    def write(self) -> Any:
+    def write(self) -> Element:
         """Write all parts in the order of the schema."""
         about = self.about
-        top = root(
-            "fmiModelDescription", fmiVersion=about.version, modelName=self.model.name, **self._attributes(),
-            description=about.description or None, generationTool=about.tool, variableNamingConvention="structured",
-        )  # fmt: skip
+        top = Element("fmiModelDescription", {
+            "fmiVersion": about.version, "modelName": self.model.name, **self._attributes(),
+            "description": about.description or None, "generationTool": about.tool,
+            "variableNamingConvention": "structured",
+        })  # fmt: skip
         self._kinds(top)
         self.units(top)
         if self.types:
@@ -113,30 +114,34 @@ class _Writer(ABC):
         self.log_categories(top)
         self.default_experiment(top)
         listed = element(top, "ModelVariables")
-        for one in self.variables:
+        for one in self.listed():
             self._variable(listed, one)
         self._structure(element(top, "ModelStructure"))
         return top
+
+    def listed(self) -> Iterable[FmuVariable]:
+        """Variables in the order of the description."""
+        return self.variables
 
     @abstractmethod
     def _attributes(self) -> dict[str, Any]: ...
 
     @abstractmethod
-    def _kinds(self, top: Any) -> None: ...
+    def _kinds(self, top: Element) -> None: ...
 
     @abstractmethod
-    def _type(self, definitions: Any, title: str) -> Any: ...
+    def _type(self, definitions: Element, title: str) -> Element: ...
 
     @abstractmethod
-    def _variable(self, listed: Any, one: FmuVariable) -> None: ...
+    def _variable(self, listed: Element, one: FmuVariable) -> None: ...
 
     @abstractmethod
-    def _structure(self, structure: Any) -> None: ...
+    def _structure(self, structure: Element) -> None: ...
 
     def _mode_names(self) -> list[tuple[str, ...]]:
         return list(dict.fromkeys(one.modes for one in self.variables if one.modes))
 
-    def units(self, top: Any) -> None:
+    def units(self, top: Element) -> None:
         """Define every unit, with its base units, and how people read it."""
         used = {name: one.unit for one in self.variables if (name := unit_name(one.unit)) is not None}
         if not used:
@@ -152,13 +157,13 @@ class _Writer(ABC):
                 offset = -other.offset / other.factor
                 element(defined, "DisplayUnit", name=shown, factor=1.0 / other.factor, offset=offset or None)
 
-    def log_categories(self, top: Any) -> None:
+    def log_categories(self, top: Element) -> None:
         """List the log categories."""
         categories = element(top, "LogCategories")
         for name, text in self.about.log_categories.items():
             element(categories, "Category", name=name, description=text)
 
-    def default_experiment(self, top: Any) -> None:
+    def default_experiment(self, top: Element) -> None:
         """Suggest how to run."""
         about = self.about
         element(
@@ -210,7 +215,7 @@ class _Fmi2(_Writer):
     def _attributes(self) -> dict[str, Any]:
         return {"guid": self.about.token, "numberOfEventIndicators": len(self.interface.indicators)}
 
-    def _kinds(self, top: Any) -> None:
+    def _kinds(self, top: Element) -> None:
         common = {
             "modelIdentifier": identifier(self.model.name), "canGetAndSetFMUstate": True, "canSerializeFMUstate": True,
             "providesDirectionalDerivative": True,
@@ -225,10 +230,10 @@ class _Fmi2(_Writer):
                 for name in self.about.sources:
                     element(files, "File", name=name)
 
-    def _type(self, definitions: Any, title: str) -> Any:
+    def _type(self, definitions: Element, title: str) -> Element:
         return element(element(definitions, "SimpleType", name=title), "Enumeration")
 
-    def _variable(self, listed: Any, one: FmuVariable) -> None:
+    def _variable(self, listed: Element, one: FmuVariable) -> None:
         scalar = element(
             listed, "ScalarVariable", name=one.name, valueReference=one.reference,
             description=one.description or None, causality=one.causality, variability=one.variability,
@@ -242,7 +247,7 @@ class _Fmi2(_Writer):
             derivative = None if one.derivative_of is None else one.derivative_of + 1
             element(scalar, "Real", **attributes, derivative=derivative)
 
-    def _structure(self, structure: Any) -> None:
+    def _structure(self, structure: Element) -> None:
         interface = self.interface
         lists = (
             ("Outputs", self.ordered(interface.outputs), False),
@@ -269,7 +274,7 @@ class _Fmi3(_Writer):
     def _attributes(self) -> dict[str, Any]:
         return {"instantiationToken": self.about.token}
 
-    def _kinds(self, top: Any) -> None:
+    def _kinds(self, top: Element) -> None:
         common = {
             "modelIdentifier": identifier(self.model.name), "canGetAndSetFMUState": True, "canSerializeFMUState": True,
             "providesDirectionalDerivatives": True, "providesAdjointDerivatives": True,
@@ -285,20 +290,33 @@ class _Fmi3(_Writer):
                 fixedInternalStepSize=fixed or None,
             )  # fmt: skip
 
-    def _type(self, definitions: Any, title: str) -> Any:
+    def _type(self, definitions: Element, title: str) -> Element:
         return element(definitions, "EnumerationType", name=title)
 
-    def _variable(self, listed: Any, one: FmuVariable) -> None:
+    def listed(self) -> Iterable[FmuVariable]:
+        inside = {k for array in self.interface.arrays for k in array.elements}
+        return (one for one in (*self.variables, *self.interface.arrays) if one.reference not in inside)
+
+    def known(self, one: FmuVariable, initial: bool = False) -> list[int] | None:
+        arrays = {k: array.reference for array in self.interface.arrays for k in array.elements}
+        found = super().known(one, initial)
+        return found if found is None or not arrays else list(dict.fromkeys(arrays.get(k, k) for k in found))
+
+    def _variable(self, listed: Element, one: FmuVariable) -> None:
         attributes = self.attributes(one)
         if one.type != "Float64":
             del attributes["unit"], attributes["displayUnit"], attributes["nominal"]
-        element(
+        if one.elements:
+            attributes["start"] = [self.variables[k].start for k in one.elements]
+        written = element(
             listed, one.type, name=one.name, valueReference=one.reference, description=one.description or None,
             causality=one.causality, variability=one.variability, initial=one.initial,
             declaredType=self.types.get(one.modes), **attributes, derivative=one.derivative_of,
         )  # fmt: skip
+        for size in one.dimensions:
+            element(written, "Dimension", start=size)
 
-    def _structure(self, structure: Any) -> None:
+    def _structure(self, structure: Element) -> None:
         interface = self.interface
         lists = (
             ("Output", self.ordered(interface.outputs), False),

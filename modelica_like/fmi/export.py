@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import math
 import tempfile
 import time
 from collections.abc import Callable, Collection, Sequence
@@ -14,7 +13,7 @@ from typing import get_args
 
 from modelica_like.compile import compile
 from modelica_like.compile.compiled import CompiledDae
-from modelica_like.errors import ExportError, UnknownName, ValueOutOfRange
+from modelica_like.errors import ExportError, UnknownName
 from modelica_like.flatten import flatten
 from modelica_like.flatten.model import FlatModel
 from modelica_like.fmi.build import PLATFORMS, build, chosen_platforms, native_platform
@@ -29,7 +28,8 @@ from modelica_like.fmi.runtime import runtime_library
 from modelica_like.fmi.sources import LOG_CATEGORIES, licenses, runtime_sources, source_files
 from modelica_like.fmi.tables import make_tables
 from modelica_like.fmi.terminals import Takes, terminals_and_icons, with_open_ends
-from modelica_like.simulation import Model, seconds
+from modelica_like.language.tunable import with_tunable_tables
+from modelica_like.simulation import Model, positive_step, seconds
 from modelica_like.solve.options import Options
 from modelica_like.solve.plot import save_plot
 from modelica_like.structure import reduce
@@ -74,7 +74,8 @@ def export_fmu(
     drive: Model, path: str | Path, version: Version | str = "2.0", kind: Collection[Kind | str] = ("me", "cs"),
     platforms: Sequence[str] | str = "native", *, outputs: Sequence[str] = (), ends: Sequence[str] = (),
     takes: Takes = "flow", embed: bool = False, modes: ModesAs | str = "output",
-    fixed_step: float | str | None = None, check: bool = True, strict: bool = False, report: Report | None = None,
+    fixed_step: float | str | None = None, tables: Sequence[str] = (), check: bool = True, strict: bool = False,
+    report: Report | None = None,
 ) -> Export:  # fmt: skip
     """Export a drive as an FMU: a model and a compiled run-time that need no Python.
 
@@ -97,6 +98,8 @@ def export_fmu(
         fixed_step: step size of Co-Simulation in s, or a time such as "1 ms", for hardware in the loop: the work of a
             step is bounded then, and a communication step is a whole number of them. By default steps are as long as
             accuracy lets them be. The `check` of what is returned tells the error against IDAS over the whole run.
+        tables: patterns of tables whose numbers are to be tunable parameters, such as `clutch.mu_pos`: an array each in
+            FMI 3, scalars `clutch.mu_pos[2,1]` in FMI 2.
         check: whether to run the FMU against IDAS, where it has a binary for this machine. What it shows is told by the
             `check` of what is returned; where they differ, a picture `…_check.png` is drawn next to the FMU.
         strict: whether not to write an FMU that differs from IDAS.
@@ -116,7 +119,7 @@ def export_fmu(
     target = _target(path)
     chosen, kinds, names = _version(version), _kinds(kind), chosen_platforms(platforms)
     tell("compiling the model")
-    model, description, equations = _compiled(drive, ends, takes)
+    model, description, equations = _compiled(drive, ends, takes, tables)
     fixed = _fixed_step(fixed_step, kinds)
     variables = interface(model, outputs, _modes(modes))
     tell("writing the model")
@@ -181,12 +184,8 @@ def _kinds(kind: Collection[str]) -> tuple[Kind, ...]:
 
 
 def _fixed_step(asked: float | str | None, kinds: tuple[Kind, ...]) -> float:
-    if asked is None:
-        return 0.0
-    step = seconds(asked, "fixed_step")
-    if not 0 < step < math.inf:
-        raise ValueOutOfRange(f"The fixed step must be a positive time, not {step:g} s.")
-    if "cs" not in kinds:
+    step = positive_step(asked)
+    if step and "cs" not in kinds:
         raise ExportError(
             "A fixed step belongs to Co-Simulation, and only Model Exchange is exported.",
             why="In Model Exchange the importer chooses the steps.", advice="Export cs, too.",
@@ -197,18 +196,21 @@ def _fixed_step(asked: float | str | None, kinds: tuple[Kind, ...]) -> float:
 # -- the model ---------------------------------------------------------------------------------------------------------
 
 
-def _compiled(drive: Model, ends: Sequence[str], takes: Takes) -> tuple[CompiledDae, str, Listing]:
+def _compiled(
+    drive: Model, ends: Sequence[str], takes: Takes, tables: Sequence[str] = ()
+) -> tuple[CompiledDae, str, Listing]:
     """Return the compiled model, its description and its equations."""
     if isinstance(drive, CompiledDae):
-        if ends:
-            raise ExportError(
-                "A compiled model has no ends that could be opened.", advice="Export its netlist instead."
-            )
+        if ends or tables:
+            what = "ends that could be opened" if ends else "tables whose numbers could become parameters"
+            raise ExportError(f"A compiled model has no {what}.", advice="Export its netlist instead.")
         return drive, "", ()
     if isinstance(drive, str | Path):
         from modelica_like.netlist import load
 
         drive = load(drive)
+    if tables:
+        drive = with_tunable_tables(drive, tables)
     flat = flatten(with_open_ends(drive, ends, takes), open_inputs=True)
     return compile(reduce(flat)), str(getattr(drive, "_description", "") or ""), _equations(flat)
 
@@ -270,7 +272,8 @@ def _contents(
         pictures = {f"terminalsAndIcons/icon.{suffix}": drive_icon(suffix) for suffix in ("png", "svg")}
         for family in dict.fromkeys(icon_name(one.kind) for one in model.terminals):
             pictures |= {f"terminalsAndIcons/{family}.{s}": terminal_icon(family, s) for s in ("png", "svg")}
-    data = model_file(make_tables(model), variables.variables, _TOKEN, about.tolerance, about.fixed_step)
+    seen = variables.variables + (variables.arrays if about.version == "3.0" else ())
+    data = model_file(make_tables(model, variables.start), seen, _TOKEN, about.tolerance, about.fixed_step)
     token = _token(texts, data)
     data = with_token(data, _TOKEN, token)
     texts |= {name: text.replace(_TOKEN, token) for name, text in texts.items()}

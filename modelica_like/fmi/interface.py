@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from functools import cached_property
-from typing import Any, Literal
+from itertools import groupby
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -27,8 +28,7 @@ SlotKind = Literal["time", "state", "der", "variable", "parameter", "derived", "
 _SECOND = parse_unit("s")
 
 
-@dataclass(frozen=True)
-class FmuVariable:
+class FmuVariable(NamedTuple):
     """One variable of the description.
 
     Attributes:
@@ -41,6 +41,8 @@ class FmuVariable:
         start_entry: position in the model's `starts` of the start value that an importer replaces when it sets this.
         derivative_of: value reference of the variable whose time derivative this is.
         modes: names of a mode's values, from zero.
+        elements: of an array: value references of its numbers, which follow each other, row by row.
+        dimensions: of an array: number of rows, and of columns.
     """
 
     name: str
@@ -59,6 +61,8 @@ class FmuVariable:
     start_entry: int | None = None
     derivative_of: int | None = None
     modes: tuple[str, ...] = ()
+    elements: tuple[int, ...] = ()
+    dimensions: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -70,6 +74,9 @@ class Interface:
         states, derivatives: value references in the order of x.
         outputs: value references of continuous and discrete outputs.
         indicators: value references of the event indicators, in the order of the guards.
+        start: what start values determine.
+        reach: what the variables depend on at once.
+        arrays: tables whose numbers are parameters, as FMI 3 knows them; their references follow those of variables.
     """
 
     name: str
@@ -78,6 +85,9 @@ class Interface:
     derivatives: tuple[int, ...]
     outputs: tuple[int, ...]
     indicators: tuple[int, ...]
+    start: StartTables
+    reach: Reach
+    arrays: tuple[FmuVariable, ...] = ()
 
     @cached_property
     def by_name(self) -> dict[str, FmuVariable]:
@@ -122,7 +132,8 @@ class _Builder:
         self.derivatives: dict[int, int] = {}
         self.wanted = _matcher(model, outputs)
         self.starts = _Starts(model)
-        self.depends = _dependence(model)
+        self.reach = Reach(model.variables)
+        self.depends = _dependence(self.reach, model.variables)
         self.add("time", "Float64", "independent", "continuous", None, ("time", 0), unit=_SECOND, description="time")
 
     def add(self, name: str, kind: Any, causality: Any, variability: Any, initial: Any, slot: Any, **rest: Any) -> int:
@@ -240,7 +251,28 @@ class _Builder:
             tuple(self.derivatives[k] for k in range(count)),
             tuple(one.reference for one in self.found if one.causality == "output"),
             tuple(self.indicators[k] for k in sorted(self.indicators)),
+            self.starts.tables,
+            self.reach,
+            tuple(self.arrays()),
         )
+
+    def arrays(self) -> Iterator[FmuVariable]:
+        """Tables: parameters `clutch.mu_pos[2,1]` belong together."""
+        cells = (one for one in self.found if one.causality == "parameter" and one.name.endswith("]"))
+        for number, (name, group) in enumerate(groupby(cells, lambda one: one.name.rpartition("[")[0])):
+            numbers = tuple(group)
+            dimensions = tuple(int(size) for size in numbers[-1].name[len(name) + 1 : -1].split(","))
+            units = {str(one.unit): one.unit for one in numbers}
+            yield FmuVariable(
+                name, len(self.found) + number, "Float64", "parameter", "tunable", None, numbers[0].slot,
+                next(iter(units.values())) if len(units) == 1 else ONE, _table_text(numbers, dimensions),
+                elements=tuple(one.reference for one in numbers), dimensions=dimensions,
+            )  # fmt: skip
+
+
+def _table_text(numbers: Sequence[FmuVariable], dimensions: tuple[int, ...]) -> str:
+    columns = numbers[: dimensions[1]] if len(dimensions) > 1 else numbers[:1]
+    return "rows of " + ", ".join(one.description.partition(" in row 1 of ")[0] for one in columns)
 
 
 def fmi_name(name: str) -> str:
@@ -275,15 +307,11 @@ def _literal_brackets(pattern: str) -> str:
     return re.sub(r"\[", "[[]", pattern)
 
 
-def _dependence(model: CompiledDae) -> list[Variability]:
+def _dependence(reach: Reach, variables: Any) -> list[Variability]:
     """How each variable changes: with time, at events only, or with parameters only."""
-    reach = Reach(model.variables)
-    moving = reach.mask(*(name for name in model.variables.name_in() if name not in ("p", "d")))
+    moving = reach.mask(*(name for name in variables.name_in() if name not in ("p", "d")))
     switching = reach.mask("d")
-    return [
-        "continuous" if row & moving else "discrete" if row & switching else "tunable"
-        for row in reach.rows[: len(model.flat_variables)]
-    ]
+    return ["continuous" if row & moving else "discrete" if row & switching else "tunable" for row in reach.rows]
 
 
 class _Starts:

@@ -28,7 +28,7 @@ ABSOLUTE_TO_RELATIVE = 1e-2
 
 MODEL = "resources/model.bin"
 """Where the file stands in an FMU."""
-FORMAT = 1
+FORMAT = 2
 _MAGIC = b"MLMODEL\0"
 _HEADER = struct.Struct("<8siiII")
 _ENTRY = struct.Struct("<4i")
@@ -60,8 +60,12 @@ SECTIONS: dict[str, Any] = {
     **dict.fromkeys(("constants", "parameters", "parameter_min", "parameter_max"), _DOUBLE),
     **dict.fromkeys(("inputs", "guesses", "z_guesses", "nominals"), _DOUBLE),
     **dict.fromkeys(("state_names", "implicit_names", "singular_names"), _INTEGER),
-    "variables": [("reference", "<u4"), *_record("type kind index start tunable name")],
-    "transitions": [*_record("mode target timed index first_reset n_resets name notice"), ("sources", "<u8")],
+    "variables": [("reference", "<u4"), *_record("type kind index start tunable name count")],
+    "rising": _record("below above below_name above_name"),
+    "transitions": [
+        *_record("mode target"), ("timed", "<i2"), ("fails", "<i2"),
+        *_record("index first_reset n_resets name notice"), ("sources", "<u8"),
+    ],
     "guard_transition": _INTEGER,
     "resets": _record("kind index value target", "factor"),
     "reset_nodes": _INTEGER,
@@ -88,6 +92,7 @@ SECTIONS: dict[str, Any] = {
 
 _KINDS = ("time", "state", "der", "variable", "parameter", "derived", "input", "discrete", "guard")
 _TYPES = {"Float64": 0, "Enumeration": 1, "Int64": 1}
+_ARRAY = 2
 _RESETS = ("state", "discrete", "value")
 _CODES = {name: code for code, name in enumerate(OPERATIONS)}
 
@@ -174,6 +179,7 @@ def _contents(
         "implicit_names": [text(name) for name in model.implicit],
         "singular_names": [text(", ".join(names[:6])) for names, _ in model.singular],
         "variables": [_variable(one, text) for one in sorted(variables, key=lambda one: one.reference)],
+        "rising": [(*pair, *(text(model.flat_parameters[k].path) for k in pair)) for pair in model.rising],
         "jacobian_to_step": tables.to_step,
         "step_diagonal": tables.diagonal,
     }
@@ -192,7 +198,7 @@ def _events(model: CompiledDae, text: _Text) -> dict[str, Any]:
         path = model.flat_discretes[one.mode].path
         changes = (len(resets), len(one.resets), text(path), text(_notice(path, one.notice)))
         sources = sum(1 << source for source in one.sources)
-        transitions.append((one.mode, one.target, int(one.timed), one.index, *changes, sources))
+        transitions.append((one.mode, one.target, int(one.timed), int(one.fails), one.index, *changes, sources))
         resets += [(_RESETS.index(r.kind), r.index, r.value, r.target, r.factor) for r in one.resets]
     guards = {one.index: k for k, one in enumerate(model.transitions) if not one.timed}
     names = [text(name) for one in model.flat_discretes for name in one.names]
@@ -266,7 +272,10 @@ def _variable(one: FmuVariable, text: _Text) -> tuple[int, ...]:
     kind, index = one.slot
     start = -1 if one.start_entry is None else one.start_entry
     tunable = int(kind == "parameter" and one.variability == "tunable")
-    return (one.reference, _TYPES[one.type], _KINDS.index(kind), index, start, tunable, text(one.name))
+    of_type, count = _TYPES[one.type], len(one.elements)
+    if count:
+        of_type, start = _ARRAY, one.elements[0]
+    return (one.reference, of_type, _KINDS.index(kind), index, start, tunable, text(one.name), count or 1)
 
 
 def _pattern(name: str, one: QrPattern) -> dict[str, Any]:

@@ -46,8 +46,8 @@ LOG_CATEGORIES = {
 """Log categories of every FMU with a description; errors are always reported."""
 
 _FACES = {
-    "2.0": ("fmi2.h", "fmi2.c", "fmi2_values.c"),
-    "3.0": ("fmi3.h", "fmi3.c", "fmi3_values.c", "fmi3_unused.c"),
+    "2.0": ("fmi.h", "fmi2.c"),
+    "3.0": ("fmi.h", "fmi3.c"),
     "native": ("native.h", "native.c", "batch.c"),
 }
 _HEADERS = {
@@ -77,7 +77,8 @@ def runtime_sources(faces: Iterable[Face]) -> dict[str, str]:
 
 def own_sources(faces: Iterable[Face]) -> dict[str, str]:
     """Read the same without the headers of the standard."""
-    names = ("core.h", "model.h", "model_data.c", *RUNTIME, *(name for face in faces for name in _FACES[face]))
+    own = (name for face in faces for name in _FACES[face])
+    names = ("core.h", "model.h", "operations.h", "model_data.c", *RUNTIME, *own)
     return {name: (_TEMPLATES / name).read_text(encoding="utf-8") for name in names}
 
 

@@ -46,6 +46,8 @@ from modelica_like.language.functions import tanh as tanh
 from modelica_like.language.functions import where as where
 from modelica_like.language.hold import UNLIMITED as UNLIMITED
 from modelica_like.language.hold import Hold as Hold
+from modelica_like.language.icon import Icon as Icon
+from modelica_like.language.icon import Stroke as Stroke
 from modelica_like.language.mode import BoundMode as BoundMode
 from modelica_like.language.mode import Mode as Mode
 from modelica_like.language.tables import column as column

@@ -12,7 +12,7 @@ from modelica_like.language.component import Component
 from modelica_like.language.declared import Connector, unknown
 from modelica_like.language.equation import Connection, Equations, FreeEnd, connect, free, series
 from modelica_like.language.expr import Expr, Symbol, symbol_of
-from modelica_like.language.fields import Field, Parameter, Variable, param
+from modelica_like.language.fields import Parameter, Variable, param
 from modelica_like.language.places import NOWHERE, caller
 
 
@@ -22,7 +22,6 @@ class Assembly(Component):
     Wires are kept as text (`"clutch.flange_a"`), as in a netlist; they are resolved when the model is used.
     """
 
-    _own_fields: dict[str, Field]
     _own_connectors: tuple[tuple[str, str], ...]
     _wires: dict[str, tuple[str, ...]]
     _chains: dict[str, tuple[str, ...]]
@@ -54,7 +53,7 @@ class Assembly(Component):
         field.owner, field.name = self.label, name
         field.default = value
         field.read(value)
-        self._own_fields[name] = field
+        self._own_fields = {**self._own_fields, name: field}
 
     def expose(self, name: str, end: str) -> None:
         """Make an inner connector an outer one of the assembly."""
@@ -73,11 +72,6 @@ class Assembly(Component):
         if not self._places and key.startswith("parts."):
             return replace(self._made, text=key)
         return self._places.get(key, NOWHERE)
-
-    @property
-    def fields(self) -> dict[str, Field]:
-        """Declared fields, with the assembly's own parameters."""
-        return {**self._class_fields, **self._own_fields}
 
     @property
     def wires(self) -> dict[str, tuple[str, ...]]:

@@ -7,10 +7,11 @@ from contextlib import contextmanager
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar, cast, dataclass_transform
 
-from modelica_like.errors import DuplicateName, LanguageError, ModelicaLikeError, NetlistError, Source
+from modelica_like.errors import DuplicateName, LanguageError, ModelicaLikeError, NetlistError, Source, did_you_mean
 from modelica_like.language.declared import Connector, Declared, unknown
 from modelica_like.language.expr import TIME, Expr
 from modelica_like.language.fields import Discrete, Field, Input, Output, Parameter, Value, param, require_identifier
+from modelica_like.language.icon import Icon
 from modelica_like.language.mode import Mode
 from modelica_like.language.places import NOWHERE, caller
 from modelica_like.language.tables import REQUIRED, Rows, both_given, frozen_rows, rows
@@ -32,6 +33,7 @@ class Component(Declared):
     inlet: ClassVar[str] = ""
     outlet: ClassVar[str] = ""
     terminal: ClassVar[Terminal | None] = None
+    icon: ClassVar[Icon | None] = None
     _partial: ClassVar[bool] = True
     _class_connectors: ClassVar[dict[str, Connector]] = {}
     _class_parts: ClassVar[dict[str, Component | list[Component]]] = {}
@@ -40,6 +42,7 @@ class Component(Declared):
     _tables: ClassVar[dict[str, Rows]] = {}
     _given_tables: Mapping[str, Any] = {}
     _measured: Mapping[str, str] = {}
+    _own_fields: Mapping[str, Field] = {}
     _class_modes: ClassVar[dict[str, Mode]] = {}
 
     def __init_subclass__(cls, partial: bool = False, **options: Any) -> None:
@@ -86,6 +89,8 @@ class Component(Declared):
         for name, part in self._class_parts.items():
             setattr(self, name, values.pop(name) if name in values and name in self._replaceable else part)
         for name, default in self._structural.items():
+            if name in values and name not in self._tables:
+                self.check_structural(name, values[name])
             self._set_structural(name, values.pop(name, default))
         for name, value in values.items():
             self.give(name, value)
@@ -126,6 +131,11 @@ class Component(Declared):
         return name in self._values or self.fields[name].default is not None
 
     # -- values ------------------------------------------------------------------------------------------------------
+
+    @property
+    def fields(self) -> dict[str, Field]:
+        """Declared fields, and those that this one alone has."""
+        return {**self._class_fields, **self._own_fields} if self._own_fields else self._class_fields
 
     def give(self, name: str, value: Any) -> None:
         """Set a parameter, input, start value, start mode, structural field or replaceable part by name.
@@ -186,10 +196,13 @@ class Component(Declared):
         if type(value) is int and abs(value) > _MOST:
             # It may be a number of parts, which would be made.
             raise NetlistError(f"{cls.__name__}.{name} is larger than {_MOST}; no drive has as many parts.")
+        hint = next(str(_annotated(base)[name]) for base in cls.__mro__ if name in _annotated(base))
+        if hint.startswith("Literal[") and value not in (choices := hint[9:-2].split("', '")):
+            hints = did_you_mean(str(value), choices) or "."
+            raise NetlistError(f"{cls.__name__}.{name} = {value!r} must be {' or '.join(choices)}{hints}")
         wanted = cast("type[object]", type(cls._structural[name]))
         if cls._structural[name] is REQUIRED:
-            hint = next(_annotated(base)[name] for base in cls.__mro__ if name in _annotated(base))
-            wanted = next((kind for kind in _PLAIN if hint in (kind, kind.__name__)), object)
+            wanted = next((kind for kind in _PLAIN if hint == kind.__name__), object)
         if wanted not in _PLAIN or (isinstance(value, wanted) and isinstance(value, bool) == (wanted is bool)):
             return
         if not (wanted is float and isinstance(value, int) and not isinstance(value, bool)):

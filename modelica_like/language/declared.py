@@ -8,6 +8,7 @@ from typing import Any, ClassVar, Self
 from modelica_like.errors import UnknownName, did_you_mean
 from modelica_like.language.expr import Expr
 from modelica_like.language.fields import Field
+from modelica_like.language.icon import Stroke
 
 
 class Declared:
@@ -67,6 +68,9 @@ class Connector(Declared):
         free: it may stay unconnected (its flows are then zero).
         optional: it exists only where something is connected to it.
     """
+
+    stroke: ClassVar[Stroke | None] = None
+    """How its connections are drawn."""
 
     def __init__(self, description: str = "", *, free: bool = False, optional: bool = False) -> None:
         self.description = description

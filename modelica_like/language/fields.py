@@ -142,9 +142,15 @@ class _Symbolic(Field):
 
 
 class Parameter(_Symbolic, Arithmetic):
-    """Constant during a run; tunable, differentiable, an FMU parameter."""
+    """Constant during a run; tunable, differentiable, an FMU parameter.
+
+    Attributes:
+        tunable: whether it can change after compilation.
+        above: it must exceed the parameter that stands so many places before it; 0: none.
+    """
 
     tunable = True
+    above = 0
 
 
 class Variable(_Symbolic):

@@ -9,7 +9,16 @@ from typing import Any, cast
 import casadi as ca
 
 from modelica_like.errors import LanguageError
-from modelica_like.language.expr import TIME, Expr, Scalar, Symbol, flag_name, symbol_of, symbols_in
+from modelica_like.language.expr import (
+    TIME,
+    Expr,
+    Scalar,
+    Symbol,
+    flag_name,
+    is_expression,
+    symbol_of,
+    symbols_in,
+)
 
 
 def _sx(value: Scalar) -> Any:
@@ -139,7 +148,13 @@ def negate(condition: Expr) -> Expr:
     return ca.logic_not(condition)
 
 
-def interpolate(x: Scalar, xs: Sequence[float], ys: Sequence[float], smooth: bool = False) -> Expr:
+BEYOND = ("hold", "linear", "error")
+"""What may be beyond the ends of a table."""
+
+
+def interpolate(
+    x: Scalar, xs: Sequence[float], ys: Sequence[float], smooth: bool = False, extrapolate: str = "linear"
+) -> Expr:
     """Interpolate in a table.
 
     Args:
@@ -148,32 +163,35 @@ def interpolate(x: Scalar, xs: Sequence[float], ys: Sequence[float], smooth: boo
         ys: values at the abscissae.
         smooth: False: piecewise linear. True: continuous slope (cubic Hermite with Fritsch-Carlson slopes, no
             overshoot).
-
-    Beyond the ends the last slope goes on.
+        extrapolate: beyond the ends `hold`: the last value; `linear`: the last slope goes on; `error`: the last value,
+            too: that a run must end there, an event of the component says.
 
     Raises:
-        LanguageError: lengths differ, or `xs` does not increase.
+        LanguageError: lengths differ, `xs` does not increase, or `extrapolate` is none of the three.
     """
-    if len(xs) != len(ys) or not xs or any(b <= a for a, b in itertools.pairwise(xs)):
+    known = not any(is_expression(x) for x in xs)
+    if extrapolate not in BEYOND:
+        raise LanguageError(f"A table has extrapolate = '{extrapolate}', which is not {', '.join(BEYOND)}.")
+    if len(xs) != len(ys) or not xs or (known and any(b <= a for a, b in itertools.pairwise(xs))):
         raise LanguageError(
             f"A table has the abscissae {list(xs)} and the values {list(ys)}.",
             advice="Give both the same length, and let the abscissae increase strictly.",
         )
     if len(xs) == 1:
         return _sx(ys[0])
-    slopes = _monotone_slopes(xs, ys) if smooth else None
-    x = _sx(x)
+    slopes = _monotone_slopes(xs, ys) if smooth and len(xs) > 2 else None
+    x = _sx(x) if extrapolate == "linear" else ca.fmin(ca.fmax(_sx(x), xs[0]), xs[-1])
     pieces = [_piece(x, xs, ys, slopes, k) for k in range(len(xs) - 1)]
     result: Any = pieces[0]
     for start, piece in zip(xs[1:-1], pieces[1:], strict=True):
         result = ca.if_else(x < start, result, piece)
-    if slopes is not None:
+    if slopes is not None and extrapolate == "linear":
         result = ca.if_else(x < xs[0], ys[0] + slopes[0] * (x - xs[0]), result)
         result = ca.if_else(x > xs[-1], ys[-1] + slopes[-1] * (x - xs[-1]), result)
     return result
 
 
-def _piece(x: Any, xs: Sequence[float], ys: Sequence[float], slopes: list[float] | None, k: int) -> Any:
+def _piece(x: Any, xs: Sequence[float], ys: Sequence[float], slopes: list[Any] | None, k: int) -> Any:
     width = xs[k + 1] - xs[k]
     rise = ys[k + 1] - ys[k]
     if slopes is None:
@@ -183,12 +201,17 @@ def _piece(x: Any, xs: Sequence[float], ys: Sequence[float], slopes: list[float]
     return ys[k] + s * (a + s * (3 * rise - 2 * a - b + s * (a + b - 2 * rise)))
 
 
-def _monotone_slopes(xs: Sequence[float], ys: Sequence[float]) -> list[float]:
+def _monotone_slopes(xs: Sequence[float], ys: Sequence[float]) -> list[Any]:
     """Slopes after Fritsch and Butland (1984): the weighted harmonic mean of the neighbouring secants."""
     widths = [b - a for a, b in itertools.pairwise(xs)]
     secants = [(d - c) / h for c, d, h in zip(ys, ys[1:], widths, strict=False)]
-    slopes = [secants[0]]
+    slopes: list[Any] = [secants[0]]
     for (h0, h1), (s0, s1) in zip(itertools.pairwise(widths), itertools.pairwise(secants), strict=True):
         weight0, weight1 = 2 * h1 + h0, h1 + 2 * h0
-        slopes.append(0.0 if s0 * s1 <= 0 else (weight0 + weight1) / (weight0 / s0 + weight1 / s1))
+        mean = _ratio(weight0 + weight1, _ratio(weight0, s0) + _ratio(weight1, s1))
+        slopes.append(where(s0 * s1 > 0, mean, 0.0) if is_expression(mean) else mean if s0 * s1 > 0 else 0.0)
     return [*slopes, secants[-1]]
+
+
+def _ratio(over: Any, under: Any) -> Any:
+    return over / under if is_expression(under) or under else 0.0

@@ -129,12 +129,13 @@ class BoundMode:
 
     def go(
         self, source: str | tuple[str, ...], target: str, *, when: Expr | None = None, at: Scalar | None = None,
-        reset: Mapping[Expr, Scalar] | None = None, notice: str = "",
+        reset: Mapping[Expr, Scalar] | None = None, notice: str = "", fails: bool = False,
     ) -> Transition:  # fmt: skip
         """Declare a transition: a state event (`when`) or a time event (`at`).
 
         With a `notice`, such as "exceeds {w_max} rad/s", the report of a run says that it happened: the name of the
-        component comes first, and values of its parameters stand for their names.
+        component comes first, and values of its parameters stand for their names. With `fails` the run ends there, with
+        the notice as an error.
 
         Raises:
             UnknownName: a mode does not exist.
@@ -146,7 +147,7 @@ class BoundMode:
         if (when is None) == (at is None):
             raise LanguageError(f"{self.mode.label}.go(…, '{target}') needs either `when=` or `at=`.")
         moment = None if at is None else cast(Expr, ca.SX(cast(Any, at)))
-        return Transition(self, sources, target, when, moment, dict(reset or {}), notice=notice)
+        return Transition(self, sources, target, when, moment, dict(reset or {}), notice=notice, fails=fails)
 
     def initially(self, target: str, *, when: Expr) -> StartMode:
         """Declare the mode at the start, if the condition holds there."""

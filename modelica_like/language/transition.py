@@ -50,6 +50,7 @@ class Transition:
         at: time of a time event in s, or None.
         reset: new values of states and discrete values.
         notice: what the user is told when it happens, without the name of the component.
+        fails: the run ends there, with an error.
     """
 
     mode: ModeOf
@@ -60,6 +61,7 @@ class Transition:
     reset: Mapping[Expr, Any]
     source: Source = NOWHERE
     notice: str = ""
+    fails: bool = False
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,6 +15,7 @@ from modelica_like.errors import ValueOutOfRange
 from modelica_like.initialize import StartKind
 from modelica_like.native.buffers import Buffers
 from modelica_like.native.model import Instance
+from modelica_like.simulation import positive_step
 from modelica_like.solve.options import Options
 
 
@@ -37,6 +38,11 @@ class Native:
         start: `given`, `rest` or `steady`; by default as the netlist says.
         rtol: relative tolerance.
         atol: absolute tolerance, in nominal values.
+        fixed_step: step size in s, or a time such as "1 ms", for a bound on the work of every step; steps and the
+            distances of a run's results are whole numbers of it. By default steps are as long as accuracy lets them be.
+
+    Raises:
+        ValueOutOfRange: the fixed step is not a positive time.
 
     Attributes:
         inputs: what the next step sets, shape (inputs,); to be written into.
@@ -46,8 +52,9 @@ class Native:
     def __init__(
         self, model: CompiledDae, inputs: Sequence[str] = (), outputs: Sequence[str] = (), *,
         start: StartKind | None = None, rtol: float = Options.rtol, atol: float | None = None,
+        fixed_step: float | str | None = None,
     ) -> None:  # fmt: skip
-        self._instance = Instance(model, start)
+        self._instance = Instance(model, start, positive_step(fixed_step))
         self._library, self._address = self._instance.library, self._instance.address
         self._tolerances = rtol, rtol / 100 if atol is None else atol
         names = self._instance.native
@@ -95,7 +102,7 @@ class Native:
 
         Raises:
             SolveError: the run cannot go on; `restore` or `reset` helps.
-            ValueOutOfRange: an input cannot be set.
+            ValueOutOfRange: an input cannot be set, or the time is no whole number of fixed steps away.
         """
         code = self._library.step(self._address, time, *self._step)
         if code:

@@ -30,7 +30,7 @@ from modelica_like.native.library import MESSAGE_LENGTH, OK, library
 from modelica_like.solve.options import Options
 
 _ERRORS: tuple[tuple[str, type[ModelicaLikeError]], ...] = (
-    ("The integrator gave up", StepFailed),
+    ("The integrator gave up|The step from", StepFailed),
     ("Modes still switch|Events follow each other", Chattering),
     ("The Jacobian is singular|The derivative of .* is not finite", SingularAtStart),
     ("Two start values|A start value of", ContradictingStart),
@@ -52,6 +52,7 @@ class NativeModel:
     Args:
         model: the compiled model.
         start: what its instances begin from when they find the start themselves; by default as the netlist says.
+        fixed_step: of its instances in s, 0 for steps as long as accuracy lets them be.
 
     Raises:
         MissingStart, ContradictingStart: the start values do not determine all states.
@@ -59,26 +60,26 @@ class NativeModel:
         LanguageError: a function has no counterpart in C.
     """
 
-    def __init__(self, model: CompiledDae, start: StartKind | None = None) -> None:
+    def __init__(self, model: CompiledDae, start: StartKind | None = None, fixed_step: float = 0.0) -> None:
         twin = model.twin(settings={**model.settings, **({"start": start} if start else {})})
-        variables = interface(twin).variables
-        data = model_file(make_tables(twin), variables, "{native}", Options.rtol)
+        face = interface(twin)
+        data = model_file(make_tables(twin, face.start), face.variables, "{native}", Options.rtol, fixed_step)
         self.library = library()
         message = ctypes.create_string_buffer(MESSAGE_LENGTH)
         self.address = self.library.open(data, len(data), message)
         if not self.address:
             raise ModelicaLikeError(message.value.decode())
         weakref.finalize(self, self.library.close, self.address)
-        self.variables = {one.name: one for one in variables}
+        self.variables = {one.name: one for one in face.variables}
         self.name, self.sizes = model.name, (len(model.states), len(model.implicit), model.discrete_size)
 
     @staticmethod
-    def of(model: CompiledDae, start: StartKind | None = None) -> NativeModel:
+    def of(model: CompiledDae, start: StartKind | None = None, fixed_step: float = 0.0) -> NativeModel:
         """Return the one that was made before of the same model, whatever its parameters were."""
-        kind = start or model.settings.get("start", "given")
-        if ("native", kind) not in model._cache:
-            model._cache["native", kind] = NativeModel(model, kind)
-        return model._cache["native", kind]
+        key = "native", start or model.settings.get("start", "given"), fixed_step
+        if key not in model._cache:
+            model._cache[key] = NativeModel(model, *key[1:])
+        return model._cache[key]
 
     def references(self, names: Iterable[str]) -> np.ndarray[Any, np.dtype[np.uint32]]:
         """Return the value references of variables.
@@ -99,11 +100,11 @@ class Instance:
 
     Args:
         model: the compiled model; its parameters and inputs are those of the instance.
-        start: as of `NativeModel`.
+        start, fixed_step: as of `NativeModel`.
     """
 
-    def __init__(self, model: CompiledDae, start: StartKind | None = None) -> None:
-        self.model, self.native = model, NativeModel.of(model, start)
+    def __init__(self, model: CompiledDae, start: StartKind | None = None, fixed_step: float = 0.0) -> None:
+        self.model, self.native = model, NativeModel.of(model, start, fixed_step)
         self.library = self.native.library
         self.address = self.library.new(self.native.address)
         if not self.address:

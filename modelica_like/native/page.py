@@ -101,7 +101,7 @@ def export_html(
     begin = time.perf_counter()
     target = _target(path, ".html", "A page")
     report("compiling the model")
-    model, description, _ = _compiled(drive, (), "flow")
+    model, description, _ = _compiled(drive, (), "flow", ())
     report("simulating")
     end = seconds(until if until is not None else model.settings.get("until"))
     solution = simulate(model, end)
@@ -132,7 +132,7 @@ def _content(model: CompiledDae, names: Sequence[str], until: float, options: Op
     end = _Slider("end time", "", None, "", "s", 1.0, 0.0, until, until / _SPREAD, until * _SPREAD, True)
     units = _Units()
     return {
-        "model": _text(model_file(make_tables(model), variables.variables, "{page}", options.rtol)),
+        "model": _text(model_file(make_tables(model, variables.start), variables.variables, "{page}", options.rtol)),
         "layout": _layout(), "message_length": MESSAGE_LENGTH, "tool": _tool(), "until": until,
         "rtol": options.rtol, "atol": options.atol, "points": options.points, "most_events": options.max_events,
         "sliders": [asdict(end), *(asdict(one) for one in _sliders(model, variables.by_name))],

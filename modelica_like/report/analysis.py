@@ -10,16 +10,16 @@ from rich.console import Group, RenderableType
 from rich.markup import escape
 from rich.table import Table
 
-from modelica_like.analyse.sensitivity.report import SHOWN, relative_text, unit_text
+from modelica_like.analyse.sensitivity.result import COLUMNS, SHOWN
 from modelica_like.report.types import table
 
 if TYPE_CHECKING:
     import xarray
 
-    from modelica_like.analyse.linear.modes import Mode, Modes
+    from modelica_like.analyse.linear.model import Mode, Modes
     from modelica_like.analyse.operating.curves import Curves
     from modelica_like.analyse.operating.steady import OperatingPoint
-    from modelica_like.analyse.sensitivity.derivatives import Sensitivities
+    from modelica_like.analyse.sensitivity.result import Sensitivities
 
 _FAILURES_TOLD = 3
 _SMALL = 1e-9
@@ -94,16 +94,12 @@ def sensitivity_report(result: Sensitivities) -> RenderableType:
     """Return one ranking table per output, the most important parameters first."""
     parts: list[RenderableType] = []
     for output in result.outputs:
-        title = f"{output.name} = {output.value:.9g} {unit_text(output.unit)}".rstrip()
-        rows = [
-            (one.name, f"{one.value:.6g}", unit_text(one.unit), f"{derivative:.6g}", relative_text(relative))
-            for one, derivative, relative in result.ranking(output.name)
-        ]
-        columns = "parameter", "value>", "unit", "derivative>", "relative>"
-        parts += [table(title, *columns, rows=rows, most=SHOWN), ""]
+        title, rows = result.table(output.name)
+        parts += [table(title, *COLUMNS, rows=rows, most=SHOWN), ""]
     parts += [
         f"{escape(name)}: {rows.shape[0]} times, see Sensitivities.series" for name, rows in result.series.items()
     ]
+    parts += [escape(sentence) for sentence in result.notes()]
     parts.append(f"[dim]derivatives in SI units; relative: percent per percent; {result.method} method[/]")
     return Group(*parts)
 

@@ -11,7 +11,7 @@ from rich.table import Table
 
 from modelica_like.language.transition import NAME_IN_NOTICE
 from modelica_like.report.types import table
-from modelica_like.solve.solution import Solution
+from modelica_like.solve.trajectories import Trajectories
 
 if TYPE_CHECKING:
     from modelica_like.cosimulation.solution import CosimSolution
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 _SHOWN = 20
 
 
-def run_report(solution: Solution, *, energy: bool = True) -> RenderableType:
+def run_report(solution: Trajectories, *, energy: bool = True) -> RenderableType:
     """Return events, energy balance and statistics of a run.
 
     Args:
@@ -34,14 +34,14 @@ def run_report(solution: Solution, *, energy: bool = True) -> RenderableType:
     return Group(*parts)
 
 
-def _head(solution: Solution, notices: Iterable[str]) -> list[RenderableType]:
+def _head(solution: Trajectories, notices: Iterable[str]) -> list[RenderableType]:
     span = f"{solution.time[0]:g} s to {solution.time[-1]:g} s"
     parts: list[RenderableType] = [f"[bold]{escape(solution.model.name)}[/]  {span}"]
     parts += ["", events_table(solution)] if solution.events else []
     return parts + [f"[bold]{escape(notice)}[/]" for notice in notices]
 
 
-def events_table(solution: Solution) -> Table:
+def events_table(solution: Trajectories) -> Table:
     """Return the mode changes; of many only the first and the last."""
     rows = [
         (f"{event.time:.9g}", event.mode, event.before, event.after, f"{event.source}".partition(" `")[0])
@@ -52,7 +52,7 @@ def events_table(solution: Solution) -> Table:
     return table(_mode_changes(len(solution.events)), "time in s>", "mode", "from", "to", "because of", rows=rows)
 
 
-def notices(solution: Solution) -> list[str]:
+def notices(solution: Trajectories) -> list[str]:
     """Return what a run and its events have to say: one sentence for each kind of event, with the time of the first."""
     told: dict[tuple[str, str], str] = {}
     for event in solution.events:
@@ -63,7 +63,7 @@ def notices(solution: Solution) -> list[str]:
     return [*solution.notices, *told.values()]
 
 
-def energy_table(solution: Solution) -> Table:
+def energy_table(solution: Trajectories) -> Table:
     """Return the energy balance in J; of many components only those that exchanged most."""
     balance = solution.energy()
     # Where nothing collides there is no column for it.
@@ -84,7 +84,7 @@ def energy_table(solution: Solution) -> Table:
     return made
 
 
-def closure_line(solution: Solution) -> str:
+def closure_line(solution: Trajectories) -> str:
     """Return how well the energy balance closes."""
     balance = solution.energy()
     return f"The energy balance closes to {balance.closure:.1e} of {balance.throughput:.6g} J."
@@ -94,7 +94,7 @@ def _energy(value: float) -> str:
     return f"{value:.4f}" if abs(value) < 1e7 else f"{value:.6g}"
 
 
-def statistics_line(solution: Solution) -> str:
+def statistics_line(solution: Trajectories) -> str:
     """Return steps, evaluations, events and seconds in one sentence."""
     counts = solution.statistics
     return (

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from modelica_like.errors import UnknownName, did_you_mean
 
 if TYPE_CHECKING:
-    from modelica_like.solve.solution import Solution
+    from modelica_like.solve.trajectories import Trajectories
 
 Vector = NDArray[np.float64]
 _Reader = Callable[[Vector, Vector], float]
@@ -37,7 +37,7 @@ READERS: dict[str, _Reader] = {
 """What can be taken from a trajectory: `peak` is the largest absolute value."""
 
 
-def load_of(run: Solution, key: Any, what: str = "peak") -> float:
+def load_of(run: Trajectories, key: Any, what: str = "peak") -> float:
     """Return one number of a trajectory, as the load of a design check.
 
     Args:

@@ -227,6 +227,8 @@ class _Run:
         known = [line.name for line in result.lines()]
         if name not in known:
             raise UnknownName(f"{where}: the result has no line '{name}'{did_you_mean(name, known) or '.'}")
+        if isinstance(value, list) or isinstance(getattr(result, name), str | bool | tuple):
+            raise NetlistError(f"{where}.{name} compares one number with a line that is a number.")
         return self.converter.quantity(unit_of_line(result, name), value, f"{where}.{name}")
 
 

@@ -14,7 +14,7 @@ from modelica_like.errors import UnknownName, ValueOutOfRange, did_you_mean
 from modelica_like.solve.plot import unit_of
 from modelica_like.solve.ranges import ranges
 from modelica_like.solve.recorder import Event
-from modelica_like.solve.solution import Solution
+from modelica_like.solve.trajectories import Trajectories
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -81,8 +81,8 @@ class Curves:
         interpolated: the results lie at different times; the second is interpolated in between, which costs precision.
     """
 
-    first: Solution
-    second: Solution
+    first: Trajectories
+    second: Trajectories
     deviations: tuple[Deviation, ...]
     events: tuple[EventDifference, ...]
     labels: tuple[str, str]
@@ -114,7 +114,7 @@ class Curves:
 
 
 def compare_solutions(
-    first: Solution, second: Solution, signals: Sequence[str], labels: tuple[str, str], least: float = 1e-6
+    first: Trajectories, second: Trajectories, signals: Sequence[str], labels: tuple[str, str], least: float = 1e-6
 ) -> Curves:
     """Compare two solutions by the names of their signals.
 
@@ -143,7 +143,7 @@ def compare_solutions(
     return Curves(first, second, ordered, events, labels, grid.interpolated)
 
 
-def _signals(first: Solution, second: Solution, labels: tuple[str, str], patterns: Sequence[str]) -> list[str]:
+def _signals(first: Trajectories, second: Trajectories, labels: tuple[str, str], patterns: Sequence[str]) -> list[str]:
     common = [name for name in first.names if name in first.model.position and name in second.model.position]
     if not common:
         raise UnknownName(
@@ -171,7 +171,7 @@ def _instants(events: Sequence[Event], start: float, known: set[str]) -> dict[st
     return by_mode
 
 
-def _match_events(first: Solution, second: Solution) -> list[EventDifference]:
+def _match_events(first: Trajectories, second: Trajectories) -> list[EventDifference]:
     """Pair the changes of each mode that both have, in their order."""
     known = set(first.model.discrete_position) & set(second.model.discrete_position)
     ours, theirs = (_instants(run.events, float(run.time[0]), known) for run in (first, second))
@@ -208,7 +208,7 @@ class _Grid:
     interpolated: bool
 
     @classmethod
-    def of(cls, first: Solution, second: Solution, events: Sequence[EventDifference]) -> _Grid:
+    def of(cls, first: Trajectories, second: Trajectories, events: Sequence[EventDifference]) -> _Grid:
         """Take the times that both have, or those of the first where they have few in common."""
         time, other = first.time, second.time
         once = np.flatnonzero(_single(time) & (time >= other[0]) & (time <= other[-1]))
@@ -237,12 +237,12 @@ def _between(times: Vector, events: Sequence[EventDifference]) -> _Marks:
     return inside
 
 
-def _difference(first: Solution, second: Solution, name: str, grid: _Grid) -> Vector:
+def _difference(first: Trajectories, second: Trajectories, name: str, grid: _Grid) -> Vector:
     other = np.interp(grid.times, second.time, second[name]) if grid.interpolated else second[name][grid.partners]
     return other - first[name][grid.rows]
 
 
-def _deviation(first: Solution, second: Solution, name: str, grid: _Grid, scale: float) -> Deviation:
+def _deviation(first: Trajectories, second: Trajectories, name: str, grid: _Grid, scale: float) -> Deviation:
     difference = np.abs(_difference(first, second, name, grid))
     difference = np.where(np.isnan(difference), np.inf, difference)
     k = int(np.argmax(difference))

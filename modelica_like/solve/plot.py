@@ -12,8 +12,8 @@ import numpy as np
 
 from modelica_like.errors import NetlistError, UnknownName, did_you_mean
 from modelica_like.solve.recorder import Event
-from modelica_like.solve.solution import Solution
 from modelica_like.solve.style import COLOURS, STYLE, headline, panels, with_unit
+from modelica_like.solve.trajectories import Trajectories
 from modelica_like.writing import check_writable, write_bytes
 
 if TYPE_CHECKING:
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from modelica_like.compile.compiled import CompiledDae
+    from modelica_like.solve.recorded import RecordedModel
 
 _QUANTITIES = {
     "rad/s": "speed", "N.m": "torque", "m/s": "velocity", "N": "force", "rad": "angle", "m": "position", "W": "power",
@@ -31,7 +32,7 @@ _MOST = 6
 _MOST_EVENTS = 40
 
 
-def plot(solution: Solution, patterns: Sequence[str] = (), *, title: str = "") -> Figure:
+def plot(solution: Trajectories, patterns: Sequence[str] = (), *, title: str = "") -> Figure:
     """Draw trajectories over time, one panel per unit, with events as dotted lines.
 
     Args:
@@ -90,7 +91,7 @@ def save_plot(figure: Figure, path: Path, **options: Any) -> None:
     write_bytes(path, content.getvalue())
 
 
-def chosen(solution: Solution, patterns: Sequence[str]) -> list[str]:
+def chosen(solution: Trajectories, patterns: Sequence[str]) -> list[str]:
     """Return the names that fit the patterns, or a sensible choice if there are none.
 
     Raises:
@@ -99,7 +100,7 @@ def chosen(solution: Solution, patterns: Sequence[str]) -> list[str]:
     return matching(solution.model, patterns) if patterns else _usual(solution)
 
 
-def matching(model: CompiledDae, patterns: Sequence[str]) -> list[str]:
+def matching(model: CompiledDae | RecordedModel, patterns: Sequence[str]) -> list[str]:
     """Return the variables and modes of a model that fit patterns, before it is run.
 
     Raises:
@@ -115,7 +116,7 @@ def matching(model: CompiledDae, patterns: Sequence[str]) -> list[str]:
     return list(names)
 
 
-def _usual(solution: Solution) -> list[str]:
+def _usual(solution: Trajectories) -> list[str]:
     """Choose speeds, torques and forces of parts; curves that coincide are drawn once, and those at rest not at all."""
     names: list[str] = []
     for unit in _USUAL:
@@ -129,7 +130,7 @@ def _usual(solution: Solution) -> list[str]:
     return names
 
 
-def unit_of(solution: Solution, name: str) -> str:
+def unit_of(solution: Trajectories, name: str) -> str:
     """Return the coherent SI unit of a variable; that of a mode is `1`."""
     model = solution.model
     if name in model.position:
@@ -137,14 +138,14 @@ def unit_of(solution: Solution, name: str) -> str:
     return str(model.flat_discretes[model.discrete_position[name]].unit)
 
 
-def _by_unit(solution: Solution, names: Sequence[str]) -> dict[str, list[str]]:
+def _by_unit(solution: Trajectories, names: Sequence[str]) -> dict[str, list[str]]:
     groups: dict[str, list[str]] = {}
     for name in names:
         groups.setdefault(unit_of(solution, name), []).append(name)
     return groups
 
 
-def _draw(axes: Axes, solution: Solution, unit: str, names: Sequence[str]) -> None:
+def _draw(axes: Axes, solution: Trajectories, unit: str, names: Sequence[str]) -> None:
     for k, (name, values) in enumerate(solution.together(*names).items()):
         style = "-" if k < len(COLOURS) else "--"
         axes.plot(solution.time, values, style, label=name, color=COLOURS[k % len(COLOURS)])

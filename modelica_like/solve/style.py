@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -22,6 +24,17 @@ def panels(count: int, height: float) -> tuple[Figure, list[Any]]:
 
     figure = Figure(figsize=(8.0, height), layout="constrained", dpi=150)
     return figure, list(figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0])
+
+
+@contextmanager
+def picture(title: str, count: int, height: float) -> Iterator[tuple[Figure, list[Any]]]:
+    """Give a figure in the house's style, and its panels as `panels` makes them, to be drawn within the context."""
+    import matplotlib as mpl
+
+    with mpl.rc_context(STYLE):
+        figure, rows = panels(count, height)
+        headline(figure, title)
+        yield figure, rows
 
 
 def headline(figure: Figure, text: str) -> None:

@@ -8,6 +8,7 @@ import pytest
 
 from modelica_like import CompiledDae, Options, build, load, sensitivities, simulate, simulation_function
 from modelica_like.analyse.sensitivity.derivatives import Sensitivities
+from modelica_like.errors import NoGradient
 from modelica_like.netlist import loads
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -195,3 +196,17 @@ def test_only_parameters_that_tell_coinciding_events_apart_are_refused() -> None
     netlist = EXAMPLES / "lepelletier.toml"
     result = sensitivities(netlist, ["car.w"], ["motor_torque"], until="4.5 s")
     assert result["car.w", "motor_torque"] > 0.0
+
+
+def test_parameters_on_an_edge_are_refused_by_name_and_left_out_of_all() -> None:
+    # Clutches 2 and 3 are open at the start, without any force: a drag torque or an offset of the force engages them.
+    run = simulate(EXAMPLES / "msl" / "rotational" / "CoupledClutches.toml")
+    on_edge = {"step1.offset", "step2.offset", "clutch2.tau_drag", "clutch3.tau_drag"}
+    everything = sensitivities(run, "clutch1.loss_energy")
+    assert set(everything.left_out) == on_edge
+    assert "step1.offset is left out. No gradient from t = 0 s on: clutch2.mode stays free" in str(everything)
+    known = [one.name for one in everything.parameters]
+    assert not on_edge & set(known)
+    assert relative_error(sensitivities(run, "clutch1.loss_energy", known), everything.derivatives) < 1e-12
+    with pytest.raises(NoGradient, match=r"Leave out clutch2\.tau_drag or move"):
+        sensitivities(run, "clutch1.loss_energy", ["J1.J", "clutch2.tau_drag"])

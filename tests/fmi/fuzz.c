@@ -63,10 +63,9 @@ static void make_right(size_t size) {
 
 /* Everything but integration over time, which garbage can make as long as it likes. */
 static void use(const Model *m) {
-    Instance *c = instance_new(m, "fuzz", m->token, calloc, free, NULL, NULL, NULL, 0);
+    Instance *c = instance_new((Instance){.model = m, .name = "fuzz", .allocate = calloc, .release = free}, m->token);
     double error, *rates, *indicators, value;
     void *copy = NULL;
-    int mode;
     if (c == NULL) return;
     rates = calloc((size_t)m->n_x + 1, sizeof(double));
     indicators = calloc((size_t)m->n_guards + 1, sizeof(double));
@@ -83,7 +82,7 @@ static void use(const Model *m) {
     for (int k = 0; k < m->n_variables; k++) {
         const Variable *v = &m->variables[k];
         double one = 1;
-        if (v->type == TYPE_ENUMERATION) get_mode(c, v->reference, &mode);
+        if (v->type == TYPE_ENUMERATION) get_mode(c, v->reference);
         else get_float(c, v->reference, &value);
         if (k % 7 == 0) directional(c, &v->reference, 1, &v->reference, 1, &one, &value);
         if (k % 7 == 1) adjoint(c, &v->reference, 1, &v->reference, 1, &one, &value);

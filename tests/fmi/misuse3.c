@@ -72,9 +72,8 @@ static fmi3Status update(fmi3Instance c) {
 
 static void refuses_wrong_values(fmi3Instance c) {
     fmi3ValueReference unknown = 4000000000u, state = first_of(KIND_STATE), mode = first_of(KIND_DISCRETE);
-    fmi3ValueReference parameter = first_of(KIND_PARAMETER), rate = first_of(KIND_DERIVATIVE), some[64];
-    size_t count, elements[64];
-    fmi3DependencyKind kinds[64];
+    fmi3ValueReference parameter = first_of(KIND_PARAMETER), rate = first_of(KIND_DERIVATIVE);
+    size_t count;
     double value = 0, nan_value = NAN, two[2];
     fmi3Int64 number = 99;
     REFUSED(fmi3GetFloat64(c, &unknown, 1, &value, 1));
@@ -100,11 +99,8 @@ static void refuses_wrong_values(fmi3Instance c) {
     REFUSED(fmi3GetAdjointDerivative(c, &rate, 1, &state, 1, NULL, 1, &value, 1));
     OK(fmi3GetDirectionalDerivative(c, &rate, 1, &state, 1, &value, 1, &value, 1));
     OK(fmi3GetAdjointDerivative(c, &rate, 1, &state, 1, &value, 1, &value, 1));
-    REFUSED(fmi3GetNumberOfVariableDependencies(c, unknown, &count));
-    REFUSED(fmi3GetNumberOfVariableDependencies(c, rate, NULL));
-    OK(fmi3GetNumberOfVariableDependencies(c, rate, &count));
-    REFUSED(fmi3GetVariableDependencies(c, rate, elements, some, elements, kinds, count + 1));
-    OK(fmi3GetVariableDependencies(c, rate, elements, some, elements, kinds, count));
+    REFUSED(fmi3GetNumberOfVariableDependencies(c, rate, &count));
+    REFUSED(fmi3GetVariableDependencies(c, rate, NULL, NULL, NULL, NULL, 0));
     OK(fmi3GetFloat64(c, NULL, 0, NULL, 0));
     REFUSED(fmi3ActivateModelPartition(c, 0, 0));
 }

@@ -3,6 +3,7 @@
 import ctypes
 import subprocess
 from collections.abc import Callable
+from itertools import accumulate
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +31,10 @@ Model *read_model(void) {
     return model_read((const unsigned char *)model_data, model_data_size, calloc, free, message);
 }
 const Tape *tape(const Model *m, int k) { return (const Tape *)(const void *)&m->tapes + k; }
+
+Instance *made(const Model *m) {
+    return instance_new((Instance){.model = m, .name = "one", .allocate = calloc, .release = free}, m->token);
+}
 """
 TAPES = [name.split(".")[1] for name in SECTIONS if name.startswith("tapes.") and name.endswith(".runs")]
 
@@ -51,11 +56,15 @@ class Inside:
         files = ["inside.c", "model_data.c", *RUNTIME]
         subprocess.run([*command, "-o", "inside.so", *files, "-lm"], cwd=folder, check=True)
         self.library = ctypes.CDLL(str(folder / "inside.so"))
-        for name in ("read_model", "tape", "instance_new"):
+        for name in ("read_model", "tape", "made"):
             getattr(self.library, name).restype = ctypes.c_void_p
         self.read = ctypes.c_void_p(self.library.read_model())
         assert self.read.value
-        self.size = self.tables.slots.results + max(len(t.operations) for t in self.tables.tapes.values())
+        slots = self.tables.slots
+        self.first = dict(zip(ARGUMENTS, accumulate((slots.sizes[n] for n in ARGUMENTS), initial=0), strict=False))
+        self.constants = sum(slots.sizes.values())
+        longest = max(len(t.operations) for t in self.tables.tapes.values())
+        self.size = self.constants + len(slots.constants) + longest
 
     def tape(self, name: str) -> Any:
         return ctypes.c_void_p(self.library.tape(self.read, TAPES.index(name)))
@@ -63,11 +72,8 @@ class Inside:
     def slots(self, arguments: dict[str, np.ndarray]) -> np.ndarray:
         slots = np.zeros(self.size)
         for name, values in arguments.items():
-            first = self.tables.slots.first(name)
-            slots[first : first + len(values)] = values
-        slots[self.tables.slots.first("y") + self.tables.slots.sizes["y"] :][: len(self.tables.slots.constants)] = (
-            self.tables.slots.constants
-        )
+            slots[self.first[name] : self.first[name] + len(values)] = values
+        slots[self.constants :][: len(self.tables.slots.constants)] = self.tables.slots.constants
         return slots
 
     def random(self, seed: int) -> dict[str, np.ndarray]:
@@ -125,7 +131,7 @@ def test_tangents_and_adjoints_are_those_of_casadi(inside, drive):
     code = inside(drive)
     function, everything = rates_function(code)
     jacobian = ca.Function("jacobian", everything, [ca.jacobian(function(*everything), ca.vertcat(*everything))])
-    given = code.tables.slots.first("y")
+    given = code.first["y"]
     count = function.numel_out(0)
     for seed in range(3):
         values = code.random(seed)
@@ -202,9 +208,7 @@ def test_the_integrator_has_order_five_and_dense_output_of_order_four(inside):
     code = inside(Circle())
     library = code.library
     assert code.model.implicit == ("z",)
-    libc = ctypes.CDLL(None)
-    new = library.instance_new(code.read, b"one", b"{t}", libc.calloc, libc.free, None, None, None, 0)
-    c = ctypes.c_void_p(new)
+    c = ctypes.c_void_p(library.made(code.read))
     library.rosenbrock_step.argtypes = [
         ctypes.c_void_p, ctypes.c_double, DOUBLES, ctypes.c_double, ctypes.c_int, ctypes.c_void_p, DOUBLES
     ]  # fmt: skip

@@ -228,7 +228,7 @@ def test_outputs_know_their_inputs() -> None:
     )
     from modelica_like.fmi.export import _compiled
 
-    model, _, _ = _compiled(drive, (), "flow")
+    model, _, _ = _compiled(drive, (), "flow", ())
     faces = interface(model)
     names = [faces.variables[k].name for k in Dependencies(model, faces).continuous(faces.by_name["end.tau"])]
     assert names == ["end.phi", "end.w"]

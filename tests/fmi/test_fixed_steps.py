@@ -156,3 +156,37 @@ def test_what_cannot_be_a_fixed_step_is_refused(tmp_path):
         export_fmu(EXAMPLES / CLUTCHES, tmp_path / "me.fmu", kind="me", fixed_step=STEP)
     with pytest.raises(ValueOutOfRange, match="positive"):
         export_fmu(EXAMPLES / CLUTCHES, tmp_path / "none.fmu", fixed_step=0)
+
+
+# -- handles -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("drive", [CLUTCHES, WINCH])
+def test_a_handle_takes_the_same_steps_as_an_fmu(exported, drive):
+    case, until = exported(drive, "2.0", STEP), 0.4
+    fmu = case.started()
+    expected = go(case, fmu, until, STEP)
+    names = [name for name in case.model.states if name in case.face.by_name]
+    handle = case.model.native(outputs=names, fixed_step="1 ms")
+    handle.reset(until=until)
+    found = np.array([handle.step(k * STEP + STEP).copy() for k in range(len(expected))])
+    assert np.array_equal(found, expected)
+    handle.reset(until=until)
+    times, results = handle.run(until, round(until / (4 * STEP)))
+    assert times[-1] == until
+    assert np.allclose(results[-1], expected[-1], rtol=1e-9, atol=1e-9)  # times are rounded otherwise
+    assert np.all(np.abs(times / STEP - np.round(times / STEP)) < 1e-9)
+
+
+def test_a_handle_of_fixed_steps_refuses_what_is_no_whole_number_of_them(exported):
+    handle = exported(OSCILLATOR).model.native(outputs=["rotor.phi"], fixed_step=STEP)
+    handle.step(STEP)
+    for wrong in (1.5 * STEP, STEP, 0.0):
+        with pytest.raises(ValueOutOfRange, match=r"is not a whole number of fixed steps of 0\.001 s"):
+            handle.step(wrong)
+    with pytest.raises(ValueOutOfRange, match=r"The step of 0\.00333333333 s is not a whole number"):
+        handle.run(STEP + 0.01, 3)
+    assert handle.step(2 * STEP)[0] == pytest.approx(np.cos(4 * STEP), abs=1e-12)
+    for wrong in (0.0, -1.0, float("inf")):
+        with pytest.raises(ValueOutOfRange, match=r"fixed step must be a positive time|must be a finite"):
+            exported(OSCILLATOR).model.native(fixed_step=wrong)

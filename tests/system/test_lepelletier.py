@@ -17,7 +17,7 @@ from components.shift_report import ShiftReport, shift_report
 from components.sizing import lepelletier_gear
 from modelica_like import Assembly, CompiledDae, Solution, build, simulate
 from modelica_like.netlist import load
-from modelica_like.solve.solution import Values
+from modelica_like.solve.trajectories import Values
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 NETLIST, GEARS = EXAMPLES / "lepelletier.toml", EXAMPLES / "lepelletier_gears.toml"
@@ -258,6 +258,19 @@ def test_torques_of_the_shifts(report: ShiftReport) -> None:
     for row in report.shifts:
         assert 0 < row.torque <= CAPACITY[row.element] * (1 + 1e-9)
         assert 0 < row.slipping < 1.5
+
+
+def test_a_report_needs_no_close_results(model: CompiledDae, report: ShiftReport) -> None:
+    """What opens slips first where it breaks away: with its capacity times the pressure that falls there in 0.8 s."""
+    run = simulate(model)
+    coarse = shift_report(run)
+    for ours, theirs in zip(coarse.shifts, report.shifts, strict=True):
+        assert (ours.element, ours.slipping) == (theirs.element, pytest.approx(theirs.slipping, rel=1e-4))
+        assert ours.work == pytest.approx(theirs.work, rel=1e-4, abs=1e-7 * report.work)
+        assert ours.torque == pytest.approx(theirs.torque, rel=1e-4)
+    opening = next(row for row in coarse.shifts if row.element == "brake_d")
+    begins = next(one.time for one in run.events if (one.mode, one.before) == ("box.brake_d.mode", "stuck"))
+    assert opening.torque == pytest.approx(900.0 * (1 - (begins - 3.2) / 0.8), rel=1e-9)
 
 
 def test_launch_work_exceeds_what_the_car_gets(report: ShiftReport, run: Solution) -> None:

@@ -16,10 +16,10 @@ from modelica_like.errors import (
     SolveError,
     UnknownName,
     ValueOutOfRange,
-    missing_extra,
+    extra_module,
 )
 from modelica_like.simulation import Model, build
-from modelica_like.units import coherent, to_si
+from modelica_like.units import to_si
 
 __all__ = ["Calibration", "Numbers", "OperatingPoints", "Trajectories", "calibrate"]
 
@@ -155,12 +155,11 @@ class _Problem:
         self, model: CompiledDae, data: Sequence[Measurement], parameters: Mapping[str, tuple[Any, Any]]
     ) -> None:
         self.model, self.data, self.names = model, data, tuple(parameters)
-        units = {one.path: coherent(one.unit) for one in model.flat_parameters}
         for name in self.names:
             # Tells what is wrong with a name.
             model.with_parameters({name: parameters[name][0]})
-        self.units = tuple(str(units[name]) for name in self.names)
-        bounds = np.array([[to_si(v, units[name], name) for v in parameters[name]] for name in self.names])
+        self.units = tuple(str(model.units[name]) for name in self.names)
+        bounds = np.array([[to_si(v, model.units[name], name) for v in parameters[name]] for name in self.names])
         self.low, self.high = bounds.T
         for name, low, high in zip(self.names, self.low, self.high, strict=True):
             if not low < high:
@@ -181,13 +180,8 @@ class _Problem:
 
     def solve(self, begin: Matrix) -> Any:
         """Run the least-squares solver from one start."""
-        try:
-            from scipy.optimize import least_squares
-        except ImportError:
-            raise missing_extra("scipy", "analyse") from None
-        slopes: Any = lambda q: self.evaluate(q)[1]  # noqa: E731 - scipy's stubs know names only
-        return least_squares(
-            lambda q: self.evaluate(q)[0], begin, slopes, bounds=(0.0, 1.0), x_scale="jac",
+        return extra_module("scipy.optimize", "analyse").least_squares(
+            lambda q: self.evaluate(q)[0], begin, lambda q: self.evaluate(q)[1], bounds=(0.0, 1.0), x_scale="jac",
             ftol=1e-14, xtol=1e-12, gtol=1e-12,
         )  # fmt: skip
 

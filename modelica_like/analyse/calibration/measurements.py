@@ -16,7 +16,7 @@ from modelica_like.analyse.sensitivity.outputs import read_output
 from modelica_like.analyse.sensitivity.runs import quick_run
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import NetlistError, UnknownName, ValueOutOfRange, did_you_mean
-from modelica_like.units import Unit, coherent, parse_unit, to_si
+from modelica_like.units import Unit, parse_unit, to_si
 
 Matrix = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -194,10 +194,10 @@ def _in_si(model: CompiledDae, columns: Columns) -> dict[str, Matrix]:
 
 
 def _unit(model: CompiledDae, name: str) -> Unit:
-    known = {one.path: one.unit for one in (*model.flat_variables, *model.flat_parameters)}
-    if name not in known:
-        raise UnknownName(f"{model.name} has no variable or parameter '{name}'{did_you_mean(name, known) or '.'}")
-    return coherent(known[name])
+    if name not in model.units:
+        near = did_you_mean(name, model.units)
+        raise UnknownName(f"{model.name} has no variable or parameter '{name}'{near or '.'}")
+    return model.units[name]
 
 
 def _column_uncertainty(model: CompiledDae, stated: Mapping[str, Any], name: str, values: Iterable[float]) -> float:

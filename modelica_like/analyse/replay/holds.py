@@ -37,10 +37,10 @@ def impact(model: CompiledDae, point: Point, struck: Sequence[int], total: Total
         return _response(model, struck, ca.SX(0, 1) if w is None else w)
 
     if not model.implicit:
-        return total(name, make)[1]
+        return total(name, None, make)[1]
     ode_z, alg_z, _ = _by_implicit(model, point)
-    follow = -np.linalg.solve(alg_z, total(name, make, np.zeros(len(alg_z)))[0][nx:])
-    slope = total(name, make, follow)[1]
+    follow = -np.linalg.solve(alg_z, total(name, None, make, np.zeros(len(alg_z)))[0][nx:])
+    slope = total(name, None, make, follow)[1]
     return slope[:nx] - ode_z @ np.linalg.solve(alg_z, slope[nx:])
 
 
@@ -124,10 +124,10 @@ def _turned(model: CompiledDae, point: Point, members: list[int], own: int, free
 
     if nz:
         _, alg_z, alg_x = _by_implicit(model, point)
-        weights[len(parts) :] = np.linalg.solve(alg_z.T, total(name, make, weights)[0][nx:])
-        slope = total(name, make, weights)[1]
+        weights[len(parts) :] = np.linalg.solve(alg_z.T, total(name, None, make, weights)[0][nx:])
+        slope = total(name, None, make, weights)[1]
         turned = slope[:nx] - alg_x.T @ np.linalg.solve(alg_z.T, slope[nx:])
     else:
-        turned = total(name, make, weights)[1]
+        turned = total(name, None, make, weights)[1]
     change = np.linalg.lstsq(motions[free].T, turned, rcond=None)[0]
     return np.asarray(-change / parts[free, None], np.float64)

@@ -49,28 +49,16 @@ typedef struct {
     int failed, sampled, in_steps;
 } Batch;
 
-/* All variables that are asked for, at a point whose implicit unknowns are nearly solved. */
-static const double *variables_at(Batch *b, double t, double *point) {
-    Instance *c = b->c;
-    double *z = point + c->model->n_x;
-    if (solve_implicit(c, t, point, z, 1) != RESULT_OK) b->failed = 1;
-    c->variables_valid = 0;
-    evaluate_special(c, SPECIAL_VARIABLES, t, point, z, c->work.variables);
-    return c->work.variables;
-}
-
-static const double *variables_in_piece(Batch *b, double t) {
-    double *point = b->c->work.vector + b->c->model->n_z;
-    piece_at(b->c->model, b->c->piece, t, point);
-    return variables_at(b, t, point);
-}
-
-static const double *variables_now(Batch *b) {
+/* All variables that are asked for, now or at a time within the step that has just been taken. */
+static const double *variables_at(Batch *b, double t, int now) {
     Instance *c = b->c;
     double *point = c->work.vector + c->model->n_z;
-    memcpy(point, c->x, (size_t)c->model->n_x * sizeof(double));
-    memcpy(point + c->model->n_x, c->z, (size_t)c->model->n_z * sizeof(double));
-    return variables_at(b, c->state.t, point);
+    if (now) memcpy(point, c->x, (size_t)c->model->n_unknowns * sizeof(double));
+    else piece_at(c->model, c->piece, t, point);
+    if (solve_implicit(c, t, point, 1) != RESULT_OK) b->failed = 1;
+    c->variables_valid = 0;
+    evaluate_special(c, SPECIAL_VARIABLES, t, point, c->work.variables);
+    return c->work.variables;
 }
 
 /* Takes a result. */
@@ -92,7 +80,7 @@ static void read_moments(Batch *b, double begin, double end) {
     for (int64_t k = 0; k < b->asked->n_readings; k++) {
         const Reading *one = &b->asked->readings[k];
         if (one->kind != READ_AT || !(one->moment >= begin && one->moment < end)) continue;
-        b->values[k] = variables_in_piece(b, one->moment)[one->place];
+        b->values[k] = variables_at(b, one->moment, 0)[one->place];
     }
 }
 
@@ -100,7 +88,7 @@ static void read_moments(Batch *b, double begin, double end) {
 static void add_work(Batch *b, double begin, double end) {
     static const double places[] = {-0.7745966692414834, 0, 0.7745966692414834}, weights[] = {5, 8, 5};
     for (int g = 0; g < 3; g++) {
-        const double *variables = variables_in_piece(b, 0.5 * (begin + end) + 0.5 * (end - begin) * places[g]);
+        const double *variables = variables_at(b, 0.5 * (begin + end) + 0.5 * (end - begin) * places[g], 0);
         for (int64_t k = 0; k < b->asked->n_readings; k++)
             if (b->asked->readings[k].kind == READ_WORK)
                 b->values[k] += weights[g] / 18 * (end - begin) * variables[b->asked->readings[k].place];
@@ -114,7 +102,7 @@ static void read_piece(Batch *b) {
     for (; b->sampled && b->next < a->results; b->next++) {
         double t = a->start + (a->end - a->start) * ((double)b->next / (double)a->results);
         if (t >= end) break;
-        if (t > begin) take_result(b, t, variables_in_piece(b, t));
+        if (t > begin) take_result(b, t, variables_at(b, t, 0));
     }
     if (b->in_steps & 1 << READ_AT) read_moments(b, begin, end);
     if (b->in_steps & 1 << READ_WORK) add_work(b, begin, end);
@@ -207,13 +195,13 @@ static int run_to_end(Batch *b) {
                 case REACHED:
                     if (s->t < b->asked->end) continue;
             }
-        if (b->sampled) take_result(b, s->t, variables_now(b));
+        if (b->sampled) take_result(b, s->t, variables_at(b, b->c->state.t, 1));
     }
     return !b->failed;
 }
 
 static void read_end(Batch *b) {
-    const double *variables = variables_now(b);
+    const double *variables = variables_at(b, b->c->state.t, 1);
     for (int64_t k = 0; k < b->asked->n_readings; k++) {
         const Reading *one = &b->asked->readings[k];
         if (one->kind == READ_END || (one->kind == READ_AT && one->moment >= b->asked->end))
@@ -224,12 +212,17 @@ static void read_end(Batch *b) {
 static int begin_batch(Batch *b, const Model *m) {
     const NativeBatch *a = b->asked;
     b->kept = calloc((size_t)a->n_readings + 1, sizeof(double));
-    b->c = instance_new(m, "batch", m->token, calloc, free, NULL, NULL, b, 0);
+    b->c = instance_new((Instance){.model = m,
+                            .name = "batch",
+                            .environment = b,
+                            .co_simulation = 1,
+                            .allocate = calloc,
+                            .release = free,
+                            .noted = count_change,
+                            .struck = add_impact,
+                            .step_finished = after_step},
+        m->token);
     if (b->kept == NULL || b->c == NULL) return 0;
-    b->c->co_simulation = 1;
-    b->c->noted = count_change;
-    b->c->struck = add_impact;
-    b->c->step_finished = after_step;
     for (int64_t k = 0; k < a->n_readings; k++) {
         int kind = a->readings[k].kind;
         b->in_steps |= 1 << kind;

@@ -149,15 +149,15 @@ typedef struct Instance {
     State state;
     double *numbers; /* the rest of the state: the arrays that follow */
     size_t n_numbers;
-    double *x, *z, *p, *u, *d;
-    double *u_rate; /* inputs are u + u_rate * (t - u_time) */
+    double *x, *z, *p, *u, *d; /* z stands behind x: together they are a point */
+    double *u_rate;            /* inputs are u + u_rate * (t - u_time) */
     double *start_value;
     unsigned char *start_given, *mode_given;
     unsigned char *wanting; /* transitions that fire at the end of the piece */
     Piece *piece;
     double *end_look; /* guards and their rates at the end of the last fixed step */
     Work work;
-    char *name;
+    const char *name;
     void *environment;
     AnyFunction logger, intermediate_update;
     LogFunction log;
@@ -178,10 +178,12 @@ typedef struct Instance {
 } Instance;
 
 /* tape.c */
+/* What does not count is not multiplied: an inactive branch may be infinite. */
+static inline double product(double a, double b) { return a == 0 || b == 0 ? 0 : a * b; }
 void tape_run(const Tape *tape, double *slots, double *outputs);
 void tape_tangent(const Tape *tape, const double *slots, double *dots, double *output_dots);
 void tape_adjoint(const Tape *tape, const double *slots, double *bars, const double *output_bars);
-void tape_reaches(const Tape *tape, double *marks, const double *output_marks);
+void slopes(int operation, double a, double b, double f, double *by_left, double *by_right);
 
 /* linear.c */
 int qr_factor(const QrPattern *pattern, const double *values, Work *work);
@@ -196,13 +198,18 @@ void keeping_least_squares(int n, int states, double *a, double *turns, double *
 /* special.c */
 const Tape *full_tape(const Model *m, SpecialTape which);
 void run_special(Instance *c, SpecialTape which, double *outputs);
-void evaluate_special(Instance *c, SpecialTape which, double t, const double *x, const double *z, double *outputs);
+void evaluate_special(Instance *c, SpecialTape which, double t, const double *point, double *outputs);
 void ask_for(Instance *c, int node);
 
 /* point.c */
-void load(Instance *c, double t, const double *x, const double *z);
-void evaluate(Instance *c, const Tape *tape, double t, const double *x, const double *z, double *outputs);
-Result solve_implicit(Instance *c, double t, const double *x, double *z, int quiet);
+void load(Instance *c, double t, const double *point);
+void evaluate(Instance *c, const Tape *tape, double t, const double *point, double *outputs);
+void evaluate_now(Instance *c, const Tape *tape, double *outputs); /* at the present point */
+const double *variables_now(Instance *c);
+double largest_of(int n, const double *values);
+int any_of(const unsigned char *marks, int n);
+Result solve_implicit(Instance *c, double t, double *point, int quiet);
+Result solve_now(Instance *c, int quiet);
 Result check_singular(Instance *c);
 Result settle(Instance *c);
 double input_at(const Instance *c, int k, double t);
@@ -215,8 +222,8 @@ void choose_modes(Instance *c, unsigned char *decided);
 /* holds.c */
 #define UNLIMITED 1e30
 #define ROUNDING 1e-10 /* relative size of a motion that is nothing but rounding */
-void hold_terms(Instance *c, Terms *terms);
-void mark_held(Instance *c, const Terms *terms, unsigned char *held);
+void mark_held(const Instance *c, const Terms *terms, unsigned char *held);
+void find_held(Instance *c, Terms *terms, unsigned char *held);
 double largest_like(const Model *m, const double *values, int node);
 int anything_shared(const Instance *c);
 void share(Instance *c);
@@ -251,6 +258,7 @@ typedef enum { REACHED, AT_EVENT, FAILED } Arrival;
 Arrival integrate_to(Instance *c, double target, int stop_at_events);
 void leave_piece(Instance *c);
 Result handle_event(Instance *c);
+Result check_whole(Instance *c, double size);
 Result check_step(Instance *c, double point, double size, double *target);
 double cubic_guess(double g0, double r0, double g1, double r1);
 Result move_to(Instance *c, double t);
@@ -264,13 +272,14 @@ Arrival step_fixed(Instance *c, double target);
 const Variable *find_variable(const Model *m, uint32_t reference);
 const Variable *known_variable(Instance *c, uint32_t reference, ValueType type);
 Result get_float(Instance *c, uint32_t reference, double *value);
-Result get_mode(Instance *c, uint32_t reference, int *value);
+int get_mode(Instance *c, uint32_t reference);
 Result set_float(Instance *c, uint32_t reference, double value);
 Result set_mode(Instance *c, uint32_t reference, int64_t value);
 Result set_input_rate(Instance *c, uint32_t reference, double rate);
 Result set_time(Instance *c, double time);
 Result set_states(Instance *c, const double *x);
 Result make_consistent(Instance *c);
+Result check_tables(Instance *c);
 void get_derivatives(Instance *c, double *derivatives);
 void get_indicators(Instance *c, double *indicators);
 
@@ -281,16 +290,13 @@ Result adjoint(Instance *c, const uint32_t *unknowns, size_t n_unknowns, const u
     const double *seed, double *result);
 void slope_of_node(Instance *c, int node, int again, double *by_state);
 Result factor_implicit(Instance *c, int *order);
-size_t dependencies(Instance *c, uint32_t unknown, uint32_t *knowns, size_t capacity, Result *result);
 
 /* taylor.c */
 Result output_rate(Instance *c, uint32_t reference, int order, double *value);
 
 /* instance.c */
-Instance *instance_new(const Model *model, const char *name, const char *token, Allocate allocate, Release release,
-    LogFunction log, AnyFunction logger, void *environment, int logging);
-Instance *instance_open(const char *location, const char *name, const char *token, Allocate allocate, Release release,
-    LogFunction log, AnyFunction logger, void *environment, int logging);
+Instance *instance_new(Instance bare, const char *token);
+Instance *instance_open(Instance bare, const char *token, const char *location);
 void instance_free(Instance *c);
 void instance_reset(Instance *c);
 Result set_experiment(
@@ -302,6 +308,7 @@ size_t state_size(const Instance *c);
 Result state_write(Instance *c, const void *copy, unsigned char *bytes, size_t size);
 Result state_read(Instance *c, const unsigned char *bytes, size_t size, void **copy);
 Result report(Instance *c, LogCategory category, Result result, const char *format, ...);
+#define fail(c, ...) report(c, LOG_ERROR, RESULT_ERROR, __VA_ARGS__)
 Result set_log_category(Instance *c, const char *category, int on);
 Result allowed(Instance *c, const char *function, int phases);
 

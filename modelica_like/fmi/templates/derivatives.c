@@ -26,8 +26,7 @@ static Result check_knowns(Instance *c, const uint32_t *knowns, size_t n) {
         const Variable *v = known_variable(c, knowns[k], TYPE_FLOAT64);
         if (v == NULL) return RESULT_ERROR;
         if (is_start(c, v) ? v->start < 0 || v->start >= m->n_starts : known_slot(m, v) < 0)
-            return report(c, LOG_ERROR, RESULT_ERROR, "Derivatives by %s are not available: it is neither %s.",
-                text_of(m, v->name),
+            return fail(c, "Derivatives by %s are not available: it is neither %s.", text_of(m, v->name),
                 is_start(c, v) ? "a start value, input nor parameter" : "state, input nor parameter");
     }
     return RESULT_OK;
@@ -38,8 +37,7 @@ static Result check_unknowns(Instance *c, const uint32_t *unknowns, size_t n) {
         const Variable *v = known_variable(c, unknowns[k], TYPE_FLOAT64);
         if (v == NULL) return RESULT_ERROR;
         if (v->kind == KIND_DISCRETE)
-            return report(c, LOG_ERROR, RESULT_ERROR, "%s changes at events only: it has no derivatives.",
-                text_of(c->model, v->name));
+            return fail(c, "%s changes at events only: it has no derivatives.", text_of(c->model, v->name));
     }
     return RESULT_OK;
 }
@@ -49,9 +47,9 @@ Result factor_implicit(Instance *c, int *order) {
     const Model *m = c->model;
     State *s = &c->state;
     if (settle(c) != RESULT_OK) return RESULT_ERROR;
-    evaluate(c, &m->tapes.alg_jacobian, s->t, c->x, c->z, c->work.dense_matrix);
+    evaluate_now(c, &m->tapes.alg_jacobian, c->work.dense_matrix);
     if (!lu_factor(m->n_z, c->work.dense_matrix, order))
-        return report(c, LOG_ERROR, RESULT_ERROR, "The implicit equations are singular at t = %.9g s.", s->t);
+        return fail(c, "The implicit equations are singular at t = %.9g s.", s->t);
     return RESULT_OK;
 }
 
@@ -60,10 +58,9 @@ static void tangent_of_implicit(Instance *c, const int *order) {
     const Model *m = c->model;
     Work *w = &c->work;
     double *dots = w->dots;
-    State *s = &c->state;
     if (m->n_z == 0) return;
     memset(dots + m->slot_z, 0, m->n_z * sizeof(double));
-    evaluate(c, &m->tapes.alg, s->t, c->x, c->z, w->vector);
+    evaluate_now(c, &m->tapes.alg, w->vector);
     tape_tangent(&m->tapes.alg, w->slots, dots, w->vector);
     lu_solve(m->n_z, w->dense_matrix, order, w->vector);
     for (int k = 0; k < m->n_z; k++) dots[m->slot_z + k] = -w->vector[k];
@@ -83,11 +80,10 @@ static Result start_system_tangent(Instance *c, const double *start_dots) {
     Work *w = &c->work;
     State *s = &c->state;
     double *step = w->start_unknowns;
-    evaluate(c, &m->tapes.start_system, s->t, c->x, c->z, w->start_residual);
+    evaluate_now(c, &m->tapes.start_system, w->start_residual);
     tape_run(&m->tapes.start_jacobian, w->slots, w->jacobian);
-    if (!qr_factor(&m->start, w->jacobian, w))
-        return report(c, LOG_ERROR, RESULT_ERROR, "The start equations are singular at t = %.9g s.", s->t);
-    evaluate(c, &m->tapes.start_system, s->t, c->x, c->z, w->start_residual);
+    if (!qr_factor(&m->start, w->jacobian, w)) return fail(c, "The start equations are singular at t = %.9g s.", s->t);
+    evaluate_now(c, &m->tapes.start_system, w->start_residual);
     tape_tangent(&m->tapes.start_system, w->slots, w->dots, w->start_residual);
     for (int k = 0; k < m->n_start_unknowns; k++) {
         int start = m->start_rows[k].start;
@@ -108,14 +104,14 @@ static Result start_tangent(Instance *c, const uint32_t *knowns, size_t n, const
     s->solved = 0;
     if (start_solve(c) != RESULT_OK) return RESULT_ERROR;
     if (m->settings->steady || anything_shared(c))
-        return report(c, LOG_ERROR, RESULT_ERROR,
-            "A steady start, and one at which parts share a load, have derivatives after the initialization only.");
+        return fail(
+            c, "A steady start, and one at which parts share a load, have derivatives after the initialization only.");
     memset(dots, 0, m->slot_results * sizeof(double));
     seed_knowns(c, knowns, n, seed);
-    evaluate(c, &m->tapes.discrete_starts, s->t, c->x, c->z, w->guards);
+    evaluate_now(c, &m->tapes.discrete_starts, w->guards);
     tape_tangent(&m->tapes.discrete_starts, w->slots, dots, w->guards);
     for (int k = 0; k < m->n_d; k++) dots[m->slot_d + k] = c->mode_given[k] ? 0 : w->guards[k];
-    evaluate(c, &m->tapes.start_values, s->t, c->x, c->z, starts);
+    evaluate_now(c, &m->tapes.start_values, starts);
     tape_tangent(&m->tapes.start_values, w->slots, dots, starts);
     for (int k = 0; k < m->n_starts; k++) starts[k] = c->start_given[k] ? 0 : starts[k];
     for (size_t k = 0; k < n; k++) {
@@ -127,38 +123,49 @@ static Result start_tangent(Instance *c, const uint32_t *knowns, size_t n, const
     return m->n_start_unknowns > 0 ? start_system_tangent(c, starts) : RESULT_OK;
 }
 
+/* Kinds of variables whose values a tape gives. */
+static const Kind given[] = {KIND_DERIVATIVE, KIND_VARIABLE, KIND_DERIVED, KIND_GUARD};
+enum { N_GIVEN = sizeof given / sizeof given[0] };
+
+static const Tape *tape_of(const Model *m, int kind) {
+    if (kind == KIND_DERIVATIVE) return &m->tapes.rates;
+    if (kind == KIND_VARIABLE) return &m->tapes.variables;
+    return kind == KIND_DERIVED ? &m->tapes.derived : &m->tapes.guards;
+}
+
+/* Room for the results of such a tape; NULL: no tape gives this kind. */
+static double *room_of(const Work *w, int kind) {
+    switch (kind) {
+        case KIND_DERIVATIVE: return w->rhs;
+        case KIND_VARIABLE: return w->variables;
+        case KIND_DERIVED: return w->guards;
+        case KIND_GUARD: return w->guards_before;
+        default: return NULL;
+    }
+}
+
 Result directional(Instance *c, const uint32_t *unknowns, size_t n_unknowns, const uint32_t *knowns, size_t n_knowns,
     const double *seed, double *result) {
     const Model *m = c->model;
     Work *w = &c->work;
-    State *s = &c->state;
-    int *order = c->work.order;
     if (check_unknowns(c, unknowns, n_unknowns) != RESULT_OK || check_knowns(c, knowns, n_knowns) != RESULT_OK)
         return RESULT_ERROR;
-    if (s->phase != PHASE_INITIALIZATION) {
+    if (c->state.phase != PHASE_INITIALIZATION) {
         memset(w->dots, 0, m->slot_results * sizeof(double));
         seed_knowns(c, knowns, n_knowns, seed);
     } else if (start_tangent(c, knowns, n_knowns, seed) != RESULT_OK) return RESULT_ERROR;
-    if (factor_implicit(c, order) != RESULT_OK) return RESULT_ERROR;
-    tangent_of_implicit(c, order);
-    evaluate(c, &m->tapes.rates, s->t, c->x, c->z, w->rhs);
-    tape_tangent(&m->tapes.rates, w->slots, w->dots, w->rhs);
+    if (factor_implicit(c, w->order) != RESULT_OK) return RESULT_ERROR;
+    tangent_of_implicit(c, w->order);
     c->variables_valid = 0;
-    evaluate(c, &m->tapes.variables, s->t, c->x, c->z, w->variables);
-    tape_tangent(&m->tapes.variables, w->slots, w->dots, w->variables);
-    evaluate(c, &m->tapes.derived, s->t, c->x, c->z, w->guards);
-    tape_tangent(&m->tapes.derived, w->slots, w->dots, w->guards);
-    evaluate(c, &m->tapes.guards, s->t, c->x, c->z, w->guards_before);
-    tape_tangent(&m->tapes.guards, w->slots, w->dots, w->guards_before);
+    for (int k = 0; k < N_GIVEN; k++) {
+        evaluate_now(c, tape_of(m, given[k]), room_of(w, given[k]));
+        tape_tangent(tape_of(m, given[k]), w->slots, w->dots, room_of(w, given[k]));
+    }
     for (size_t k = 0; k < n_unknowns; k++) {
         const Variable *v = find_variable(m, unknowns[k]);
-        switch (v->kind) {
-            case KIND_DERIVATIVE: result[k] = w->rhs[v->index]; break;
-            case KIND_VARIABLE: result[k] = w->variables[v->index]; break;
-            case KIND_DERIVED: result[k] = w->guards[v->index]; break;
-            case KIND_GUARD: result[k] = guard_active(c, v->index) ? w->guards_before[v->index] : 0; break;
-            default: result[k] = w->dots[known_slot(m, v)];
-        }
+        const double *room = room_of(w, v->kind);
+        if (v->kind == KIND_GUARD && !guard_active(c, v->index)) result[k] = 0;
+        else result[k] = room == NULL ? w->dots[known_slot(m, v)] : room[v->index];
     }
     return RESULT_OK;
 }
@@ -167,18 +174,17 @@ Result directional(Instance *c, const uint32_t *unknowns, size_t n_unknowns, con
 static void adjoint_of_implicit(Instance *c, const int *order) {
     const Model *m = c->model;
     Work *w = &c->work;
-    State *s = &c->state;
     double *residual = w->residual;
     if (m->n_z == 0) return;
     for (int k = 0; k < m->n_z; k++) w->vector[k] = -w->dots[m->slot_z + k];
     if (order != NULL) lu_solve_transposed(m->n_z, w->dense_matrix, order, w->vector);
     else {
         memcpy(residual, w->vector, m->n_z * sizeof(double));
-        evaluate(c, &m->tapes.alg_jacobian, s->t, c->x, c->z, w->dense_matrix);
+        evaluate_now(c, &m->tapes.alg_jacobian, w->dense_matrix);
         least_squares(m->n_z, m->n_z, w->dense_matrix, residual, w->vector);
     }
     memset(w->dots + m->slot_z, 0, m->n_z * sizeof(double));
-    evaluate(c, &m->tapes.alg, s->t, c->x, c->z, residual);
+    evaluate_now(c, &m->tapes.alg, residual);
     tape_adjoint(&m->tapes.alg, w->slots, w->dots, w->vector);
 }
 
@@ -186,7 +192,6 @@ Result adjoint(Instance *c, const uint32_t *unknowns, size_t n_unknowns, const u
     const double *seed, double *result) {
     const Model *m = c->model;
     Work *w = &c->work;
-    State *s = &c->state;
     int *order = c->work.order;
     if (check_unknowns(c, unknowns, n_unknowns) != RESULT_OK || check_knowns(c, knowns, n_knowns) != RESULT_OK)
         return RESULT_ERROR;
@@ -197,26 +202,17 @@ Result adjoint(Instance *c, const uint32_t *unknowns, size_t n_unknowns, const u
         if (slot >= 0) w->dots[slot] += seed[k];
     }
     c->variables_valid = 0;
-    for (int pass = 0; pass < 4; pass++) {
-        const struct {
-            const Tape *tape;
-            Kind kind;
-            double *outputs;
-        } of[] = {
-            {&m->tapes.rates, KIND_DERIVATIVE, w->rhs},
-            {&m->tapes.variables, KIND_VARIABLE, w->variables},
-            {&m->tapes.derived, KIND_DERIVED, w->guards},
-            {&m->tapes.guards, KIND_GUARD, w->guards_before},
-        };
-        double *bars = of[pass].outputs;
-        evaluate(c, of[pass].tape, s->t, c->x, c->z, bars);
-        memset(bars, 0, (size_t)of[pass].tape->n_outputs * sizeof(double));
+    for (int kind = 0; kind < N_GIVEN; kind++) {
+        const Tape *tape = tape_of(m, given[kind]);
+        double *bars = room_of(w, given[kind]);
+        evaluate_now(c, tape, bars);
+        memset(bars, 0, (size_t)tape->n_outputs * sizeof(double));
         for (size_t k = 0; k < n_unknowns; k++) {
             const Variable *v = find_variable(m, unknowns[k]);
-            if (v->kind == (int)of[pass].kind && (v->kind != KIND_GUARD || guard_active(c, v->index)))
+            if (v->kind == (int)given[kind] && (v->kind != KIND_GUARD || guard_active(c, v->index)))
                 bars[v->index] += seed[k];
         }
-        tape_adjoint(of[pass].tape, w->slots, w->dots, bars);
+        tape_adjoint(tape, w->slots, w->dots, bars);
     }
     adjoint_of_implicit(c, order);
     for (size_t k = 0; k < n_knowns; k++) result[k] = w->dots[known_slot(m, find_variable(m, knowns[k]))];
@@ -228,63 +224,18 @@ Result adjoint(Instance *c, const uint32_t *unknowns, size_t n_unknowns, const u
 void slope_of_node(Instance *c, int node, int again, double *by_state) {
     const Model *m = c->model;
     Work *w = &c->work;
-    State *s = &c->state;
     int *order = w->order, follows = 0;
     memset(w->dots, 0, m->slot_results * sizeof(double));
     c->variables_valid = 0;
-    if (!again) evaluate(c, &m->tapes.variables, s->t, c->x, c->z, w->variables);
+    if (!again) evaluate_now(c, &m->tapes.variables, w->variables);
     memset(w->variables, 0, m->n_nodes * sizeof(double));
     w->variables[node] = 1;
     tape_adjoint(&m->tapes.variables, w->slots, w->dots, w->variables);
     for (int k = 0; k < m->n_z; k++) follows |= w->dots[m->slot_z + k] != 0;
     if (follows) {
-        evaluate(c, &m->tapes.alg_jacobian, s->t, c->x, c->z, w->dense_matrix);
+        evaluate_now(c, &m->tapes.alg_jacobian, w->dense_matrix);
         adjoint_of_implicit(c, lu_factor(m->n_z, w->dense_matrix, order) ? order : NULL);
-        evaluate(c, &m->tapes.variables, s->t, c->x, c->z, w->variables);
+        evaluate_now(c, &m->tapes.variables, w->variables);
     }
     memcpy(by_state, w->dots + m->slot_x, m->n_x * sizeof(double));
-}
-
-/* States and inputs on which an unknown depends; returns their number, writes as many as there is room for. */
-size_t dependencies(Instance *c, uint32_t unknown, uint32_t *knowns, size_t capacity, Result *result) {
-    const Model *m = c->model;
-    const Variable *v = find_variable(m, unknown);
-    double *marks = c->work.dots, *outputs;
-    const Tape *tape;
-    size_t count = 0;
-    *result = RESULT_ERROR;
-    if (v == NULL ||
-        (v->kind != KIND_DERIVATIVE && v->kind != KIND_VARIABLE && v->kind != KIND_STATE && v->kind != KIND_GUARD)) {
-        report(c, LOG_ERROR, RESULT_ERROR, "The variable with value reference %u is no output.", (unsigned)unknown);
-        return 0;
-    }
-    *result = RESULT_OK;
-    memset(marks, 0, m->slot_results * sizeof(double));
-    c->variables_valid = 0;
-    if (v->kind == KIND_STATE) marks[m->slot_x + v->index] = 1;
-    else {
-        int implicit = 0;
-        tape = v->kind == KIND_DERIVATIVE ? &m->tapes.rates
-               : v->kind == KIND_GUARD    ? &m->tapes.guards
-                                          : &m->tapes.variables;
-        outputs = v->kind == KIND_DERIVATIVE ? c->work.rhs
-                  : v->kind == KIND_GUARD    ? c->work.guards_before
-                                             : c->work.variables;
-        memset(outputs, 0, (size_t)tape->n_outputs * sizeof(double));
-        outputs[v->index] = 1;
-        tape_reaches(tape, marks, outputs);
-        for (int k = 0; k < m->n_z; k++) implicit |= marks[m->slot_z + k] != 0;
-        if (implicit) {
-            for (int k = 0; k < m->n_z; k++) c->work.vector[k] = 1;
-            tape_reaches(&m->tapes.alg, marks, c->work.vector);
-        }
-    }
-    for (int k = 0; k < m->n_variables; k++) {
-        const Variable *one = &m->variables[k];
-        int slot = one->kind == KIND_STATE || one->kind == KIND_INPUT ? known_slot(m, one) : -1;
-        if (slot < 0 || marks[slot] == 0) continue;
-        if (count < capacity) knowns[count] = one->reference;
-        count++;
-    }
-    return count;
 }

@@ -36,7 +36,7 @@ double next_moment(Instance *c) {
     State *s = &c->state;
     double *moments = c->work.guards, next = INFINITY;
     if (m->n_moments == 0) return next;
-    evaluate(c, &m->tapes.moments, s->t, c->x, c->z, moments);
+    evaluate_now(c, &m->tapes.moments, moments);
     for (int k = 0; k < m->n_transitions; k++) {
         const Transition *one = &m->transitions[k];
         if (one->timed && is_source(c, one) && moments[one->index] > just_after(s))
@@ -52,12 +52,12 @@ int find_wanting(Instance *c, unsigned char *wanting, int guards_too) {
     double *values = c->work.guards;
     int any = 0;
     if (m->n_moments > 0) {
-        evaluate(c, &m->tapes.moments, s->t, c->x, c->z, values);
+        evaluate_now(c, &m->tapes.moments, values);
         for (int k = 0; k < m->n_transitions; k++)
             if (m->transitions[k].timed && values[m->transitions[k].index] <= just_after(s)) wanting[k] = 1;
     }
     if (m->n_guards > 0 && guards_too) {
-        evaluate(c, &m->tapes.guards_soon, s->t, c->x, c->z, values);
+        evaluate_now(c, &m->tapes.guards_soon, values);
         for (int k = 0; k < m->n_guards; k++)
             if (number_or_false(values[k]) > 0) wanting[m->guard_transition[k]] = 1;
     }
@@ -72,10 +72,9 @@ int find_wanting(Instance *c, unsigned char *wanting, int guards_too) {
    stops there has them balanced on that edge, and would see them switch back and forth. They come a little later. */
 static void drop_balanced(Instance *c, unsigned char *wanting) {
     const Model *m = c->model;
-    State *s = &c->state;
     double *soon = c->work.guards /* from find_wanting */, *now = c->work.guards_before;
     if (m->n_guards == 0) return;
-    evaluate(c, &m->tapes.guards, s->t, c->x, c->z, now);
+    evaluate_now(c, &m->tapes.guards, now);
     for (int k = 0; k < m->n_guards; k++)
         if (number_or_false(now[k]) < 0 && number_or_false(soon[k]) <= BALANCED * fabs(now[k]))
             wanting[m->guard_transition[k]] = 0;
@@ -85,7 +84,7 @@ static void drop_balanced(Instance *c, unsigned char *wanting) {
 void move_states(Instance *c, const int *nodes, const double *values, int count) {
     const Model *m = c->model;
     double *slopes = c->work.square, *change = c->work.start_residual, *step = c->work.point;
-    evaluate(c, &m->tapes.variables, c->state.t, c->x, c->z, c->work.variables);
+    variables_now(c);
     for (int k = 0; k < count; k++) change[k] = (values ? values[k] : 0) - c->work.variables[nodes[k]];
     for (int k = 0; k < count; k++) slope_of_node(c, nodes[k], k > 0, slopes + (size_t)k * m->n_x);
     least_squares(count, m->n_x, slopes, change, step);
@@ -105,21 +104,22 @@ void note_change(Instance *c, int name, int transition, int mode, int target) {
             text_of(m, names[(int)before]), text_of(m, names[target]));
 }
 
-/* Carry out transitions together; of one mode only the one declared first. */
-static void fire(Instance *c, const unsigned char *wanting, Impacts *impacts) {
+/* Carry out transitions together; of one mode only the one declared first. An error if one of them ends the run. */
+static Result fire(Instance *c, const unsigned char *wanting, Impacts *impacts) {
     const Model *m = c->model;
     State *s = &c->state;
     Work *w = &c->work;
     double *values = w->reset_values, *d = w->d_fired;
     unsigned char *changed = memset(w->changed, 0, (size_t)m->n_modes);
     int count = 0;
-    evaluate(c, &m->tapes.resets, s->t, c->x, c->z, values);
+    evaluate_now(c, &m->tapes.resets, values);
     memcpy(d, c->d, (size_t)m->n_d * sizeof(double));
     for (int k = 0; k < m->n_transitions; k++) {
         const Transition *one = &m->transitions[k];
         if (!wanting[k] || changed[one->mode]) continue;
         changed[one->mode] = 1;
         note_change(c, one->name, k, one->mode, one->target);
+        if (one->fails) return report(c, LOG_ERROR, RESULT_ERROR, "t = %.9g s: %s", s->t, text_of(m, one->notice));
         if (*text_of(m, one->notice))
             report(c, LOG_WARNING, RESULT_OK, "t = %.9g s: %s", s->t, text_of(m, one->notice));
         d[one->mode] = one->target;
@@ -137,6 +137,7 @@ static void fire(Instance *c, const unsigned char *wanting, Impacts *impacts) {
     }
     memcpy(c->d, d, (size_t)m->n_d * sizeof(double));
     if (count > 0) move_states(c, w->targets, w->target_values, count);
+    return RESULT_OK;
 }
 
 /* Notes an instant; an error where the last ones came ever faster. */
@@ -146,20 +147,19 @@ static Result crowded(Instance *c) {
     double first = s->instants[s->n_instants % CROWD]; /* CROWD instants ago, once there were so many */
     s->instants[s->n_instants % CROWD] = s->t;
     if (++s->n_instants <= CROWD || s->t - first >= CROWDED * span) return RESULT_OK;
-    return report(c, LOG_ERROR, RESULT_ERROR,
-        "Events follow each other ever faster at t = %.12g s. Give the switching a hysteresis, or smooth it.", s->t);
+    return fail(
+        c, "Events follow each other ever faster at t = %.12g s. Give the switching a hysteresis, or smooth it.", s->t);
 }
 
 /* Before one of several that hold a motion gives way, let the others take more. */
 static Result share_anew(Instance *c, unsigned char *wanting) {
     const Model *m = c->model;
-    State *s = &c->state;
     double *soon = c->work.guards;
     if (m->n_circuits == 0 || (c->bounded && !anything_shared(c))) return RESULT_OK;
     share(c);
     c->variables_valid = 0;
-    if (solve_implicit(c, s->t, c->x, c->z, 0) != RESULT_OK) return RESULT_ERROR;
-    evaluate(c, &m->tapes.guards_soon, s->t, c->x, c->z, soon);
+    if (solve_now(c, 0) != RESULT_OK) return RESULT_ERROR;
+    evaluate_now(c, &m->tapes.guards_soon, soon);
     for (int k = 0; k < m->n_guards; k++)
         if (!(number_or_false(soon[k]) > 0)) wanting[m->guard_transition[k]] = 0;
     return RESULT_OK;
@@ -189,16 +189,16 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
         }
         c->round = round;
         memcpy(before, c->d, (size_t)m->n_d * sizeof(double));
-        fire(c, wanting, impacts);
+        if (fire(c, wanting, impacts) != RESULT_OK) return RESULT_ERROR;
         share(c);
         c->variables_valid = 0;
-        if (solve_implicit(c, s->t, c->x, c->z, 0) != RESULT_OK || stop_motions(c, before, impacts) != RESULT_OK ||
+        if (solve_now(c, 0) != RESULT_OK || stop_motions(c, before, impacts) != RESULT_OK ||
             check_singular(c) != RESULT_OK)
             return RESULT_ERROR;
         memset(wanting, 0, m->n_transitions);
         if (find_wanting(c, wanting, 1) && !c->bounded) drop_balanced(c, wanting);
     }
-    return report(c, LOG_ERROR, RESULT_ERROR,
+    return fail(c,
         "Modes still switch after %d rounds at t = %.12g s. Give the switching a hysteresis, or smooth what drives it.",
         ROUNDS + ALONE * m->n_holds, s->t);
 }
@@ -208,6 +208,7 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
 Result update_discrete(Instance *c, int *restart, double *next) {
     double before = c->state.n_events;
     *restart = c->state.inputs_changed;
+    if (*restart && check_tables(c) != RESULT_OK) return RESULT_ERROR;
     c->state.inputs_changed = 0;
     if (handle_event(c) != RESULT_OK) return RESULT_ERROR;
     *restart |= c->state.n_events != before;

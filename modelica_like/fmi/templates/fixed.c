@@ -58,11 +58,10 @@ static double first_crossing(Instance *c, int behind_event) {
     Piece *piece = c->piece;
     int n = m->n_guards, any = 0;
     double *last = c->work.looks;
-    evaluate(c, &m->tapes.guards, piece->end, last_of(m, piece), last_of(m, piece) + m->n_x, last);
+    evaluate(c, &m->tapes.guards, piece->end, last_of(m, piece), last);
     for (int g = 0; g < n; g++) any |= guard_active(c, g) && number_or_false(last[g]) > 0;
     if (any && behind_event) return first_zero(c, c->work.guards, 0); /* as the last round has left them */
-    if (any && !c->state.looked)
-        evaluate(c, &m->tapes.guards, piece->begin, piece->points, piece->points + m->n_x, c->end_look);
+    if (any && !c->state.looked) evaluate(c, &m->tapes.guards, piece->begin, piece->points, c->end_look);
     if (any) return first_zero(c, c->end_look, 1);
     memcpy(c->end_look, last, 2 * (size_t)n * sizeof(double));
     c->state.looked = 1;
@@ -86,10 +85,9 @@ static Result go_on(Instance *c, double limit, int *fired) {
     double *first = c->work.first, begin = s->t, error, part = QUIET;
     int behind_event = *fired;
     *fired = 0;
-    memcpy(first, c->x, m->n_x * sizeof(double));
-    memcpy(first + m->n_x, c->z, m->n_z * sizeof(double));
+    memcpy(first, c->x, m->n_unknowns * sizeof(double));
     if (!rosenbrock_step(c, begin, first, limit - begin, 0, c->piece, &error))
-        return report(c, LOG_ERROR, RESULT_ERROR,
+        return fail(c,
             "The step from t = %.12g s gives values that are not finite, or singular equations. Take smaller steps.",
             begin);
     c->piece->end = limit;

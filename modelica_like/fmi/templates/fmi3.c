@@ -1,13 +1,13 @@
-/* FMI 3.0, life of an instance and its steps: checks every call, then leaves the work to the run-time. */
+/* FMI 3.0: checks every call, then leaves the work to the run-time. What 2.0 has, too, stands in fmi.h. */
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
-#include "fmi3.h"
+#include "fmi3Functions.h"
 
-static fmi3Status failed(Instance *c) {
-    c->state.phase = PHASE_FAILED;
-    return fmi3Error;
-}
+#define VERSION fmi3
+#define SerializedSize SerializedFMUStateSize
+#define GetDerivatives GetContinuousStateDerivatives
+#define GetNominals GetNominalsOfContinuousStates
+#include "fmi.h"
 
 static void log_fmi3(const Instance *c, int result, const char *category, const char *message) {
     ((fmi3LogMessageCallback)c->logger)(c->environment, status((Result)result), category, message);
@@ -20,9 +20,15 @@ const char *fmi3GetVersion(void) { return fmi3Version; }
 fmi3Instance fmi3InstantiateModelExchange(fmi3String instanceName, fmi3String instantiationToken,
     fmi3String resourcePath, fmi3Boolean visible, fmi3Boolean loggingOn, fmi3InstanceEnvironment instanceEnvironment,
     fmi3LogMessageCallback logMessage) {
+    const Instance bare = {.name = instanceName,
+        .log_enabled = loggingOn,
+        .environment = instanceEnvironment,
+        .logger = (AnyFunction)logMessage,
+        .log = logMessage ? log_fmi3 : NULL,
+        .allocate = calloc,
+        .release = free};
     (void)visible;
-    return instance_open(resourcePath, instanceName, instantiationToken, calloc, free, logMessage ? log_fmi3 : NULL,
-        (AnyFunction)logMessage, instanceEnvironment, loggingOn);
+    return instance_open(bare, instantiationToken, resourcePath);
 }
 
 /* Tells the importer that an internal step is done; returns until when it wants to go on. */
@@ -58,75 +64,160 @@ fmi3Instance fmi3InstantiateScheduledExecution(fmi3String instanceName, fmi3Stri
     fmi3String resourcePath, fmi3Boolean visible, fmi3Boolean loggingOn, fmi3InstanceEnvironment instanceEnvironment,
     fmi3LogMessageCallback logMessage, fmi3ClockUpdateCallback clockUpdate, fmi3LockPreemptionCallback lockPreemption,
     fmi3UnlockPreemptionCallback unlockPreemption) {
-    (void)instantiationToken, (void)resourcePath, (void)visible, (void)loggingOn, (void)clockUpdate,
-        (void)lockPreemption, (void)unlockPreemption;
-    (void)instanceName;
+    (void)instanceName, (void)instantiationToken, (void)resourcePath, (void)visible, (void)loggingOn;
+    (void)clockUpdate, (void)lockPreemption, (void)unlockPreemption;
     if (logMessage != NULL)
         logMessage(instanceEnvironment, fmi3Error, "logStatusError", "This model has no scheduled execution.");
     return NULL;
 }
 
-void fmi3FreeInstance(fmi3Instance instance) {
-    if (instance != NULL) instance_free(instance);
-}
-
-fmi3Status fmi3SetDebugLogging(
-    fmi3Instance instance, fmi3Boolean loggingOn, size_t nCategories, const fmi3String categories[]) {
-    Result result = RESULT_OK;
-    ENTER(fmi3SetDebugLogging, ANY_PHASE);
-    NEED(categories, nCategories);
-    if (nCategories == 0) result = set_log_category(c, NULL, loggingOn);
-    for (size_t k = 0; k < nCategories; k++)
-        if (set_log_category(c, categories[k], loggingOn) != RESULT_OK) result = RESULT_ERROR;
-    return status(result);
-}
-
 fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean toleranceDefined, fmi3Float64 tolerance,
     fmi3Float64 startTime, fmi3Boolean stopTimeDefined, fmi3Float64 stopTime) {
-    ENTER(fmi3EnterInitializationMode, PHASE_INSTANTIATED);
+    ENTER(EnterInitializationMode, PHASE_INSTANTIATED);
     if (set_experiment(c, toleranceDefined, tolerance, startTime, stopTimeDefined, stopTime) != RESULT_OK)
         return fmi3Error;
     c->state.phase = PHASE_INITIALIZATION;
     return fmi3OK;
 }
 
-fmi3Status fmi3ExitInitializationMode(fmi3Instance instance) {
-    ENTER(fmi3ExitInitializationMode, PHASE_INITIALIZATION);
-    if (!c->state.solved && start_solve(c) != RESULT_OK) return failed(c);
-    c->state.inputs_changed = 0;
-    c->state.phase = c->co_simulation && !c->event_mode_used ? PHASE_STEP : PHASE_EVENT;
-    if (c->state.phase == PHASE_STEP && handle_event(c) != RESULT_OK) return failed(c);
-    return fmi3OK;
-}
-
 fmi3Status fmi3EnterConfigurationMode(fmi3Instance instance) {
-    ENTER(fmi3EnterConfigurationMode, PHASE_INSTANTIATED);
+    ENTER(EnterConfigurationMode, PHASE_INSTANTIATED);
     c->state.phase = PHASE_CONFIGURATION;
     return fmi3OK;
 }
 
 fmi3Status fmi3ExitConfigurationMode(fmi3Instance instance) {
-    ENTER(fmi3ExitConfigurationMode, PHASE_CONFIGURATION);
+    ENTER(ExitConfigurationMode, PHASE_CONFIGURATION);
     c->state.phase = PHASE_INSTANTIATED;
     return fmi3OK;
 }
 
-fmi3Status fmi3Terminate(fmi3Instance instance) {
-    ENTER(fmi3Terminate, PHASE_EVENT | PHASE_CONTINUOUS | PHASE_STEP | PHASE_FAILED);
-    c->state.phase = PHASE_TERMINATED;
-    return fmi3OK;
+/* ---- values ----------------------------------------------------------------------------------------------------- */
+
+/* Values of arrays lie one behind the other. */
+static size_t elements(const Instance *c, fmi3ValueReference reference, fmi3ValueReference *first) {
+    const Variable *v = find_variable(c->model, reference);
+    int array = v != NULL && v->type == TYPE_ARRAY;
+    *first = array ? (fmi3ValueReference)v->start : reference;
+    return array ? (size_t)v->count : 1;
 }
 
-fmi3Status fmi3Reset(fmi3Instance instance) {
-    ENTER(fmi3Reset, ANY_PHASE);
-    instance_reset(c);
-    return fmi3OK;
+#define REFERENCES fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences
+#define VALUES(name, phases, type, done)                                                            \
+    fmi3Status fmi3##name(REFERENCES, type values[], size_t nValues) {                              \
+        fmi3ValueReference r;                                                                       \
+        size_t count = 0;                                                                           \
+        ENTER(name, phases);                                                                        \
+        NEED(nValueReferences, valueReferences);                                                    \
+        for (size_t k = 0; k < nValueReferences; k++) count += elements(c, valueReferences[k], &r); \
+        NEED_SIZE(nValues, count, "values");                                                        \
+        NEED(nValues, values);                                                                      \
+        for (size_t k = 0; k < nValueReferences; k++)                                               \
+            for (count = elements(c, valueReferences[k], &r); count > 0; count--, r++, values++)    \
+                if (!(done)) return fmi3Error;                                                      \
+        return fmi3OK;                                                                              \
+    }
+
+static int is_mode(int mode, fmi3Int64 *value) {
+    if (mode >= 0) *value = mode;
+    return mode >= 0;
+}
+
+VALUES(GetFloat64, READABLE, fmi3Float64, get_float(c, r, values) == RESULT_OK)
+VALUES(SetFloat64, SETTABLE, const fmi3Float64, set_float(c, r, *values) == RESULT_OK)
+VALUES(GetInt64, READABLE, fmi3Int64, is_mode(get_mode(c, r), values))
+VALUES(SetInt64, SETTABLE, const fmi3Int64, set_mode(c, r, *values) == RESULT_OK)
+
+/* Functions for what no model has: other types, clocks, parts. They refuse every call that asks for something. */
+#define NOTHING(name, phases, what, unused, ...)                                          \
+    fmi3Status fmi3##name(REFERENCES, __VA_ARGS__) {                                      \
+        ENTER(name, phases);                                                              \
+        (void)valueReferences, unused;                                                    \
+        return nValueReferences == 0 ? fmi3OK : refuse(c, "This model has no " what "."); \
+    }
+#define NO_VALUES(type)                                                                                    \
+    NOTHING(Get##type, READABLE, "variables of type " #type, ((void)a, (void)n), fmi3##type a[], size_t n) \
+    NOTHING(Set##type, SETTABLE, "variables of type " #type, ((void)a, (void)n), const fmi3##type a[], size_t n)
+#define NO_BINARIES(name, phases, size, type) \
+    NOTHING(name, phases, "variables of type Binary", ((void)s, (void)a, (void)n), size s[], type a[], size_t n)
+#define NO_CLOCK(name, type) NOTHING(name, ANY_PHASE, "clocks", (void)a, type a[])
+#define NO_PAIRS(name, type, other) NOTHING(name, ANY_PHASE, "clocks", ((void)a, (void)b), type a[], other b[])
+
+NO_VALUES(Float32)
+NO_VALUES(Int8)
+NO_VALUES(UInt8)
+NO_VALUES(Int16)
+NO_VALUES(UInt16)
+NO_VALUES(Int32)
+NO_VALUES(UInt32)
+NO_VALUES(UInt64)
+NO_VALUES(Boolean)
+NO_VALUES(String)
+NO_BINARIES(GetBinary, READABLE, size_t, fmi3Binary)
+NO_BINARIES(SetBinary, SETTABLE, const size_t, const fmi3Binary)
+NO_CLOCK(GetClock, fmi3Clock)
+NO_CLOCK(SetClock, const fmi3Clock)
+NO_CLOCK(GetShiftDecimal, fmi3Float64)
+NO_CLOCK(SetShiftDecimal, const fmi3Float64)
+NO_CLOCK(SetIntervalDecimal, const fmi3Float64)
+NO_PAIRS(GetIntervalDecimal, fmi3Float64, fmi3IntervalQualifier)
+NO_PAIRS(GetShiftFraction, fmi3UInt64, fmi3UInt64)
+NO_PAIRS(SetShiftFraction, const fmi3UInt64, const fmi3UInt64)
+NO_PAIRS(SetIntervalFraction, const fmi3UInt64, const fmi3UInt64)
+NOTHING(GetIntervalFraction, ANY_PHASE, "clocks", ((void)a, (void)b, (void)q), fmi3UInt64 a[], fmi3UInt64 b[],
+    fmi3IntervalQualifier q[])
+
+fmi3Status fmi3ActivateModelPartition(
+    fmi3Instance instance, fmi3ValueReference clockReference, fmi3Float64 activationTime) {
+    ENTER(ActivateModelPartition, ANY_PHASE);
+    (void)clockReference, (void)activationTime;
+    return refuse(c, "This model has no scheduled execution.");
+}
+
+/* ---- derivatives ------------------------------------------------------------------------------------------------ */
+
+/* Dependencies stand in the description, which does not announce these (providesPerElementDependencies). */
+#define SEE_DESCRIPTION "What a variable depends on is told by the description of the model."
+fmi3Status fmi3GetNumberOfVariableDependencies(
+    fmi3Instance instance, fmi3ValueReference valueReference, size_t *nDependencies) {
+    ENTER(GetNumberOfVariableDependencies, ANY_PHASE);
+    (void)valueReference, (void)nDependencies;
+    return refuse(c, SEE_DESCRIPTION);
+}
+
+fmi3Status fmi3GetVariableDependencies(fmi3Instance instance, fmi3ValueReference dependent, size_t elements[],
+    fmi3ValueReference independents[], size_t others[], fmi3DependencyKind kinds[], size_t nDependencies) {
+    ENTER(GetVariableDependencies, ANY_PHASE);
+    (void)dependent, (void)elements, (void)independents, (void)others, (void)kinds, (void)nDependencies;
+    return refuse(c, SEE_DESCRIPTION);
+}
+
+fmi3Status fmi3GetDirectionalDerivative(fmi3Instance instance, const fmi3ValueReference unknowns[], size_t nUnknowns,
+    const fmi3ValueReference knowns[], size_t nKnowns, const fmi3Float64 seed[], size_t nSeed,
+    fmi3Float64 sensitivity[], size_t nSensitivity) {
+    ENTER(GetDirectionalDerivative, READABLE);
+    NEED_SIZE(nSeed, nKnowns, "seeds, one per known");
+    NEED_SIZE(nSensitivity, nUnknowns, "sensitivities, one per unknown");
+    NEED(nUnknowns, unknowns, sensitivity);
+    NEED(nKnowns, knowns, seed);
+    return status(directional(c, unknowns, nUnknowns, knowns, nKnowns, seed, sensitivity));
+}
+
+fmi3Status fmi3GetAdjointDerivative(fmi3Instance instance, const fmi3ValueReference unknowns[], size_t nUnknowns,
+    const fmi3ValueReference knowns[], size_t nKnowns, const fmi3Float64 seed[], size_t nSeed,
+    fmi3Float64 sensitivity[], size_t nSensitivity) {
+    ENTER(GetAdjointDerivative, PHASE_EVENT | PHASE_CONTINUOUS | PHASE_STEP | PHASE_TERMINATED);
+    NEED_SIZE(nSeed, nUnknowns, "seeds, one per unknown");
+    NEED_SIZE(nSensitivity, nKnowns, "sensitivities, one per known");
+    NEED(nUnknowns, unknowns, seed);
+    NEED(nKnowns, knowns, sensitivity);
+    return status(adjoint(c, unknowns, nUnknowns, knowns, nKnowns, seed, sensitivity));
 }
 
 /* ---- events ----------------------------------------------------------------------------------------------------- */
 
 fmi3Status fmi3EnterEventMode(fmi3Instance instance) {
-    ENTER(fmi3EnterEventMode, PHASE_CONTINUOUS | PHASE_STEP);
+    ENTER(EnterEventMode, PHASE_CONTINUOUS | PHASE_STEP);
     if (c->co_simulation && !c->event_mode_used)
         return refuse(c, "fmi3EnterEventMode: this instance was made with eventModeUsed = false.");
     c->state.phase = PHASE_EVENT;
@@ -134,7 +225,7 @@ fmi3Status fmi3EnterEventMode(fmi3Instance instance) {
 }
 
 fmi3Status fmi3EvaluateDiscreteStates(fmi3Instance instance) {
-    ENTER(fmi3EvaluateDiscreteStates, PHASE_INITIALIZATION | PHASE_EVENT);
+    ENTER(EvaluateDiscreteStates, PHASE_INITIALIZATION | PHASE_EVENT);
     return status(make_consistent(c));
 }
 
@@ -143,13 +234,9 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discrete
     fmi3Boolean *valuesOfContinuousStatesChanged, fmi3Boolean *nextEventTimeDefined, fmi3Float64 *nextEventTime) {
     double next;
     int restart;
-    ENTER(fmi3UpdateDiscreteStates, PHASE_EVENT);
-    NEED(discreteStatesNeedUpdate, 1);
-    NEED(terminateSimulation, 1);
-    NEED(nominalsOfContinuousStatesChanged, 1);
-    NEED(valuesOfContinuousStatesChanged, 1);
-    NEED(nextEventTimeDefined, 1);
-    NEED(nextEventTime, 1);
+    ENTER(UpdateDiscreteStates, PHASE_EVENT);
+    NEED(1, discreteStatesNeedUpdate, terminateSimulation, nominalsOfContinuousStatesChanged,
+        valuesOfContinuousStatesChanged, nextEventTimeDefined, nextEventTime);
     if (update_discrete(c, &restart, &next) != RESULT_OK) return failed(c);
     *discreteStatesNeedUpdate = *terminateSimulation = *nominalsOfContinuousStatesChanged = fmi3False;
     *valuesOfContinuousStatesChanged = restart != 0;
@@ -160,65 +247,16 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discrete
 
 /* ---- Model Exchange --------------------------------------------------------------------------------------------- */
 
-fmi3Status fmi3EnterContinuousTimeMode(fmi3Instance instance) {
-    ENTER(fmi3EnterContinuousTimeMode, PHASE_EVENT);
-    if (c->co_simulation) return refuse(c, "fmi3EnterContinuousTimeMode belongs to Model Exchange.");
-    c->state.phase = PHASE_CONTINUOUS;
-    return fmi3OK;
-}
-
-fmi3Status fmi3CompletedIntegratorStep(fmi3Instance instance, fmi3Boolean noSetFMUStatePriorToCurrentPoint,
-    fmi3Boolean *enterEventMode, fmi3Boolean *terminateSimulation) {
-    ENTER(fmi3CompletedIntegratorStep, PHASE_CONTINUOUS);
-    (void)noSetFMUStatePriorToCurrentPoint;
-    NEED(enterEventMode, 1);
-    NEED(terminateSimulation, 1);
-    if (settle(c) != RESULT_OK) return fmi3Error;
-    *enterEventMode = find_wanting(c, nothing_wanting(c), 1) != 0;
-    *terminateSimulation = fmi3False;
-    return fmi3OK;
-}
-
-fmi3Status fmi3SetTime(fmi3Instance instance, fmi3Float64 time) {
-    ENTER(fmi3SetTime, PHASE_EVENT | PHASE_CONTINUOUS);
-    return status(set_time(c, time));
-}
-
-fmi3Status fmi3SetContinuousStates(
-    fmi3Instance instance, const fmi3Float64 continuousStates[], size_t nContinuousStates) {
-    ENTER(fmi3SetContinuousStates, PHASE_EVENT | PHASE_CONTINUOUS);
-    NEED_SIZE(nContinuousStates, c->model->n_x, "continuous states");
-    NEED(continuousStates, nContinuousStates);
-    return status(set_states(c, continuousStates));
-}
-
-#define GET_ALL(name, phases, count, what, action)                           \
-    fmi3Status name(fmi3Instance instance, fmi3Float64 values[], size_t n) { \
-        ENTER(name, phases);                                                 \
-        NEED_SIZE(n, count, what);                                           \
-        NEED(values, n);                                                     \
-        if (make_consistent(c) != RESULT_OK) return fmi3Error;               \
-        action;                                                              \
-        return fmi3OK;                                                       \
-    }
-
-GET_ALL(fmi3GetContinuousStateDerivatives, READABLE, c->model->n_x, "continuous states", get_derivatives(c, values))
-GET_ALL(fmi3GetEventIndicators, READABLE, c->model->n_guards, "event indicators", get_indicators(c, values))
-GET_ALL(fmi3GetContinuousStates, READABLE, c->model->n_x, "continuous states",
-    memcpy(values, c->x, c->model->n_x * sizeof(double)))
-GET_ALL(fmi3GetNominalsOfContinuousStates, READABLE, c->model->n_x, "continuous states",
-    memcpy(values, c->model->nominals, c->model->n_x * sizeof(double)))
-
 fmi3Status fmi3GetNumberOfEventIndicators(fmi3Instance instance, size_t *nEventIndicators) {
-    ENTER(fmi3GetNumberOfEventIndicators, ANY_PHASE);
-    NEED(nEventIndicators, 1);
+    ENTER(GetNumberOfEventIndicators, ANY_PHASE);
+    NEED(1, nEventIndicators);
     *nEventIndicators = c->model->n_guards;
     return fmi3OK;
 }
 
 fmi3Status fmi3GetNumberOfContinuousStates(fmi3Instance instance, size_t *nContinuousStates) {
-    ENTER(fmi3GetNumberOfContinuousStates, ANY_PHASE);
-    NEED(nContinuousStates, 1);
+    ENTER(GetNumberOfContinuousStates, ANY_PHASE);
+    NEED(1, nContinuousStates);
     *nContinuousStates = c->model->n_x;
     return fmi3OK;
 }
@@ -226,7 +264,7 @@ fmi3Status fmi3GetNumberOfContinuousStates(fmi3Instance instance, size_t *nConti
 /* ---- Co-Simulation ---------------------------------------------------------------------------------------------- */
 
 fmi3Status fmi3EnterStepMode(fmi3Instance instance) {
-    ENTER(fmi3EnterStepMode, PHASE_EVENT);
+    ENTER(EnterStepMode, PHASE_EVENT);
     if (!c->co_simulation) return refuse(c, "fmi3EnterStepMode belongs to Co-Simulation.");
     c->state.phase = PHASE_STEP;
     return fmi3OK;
@@ -234,11 +272,9 @@ fmi3Status fmi3EnterStepMode(fmi3Instance instance) {
 
 fmi3Status fmi3GetOutputDerivatives(fmi3Instance instance, const fmi3ValueReference valueReferences[],
     size_t nValueReferences, const fmi3Int32 orders[], fmi3Float64 values[], size_t nValues) {
-    ENTER(fmi3GetOutputDerivatives, PHASE_STEP | PHASE_TERMINATED);
+    ENTER(GetOutputDerivatives, PHASE_STEP | PHASE_TERMINATED);
     NEED_SIZE(nValues, nValueReferences, "values");
-    NEED(valueReferences, nValues);
-    NEED(orders, nValues);
-    NEED(values, nValues);
+    NEED(nValues, valueReferences, orders, values);
     for (size_t k = 0; k < nValues; k++) {
         if (output_rate(c, valueReferences[k], orders[k], &values[k]) != RESULT_OK) return fmi3Error;
     }
@@ -250,12 +286,9 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
     fmi3Boolean *earlyReturn, fmi3Float64 *lastSuccessfulTime) {
     double target;
     Arrival arrival;
-    ENTER(fmi3DoStep, PHASE_STEP);
+    ENTER(DoStep, PHASE_STEP);
     (void)noSetFMUStatePriorToCurrentPoint;
-    NEED(eventHandlingNeeded, 1);
-    NEED(terminateSimulation, 1);
-    NEED(earlyReturn, 1);
-    NEED(lastSuccessfulTime, 1);
+    NEED(1, eventHandlingNeeded, terminateSimulation, earlyReturn, lastSuccessfulTime);
     *eventHandlingNeeded = *terminateSimulation = *earlyReturn = fmi3False;
     *lastSuccessfulTime = c->state.t;
     if (check_step(c, currentCommunicationPoint, communicationStepSize, &target) != RESULT_OK) return fmi3Error;

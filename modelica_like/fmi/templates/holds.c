@@ -12,15 +12,15 @@
 #define SPLITS 20     /* trials to find a split that all can bear */
 #define TURNED 100.0
 
-void hold_terms(Instance *c, Terms *terms) {
-    State *s = &c->state;
-    evaluate(c, &c->model->tapes.hold_terms, s->t, c->x, c->z, (double *)terms);
-}
-
-/* Marks the motions that are held. */
-void mark_held(Instance *c, const Terms *terms, unsigned char *held) {
+void mark_held(const Instance *c, const Terms *terms, unsigned char *held) {
     const Model *m = c->model;
     for (int k = 0; k < m->n_holds; k++) held[k] = c->d[m->holds[k].mode] == m->holds[k].number && terms[k].gain != 0;
+}
+
+/* Terms of all motions that modes may hold at the present point; marks those that are held. */
+void find_held(Instance *c, Terms *terms, unsigned char *held) {
+    evaluate_now(c, &c->model->tapes.hold_terms, (double *)terms);
+    mark_held(c, terms, held);
 }
 
 /* The largest variable with the unit of a node. */
@@ -34,18 +34,15 @@ double largest_like(const Model *m, const double *values, int node) {
 /* Put held motions that are zero but for rounding at zero, where they are states. */
 void rest(Instance *c) {
     const Model *m = c->model;
-    State *s = &c->state;
-    Terms *terms = c->work.terms;
-    unsigned char *held = c->work.held;
-    const double *values = c->work.variables;
+    const double *values;
     if (m->n_holds == 0) return;
-    hold_terms(c, terms);
-    mark_held(c, terms, held);
-    evaluate(c, &m->tapes.variables, s->t, c->x, c->z, c->work.variables);
+    find_held(c, c->work.terms, c->work.held);
+    values = variables_now(c);
     for (int k = 0; k < m->n_holds; k++) {
         const Held *one = &m->holds[k];
-        if (!held[k] || one->state < 0) continue;
-        if (fabs(values[one->motion]) <= ROUNDING * largest_like(m, values, one->motion)) c->x[one->state] = 0;
+        if (c->work.held[k] && one->state >= 0 &&
+            fabs(values[one->motion]) <= ROUNDING * largest_like(m, values, one->motion))
+            c->x[one->state] = 0;
     }
 }
 
@@ -53,17 +50,12 @@ void rest(Instance *c) {
  * a Jacobian, and what is nothing but rounding then counts as very stiff. */
 void rest_rates(Instance *c, double *rates) {
     const Model *m = c->model;
-    Terms *terms = c->work.terms;
-    unsigned char *held = c->work.held;
-    double largest = 0;
+    double largest = fmax(largest_of(m->n_x, rates), largest_of(m->n_z, c->z));
     if (m->n_holds == 0) return;
-    hold_terms(c, terms);
-    mark_held(c, terms, held);
-    for (int k = 0; k < m->n_x; k++) largest = fmax(largest, fabs(rates[k]));
-    for (int k = 0; k < m->n_z; k++) largest = fmax(largest, fabs(c->z[k]));
+    find_held(c, c->work.terms, c->work.held);
     for (int k = 0; k < m->n_holds; k++) {
         int state = m->holds[k].state;
-        if (held[k] && state >= 0 && fabs(rates[state]) <= CANCELLED * largest) rates[state] = 0;
+        if (c->work.held[k] && state >= 0 && fabs(rates[state]) <= CANCELLED * largest) rates[state] = 0;
     }
 }
 
@@ -155,7 +147,6 @@ int anything_shared(const Instance *c) {
  * switched equation says sum(share * reaction) = stiff * inertia * der(motion). */
 static void yield_to_contradiction(Instance *c, const Circuit *one) {
     const Model *m = c->model;
-    State *s = &c->state;
     const int *member = m->members + one->first_member;
     double *z = c->work.kept_z, *reaction = c->work.reactions, inertia = 0, stiff;
     unsigned char *other = c->work.other;
@@ -165,8 +156,8 @@ static void yield_to_contradiction(Instance *c, const Circuit *one) {
     for (int asked = 0; asked < 2; asked++) {
         for (int k = 0; k < one->n_members; k++)
             if (other[k]) c->d[m->holds[member[k]].approach] = asked;
-        solved = solved && solve_implicit(c, s->t, c->x, c->z, 1) == RESULT_OK;
-        evaluate(c, &m->tapes.variables, s->t, c->x, c->z, c->work.variables);
+        solved = solved && solve_now(c, 1) == RESULT_OK;
+        variables_now(c);
         for (int k = 0; k < one->n_members; k++) {
             double now = c->work.variables[m->holds[member[k]].reaction];
             if (asked && other[k]) inertia = fmax(inertia, fabs(now - reaction[k]));
@@ -205,12 +196,11 @@ static int share_circuit(Instance *c, const Circuit *one, const unsigned char *h
 /* Reactions over what can be borne, of the elements that share; returns the largest. */
 static double use_of(Instance *c, const Terms *terms, double *use) {
     const Model *m = c->model;
-    State *s = &c->state;
     double *z = c->work.kept_z, worst = 0;
     memset(use, 0, m->n_holds * sizeof(double));
     memcpy(z, c->z, (size_t)m->n_z * sizeof(double));
-    if (solve_implicit(c, s->t, c->x, c->z, 1) != RESULT_OK) worst = INFINITY;
-    evaluate(c, &m->tapes.variables, s->t, c->x, c->z, c->work.variables);
+    if (solve_now(c, 1) != RESULT_OK) worst = INFINITY;
+    variables_now(c);
     for (int i = 0; i < m->n_circuits; i++)
         for (int place = 0; place < m->circuits[i].n_members; place++) {
             int k = m->members[m->circuits[i].first_member + place];
@@ -230,18 +220,16 @@ static double use_of(Instance *c, const Terms *terms, double *use) {
 void share(Instance *c) {
     const Model *m = c->model;
     Terms *terms = c->work.terms;
-    unsigned char *held = c->work.held;
     double *weights = c->work.weights, *base = c->work.base_weights, *use = c->work.use;
     double *best = c->work.best, least = INFINITY;
     if (m->n_circuits == 0) return;
-    hold_terms(c, terms);
-    mark_held(c, terms, held);
+    find_held(c, terms, c->work.held);
     weigh(m, terms, base);
     memcpy(weights, base, (size_t)m->n_holds * sizeof(double));
     for (int trial = 0; trial < SPLITS; trial++) {
         int shared = 0;
         double worst;
-        for (int i = 0; i < m->n_circuits; i++) shared |= share_circuit(c, &m->circuits[i], held, weights);
+        for (int i = 0; i < m->n_circuits; i++) shared |= share_circuit(c, &m->circuits[i], c->work.held, weights);
         if (c->bounded) return; /* the split by capacities, without asking whether all can bear it */
         worst = shared ? use_of(c, terms, use) : 0;
         if (worst < least || trial == 0) memcpy(best, c->d, (size_t)m->n_d * sizeof(double));

@@ -8,23 +8,16 @@
 #define TRIALS 50
 #define FELT 1e-9 /* change of a motion, relative to the largest one, from which on it is no rounding */
 
-static const double *motions(Instance *c) {
-    State *s = &c->state;
-    evaluate(c, &c->model->tapes.variables, s->t, c->x, c->z, c->work.variables);
-    return c->work.variables;
-}
-
 /* Rates, and reactions where they matter, at the present point, with or without the approaches. */
 static Result ask(Instance *c, const Strike *strike, int approaching, int unsolved, double *rates, double *reactions) {
     const Model *m = c->model;
-    State *s = &c->state;
     const double *values;
     for (int k = 0; k < m->n_holds; k++) c->d[m->holds[k].approach] = approaching ? strike->approach[k] : 0;
-    if (unsolved && solve_implicit(c, s->t, c->x, c->z, 0) != RESULT_OK) return RESULT_ERROR;
-    evaluate(c, &m->tapes.rates, s->t, c->x, c->z, c->work.rhs);
+    if (unsolved && solve_now(c, 0) != RESULT_OK) return RESULT_ERROR;
+    evaluate_now(c, &m->tapes.rates, c->work.rhs);
     memcpy(rates, c->work.rhs, m->n_x * sizeof(double));
     if (!strike->hard) return RESULT_OK;
-    values = motions(c);
+    values = variables_now(c);
     for (int k = 0; k < m->n_holds; k++) reactions[k] = strike->held[k] ? values[m->holds[k].reaction] : 0;
     return RESULT_OK;
 }
@@ -32,17 +25,15 @@ static Result ask(Instance *c, const Strike *strike, int approaching, int unsolv
 /* Jump of the states, impulses and finite reactions of all that holds, with what is loose let go. */
 static Result respond(Instance *c, Strike *strike) {
     const Model *m = c->model;
-    Terms *terms = c->work.terms;
     double *d = c->work.respond_d, *z = c->work.respond_z, *rates = c->work.rates;
-    int any = 0;
+    int any = any_of(strike->loose, m->n_holds);
     Result result;
     memcpy(d, c->d, (size_t)m->n_d * sizeof(double));
     memcpy(z, c->z, (size_t)m->n_z * sizeof(double));
     for (int k = 0; k < m->n_holds; k++)
         if (strike->loose[k]) c->d[m->holds[k].mode] = m->holds[k].loose;
-    for (int k = 0; k < m->n_holds; k++) any |= strike->loose[k];
     if (any || !c->bounded) share(c); /* else it has just been done, with the implicit equations solved */
-    if (strike->hard) hold_terms(c, terms), mark_held(c, terms, strike->held);
+    if (strike->hard) find_held(c, c->work.terms, strike->held);
     for (int k = 0; k < m->n_holds; k++) strike->held[k] &= !strike->loose[k] && m->holds[k].reaction >= 0;
     result = ask(c, strike, 0, any || !c->bounded, rates, strike->reaction);
     if (result == RESULT_OK) result = ask(c, strike, 1, 1, strike->jump, strike->impulse);
@@ -76,12 +67,10 @@ static int put_back_approaching(Instance *c, Strike *strike, const Terms *terms)
     double *x = c->work.x_kept;
     const double *after;
     int any = 0;
-    for (int k = 0; k < m->n_holds; k++) any |= strike->loose[k];
-    if (!any) return 0;
-    any = 0;
+    if (!any_of(strike->loose, m->n_holds)) return 0;
     memcpy(x, c->x, (size_t)m->n_x * sizeof(double));
     for (int k = 0; k < m->n_x; k++) c->x[k] += strike->jump[k];
-    after = motions(c);
+    after = variables_now(c);
     for (int k = 0; k < m->n_holds; k++) {
         double motion = after[m->holds[k].motion];
         double against = motion > 0 ? terms[k].forward : terms[k].backward;
@@ -98,14 +87,13 @@ static int put_back_approaching(Instance *c, Strike *strike, const Terms *terms)
 static void mark_moved(Instance *c, Strike *strike, const Terms *terms) {
     const Model *m = c->model;
     unsigned char *held = c->work.held;
-    const double *after = motions(c);
+    const double *after = variables_now(c);
     double largest = 0;
     mark_held(c, terms, held);
     for (int k = 0; k < m->n_holds; k++) largest = fmax(largest, fabs(after[m->holds[k].motion] - strike->before[k]));
     for (int k = 0; k < m->n_holds; k++) {
         double now = after[m->holds[k].motion];
-        int stays = held[k] && !strike->loose[k] && now == 0;
-        if (stays) continue;
+        if (held[k] && !strike->loose[k] && now == 0) continue; /* it stays */
         if (fabs(now - strike->before[k]) > FELT * largest || (strike->approach[k] != 0 && now != 0))
             strike->loose[k] = 1;
     }
@@ -114,7 +102,7 @@ static void mark_moved(Instance *c, Strike *strike, const Terms *terms) {
 /* Tells what the impact has cost. */
 static void book(Instance *c, const Strike *strike, int first) {
     const Model *m = c->model;
-    const double *after = motions(c);
+    const double *after = variables_now(c);
     int any = 0;
     for (int k = 0; k < m->n_holds; k++) {
         double energy = 0.5 * (strike->before[k] + after[m->holds[k].motion]) * strike->impulse[k];
@@ -128,9 +116,8 @@ static void book(Instance *c, const Strike *strike, int first) {
 /* Carries out the impact; `loose` then tells what was knocked loose, bounces, or was moved in passing. */
 static Result carry_out(Instance *c, Strike *strike, int first) {
     const Model *m = c->model;
-    State *s = &c->state;
     Terms *terms = c->work.strike_terms;
-    if (strike->hard) hold_terms(c, terms);
+    if (strike->hard) find_held(c, terms, c->work.held);
     for (int trial = 0; trial < TRIALS && !(trial > 0 && c->bounded && c->budget < 1); trial++) {
         c->budget--;
         for (int k = 0; k < m->n_holds; k++)
@@ -148,7 +135,7 @@ static Result carry_out(Instance *c, Strike *strike, int first) {
         if (strike->entering[k] && !strike->loose[k] && one->state >= 0)
             c->x[one->state] = -terms[k].restitution * strike->before[k] / one->factor;
     }
-    if (solve_implicit(c, s->t, c->x, c->z, 0) != RESULT_OK) return RESULT_ERROR;
+    if (solve_now(c, 0) != RESULT_OK) return RESULT_ERROR;
     if (strike->hard && c->struck != NULL) book(c, strike, first);
     if (strike->hard) mark_moved(c, strike, terms);
     return RESULT_OK;
@@ -157,12 +144,11 @@ static Result carry_out(Instance *c, Strike *strike, int first) {
 /* What the impact knocks loose takes the mode that its start would take. */
 static void choose_again(Instance *c, const Strike *strike) {
     const Model *m = c->model;
-    State *s = &c->state;
     double *d = c->work.respond_d;
     unsigned char *decided = c->work.decided;
     memcpy(d, c->d, (size_t)m->n_d * sizeof(double));
     memset(decided, 1, (size_t)m->n_d);
-    evaluate(c, &m->tapes.discrete_starts, s->t, c->x, c->z, c->work.guards);
+    evaluate_now(c, &m->tapes.discrete_starts, c->work.guards);
     for (int k = 0; k < m->n_holds; k++) {
         int mode = m->holds[k].mode;
         if (!strike->loose[k]) continue;
@@ -182,7 +168,6 @@ static void choose_again(Instance *c, const Strike *strike) {
 /* Close what finite forces have opened since the first impact at this instant: they come after it. */
 static Result hold_again(Instance *c, const unsigned char *entered) {
     const Model *m = c->model;
-    State *s = &c->state;
     for (int k = 0; k < m->n_holds; k++) {
         const Held *one = &m->holds[k];
         if (!entered[k] || c->d[one->mode] == one->number) continue;
@@ -190,14 +175,14 @@ static Result hold_again(Instance *c, const unsigned char *entered) {
         c->d[one->mode] = one->number;
     }
     share(c);
-    return solve_implicit(c, s->t, c->x, c->z, 0);
+    return solve_now(c, 0);
 }
 
 /* Speeds before an impact, and whether it is one. Friction stops nothing at once; where an importer lets it overrun
  * standstill, that is none. */
 static void begin_strike(Instance *c, Strike *strike, const Terms *terms) {
     const Model *m = c->model;
-    const double *values = motions(c);
+    const double *values = variables_now(c);
     strike->hard = 0;
     for (int k = 0; k < m->n_holds; k++) {
         const Held *one = &m->holds[k];
@@ -213,19 +198,14 @@ static void begin_strike(Instance *c, Strike *strike, const Terms *terms) {
  * instant are one, from the speeds before the first. */
 Result stop_motions(Instance *c, const double *before, Impacts *impacts) {
     const Model *m = c->model;
-    State *s = &c->state;
     Strike *strike = &c->work.strike;
     Terms *terms = c->work.strike_terms;
-    int any = 0, first = !impacts->struck;
+    int first = !impacts->struck;
     if (m->n_holds == 0) return RESULT_OK;
     memset(strike->loose, 0, (size_t)m->n_holds);
-    hold_terms(c, terms);
-    mark_held(c, terms, strike->entering);
-    for (int k = 0; k < m->n_holds; k++) {
-        if (before[m->holds[k].mode] == m->holds[k].number) strike->entering[k] = 0;
-        any |= strike->entering[k];
-    }
-    if (!any) return RESULT_OK;
+    find_held(c, terms, strike->entering);
+    for (int k = 0; k < m->n_holds; k++) strike->entering[k] &= before[m->holds[k].mode] != m->holds[k].number;
+    if (!any_of(strike->entering, m->n_holds)) return RESULT_OK;
     begin_strike(c, strike, terms);
     if (strike->hard) {
         for (int k = 0; k < m->n_holds; k++) strike->entering[k] = impacts->entered[k] |= strike->entering[k];
@@ -237,10 +217,8 @@ Result stop_motions(Instance *c, const double *before, Impacts *impacts) {
     }
     if (carry_out(c, strike, first) != RESULT_OK) return RESULT_ERROR;
     for (int k = 0; k < m->n_holds; k++) impacts->entered[k] &= !strike->knocked[k];
-    any = 0;
-    for (int k = 0; k < m->n_holds; k++) any |= strike->loose[k];
-    if (!any) return RESULT_OK;
+    if (!any_of(strike->loose, m->n_holds)) return RESULT_OK;
     choose_again(c, strike);
     share(c);
-    return solve_implicit(c, s->t, c->x, c->z, 0);
+    return solve_now(c, 0);
 }

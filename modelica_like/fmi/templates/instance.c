@@ -40,7 +40,7 @@ Result set_log_category(Instance *c, const char *category, int on) {
     else
         for (int k = 0; k < N_CATEGORIES; k++)
             if (strcmp(category, categories[k].name) == 0) chosen = categories[k].category;
-    if (chosen == 0) return report(c, LOG_ERROR, RESULT_ERROR, "There is no log category '%.100s'.", category);
+    if (chosen == 0) return fail(c, "There is no log category '%.100s'.", category);
     c->log_enabled = on ? c->log_enabled | chosen : c->log_enabled & ~chosen;
     return RESULT_OK;
 }
@@ -60,7 +60,7 @@ static const char *phase_name(int phase) {
 
 Result allowed(Instance *c, const char *function, int phases) {
     if (c->state.phase & phases) return RESULT_OK;
-    return report(c, LOG_ERROR, RESULT_ERROR, "%s is not allowed now: %s.", function, phase_name(c->state.phase));
+    return fail(c, "%s is not allowed now: %s.", function, phase_name(c->state.phase));
 }
 
 /* ---- memory ----------------------------------------------------------------------------------------------------- */
@@ -88,10 +88,9 @@ static uint64_t place(const Room *rooms, size_t count, double *memory) {
 static uint64_t place_state(Instance *c, double *memory) {
     const Model *m = c->model;
     uint64_t n = m->n_unknowns, n_d = m->n_d, n_starts = m->n_starts;
-    const Room rooms[] = {{m->n_x, 8, {&c->x}}, {m->n_z, 8, {&c->z}}, {m->n_p, 8, {&c->p}},
-        {m->n_u, 8, {&c->u, &c->u_rate}}, {n_d, 8, {&c->d}}, {n_d, 1, {&c->mode_given}},
-        {n_starts, 8, {&c->start_value}}, {n_starts, 1, {&c->start_given}}, {2 + 5 * n, 8, {&c->piece}},
-        {m->settings->fixed_step > 0 ? 2 * (uint64_t)m->n_guards : 0, 8, {&c->end_look}},
+    const Room rooms[] = {{n, 8, {&c->x}}, {m->n_p, 8, {&c->p}}, {m->n_u, 8, {&c->u, &c->u_rate}}, {n_d, 8, {&c->d}},
+        {n_d, 1, {&c->mode_given}}, {n_starts, 8, {&c->start_value}}, {n_starts, 1, {&c->start_given}},
+        {2 + 5 * n, 8, {&c->piece}}, {m->settings->fixed_step > 0 ? 2 * (uint64_t)m->n_guards : 0, 8, {&c->end_look}},
         {m->n_transitions, 1, {&c->wanting}}};
     return PLACE(rooms, memory);
 }
@@ -184,71 +183,56 @@ void instance_reset(Instance *c) {
 
 static Instance *instance_make(const Instance *bare) {
     const Model *m = bare->model;
-    size_t length = strlen(bare->name);
-    Instance measured = *bare, *c = bare->allocate(1, sizeof *c);
+    size_t length = strlen(bare->name) + 1;
+    Instance measured = *bare, *c = bare->allocate(1, sizeof *c + length);
     uint64_t size = lay_out(&measured, NULL);
-    if (c == NULL) return NULL;
-    *c = *bare;
-    c->numbers = size > SIZE_MAX / sizeof(double) ? NULL : bare->allocate((size_t)size, sizeof(double));
-    c->name = bare->allocate(length + 1, 1);
-    if (c->numbers == NULL || c->name == NULL) {
-        if (c->numbers != NULL) bare->release(c->numbers);
-        if (c->name != NULL) bare->release(c->name);
-        bare->release(c);
+    double *numbers = size > SIZE_MAX / sizeof(double) ? NULL : bare->allocate((size_t)size, sizeof(double));
+    if (c == NULL || numbers == NULL) {
+        if (c != NULL) bare->release(c);
+        if (numbers != NULL) bare->release(numbers);
         return NULL;
     }
-    memcpy(c->name, bare->name, length + 1);
-    lay_out(c, c->numbers);
+    *c = *bare;
+    c->name = memcpy(c + 1, bare->name, length);
+    c->numbers = numbers;
+    lay_out(c, numbers);
+    c->z = c->x + m->n_x;
     share_out_specials(c);
     memcpy(c->work.slots + m->slot_constants, m->constants, (size_t)m->n_constants * sizeof(double));
     instance_reset(c);
     return c;
 }
 
-/* An instance of a model, which must outlive it; NULL, with a message in the log, if there is none. */
-Instance *instance_new(const Model *model, const char *name, const char *token, Allocate allocate, Release release,
-    LogFunction log, AnyFunction logger, void *environment, int logging) {
-    Instance bare = {0}, *c;
-    bare.model = model;
-    bare.log = log;
-    bare.logger = logger;
-    bare.environment = environment;
-    bare.name = (char *)(name == NULL || *name == 0 ? "?" : name);
-    bare.allocate = allocate;
-    bare.release = release;
-    bare.log_enabled = logging ? LOG_ERROR | LOG_WARNING | LOG_EVENTS : LOG_ERROR;
-    if (name == NULL || *name == 0) {
-        report(&bare, LOG_ERROR, RESULT_ERROR, "The instance needs a name.");
-        return NULL;
-    }
-    if (token == NULL || strcmp(token, model->token) != 0) {
-        report(&bare, LOG_ERROR, RESULT_ERROR, "The instantiation token is that of another export of the model.");
-        return NULL;
-    }
-    c = instance_make(&bare);
-    if (c == NULL) report(&bare, LOG_ERROR, RESULT_ERROR, "There is not enough memory.");
+/* An instance of a model, which must outlive it; NULL, with a message in the log, if there is none. `bare` has the
+ * model, a name, and what belongs to the caller; log_enabled tells whether there is to be logged more than errors. */
+Instance *instance_new(Instance bare, const char *token) {
+    Instance *c = NULL;
+    const char *name = bare.name;
+    if (name == NULL || *name == 0) bare.name = "?";
+    bare.log_enabled = bare.log_enabled ? LOG_ERROR | LOG_WARNING | LOG_EVENTS : LOG_ERROR;
+    if (name != bare.name) fail(&bare, "The instance needs a name.");
+    else if (token == NULL || strcmp(token, bare.model->token) != 0)
+        fail(&bare, "The instantiation token is that of another export of the model.");
+    else if ((c = instance_make(&bare)) == NULL) fail(&bare, "There is not enough memory.");
     return c;
 }
 
 /* The same with a model of its own: the one that is compiled in, or else the one in the folder of resources. */
-Instance *instance_open(const char *location, const char *name, const char *token, Allocate allocate, Release release,
-    LogFunction log, AnyFunction logger, void *environment, int logging) {
+Instance *instance_open(Instance bare, const char *token, const char *location) {
     char message[MESSAGE_LENGTH];
-    Instance bare = {0}, *c;
-    Model *model = model_data_size > 0
-                       ? model_read((const unsigned char *)model_data, model_data_size, allocate, release, message)
-                       : model_open(location, allocate, release, message);
-    bare.log = log;
-    bare.logger = logger;
-    bare.environment = environment;
-    bare.name = (char *)(name == NULL || *name == 0 ? "?" : name);
-    if (model == NULL) {
-        report(&bare, LOG_ERROR, RESULT_ERROR, "%s", message);
+    Instance *c;
+    Model *own = model_data_size > 0 ? model_read((const unsigned char *)model_data, model_data_size, bare.allocate,
+                                           bare.release, message)
+                                     : model_open(location, bare.allocate, bare.release, message);
+    if (own == NULL) {
+        if (bare.name == NULL) bare.name = "?";
+        fail(&bare, "%s", message);
         return NULL;
     }
-    c = instance_new(model, name, token, allocate, release, log, logger, environment, logging);
-    if (c == NULL) model_free(model);
-    else c->own_model = model;
+    bare.model = own;
+    c = instance_new(bare, token);
+    if (c == NULL) model_free(own);
+    else c->own_model = own;
     return c;
 }
 
@@ -256,7 +240,6 @@ void instance_free(Instance *c) {
     Release release = c->release;
     if (c->own_model != NULL) model_free(c->own_model);
     release(c->numbers);
-    release(c->name);
     release(c);
 }
 
@@ -264,10 +247,9 @@ Result set_experiment(
     Instance *c, int tolerance_defined, double tolerance, double start, int stop_defined, double stop) {
     State *s = &c->state;
     if (!isfinite(start) || (stop_defined && !(stop >= start)))
-        return report(c, LOG_ERROR, RESULT_ERROR,
-            "The start time %g s must be finite and not after the stop time %g s.", start, stop);
+        return fail(c, "The start time %g s must be finite and not after the stop time %g s.", start, stop);
     if (tolerance_defined && !(tolerance > 0 && tolerance < 1))
-        return report(c, LOG_ERROR, RESULT_ERROR, "The tolerance must be between 0 and 1, not %g.", tolerance);
+        return fail(c, "The tolerance must be between 0 and 1, not %g.", tolerance);
     if (tolerance_defined) set_tolerance(s, c->model, tolerance);
     s->t = s->start_time = s->u_time = start;
     s->stop_time_defined = stop_defined && isfinite(stop);
@@ -298,9 +280,14 @@ static Header header_of(const Instance *c, const void *copy) {
     return h;
 }
 
-Result state_copy_out(Instance *c, void **copy) {
+static Result room_for_copy(Instance *c, void **copy) {
     if (*copy == NULL) *copy = c->allocate(1, copy_size(c));
-    if (*copy == NULL) return report(c, LOG_ERROR, RESULT_ERROR, "There is not enough memory for a copy of the state.");
+    if (*copy != NULL) return RESULT_OK;
+    return fail(c, "There is not enough memory for a copy of the state.");
+}
+
+Result state_copy_out(Instance *c, void **copy) {
+    if (room_for_copy(c, copy) != RESULT_OK) return RESULT_ERROR;
     memcpy(*copy, &c->state, sizeof(State));
     memcpy((char *)*copy + sizeof(State), c->numbers, c->n_numbers * sizeof(double));
     return RESULT_OK;
@@ -322,8 +309,7 @@ size_t state_size(const Instance *c) { return sizeof(Header) + copy_size(c); }
 
 Result state_write(Instance *c, const void *copy, unsigned char *bytes, size_t size) {
     Header h = header_of(c, copy);
-    if (size < state_size(c))
-        return report(c, LOG_ERROR, RESULT_ERROR, "The state needs %zu bytes, not %zu.", state_size(c), size);
+    if (size < state_size(c)) return fail(c, "The state needs %zu bytes, not %zu.", state_size(c), size);
     memcpy(bytes, &h, sizeof h);
     memcpy(bytes + sizeof h, copy, copy_size(c));
     return RESULT_OK;
@@ -331,15 +317,13 @@ Result state_write(Instance *c, const void *copy, unsigned char *bytes, size_t s
 
 Result state_read(Instance *c, const unsigned char *bytes, size_t size, void **copy) {
     Header h, expected;
-    if (size != state_size(c))
-        return report(c, LOG_ERROR, RESULT_ERROR, "A state of this model has %zu bytes, not %zu.", state_size(c), size);
+    if (size != state_size(c)) return fail(c, "A state of this model has %zu bytes, not %zu.", state_size(c), size);
     memcpy(&h, bytes, sizeof h);
     expected = header_of(c, bytes + sizeof h);
     if (memcmp(&h, &expected, sizeof h) != 0)
-        return report(c, LOG_ERROR, RESULT_ERROR,
-            "These bytes are no state of this model: it is another model's, or they are damaged.");
-    *copy = c->allocate(1, copy_size(c));
-    if (*copy == NULL) return report(c, LOG_ERROR, RESULT_ERROR, "There is not enough memory for a copy of the state.");
+        return fail(c, "These bytes are no state of this model: it is another model's, or they are damaged.");
+    *copy = NULL;
+    if (room_for_copy(c, copy) != RESULT_OK) return RESULT_ERROR;
     memcpy(*copy, bytes + sizeof h, copy_size(c));
     return RESULT_OK;
 }

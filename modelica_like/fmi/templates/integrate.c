@@ -34,8 +34,8 @@ void leave_piece(Instance *c) {
 
 static int look_at(Instance *c, double t, double *point, Look *look) {
     const Model *m = c->model;
-    if (solve_implicit(c, t, point, point + m->n_x, 1) != RESULT_OK) return 0;
-    evaluate_special(c, SPECIAL_GUARDS, t, point, point + m->n_x, look->values);
+    if (solve_implicit(c, t, point, 1) != RESULT_OK) return 0;
+    evaluate_special(c, SPECIAL_GUARDS, t, point, look->values);
     look->t = t;
     look->rates = look->values + m->n_guards;
     for (int g = 0; g < m->n_guards; g++) {
@@ -190,7 +190,7 @@ static int mark_wanting(Instance *c, Piece *piece, const Look *look, const unsig
     const Model *m = c->model;
     double *soon = look->values + 2 * (size_t)m->n_guards, *last = last_of(m, piece);
     int any = 0;
-    evaluate(c, &m->tapes.guards_soon, piece->end, last, last + m->n_x, soon);
+    evaluate(c, &m->tapes.guards_soon, piece->end, last, soon);
     for (int g = 0; g < m->n_guards; g++) {
         int near = look->values[g] > 0 || (look->rates[g] > 0 && -look->values[g] <= 10 * tolerance * look->rates[g]);
         if (kinds[g] != QUIET && near && number_or_false(soon[g]) > 0) any = c->wanting[m->guard_transition[g]] = 1;
@@ -304,8 +304,7 @@ static Result take_step(Instance *c, double limit) {
     double *first = c->work.first, wished = s->step > 0 ? s->step : first_step(c);
     double least = least_step(s);
     int rejected = 0;
-    memcpy(first, c->x, m->n_x * sizeof(double));
-    memcpy(first + m->n_x, c->z, m->n_z * sizeof(double));
+    memcpy(first, c->x, m->n_unknowns * sizeof(double));
     wished = fmin(wished, largest_step(c));
     for (int n = 0; n < MAX_REJECTIONS; n++) {
         double error = 0, factor, h = wished;
@@ -322,7 +321,7 @@ static Result take_step(Instance *c, double limit) {
             wished = h * fmax(0.1, factor);
             continue;
         }
-        if (solve_implicit(c, c->piece->end, last_of(m, c->piece), last_of(m, c->piece) + m->n_x, 1) != RESULT_OK ||
+        if (solve_implicit(c, c->piece->end, last_of(m, c->piece), 1) != RESULT_OK ||
             (m->n_guards > 0 && !search_events(c))) {
             rejected++;
             s->n_rejected++;
@@ -339,7 +338,7 @@ static Result take_step(Instance *c, double limit) {
         return RESULT_OK;
     }
     leave_piece(c);
-    return report(c, LOG_ERROR, RESULT_ERROR,
+    return fail(c,
         "The integrator gave up at t = %.12g s: the step became too small. Look for a stiff spring, a vanishing "
         "mass or a speed without bound.",
         s->t);
@@ -347,15 +346,9 @@ static Result take_step(Instance *c, double limit) {
 
 /* Makes a point of the piece the present one. */
 Result move_to(Instance *c, double t) {
-    const Model *m = c->model;
-    State *s = &c->state;
-    double *point = c->work.vector + m->n_z;
-    piece_at(m, c->piece, t, point);
-    s->t = t;
-    memcpy(c->x, point, m->n_x * sizeof(double));
-    memcpy(c->z, point + m->n_x, m->n_z * sizeof(double));
-    c->variables_valid = 0;
-    s->z_valid = 0;
+    piece_at(c->model, c->piece, t, c->x);
+    c->state.t = t;
+    c->variables_valid = c->state.z_valid = 0;
     return settle(c);
 }
 
@@ -364,6 +357,7 @@ Result take_changes(Instance *c, int *event) {
     State *s = &c->state;
     *event = 0;
     if (!s->inputs_changed) return RESULT_OK;
+    if (check_tables(c) != RESULT_OK) return RESULT_ERROR;
     s->inputs_changed = 0;
     leave_piece(c);
     s->z_valid = 0;
@@ -390,26 +384,27 @@ Result handle_event(Instance *c) {
 
 int is_due(Instance *c) { return c->model->n_moments > 0 && find_wanting(c, nothing_wanting(c), 0); }
 
+/* Fixed steps go to whole numbers of them only. */
+Result check_whole(Instance *c, double size) {
+    double fixed = c->model->settings->fixed_step;
+    if (!(fixed > 0) || (fabs(size / fixed - floor(size / fixed + 0.5)) <= SAME_PART && size > 0.5 * fixed))
+        return RESULT_OK;
+    return fail(c, "The step of %.9g s is not a whole number of fixed steps of %.9g s, for which the model was made.",
+        size, fixed);
+}
+
 /* Checks what the importer asks for and says where the step ends. */
 Result check_step(Instance *c, double point, double size, double *target) {
     State *s = &c->state;
-    double slack = SAME_POINT * fmax(1, fabs(s->t)), fixed = c->model->settings->fixed_step;
+    double slack = SAME_POINT * fmax(1, fabs(s->t));
     *target = point + size;
     if (!isfinite(point) || fabs(point - s->t) > slack)
-        return report(c, LOG_ERROR, RESULT_ERROR,
-            "The communication point is %.12g s, but the instance stands at %.12g s.", point, s->t);
-    if (!(size > 0) || !isfinite(*target))
-        return report(c, LOG_ERROR, RESULT_ERROR, "The communication step size %g s is not positive.", size);
-    if (fixed > 0 && !(fabs(size / fixed - floor(size / fixed + 0.5)) <= SAME_PART && size > 0.5 * fixed))
-        return report(c, LOG_ERROR, RESULT_ERROR,
-            "The communication step size %.9g s is not a whole number of fixed steps of %.9g s, for which the model "
-            "was "
-            "exported.",
-            size, fixed);
+        return fail(c, "The communication point is %.12g s, but the instance stands at %.12g s.", point, s->t);
+    if (!(size > 0) || !isfinite(*target)) return fail(c, "The communication step size %g s is not positive.", size);
+    if (check_whole(c, size) != RESULT_OK) return RESULT_ERROR;
     if (!s->stop_time_defined || *target <= s->stop_time) return RESULT_OK;
     if (*target > s->stop_time + slack)
-        return report(c, LOG_ERROR, RESULT_ERROR, "The step to %.12g s goes beyond the stop time %.12g s.", *target,
-            s->stop_time);
+        return fail(c, "The step to %.12g s goes beyond the stop time %.12g s.", *target, s->stop_time);
     *target = s->stop_time;
     return RESULT_OK;
 }

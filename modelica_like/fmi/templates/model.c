@@ -4,7 +4,7 @@
 #include <string.h>
 #include "model.h"
 
-#define FORMAT 1
+#define FORMAT 2
 #define LONGEST 0x10000000 /* slots, so that their sums stay integers */
 
 typedef struct {
@@ -33,11 +33,11 @@ static const struct {
     TABLE(parameters, n_p), TABLE(parameter_min, n_p), TABLE(parameter_max, n_p), TABLE(inputs, n_u),
     TABLE(guesses, n_x), TABLE(z_guesses, n_z), TABLE(nominals, n_x), TABLE(state_names, n_x),
     TABLE(implicit_names, n_z), TABLE(singular_names, n_determinants), TABLE(variables, n_variables),
-    TABLE(transitions, n_transitions), TABLE(guard_transition, n_guards), TABLE(resets, n_resets),
-    TABLE(reset_nodes, n_reset_nodes), TABLE(modes, n_modes), TABLE(mode_names, n_mode_names), TABLE(holds, n_holds),
-    TABLE(circuits, n_circuits), TABLE(members, n_members), TABLE(units, n_units), TABLE(start_modes, n_start_modes),
-    TABLE(start_direct, n_start_direct), TABLE(start_default, n_start_default), TABLE(start_x_guess, n_start_x_guess),
-    TABLE(start_z_guess, n_start_z_guess), TABLE(start_rows, n_start_unknowns),
+    TABLE(rising, n_rising), TABLE(transitions, n_transitions), TABLE(guard_transition, n_guards),
+    TABLE(resets, n_resets), TABLE(reset_nodes, n_reset_nodes), TABLE(modes, n_modes), TABLE(mode_names, n_mode_names),
+    TABLE(holds, n_holds), TABLE(circuits, n_circuits), TABLE(members, n_members), TABLE(units, n_units),
+    TABLE(start_modes, n_start_modes), TABLE(start_direct, n_start_direct), TABLE(start_default, n_start_default),
+    TABLE(start_x_guess, n_start_x_guess), TABLE(start_z_guess, n_start_z_guess), TABLE(start_rows, n_start_unknowns),
     TABLE(start_dependent, n_start_dependent), TABLE(start_zero, n_start_zero), TABLE(start_columns, n_start_unknowns),
     TABLE(steady_states, n_steady), TABLE(jacobian_to_step, n_jacobian), TABLE(step_diagonal, n_x), QR(step), QR(start),
     TAPE(rates), TAPE(jacobian), TAPE(alg), TAPE(alg_jacobian), TAPE(variables), TAPE(guards), TAPE(guards_soon),

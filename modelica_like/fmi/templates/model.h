@@ -5,19 +5,12 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* clang-format off */
-/* The order is that of OPERATIONS in tape.py. */
+#define OPERATION(name, value, by_a, by_b) OPERATION_##name,
 typedef enum {
-    OPERATION_ADD, OPERATION_SUB, OPERATION_MUL, OPERATION_DIV, OPERATION_NEG, OPERATION_EXP, OPERATION_LOG,
-    OPERATION_POW, OPERATION_CONSTPOW, OPERATION_SQRT, OPERATION_SQ, OPERATION_TWICE, OPERATION_SIN, OPERATION_COS,
-    OPERATION_TAN, OPERATION_ASIN, OPERATION_ACOS, OPERATION_ATAN, OPERATION_LT, OPERATION_LE, OPERATION_EQ,
-    OPERATION_NE, OPERATION_NOT, OPERATION_AND, OPERATION_OR, OPERATION_FLOOR, OPERATION_CEIL, OPERATION_FMOD,
-    OPERATION_REMAINDER, OPERATION_FABS, OPERATION_SIGN, OPERATION_COPYSIGN, OPERATION_IF_ELSE_ZERO, OPERATION_ERF,
-    OPERATION_FMIN, OPERATION_FMAX, OPERATION_INV, OPERATION_SINH, OPERATION_COSH, OPERATION_TANH, OPERATION_ASINH,
-    OPERATION_ACOSH, OPERATION_ATANH, OPERATION_ATAN2, OPERATION_HYPOT, OPERATION_LOG1P, OPERATION_EXPM1,
+#include "operations.h"
     N_OPERATION_CODES
 } OperationCode;
-/* clang-format on */
+#undef OPERATION
 
 /* Records lie in the file as they lie in memory: numbers of 4 and 8 bytes, without gaps. */
 typedef struct {
@@ -51,15 +44,20 @@ typedef enum {
     KIND_GUARD,
     N_KINDS
 } Kind;
-typedef enum { TYPE_FLOAT64, TYPE_ENUMERATION, N_TYPES } ValueType;
+typedef enum { TYPE_FLOAT64, TYPE_ENUMERATION, TYPE_ARRAY, N_TYPES } ValueType;
 
 typedef struct {
     uint32_t reference;
     int type, kind, index;
-    int start;   /* start value that determines it, or -1 */
+    int start;   /* start value that determines it, or -1; of an array: reference of its first element */
     int tunable; /* a parameter that may change during a run */
     int name;
-} Variable; /* sorted by reference */
+    int count; /* elements of an array, whose references follow each other */
+} Variable;    /* sorted by reference */
+
+typedef struct {
+    int below, above, below_name, above_name;
+} Rising; /* parameters of which the second must exceed the first */
 
 typedef enum { RESET_STATE, RESET_DISCRETE, RESET_VALUE, N_RESET_KINDS } ResetKind;
 typedef struct {
@@ -67,7 +65,9 @@ typedef struct {
     double factor;
 } Reset;
 typedef struct {
-    int mode, target, timed, index, first_reset, n_resets, name, notice;
+    int mode, target;
+    short timed, fails;
+    int index, first_reset, n_resets, name, notice;
     uint64_t sources;
 } Transition;
 typedef struct {
@@ -100,10 +100,11 @@ typedef struct {
 typedef struct Model { /* tables lie in the bytes of the file; texts are offsets in `text` */
     const Settings *settings;
     const char *text, *token;
-    int n_settings, n_text, n_token, n_x, n_z, n_p, n_u, n_constants, n_variables;
+    int n_settings, n_text, n_token, n_x, n_z, n_p, n_u, n_constants, n_variables, n_rising;
     const double *constants, *parameters, *parameter_min, *parameter_max, *inputs, *guesses, *z_guesses, *nominals;
     const int *state_names, *implicit_names, *singular_names;
     const Variable *variables;
+    const Rising *rising;
 
     int n_transitions, n_guards, n_resets, n_reset_nodes, n_modes, n_mode_names;
     const Transition *transitions; /* in the order in which they are declared */

@@ -93,7 +93,10 @@ static int check_variables(const Model *m, char *message) {
         1, m->n_x, m->n_x, m->n_nodes, m->n_p, m->n_derived, m->n_u, m->n_modes, m->n_guards}; /* as Kind */
     const Range ranges[] = {ARRAY(state_names, m->n_x, m->n_text), ARRAY(implicit_names, m->n_z, m->n_text),
         ARRAY(singular_names, m->n_determinants, m->n_text), COLUMN(variables, kind, m->n_variables, 0, N_KINDS),
-        COLUMN(variables, type, m->n_variables, 0, N_TYPES), COLUMN(variables, name, m->n_variables, 0, m->n_text)};
+        COLUMN(variables, type, m->n_variables, 0, N_TYPES), COLUMN(variables, name, m->n_variables, 0, m->n_text),
+        COLUMN(variables, count, m->n_variables, 1, m->n_p + 2), COLUMN(rising, below, m->n_rising, 0, m->n_p),
+        COLUMN(rising, above, m->n_rising, 0, m->n_p), COLUMN(rising, below_name, m->n_rising, 0, m->n_text),
+        COLUMN(rising, above_name, m->n_rising, 0, m->n_text)};
     /* Texts end at the latest where their section ends. */
     if (m->n_text == 0 || m->text[m->n_text - 1] != 0) return damaged(message, "text");
     if (m->n_token == 0 || m->token[m->n_token - 1] != 0) return damaged(message, "token");

@@ -67,11 +67,15 @@ EXPORTED void native_close(Model *m) { model_free(m); }
 EXPORTED Native *native_new(const Model *m) {
     Native *n = calloc(1, sizeof *n);
     if (n == NULL) return NULL;
-    n->c = instance_new(m, "native", m->token, calloc, free, keep_message, NULL, n, 0);
-    if (n->c != NULL) {
-        n->c->co_simulation = 1;
-        return n;
-    }
+    n->c = instance_new((Instance){.model = m,
+                            .name = "native",
+                            .log = keep_message,
+                            .environment = n,
+                            .co_simulation = 1,
+                            .allocate = calloc,
+                            .release = free},
+        m->token);
+    if (n->c != NULL) return n;
     free(n);
     return NULL;
 }
@@ -118,15 +122,17 @@ EXPORTED void native_set_all(Native *n, const double *parameters, const double *
 static int read_values(Instance *c, int64_t count, const uint32_t *references, double *values) {
     Result result = RESULT_OK;
     for (int64_t k = 0; k < count && result == RESULT_OK; k++) {
-        int mode = 0;
         if (!is_mode(c, references[k])) result = get_float(c, references[k], &values[k]);
-        else if ((result = get_mode(c, references[k], &mode)) == RESULT_OK) values[k] = mode;
+        else if ((values[k] = get_mode(c, references[k])) < 0) result = RESULT_ERROR;
     }
     return code(result);
 }
 
+/* Has an event to be handled before anything else? What a fixed step has left is taken by the next one. */
+static int event_first(const Instance *c) { return c->state.at_event && !(c->model->settings->fixed_step > 0); }
+
 EXPORTED int native_get(Native *n, int64_t count, const uint32_t *references, double *values) {
-    if (n->c->state.at_event && handle_event(n->c) != RESULT_OK) return NATIVE_FAILED;
+    if (event_first(n->c) && handle_event(n->c) != RESULT_OK) return NATIVE_FAILED;
     return read_values(n->c, count, references, values);
 }
 
@@ -136,7 +142,7 @@ static int begun(Native *n) {
     n->c->state.phase = PHASE_STEP;
     n->c->state.inputs_changed = 0;
     n->c->state.at_event = 1; /* events at the start come first, whatever is asked for next */
-    return NATIVE_OK;
+    return n->c->model->settings->fixed_step > 0 ? code(handle_event(n->c)) : NATIVE_OK;
 }
 
 /* Finds the start from the model's start values and from those that were set. */
@@ -159,7 +165,9 @@ EXPORTED int native_begin_at(Native *n, const double *x, const double *z, const 
 /* A control loop's step: sets, goes to a time through all events, gets. */
 EXPORTED int native_step(Native *n, double time, int64_t n_set, const uint32_t *set, const double *given, int64_t n_get,
     const uint32_t *get, double *values) {
-    if (native_set(n, n_set, set, given) != NATIVE_OK || integrate_to(n->c, time, 0) == FAILED) return NATIVE_FAILED;
+    if (native_set(n, n_set, set, given) != NATIVE_OK || check_whole(n->c, time - n->c->state.t) != RESULT_OK ||
+        integrate_to(n->c, time, 0) == FAILED)
+        return NATIVE_FAILED;
     return native_get(n, n_get, get, values);
 }
 
@@ -213,8 +221,7 @@ static int write_point(Native *n, NativeRun *r) {
     r->last = c->state.t;
     if (r->times != NULL) r->times[k] = c->state.t;
     if (r->states != NULL) {
-        memcpy(r->states + k * m->n_unknowns, c->x, (size_t)m->n_x * sizeof(double));
-        memcpy(r->states + k * m->n_unknowns + m->n_x, c->z, (size_t)m->n_z * sizeof(double));
+        memcpy(r->states + k * m->n_unknowns, c->x, (size_t)m->n_unknowns * sizeof(double));
     }
     if (r->outputs == NULL) return NATIVE_OK;
     return read_values(n->c, r->n_outputs, r->references, r->outputs + k * r->n_outputs);
@@ -252,10 +259,10 @@ static double pause_after(Instance *c) {
 static int run_on(Native *n, double end, int64_t results, NativeRun *r) {
     State *s = &n->c->state;
     double width = (end - r->begin) / (double)results;
-    while (s->t < end || s->at_event || r->n_segments == 0) {
+    while (s->t < end || event_first(n->c) || r->n_segments == 0) {
         double t = r->begin + (end - r->begin) * ((double)r->next / (double)results);
         int result = NATIVE_OK;
-        if (s->at_event || r->n_segments == 0) {
+        if (event_first(n->c) || r->n_segments == 0) {
             result = instant(n, r, width);
             if (result != NATIVE_OK) return result;
             continue;
@@ -285,6 +292,7 @@ EXPORTED int native_run(Native *n, double end, int64_t results, NativeRun *run) 
         run->begin = n->c->state.t;
         run->next = 1;
     }
+    if (check_whole(n->c, (end - run->begin) / (double)results) != RESULT_OK) return NATIVE_FAILED;
     n->run = run;
     n->pause = run->steps > 0 ? n->c->state.n_steps + (double)run->steps : INFINITY;
     n->c->noted = note_event;

@@ -9,12 +9,11 @@
 
 double input_at(const Instance *c, int k, double t) { return c->u[k] + c->u_rate[k] * (t - c->state.u_time); }
 
-void load(Instance *c, double t, const double *x, const double *z) {
+void load(Instance *c, double t, const double *point) {
     const Model *m = c->model;
     double *slots = c->work.slots;
     slots[0] = t;
-    memcpy(slots + m->slot_x, x, m->n_x * sizeof(double));
-    memcpy(slots + m->slot_z, z, m->n_z * sizeof(double));
+    memcpy(slots + m->slot_x, point, m->n_unknowns * sizeof(double));
     for (int k = 0; k < m->n_u; k++) slots[m->slot_u + k] = input_at(c, k, t);
     if (memcmp(slots + m->slot_p, c->p, (size_t)m->n_p * sizeof(double)) != 0) {
         for (int k = 0; k < m->n_p; k++) {
@@ -28,31 +27,44 @@ void load(Instance *c, double t, const double *x, const double *z) {
     }
 }
 
-void evaluate(Instance *c, const Tape *tape, double t, const double *x, const double *z, double *outputs) {
-    load(c, t, x, z);
+void evaluate(Instance *c, const Tape *tape, double t, const double *point, double *outputs) {
+    load(c, t, point);
     tape_run(tape, c->work.slots, outputs);
 }
 
+void evaluate_now(Instance *c, const Tape *tape, double *outputs) { evaluate(c, tape, c->state.t, c->x, outputs); }
+
+const double *variables_now(Instance *c) {
+    evaluate_now(c, &c->model->tapes.variables, c->work.variables);
+    return c->work.variables;
+}
+
+int any_of(const unsigned char *marks, int n) {
+    int any = 0;
+    for (int k = 0; k < n; k++) any |= marks[k];
+    return any;
+}
+
 static Result singular(Instance *c, double t, const char *names) {
-    return report(c, LOG_ERROR, RESULT_ERROR,
+    return fail(c,
         "The Jacobian is singular at t = %.9g s in the equations for %s. Where two frictions stick on the "
         "same motion, make one compliant, or let one start open.",
         t, names);
 }
 
-static inline double largest_of(int n, const double *values) {
+double largest_of(int n, const double *values) {
     double largest = 0;
     for (int k = 0; k < n; k++) largest = fmax(largest, fabs(values[k]));
     return largest;
 }
 
-Result solve_implicit(Instance *c, double t, const double *x, double *z, int quiet) {
+Result solve_implicit(Instance *c, double t, double *point, int quiet) {
     const Model *m = c->model;
-    double *step = c->work.vector, *matrix = c->work.dense_matrix, change = INFINITY, residual = 0;
+    double *z = point + m->n_x, *step = c->work.vector, *matrix = c->work.dense_matrix, change = INFINITY, residual = 0;
     int *order = c->work.order, rounds = !c->bounded ? MAX_NEWTON : m->settings->implicit_linear ? 1 : BOUNDED_NEWTON;
     if (m->n_z == 0) return RESULT_OK;
     for (int round = 0; round < rounds; round++) {
-        evaluate_special(c, SPECIAL_ALG, t, x, z, step);
+        evaluate_special(c, SPECIAL_ALG, t, point, step);
         if (c->bounded && round > 0 && largest_of(m->n_z, step) <= SOLVED * residual) return RESULT_OK;
         residual = largest_of(m->n_z, step);
         run_special(c, SPECIAL_ALG_JACOBIAN, matrix);
@@ -74,22 +86,23 @@ Result solve_implicit(Instance *c, double t, const double *x, double *z, int qui
     }
     if (change <= 1e-9 || c->bounded) return RESULT_OK;
     return quiet ? RESULT_ERROR
-                 : report(c, LOG_ERROR, RESULT_ERROR, "The equations for %s were not solved at t = %.9g s.",
-                       text_of(m, m->implicit_names[0]), t);
+                 : fail(c, "The equations for %s were not solved at t = %.9g s.", text_of(m, m->implicit_names[0]), t);
 }
+
+Result solve_now(Instance *c, int quiet) { return solve_implicit(c, c->state.t, c->x, quiet); }
 
 Result check_singular(Instance *c) {
     const Model *m = c->model;
     State *s = &c->state;
     double *values = c->work.rhs;
-    evaluate(c, &m->tapes.determinants, s->t, c->x, c->z, values);
+    evaluate_now(c, &m->tapes.determinants, values);
     for (int k = 0; k < m->n_determinants; k++)
         if (!isfinite(values[k]) || fabs(values[k]) < 1e-12) return singular(c, s->t, text_of(m, m->singular_names[k]));
     if (c->bounded) return RESULT_OK; /* the next step tells */
     tape_run(&m->tapes.rates, c->work.slots, values);
     for (int k = 0; k < m->n_x; k++)
         if (!isfinite(values[k]))
-            return report(c, LOG_ERROR, RESULT_ERROR,
+            return fail(c,
                 "The derivative of %s is not finite at t = %.9g s. Look for a mass, inertia or ratio of zero.",
                 text_of(m, m->state_names[k]), s->t);
     return RESULT_OK;
@@ -98,7 +111,7 @@ Result check_singular(Instance *c) {
 /* Bring the implicit unknowns up to date with time, states, parameters and inputs. */
 Result settle(Instance *c) {
     if (c->state.z_valid) return RESULT_OK;
-    if (solve_implicit(c, c->state.t, c->x, c->z, 0) != RESULT_OK) return RESULT_ERROR;
+    if (solve_now(c, 0) != RESULT_OK) return RESULT_ERROR;
     c->state.z_valid = 1;
     return RESULT_OK;
 }

@@ -53,12 +53,12 @@ static void linearize(Instance *c, double t, const double *y, double *slope) {
     for (int k = 0; k < m->n_u; k++) moving |= c->u_rate[k] != 0;
     memset(slope, 0, (size_t)m->n_unknowns * sizeof(double));
     if (moving) {
-        evaluate(c, &m->tapes.rates, t, y, y + m->n_x, w->first_rates);
+        evaluate(c, &m->tapes.rates, t, y, w->first_rates);
         memset(w->dots, 0, m->slot_results * sizeof(double));
         w->dots[0] = 1;
         for (int k = 0; k < m->n_u; k++) w->dots[m->slot_u + k] = c->u_rate[k];
         tape_tangent(&m->tapes.rates, w->slots, w->dots, slope);
-    } else evaluate_special(c, SPECIAL_RATES, t, y, y + m->n_x, w->first_rates);
+    } else evaluate_special(c, SPECIAL_RATES, t, y, w->first_rates);
     run_special(c, SPECIAL_JACOBIAN, w->jacobian);
 }
 
@@ -104,7 +104,7 @@ int rosenbrock_step(
         for (int j = 0; j < i; j++)
             for (int k = 0; k < n; k++) y[k] += A[i][j] * w->stages[j * n + k];
         if (i == 0) memcpy(stage, w->first_rates, size);
-        else evaluate_special(c, SPECIAL_RATES, t + C_TIME[i] * h, y, y + m->n_x, stage);
+        else evaluate_special(c, SPECIAL_RATES, t + C_TIME[i] * h, y, stage);
         for (int j = 0; j < i; j++)
             for (int k = 0; k < m->n_x; k++) stage[k] += C[i][j] / h * w->stages[j * n + k];
         for (int k = 0; k < n; k++) {
@@ -146,12 +146,11 @@ void piece_at(const Model *m, const Piece *piece, double t, double *point) {
  * rounding tell nothing about it. */
 double first_step(Instance *c) {
     const Model *m = c->model;
-    const State *s = &c->state;
     double size, speed, *rates = c->work.rhs;
-    evaluate(c, &m->tapes.rates, s->t, c->x, c->z, rates);
+    evaluate_now(c, &m->tapes.rates, rates);
     size = error_norm(c, c->x, c->x, c->x);
     speed = error_norm(c, c->x, c->x, rates);
     if (!isfinite(speed) || m->n_x == 0) return 1e-3;
     if (size < 1e-5 || speed < 1e-5) return 1e-6;
-    return fmax(0.01 * size / speed, TIME_RESOLUTION * fmax(1, fabs(s->t)));
+    return fmax(0.01 * size / speed, TIME_RESOLUTION * fmax(1, fabs(c->state.t)));
 }

@@ -143,8 +143,8 @@ void run_special(Instance *c, SpecialTape which, double *outputs) {
 }
 
 /* The same at a point. */
-void evaluate_special(Instance *c, SpecialTape which, double t, const double *x, const double *z, double *outputs) {
-    load(c, t, x, z);
+void evaluate_special(Instance *c, SpecialTape which, double t, const double *point, double *outputs) {
+    load(c, t, point);
     run_special(c, which, outputs);
 }
 

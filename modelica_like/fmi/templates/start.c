@@ -19,8 +19,7 @@ void start_defaults(Instance *c) {
 /* Start values as the model says, or as they were given. */
 static const double *start_values(Instance *c) {
     const Model *m = c->model;
-    const State *s = &c->state;
-    evaluate(c, &m->tapes.start_values, s->t, c->x, c->z, c->work.start_values);
+    evaluate_now(c, &m->tapes.start_values, c->work.start_values);
     for (int k = 0; k < m->n_starts; k++)
         if (c->start_given[k]) c->work.start_values[k] = c->start_value[k];
     return c->work.start_values;
@@ -34,7 +33,7 @@ static Result apply_direct(Instance *c, const double *values) {
         const StartOf *one = &m->start_direct[k];
         double value = values[one->start] / one->factor;
         if (known[one->position] && fabs(value - x[one->position]) > CONSISTENT * (1 + fabs(x[one->position])))
-            return report(c, LOG_ERROR, RESULT_ERROR, "Two start values of %s contradict each other: %.9g and %.9g.",
+            return fail(c, "Two start values of %s contradict each other: %.9g and %.9g.",
                 text_of(m, m->state_names[one->position]), x[one->position], value);
         if (!known[one->position]) x[one->position] = value;
         known[one->position] = 1;
@@ -59,13 +58,12 @@ static double *start_unknown(Instance *c, int column) {
 /* Newton's method on the equations between free states, the variables that follow from them, and start values. */
 static Result solve_start_system(Instance *c, const double *values) {
     const Model *m = c->model;
-    State *s = &c->state;
     double *residual = c->work.start_residual, *step = c->work.start_unknowns, error = 0;
     memset(c->work.slots + m->slot_y, 0, m->n_y * sizeof(double));
     for (int k = 0; k < m->n_start_zero; k++) c->x[m->start_zero[k]] = 0;
     for (int round = 0; round < MAX_NEWTON; round++) {
         double change = 0;
-        evaluate(c, &m->tapes.start_system, s->t, c->x, c->z, residual);
+        evaluate_now(c, &m->tapes.start_system, residual);
         tape_run(&m->tapes.start_jacobian, c->work.slots, c->work.jacobian);
         error = 0;
         for (int k = 0; k < m->n_start_unknowns; k++) {
@@ -87,30 +85,26 @@ static Result solve_start_system(Instance *c, const double *values) {
         if (change < 1e-13) break;
     }
     if (error <= CONSISTENT) return RESULT_OK;
-    return report(c, LOG_ERROR, RESULT_ERROR,
-        "No start was found that meets all start values. Give others, or start values of states.");
+    return fail(c, "No start was found that meets all start values. Give others, or start values of states.");
 }
 
 static Result check_dependent(Instance *c, const double *values) {
     const Model *m = c->model;
-    State *s = &c->state;
     if (m->n_start_dependent == 0) return RESULT_OK;
-    evaluate(c, &m->tapes.variables, s->t, c->x, c->z, c->work.variables);
+    variables_now(c);
     for (int k = 0; k < m->n_start_dependent; k++) {
         double value = values[m->start_dependent[k].start], actual = c->work.variables[m->start_dependent[k].node];
         if (!(fabs(actual - value) <= CONSISTENT * (1 + fabs(value))))
-            return report(c, LOG_ERROR, RESULT_ERROR,
-                "A start value of %.9g cannot be met: the variable follows to be %.9g.", value, actual);
+            return fail(c, "A start value of %.9g cannot be met: the variable follows to be %.9g.", value, actual);
     }
     return RESULT_OK;
 }
 
 static Result solve_states(Instance *c) {
-    State *s = &c->state;
     const double *values = c->work.start_values;
     if (apply_direct(c, values) != RESULT_OK) return RESULT_ERROR;
     if (c->model->n_start_unknowns > 0 && solve_start_system(c, values) != RESULT_OK) return RESULT_ERROR;
-    if (solve_implicit(c, s->t, c->x, c->z, 0) != RESULT_OK) return RESULT_ERROR;
+    if (solve_now(c, 0) != RESULT_OK) return RESULT_ERROR;
     return check_dependent(c, values);
 }
 
@@ -122,7 +116,7 @@ static Result solve_steady(Instance *c) {
     double *rates = c->work.rhs, *a = c->work.square, *step = c->work.point, residual = INFINITY;
     for (int round = 0; round < MAX_NEWTON && n > 0; round++) {
         double change = 0;
-        evaluate(c, &m->tapes.rates, s->t, c->x, c->z, rates);
+        evaluate_now(c, &m->tapes.rates, rates);
         tape_run(&m->tapes.jacobian, c->work.slots, c->work.jacobian);
         memset(c->work.matrix, 0, (size_t)m->step.n_nonzeros * sizeof(double));
         for (int k = 0; k < m->n_jacobian; k++) c->work.matrix[m->jacobian_to_step[k]] = c->work.jacobian[k];
@@ -148,14 +142,14 @@ static Result solve_steady(Instance *c) {
         if (change < 1e-13) break;
     }
     if (n == 0 || residual <= 1e-6) return RESULT_OK;
-    return report(c, LOG_ERROR, RESULT_ERROR, "No steady state was found at t = %.9g s.", s->t);
+    return fail(c, "No steady state was found at t = %.9g s.", s->t);
 }
 
 /* Choose modes that are not decided by their start conditions: the first that holds wins. */
 void choose_modes(Instance *c, unsigned char *decided) {
     const Model *m = c->model;
     double *holds = c->work.guards;
-    evaluate(c, &m->tapes.start_conditions, c->state.t, c->x, c->z, holds);
+    evaluate_now(c, &m->tapes.start_conditions, holds);
     for (int k = 0; k < m->n_start_modes; k++) {
         const StartMode *one = &m->start_modes[k];
         if (holds[k] == 0 || decided[one->mode]) continue;
@@ -172,7 +166,7 @@ static int choose_start_modes(Instance *c, const double *begun) {
     memcpy(w->decided, c->mode_given, (size_t)m->n_d);
     memcpy(w->d_before, c->d, (size_t)m->n_d * sizeof(double));
     choose_modes(c, w->decided);
-    if (begun) evaluate(c, &m->tapes.variables, c->state.t, c->x, c->z, w->variables);
+    if (begun) variables_now(c);
     for (int k = 0; k < m->n_holds && begun; k++) {
         const Held *one = &m->holds[k];
         if (begun[k] * w->variables[one->motion] < 0 && c->d[one->mode] != w->d_before[one->mode])
@@ -183,9 +177,8 @@ static int choose_start_modes(Instance *c, const double *begun) {
 
 static void start_discretes(Instance *c) {
     const Model *m = c->model;
-    State *s = &c->state;
     double *values = c->work.guards;
-    evaluate(c, &m->tapes.discrete_starts, s->t, c->x, c->z, values);
+    evaluate_now(c, &m->tapes.discrete_starts, values);
     for (int k = 0; k < m->n_d; k++)
         if (!c->mode_given[k]) c->d[k] = values[k];
 }
@@ -205,9 +198,8 @@ static Result find_steady(Instance *c, double *begun) {
     int count = 0;
     apply_defaults(c, w->start_values);
     if (apply_direct(c, w->start_values) != RESULT_OK) return RESULT_ERROR;
-    if (m->n_holds > 0) hold_terms(c, w->terms);
-    mark_held(c, w->terms, w->held);
-    evaluate(c, &m->tapes.variables, c->state.t, c->x, c->z, w->variables);
+    if (m->n_holds > 0) find_held(c, w->terms, w->held);
+    variables_now(c);
     for (int k = 0; k < m->n_holds; k++) {
         begun[k] = w->variables[m->holds[k].motion];
         if (w->held[k]) w->standing[count++] = m->holds[k].motion;
@@ -222,12 +214,12 @@ static Result check_modes_hold(Instance *c) {
     const State *s = &c->state;
     double *guards = c->work.guards;
     if (m->n_guards == 0) return RESULT_OK;
-    evaluate(c, &m->tapes.guards, s->t, c->x, c->z, guards);
+    evaluate_now(c, &m->tapes.guards, guards);
     for (int k = 0; k < m->n_guards; k++) {
         const Transition *one = &m->transitions[m->guard_transition[k]];
         if (guard_active(c, k) && guards[k] > 0)
-            return report(c, LOG_ERROR, RESULT_ERROR,
-                "No steady state was found at t = %.9g s: %s does not stay in its mode.", s->t, text_of(m, one->name));
+            return fail(c, "No steady state was found at t = %.9g s: %s does not stay in its mode.", s->t,
+                text_of(m, one->name));
     }
     return RESULT_OK;
 }
@@ -238,6 +230,7 @@ Result start_solve(Instance *c) {
     State *s = &c->state;
     double *begun = c->work.begun;
     int round;
+    if (check_tables(c) != RESULT_OK) return RESULT_ERROR;
     memcpy(c->x, m->guesses, m->n_x * sizeof(double));
     memcpy(c->z, m->z_guesses, m->n_z * sizeof(double));
     memset(c->d, 0, m->n_d * sizeof(double));
@@ -257,10 +250,10 @@ Result start_solve(Instance *c) {
         share(c);
     }
     if (round == MODE_ROUNDS)
-        return report(c, LOG_ERROR, RESULT_ERROR,
-            "The modes at the start do not settle: they and the start values change each other in a circle.");
+        return fail(
+            c, "The modes at the start do not settle: they and the start values change each other in a circle.");
     rest(c);
-    if (solve_implicit(c, s->t, c->x, c->z, 0) != RESULT_OK || check_singular(c) != RESULT_OK) return RESULT_ERROR;
+    if (solve_now(c, 0) != RESULT_OK || check_singular(c) != RESULT_OK) return RESULT_ERROR;
     if (m->settings->steady && check_modes_hold(c) != RESULT_OK) return RESULT_ERROR;
     s->z_valid = s->solved = 1;
     s->piece_valid = s->event_pending = 0;

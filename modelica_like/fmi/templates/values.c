@@ -19,7 +19,7 @@ const Variable *find_variable(const Model *m, uint32_t reference) {
 const Variable *known_variable(Instance *c, uint32_t reference, ValueType type) {
     const Variable *v = find_variable(c->model, reference);
     if (v != NULL && v->type == (int)type) return v;
-    report(c, LOG_ERROR, RESULT_ERROR,
+    fail(c,
         v == NULL ? "There is no variable with value reference %u."
                   : "The variable with value reference %u is not of type %s.",
         (unsigned)reference, type == TYPE_FLOAT64 ? "Real (Float64)" : "Enumeration (Integer, Int64)");
@@ -29,7 +29,6 @@ const Variable *known_variable(Instance *c, uint32_t reference, ValueType type) 
 /* Values that a tape gives, each computed once per point; NULL if there are none. */
 static const double *seen(Instance *c, const Variable *v) {
     const Model *m = c->model;
-    const State *s = &c->state;
     Work *w = &c->work;
     const double *values = v->kind == KIND_DERIVED      ? w->seen_derived
                            : v->kind == KIND_DERIVATIVE ? w->seen_rates
@@ -39,13 +38,13 @@ static const double *seen(Instance *c, const Variable *v) {
     if (c->variables_valid & 1 << v->kind) return values;
     if (v->kind != KIND_DERIVED && settle(c) != RESULT_OK) return NULL;
     switch (v->kind) {
-        case KIND_DERIVED: evaluate(c, &m->tapes.derived, s->t, c->x, c->z, w->seen_derived); break;
+        case KIND_DERIVED: evaluate_now(c, &m->tapes.derived, w->seen_derived); break;
         case KIND_DERIVATIVE:
-            evaluate_special(c, SPECIAL_RATES, s->t, c->x, c->z, w->rhs);
+            evaluate_special(c, SPECIAL_RATES, c->state.t, c->x, w->rhs);
             memcpy(w->seen_rates, w->rhs, (size_t)m->n_x * sizeof(double));
             break;
         case KIND_GUARD: get_indicators(c, w->seen_indicators); break;
-        default: evaluate_special(c, SPECIAL_VARIABLES, s->t, c->x, c->z, w->variables);
+        default: evaluate_special(c, SPECIAL_VARIABLES, c->state.t, c->x, w->variables);
     }
     c->variables_valid |= 1 << v->kind;
     return values;
@@ -53,22 +52,20 @@ static const double *seen(Instance *c, const Variable *v) {
 
 /* In initialization mode, whatever was set since the last time must have its effect before anything is read. */
 static Result make_ready(Instance *c, const Variable *v) {
-    State *s = &c->state;
-    if (s->phase != PHASE_INITIALIZATION || s->solved || v->kind == KIND_PARAMETER || v->kind == KIND_INPUT ||
-        v->kind == KIND_TIME || v->kind == KIND_DERIVED)
+    if (c->state.phase != PHASE_INITIALIZATION || c->state.solved || v->kind == KIND_PARAMETER ||
+        v->kind == KIND_INPUT || v->kind == KIND_TIME || v->kind == KIND_DERIVED)
         return RESULT_OK;
     return start_solve(c);
 }
 
 Result get_float(Instance *c, uint32_t reference, double *value) {
     const Variable *v = known_variable(c, reference, TYPE_FLOAT64);
-    State *s = &c->state;
     if (v == NULL || make_ready(c, v) != RESULT_OK) return RESULT_ERROR;
     switch (v->kind) {
-        case KIND_TIME: *value = s->t; return RESULT_OK;
+        case KIND_TIME: *value = c->state.t; return RESULT_OK;
         case KIND_STATE: *value = c->x[v->index]; return RESULT_OK;
         case KIND_PARAMETER: *value = c->p[v->index]; return RESULT_OK;
-        case KIND_INPUT: *value = input_at(c, v->index, s->t); return RESULT_OK;
+        case KIND_INPUT: *value = input_at(c, v->index, c->state.t); return RESULT_OK;
         case KIND_DISCRETE: *value = c->d[v->index]; return RESULT_OK;
         default: {
             const double *values = seen(c, v);
@@ -87,8 +84,7 @@ Result make_consistent(Instance *c) {
 
 void get_derivatives(Instance *c, double *derivatives) {
     const Model *m = c->model;
-    State *s = &c->state;
-    evaluate(c, &m->tapes.rates, s->t, c->x, c->z, c->work.rhs);
+    evaluate_now(c, &m->tapes.rates, c->work.rhs);
     memcpy(derivatives, c->work.rhs, m->n_x * sizeof(double));
     rest_rates(c, derivatives);
 }
@@ -101,22 +97,21 @@ void get_derivatives(Instance *c, double *derivatives) {
 void get_indicators(Instance *c, double *indicators) {
     const Model *m = c->model;
     double *values = c->work.guards_before;
-    evaluate(c, &m->tapes.guards_soon, c->state.t, c->x, c->z, values);
+    evaluate_now(c, &m->tapes.guards_soon, values);
     for (int k = 0; k < m->n_guards; k++) {
         double value = guard_active(c, k) ? number_or_false(values[k]) : -1;
         indicators[k] = value > 0 ? value : value - OFFSET;
     }
 }
 
-Result get_mode(Instance *c, uint32_t reference, int *value) {
+/* The number of the mode, -1 if there is none. */
+int get_mode(Instance *c, uint32_t reference) {
     const Variable *v = known_variable(c, reference, TYPE_ENUMERATION);
-    if (v == NULL || make_ready(c, v) != RESULT_OK) return RESULT_ERROR;
-    *value = (int)c->d[v->index];
-    return RESULT_OK;
+    return v == NULL || make_ready(c, v) != RESULT_OK ? -1 : (int)c->d[v->index];
 }
 
 static Result refuse_value(Instance *c, const Variable *v, const char *why) {
-    return report(c, LOG_ERROR, RESULT_ERROR, "%s cannot be set: %s", text_of(c->model, v->name), why);
+    return fail(c, "%s cannot be set: %s", text_of(c->model, v->name), why);
 }
 
 static void touch(Instance *c) {
@@ -138,14 +133,26 @@ static Result set_parameter(Instance *c, const Variable *v, double value) {
     if (v->tunable && s->phase == PHASE_CONTINUOUS)
         return refuse_value(c, v, "tunable parameters change in event mode only.");
     if (value < low || value > high)
-        return report(c, LOG_ERROR, RESULT_ERROR, "%s = %g is out of range: it must be at %s %g.", text_of(m, v->name),
-            value, value < low ? "least" : "most", value < low ? low : high);
+        return fail(c, "%s = %g is out of range: it must be at %s %g.", text_of(m, v->name), value,
+            value < low ? "least" : "most", value < low ? low : high);
     if (c->p[v->index] != value) touch(c);
     if (c->p[v->index] != value && !before_start(s) && !c->work.tuned[v->index]) {
         c->work.tuned[v->index] = 1;
         c->work.decided_by++;
     }
     c->p[v->index] = value;
+    return RESULT_OK;
+}
+
+/* Columns of tables must rise; they are set number by number, so this is asked where they are needed. */
+Result check_tables(Instance *c) {
+    const Model *m = c->model;
+    for (int k = 0; k < m->n_rising; k++) {
+        const Rising *one = &m->rising[k];
+        if (!(c->p[one->below] < c->p[one->above]))
+            return fail(c, "%s = %g is not above %s = %g: this column of the table must rise.",
+                text_of(m, one->above_name), c->p[one->above], text_of(m, one->below_name), c->p[one->below]);
+    }
     return RESULT_OK;
 }
 
@@ -200,13 +207,13 @@ Result set_mode(Instance *c, uint32_t reference, int64_t value) {
     if (v == NULL) return RESULT_ERROR;
     if (v->kind != KIND_DISCRETE) return refuse_value(c, v, "it is calculated.");
     if (value < 0 || value >= m->modes[v->index].n_names)
-        return report(c, LOG_ERROR, RESULT_ERROR, "%s has no mode %lld: they are 0 to %d.", text_of(m, v->name),
-            (long long)value, m->modes[v->index].n_names - 1);
+        return fail(c, "%s has no mode %lld: they are 0 to %d.", text_of(m, v->name), (long long)value,
+            m->modes[v->index].n_names - 1);
     return set_start(c, v, (double)value);
 }
 
 Result set_time(Instance *c, double time) {
-    if (!isfinite(time)) return report(c, LOG_ERROR, RESULT_ERROR, "The time is not a finite number.");
+    if (!isfinite(time)) return fail(c, "The time is not a finite number.");
     c->state.t = time;
     c->state.z_valid = c->variables_valid = 0;
     return RESULT_OK;
@@ -216,8 +223,7 @@ Result set_states(Instance *c, const double *x) {
     const Model *m = c->model;
     for (int k = 0; k < m->n_x; k++)
         if (!isfinite(x[k]))
-            return report(c, LOG_ERROR, RESULT_ERROR, "%s cannot be set: the value is not a finite number.",
-                text_of(m, m->state_names[k]));
+            return fail(c, "%s cannot be set: the value is not a finite number.", text_of(m, m->state_names[k]));
     memcpy(c->x, x, m->n_x * sizeof(double));
     c->state.z_valid = c->variables_valid = 0;
     return RESULT_OK;

@@ -69,7 +69,7 @@ def examples_by_type(folder: Path) -> dict[str, list[Example]]:
         if "[parts" in contents[file]:
             netlist = parse(contents[file], str(file))
             for part in _parts(netlist.parts):
-                example = Example(file, netlist.description or netlist.name, part)
+                example = Example(file, netlist.description or netlist.name)
                 found.setdefault(part["is"], {}).setdefault(file, example)
     return {name: list(examples.values()) for name, examples in found.items()}
 

@@ -1,0 +1,88 @@
+"""Tables whose numbers are parameters: they can be changed without compiling again."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Generator, Iterable
+from contextlib import contextmanager
+from fnmatch import fnmatchcase
+from typing import Any, TypeVar, cast
+
+from modelica_like.errors import LanguageError, UnknownName, did_you_mean
+from modelica_like.language.component import Component
+from modelica_like.language.expr import symbol_of
+from modelica_like.language.fields import Parameter, param
+from modelica_like.language.tables import Rows
+
+_Root = TypeVar("_Root", bound=Component)
+
+
+def with_tunable_tables(root: _Root, patterns: Iterable[str]) -> _Root:
+    """Return a copy in which the numbers of tables are parameters `clutch.mu_pos[2,1]`, by row and column.
+
+    Args:
+        root: a component tree.
+        patterns: paths of tables, such as `clutch.mu_pos` or `*.loss_table`. The number of rows stays as it is. Tables
+            with texts, and those that are passed on to parts, stay what they are where a pattern with `*` meets them.
+
+    Raises:
+        UnknownName: no table has such a path.
+        LanguageError: a table that is named has texts, or is passed on to parts.
+    """
+    root = copy.deepcopy(root)
+    found = [(part, name, rows) for part in cast("Iterable[Any]", root.walk()) for name, rows in part._tables.items()]
+    tables = {f"{one[0].path}.{one[1]}".lstrip("."): one for one in found}
+    for pattern in patterns:
+        met = [path for path in tables if fnmatchcase(path, pattern.replace("[", "[[]"))]
+        if not met:
+            raise UnknownName(
+                f"{root.label} has no table '{pattern}'{did_you_mean(pattern, tables) or '.'}",
+                advice=f"Its tables are {', '.join(tables)}." if tables else "None of its parts has a table.",
+            )
+        for path in met:
+            owner, name, rows = tables[path]
+            kept = owner.parts or any(column.text for column in rows.columns)
+            if kept and path == pattern:
+                raise LanguageError(
+                    f"The numbers of {path} cannot be parameters: "
+                    + ("its parts are made from it." if owner.parts else "it has texts."),
+                    advice="Ask for the table of the part." if owner.parts else "",
+                )
+            if not kept:
+                owner.__dict__["_own_fields"] = {**owner._own_fields, **_cells(owner, name, rows)}
+    return root
+
+
+def _cells(owner: Component, table: str, rows: Rows) -> dict[str, Parameter]:
+    """Return a parameter for every number of a table, row by row."""
+    found: dict[str, Parameter] = {}
+    for i, row in enumerate(owner.__dict__[table], 1):
+        numbers: tuple[float, ...] = (row,) if rows.flat else row
+        for j, number in enumerate(numbers, 1):
+            column = rows.columns[min(j, len(rows.columns)) - 1]
+            unit = "1" if column.scale else column.unit
+            cell = cast("Parameter", param(unit, f"{column.what} in row {i} of {table}", default=number))
+            cell.owner, cell.name = type(owner).__name__, f"{table}[{i}]" if rows.flat else f"{table}[{i},{j}]"
+            cell.above = len(numbers) if column.rising and i > 1 else 0
+            found[cell.name] = cell
+    return found
+
+
+@contextmanager
+def symbols_in_tables(component: Any) -> Generator[None]:
+    """Let the equations of a component see symbols in the tables whose numbers are parameters."""
+    numbers: dict[str, Any] = {}
+    for name, rows in component._tables.items():
+        table = component.__dict__[name]
+        if f"{name}[1]" in component.fields or f"{name}[1,1]" in component.fields:
+            numbers[name] = table
+            component.__dict__[name] = tuple(
+                symbol_of(component, f"{name}[{i}]")
+                if rows.flat
+                else tuple(symbol_of(component, f"{name}[{i},{j}]") for j in range(1, len(row) + 1))
+                for i, row in enumerate(table, 1)
+            )
+    try:
+        yield
+    finally:
+        component.__dict__.update(numbers)
