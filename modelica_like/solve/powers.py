@@ -21,10 +21,8 @@ from modelica_like.solve.recorder import Segment
 
 POWERS = 4
 """Powers of a component that are integrated: loss, source, inflow, rate of the stored energy."""
-_RATE = 4
-"""Column of the rate of the stored energy among the energy terms."""
-_PIECE = 20_000
-"""Results that are looked at together."""
+_PIECE, _LARGEST = 20_000, 10_000_000
+"""Results that are looked at together, and numbers in their energy terms at most."""
 _SHARE, _ALL = 0.1, 50.0
 """Errors of one interval and of all, in relative tolerances of the energy that moves, that are left as they are."""
 _ASTRAY = 3.0
@@ -76,13 +74,13 @@ class Results:
 def results(model: CompiledDae, segments: Sequence[Segment]) -> Iterator[Results]:
     """Go through a run in pieces of bounded size; a long segment is cut into some that share a result."""
     held: list[Segment] = []
-    count = 0
+    count, most = 0, min(_PIECE, max(_LARGEST // (6 * max(len(model.components), 1)), 100))
     for segment in segments:
-        for first in range(0, max(len(segment.times) - 1, 1), _PIECE):
-            part = slice(first, first + _PIECE + 1)
+        for first in range(0, max(len(segment.times) - 1, 1), most):
+            part = slice(first, first + most + 1)
             held.append(Segment(segment.times[part], segment.x[:, part], segment.z[:, part], segment.d))
             count += len(held[-1].times)
-            if count > _PIECE:
+            if count > most:
                 yield _together(model, held)
                 held, count = [], 0
     if held:
@@ -135,7 +133,7 @@ class Powers:
         first, last = (np.searchsorted(kept, ends[kept]) for ends in (every.first, every.last))
         intervals, places, weights = rules(every.times[kept], first, last)
         first, last = first[intervals], last[intervals]
-        terms = every.terms[..., kept]
+        terms = np.take(every.terms, kept, axis=-1)
         powers = terms[1 : 1 + POWERS].reshape(-1, len(kept))
         self._move(terms[0], powers, np.diff(every.times[kept]))
         bent, bends = intervals[:0], np.zeros((2, len(powers), 0))
@@ -203,14 +201,13 @@ class Powers:
         if not self.model.states and not depth:
             # Nothing tells what happens between the results.
             return np.ones(len(intervals), bool)
-        mixed = _mixing(terms.shape[1]) @ terms.reshape(-1, terms.shape[-1])
-        best, lower, lowest = np.matmul(weights, mixed[:4].T[places]).transpose(1, 2, 0).copy()
+        mixed, stored = _mixed(terms[1 : 1 + POWERS]), _mixing(terms[0].shape[0]) @ terms[0]
+        best, lower, lowest = np.matmul(weights, mixed.T[places]).transpose(1, 2, 0).copy()
         if len(bent):
-            more = _mixing(terms.shape[1])[:4, terms.shape[1] : -terms.shape[1]] @ bends
-            best[:, bent] += more[0]
-            lower[:, bent] += more[1]
+            for rule, more in zip((best, lower), bends, strict=True):
+                rule[:, bent] += _mixed(more.reshape(POWERS, terms.shape[1], -1))
         near, far = np.abs(best - lower), np.abs(lower - lowest)
-        known = np.maximum(*np.abs(mixed[4:, intervals + 1] - mixed[4:, intervals] - best[2:]))
+        known = np.maximum(*np.abs(stored[:, intervals + 1] - stored[:, intervals] - best[2:]))
         smooth = np.maximum(*near[2:])
         gain = np.maximum(_ratio(near[:2], far[:2]), _ratio(known, smooth))
         errors = np.maximum(np.maximum(*(near[:2] * gain)), np.minimum(known, smooth))
@@ -252,12 +249,13 @@ def _ratio(small: Vector, large: Vector) -> Vector:
     return np.divide(small, large, out=np.ones_like(small), where=large > small)
 
 
+def _mixed(powers: Vector) -> Vector:
+    """Return two sums each, with different weights, of powers and of rates of stored energies; (4, n)."""
+    flat, rates = powers.reshape(-1, powers.shape[-1]), powers[-1]
+    return np.concatenate([_mixing(len(flat)) @ flat, _mixing(len(rates)) @ rates])
+
+
 @cache
-def _mixing(components: int) -> Vector:
-    """Return weights of two sums each of powers, of rates of stored energies, and of these; (6, 6 components)."""
-    turns = 0.618 * np.arange(POWERS * components)
-    sums = np.array([1.0 + np.modf(turns)[0], 2.0 - 3.0 * np.modf(1.7 * turns)[0]])
-    table = np.zeros((3, 2, 2 + POWERS, components))
-    table[0, :, 1 : 1 + POWERS] = sums.reshape(2, POWERS, components)
-    table[1, :, _RATE] = table[2, :, 0] = sums[:, :components]
-    return table.reshape(6, -1)
+def _mixing(count: int) -> Vector:
+    turns = 0.618 * np.arange(count)
+    return np.array([1.0 + np.modf(turns)[0], 2.0 - 3.0 * np.modf(1.7 * turns)[0]])
