@@ -9,7 +9,6 @@ import time
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import replace
-from importlib import import_module
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -35,6 +34,7 @@ from modelica_like.solve.solution import Solution
 from modelica_like.solve.trajectories import Statistics, Trajectories, needs_equations
 from modelica_like.structure import reduce
 from modelica_like.units import parse_unit, to_si
+from modelica_like.upper import upper
 
 _SECOND = parse_unit("s")
 _SHORTEST = 1e-12
@@ -162,8 +162,7 @@ def _loop(solver: str) -> Any:
     if solver == "idas":
         return EventLoop
     if solver == "native":
-        # It stands above this layer.
-        return import_module("modelica_like.native.run").NativeLoop
+        return upper("NativeLoop")
     raise UnknownName(
         f"There is no solver '{solver}'{did_you_mean(solver, get_args(Solver)) or '.'}",
         advice="There are idas (the reference) and native (the compiled run-time of FMUs).",

@@ -10,12 +10,12 @@ import casadi as ca
 
 from modelica_like.errors import CyclicAssembly, MissingValue, ValueOutOfRange
 from modelica_like.flatten.checks import unit_of_field
+from modelica_like.flatten.dimensions import Dimensions, check_expression
 from modelica_like.flatten.model import FlatParameter
 from modelica_like.language.component import Component
 from modelica_like.language.declared import unknown
 from modelica_like.language.expr import leaf_id
 from modelica_like.language.fields import Input, Parameter, Value
-from modelica_like.unitcheck import Dimensions, check_expression
 from modelica_like.units import ONE, Unit, read_quantity
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from modelica_like.compile.compiled import Circuit, CompiledDae, CompiledHold, Vector
+from modelica_like.compile.compiled import Circuit, CompiledDae, Vector
 from modelica_like.compile.functions import ROUNDING
 from modelica_like.compile.soon import TIME_RESOLUTION
 from modelica_like.flatten.holds import TERMS
@@ -356,6 +356,6 @@ class Strike:
     def _stop(self, before: Vector, restitution: Vector) -> None:
         """Put states that are held exactly to where the impact left them."""
         for k in sorted(self.entering - set(self.loose)):
-            one: CompiledHold = self.model.holds[k]
+            one = self.model.holds[k]
             if one.state is not None:
                 self.point.x[one.state[0]] = -restitution[k] * before[k] / one.state[1]

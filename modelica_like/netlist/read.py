@@ -155,7 +155,7 @@ class _Task:
         if kind.endswith(".toml"):
             part: Component = self.loader.load(Path(self.document.lines.file).parent / kind, self.chain).copy()
         else:
-            part = new_component(find_type(kind), values)
+            part = new_component(find_type(kind, Path(self.document.lines.file).parent), values)
         for key, value in values.items():
             self._give(part, key, value, f"{name}.{key}")
         self.loader.count(table.get("count", 1) * sum(1 for _ in part.walk()))

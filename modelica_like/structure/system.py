@@ -66,6 +66,11 @@ class System:
         # A vector of one entry, indexed by a list, gives a row.
         return ca.vec(self._stacked[levels])
 
+    @property
+    def everything(self) -> Any:
+        """The column of all symbols."""
+        return self.column(list(range(len(self.symbols))))
+
     def add_level(self, chain: int) -> int:
         """Extend a chain by one derivative."""
         below = self.levels[self.chains[chain][-1]]

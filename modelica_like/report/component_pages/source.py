@@ -360,9 +360,10 @@ class _Reader(Writer):
         raise Unwritable
 
     def _event(self, mode: str, arguments: Sequence[ast.expr], options: Mapping[str, ast.expr]) -> Event:
-        if not all(isinstance(one, ast.Constant | ast.Tuple) for one in arguments):
-            raise Unwritable
-        *sources, target = (ast.literal_eval(one) for one in arguments)
+        try:
+            *sources, target = (ast.literal_eval(one) for one in arguments)
+        except ValueError:  # not only words
+            raise Unwritable from None
         source = ", ".join(sources[0]) if sources and isinstance(sources[0], tuple) else "".join(sources)
         when = self.latex(options["when"]) if "when" in options else f"t = {self.latex(options['at'])}"
         reset, notice = options.get("reset", ast.Dict([], [])), options.get("notice", ast.Constant(""))
