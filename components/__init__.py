@@ -13,6 +13,7 @@ _NAMES = {
     "belts": "TimingBelt",
     "bristle_friction": "LuGreFriction",
     "choppers": "HBridge",
+    "contacts": "DogClutch RigidBacklash",
     "control": "PI PID ClutchActuator Feedback FirstOrder Gain Integrator Limiter P Sum",
     "dc_machines": "PermanentMagnetDCMachine SeparatelyExcitedDCMachine SeriesDCMachine ShuntDCMachine",
     "eddy_current_brakes": "EddyCurrentForce EddyCurrentTorque",

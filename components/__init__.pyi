@@ -9,6 +9,8 @@ from components.adaptors import VoltageToCurrentAdaptor as VoltageToCurrentAdapt
 from components.belts import TimingBelt as TimingBelt
 from components.bristle_friction import LuGreFriction as LuGreFriction
 from components.choppers import HBridge as HBridge
+from components.contacts import DogClutch as DogClutch
+from components.contacts import RigidBacklash as RigidBacklash
 from components.control import PI as PI
 from components.control import PID as PID
 from components.control import ClutchActuator as ClutchActuator

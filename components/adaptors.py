@@ -6,6 +6,7 @@ flow) decides about the states of the parts. In signals, a flow is the one that 
 
 from __future__ import annotations
 
+from components import icons
 from components.electrical import Pin
 from components.interfaces import Flange, LinearFlange
 from components.thermal import HeatPort
@@ -32,6 +33,7 @@ THERMAL = "org.modelica.thermal.heat_transfer.port"
 class TorqueToAngleAdaptor(Component):
     """Shaft end of a part that takes a torque and tells how it moves: it keeps its inertia and its states."""
 
+    icon = icons.BOUNDARY
     terminal = Terminal(ROTATIONAL, takes="flow")
     flange = Flange("shaft end")
     use_w: bool = True
@@ -68,7 +70,8 @@ class AngleToTorqueAdaptor(Component):
     derivatives of each other, which is up to the one who gives them.
     """
 
-    terminal = Terminal(ROTATIONAL, takes="potential", rates=(("phi", "w"), ("w", "a")))
+    icon = icons.BOUNDARY
+    terminal = Terminal(ROTATIONAL, takes="potential", rates=(("phi", "w"), ("w", "a")), power=("tau", "w"))
     flange = Flange("shaft end")
     phi: Input = signal_in("rad", "angle of the shaft")
     w: Input = signal_in("rad/s", "speed of the shaft", default=0.0)
@@ -86,6 +89,7 @@ class AngleToTorqueAdaptor(Component):
 class ForceToPositionAdaptor(Component):
     """Slide end of a part that takes a force and tells how it moves: it keeps its mass and its states."""
 
+    icon = icons.BOUNDARY
     terminal = Terminal(TRANSLATIONAL, takes="flow")
     flange = LinearFlange("slide end")
     use_v: bool = True
@@ -118,7 +122,8 @@ class ForceToPositionAdaptor(Component):
 class PositionToForceAdaptor(Component):
     """Slide end of a part that is moved, and answers with a force; see `AngleToTorqueAdaptor`."""
 
-    terminal = Terminal(TRANSLATIONAL, takes="potential", rates=(("s", "v"), ("v", "a")))
+    icon = icons.BOUNDARY
+    terminal = Terminal(TRANSLATIONAL, takes="potential", rates=(("s", "v"), ("v", "a")), power=("f", "v"))
     flange = LinearFlange("slide end")
     s: Input = signal_in("m", "position of the slide")
     v: Input = signal_in("m/s", "velocity of the slide", default=0.0)
@@ -136,6 +141,7 @@ class PositionToForceAdaptor(Component):
 class CurrentToVoltageAdaptor(Component):
     """Pin of a circuit that takes a current and tells its potential."""
 
+    icon = icons.BOUNDARY
     terminal = Terminal(ELECTRICAL, takes="flow")
     pin = Pin("open end of the circuit")
     i: Input = signal_in("A", "current into the circuit")
@@ -152,7 +158,8 @@ class CurrentToVoltageAdaptor(Component):
 class VoltageToCurrentAdaptor(Component):
     """Pin of a circuit whose potential is given, and that answers with a current."""
 
-    terminal = Terminal(ELECTRICAL, takes="potential")
+    icon = icons.BOUNDARY
+    terminal = Terminal(ELECTRICAL, takes="potential", power=("i", "v"))
     pin = Pin("open end of the circuit")
     v: Input = signal_in("V", "potential of the pin")
     i: Output = signal_out("A", "current into the other part")
@@ -168,6 +175,7 @@ class VoltageToCurrentAdaptor(Component):
 class HeatFlowToTemperatureAdaptor(Component):
     """Heat port of a part that takes a heat flow and tells its temperature."""
 
+    icon = icons.BOUNDARY
     terminal = Terminal(THERMAL, takes="flow")
     port = HeatPort("open heat port")
     Q_flow: Input = signal_in("W", "heat flow into the part")
@@ -184,6 +192,7 @@ class HeatFlowToTemperatureAdaptor(Component):
 class TemperatureToHeatFlowAdaptor(Component):
     """Heat port of a part whose temperature is given, and that answers with a heat flow."""
 
+    icon = icons.BOUNDARY
     terminal = Terminal(THERMAL, takes="potential")
     port = HeatPort("open heat port")
     T: Input = signal_in("K", "temperature of the port")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from components import icons
 from components.interfaces import ShaftInHousing
 from components.thermal import Lossy
 from modelica_like.language import Equations, Expr, Parameter, Variable, absolute, der, exp, param, var
@@ -18,6 +19,7 @@ class LuGreFriction(Lossy, ShaftInHousing):
     Control 40 (1995).
     """
 
+    icon = icons.BEARING
     sigma_0: Parameter = param("N.m/rad", "stiffness of the bristles", min=1e-12)
     sigma_1: Parameter = param("N.m.s/rad", "damping of the bristles at standstill", default=0.0, min=0)
     sigma_2: Parameter = param("N.m.s/rad", "viscous friction", default=0.0, min=0)
@@ -46,4 +48,5 @@ class LuGreFriction(Lossy, ShaftInHousing):
         return 0.5 * self.sigma_0 * self.z**2
 
     def dissipation(self) -> Expr:
-        return self.tau * self.w - self.sigma_0 * self.z * der(self.z)
+        slipping = self.sigma_0 * self.z**2 * self.sigma_0 * absolute(self.w) / self.steady()
+        return slipping + self.damping() * der(self.z) * self.w + self.sigma_2 * self.w**2

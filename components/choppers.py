@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from components import icons
 from components.electrical import Pin
 from components.thermal import Lossy
 from modelica_like.language import (
@@ -33,6 +34,7 @@ class HBridge(Lossy):
     resistance, and no other loss. Both terminals of the motor lie symmetrically to those of the supply.
     """
 
+    icon = icons.BRIDGE
     p = Pin("positive terminal of the supply")
     n = Pin("negative terminal of the supply")
     p_out = Pin("positive terminal of the motor")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from math import log
 
+from components import icons
 from modelica_like.language import (
     BoundMode,
     Component,
@@ -41,6 +42,7 @@ def at_limits(limit: BoundMode, free: Expr, low: Expr, high: Expr) -> Events:
 class Feedback(Component):
     """Difference of set value and measured value."""
 
+    icon = icons.DIFFERENCE
     u1: Input = signal_in("*", "set value")
     u2: Input = signal_in("*", "measured value")
     y: Output = signal_out("*", "u1 - u2")
@@ -52,6 +54,7 @@ class Feedback(Component):
 class Gain(Component):
     """Signal times a constant."""
 
+    icon = icons.GAIN
     u: Input = signal_in("*", "signal")
     k: Parameter = param("*", "factor")
     y: Output = signal_out("*", "product")
@@ -63,6 +66,7 @@ class Gain(Component):
 class Sum(Component):
     """Sum of two signals."""
 
+    icon = icons.SUM
     u1: Input = signal_in("*", "first signal")
     u2: Input = signal_in("*", "second signal")
     y: Output = signal_out("*", "u1 + u2")
@@ -74,6 +78,7 @@ class Sum(Component):
 class Limiter(Component):
     """Signal that keeps between ±y_max; with y_min given, between y_min and y_max. It has a kink at an event."""
 
+    icon = icons.LIMITER
     u: Input = signal_in("*", "signal")
     y_max: Parameter = param("*", "upper limit")
     y_min: Parameter = param("*", "lower limit; without a value -y_max", default=None)
@@ -95,6 +100,7 @@ class Limiter(Component):
 class P(Component):
     """Proportional controller y = k·(u_s - u_m), limited to ±y_max where that is given; it needs no anti-windup."""
 
+    icon = icons.CONTROL_P
     u_s: Input = signal_in("*", "set value")
     u_m: Input = signal_in("*", "measured value")
     k: Parameter = param("*", "gain, output over error")
@@ -119,6 +125,7 @@ class P(Component):
 class FirstOrder(Component):
     """Signal that follows another with a time constant."""
 
+    icon = icons.RISE
     u: Input = signal_in("*", "signal")
     T: Parameter = param("s", "time constant", min=1e-12)
     y: Output = signal_out("*", "delayed signal")
@@ -130,6 +137,7 @@ class FirstOrder(Component):
 class Integrator(Component):
     """Integral of a signal over time."""
 
+    icon = icons.INTEGRATOR
     u: Input = signal_in("*", "signal")
     y: Output = signal_out("*", "integral")
 
@@ -145,6 +153,7 @@ class PI(Component):
     Blocks.Continuous.LimPID).
     """
 
+    icon = icons.CONTROL_PI
     u_s: Input = signal_in("*", "set value")
     u_m: Input = signal_in("*", "measured value")
     u_ff: Input = signal_in("*", "feed-forward, in units of the output", default=0.0)
@@ -179,6 +188,7 @@ class PI(Component):
 class PID(Component):
     """Controller y = k·(e + 1/Ti·∫e dt + Td·der(e)), e = u_s - u_m; the derivative is filtered with Td/Nd."""
 
+    icon = icons.CONTROL_PID
     u_s: Input = signal_in("*", "set value")
     u_m: Input = signal_in("*", "measured value")
     k: Parameter = param("*", "gain, output over error")
@@ -206,6 +216,7 @@ class ClutchActuator(Component):
     from the final value is divided by ten in each of them. Its output goes to `f_normalized`.
     """
 
+    icon = icons.RISE
     on: Input = signal_in("1", "the coil is switched on above 0.5")
     t11: Parameter = param("s", "response delay", default=0.0, min=0)
     t12: Parameter = param("s", "rise time to full torque; exponential: to 90 %", min=1e-12)

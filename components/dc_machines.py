@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from components import icons
 from components.electrical import Pin
 from components.interfaces import Flange, Supported
 from components.thermal import Lossy
@@ -35,6 +36,7 @@ class DCMachine(Lossy, Supported, partial=True):
     A subclass says where the flux comes from.
     """
 
+    icon = icons.MOTOR
     ap = Pin("positive armature terminal")
     an = Pin("negative armature terminal")
     flange = Flange("shaft end")

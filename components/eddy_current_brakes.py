@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from components import icons
 from components.interfaces import LinearOneFlange, OneFlange
 from components.thermal import Lossy
 from modelica_like.language import Equations, Expr, Input, Parameter, Variable, der, param, signal_in, var
@@ -15,6 +16,7 @@ class EddyCurrentDisc(Lossy, partial=True):
     Rotational.EddyCurrentTorque.
     """
 
+    icon = icons.EDDY
     excitation: Input = signal_in("1", "excitation current over its nominal value", default=1.0)
     T_ref: Parameter = param("K", "reference temperature", default=293.15)
     T: Parameter = param("K", "temperature of the conductor without a heat port", default=293.15)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from components import icons
 from components.thermal import Lossy
 from modelica_like.language import (
     Component,
     Connector,
+    Domain,
     Equations,
     Events,
     Expr,
@@ -27,6 +29,8 @@ from modelica_like.language import (
 class Pin(Connector):
     """Electrical terminal: potential, and the current into the component."""
 
+    domain = Domain("current", "voltage", "a resistor", reference="Ground")
+    stroke = icons.CIRCUIT
     v: Variable = var("V", "potential")
     i: Variable = flow("A", "current, positive into the component")
 
@@ -37,6 +41,7 @@ class Pin(Connector):
 class Ground(Component):
     """Potential zero; every circuit needs one."""
 
+    icon = icons.GROUND
     p = Pin("grounded terminal")
 
     def equations(self) -> Equations:
@@ -61,6 +66,7 @@ class TwoPins(Component, partial=True):
 class Resistor(Lossy, TwoPins):
     """Ohmic resistance, which may rise with the temperature of its heat port."""
 
+    icon = icons.RESISTOR
     R: Parameter = param("Ohm", "resistance at T_ref", min=0)
     alpha: Parameter = param("1/K", "temperature coefficient", default=0.0)
     T_ref: Parameter = param("K", "temperature to which R belongs", default=293.15)
@@ -78,6 +84,7 @@ class Resistor(Lossy, TwoPins):
 class VariableResistor(Lossy, TwoPins):
     """Resistance given by a signal, e.g. a starting resistor."""
 
+    icon = icons.VARIABLE_RESISTOR
     R: Input = signal_in("Ohm", "resistance")
 
     def equations(self) -> Equations:
@@ -91,6 +98,7 @@ class VariableResistor(Lossy, TwoPins):
 class Inductor(TwoPins):
     """Ideal inductance: v = L·der(i)."""
 
+    icon = icons.INDUCTOR
     L: Parameter = param("H", "inductance", min=0)
 
     def equations(self) -> Equations:
@@ -104,6 +112,7 @@ class Inductor(TwoPins):
 class Capacitor(TwoPins):
     """Ideal capacitance: i = C·der(v)."""
 
+    icon = icons.CAPACITOR
     C: Parameter = param("F", "capacitance", min=0)
 
     def equations(self) -> Equations:
@@ -124,6 +133,7 @@ class ElectricalSource(TwoPins, partial=True):
 class ConstantVoltage(ElectricalSource):
     """Constant voltage between p and n."""
 
+    icon = icons.BATTERY
     V: Parameter = param("V", "voltage")
 
     def equations(self) -> Equations:
@@ -134,6 +144,7 @@ class ConstantVoltage(ElectricalSource):
 class SignalVoltage(ElectricalSource):
     """Voltage between p and n given by a signal."""
 
+    icon = icons.VOLTAGE
     v_ref: Input = signal_in("V", "voltage")
 
     def equations(self) -> Equations:
@@ -144,6 +155,7 @@ class SignalVoltage(ElectricalSource):
 class ConstantCurrent(ElectricalSource):
     """Constant current from p to n."""
 
+    icon = icons.CURRENT
     I: Parameter = param("A", "current")  # noqa: E741
 
     def equations(self) -> Equations:
@@ -159,6 +171,7 @@ class CurrentSink(ElectricalSource):
     inductance is in series, whose current cannot jump, it needs a capacitor in parallel, as such loads have one.
     """
 
+    icon = icons.CURRENT
     i_ref: Input = signal_in("A", "current drawn at p")
     R_min: Parameter = param("Ohm", "smallest resistance", default=1e-3, min=1e-12)
     load = Mode("sinking", "empty", "reversed", description="whether the voltage suffices for the current")
@@ -183,6 +196,7 @@ class CurrentSink(ElectricalSource):
 class Switch(Lossy, TwoPins):
     """Switch, closed while its signal is above one half; a small resistance closed, a small conductance open."""
 
+    icon = icons.SWITCH
     closed: Input = signal_in("1", "the switch is closed above 0.5")
     R_closed: Parameter = param("Ohm", "resistance of the closed switch", default=1e-5, min=0)
     G_open: Parameter = param("S", "conductance of the open switch", default=1e-5, min=0)
@@ -204,6 +218,7 @@ class Switch(Lossy, TwoPins):
 class VoltageSensor(Component):
     """Voltage between two terminals."""
 
+    icon = icons.VOLTMETER
     p = Pin("positive terminal")
     n = Pin("negative terminal")
     v: Output = signal_out("V", "voltage, p.v - n.v")
@@ -217,6 +232,7 @@ class VoltageSensor(Component):
 class CurrentSensor(Component):
     """Current through a wire, from p to n."""
 
+    icon = icons.AMMETER
     p = Pin("positive terminal")
     n = Pin("negative terminal")
     inlet, outlet = "p", "n"

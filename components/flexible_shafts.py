@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from components import icons
 from components.friction import ShaftFriction
 from components.inertias import Inertia
 from components.interfaces import Flange, ShaftInHousing
@@ -28,6 +29,7 @@ class FlexibleShaft(Component):
     k·pi·sqrt(c/J), to (k·pi/n)²/24.
     """
 
+    icon = icons.LONG_SHAFT
     flange_a = Flange("left end")
     flange_b = Flange("right end")
     n: int = 5
@@ -57,6 +59,7 @@ class StribeckBearing(ShaftFriction, ShaftInHousing):
     R. Stribeck: Die wesentlichen Eigenschaften der Gleit- und Rollenlager, Z. VDI 46 (1902).
     """
 
+    icon = icons.BEARING
     w: Variable = var("rad/s", "speed of the shaft relative to the housing", state="always")
     d: Parameter = param("N.m.s/rad", "viscous friction", default=0.0, min=0)
     tau_Coulomb: Parameter = param("N.m", "dry friction at high speed, without the viscous part", min=0)

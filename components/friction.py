@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from components import icons
 from components.interfaces import CompliantWithRelativeStates, ShaftInHousing
+from components.tabulated import Tabulated
 from components.thermal import Lossy
 from modelica_like.language import (
     Equations,
@@ -19,7 +21,6 @@ from modelica_like.language import (
     all_of,
     column,
     der,
-    interpolate,
     maximum,
     negate,
     param,
@@ -114,14 +115,14 @@ class Sticking(Lossy, partial=True):
 
     def events(self) -> Events:
         mode, slip = self.mode, self.slip
-        yield mode.go("stuck", "start_forward", when=self.breaks_forward())
-        yield mode.go("stuck", "start_backward", when=self.breaks_backward())
-        yield mode.go("start_forward", "forward", when=slip > 0)
-        yield mode.go("start_backward", "backward", when=slip < 0)
-        yield mode.go("start_forward", "stuck", when=der(slip) < 0)
-        yield mode.go("start_backward", "stuck", when=der(slip) > 0)
-        yield mode.go("forward", "stuck", when=self.stops(1))
-        yield mode.go("backward", "stuck", when=self.stops(-1))
+        yield mode.go("stuck", "start_forward", when=self.breaks_forward(), because="friction limit exceeded")
+        yield mode.go("stuck", "start_backward", when=self.breaks_backward(), because="friction limit exceeded")
+        yield mode.go("start_forward", "forward", when=slip > 0, because="slip begins")
+        yield mode.go("start_backward", "backward", when=slip < 0, because="slip begins")
+        yield mode.go("start_forward", "stuck", when=der(slip) < 0, because="no slip follows")
+        yield mode.go("start_backward", "stuck", when=der(slip) > 0, because="no slip follows")
+        yield mode.go("forward", "stuck", when=self.stops(1), because="slip reached zero")
+        yield mode.go("backward", "stuck", when=self.stops(-1), because="slip reached zero")
 
     def dissipation(self) -> Expr:
         return self.friction * self.slip
@@ -188,10 +189,13 @@ class DryFriction(Sticking, partial=True):
         yield mode.initially("forward", when=all_of(pressed, slip > 0))
         yield mode.initially("backward", when=all_of(pressed, slip < 0))
         yield mode.initially("stuck", when=pressed)
-        yield mode.go(("stuck", "start_forward", "start_backward", "forward", "backward"), "free", when=negate(pressed))
-        yield mode.go("free", "forward", when=all_of(pressed, slip > 0))
-        yield mode.go("free", "backward", when=all_of(pressed, slip < 0))
-        yield mode.go("free", "stuck", when=pressed)
+        yield mode.go(
+            ("stuck", "start_forward", "start_backward", "forward", "backward"), "free", when=negate(pressed),
+            because="no pressure",
+        )  # fmt: skip
+        yield mode.go("free", "forward", when=all_of(pressed, slip > 0), because="pressed while slipping")
+        yield mode.go("free", "backward", when=all_of(pressed, slip < 0), because="pressed while slipping")
+        yield mode.go("free", "stuck", when=pressed, because="pressed without slip")
         yield from super().events()
 
 
@@ -199,7 +203,7 @@ class ShaftFriction(ShaftSticking, DryFriction, partial=True):
     """Dry friction between turning parts."""
 
 
-class PressedFriction(ShaftFriction, partial=True):
+class PressedFriction(Tabulated, ShaftFriction, partial=True):
     """Friction surfaces pressed together by a normal force.
 
     Friction torque cgeo·mu(slip)·fn with the normal force fn = fn_max·f_normalized. For N surfaces with the radii r_i
@@ -212,11 +216,9 @@ class PressedFriction(ShaftFriction, partial=True):
     cgeo: Parameter = param("m", "friction radius times number of friction surfaces", default=1.0, min=0)
     mu_pos: Rows = rows(
         column("slip speed", scale="w_scale", rising=True),
-        column("sliding friction coefficient"),
+        column("sliding friction coefficient", min=0),
         default=((0.0, 0.5),),
     )
-    smooth: bool = False
-    """Interpolate mu_pos with a continuous slope."""
     w_scale: Parameter = param("rad/s", "slip speed that counts as 1 in mu_pos", default=1.0)
     capacity: Parameter = param(
         "N.m", "sliding torque at f_normalized = 1; replaces fn_max, cgeo and mu_pos", default=None, min=0
@@ -225,18 +227,28 @@ class PressedFriction(ShaftFriction, partial=True):
 
     def mu(self, speed: Expr | float) -> Expr | float:
         """Return the coefficient of sliding friction."""
-        speeds, values = zip(*self.mu_pos, strict=True)
-        return interpolate(speed / self.w_scale, speeds, values, smooth=self.smooth)
+        return self.look_up(speed / self.w_scale, self.mu_pos)
 
     def sliding_friction(self, speed: Expr | float) -> Expr:
         if self.given("capacity"):
             return self.capacity * self.f_normalized + self.tau_drag
         return self.cgeo * self.mu(speed) * (self.fn_max * self.f_normalized) + self.tau_drag
 
+    def events(self) -> Events:
+        yield from super().events()
+        yield from self.measured()
+
+    def measured(self) -> Events:
+        """Yield the event that tells that the slip leaves mu_pos while the surfaces are pressed together."""
+        if not self.given("capacity"):
+            speed = absolute(self.slip) / self.w_scale
+            yield from self.leaving("mu_pos", speed, self.mu_pos, self.f_normalized > 0)
+
 
 class Clutch(PressedFriction, CompliantWithRelativeStates):
     """Friction clutch between two shafts."""
 
+    icon = icons.CLUTCH
     # No torque depends on the angle by which a clutch has slipped.
     phi_rel: Variable = var("rad", "relative angle, flange_b.phi - flange_a.phi", state="prefer", default=0)
     w_rel: Variable = var("rad/s", "slip speed", state="always")
@@ -258,6 +270,7 @@ class MultiPlateClutch(Clutch):
     Politechnika Szczecińska, after K. Marchelek: Dynamika obrabiarek, 4.4.2).
     """
 
+    icon = icons.MULTI_PLATE
     mu_min: Parameter = param("1", "smallest coefficient of sliding friction", min=0)
     w_min: Parameter = param("rad/s", "slip speed there", min=0)
     curvature: Parameter = param("s3/rad3", "factor of the cube below w_min", min=0)
@@ -268,6 +281,9 @@ class MultiPlateClutch(Clutch):
         below = self.w_min - speed
         return self.mu_min + where(below > 0, self.curvature * below**3, -self.slope * below)
 
+    def measured(self) -> Events:
+        return iter(())
+
     def static_friction(self) -> Expr:
         return self.cgeo * self.mu_static * (self.fn_max * self.f_normalized) + self.tau_drag
 
@@ -275,6 +291,7 @@ class MultiPlateClutch(Clutch):
 class Brake(PressedFriction, ShaftInHousing):
     """Friction brake: a clutch between a shaft and the housing."""
 
+    icon = icons.BRAKE
     w: Variable = var("rad/s", "speed of the shaft relative to the housing", state="always")
 
     @property
@@ -286,16 +303,15 @@ class Brake(PressedFriction, ShaftInHousing):
         return self.tau
 
 
-class BearingFriction(ShaftFriction, ShaftInHousing):
+class BearingFriction(Tabulated, ShaftFriction, ShaftInHousing):
     """Friction of a bearing: a torque against the rotation that depends on the speed, with stiction."""
 
+    icon = icons.BEARING
     w: Variable = var("rad/s", "speed of the shaft relative to the housing", state="always")
     tau_pos: Rows = rows(
-        column("speed", scale="w_scale", rising=True), column("friction torque", scale="tau_scale"),
+        column("speed", scale="w_scale", rising=True), column("friction torque", scale="tau_scale", min=0),
         default=((0.0, 1.0),),
     )  # fmt: skip
-    smooth: bool = False
-    """Interpolate tau_pos with a continuous slope."""
     w_scale: Parameter = param("rad/s", "speed that counts as 1 in tau_pos", default=1.0)
     tau_scale: Parameter = param("N.m", "torque that counts as 1 in tau_pos", default=1.0)
 
@@ -308,5 +324,8 @@ class BearingFriction(ShaftFriction, ShaftInHousing):
         return self.tau
 
     def sliding_friction(self, speed: Expr | float) -> Expr:
-        speeds, torques = zip(*self.tau_pos, strict=True)
-        return self.tau_scale * interpolate(speed / self.w_scale, speeds, torques, smooth=self.smooth)
+        return self.tau_scale * self.look_up(speed / self.w_scale, self.tau_pos)
+
+    def events(self) -> Events:
+        yield from super().events()
+        yield from self.leaving("tau_pos", absolute(self.w) / self.w_scale, self.tau_pos)

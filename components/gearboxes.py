@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
+from components import icons
 from components.interfaces import Flange
 from components.lossy_gears import LossRows, LossyGear
 from components.springs import ElastoBacklash, SpringDamper
@@ -23,14 +26,17 @@ class Gearbox(Component):
     Modelica Standard Library, Rotational.Gearbox. The inertia of the input wheel belongs to the shaft at flange_a.
     """
 
+    icon = icons.GEARBOX
     flange_a = Flange("input shaft")
     flange_b = Flange("output shaft")
     support = Flange("housing", optional=True)
     loss_table: LossRows = rows(
-        column("speed |w_a|", "rad/s", rising=True), column("eta_mf1"), column("eta_mf2"),
+        column("speed |w_a|", "rad/s", rising=True), column("eta_mf1", min=1e-3, max=1), column("eta_mf2", max=1),
         column("|tau_bf1|", "N.m"), column("|tau_bf2|", "N.m"), default=((0.0, 1.0, 1.0, 0.0, 0.0),),
     )  # fmt: skip
     """As in a `LossyGear`: rows of speed |w_a| in rad/s, eta_mf1, eta_mf2, and |tau_bf1|, |tau_bf2| in N.m."""
+    extrapolate: Literal["hold", "linear", "error"] = "hold"
+    """Beyond the rows: `hold` the last values, let the last slopes go on (`linear`), or end the run (`error`)."""
     has_backlash: bool = True
     """The flanks have backlash."""
     ratio: Parameter = param("1", "transmission ratio, speed of flange_a over speed of flange_b")
@@ -39,7 +45,7 @@ class Gearbox(Component):
     b: Parameter = param("rad", "total backlash", default=1e-3, min=1e-10)
 
     def build(self) -> None:
-        self.gear = LossyGear(ratio="ratio", loss_table=self.loss_table)
+        self.gear = LossyGear(ratio="ratio", loss_table=self.loss_table, extrapolate=self.extrapolate)
         self.flanks = ElastoBacklash(c="c", d="d", b="b") if self.has_backlash else SpringDamper(c="c", d="d")
 
     def equations(self) -> Equations:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from components import icons
 from components.interfaces import TwoFlanges
 from modelica_like.language import Equations, Parameter, param
 
@@ -12,6 +13,7 @@ class IdealGear(TwoFlanges):
     All angles count from the housing, which carries the difference of the torques.
     """
 
+    icon = icons.GEAR
     ratio: Parameter = param("1", "transmission ratio, speed of flange_a over speed of flange_b")
 
     def equations(self) -> Equations:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from components import icons
 from components.interfaces import Flange, LinearFlange
 from modelica_like.language import Component, Equations, Expr, Parameter, Variable, der, param, var
 
@@ -12,6 +13,7 @@ class Inertia(Component):
     The acceleration torque J·der(w) is the sum of both cut torques.
     """
 
+    icon = icons.INERTIA
     flange_a = Flange("left end", free=True)
     flange_b = Flange("right end", free=True)
     J: Parameter = param("kg.m2", "moment of inertia", min=0)
@@ -35,6 +37,7 @@ class Mass(Component):
     The acceleration force m·der(v) is the sum of both cut forces.
     """
 
+    icon = icons.MASS
     flange_a = LinearFlange("left end", free=True)
     flange_b = LinearFlange("right end", free=True)
     m: Parameter = param("kg", "mass", min=0)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from components import icons
 from components.friction import ShaftFriction
 from components.interfaces import OneFlange
-from modelica_like.language import Equations, Expr, Parameter, Variable, der, maximum, param, var
+from modelica_like.language import Equations, Expr, Parameter, Variable, der, maximum, param, var, where
 
 _STANDSTILL = 1e-20
 
@@ -12,9 +13,11 @@ _STANDSTILL = 1e-20
 class SpeedDependentLoad(ShaftFriction, OneFlange):
     """Torque (a + b·(|w|/w_ref)^p)·sgn(w) against the rotation; the constant part also holds the shaft at standstill.
 
-    With p = 2/3 it is a bearing after A. Palmgren, with p = 1 a viscous load, with p = 2 a fan or pump.
+    With p = 0 that is a + b. With p = 2/3 it is a bearing after A. Palmgren, with p = 1 a viscous load, with p = 2 a
+    fan or pump.
     """
 
+    icon = icons.LOAD
     a: Parameter = param("N.m", "constant part", default=0.0, min=0)
     b: Parameter = param("N.m", "speed-dependent part at the speed w_ref", default=0.0, min=0)
     w_ref: Parameter = param("rad/s", "reference speed", default=1.0)
@@ -31,12 +34,10 @@ class SpeedDependentLoad(ShaftFriction, OneFlange):
         return self.tau
 
     def sliding_friction(self, speed: Expr | float) -> Expr:
-        # For p < 1 the slope at standstill is infinite; below a tiny speed it is held constant.
-        relative = maximum(speed / self.w_ref, _STANDSTILL)
-        return self.a + self.b * (relative**self.p - _STANDSTILL**self.p)
-
-    def static_friction(self) -> Expr:
-        return self.peak * self.a
+        # For p < 1 the slope at standstill is infinite; below a tiny speed a straight line leads there.
+        relative = speed / self.w_ref
+        near = where(self.p > 0, relative / _STANDSTILL * _STANDSTILL**self.p, 1)
+        return self.a + self.b * where(relative > _STANDSTILL, maximum(relative, _STANDSTILL) ** self.p, near)
 
     def equations(self) -> Equations:
         yield from super().equations()

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from components import icons
 from components.friction import ShaftSticking
 from components.interfaces import TwoFlanges
+from components.tabulated import Tabulated
 from modelica_like.language import (
     Equations,
     Events,
@@ -14,7 +16,6 @@ from modelica_like.language import (
     absolute,
     column,
     der,
-    interpolate,
     maximum,
     minimum,
     param,
@@ -40,6 +41,7 @@ class MeshWithFriction(ShaftSticking, TwoFlanges, partial=True):
     A subclass gives the efficiencies and the friction of the bearings at a speed.
     """
 
+    icon = icons.GEAR
     ratio: Parameter = param("1", "transmission ratio, speed of flange_a over speed of flange_b")
     phi_a: Variable = var("rad", "angle of flange_a relative to the housing")
     w_a: Variable = var("rad/s", "speed of flange_a relative to the housing", state="always")
@@ -102,7 +104,7 @@ class MeshWithFriction(ShaftSticking, TwoFlanges, partial=True):
         yield from super().events()
 
 
-class LossyGear(MeshWithFriction):
+class LossyGear(Tabulated, MeshWithFriction):
     """Gear with the loss table of the Modelica Standard Library, Rotational.LossyGear.
 
     -flange_b.tau = ratio·(eta_mf·flange_a.tau - tau_bf), where eta_mf is eta_mf1 while flange_a drives and 1/eta_mf2
@@ -110,14 +112,15 @@ class LossyGear(MeshWithFriction):
     """
 
     loss_table: LossRows = rows(
-        column("speed |w_a|", scale="w_scale", rising=True), column("eta_mf1"), column("eta_mf2"),
+        column("speed |w_a|", scale="w_scale", rising=True),
+        column("eta_mf1", min=1e-3, max=1), column("eta_mf2", max=1),
         column("|tau_bf1|", scale="tau_scale"), column("|tau_bf2|", scale="tau_scale"),
     )  # fmt: skip
     w_scale: Parameter = param("rad/s", "speed that counts as 1 in loss_table", default=1.0)
     tau_scale: Parameter = param("N.m", "torque that counts as 1 in loss_table", default=1.0)
 
     def _column(self, speed: Expr | float, column: int) -> Expr:
-        return interpolate(speed / self.w_scale, [r[0] for r in self.loss_table], [r[column] for r in self.loss_table])
+        return self.look_up(speed / self.w_scale, self.loss_table, column)
 
     def efficiencies(self, speed: Expr | float) -> tuple[Expr | float, Expr | float]:
         return self._column(speed, 1), self._column(speed, 2)
@@ -128,6 +131,10 @@ class LossyGear(MeshWithFriction):
         tau_a, tau_b = (self.tau_scale * absolute(self._column(speed, k)) for k in (3, 4))
         return tau_a / eta_a, tau_b * eta_b
 
+    def events(self) -> Events:
+        yield from super().events()
+        yield from self.leaving("loss_table", absolute(self.w_a) / self.w_scale, self.loss_table)
+
 
 class ConstantEfficiencyGear(MeshWithFriction):
     """Gear with one efficiency in each direction of power.
@@ -137,6 +144,7 @@ class ConstantEfficiencyGear(MeshWithFriction):
     flange_b can turn it, only a drive at flange_a.
     """
 
+    icon = icons.WORM
     efficiency: Parameter = param("1", "power out at flange_b over power in at flange_a", min=1e-3, max=1)
     efficiency_back: Parameter = param(
         "1", "power out at flange_a over power in at flange_b; not above 0: none", default=None, max=1

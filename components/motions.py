@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from math import pi
 
+from components import icons
 from components.interfaces import (
     CompliantWithRelativeStates,
     Flange,
@@ -38,6 +39,7 @@ class Move(ShaftMotionSource):
     what deviates from angle and speed dies out critically damped, at f_crit.
     """
 
+    icon = icons.ANGLE
     phi_ref: Input = signal_in("rad", "angle")
     w_ref: Input = signal_in("rad/s", "speed")
     a_ref: Input = signal_in("rad/s2", "angular acceleration")
@@ -61,6 +63,7 @@ class Move(ShaftMotionSource):
 class TranslationalMove(MotionSource):
     """Motion of a slide given by signals of position, velocity and acceleration; see `Move`."""
 
+    icon = icons.POSITION
     s_ref: Input = signal_in("m", "position")
     v_ref: Input = signal_in("m/s", "velocity")
     a_ref: Input = signal_in("m/s2", "acceleration")
@@ -87,6 +90,7 @@ class InitializeFlange(Component):
     An acceleration cannot be given: it follows from the torques.
     """
 
+    icon = icons.START
     flange = Flange("shaft end")
     use_phi: bool = True
     """Give the angle."""
@@ -114,6 +118,7 @@ class InitializeFlange(Component):
 class TranslationalInitializeFlange(Component):
     """Start of a slide from signals of position and velocity; see `InitializeFlange`."""
 
+    icon = icons.START
     flange = LinearFlange("slide end")
     use_s: bool = True
     """Give the position."""
@@ -144,6 +149,7 @@ class RelativeStates(CompliantWithRelativeStates):
     Then the states stay small where both shafts turn on and on.
     """
 
+    icon = icons.STATES
     phi_rel: Variable = var("rad", "relative angle, flange_b.phi - flange_a.phi", state="always")
     w_rel: Variable = var("rad/s", "relative speed", state="always")
 
@@ -155,6 +161,7 @@ class RelativeStates(CompliantWithRelativeStates):
 class TranslationalRelativeStates(LinearCompliantWithRelativeStates):
     """Makes the relative position and velocity of two slides the states of the model; it carries no force."""
 
+    icon = icons.STATES
     s_rel: Variable = var("m", "relative position, flange_b.s - flange_a.s", state="always")
     v_rel: Variable = var("m/s", "relative velocity", state="always")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from components import icons
 from components.friction import Clutch, ShaftFriction
 from components.interfaces import CompliantWithRelativeStates
 from modelica_like.language import (
@@ -28,6 +29,7 @@ class Freewheel(CompliantWithRelativeStates):
     overrunning speed and the driving torque at most one is not zero, and none is negative.
     """
 
+    icon = icons.FREEWHEEL
     # No torque depends on the angle by which a freewheel has overrun.
     phi_rel: Variable = var("rad", "relative angle, flange_b.phi - flange_a.phi", state="prefer", default=0)
     w_rel: Variable = var("rad/s", "overrunning speed", state="always")
@@ -49,10 +51,10 @@ class Freewheel(CompliantWithRelativeStates):
 
     def events(self) -> Events:
         yield self.mode.initially("locked", when=all_of(self.w_rel <= 0, self.w_rel >= 0))
-        yield self.mode.go("locked", "overrunning", when=self.tau > self.faint)
+        yield self.mode.go("locked", "overrunning", when=self.tau > self.faint, because="the torque would reverse")
         # Just after the release the speed is zero but for rounding; whether it falls decides.
         falling = all_of(self.w_rel < 0, any_of(self.soon * der(self.w_rel) < -self.slow, self.w_rel < -self.slow))
-        yield self.mode.go("overrunning", "locked", when=falling)
+        yield self.mode.go("overrunning", "locked", when=falling, because="overrunning speed reached zero")
 
 
 class OneWayClutch(Clutch):
@@ -61,6 +63,8 @@ class OneWayClutch(Clutch):
     One element, because the torque would not be unique between a freewheel and a clutch that both hold. Modelica
     Standard Library, Rotational.OneWayClutch.
     """
+
+    icon = icons.ONE_WAY_CLUTCH
 
     def sliding_friction(self, speed: Expr | float) -> Expr:
         return where(self.f_normalized > 0, super().sliding_friction(speed), self.tau_drag)
@@ -87,15 +91,17 @@ class OneWayClutch(Clutch):
         mode, w = self.mode, self.w_rel
         yield mode.initially("forward", when=any_of(w > 0, w < 0))
         yield mode.initially("stuck", when=w >= 0)
-        yield mode.go("stuck", "start_forward", when=self.breaks_forward())
-        yield mode.go("start_forward", "forward", when=w > 0)
-        yield mode.go("start_forward", "stuck", when=der(w) < 0)
-        yield mode.go("forward", "stuck", when=w < 0)
+        yield mode.go("stuck", "start_forward", when=self.breaks_forward(), because="friction limit exceeded")
+        yield mode.go("start_forward", "forward", when=w > 0, because="slip begins")
+        yield mode.go("start_forward", "stuck", when=der(w) < 0, because="no slip follows")
+        yield mode.go("forward", "stuck", when=w < 0, because="slip reached zero")
+        yield from self.measured()
 
 
 class TorqueLimiter(ShaftFriction, CompliantWithRelativeStates):
     """Slipping coupling that protects a drive: rigid up to tau_max·peak, then it slips at tau_max."""
 
+    icon = icons.LIMITER_CLUTCH
     tau_max: Parameter = param("N.m", "torque at which it slips", min=0)
     phi_rel: Variable = var("rad", "relative angle, flange_b.phi - flange_a.phi", state="prefer", default=0)
     w_rel: Variable = var("rad/s", "slip speed", state="always")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from components import icons
 from components.interfaces import Flange
 from components.thermal import Lossy
 from modelica_like.language import (
@@ -26,6 +27,7 @@ class IdealPlanetary(Component):
     Mechanism, 1841). With equal torque arms it is a differential.
     """
 
+    icon = icons.PLANETARY
     sun = Flange("sun gear shaft")
     carrier = Flange("planet carrier shaft")
     ring = Flange("ring gear shaft")
@@ -48,6 +50,7 @@ class PlanetarySet(Component):
     of the power passes with the carrier, as in a coupling.
     """
 
+    icon = icons.PLANETARY
     sun = Flange("sun gear shaft")
     carrier = Flange("planet carrier shaft")
     ring = Flange("ring gear shaft")
@@ -105,6 +108,7 @@ class Differential(Component):
     An `IdealPlanetary` with equal torque arms, behind the final drive of the given ratio.
     """
 
+    icon = icons.DIFFERENTIAL
     flange = Flange("drive shaft")
     left = Flange("left wheel shaft")
     right = Flange("right wheel shaft")

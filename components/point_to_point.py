@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from components import icons
 from modelica_like.language import (
     Component,
     Equations,
@@ -28,6 +29,7 @@ class KinematicPTP2(Component):
     Modelica Standard Library, Blocks.Sources.KinematicPTP2; its KinematicPTP is the output qdd.
     """
 
+    icon = icons.PATH
     q_begin: Parameter = param("*", "position at the start", default=0.0)
     q_end: Parameter = param("*", "position at the end")
     qd_max: Parameter = param("*", "largest speed")

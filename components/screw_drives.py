@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from components import icons
 from components.inertias import Inertia
 from components.interfaces import Flange, LinearFlange
 from components.lossy_gears import ConstantEfficiencyGear
@@ -17,6 +18,7 @@ class BallScrewDrive(Component):
     c·(lead/2π)² and the angle 2π·backlash/lead.
     """
 
+    icon = icons.BALL_SCREW
     flange_r = Flange("spindle")
     flange_t = LinearFlange("nut")
     inlet, outlet = "flange_r", "flange_t"

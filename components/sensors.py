@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from components import icons
 from components.interfaces import Flange, LinearFlange
 from modelica_like.language import (
     Component,
@@ -20,6 +21,7 @@ from modelica_like.language import (
 class AngleSensor(Component):
     """Angle of a shaft end."""
 
+    icon = icons.SENSOR
     flange = Flange("measured shaft end")
     phi: Output = signal_out("rad", "angle")
 
@@ -31,6 +33,7 @@ class AngleSensor(Component):
 class SpeedSensor(Component):
     """Speed of a shaft end."""
 
+    icon = icons.SENSOR
     flange = Flange("measured shaft end")
     w: Output = signal_out("rad/s", "speed")
 
@@ -58,6 +61,7 @@ class SpeedLimit(SpeedSensor):
 class RelativeSensor(Component, partial=True):
     """Sensor between two shaft ends that are not joined by it."""
 
+    icon = icons.BETWEEN_SENSOR
     flange_a = Flange("reference shaft end")
     flange_b = Flange("measured shaft end")
 
@@ -89,6 +93,7 @@ class RelativeSpeedSensor(RelativeSensor):
 class ShaftSensor(Component, partial=True):
     """Sensor in a cut through a shaft."""
 
+    icon = icons.BETWEEN_SENSOR
     flange_a = Flange("left end")
     flange_b = Flange("right end")
 
@@ -134,6 +139,7 @@ class MultiSensor(ShaftSensor):
 class PositionSensor(Component):
     """Position of a slide end."""
 
+    icon = icons.SENSOR
     flange = LinearFlange("measured slide end")
     s: Output = signal_out("m", "position")
 
@@ -145,6 +151,7 @@ class PositionSensor(Component):
 class ForceSensor(Component):
     """Force in a slide, flange_a.f."""
 
+    icon = icons.BETWEEN_SENSOR
     flange_a = LinearFlange("left end")
     flange_b = LinearFlange("right end")
     f: Output = signal_out("N", "force")

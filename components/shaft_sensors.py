@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from components import icons
 from components.interfaces import Flange
 from components.sensors import RelativeSensor
 from modelica_like.language import Component, Equations, Output, Variable, der, signal_out, var
@@ -10,6 +11,7 @@ from modelica_like.language import Component, Equations, Output, Variable, der, 
 class AccelerationSensor(Component):
     """Angular acceleration of a shaft end."""
 
+    icon = icons.SENSOR
     flange = Flange("measured shaft end")
     w: Variable = var("rad/s", "speed")
     a: Output = signal_out("rad/s2", "angular acceleration")

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from math import pi
 
+from components import icons
 from components.interfaces import Flange, OneFlange
 from components.sources import TorqueSource
 from components.speed_laws import inverse_law, linear_law, quadratic_law, sign_law
@@ -16,6 +17,7 @@ from modelica_like.language import Component, Equations, Expr, Input, Parameter,
 class Torque2(Component):
     """Torque between two shafts, given by a signal: it drives flange_b in positive, flange_a in negative direction."""
 
+    icon = icons.BETWEEN_TORQUE
     flange_a = Flange("shaft end that is pushed back")
     flange_b = Flange("shaft end that is driven")
     tau: Input = signal_in("N.m", "torque on flange_b")
@@ -31,6 +33,7 @@ class Torque2(Component):
 class SpeedDependentTorque(TorqueSource, partial=True):
     """Torque that depends on the speed; a negative tau_nominal brakes."""
 
+    icon = icons.LOAD
     tau_nominal: Parameter = param("N.m", "torque on the connected part at w_nominal; negative for a load")
     w_nominal: Parameter = param("rad/s", "nominal speed", min=1e-12)
     reverses: bool = True
@@ -69,6 +72,7 @@ class InverseSpeedDependentTorque(SpeedDependentTorque):
 class SignTorque(TorqueSource):
     """Constant torque with the sign of the speed, smoothed around standstill."""
 
+    icon = icons.LOAD
     tau_nominal: Parameter = param("N.m", "torque on the connected part in forward rotation; negative for a load")
     w0: Parameter = param("rad/s", "speed at which 99 % of it are reached", default=0.1, min=1e-12)
     w: Variable = var("rad/s", "speed of the shaft relative to the housing")
@@ -100,6 +104,7 @@ class Position(ShaftMotionSource):
     The filter makes speed and acceleration of any signal finite (Modelica Standard Library, Rotational.Position).
     """
 
+    icon = icons.ANGLE
     phi_ref: Input = signal_in("rad", "angle")
     exact: bool = True
     """Follow the signal exactly: it must then have derivatives."""
@@ -117,6 +122,7 @@ class Position(ShaftMotionSource):
 class Accelerate(ShaftMotionSource):
     """Angular acceleration given by a signal."""
 
+    icon = icons.ANGLE
     a_ref: Input = signal_in("rad/s2", "angular acceleration")
 
     def equations(self) -> Equations:

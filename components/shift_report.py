@@ -7,19 +7,29 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from components.sizing.quantities import Energy, Time, Torque
-from components.sizing.result import Result, line
+from components.friction import DryFriction
+from modelica_like.language.quantities import Energy, Time, Torque
+from modelica_like.language.results import Result, line
 
 _ELEMENTS = ("clutch_a", "clutch_b", "brake_c", "brake_d", "clutch_e")
 _ROUNDING = 1e-9
 _NAMES = {-1.0: "R", 0.0: "N"}
+_SLIDING = [k for k, name in enumerate(DryFriction.mode.names) if name not in ("free", "stuck")]
 
 
 class Run(Protocol):
-    """Trajectories by path, as a `Solution` has them."""
+    """Trajectories by path, values at a time, and energies of a part, as a `Solution` has them."""
 
     def __getitem__(self, key: str, /) -> Any:
         """Return a trajectory."""
+        ...
+
+    def at(self, t: float, /) -> Any:
+        """Return all values at a time."""
+        ...
+
+    def energy(self, begin: float, end: float, /) -> Any:
+        """Return the energy balance between two times."""
         ...
 
 
@@ -46,8 +56,8 @@ def shift_report(
 ) -> ShiftReport:
     """Work out what every clutch and brake does in every shift.
 
-    A shift lasts until the next one begins. Its friction work is the integral of the loss power over the results of the
-    run; a dozen results while an element slips make it exact to four digits.
+    A shift lasts until the next one begins. An element slips while its mode says so: from event to event. The friction
+    work is as precise as the run.
 
     Args:
         run: a run of a gearbox with a `ShiftSchedule`.
@@ -60,32 +70,33 @@ def shift_report(
     rows: list[ElementShift] = []
     for first, last in pairwise([*begins, len(time)]):
         # The results have both sides of the instant at which the next shift begins.
-        window = slice(first, last)
+        begin, end = float(time[first]), float(time[last - 1])
+        if end <= begin:
+            continue
+        balance = run.energy(begin, end)
         name = _NAMES.get(float(gear[first]), f"{gear[first]:g}")
         for element in elements:
-            rows += _element(run, f"{box}.{element}", window, (name, float(time[first]), element))
+            path = f"{box}.{element}"
+            slipping, torque = _slip(run, path, slice(first, last))
+            if slipping:
+                rows.append(ElementShift(name, begin, element, slipping, torque, balance[path].lost))
     return ShiftReport(sum(row.work for row in rows), tuple(rows))
 
 
-def _element(run: Run, path: str, window: slice, head: tuple[str, float, str]) -> list[ElementShift]:
-    power = run[f"{path}.loss_power"]
-    # What sticks has a slip of rounding errors.
-    power = np.where(power > _ROUNDING * np.max(power), power, 0.0)[window]
-    if not np.any(power):
-        return []
-    time, torque, slips = run["time"][window], run[f"{path}.tau"][window], power > 0
-    slipping = float(np.sum(np.diff(time)[slips[1:] | slips[:-1]]))
-    return [ElementShift(*head, slipping, float(np.max(np.abs(torque[slips]))), _integral(time, power))]
-
-
-def _integral(time: Any, power: Any) -> float:
-    """Integrate cubics piece by piece; between the pieces there are the two sides of an event."""
-    total = 0.0
-    for piece in np.split(np.arange(len(time)), np.flatnonzero(np.diff(time) == 0) + 1):
-        t, p = time[piece], power[piece]
-        step = np.diff(t)
-        total += float(np.sum(0.5 * step * (p[1:] + p[:-1])))
-        if len(t) > 2:
-            slope = np.gradient(p, t, edge_order=2)
-            total += float(np.sum(step**2 * (slope[:-1] - slope[1:]))) / 12
-    return total
+def _slip(run: Run, path: str, window: slice) -> tuple[float, float]:
+    """Return for how long an element slips under load, and its largest torque meanwhile; 0 if it does not."""
+    time, torque = run["time"][window], np.abs(run[f"{path}.tau"])
+    # What just touches carries a torque of rounding errors.
+    loaded = torque[window] > _ROUNDING * np.max(torque)
+    slips = np.isin(run[f"{path}.mode"][window], _SLIDING) & loaded
+    if not slips.any():
+        return 0.0, 0.0
+    inside = np.where(slips, torque[window], 0.0)
+    k = int(np.argmax(inside))
+    largest = float(inside[k])
+    # Between events it may be largest between two results: at the vertex of the parabola through three of them.
+    if 0 < k < len(inside) - 1 and slips[k - 1] and slips[k + 1] and time[k - 1] < time[k] < time[k + 1]:
+        bend, slope, _ = np.polyfit(time[k - 1 : k + 2] - time[k], inside[k - 1 : k + 2] - largest, 2)
+        if bend < 0:
+            largest = max(largest, abs(run.at(float(time[k] - 0.5 * slope / bend))[f"{path}.tau"]))
+    return float(np.sum(np.diff(time)[slips[1:] | slips[:-1]])), largest

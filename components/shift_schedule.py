@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from itertools import pairwise
 
+from components import icons
 from modelica_like.language import (
     Component,
     Discrete,
@@ -39,6 +40,7 @@ class ShiftSchedule(Component):
     two gears being locked at once. Elements that stay closed keep their pressure.
     """
 
+    icon = icons.SCHEDULE
     shifts: tuple[tuple[float, str, float], ...] = rows(
         column("time", scale="time_scale"), column("gear", text=True),
         column("duration of the shift", scale="time_scale"),

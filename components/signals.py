@@ -6,7 +6,9 @@ Where a signal jumps or has a kink there is a time event, so that the solver nev
 from __future__ import annotations
 
 from math import pi
+from typing import Literal
 
+from components import icons
 from modelica_like.language import (
     Component,
     Discrete,
@@ -36,11 +38,13 @@ from modelica_like.language import (
 )
 
 _NEVER = 1e30
+_ROUNDING = 1e-9
 
 
 class Constant(Component):
     """Constant signal."""
 
+    icon = icons.CONSTANT
     k: Parameter = param("*", "value")
     y: Output = signal_out("*", "signal")
 
@@ -51,6 +55,7 @@ class Constant(Component):
 class Product(Component):
     """Product of two signals."""
 
+    icon = icons.PRODUCT
     u1: Input = signal_in("*", "first factor")
     u2: Input = signal_in("*", "second factor")
     y: Output = signal_out("*", "signal")
@@ -83,6 +88,7 @@ class Started(Component, partial=True):
 class Step(Started):
     """Signal that jumps."""
 
+    icon = icons.STEP
     height: Parameter = param("*", "height of the jump", default=1.0)
 
     def running(self, elapsed: Expr) -> Expr:
@@ -92,6 +98,7 @@ class Step(Started):
 class Sine(Started):
     """Sine signal."""
 
+    icon = icons.SINE
     amplitude: Parameter = param("*", "amplitude", default=1.0)
     f: Parameter = param("Hz", "frequency", min=0)
     phase: Parameter = param("rad", "angle at the start", default=0.0)
@@ -107,6 +114,7 @@ class CoilForce(Started):
     not without current rises from there, and the force of a polarised magnet is proportional to the current.
     """
 
+    icon = icons.RISE
     amplitude: Parameter = param("*", "final value", default=1.0)
     T: Parameter = param("s", "time constant of the coil current", min=0)
     start_current: Parameter = param("1", "current at the start over its final value", default=0.0, min=0, max=1)
@@ -124,6 +132,7 @@ class TimeFormula(Component):
     In the formula, `time` is the time in units of time_scale; its value counts in units of scale.
     """
 
+    icon = icons.FORMULA
     formula: str
     """Arithmetic of `time` with numbers, pi, sqrt, abs, sin, cos, tan, exp, log, tanh, min, max."""
     scale: Parameter = param("*", "what counts as 1", default=1.0)
@@ -146,6 +155,7 @@ class TimeFormula(Component):
 class Ramp(Component):
     """Signal that rises linearly and then keeps its value."""
 
+    icon = icons.RAMP
     height: Parameter = param("*", "height of the ramp", default=1.0)
     duration: Parameter = param("s", "duration of the ramp", min=1e-12)
     offset: Parameter = param("*", "value before the ramp", default=0.0)
@@ -193,6 +203,7 @@ class Periodic(Component, partial=True):
 class Pulse(Periodic):
     """Rectangular pulses."""
 
+    icon = icons.PULSE
     width: Parameter = param("1", "high part of the period", default=0.5, min=0, max=1)
     stage = Mode("low", "high", description="part of the period")
 
@@ -209,6 +220,7 @@ class Pulse(Periodic):
 class Trapezoid(Periodic):
     """Trapezoidal pulses."""
 
+    icon = icons.TRAPEZOID
     rising: Parameter = param("s", "duration of the rise", min=1e-12)
     width: Parameter = param("s", "duration at the high value", min=0)
     falling: Parameter = param("s", "duration of the fall", min=1e-12)
@@ -235,6 +247,7 @@ class Trapezoid(Periodic):
 class Rowwise(Component, partial=True):
     """Signal from a table over time, with a time event at every row."""
 
+    icon = icons.TABLE_BLOCK
     time_scale: Parameter = param("s", "what counts as 1 in the times", default=1.0)
     y: Output = signal_out("*", "signal")
     row: Discrete = discrete("1", "number of the last row that was passed", start=-1.0)
@@ -255,13 +268,16 @@ class Rowwise(Component, partial=True):
 
 
 class Table(Rowwise):
-    """Signal that interpolates in a table of time and value; beyond its ends the last slope goes on."""
+    """Signal that interpolates in a table of time and value."""
 
     table: tuple[tuple[float, float], ...] = rows(
         column("time", scale="time_scale", rising=True), column("value", scale="scale")
     )
     smooth: bool = False
     """Interpolate with a continuous slope instead of straight lines."""
+    extrapolate: Literal["linear", "hold", "error"] = "linear"
+    """Beyond the ends let the last slope go on (`linear`), `hold` the last value, or end the run (`error`)."""
+    end = Mode("ahead", "passed", description="whether the table has ended")
     scale: Parameter = param("*", "what counts as 1 in the values", default=1.0)
 
     def moments(self) -> tuple[float, ...]:
@@ -269,8 +285,15 @@ class Table(Rowwise):
 
     def equations(self) -> Equations:
         times, values = zip(*self.table, strict=True)
-        yield self.y == self.scale * interpolate(self.time / self.time_scale, times, values, smooth=self.smooth)
+        yield self.y == self.scale * interpolate(
+            self.time / self.time_scale, times, values, self.smooth, self.extrapolate
+        )
 
     def events(self) -> Events:
         if not self.smooth:
             yield from super().events()
+        if self.extrapolate == "error":
+            # A run may end where the table does.
+            begin, end = self.table[0][0], self.table[-1][0]
+            over = self.time / self.time_scale > end + _ROUNDING * (end - begin)
+            yield self.end.go("ahead", "passed", when=over, notice="has no more rows", fails=True)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from components import icons
 from components.friction import DryFriction, Rows, Sticking
 from components.interfaces import LinearCompliantWithRelativeStates, LinearFlange, SlideInHousing
+from components.tabulated import Tabulated
 from components.thermal import Lossy
 from modelica_like.language import (
     UNLIMITED,
@@ -11,16 +13,17 @@ from modelica_like.language import (
     Equations,
     Events,
     Expr,
+    Hold,
     Input,
     Mode,
     Parameter,
     Variable,
+    absolute,
     all_of,
     any_of,
     column,
     der,
     exp,
-    interpolate,
     maximum,
     negate,
     param,
@@ -34,6 +37,7 @@ from modelica_like.language import (
 class Rod(Component):
     """Rigid rod without mass."""
 
+    icon = icons.ROD
     flange_a = LinearFlange("left end")
     flange_b = LinearFlange("right end")
     L: Parameter = param("m", "length, flange_b.s - flange_a.s", default=0.0)
@@ -52,6 +56,7 @@ class ElastoGap(Lossy, LinearCompliantWithRelativeStates):
     Library, Translational.ElastoGap.
     """
 
+    icon = icons.STOP
     c: Parameter = param("N/m", "stiffness in contact; for n above 1 the secant stiffness at s_ref", min=0)
     d: Parameter = param("N.s/m", "damping coefficient in contact", default=0.0, min=0)
     s_rel0: Parameter = param("m", "distance at which the bodies touch", default=0.0)
@@ -116,6 +121,7 @@ class SlideSticking(Sticking, partial=True):
 class SlideFriction(SlideSticking, DryFriction, SlideInHousing, partial=True):
     """Dry friction between a slide and the housing."""
 
+    icon = icons.SLIDEWAY
     v: Variable = var("m/s", "velocity of the slide relative to the housing", state="always")
 
     @property
@@ -127,21 +133,22 @@ class SlideFriction(SlideSticking, DryFriction, SlideInHousing, partial=True):
         return self.f
 
 
-class SupportFriction(SlideFriction):
+class SupportFriction(Tabulated, SlideFriction):
     """Friction of a slideway: a force against the motion that depends on the velocity, with stiction."""
 
     f_pos: Rows = rows(
-        column("velocity", scale="v_scale", rising=True), column("friction force", scale="f_scale"),
+        column("velocity", scale="v_scale", rising=True), column("friction force", scale="f_scale", min=0),
         default=((0.0, 1.0),),
     )  # fmt: skip
-    smooth: bool = False
-    """Interpolate f_pos with a continuous slope."""
     v_scale: Parameter = param("m/s", "velocity that counts as 1 in f_pos", default=1.0)
     f_scale: Parameter = param("N", "force that counts as 1 in f_pos", default=1.0)
 
     def sliding_friction(self, speed: Expr | float) -> Expr:
-        speeds, forces = zip(*self.f_pos, strict=True)
-        return self.f_scale * interpolate(speed / self.v_scale, speeds, forces, smooth=self.smooth)
+        return self.f_scale * self.look_up(speed / self.v_scale, self.f_pos)
+
+    def events(self) -> Events:
+        yield from super().events()
+        yield from self.leaving("f_pos", absolute(self.v) / self.v_scale, self.f_pos)
 
 
 class StribeckFriction(SlideFriction):
@@ -159,34 +166,38 @@ class StribeckFriction(SlideFriction):
         return self.F_prop * speed + self.F_Coulomb + self.F_Stribeck * exp(-self.fexp * speed)
 
 
-class TranslationalBrake(SlideFriction):
+class TranslationalBrake(Tabulated, SlideFriction):
     """Friction brake between a slide and the housing: friction force cgeo·mu(v)·fn, fn = fn_max·f_normalized."""
 
+    icon = icons.SLIDE_BRAKE
     f_normalized: Input = signal_in("1", "normal force over fn_max; the brake is free at 0", default=1.0)
     fn_max: Parameter = param("N", "normal force at f_normalized = 1", min=0)
     cgeo: Parameter = param("1", "number of friction surfaces", default=1.0, min=0)
     mu_pos: Rows = rows(
         column("velocity", scale="v_scale", rising=True),
-        column("sliding friction coefficient"),
+        column("sliding friction coefficient", min=0),
         default=((0.0, 0.5),),
     )
-    smooth: bool = False
-    """Interpolate mu_pos with a continuous slope."""
     v_scale: Parameter = param("m/s", "velocity that counts as 1 in mu_pos", default=1.0)
 
     def sliding_friction(self, speed: Expr | float) -> Expr:
-        speeds, values = zip(*self.mu_pos, strict=True)
-        mu = interpolate(speed / self.v_scale, speeds, values, smooth=self.smooth)
+        mu = self.look_up(speed / self.v_scale, self.mu_pos)
         return self.cgeo * mu * (self.fn_max * self.f_normalized)
+
+    def events(self) -> Events:
+        yield from super().events()
+        yield from self.leaving("mu_pos", absolute(self.v) / self.v_scale, self.mu_pos, self.f_normalized > 0)
 
 
 class MassWithStopAndFriction(SlideSticking, DryFriction):
     """Sliding mass between hard stops, with the friction of R. Stribeck.
 
-    A mass that meets a stop comes to rest there at once, its kinetic energy is lost; the stop holds whatever presses
-    the mass against it. Modelica Standard Library, Translational.MassWithStopAndFriction.
+    A mass that meets a stop leaves it with the part e of its speed; with e = 0 it comes to rest there at once, and its
+    kinetic energy is lost. The stop holds whatever presses the mass against it. Modelica Standard Library,
+    Translational.MassWithStopAndFriction, where e is 0.
     """
 
+    icon = icons.TABLE
     flange_a = LinearFlange("left end", free=True)
     flange_b = LinearFlange("right end", free=True)
     m: Parameter = param("kg", "mass", min=0)
@@ -198,9 +209,15 @@ class MassWithStopAndFriction(SlideSticking, DryFriction):
     F_Stribeck: Parameter = param("N", "what friction at rest has in excess", default=0.0, min=0)
     fexp: Parameter = param("s/m", "inverse of the velocity at which the excess has fallen to 1/e", default=1.0, min=0)
     peak: Parameter = param("1", "static friction over sliding friction at standstill", default=1.001, min=1)
+    e: Parameter = param("1", "restitution of the stops: speed after over before an impact", default=0.0, min=0, max=1)
+    v_rest: Parameter = param("m/s", "velocity from which on it comes to rest at a stop", default=1e-3, min=0)
     s: Variable = var("m", "position of the centre of mass", state="always")
     v: Variable = var("m/s", "velocity", state="always")
     f: Variable = var("N", "force of the housing against forward motion")
+    mode = Mode(
+        *DryFriction.mode.names, description="friction mode",
+        holds={"stuck": Hold("slip", reaction="friction", capacity="limits", restitution="restitution")},
+    )  # fmt: skip
     stop = Mode("none", "left", "right", description="stop at which the mass rests")
 
     @property
@@ -219,6 +236,10 @@ class MassWithStopAndFriction(SlideSticking, DryFriction):
 
     def pressed(self) -> Expr:
         return any_of(super().pressed(), negate(self.stop.is_("none")))
+
+    def restitution(self) -> Expr:
+        """Return the restitution of the stop; surfaces that come to rest on each other have none."""
+        return where(any_of(self.stop.is_("none"), absolute(self.v) < self.v_rest), 0, self.e)
 
     def limits(self) -> tuple[Expr, Expr]:
         forward, backward = self.holds_forward(), -self.holds_backward()
@@ -250,11 +271,15 @@ class MassWithStopAndFriction(SlideSticking, DryFriction):
             yield mode.initially("stuck", when=there)
             yield stop.initially(side, when=there)
             moving = ("free", "start_forward", "start_backward", "forward", "backward")
-            yield mode.go(moving, "stuck", when=beyond, reset={self.s: end})
-            yield stop.go("none", side, when=beyond)
+            yield mode.go(moving, "stuck", when=beyond, reset={self.s: end}, because="end stop reached")
+            yield stop.go("none", side, when=beyond, because="end stop reached")
         # While it is held, its velocity is nothing but rounding.
-        yield stop.go("left", "none", when=all_of(negate(mode.is_("stuck")), self.v > 0))
-        yield stop.go("right", "none", when=all_of(negate(mode.is_("stuck")), self.v < 0))
+        yield stop.go(
+            "left", "none", when=all_of(negate(mode.is_("stuck")), self.v > 0), because="moves away from the stop"
+        )
+        yield stop.go(
+            "right", "none", when=all_of(negate(mode.is_("stuck")), self.v < 0), because="moves away from the stop"
+        )
         yield from super().events()
 
     def stored_energy(self) -> Expr:

@@ -5,6 +5,7 @@ A positive torque or force drives the connected part in positive direction.
 
 from __future__ import annotations
 
+from components import icons
 from components.interfaces import LinearFlange, LinearOneFlange, OneFlange
 from modelica_like.language import (
     Component,
@@ -24,6 +25,8 @@ from modelica_like.language import (
 
 class TorqueSource(OneFlange, partial=True):
     """Torque between the housing and a shaft."""
+
+    icon = icons.TORQUE
 
     def torque(self) -> Expr:
         """Return the torque on the connected part."""
@@ -74,6 +77,7 @@ class TorqueStep(TorqueSource):
 class SpeedSource(OneFlange, partial=True):
     """Speed between the housing and a shaft, whatever torque it takes."""
 
+    icon = icons.SPEED
     phi: Variable = var("rad", "angle of the shaft relative to the housing", default=0)
     w: Variable = var("rad/s", "speed")
 
@@ -111,6 +115,8 @@ class ConstantSpeed(SpeedSource):
 class ForceSource(LinearOneFlange, partial=True):
     """Force between the housing and a slide."""
 
+    icon = icons.FORCE
+
     def force(self) -> Expr:
         """Return the force on the connected part."""
         raise NotImplementedError
@@ -144,6 +150,7 @@ class ConstantForce(ForceSource):
 class TranslationalSpeed(Component):
     """Velocity of a slide given by a signal, whatever force it takes."""
 
+    icon = icons.VELOCITY
     flange = LinearFlange("slide end")
     v_ref: Input = signal_in("m/s", "velocity")
     s: Variable = var("m", "position")

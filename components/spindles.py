@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from math import pi
 
+from components import icons
 from components.friction import DryFriction
 from components.interfaces import Flange, LinearFlange
 from components.slides import SlideSticking
@@ -16,6 +17,7 @@ class BallScrew(Component):
     A positive torque on the spindle pushes the nut in positive direction.
     """
 
+    icon = icons.BALL_SCREW
     flange_r = Flange("spindle")
     flange_t = LinearFlange("nut")
     inlet, outlet = "flange_r", "flange_t"
@@ -29,6 +31,7 @@ class BallScrew(Component):
 class MachineTable(SlideSticking, DryFriction):
     """Machine table on a slideway: a mass with a constant process force, and dry friction with stiction."""
 
+    icon = icons.TABLE
     flange_a = LinearFlange("drive side", free=True)
     flange_b = LinearFlange("far side", free=True)
     m: Parameter = param("kg", "mass of table and workpiece", min=0)

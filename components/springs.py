@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from components import icons
 from components.interfaces import (
     Compliant,
     CompliantWithRelativeStates,
@@ -15,6 +16,7 @@ from modelica_like.language import Equations, Events, Expr, Mode, Parameter, par
 class Spring(Compliant):
     """Torsion spring: the torque is proportional to the twist."""
 
+    icon = icons.SPRING
     c: Parameter = param("N.m/rad", "stiffness", min=0)
     phi_rel0: Parameter = param("rad", "relative angle without torque", default=0.0)
 
@@ -29,6 +31,7 @@ class Spring(Compliant):
 class Damper(Lossy, CompliantWithRelativeStates):
     """Viscous damper: the torque is proportional to the relative speed."""
 
+    icon = icons.DAMPER
     d: Parameter = param("N.m.s/rad", "damping coefficient", min=0)
 
     def equations(self) -> Equations:
@@ -42,6 +45,7 @@ class Damper(Lossy, CompliantWithRelativeStates):
 class SpringDamper(Lossy, CompliantWithRelativeStates):
     """Torsion spring and viscous damper side by side, e.g. an elastic coupling."""
 
+    icon = icons.SPRING_DAMPER
     c: Parameter = param("N.m/rad", "stiffness", min=0)
     d: Parameter = param("N.m.s/rad", "damping coefficient", min=0)
     phi_rel0: Parameter = param("rad", "relative angle without torque", default=0.0)
@@ -65,6 +69,7 @@ class Backlash(Lossy, CompliantWithRelativeStates, partial=True):
     backlash take a `SpringDamper`.
     """
 
+    icon = icons.BACKLASH
     c: Parameter = param("N.m/rad", "stiffness in contact", min=0)
     d: Parameter = param("N.m.s/rad", "damping coefficient in contact", default=0.0, min=0)
     b: Parameter = param("rad", "total backlash", min=1e-10)
@@ -153,6 +158,7 @@ class ElastoBacklash2(Backlash):
 class TranslationalSpring(LinearCompliant):
     """Spring: the force is proportional to the extension."""
 
+    icon = icons.SPRING
     c: Parameter = param("N/m", "stiffness", min=0)
     s_rel0: Parameter = param("m", "relative position without force", default=0.0)
 
@@ -167,6 +173,7 @@ class TranslationalSpring(LinearCompliant):
 class TranslationalDamper(Lossy, LinearCompliantWithRelativeStates):
     """Viscous damper: the force is proportional to the relative velocity."""
 
+    icon = icons.DAMPER
     d: Parameter = param("N.s/m", "damping coefficient", min=0)
 
     def equations(self) -> Equations:
@@ -180,6 +187,7 @@ class TranslationalDamper(Lossy, LinearCompliantWithRelativeStates):
 class TranslationalSpringDamper(Lossy, LinearCompliantWithRelativeStates):
     """Spring and viscous damper side by side."""
 
+    icon = icons.SPRING_DAMPER
     c: Parameter = param("N/m", "stiffness", min=0)
     d: Parameter = param("N.s/m", "damping coefficient", min=0)
     s_rel0: Parameter = param("m", "relative position without force", default=0.0)

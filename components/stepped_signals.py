@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from components import icons
 from components.signals import Pulse, Rowwise
 from modelica_like.language import (
     Component,
@@ -58,6 +59,7 @@ class BooleanTable(Rowwise):
 class BooleanStep(Component):
     """Signal 0 or 1 that changes once."""
 
+    icon = icons.STEP
     start_time: Parameter = param("s", "time of the change", default=0.0)
     start_value: bool = False
     """Value before the change."""
@@ -75,6 +77,7 @@ class BooleanStep(Component):
 class BooleanPulse(Component):
     """Signal that is 1 during the first part of every period, and 0 in the rest of it and before the start."""
 
+    icon = icons.PULSE
     period: Parameter = param("s", "time of one period", min=1e-12)
     width: Parameter = param("1", "part of the period in which it is 1", default=0.5, min=0, max=1)
     start_time: Parameter = param("s", "start of the first period", default=0.0)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from components import icons
 from modelica_like.language import (
     Component,
     Connector,
+    Domain,
     Equations,
     Expr,
     Output,
@@ -23,6 +25,8 @@ _ROOM = 293.15
 class HeatPort(Connector):
     """Where heat enters: temperature, and the heat flow into the component."""
 
+    domain = Domain("heat flow", "temperature", "a thermal conductor")
+    stroke = icons.HEAT
     T: Variable = var("K", "temperature", guess=_ROOM, nominal=300.0)
     Q_flow: Variable = flow("W", "heat flow, positive into the component")
 
@@ -58,6 +62,7 @@ class ThermalMass(Component):
     Its stored energy counts from 20 °C.
     """
 
+    icon = icons.THERMAL_MASS
     port = HeatPort("surface")
     C: Parameter = param("J/K", "heat capacity", min=0)
     T: Variable = var("K", "temperature", nominal=300.0, guess=_ROOM)
@@ -74,6 +79,7 @@ class ThermalMass(Component):
 class FixedTemperature(Component):
     """Surroundings that keep their temperature, whatever heat they take."""
 
+    icon = icons.TEMPERATURE
     port = HeatPort("surface")
     T: Parameter = param("K", "temperature", default=_ROOM, min=0)
 
@@ -87,6 +93,7 @@ class FixedTemperature(Component):
 class HeatSource(Component):
     """Prescribed heat flow into the connected body."""
 
+    icon = icons.HEAT_SOURCE
     port = HeatPort("surface")
     Q_flow: Parameter = param("W", "heat flow into the connected body")
 
@@ -100,6 +107,7 @@ class HeatSource(Component):
 class ThermalConductor(Component):
     """Heat conduction or convection without storage: the heat flow is proportional to the difference in temperature."""
 
+    icon = icons.CONDUCTOR
     port_a = HeatPort("one side")
     port_b = HeatPort("other side")
     inlet, outlet = "port_a", "port_b"
@@ -114,6 +122,7 @@ class ThermalConductor(Component):
 class TemperatureSensor(Component):
     """Temperature of a body, e.g. for a control that protects a motor's winding."""
 
+    icon = icons.SENSOR
     port = HeatPort("measured surface")
     T: Output = signal_out("K", "temperature")
 

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+from typing import Any
+
+from components import icons
 from components.interfaces import TwoFlanges
+from components.tabulated import Tabulated
 from components.thermal import Lossy
 from modelica_like.language import (
     Equations,
+    Events,
     Expr,
+    LanguageError,
     Parameter,
     Variable,
     absolute,
-    all_of,
     column,
     der,
-    interpolate,
     maximum,
     minimum,
     param,
@@ -23,45 +28,86 @@ from modelica_like.language import (
 )
 
 Rows = tuple[tuple[float, float], ...]
+_ROUNDING = 1e-9
 
 
-def _held(x: Expr, rows: Rows) -> Expr:
-    """Interpolate in a table whose ends go on with their value."""
-    xs, ys = zip(*rows, strict=True)
-    return interpolate(maximum(minimum(x, xs[-1]), xs[0]), xs, ys)
-
-
-class TorqueConverter(Lossy, TwoFlanges):
+class TorqueConverter(Tabulated, Lossy, TwoFlanges):
     """Hydrodynamic torque converter: flange_a drives the pump, the turbine flange_b, the housing holds the stator.
 
     The pump takes the torque C(x)·w_pump·|w_pump|, the turbine gives t(x) times as much, where x is the speed of the
-    turbine over that of the pump; beyond the rows of a table its value stays. Where the turbine is the faster one, it
-    drives the pump as in a coupling: t = 1, with the capacity at 1/x. No t may exceed 1/x: it would deliver energy.
-    With the torque ratio 1 throughout it is a hydrodynamic coupling. VDI 2153.
+    turbine over that of the pump. Where the turbine is the faster one, it drives the pump as in a coupling: t = 1, with
+    the capacity at 1/x; while they turn against each other, t goes over to that of x = -1 in a straight line, so that
+    no torque jumps. What does not come out is lost in the fluid; so no t may exceed 1/x: it would deliver energy. With
+    the torque ratio 1 throughout it is a hydrodynamic coupling. VDI 2153.
     """
 
-    capacity: Rows = rows(column("speed ratio", rising=True), column("capacity", scale="C_scale"))
+    icon = icons.CONVERTER
+    capacity: Rows = rows(column("speed ratio", rising=True), column("capacity", scale="C_scale", min=0))
     """Rows of speed ratio and capacity in C_scale, which should end with zero at the speed ratio 1."""
     torque_ratio: Rows = rows(
-        column("speed ratio", rising=True), column("torque of the turbine over that of the pump"), default=((0.0, 1.0),)
-    )
+        column("speed ratio", rising=True), column("torque of the turbine over that of the pump", min=0),
+        default=((0.0, 1.0),),
+    )  # fmt: skip
     C_scale: Parameter = param("N.m.s2/rad2", "what counts as 1 in capacity", default=1.0)
     w_still: Parameter = param("rad/s", "speed that counts as standstill", default=1e-6, min=1e-12)
     w_pump: Variable = var("rad/s", "speed of the pump relative to the housing")
     w_turbine: Variable = var("rad/s", "speed of the turbine relative to the housing")
     x: Variable = var("1", "lower speed over higher speed")
+    tau_leading: Variable = var("N.m", "torque that the faster one gives to the fluid")
+
+    @property
+    def overrun(self) -> Expr:
+        """Condition that the turbine is the faster one."""
+        return absolute(self.w_turbine) > absolute(self.w_pump)
+
+    @property
+    def leading(self) -> Expr:
+        """Speed of the faster one."""
+        return where(self.overrun, self.w_turbine, self.w_pump)
+
+    @property
+    def gain(self) -> Expr:
+        """Torque of the turbine over that of the pump."""
+        against = 1 - minimum(self.x, 0) * (self.look_up(-1.0, self.torque_ratio) - 1)
+        return where(self.overrun, against, self.look_up(self.x, self.torque_ratio))
 
     def equations(self) -> Equations:
+        self._check()
         yield from super().equations()
-        pump, turbine = self.w_pump, self.w_turbine
+        pump, turbine, leading = self.w_pump, self.w_turbine, self.leading
         yield pump == der(self.flange_a.phi) - self.w_support
         yield turbine == der(self.flange_b.phi) - self.w_support
-        overrun = all_of(absolute(turbine) > absolute(pump), pump * turbine >= 0)
-        leading = where(overrun, turbine, pump)
         yield self.x == pump * turbine / maximum(leading**2, self.w_still**2)
-        torque = self.C_scale * _held(self.x, self.capacity) * leading * absolute(leading)
-        yield self.flange_a.tau == where(overrun, -torque, torque)
-        yield self.flange_b.tau == where(overrun, torque, -_held(self.x, self.torque_ratio) * torque)
+        capacity = self.C_scale * self.look_up(self.x, self.capacity)
+        yield self.tau_leading == capacity * leading * absolute(leading)
+        passed = where(self.overrun, -self.tau_leading, self.tau_leading)
+        yield self.flange_a.tau == passed
+        yield self.flange_b.tau == -self.gain * passed
+
+    def events(self) -> Events:
+        for name, table in (("capacity", self.capacity), ("torque_ratio", self.torque_ratio)):
+            yield from self.leaving(name, where(self.overrun, table[0][0], self.x), table, least=-1.0)
+
+    def _check(self) -> None:
+        """Check that no torque ratio exceeds 1/x, also between two rows, where t·x has its top."""
+        if not all(isinstance(cell, float | int) for row in self.torque_ratio for cell in row):
+            return  # symbols for rows that were checked as numbers
+        end: Any = self.look_up(1.0, self.torque_ratio)
+        table = {x: t for x, t in self.torque_ratio if x < 1} | {1.0: float(end)}
+        for (x, t), (x_next, t_next) in pairwise(sorted(table.items())):
+            top = 0.5 * (x + t * (x_next - x) / (t - t_next)) if t != t_next else x
+            if x < top < x_next:
+                table[top] = t + (t_next - t) * (top - x) / (x_next - x)
+        worst = max(table, key=lambda x: table[x] * x)
+        if table[worst] * worst > 1 + _ROUNDING:
+            raise LanguageError(
+                f"{self.label}: with the torque ratio {table[worst]:g} at the speed ratio {worst:.4g} the turbine "
+                "gives more power than the pump takes.",
+                advice=f"Let torque_ratio fall to {1 / worst:.4g} or less there, and to 1 at the speed ratio 1.",
+            )
 
     def dissipation(self) -> Expr:
-        return self.flange_a.tau * self.w_pump + self.flange_b.tau * self.w_turbine
+        """Return torque times slip: of the faster one, the part of the speed ratio that does not come out as power."""
+        useful = where(self.overrun, self.x, self.gain * self.x)
+        taken = where(self.overrun, self.gain, 1.0)
+        return self.tau_leading * self.leading * (taken - useful)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from components import icons
 from components.interfaces import LinearFlange
 from modelica_like.language import Component, Equations, Output, Variable, der, signal_out, var
 
@@ -9,6 +10,7 @@ from modelica_like.language import Component, Equations, Output, Variable, der, 
 class SlideSensor(Component, partial=True):
     """Sensor at a slide end."""
 
+    icon = icons.SENSOR
     flange = LinearFlange("measured slide end")
 
     def equations(self) -> Equations:
@@ -40,6 +42,7 @@ class LinearAccelerationSensor(SlideSensor):
 class RelativeSlideSensor(Component, partial=True):
     """Sensor between two slide ends that are not joined by it."""
 
+    icon = icons.BETWEEN_SENSOR
     flange_a = LinearFlange("reference slide end")
     flange_b = LinearFlange("measured slide end")
 
@@ -83,6 +86,7 @@ class RelativeLinearAccelerationSensor(RelativeSlideSensor):
 class CutSlideSensor(Component, partial=True):
     """Sensor in a cut through a slide."""
 
+    icon = icons.BETWEEN_SENSOR
     flange_a = LinearFlange("left end")
     flange_b = LinearFlange("right end")
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from math import pi
 
+from components import icons
 from components.interfaces import LinearFlange, LinearOneFlange
 from components.sources import ForceSource
 from components.speed_laws import inverse_law, linear_law, quadratic_law, sign_law
@@ -29,6 +30,7 @@ from modelica_like.language import (
 class Force2(Component):
     """Force between two slides, given by a signal: it drives flange_b in positive, flange_a in negative direction."""
 
+    icon = icons.BETWEEN_FORCE
     flange_a = LinearFlange("slide end that is pushed back")
     flange_b = LinearFlange("slide end that is driven")
     f: Input = signal_in("N", "force on flange_b")
@@ -60,6 +62,7 @@ class ForceStep(ForceSource):
 class SpeedDependentForce(ForceSource, partial=True):
     """Force that depends on the velocity; a negative f_nominal brakes."""
 
+    icon = icons.LOAD
     f_nominal: Parameter = param("N", "force on the connected part at v_nominal; negative for a load")
     v_nominal: Parameter = param("m/s", "nominal velocity", min=1e-12)
     reverses: bool = True
@@ -98,6 +101,7 @@ class InverseSpeedDependentForce(SpeedDependentForce):
 class SignForce(ForceSource):
     """Constant force with the sign of the velocity, smoothed around standstill."""
 
+    icon = icons.LOAD
     f_nominal: Parameter = param("N", "force on the connected part in forward motion; negative for a load")
     v0: Parameter = param("m/s", "velocity at which 99 % of it are reached", default=0.1, min=1e-12)
     v: Variable = var("m/s", "velocity of the slide relative to the housing")
@@ -129,6 +133,7 @@ class TranslationalPosition(MotionSource):
     The filter makes velocity and acceleration of any signal finite (Modelica Standard Library, Translational.Position).
     """
 
+    icon = icons.POSITION
     s_ref: Input = signal_in("m", "position")
     exact: bool = True
     """Follow the signal exactly: it must then have derivatives."""
@@ -146,6 +151,7 @@ class TranslationalPosition(MotionSource):
 class TranslationalAccelerate(MotionSource):
     """Acceleration given by a signal."""
 
+    icon = icons.POSITION
     a_ref: Input = signal_in("m/s2", "acceleration")
 
     def equations(self) -> Equations:
@@ -156,6 +162,7 @@ class TranslationalAccelerate(MotionSource):
 class ConstantVelocity(MotionSource):
     """Constant velocity, whatever force it takes."""
 
+    icon = icons.VELOCITY
     s: Variable = var("m", "position of the slide relative to the housing", default=0)
     v_fixed: Parameter = param("m/s", "velocity")
 

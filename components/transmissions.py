@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from components import icons
 from components.fixed import Fixed
 from components.friction import Brake, Clutch
 from components.inertias import Inertia
@@ -41,6 +42,7 @@ class Ravigneaux(WithPlanetarySets):
     planet and ring is a third set with i0 = 1, because it transmits only the sum of both rolling powers.
     """
 
+    icon = icons.RAVIGNEAUX
     small_sun = Flange("small sun, in mesh with the short planets")
     large_sun = Flange("large sun, in mesh with the long planets")
     carrier = Flange("common carrier")

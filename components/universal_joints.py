@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from components import icons
 from components.interfaces import TwoFlanges
 from modelica_like.language import Equations, Expr, Parameter, atan2, cos, param, sin
 
@@ -16,6 +17,7 @@ class UniversalJoint(TwoFlanges):
     VDI 2722.
     """
 
+    icon = icons.JOINT
     beta: Parameter = param("rad", "angle between the shafts", min=0, max=1.5)
 
     def lead(self, phi: Expr) -> Expr:

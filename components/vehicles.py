@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from components import icons
 from components.interfaces import Flange, LinearFlange, LinearOneFlange
 from components.speed_laws import sign_law
 from components.thermal import Lossy
@@ -27,6 +28,7 @@ class RollingResistance(Lossy, LinearOneFlange):
     The inclination is the tangent of the slope. Modelica Standard Library, Translational.RollingResistance.
     """
 
+    icon = icons.LOAD
     weight: Parameter = param("N", "weight on the wheels", min=0)
     Cr: Input = signal_in("1", "rolling resistance coefficient", default=0.015)
     inclination: Input = signal_in("1", "rise of the road over its run", default=0.0)
@@ -52,6 +54,7 @@ class Vehicle(Component):
     Library, Translational.Vehicle.
     """
 
+    icon = icons.VEHICLE
     flange_r = Flange("drive shaft", free=True)
     flange_t = LinearFlange("coupling to other vehicles", free=True)
     inlet, outlet = "flange_r", "flange_t"

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from math import pi
+from typing import Literal
 
+from components import icons
 from components.signals import Periodic, Started, Table
 from modelica_like.language import (
     Component,
@@ -33,6 +35,7 @@ from modelica_like.language import (
 class Cosine(Started):
     """Cosine signal."""
 
+    icon = icons.SINE
     amplitude: Parameter = param("*", "amplitude", default=1.0)
     f: Parameter = param("Hz", "frequency", min=0)
     phase: Parameter = param("rad", "angle at the start", default=0.0)
@@ -44,6 +47,7 @@ class Cosine(Started):
 class ExpSine(Started):
     """Sine signal that fades exponentially, as a hit oscillator does."""
 
+    icon = icons.DECAY
     amplitude: Parameter = param("*", "amplitude at the start", default=1.0)
     f: Parameter = param("Hz", "frequency", min=0)
     phase: Parameter = param("rad", "angle at the start", default=0.0)
@@ -56,6 +60,7 @@ class ExpSine(Started):
 class Sinc(Started):
     """Signal amplitude·sin(x)/x, x = 2·pi·f·t: it contains all frequencies up to f equally."""
 
+    icon = icons.DECAY
     amplitude: Parameter = param("*", "value at the start", default=1.0)
     f: Parameter = param("Hz", "highest frequency", min=1e-12)
 
@@ -68,6 +73,7 @@ class Sinc(Started):
 class Exponentials(Component):
     """Signal that rises exponentially towards a value for a time, and then falls exponentially."""
 
+    icon = icons.RISE
     height: Parameter = param("*", "value that the rise tends to", default=1.0)
     rise_time: Parameter = param("s", "duration of the rise", min=1e-12)
     T_rise: Parameter = param("s", "time constant of the rise", min=1e-12)
@@ -96,6 +102,7 @@ class Exponentials(Component):
 class SawTooth(Periodic):
     """Signal that rises linearly over every period and then jumps back."""
 
+    icon = icons.SAW
     stage = Mode("low", "rising", description="before the start, or in a period")
 
     def equations(self) -> Equations:
@@ -111,6 +118,7 @@ class SawTooth(Periodic):
 class LogFrequencySweep(Component):
     """Frequency that grows exponentially from one value to another: the same time for every octave."""
 
+    icon = icons.SINE
     f_min: Parameter = param("Hz", "frequency at the start", min=1e-12)
     f_max: Parameter = param("Hz", "frequency at the end", min=1e-12)
     duration: Parameter = param("s", "duration of the sweep", min=1e-12)
@@ -134,6 +142,7 @@ class LogFrequencySweep(Component):
 class VariableSine(Component):
     """Sine of an amplitude and a frequency given by signals; its angle is the integral of the frequency."""
 
+    icon = icons.SINE
     amplitude: Input = signal_in("*", "amplitude", default=1.0)
     f: Input = signal_in("Hz", "frequency")
     offset: Parameter = param("*", "mean value", default=0.0)
@@ -148,16 +157,24 @@ class VariableSine(Component):
 class CombiTable(Component):
     """Several signals from one table over time: columns[1].y, columns[2].y, …; see `Table`."""
 
+    icon = icons.TABLE_BLOCK
     table: tuple[tuple[float, ...], ...] = rows(
         column("time", scale="time_scale", rising=True), column("value"), more=True
     )
     smooth: bool = False
     """Interpolate with a continuous slope instead of straight lines."""
+    extrapolate: Literal["linear", "hold", "error"] = "linear"
+    """Beyond the ends let the last slopes go on (`linear`), `hold` the last values, or end the run (`error`)."""
     time_scale: Parameter = param("s", "what counts as 1 in the times", default=1.0)
 
     def build(self) -> None:
         times, *columns = zip(*self.table, strict=True)
         self.columns = [
-            Table(table=tuple(zip(times, column, strict=True)), smooth=self.smooth, time_scale="time_scale")
+            Table(
+                table=tuple(zip(times, column, strict=True)),
+                smooth=self.smooth,
+                extrapolate=self.extrapolate,
+                time_scale="time_scale",
+            )
             for column in columns
         ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from components import icons
 from components.interfaces import Flange, LinearFlange
 from modelica_like.language import Component, Equations, Expr, Parameter, param
 
@@ -38,6 +39,7 @@ class RotationToTranslation(Component, partial=True):
 class IdealRollingWheel(RotationToTranslation):
     """Wheel that rolls without slip, also rack and pinion or pulley and rope: s = radius·phi."""
 
+    icon = icons.WHEEL
     radius: Parameter = param("m", "rolling radius")
 
     def travel(self) -> Expr:
@@ -47,6 +49,7 @@ class IdealRollingWheel(RotationToTranslation):
 class IdealGearR2T(RotationToTranslation):
     """Gear from rotation to translation with the ratio phi/s; a spindle of the lead h has the ratio 2·pi/h."""
 
+    icon = icons.RACK
     ratio: Parameter = param("rad/m", "angle of the shaft over travel of the slide")
 
     def travel(self) -> Expr:

@@ -8,6 +8,8 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from modelica_like.upper import provide
+
 if TYPE_CHECKING:
     from modelica_like.analyse.calibration.calibrate import calibrate as calibrate
     from modelica_like.analyse.linear.campbell import campbell as campbell
@@ -35,6 +37,7 @@ if TYPE_CHECKING:
     from modelica_like.simulation import simulate as simulate
     from modelica_like.solve.options import Options as Options
     from modelica_like.solve.solution import Solution as Solution
+    from modelica_like.solve.trajectories import Trajectories as Trajectories
 
 __version__ = "0.1.0"
 
@@ -46,6 +49,7 @@ _HOME = {
     "Native": "modelica_like.native.handle",
     "Options": "modelica_like.solve.options",
     "Solution": "modelica_like.solve.solution",
+    "Trajectories": "modelica_like.solve.trajectories",
     "build": "modelica_like.simulation",
     "calibrate": "modelica_like.analyse.calibration.calibrate",
     "campbell": "modelica_like.analyse.linear.campbell",
@@ -67,34 +71,7 @@ _HOME = {
     "validate_fmu": "modelica_like.fmi.validate",
 }
 
-__all__ = [
-    "Assembly",
-    "CompiledDae",
-    "Component",
-    "ModelicaLikeError",
-    "Native",
-    "Options",
-    "Solution",
-    "build",
-    "calibrate",
-    "campbell",
-    "characteristic",
-    "compare",
-    "cosim",
-    "export_fmu",
-    "export_html",
-    "importance",
-    "linearize",
-    "load",
-    "run_fmu",
-    "sensitivities",
-    "simulate",
-    "simulation_function",
-    "split",
-    "steady",
-    "sweep",
-    "validate_fmu",
-]
+__all__ = [*_HOME]  # pyright: ignore[reportUnsupportedDunderAll]
 
 
 def __getattr__(name: str) -> Any:
@@ -102,3 +79,8 @@ def __getattr__(name: str) -> Any:
     if name in _HOME:
         return getattr(import_module(_HOME[name]), name)
     raise AttributeError(f"module 'modelica_like' has no attribute '{name}'")
+
+
+_OFFERED = {"simulation_function": _HOME["simulation_function"], "Native": _HOME["Native"],
+            "NativeLoop": "modelica_like.native.run"}  # fmt: skip
+provide(tuple(_OFFERED), lambda name: getattr(import_module(_OFFERED[name]), name))

@@ -6,6 +6,7 @@ import difflib
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -74,7 +75,7 @@ class LanguageError(ModelicaLikeError):
 
 
 class ComponentUnbalanced(LanguageError):
-    """A component has not as many equations as unknowns of its own."""
+    """A component has more or fewer equations than unknowns of its own."""
 
 
 class UnitError(ModelicaLikeError):
@@ -183,6 +184,10 @@ class Chattering(SolveError):
     """Modes switch without end."""
 
 
+class LimitPassed(SolveError):
+    """Something happened that a component says must end the run."""
+
+
 class StepFailed(SolveError):
     """The integrator gave up."""
 
@@ -208,7 +213,7 @@ class FmuCrashed(FmuFailed):
 
 
 class FmuTimeout(FmuFailed):
-    """An FMU did not come to an end in time."""
+    """An FMU did not finish in time."""
 
 
 class CalibrationFailed(SolveError):
@@ -230,6 +235,18 @@ class MissingExtra(ModelicaLikeError):
 def missing_extra(package: str, extra: str) -> MissingExtra:
     """Return the error about a package that an extra installs."""
     return MissingExtra(f"{package} is not installed.", advice=f'Install it with: pip install "modelica-like[{extra}]"')
+
+
+def extra_module(module: str, extra: str, package: str = "") -> Any:
+    """Import a module of a package that an extra installs.
+
+    Raises:
+        MissingExtra: the package is not installed.
+    """
+    try:
+        return import_module(module)
+    except ImportError:
+        raise missing_extra(package or module.partition(".")[0], extra) from None
 
 
 def did_you_mean(name: object, known: Iterable[str]) -> str:

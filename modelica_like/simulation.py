@@ -7,22 +7,34 @@ import gc
 import math
 import time
 from collections.abc import Iterable, Mapping
-from importlib import import_module
+from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal, get_args
 
 from modelica_like.compile import compile
 from modelica_like.compile.compiled import CompiledDae
-from modelica_like.errors import LanguageError, SolveError, UnitError, UnknownName, ValueOutOfRange, did_you_mean
+from modelica_like.errors import (
+    ExportError,
+    LanguageError,
+    SolveError,
+    StepFailed,
+    UnitError,
+    UnknownName,
+    ValueOutOfRange,
+    did_you_mean,
+)
 from modelica_like.flatten import flatten
 from modelica_like.initialize import StartKind, initialize
 from modelica_like.language import Component
 from modelica_like.language.tunable import with_tunable_tables
 from modelica_like.solve.events import EventLoop, Progress
 from modelica_like.solve.options import Options
-from modelica_like.solve.solution import Solution, Statistics
+from modelica_like.solve.solution import Solution
+from modelica_like.solve.trajectories import Statistics, Trajectories, needs_equations
 from modelica_like.structure import reduce
 from modelica_like.units import parse_unit, to_si
+from modelica_like.upper import upper
 
 _SECOND = parse_unit("s")
 _SHORTEST = 1e-12
@@ -36,9 +48,9 @@ def build(drive: Model, free: Iterable[str] = (), *, tables: Iterable[str] = ())
 
     Args:
         drive: the model.
-        free: parameters that shall be independent: what follows from others by a formula keeps the formula's value,
-            but can be varied on its own. Not possible in a compiled model.
-        tables: patterns of tables whose numbers shall be parameters, such as `clutch.mu_pos`: see
+        free: parameters to decouple from their formulas: each keeps its formula's value, but can be varied on its own.
+            Not possible in a compiled model.
+        tables: patterns of tables whose numbers become parameters, such as `clutch.mu_pos`: see
             `with_tunable_tables`. Not possible in a compiled model.
 
     Raises:
@@ -49,6 +61,8 @@ def build(drive: Model, free: Iterable[str] = (), *, tables: Iterable[str] = ())
         if tables:
             raise LanguageError("Tables of a compiled model stay what they are.", advice="Build it with `tables`.")
         return drive
+    if isinstance(drive, Trajectories):
+        raise needs_equations(drive)
     if isinstance(drive, str | Path):
         from modelica_like.netlist import load
 
@@ -96,7 +110,8 @@ def simulate(
         points: number of equal intervals of the results.
         options: all options together; the arguments before win.
         progress: called with the time reached.
-        solver: `idas`, the reference, or `native`: the compiled run-time of FMUs, several times as fast.
+        solver: `idas`, the reference, or `native`: the compiled run-time of FMUs, several times as fast. Where IDAS
+            gives up, the run is done by the compiled run-time, if there is one and it succeeds; a notice tells so.
 
     Raises:
         ModelicaLikeError: the model or a value is wrong, or the simulation cannot go on.
@@ -114,6 +129,12 @@ def simulate(
         loop.run()
     except (SolveError, KeyboardInterrupt) as error:
         vars(error)["run"] = _solution(loop, begin) if loop.record.segments else None
+        if solver == "idas" and isinstance(error, StepFailed):
+            # Where there is no run-time, or it fails, too, what IDAS says stands.
+            with suppress(SolveError, ExportError, LanguageError):
+                run = simulate(model, end, start=start, t0=t0, options=chosen, progress=progress, solver="native")
+                told = f"{error.what} The whole run was done by the compiled run-time instead (solver native)."
+                return replace(run, notices=(told, *run.notices))
         raise
     return _solution(loop, begin)
 
@@ -132,7 +153,7 @@ def plan(
     if end <= t0:
         raise ValueOutOfRange(f"The end time {end:g} s is not after the start time {t0:g} s.")
     if end - t0 < _SHORTEST * max(1.0, abs(t0)):
-        raise ValueOutOfRange(f"A run of {end - t0:g} s is too short: no times can be told apart in it.")
+        raise ValueOutOfRange(f"A run of {end - t0:g} s is too short: its times cannot be distinguished.")
     return end, chosen
 
 
@@ -141,8 +162,7 @@ def _loop(solver: str) -> Any:
     if solver == "idas":
         return EventLoop
     if solver == "native":
-        # It stands above this layer.
-        return import_module("modelica_like.native.run").NativeLoop
+        return upper("NativeLoop")
     raise UnknownName(
         f"There is no solver '{solver}'{did_you_mean(solver, get_args(Solver)) or '.'}",
         advice="There are idas (the reference) and native (the compiled run-time of FMUs).",

@@ -66,8 +66,6 @@ from components.sizing.ravigneaux import RavigneauxTeeth as RavigneauxTeeth
 from components.sizing.ravigneaux import ravigneaux_assembly as ravigneaux_assembly
 from components.sizing.ravigneaux import ravigneaux_gear as ravigneaux_gear
 from components.sizing.ravigneaux import ravigneaux_meshes as ravigneaux_meshes
-from components.sizing.result import Result as Result
-from components.sizing.result import comparison as comparison
 from components.sizing.rolling_bearings import BearingLife as BearingLife
 from components.sizing.rolling_bearings import bearing_life as bearing_life
 from components.sizing.shaft_statics import BearingReaction as BearingReaction
@@ -95,6 +93,8 @@ from components.sizing.speed_limits import BeltSpeedLimit as BeltSpeedLimit
 from components.sizing.speed_limits import SpeedLimit as SpeedLimit
 from components.sizing.speed_limits import belt_speed_limit as belt_speed_limit
 from components.sizing.speed_limits import speed_limit as speed_limit
+from modelica_like.language.results import Result as Result
+from modelica_like.language.results import comparison as comparison
 
 __all__ = [
     "SHOULDER_IN_BENDING",

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 from components.sizing.maths import asin, cos, exp, floor, hypot, maximum, require, sin, sqrt
-from components.sizing.quantities import Angle, Area, Density, Force, Length, Power, Ratio, Speed, Teeth, Velocity
-from components.sizing.result import Result, line
+from modelica_like.language.quantities import Angle, Area, Density, Force, Length, Power, Ratio, Speed, Teeth, Velocity
+from modelica_like.language.results import Result, line
 
 _NEWTON_STEPS = 8
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from components.sizing.quantities import (
+from modelica_like.language.quantities import (
     Acceleration,
     Energy,
     Inertia,
@@ -17,7 +17,7 @@ from components.sizing.quantities import (
     Torque,
     Velocity,
 )
-from components.sizing.result import Result, line
+from modelica_like.language.results import Result, line
 
 _RULE = 9550.0
 

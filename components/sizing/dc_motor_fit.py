@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 from components.sizing.dc_motors import DcMotor, MotorLines, motor_lines, motor_on_lines
 from components.sizing.maths import Number, absolute, maximum, settled, solve, sqrt
-from components.sizing.quantities import Current, MotorConstant, Ratio, Resistance, Speed, Torque
-from components.sizing.result import Result, line
+from modelica_like.language.quantities import Current, MotorConstant, Ratio, Resistance, Speed, Torque
+from modelica_like.language.results import Result, line
 
 _STEPS = 12
 _NAMES = ("constant", "resistance", "friction", "damping")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from components.sizing.maths import require, sqrt
-from components.sizing.quantities import (
+from modelica_like.language.quantities import (
     Compliance,
     Current,
     CurrentSlope,
@@ -20,7 +20,7 @@ from components.sizing.quantities import (
     Torque,
     Voltage,
 )
-from components.sizing.result import Result, line
+from modelica_like.language.results import Result, line
 
 GRAVITY = 9.81
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 from components.sizing.maths import Number
-from components.sizing.quantities import Force, Length, Mass, Ratio, Sag, Stress
-from components.sizing.result import Result, line
+from modelica_like.language.quantities import Force, Length, Mass, Ratio, Sag, Stress
+from modelica_like.language.results import Result, line
 
 GRAVITY = 9.81
 STEEL: Stress = 210e9

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from components.sizing.quantities import Density, Length, Mass, SmallInertia, Speed, Time, Torque
-from components.sizing.result import Result, line
+from modelica_like.language.quantities import Density, Length, Mass, SmallInertia, Speed, Time, Torque
+from modelica_like.language.results import Result, line
 
 
 def cylinder_mass(density: Density, radius: Length, width: Length) -> Mass:

@@ -6,7 +6,6 @@ import itertools
 from dataclasses import dataclass
 
 from components.sizing.maths import absolute
-from components.sizing.quantities import Power, Ratio, Speed, Torque
 from components.sizing.ravigneaux_shafts import (
     CARRIER,
     LARGE_SUN,
@@ -22,7 +21,8 @@ from components.sizing.ravigneaux_shafts import (
     shaft_torques,
     sign_of,
 )
-from components.sizing.result import Result, line
+from modelica_like.language.quantities import Power, Ratio, Speed, Torque
+from modelica_like.language.results import Result, line
 
 
 @dataclass(frozen=True)

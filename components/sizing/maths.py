@@ -9,15 +9,10 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from modelica_like.language.quantities import Number, is_symbolic
+
 _ROUNDING = 1e-12
 _NO_SOLUTION = "The equations have no unique solution."
-Number = Any
-"""A float, a numpy array (all arrays of one call fit each other by broadcasting) or a CasADi SX, MX or DM."""
-
-
-def is_symbolic(*values: Number) -> bool:
-    """Tell whether any of the values belongs to CasADi."""
-    return any(isinstance(value, ca.SX | ca.MX | ca.DM) for value in values)
 
 
 def _function(numeric: Callable[..., Any], symbolic: Callable[..., Any], text: str) -> Callable[..., Number]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from components.sizing.maths import absolute, floor
-from components.sizing.quantities import Power, Ratio, Speed, Teeth, Torque
 from components.sizing.ravigneaux_shafts import (
     CARRIER,
     LARGE_SUN,
@@ -20,7 +19,8 @@ from components.sizing.ravigneaux_shafts import (
     shaft_speeds,
     shaft_torques,
 )
-from components.sizing.result import Result, line
+from modelica_like.language.quantities import Power, Ratio, Speed, Teeth, Torque
+from modelica_like.language.results import Result, line
 
 
 @dataclass(frozen=True)
@@ -153,7 +153,12 @@ def ravigneaux_meshes(
         rolling: rolling powers of the small and the large sun.
         planets: speeds of short and long planets relative to the carrier.
         load_sharing: factor K_gamma.
+
+    Raises:
+        ValueError: the ring has fewer teeth than the long planet.
     """
+    if teeth.ring <= teeth.long_planet:
+        raise ValueError(f"A ring of {teeth.ring:g} teeth cannot hold planets of {teeth.long_planet:g}.")
     share = load_sharing / teeth.planets
     short, long = absolute(planets[0]), absolute(planets[1])
     force_small = absolute(torques.small_sun) * share / teeth.small_sun

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from components.sizing.maths import Number, absolute, settled, sign, where
-from components.sizing.quantities import Power, Ratio, Speed, Torque
-from components.sizing.result import Result, line
+from modelica_like.language.quantities import Power, Ratio, Speed, Torque
+from modelica_like.language.results import Result, line
 
 SMALL_SUN, LARGE_SUN, CARRIER, RING = "small_sun", "large_sun", "carrier", "ring"
 MEMBERS = (SMALL_SUN, LARGE_SUN, CARRIER, RING)

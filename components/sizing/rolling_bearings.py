@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from components.sizing.quantities import Force, Life, Ratio, Revolutions, Speed
-from components.sizing.result import Result, line
+from modelica_like.language.quantities import Force, Life, Ratio, Revolutions, Speed
+from modelica_like.language.results import Result, line
 
 
 class BearingLife(Result):

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from components.sizing.maths import Number, hypot, is_symbolic, maximum, settled, solve, where
-from components.sizing.quantities import Force, Length, SmallTorque, Torque
-from components.sizing.result import Result, line
+from modelica_like.language.quantities import Force, Length, SmallTorque, Torque
+from modelica_like.language.results import Result, line
 
 Positions = tuple[Length, ...]
 

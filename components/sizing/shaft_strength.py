@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from components.sizing.maths import is_symbolic, maximum, minimum, require, sqrt, where
-from components.sizing.quantities import Force, Length, Ratio, SmallTorque, Stress, Torque
-from components.sizing.result import Result, line
 from components.sizing.shaft_statics import Load, SectionForces, section_forces, shaft_statics
+from modelica_like.language.quantities import Force, Length, Ratio, SmallTorque, Stress, Torque
+from modelica_like.language.results import Result, line
 
 _NOTHING = 1e-9
 

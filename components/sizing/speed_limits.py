@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 from components.sizing.belts import belt_velocity
-from components.sizing.quantities import Length, Ratio, Speed, Velocity
-from components.sizing.result import Result, line
+from modelica_like.language.quantities import Length, Ratio, Speed, Velocity
+from modelica_like.language.results import Result, line
 
 
 class SpeedLimit(Result):

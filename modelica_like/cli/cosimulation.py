@@ -2,26 +2,16 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from modelica_like.cli.declare import Argument, Option, WrongUse
-from modelica_like.cli.shared import Assignments, Debug, Netlist, load_netlist, out, told
+from modelica_like.cli.shared import Assignments, Debug, Netlist, load_netlist, say, told
 
-
-class MasterName(StrEnum):
-    """In which order the FMUs step."""
-
-    JACOBI = "jacobi"
-    GAUSS_SEIDEL = "gauss-seidel"
-
-
-class InputsName(StrEnum):
-    """How inputs move between communication points."""
-
-    LINEAR = "linear"
-    HOLD = "hold"
+Master = Literal["jacobi", "gauss-seidel"]
+"""In which order FMUs step."""
+Inputs = Literal["linear", "hold"]
+"""How inputs move between communication points."""
 
 
 def split(
@@ -57,7 +47,7 @@ def split(
                 )
             else:
                 done = run(assembly, at, output, names=names or (), version=fmi, check=check, report=status.update)
-        out().print(str(done), soft_wrap=True)
+        say(str(done))
 
 
 def cosim(
@@ -72,8 +62,8 @@ def cosim(
     tolerance: Annotated[
         float | None, Option(metavar="RTOL", help="Relative tolerance of the coupling: the step varies.")
     ] = None,
-    master: Annotated[MasterName | None, Option(help="All at once, or one after the other.")] = None,
-    inputs: Annotated[InputsName | None, Option(help="Inputs on straight lines, or held.")] = None,
+    master: Annotated[Master | None, Option(help="All at once, or one after the other.")] = None,
+    inputs: Annotated[Inputs | None, Option(help="Inputs on straight lines, or held.")] = None,
     csv: Annotated[Path | None, Option(metavar="FILE", help="Write a table: .csv, .parquet, .nc.")] = None,
     units: Annotated[bool, Option("--units", help="Units in a second header line of the table.")] = False,
     plot: Annotated[Path | None, Option(metavar="FILE", help="Draw the results: .png, .svg or .pdf.")] = None,
@@ -84,17 +74,22 @@ def cosim(
     """Run a system of FMUs together: mode changes, energies at the couplings, results as table and picture."""
     with told(debug, tables=[csv], pictures=[plot]):
         from modelica_like.cli.outcome import Outcome
-        from modelica_like.cosimulation.load import opened
+        from modelica_like.cosimulation.files import opened
         from modelica_like.cosimulation.run import cosim as run
+        from modelica_like.cosimulation.solution import described_model
         from modelica_like.report.progress import Bar
         from modelica_like.report.run import cosimulation_report
+        from modelica_like.solve.plot import matching
         from modelica_like.solve.plot import plot as draw
 
+        values = _numbers(assignments or ())
         with opened(system) as known, Bar(until or known.settings.until) as bar:
+            if show:
+                matching(described_model(known), show)
             made = Outcome(
                 lambda: run(
                     known, until, step=step, master=master, inputs=inputs, tolerance=tolerance,
-                    parameters=_numbers(assignments or ()), timeout=timeout, progress=bar,
+                    parameters=values, timeout=timeout, progress=bar,
                 ), debug=debug,
             )  # fmt: skip
         made.tell(cosimulation_report, csv)

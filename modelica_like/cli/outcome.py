@@ -12,9 +12,9 @@ from modelica_like.errors import ModelicaLikeError, SolveError
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from modelica_like.solve.solution import Solution
+    from modelica_like.solve.trajectories import Trajectories
 
-Picture = tuple[Path | None, "Callable[[Solution], Figure]"]
+Picture = tuple[Path | None, "Callable[[Trajectories], Figure]"]
 
 
 class Outcome:
@@ -25,7 +25,7 @@ class Outcome:
         debug: raise instead of warning.
     """
 
-    def __init__(self, run: Callable[[], Solution], *, debug: bool) -> None:
+    def __init__(self, run: Callable[[], Trajectories], *, debug: bool) -> None:
         self._debug = debug
         self._written: list[str] = []
         self._unwritten: OSError | None = None
@@ -74,7 +74,7 @@ class Outcome:
         if self._unwritten is not None:
             raise self._unwritten
 
-    def _draw(self, file: Path, draw: Callable[[Solution], Figure]) -> None:
+    def _draw(self, file: Path, draw: Callable[[Trajectories], Figure]) -> None:
         from modelica_like.solve.plot import save_plot
 
         save_plot(draw(self.solution), file)

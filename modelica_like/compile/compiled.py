@@ -5,17 +5,21 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from importlib import import_module
-from typing import Any
+from typing import Any, TypeVar
 
 import casadi as ca
 
+from modelica_like.compile.buffers import BufferedFunction, buffered
 from modelica_like.compile.buffers import Vector as Vector
 from modelica_like.compile.start_system import StartSystem as StartSystem
 from modelica_like.errors import LanguageError, Source, UnknownName, ValueOutOfRange, did_you_mean
 from modelica_like.flatten.model import FlatDiscrete, FlatParameter, FlatVariable, Origin
 from modelica_like.structure.holds import Circuit as Circuit
-from modelica_like.units import coherent, to_si
+from modelica_like.structure.holds import HeldMotion as HeldMotion
+from modelica_like.units import Unit, to_si
+from modelica_like.upper import upper
+
+Made = TypeVar("Made")
 
 
 @dataclass(frozen=True)
@@ -40,6 +44,8 @@ class CompiledTransition:
         timed: whether `index` is a position in the moments rather than in the guards.
         resets: what else changes.
         notice: what the user is told when it happens.
+        because: why it happens, in words.
+        fails: whether the run ends there, with an error.
     """
 
     mode: int
@@ -49,7 +55,9 @@ class CompiledTransition:
     index: int
     resets: tuple[Reset, ...]
     source: Source
-    notice: str = ""
+    notice: str
+    because: str
+    fails: bool
 
 
 @dataclass(frozen=True)
@@ -59,31 +67,6 @@ class StartEntry:
     node: int
     state: tuple[int, float] | None
     strength: str
-
-
-@dataclass(frozen=True)
-class CompiledHold:
-    """A motion that a mode holds at zero.
-
-    Attributes:
-        component: path of the component.
-        mode: position of the mode in d.
-        number: number of the mode that holds.
-        loose: number of a mode that does not, or -1.
-        motion: variable that is held.
-        state: (state, factor) if it is one.
-        reaction: variable that holds it, or -1.
-        approach: position in d of the derivative that the motion is to have; zero but in impacts.
-    """
-
-    component: str
-    mode: int
-    number: int
-    loose: int
-    motion: int
-    state: tuple[int, float] | None
-    reaction: int
-    approach: int
 
 
 @dataclass(frozen=True)
@@ -154,7 +137,7 @@ class CompiledDae:
     transitions: tuple[CompiledTransition, ...]
     start_modes: tuple[tuple[int, int, Source], ...]
     starts: tuple[StartEntry, ...]
-    holds: tuple[CompiledHold, ...]
+    holds: tuple[HeldMotion, ...]
     circuits: tuple[Circuit, ...]
     singular: tuple[tuple[tuple[str, ...], tuple[Origin, ...]], ...]
     differentiated: tuple[Origin, ...]
@@ -194,6 +177,18 @@ class CompiledDae:
     def parameter_position(self) -> dict[str, int]:
         """Position of every independent parameter by its path."""
         return {parameter.path: k for k, parameter in enumerate(self.flat_parameters)}
+
+    @cached_property
+    def fixed_position(self) -> dict[str, int]:
+        """Position in (p, u) of every independent parameter and input by its path."""
+        inputs = {self.flat_variables[k].path: len(self.p) + n for n, k in enumerate(self.inputs)}
+        return {**self.parameter_position, **inputs}
+
+    @cached_property
+    def units(self) -> dict[str, Unit]:
+        """Coherent SI unit of every variable, parameter, mode and discrete value by its path."""
+        named = (*self.flat_discretes, *self.flat_variables, *self.flat_derived, *self.flat_parameters)
+        return {one.path: one.unit for one in named}
 
     @cached_property
     def derived_position(self) -> dict[str, int]:
@@ -261,10 +256,10 @@ class CompiledDae:
                     raise LanguageError(
                         f"{path} cannot change after compilation.", advice="Set it in the model and build that again."
                     )
-                p[self.parameter_position[path]] = one.checked(to_si(value, coherent(one.unit), path), value)
+                p[self.parameter_position[path]] = one.checked(to_si(value, one.unit, path), value)
             elif path in inputs:
                 unit = self.flat_variables[self.inputs[inputs[path]]].unit
-                u[inputs[path]] = to_si(value, coherent(unit), path)
+                u[inputs[path]] = to_si(value, unit, path)
             elif path in self.derived_position:
                 raise LanguageError(f"{path} follows from other parameters.", advice="Set those.")
             else:
@@ -284,6 +279,16 @@ class CompiledDae:
         twin.__dict__.update({k: v for k, v in self.__dict__.items() if k not in twin.__dict__})
         return twin
 
+    def once(self, key: Any, make: Callable[[], Made]) -> Made:
+        """Return what `make` gives: made on first use, and kept with the model and its twins."""
+        if key not in self._cache:
+            self._cache[key] = make()
+        return self._cache[key]
+
+    def fast(self, key: Any, make: Callable[[], ca.Function]) -> BufferedFunction:
+        """Return this thread's buffered function for a key, made on first use, and kept with the model."""
+        return buffered(self._cache, key, make)
+
     def function(self, inputs: Sequence[str], outputs: Sequence[str], **run: Any) -> ca.Function:
         """Return the whole simulation as a differentiable CasADi function of parameters.
 
@@ -292,8 +297,7 @@ class CompiledDae:
             outputs: numbers read off the run.
             run: further arguments of `modelica_like.simulation_function`, which says more.
         """
-        # Analysis stands above this layer: only the face of the package knows where.
-        return import_module("modelica_like").simulation_function(self, inputs, outputs, **run)
+        return upper("simulation_function")(self, inputs, outputs, **run)
 
     def native(self, inputs: Sequence[str] = (), outputs: Sequence[str] = (), **how: Any) -> Any:
         """Return a handle for control loops: an instance that steps at the speed of C.
@@ -303,7 +307,7 @@ class CompiledDae:
             outputs: variables and modes that its steps read.
             how: further arguments of `modelica_like.Native`, which says more.
         """
-        return import_module("modelica_like").Native(self, inputs, outputs, **how)
+        return upper("Native")(self, inputs, outputs, **how)
 
     def __getstate__(self) -> dict[str, Any]:
         if self._make_energy is not None:

@@ -13,8 +13,7 @@ from modelica_like.compile.compiled import CompiledDae
 from modelica_like.cosimulation.cut import Cut, CutNetlist, as_name
 from modelica_like.errors import ModelicaLikeError, NetlistError, StructureError
 from modelica_like.flatten import flatten
-from modelica_like.fmi.dependencies import Dependencies
-from modelica_like.fmi.interface import Interface
+from modelica_like.fmi.dependencies import Following
 from modelica_like.language import Assembly, Component
 from modelica_like.language.fields import Input, Output
 from modelica_like.structure import reduce
@@ -30,6 +29,7 @@ class End:
     Attributes:
         adaptor: name of the adaptor that is added for it.
         path: of a connector at the cut.
+        takes: what comes from the other side.
     """
 
     adaptor: str
@@ -46,7 +46,7 @@ Objection = Callable[[int, Mapping[Cut, Takes]], str]
 def ends_of(cut: Cut, near_takes: Takes) -> tuple[End, End]:
     """Return both ends of a cut; the names of their adaptors are those of the ends."""
     other: Takes = "flow" if near_takes == "potential" else "potential"
-    near, far = cut.near[0], cut.far[0]
+    near, far = cut.near, cut.far[0]
     return End(as_name(near), near, near_takes), End(as_name(far), far, other)
 
 
@@ -113,7 +113,7 @@ def _bad_end(model: CompiledDae, assembly: Assembly, end: End) -> str:
     """Return what the answer of an end must not depend on, but does."""
     outputs, inputs, second = signals_of(assembly.parts[end.adaptor])
     wrong = second if end.takes == "potential" else inputs
-    depends = Dependencies(model, Interface(model.name, (), (), (), (), ()))
+    depends = Following(model)
     names = [model.flat_variables[k].path for k in model.inputs]
     for name in outputs:
         follows = {names[k] for k in depends.inputs_of(model.position[f"{end.adaptor}.{name}"])}
@@ -128,7 +128,7 @@ def _bad_end(model: CompiledDae, assembly: Assembly, end: End) -> str:
 def _impossible(found: CutNetlist, objection: Objection, cuts: Sequence[Cut]) -> ModelicaLikeError:
     """Tell for the first cut that cannot be made in either way why."""
     for cut in cuts:
-        sides = [found.group_of(cut.near[0]), found.group_of(cut.far[0])]
+        sides = [found.group_of(cut.near), found.group_of(cut.far[0])]
         others = [one for one in cuts if one is not cut]
         reasons: dict[str, None] = {}
         for chosen in _choices((cut, *others)):

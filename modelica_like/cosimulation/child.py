@@ -1,96 +1,75 @@
-"""Runs a system of FMUs in a process of its own: python -m modelica_like.cosimulation.child FOLDER.
+"""Runs a system of FMUs in a process of its own: python child.py FOLDER.
 
-The folder holds `job.json` and the unpacked FMUs in `0`, `1`, … What came out is left there: `result.npy` and
-`meta.json`, or `error.json`; `progress` holds the time reached, `calling` the number of the FMU that was called last.
+What comes out is left in the folder as it comes: before the first step `columns.json`, which becomes `meta.json` at the
+end; `rows`, doubles of the time, the columns, the energies and the counts.
 """
 
 from __future__ import annotations
 
-import json
-import mmap
-import struct
 import sys
+from array import array
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from modelica_like.cosimulation.master import Balance, Counts, Master, Signal
-from modelica_like.cosimulation.slaves import REAL, Refused, Slave
-
-
-class Board:
-    """Tells outside how far the run is, and which FMU it is in."""
-
-    def __init__(self, folder: Path) -> None:
-        self._time, self._unit = (self._shared(folder / name) for name in ("progress", "calling"))
-        self.unit = 0
-
-    @staticmethod
-    def _shared(path: Path) -> mmap.mmap:
-        with path.open("r+b") as file:
-            return mmap.mmap(file.fileno(), 8)
-
-    def reach(self, time: float) -> None:
-        """Tell the time reached."""
-        self._time[:8] = struct.pack("d", time)
-
-    def call(self, unit: int) -> None:
-        """Tell which FMU is called now."""
-        self.unit = unit
-        self._unit[:8] = struct.pack("q", unit)
+from modelica_like.cosimulation.master import Balance, Master, Signal
+from modelica_like.cosimulation.slaves import Slave
+from modelica_like.fmi.inside import Job, Messages, Refused, about
 
 
 class Recorder:
-    """Keeps rows of all variables and of the energies at the bonds.
+    """Writes rows of all variables, of the energies at the bonds and of the counts, so that no failure loses them.
 
     Args:
         slaves: whose variables.
         outputs: names of each.
-        balances: energies.
+        master: whose energies and counts.
         interval: shortest time between two rows, in s.
+        file: where to write.
     """
 
     def __init__(
-        self, slaves: list[Slave], outputs: list[list[str]], balances: list[Balance], interval: float, board: Board
+        self, slaves: list[Slave], outputs: list[list[str]], master: Master, interval: float, job: Job, file: Path
     ) -> None:
         self._readers = [slave.reader(names) for slave, names in zip(slaves, outputs, strict=True)]
-        self._balances, self._interval, self._board = balances, interval, board
-        self.rows: list[list[float]] = []
+        self._master, self._interval, self._job, self._last = master, interval, job, -float("inf")
+        self._file = file.open("wb", buffering=0)
 
     def look(self, time: float) -> list[float]:
-        """Read a row."""
-        if self.rows and time - self.rows[-1][0] < self._interval * (1 - 1e-6):
+        """Read a row; nothing but the time where the one before is nearer than the interval."""
+        if time - self._last < self._interval * (1 - 1e-6):
             return [time]
         row = [time]
         for read in self._readers:
             row += read()
-        for balance in self._balances:
-            row += [balance.power, balance.residual]
+        for balance in self._master.balances:
+            row += balance.told()
         return row
 
     def keep(self, row: list[float]) -> None:
-        """Keep a row, unless it is nearer to the one before than the interval."""
-        self._board.reach(row[0])
+        """Keep a row."""
+        self._job.reach(row[0])
         if len(row) > 1:
-            self.rows.append(row)
+            self._last = row[0]
+            self._file.write(array("d", [*row, *vars(self._master.counts).values()]))
 
     def close(self, time: float) -> None:
         """Keep the end, however near it is to the row before."""
-        if self.rows[-1][0] != time:
+        if self._last != time:
             self._interval = 0.0
             self.keep(self.look(time))
 
 
-def open_slaves(folder: Path, job: dict[str, Any], board: Board) -> list[Slave]:
+def open_slaves(job: Job) -> list[Slave]:
     """Instantiate all FMUs, and check the names."""
     slaves: list[Slave] = []
-    for k, unit in enumerate(job["units"]):
-        slaves.append(Slave(unit["name"], folder / str(k), lambda k=k: board.call(k)))
+    for k, unit in enumerate(job.asked["units"]):
+        name, messages = unit["name"], Messages()
+        job.messages[name] = messages
+        slaves.append(Slave(name, job.folder / str(k), messages, lambda k=k, name=name: job.call(k, name)))
         for name in unit["parameters"]:
             check_name(slaves[-1], name, "parameters")
-    for link in job["links"]:
+    for link in job.asked["links"]:
         (n, name), *targets = link["ends"]
         check_name(slaves[n], name, "outputs")
         for n, name in targets:
@@ -98,7 +77,7 @@ def open_slaves(folder: Path, job: dict[str, Any], board: Board) -> list[Slave]:
             if (causality := slaves[n].all[name].causality) != "input":
                 known = [v for v, about in slaves[n].all.items() if about.causality == "input"]
                 raise Refused(kind="no input", unit=slaves[n].name, name=name, causality=causality, known=known)
-    if job["tolerance"] is not None and (unable := [slave.name for slave in slaves if not slave.can_save]):
+    if job.asked["tolerance"] is not None and (unable := [slave.name for slave in slaves if not slave.can_save]):
         raise Refused(kind="no rollback", unit=unable[0])
     return slaves
 
@@ -151,42 +130,34 @@ def start(slaves: list[Slave], master: Master, job: dict[str, Any]) -> None:
     master.begin(job["start"])
 
 
-def run(folder: Path) -> None:
+def run(job: Job) -> None:
     """Run the job of a folder."""
-    job = json.loads((folder / "job.json").read_text())
-    board = Board(folder)
-    slaves: list[Slave] = []
-    sys.excepthook = reporter(folder, job, board, slaves)
-    slaves += open_slaves(folder, job, board)
-    outputs = choose(slaves, job["outputs"], own_names=job["own_names"])
-    master = connect(slaves, job)
-    start(slaves, master, job)
-    recorder = Recorder(slaves, outputs, master.balances, job["interval"], board)
-    recorder.keep(recorder.look(job["start"]))
-    span = job["start"], job["until"], job["step"]
-    if job["tolerance"] is None:
+    asked, slaves, folder = job.asked, open_slaves(job), job.folder
+    outputs = choose(slaves, asked["outputs"], own_names=asked["own_names"])
+    master = connect(slaves, asked)
+    start(slaves, master, asked)
+    recorder = Recorder(slaves, outputs, master, asked["interval"], job, folder / "rows")
+    recorder.keep(recorder.look(asked["start"]))
+    width = (folder / "rows").stat().st_size // 8
+    known = {"units": columns_of(slaves, outputs), "open": open_inputs(slaves, asked), "width": width}
+    columns = job.leave(known, "columns.json")
+    span = asked["start"], asked["until"], asked["step"]
+    if asked["tolerance"] is None:
         master.run_fixed(*span, recorder)
     else:
-        master.run_variable(*span, job["tolerance"], recorder)
-    recorder.close(job["until"])
-    meta = result(slaves, outputs, master) | {"open": open_inputs(slaves, job)}
+        master.run_variable(*span, asked["tolerance"], recorder)
+    recorder.close(asked["until"])
     for slave in slaves:
         slave.close()
-    np.save(folder / "result.npy", np.array(recorder.rows))
-    (folder / "meta.json").write_text(json.dumps(meta))
+    columns.rename(folder / "meta.json")
 
 
-def result(slaves: list[Slave], outputs: list[list[str]], master: Master) -> dict[str, Any]:
-    """Return what is to be known about the columns and the run."""
-    counts: Counts = master.counts
-    return {
-        "units": [
-            {"columns": [about(slave.all[name]) for name in names], "constants": constants(slave)}
-            for slave, names in zip(slaves, outputs, strict=True)
-        ],
-        "balances": [vars(balance) for balance in master.balances],
-        "counts": vars(counts),
-    }
+def columns_of(slaves: list[Slave], outputs: list[list[str]]) -> list[dict[str, Any]]:
+    """Return what is to be known about the columns and parameters of each FMU."""
+    return [
+        {"columns": [about(slave.all[name]) for name in names], "constants": constants(slave)}
+        for slave, names in zip(slaves, outputs, strict=True)
+    ]
 
 
 def open_inputs(slaves: list[Slave], job: dict[str, Any]) -> list[dict[str, Any]]:
@@ -204,38 +175,11 @@ def open_inputs(slaves: list[Slave], job: dict[str, Any]) -> list[dict[str, Any]
     return found
 
 
-def about(variable: Any) -> dict[str, Any]:
-    """Return what is to be known about a column, by the names of `RecordedVariable`."""
-    items = getattr(variable.declaredType, "items", None) or ()
-    return {
-        "path": variable.name,
-        "unit": variable.unit or getattr(variable.declaredType, "unit", None) or "1",
-        "description": variable.description or "",
-        "kind": (variable.causality or "local") if variable.type in REAL else "discrete",
-        "names": [(int(item.value), item.name) for item in items],
-    }
-
-
 def constants(slave: Slave) -> dict[str, float]:
     """Return the values of the parameters."""
     names = [name for name, v in slave.all.items() if v.causality == "parameter"]
     return dict(zip(names, slave.reader(names)(), strict=True))
 
 
-def reporter(folder: Path, job: dict[str, Any], board: Board, slaves: list[Slave]) -> Any:
-    """Return an exception hook that leaves the error in the folder."""
-
-    def report(kind: type[BaseException], error: BaseException, trace: Any) -> None:
-        if isinstance(error, Refused):
-            detail = error.detail
-        else:
-            messages = slaves[board.unit].messages if board.unit < len(slaves) else []
-            unit = job["units"][board.unit]["name"]
-            detail = {"kind": "failed", "unit": unit, "text": str(error) or kind.__name__, "messages": messages}
-        (folder / "error.json").write_text(json.dumps(detail))
-
-    return report
-
-
 if __name__ == "__main__":
-    run(Path(sys.argv[1]))
+    run(Job(Path(sys.argv[1])))

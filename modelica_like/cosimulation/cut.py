@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from modelica_like.errors import NetlistError, Source, UnknownName, did_you_mean
 from modelica_like.language import Assembly, Connector
@@ -13,12 +13,7 @@ from modelica_like.language.expr import Symbol
 
 @dataclass(frozen=True)
 class Wire:
-    """Ends that are joined, with a name and where they were joined.
-
-    Attributes:
-        ends: paths of connectors or signals.
-        signal: it carries a value in one direction.
-    """
+    """Paths of connectors that are joined, or of an output and the inputs that take its value (`signal`)."""
 
     name: str
     ends: tuple[str, ...]
@@ -28,17 +23,10 @@ class Wire:
 
 @dataclass(frozen=True)
 class Cut:
-    """A wire taken apart.
-
-    Attributes:
-        name: as it was asked for, fit to be a name.
-        near: ends on the one side: the end that was named.
-        far: all other ends.
-        signal: it carries a value in one direction, from `near` to `far`.
-    """
+    """A wire taken apart: the end that was named, or the output of a signal, and all others."""
 
     name: str
-    near: tuple[str, ...]
+    near: str
     far: tuple[str, ...]
     signal: bool
     source: Source
@@ -69,11 +57,7 @@ def part_of(path: str) -> str:
 
 
 def cut_netlist(assembly: Assembly, at: Sequence[str]) -> CutNetlist:
-    """Cut a netlist.
-
-    Args:
-        assembly: the netlist.
-        at: names of parts (the cut is behind them), of their ends (`shaft.flange_a`), or of entries of `[connect]`.
+    """Cut a netlist behind parts, at ends (`shaft.flange_a`), or at entries of `[connect]`.
 
     Raises:
         UnknownName: there is no such shaft.
@@ -82,18 +66,13 @@ def cut_netlist(assembly: Assembly, at: Sequence[str]) -> CutNetlist:
     if not at:
         raise NetlistError(f"{assembly.label}: there is nothing to cut.", advice="Name a shaft, e.g. --at shaft.")
     wires = _joined(_wires(assembly))
-    cuts: dict[tuple[str, ...], Cut] = {}
+    cuts: dict[Wire, Cut] = {}
     for name in at:
-        cut, wire = _find(assembly, wires, name)
-        cuts.setdefault(wire.ends, cut)
-    kept: list[Wire] = []
-    for wire in wires:
-        if wire.ends not in cuts:
-            kept.append(wire)
-        elif len(cuts[wire.ends].far) > 1 and not wire.signal:
-            kept.append(Wire(wire.name, cuts[wire.ends].far, wire.signal, wire.source))
-    groups = _groups(assembly, kept)
-    found = CutNetlist(groups, tuple(kept), tuple(cuts.values()))
+        wire, cut = _find(assembly, wires, name)
+        cuts.setdefault(wire, cut)
+    kept = [wire for wire in wires if wire not in cuts]
+    kept += [replace(wire, ends=cut.far) for wire, cut in cuts.items() if len(cut.far) > 1 and not cut.signal]
+    found = CutNetlist(_groups(assembly, kept), tuple(kept), tuple(cuts.values()))
     for cut in found.cuts:
         _check_apart(assembly, found, cut)
     return found
@@ -126,31 +105,26 @@ def _joined(wires: Iterable[Wire]) -> list[Wire]:
     """Join wires that share an end."""
     joined: list[Wire] = []
     for wire in wires:
-        touching = [one for one in joined if set(one.ends) & set(wire.ends)]
-        if touching:
-            first = touching[0]
-            ends = tuple(dict.fromkeys(end for one in (*touching, wire) for end in one.ends))
-            joined = [one for one in joined if one not in touching]
-            wire = Wire(first.name, ends, first.signal, first.source)
-        joined.append(wire)
+        touching = [*(one for one in joined if set(one.ends) & set(wire.ends)), wire]
+        ends = tuple(dict.fromkeys(end for one in touching for end in one.ends))
+        joined = [*(one for one in joined if one not in touching), replace(touching[0], ends=ends)]
     return joined
 
 
 # -- what is meant by a name -------------------------------------------------------------------------------------------
 
 
-def _find(assembly: Assembly, wires: Sequence[Wire], name: str) -> tuple[Cut, Wire]:
+def _find(assembly: Assembly, wires: Sequence[Wire], name: str) -> tuple[Wire, Cut]:
     near = _near_end(assembly, wires, name)
     wire = next((one for one in wires if near in one.ends), None)
     if wire is None:
         raise NetlistError(f"{near} is connected to nothing, so there is nothing to cut.")
     if wire.signal:  # a value goes from an output to inputs
-        source, *others = sorted(wire.ends, key=lambda end: not _is_output(assembly, end))
-        near, far = source, tuple(others)
+        near = next((end for end in wire.ends if _is_output(assembly, end)), near)
+    far = tuple(end for end in wire.ends if end != near)
+    if wire.signal:
         _check_can_open(assembly, far)
-    else:
-        far = tuple(end for end in wire.ends if end != near)
-    return Cut(as_name(name), (near,), far, wire.signal, wire.source), wire
+    return wire, Cut(as_name(name), near, far, wire.signal, wire.source)
 
 
 def _near_end(assembly: Assembly, wires: Sequence[Wire], name: str) -> str:
@@ -237,14 +211,14 @@ def _groups(assembly: Assembly, wires: Iterable[Wire]) -> tuple[tuple[str, ...],
 
 
 def _check_apart(assembly: Assembly, found: CutNetlist, cut: Cut) -> None:
-    inside = [end for end in cut.far if found.group_of(end) == found.group_of(cut.near[0])]
+    inside = [end for end in cut.far if found.group_of(end) == found.group_of(cut.near)]
     if not inside or (cut.signal and len(inside) < len(cut.far)):
         return
-    near, far = part_of(cut.near[0]), part_of(inside[0])
+    near, far = part_of(cut.near), part_of(inside[0])
     if near == far:
-        raise NetlistError(f"{cut.near[0]} lies inside of the array {near}, which cannot be cut.", where=cut.source)
+        raise NetlistError(f"{cut.near} lies inside of the array {near}, which cannot be cut.", where=cut.source)
     raise NetlistError(
-        f"{assembly.label} does not fall apart between {cut.near[0]} and {inside[0]}.", where=cut.source,
+        f"{assembly.label} does not fall apart between {cut.near} and {inside[0]}.", where=cut.source,
         why=f"{near} and {far} are also joined by {' – '.join(_way(found.wires, near, far))}.",
         advice="Cut there, too: --at can be given several times.",
     )  # fmt: skip
@@ -252,16 +226,12 @@ def _check_apart(assembly: Assembly, found: CutNetlist, cut: Cut) -> None:
 
 def _way(wires: Sequence[Wire], start: str, end: str) -> list[str]:
     """Return the parts along the shortest way from one to the other."""
-    came: dict[str, str] = {start: ""}
-    queue = [start]
-    for part in queue:
+    ways = {start: [start]}
+    for part in (queue := [start]):
         for wire in wires:
             parts = [part_of(one) for one in wire.ends]
             for other in parts if part in parts else ():
-                if other not in came:
-                    came[other] = part
+                if other not in ways:
+                    ways[other] = [*ways[part], other]
                     queue.append(other)
-    way = [end]
-    while came[way[-1]]:
-        way.append(came[way[-1]])
-    return way[::-1]
+    return ways[end]

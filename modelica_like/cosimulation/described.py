@@ -55,6 +55,12 @@ class FmuVariable:
     causality: str
     unit: str = ""
 
+    @property
+    def varies(self) -> bool:
+        """It is a number, and no parameter."""
+        number = self.kind not in ("String", "Binary", "Clock")
+        return number and "arameter" not in self.causality and self.causality != "independent"
+
 
 @dataclass(frozen=True)
 class DescribedFmu:

@@ -1,84 +1,90 @@
-"""System files: TOML in and out."""
+"""System files: TOML in and out; systems from whatever describes them."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, get_args
 
 import tomlkit
 
-from modelica_like.cosimulation.system import (
-    Bond,
-    Inputs,
-    Link,
-    Master,
-    Port,
-    Settings,
-    System,
-    Unit,
-    check_system,
-    find_bonds,
-)
-from modelica_like.errors import (
-    ModelicaLikeError,
-    NetlistError,
-    UnknownName,
-    raise_together_or_one,
-)
-from modelica_like.netlist.document import (
-    Check,
-    Reader,
-    as_text,
-    duration,
-    each,
-    options,
-    parse_toml,
-    read_sections,
-    read_text,
-    whole,
-)
+from modelica_like.cosimulation import system as kinds
+from modelica_like.cosimulation.system import Bond, Link, Port, Settings, System, Unit, check_system, find_bonds
+from modelica_like.errors import ModelicaLikeError, NetlistError, UnknownName, raise_together_or_one
+from modelica_like.netlist import document as toml
 from modelica_like.netlist.locate import Lines, locate
-from modelica_like.units import parse_unit, to_si
+from modelica_like.netlist.read import FMU_PART
+from modelica_like.units import ONE, parse_unit, to_si
 from modelica_like.writing import write_text
 
 _OWN_NAMES = "results keep the names that variables have in their FMUs"
 
 
-def read_toml(path: Path) -> tuple[dict[str, Any], Lines]:
-    """Read a TOML file, and where its entries stand.
+def load_system(path: Path, work: Path) -> System:
+    """Read a system: a TOML file, an SSP, or a netlist with FMUs as parts.
+
+    Args:
+        path: the file.
+        work: an empty folder for what has to be unpacked or exported.
+
+    Raises:
+        NetlistError, UnknownName: it is none of these, or something in it is wrong.
+        FmuRefused: an SSP is not sound.
+        ModelicaLikeError: the netlist's own parts cannot be exported.
+    """
+    if path.suffix.lower() == ".ssp":
+        from modelica_like.cosimulation.ssp import load_ssp
+
+        return load_ssp(path, work)
+    data, lines = _read_toml(path)
+    if "fmus" not in data and "parts" in data:
+        from modelica_like.cosimulation.fmu_parts import system_of_netlist
+
+        return system_of_netlist(path, work)
+    return _system(data, lines, path)
+
+
+def describes_system(path: Path) -> bool:
+    """Return whether a file describes FMUs that run together, and not a netlist that is simulated.
 
     Raises:
         NetlistError: it is not TOML, or does not exist.
-        DuplicateName: a name is used twice.
     """
-    text = read_text(path)
+    if path.suffix.lower() == ".ssp":
+        return True
+    data, _ = _read_toml(path)
+    parts = data.get("parts")
+    parts = parts.values() if isinstance(parts, dict) else ()
+    return "fmus" in data or any(isinstance(part, dict) and part.get("is") == FMU_PART for part in parts)
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[System]:
+    """Open a system, and keep what had to be unpacked for it as long as it is needed; see `load_system`."""
+    with tempfile.TemporaryDirectory(prefix="modelica_like_", ignore_cleanup_errors=True) as work:
+        yield load_system(path, Path(work))
+
+
+def _read_toml(path: Path) -> tuple[dict[str, Any], Lines]:
+    text = toml.read_text(path)
     lines = locate(text, str(path))
-    return parse_toml(text, lines), lines
+    return toml.parse_toml(text, lines), lines
 
 
-def read_system(data: Mapping[str, Any], lines: Lines, path: Path) -> System:
-    """Return the system that a TOML file describes.
-
-    Args:
-        data: its content, from `read_toml`.
-        lines: where its entries stand.
-        path: the file.
-
-    Raises:
-        NetlistError, UnknownName: something in it is wrong.
-    """
+def _system(data: Mapping[str, Any], lines: Lines, path: Path) -> System:
     errors: list[ModelicaLikeError] = []
-    read = read_sections(data, "A system", _READERS, lines, errors)
+    read = toml.read_sections(data, "A system", _READERS, lines, errors)
     if errors:
         raise raise_together_or_one(errors)
-    sections = {name: tuple(read.get(name, {}).values()) for name in ("fmus", "connect", "bonds")}
-    units = tuple(replace(unit, file=path.parent / unit.file) for unit in sections["fmus"])
-    links, bonds = sections["connect"], sections["bonds"] or find_bonds(sections["connect"])
+    fmus, links, bonds = (tuple(read.get(name, {}).values()) for name in ("fmus", "connect", "bonds"))
+    units = tuple(replace(unit, file=path.parent / unit.file) for unit in fmus)
     settings = Settings(**read.get("simulate", {}))
-    system = System(read.get("name", path.stem), units, links, bonds, settings, read.get("own_names", False))
+    own_names = read.get("own_names", False)
+    system = System(read.get("name", path.stem), units, links, bonds or find_bonds(links), settings, own_names)
     check_system(system)
     return system
 
@@ -92,7 +98,8 @@ def _unit(key: str, entry: Any) -> Unit:
     parameters = table.get("parameters", {})
     if not isinstance(parameters, dict) or not all(isinstance(v, int | float) for v in parameters.values()):
         raise NetlistError(f"{key}.parameters must be a table of numbers, in the FMU's units.")
-    return Unit(name, Path(table["file"]), {key: float(value) for key, value in parameters.items()})
+    values = {one: to_si(value + 0, ONE, f"{key}.{one}") for one, value in parameters.items()}
+    return Unit(name, Path(table["file"]), values)
 
 
 def _link(key: str, entry: Any) -> Link:
@@ -126,10 +133,10 @@ def _yes_or_no(key: str, value: Any) -> bool:
 
 
 def _time(key: str, value: Any) -> float:
-    return to_si(duration(key, value), parse_unit("s"), key)
+    return to_si(toml.duration(key, value), parse_unit("s"), key)
 
 
-def _word(known: Sequence[str]) -> Check:
+def _word(known: Sequence[str]) -> toml.Check:
     def check(key: str, value: Any) -> Any:
         if value not in known:
             raise UnknownName(f"{key} = {value!r} must be {' or '.join(known)}.")
@@ -144,13 +151,13 @@ def _tolerance(key: str, value: Any) -> float:
     return value
 
 
-_OPTIONS: Mapping[str, Check] = {
-    "until": _time, "step": _time, "master": _word(get_args(Master)), "inputs": _word(get_args(Inputs)),
+_OPTIONS: Mapping[str, toml.Check] = {
+    "until": _time, "step": _time, "master": _word(get_args(kinds.Master)), "inputs": _word(get_args(kinds.Inputs)),
     "tolerance": _tolerance,
 }  # fmt: skip
-_READERS: Mapping[str, Reader] = {
-    "name": whole(as_text), "own_names": whole(_yes_or_no), "fmus": each(_unit), "connect": each(_link),
-    "bonds": each(_bond), "simulate": options(_OPTIONS),
+_READERS: Mapping[str, toml.Reader] = {
+    "name": toml.whole(toml.as_text), "own_names": toml.whole(_yes_or_no), "fmus": toml.each(_unit),
+    "connect": toml.each(_link), "bonds": toml.each(_bond), "simulate": toml.options(_OPTIONS),
 }  # fmt: skip
 
 

@@ -9,20 +9,14 @@ from typing import Any
 
 from modelica_like.cosimulation.described import DescribedFmu, described
 from modelica_like.cosimulation.system import Link, Port, Settings, System, Unit, check_system, find_bonds
-from modelica_like.errors import (
-    ModelicaLikeError,
-    NetlistError,
-    UnknownName,
-    did_you_mean,
-    raise_together_or_one,
-)
+from modelica_like.errors import ModelicaLikeError, NetlistError, UnknownName, did_you_mean, raise_together_or_one
 from modelica_like.fmi.export import export_fmu
 from modelica_like.language import Assembly, Connector
 from modelica_like.language.fields import Input
 from modelica_like.netlist.document import Document, flattened, parse, read_text
 from modelica_like.netlist.read import FMU_PART, assemble
 from modelica_like.simulation import seconds
-from modelica_like.units import parse_unit, to_si
+from modelica_like.units import ONE, parse_unit, to_si
 
 _OWN = ("is", "file")
 _ONLY_SIGNALS = "An FMU has signals only: join its inputs and outputs in [connect]."
@@ -31,16 +25,11 @@ _ONLY_SIGNALS = "An FMU has signals only: join its inputs and outputs in [connec
 def system_of_netlist(path: Path, work: Path) -> System:
     """Make a system of a netlist that has FMUs among its parts.
 
-    The FMUs are units of their own; all other parts are exported as one FMU with the netlist's name.
-
-    Args:
-        path: the netlist; files of FMUs are named relative to it.
-        work: an existing folder for the export.
+    The FMUs, whose files are named relative to the netlist, are units of their own; all other parts are exported into a
+    folder as one FMU with the netlist's name.
 
     Raises:
-        NetlistError, UnknownName: something in the netlist is wrong; several errors come together.
-        FmuRefused: a file is no FMU.
-        ModelicaLikeError: the other parts cannot be exported.
+        ModelicaLikeError: something in the netlist or in a file is wrong; several errors come together.
     """
     document = parse(read_text(path), str(path))
     fmus = {name: entry for name, entry in document.parts.items() if _is_fmu(entry)}
@@ -64,15 +53,12 @@ class _End:
     takes: bool
     foreign: bool
 
+    def __str__(self) -> str:
+        return str(self.port) if self.foreign else self.port.variable
+
 
 class _Joiner:
-    """Tells the FMUs of a netlist from its other parts, and collects what is wrong.
-
-    Args:
-        document: the netlist.
-        fmus: entries of its FMUs.
-        path: its file.
-    """
+    """Tells the FMUs of a netlist from its other parts, and collects what is wrong."""
 
     def __init__(self, document: Document, fmus: Mapping[str, Any], path: Path) -> None:
         self.document, self.fmus, self.path = document, fmus, path
@@ -86,16 +72,17 @@ class _Joiner:
         self._refuse_other_mentions()
         self._stop()
         rest, crossing = self._rest()
-        links: list[Link] = []
         kept: dict[str, list[str]] = {}
-        for name, ends in crossing.items():
-            if link := self._tried("connect", name, self._link, rest, ends, kept):
-                links.append(link)
+        made = (self._tried("connect", name, self._link, rest, ends, kept) for name, ends in crossing.items())
+        links = [link for link in made if link is not None]
         self._stop()
         if rest is not None:
-            units.append(self._export(replace(self.document, connect={**self._plain(), **kept}), links, work))
+            outputs = [link.source.variable for link in links if link.source.unit == self.title]
+            file = work / f"{self.title}.fmu"
+            export_fmu(self._assembled({**self._plain(), **kept}), file, "2.0", "cs", outputs=outputs, check=False)
+            units.append(Unit(self.title, file))
         until = self.document.simulate.get("until")
-        settings = Settings(until=None if until is None else seconds(until))
+        settings = Settings(until if until is None else seconds(until))
         system = System(self.document.name, tuple(units), tuple(links), find_bonds(links), settings)
         check_system(system)
         return system
@@ -138,12 +125,12 @@ class _Joiner:
 
     def _value(self, fmu: str, key: str, value: Any) -> float:
         variable = self._variable(fmu, key)
-        if isinstance(value, str):
-            unit = parse_unit(variable.unit or "1")
-            return (to_si(value, unit, f"{fmu}.{key}") - unit.offset) / unit.factor
-        if not isinstance(value, int | float):
+        if not isinstance(value, str | int | float):
             raise NetlistError(f'{fmu}.{key} must be a number or a text with a unit, such as "10 N.m".')
-        return float(value)
+        if not isinstance(value, str):
+            return to_si(value + 0, ONE, f"{fmu}.{key}")  # true is 1
+        unit = parse_unit(variable.unit or "1")
+        return (to_si(value, unit, f"{fmu}.{key}") - unit.offset) / unit.factor
 
     def _variable(self, fmu: str, name: str) -> Any:
         known = self.about[fmu].variables
@@ -178,29 +165,26 @@ class _Joiner:
         """Return the other parts, joined as far as no FMU stands between, and the connections that cross."""
         plain = self._plain()
         crossing = {name: ends for name, ends in self.document.connect.items() if name not in plain}
-        parts = self._others()
-        rest = assemble(replace(self.document, parts=parts, connect=plain), self.path) if parts else None
-        for name, ends in plain.items():
-            self.given.update(dict.fromkeys(ends, name))
-        return rest, crossing
+        self.given = {end: name for name, ends in plain.items() for end in ends}
+        return (self._assembled(plain) if len(self.document.parts) > len(self.fmus) else None), crossing
 
-    def _others(self) -> dict[str, Any]:
-        return {name: entry for name, entry in self.document.parts.items() if name not in self.fmus}
+    def _assembled(self, connect: dict[str, list[str]]) -> Assembly:
+        parts = {name: entry for name, entry in self.document.parts.items() if name not in self.fmus}
+        return assemble(replace(self.document, parts=parts, connect=connect), self.path)
 
     def _link(self, name: str, rest: Assembly | None, ends: list[str], kept: dict[str, list[str]]) -> Link | None:
         found = [self._end(end, rest) for end in ends]
         sources, targets = [e for e in found if not e.takes], [e for e in found if e.takes]
         if len(sources) != 1:
-            names = ", ".join(_spoken(e) for e in (sources or targets))
+            names = ", ".join(map(str, sources or targets))
             what = "nothing gives the signal" if not sources else "several ends give the signal"
             raise NetlistError(f"{name}: {what}: {names}.", advice="Join one output with the inputs that take it.")
         (source,) = sources
         for target in targets:
-            self._give(_spoken(target), name)
-        inner = [e for e in targets if not e.foreign]
+            self._give(str(target), name)
         if not source.foreign:
-            if inner:
-                kept[name] = [e.port.variable for e in (source, *inner)]
+            inner = [e.port.variable for e in targets if not e.foreign]
+            kept |= {name: [source.port.variable, *inner]} if inner else {}
             targets = [e for e in targets if e.foreign]
         return Link(name, source.port, tuple(e.port for e in targets))
 
@@ -234,17 +218,6 @@ class _Joiner:
             )  # fmt: skip
         raise UnknownName(f"{owner.label} has no signal '{name}'{did_you_mean(name, owner.fields) or '.'}")
 
-    def _export(self, document: Document, links: list[Link], work: Path) -> Unit:
-        outputs = [link.source.variable for link in links if link.source.unit == self.title]
-        file = work / f"{self.title}.fmu"
-        export_fmu(assemble(replace(document, parts=self._others()), self.path), file, "2.0", "cs",
-                   outputs=outputs, check=False)  # fmt: skip
-        return Unit(self.title, file)
-
 
 def _part(path: str) -> str:
     return path.partition(".")[0]
-
-
-def _spoken(end: _End) -> str:
-    return str(end.port) if end.foreign else end.port.variable

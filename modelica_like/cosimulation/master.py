@@ -84,6 +84,10 @@ class Balance(Energies):
         self.mismatch += abs(received - delivered)
         self.power = flow.reached * rate.reached
 
+    def told(self) -> list[float]:
+        """Return the power and the energies."""
+        return [self.power, self.delivered, self.received, self.throughput, self.mismatch]
+
 
 @dataclass
 class Counts:

@@ -18,12 +18,7 @@ from modelica_like.structure import reduce
 
 
 class Maker:
-    """Makes the netlists of the groups.
-
-    Args:
-        assembly: the whole netlist.
-        found: where it is cut.
-    """
+    """Makes the netlists of the groups into which a whole netlist is cut."""
 
     def __init__(self, assembly: Assembly, found: CutNetlist) -> None:
         self.assembly, self.found = assembly, found

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, fields
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from modelica_like.compile.compiled import Vector
+from modelica_like.cosimulation.described import described
 from modelica_like.cosimulation.system import Energies, System
 from modelica_like.solve.recorded import RecordedModel, RecordedSolution, RecordedVariable
+
+_TOLD = 5
+"""Numbers of a bond in a row: power, energies delivered and received, throughput, mismatch."""
 
 
 @dataclass
@@ -37,6 +42,12 @@ class CosimSolution(RecordedSolution):
     Each bond has two variables of its own: `….power` in W and `….residual_energy` in J. Modes have changed somewhere in
     the communication step before the time at which they are seen.
 
+    Args:
+        system: what was run.
+        left: columns and parameters of each FMU, and the inputs to which nothing is connected.
+        table: shape (times, columns): the time in s, the variables, the energies of each bond, the counts.
+        seconds: wall time.
+
     Attributes:
         couplings: energies at the bonds.
         steps: number of communication steps.
@@ -46,48 +57,57 @@ class CosimSolution(RecordedSolution):
         notices: what should be known about the run: inputs to which nothing is connected.
     """
 
-    def __init__(
-        self, model: RecordedModel, table: Vector, is_mode: list[bool], couplings: tuple[Coupling, ...],
-        counts: dict[str, Any], notices: tuple[str, ...], seconds: float,
-    ) -> None:  # fmt: skip
-        modes = np.array(is_mode, dtype=bool)
-        columns = table[:, 1:].T
-        super().__init__(model, table[:, 0].copy(), columns[~modes], columns[modes], seconds)
-        self.couplings, self.notices = couplings, notices
-        self.steps, self.rejected = int(counts["steps"]), int(counts["rejected"])
-        self.shortest, self.longest = float(counts["shortest"]), float(counts["longest"])
+    def __init__(self, system: System, left: Mapping[str, Any], table: Vector, seconds: float) -> None:
+        columns = _columns(system, [part["columns"] for part in left["units"]])
+        constants = {
+            name if system.own_names else f"{unit.name}.{name}": value
+            for unit, part in zip(system.units, left["units"], strict=True)
+            for name, value in part["constants"].items()
+        }
+        modes = np.array([column.kind == "discrete" for column in columns], dtype=bool)
+        continuous = (*(one for one in columns if one.kind != "discrete"), *_bond_columns(system))
+        model = RecordedModel(
+            system.name, continuous, tuple(one for one in columns if one.kind == "discrete"), constants
+        )
+        rows, values = table.T, table.T[1 : 1 + len(columns)]
+        bonds = rows[1 + len(columns) : -4].reshape(-1, _TOLD, len(table))
+        told = np.stack([bonds[:, 0], bonds[:, 2] - bonds[:, 1]], axis=1).reshape(-1, len(table))
+        super().__init__(model, rows[0].copy(), np.concatenate([values[~modes], told]), values[modes], seconds)
+        self.couplings = tuple(
+            Coupling(bond.name, **dict(zip(vars(Energies()), map(float, last[1:]), strict=True)))
+            for bond, last in zip(system.bonds, bonds[:, :, -1], strict=True)
+        )
+        self.notices = tuple(map(_notice, left["open"]))
+        self.shortest, self.longest = map(float, table[-1, -2:])
+        self.steps, self.rejected = map(int, table[-1, -4:-2])
 
 
-def cosim_solution(system: System, meta: dict[str, Any], table: Vector, seconds: float) -> CosimSolution:
-    """Make the solution of what a run has left.
+def described_model(system: System) -> RecordedModel:
+    """Return the names of what a run will give, as far as the FMUs say them without being run.
 
-    Args:
-        system: what was run.
-        meta: columns, energies, counts.
-        table: shape (times, 1 + columns), times in s first.
-        seconds: wall time.
+    Raises:
+        FmuRefused: a file is no FMU.
+        OSError: a file cannot be read.
     """
-    columns: list[RecordedVariable] = []
-    constants: dict[str, float] = {}
-    counts = Counter(entry["path"] for part in meta["units"] for entry in part["columns"])
-    for unit, part in zip(system.units, meta["units"], strict=True):
-        for entry in part["columns"]:
-            path = entry["path"] if system.own_names and counts[entry["path"]] == 1 else f"{unit.name}.{entry['path']}"
-            columns.append(RecordedVariable(**{**entry, "path": path, "names": dict(entry["names"])}))
-        for name, value in part["constants"].items():
-            constants[name if system.own_names else f"{unit.name}.{name}"] = value
-    for bond in system.bonds:
-        columns.append(RecordedVariable(f"{bond.name}.power", "W", "power through the coupling"))
-        columns.append(RecordedVariable(f"{bond.name}.residual_energy", "J", "energy that the coupling has made"))
-    modes = [column.kind == "discrete" for column in columns]
-    continuous = tuple(column for column, mode in zip(columns, modes, strict=True) if not mode)
-    discrete = tuple(column for column, mode in zip(columns, modes, strict=True) if mode)
-    couplings = tuple(
-        Coupling(bond.name, **{one.name: values[one.name] for one in fields(Energies)})
-        for bond, values in zip(system.bonds, meta["balances"], strict=True)
-    )
-    model = RecordedModel(system.name, continuous, discrete, constants)
-    return CosimSolution(model, table, modes, couplings, meta["counts"], tuple(map(_notice, meta["open"])), seconds)
+    fmus = [described(unit.file).variables.values() for unit in system.units]
+    columns = _columns(system, [[{"path": one.name} for one in fmu if one.varies] for fmu in fmus])
+    return RecordedModel(system.name, (*columns, *_bond_columns(system)), (), {})
+
+
+def _columns(system: System, units: Sequence[Sequence[Mapping[str, Any]]]) -> list[RecordedVariable]:
+    counts = Counter(entry["path"] for unit in units for entry in unit)
+    found: list[RecordedVariable] = []
+    for unit, entries in zip(system.units, units, strict=True):
+        for entry in entries:
+            own = system.own_names and counts[entry["path"]] == 1
+            path = entry["path"] if own else f"{unit.name}.{entry['path']}"
+            found.append(RecordedVariable(**{**entry, "path": path, "names": dict(entry.get("names", ()))}))
+    return found
+
+
+def _bond_columns(system: System) -> list[RecordedVariable]:
+    told = ("power", "W", "power through the coupling"), ("residual_energy", "J", "energy that the coupling has made")
+    return [RecordedVariable(f"{bond.name}.{name}", unit, text) for bond in system.bonds for name, unit, text in told]
 
 
 def _notice(entry: dict[str, Any]) -> str:

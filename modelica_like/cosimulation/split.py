@@ -10,7 +10,7 @@ from modelica_like.cosimulation.causality import Takes, ends_of, open_ends, orie
 from modelica_like.cosimulation.cut import Cut, CutNetlist, cut_netlist
 from modelica_like.cosimulation.files import write_system
 from modelica_like.cosimulation.parts import Maker
-from modelica_like.cosimulation.system import POWERS, Bond, Link, Port, Settings, System, Unit
+from modelica_like.cosimulation.system import Bond, Link, Port, Settings, System, Unit
 from modelica_like.errors import DuplicateName, NetlistError
 from modelica_like.fmi.export import export_fmu
 from modelica_like.initialize import initialize
@@ -18,8 +18,10 @@ from modelica_like.language import Assembly, Component
 from modelica_like.netlist import load, save
 from modelica_like.netlist.convert import as_assembly
 from modelica_like.simulation import build, seconds
+from modelica_like.writing import check_writable
 
 Report = Callable[[str], None]
+_SYSTEM = "system.toml"
 
 
 @dataclass(frozen=True)
@@ -71,8 +73,10 @@ def split(
         NetlistError: the drive cannot be cut there.
         ExportError: a part cannot be exported.
         ModelicaLikeError: something is wrong with the drive.
+        OSError: nothing can be written into the folder.
     """
-    tell = report or (lambda _: None)
+    tell, target = report or (lambda _: None), Path(folder)
+    check_writable(target / _SYSTEM)
     tell("compiling the drive")
     assembly = _assembly(drive)
     found = cut_netlist(assembly, [at] if isinstance(at, str) else at)
@@ -82,25 +86,27 @@ def split(
     tell("looking for the causality")
     chosen = orient(found, maker.bare)
     values = _start_values(assembly)
-    target = Path(folder)
     target.mkdir(parents=True, exist_ok=True)
     units: list[Unit] = []
     notes: list[str] = []
     for k, title in enumerate(titles):
         tell(f"exporting {title}")
-        ends = open_ends(found, k, chosen)
-        part = maker.started(k, ends, values)
-        part.__dict__["_name"] = title
-        save(part, target / f"{title}.toml")
-        done = export_fmu(part, target / f"{title}.fmu", version, {"cs"}, check=check)
-        notes += [f"{title}: {done.check.sentence}"] if done.check.sentence else []
-        units.append(Unit(title, target / f"{title}.fmu", maker.not_passed_on(ends)))
+        ends, file = open_ends(found, k, chosen), target / f"{title}.fmu"
+        note = _export(maker.started(k, ends, values), title, file, version, check=check)
+        notes += [f"{title}: {note}"] if note else []
+        units.append(Unit(title, file, maker.not_passed_on(ends)))
     links, bonds = _couplings(maker, chosen, titles)
     system = System(assembly._name, tuple(units), links, bonds, settings, own_names=True)
-    path = target / "system.toml"
-    write_system(system, path)
+    write_system(system, target / _SYSTEM)
     taken: dict[str, Takes] = {end.path: end.takes for cut, takes in chosen.items() for end in ends_of(cut, takes)}
-    return Split(system, path, taken, tuple(notes))
+    return Split(system, target / _SYSTEM, taken, tuple(notes))
+
+
+def _export(part: Assembly, title: str, file: Path, version: str, *, check: bool) -> str:
+    """Write a part as a netlist and as an FMU, and return what its check has told."""
+    part.__dict__["_name"] = title
+    save(part, file.with_suffix(".toml"))
+    return export_fmu(part, file, version, {"cs"}, check=check).check.sentence
 
 
 def _settings(until: float | str | None, step: float | str | None, master: str | None) -> Settings:
@@ -160,14 +166,14 @@ def _couplings(
             giver, taker = (moved, moving) if name == flow else (moving, moved)
             ends = [Port(titles[maker.found.group_of(end.path)], f"{end.adaptor}.{name}") for end in (giver, taker)]
             links.append(Link(f"{cut.name}_{name}", ends[0], (ends[1],)))
-        rate = next((rate for name, rate in POWERS if name == flow and rate in motions), None)
-        if rate is not None:
-            bonds.append(Bond(cut.name, f"{cut.name}_{flow}", f"{cut.name}_{rate}"))
+        terminal = maker.adaptor(moved)[0].terminal
+        if terminal and terminal.power:
+            bonds.append(Bond(cut.name, *(f"{cut.name}_{name}" for name in terminal.power)))
     return tuple(links), tuple(bonds)
 
 
 def _signal(found: CutNetlist, cut: Cut, titles: Sequence[str]) -> Link:
-    source, home = cut.near[0], found.group_of(cut.near[0])
+    source, home = cut.near, found.group_of(cut.near)
     ends = (source, *(end for end in cut.far if found.group_of(end) != home))
     ports = [Port(titles[found.group_of(end)], end) for end in ends]
     return Link(cut.name, ports[0], tuple(ports[1:]))

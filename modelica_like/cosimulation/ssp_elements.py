@@ -1,11 +1,12 @@
-"""The elements of a SystemStructure.ssd: systems, components and their connectors, as they stand there."""
+"""The elements of a SystemStructure.ssd as they stand there: systems, components, connectors, and their values."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from math import isfinite
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 from urllib.parse import unquote, urlsplit
 
 import lxml.etree as etree
@@ -16,14 +17,28 @@ from modelica_like.errors import DuplicateName, NetlistError, Source, UnknownNam
 from modelica_like.fmi.unpack import refuse_document_type
 
 ElementPath = tuple[str, ...]
+Target = tuple[ElementPath, str]
+"""A connector or a variable: the path of its element, and its name."""
+Units = Mapping[str, UnitDefinition]
+
+_VALUES = "application/x-ssp-parameter-set"
+_BOOLEANS = {"true": 1.0, "1": 1.0, "false": 0.0, "0": 0.0}
+_NO_NUMBERS = ("String", "Enumeration", "Binary", "Dimension")
 
 
-@dataclass(frozen=True)
-class Connector:
+class Connector(NamedTuple):
     """A connector of an element: `kind` says in which direction, `unit` is a name or empty."""
 
     kind: str
     unit: str
+
+
+class Bound(NamedTuple):
+    """A value that a binding gives, in a unit if one is named."""
+
+    value: float
+    unit: UnitDefinition | None
+    place: Source
 
 
 @dataclass
@@ -39,8 +54,8 @@ class Element:
     path: ElementPath
     xml: Any
     file: Path | None
-    connectors: dict[str, Connector] = field(default_factory=dict)
-    children: dict[str, Element] = field(default_factory=dict)
+    connectors: dict[str, Connector] = field(default_factory=dict[str, Connector])
+    children: dict[str, Element] = field(default_factory=dict[str, "Element"])
 
     @property
     def label(self) -> str:
@@ -53,16 +68,11 @@ class Element:
         for child in self.children.values():
             yield from child.walk()
 
-    def connector(self, name: str, place: Source) -> Connector:
-        """Return a connector.
-
-        Raises:
-            UnknownName: it has no such connector.
-        """
+    def check_connector(self, name: str, place: Source) -> None:
+        """Refuse a connector that it does not have."""
         if name not in self.connectors:
             hint = did_you_mean(name, self.connectors) or "."
             raise UnknownName(f"{self.label} has no connector '{name}'{hint}", where=place)
-        return self.connectors[name]
 
 
 class Files:
@@ -72,12 +82,7 @@ class Files:
         self.name, self.folder = name, folder
 
     def root(self, file: Path) -> Any:
-        """Read an XML file.
-
-        Raises:
-            NetlistError: it is no XML.
-            FmuRefused: it declares a document type.
-        """
+        """Read an XML file that declares no document type."""
         refuse_document_type(self.name, file)
         parser = etree.XMLParser(resolve_entities=False, no_network=True, remove_comments=True, remove_pis=True)
         try:
@@ -88,11 +93,7 @@ class Files:
             ) from None
 
     def find(self, uri: str, place: Source) -> Path:
-        """Return the file that a URI means.
-
-        Raises:
-            NetlistError: it is not in the archive.
-        """
+        """Return the file of the archive that a URI means."""
         parts = urlsplit(uri)
         inside = (self.folder / unquote(parts.path)).resolve()
         if parts.scheme or parts.netloc or parts.fragment or not inside.is_relative_to(self.folder.resolve()):
@@ -117,11 +118,7 @@ def local(xml: Any) -> str:
 
 
 def needed(xml: Any, attribute: str) -> str:
-    """Return an attribute.
-
-    Raises:
-        NetlistError: it is not there.
-    """
+    """Return an attribute that has to be there."""
     value = xml.get(attribute)
     if not value:
         raise NetlistError(f"An element {local(xml)} lacks its {attribute}.", where=place(xml))
@@ -129,18 +126,17 @@ def needed(xml: Any, attribute: str) -> str:
 
 
 def number(xml: Any, attribute: str, default: float | None = None) -> float:
-    """Return a number.
-
-    Raises:
-        NetlistError: it is not there, or is none.
-    """
+    """Return a finite number."""
     text = xml.get(attribute)
     if text is None and default is not None:
         return default
     try:
-        return float(needed(xml, attribute))
+        value = float(needed(xml, attribute))
     except ValueError:
         raise NetlistError(f"{local(xml)}: {attribute} = '{text}' is no number.", where=place(xml)) from None
+    if not isfinite(value):
+        raise NetlistError(f"{local(xml)}: {attribute} = '{text}' is not finite.", where=place(xml))
+    return value
 
 
 def unit_definitions(top: Any) -> dict[str, UnitDefinition]:
@@ -156,12 +152,7 @@ def unit_definitions(top: Any) -> dict[str, UnitDefinition]:
 
 
 def read_element(xml: Any, path: ElementPath, files: Files) -> Element:
-    """Read a system or a component with all that is inside.
-
-    Raises:
-        NetlistError: it is something that cannot be run.
-        DuplicateName: two elements, or two connectors of one element, have one name.
-    """
+    """Read a system or a component with all that is inside; refuse what cannot be run, and names that stand twice."""
     kind = local(xml)
     if kind == "SignalDictionaryReference":
         raise NetlistError(
@@ -169,18 +160,22 @@ def read_element(xml: Any, path: ElementPath, files: Files) -> Element:
             advice="Connect the components directly.",
         )  # fmt: skip
     element = Element(path, xml, None if kind == "System" else _fmu(xml, files))
-    for one in xml.iterfind("ssd:Connectors/ssd:Connector", NAMES):
-        name = needed(one, "name")
-        if name in element.connectors:
-            raise DuplicateName(f"{element.label} has two connectors '{name}'.", where=place(one))
+    for name, one in _named(element, "connector", "ssd:Connectors/ssd:Connector"):
         units = [child.get("unit", "") for child in one if local(child) in ("Real", "Float64", "Float32")]
         element.connectors[name] = Connector(needed(one, "kind"), units[0] if units else "")
-    for one in xml.iterfind("ssd:Elements/*", NAMES):
-        name = needed(one, "name")
-        if name in element.children:
-            raise DuplicateName(f"{element.label} has two elements '{name}'.", where=place(one))
+    for name, one in _named(element, "element", "ssd:Elements/*"):
         element.children[name] = read_element(one, (*path, name), files)
     return element
+
+
+def _named(element: Element, what: str, where: str) -> Iterator[tuple[str, Any]]:
+    known: set[str] = set()
+    for one in element.xml.iterfind(where, NAMES):
+        name = needed(one, "name")
+        if name in known:
+            raise DuplicateName(f"{element.label} has two {what}s '{name}'.", where=place(one))
+        known.add(name)
+        yield name, one
 
 
 def _fmu(xml: Any, files: Files) -> Path:
@@ -190,8 +185,62 @@ def _fmu(xml: Any, files: Files) -> Path:
             f"{name} is no FMU but of type {kind}, which is not supported.", where=place(xml),
             advice="Put the FMUs of an SSP inside into the system itself.",
         )  # fmt: skip
-    if xml.get("implementation") not in (None, "any", "CoSimulation"):
-        raise NetlistError(
-            f"{name} is to be run as {xml.get('implementation')}; systems are run by co-simulation.", where=place(xml)
-        )
+    how = xml.get("implementation", "any")
+    if how not in ("any", "CoSimulation"):
+        raise NetlistError(f"{name} is to be run as {how}; systems are run by co-simulation.", where=place(xml))
     return files.find(needed(xml, "source"), place(xml))
+
+
+# -- values ------------------------------------------------------------------------------------------------------------
+
+
+def bound_values(root: Element, files: Files, units: Units) -> dict[Target, Bound]:
+    """Return what the bindings of a system and of all inside, in it or in .ssv files, give to variables.
+
+    Of two bindings of an element, the later one counts; of two elements, the outer one.
+    """
+    found: dict[Target, Bound] = {}
+    for element in sorted(root.walk(), key=lambda one: -len(one.path)):
+        for binding in element.xml.iterfind("ssd:ParameterBindings/ssd:ParameterBinding", NAMES):
+            prefix = binding.get("prefix", "")
+            for name, bound in _parameters(binding, files, units):
+                found.update(dict.fromkeys(_targets(element, prefix + name), bound))
+    return found
+
+
+def _targets(element: Element, name: str) -> Iterator[Target]:
+    """Yield what a hierarchical name means: names of elements may contain dots, so there can be several."""
+    if element.file is not None or name in element.connectors:
+        yield element.path, name
+    for inner, child in element.children.items():
+        if name.startswith(f"{inner}."):
+            yield from _targets(child, name[len(inner) + 1 :])
+
+
+def _parameters(binding: Any, files: Files, units: Units) -> Iterator[tuple[str, Bound]]:
+    if binding.find("ssd:ParameterMapping", NAMES) is not None:
+        raise NetlistError(
+            "Mappings of parameters (ssm) are not supported.", where=place(binding),
+            advice="Give the values under the names that they have in the system.",
+        )  # fmt: skip
+    kind, source = binding.get("type", _VALUES), binding.get("source")
+    if kind != _VALUES:
+        raise NetlistError(f"Parameters of type {kind} are not supported.", where=place(binding))
+    if source and binding.get("sourceBase", "SSD") != "SSD":
+        raise NetlistError("Parameters inside of a component's file are not supported.", where=place(binding))
+    inside = binding.iterfind("ssd:ParameterValues/ssv:ParameterSet", NAMES)
+    for group in [files.root(files.find(source, place(binding)))] if source else inside:
+        known = {**units, **unit_definitions(group)}
+        for one in group.iterfind("ssv:Parameters/ssv:Parameter", NAMES):
+            yield needed(one, "name"), _value(one, known)
+
+
+def _value(parameter: Any, units: Units) -> Bound:
+    typed = next((one for one in parameter if local(one) != "Annotations"), None)
+    if typed is None or local(typed) in _NO_NUMBERS:
+        what = "has no value" if typed is None else f"is of type {local(typed)}"
+        name = needed(parameter, "name")
+        raise NetlistError(f"Parameter '{name}' {what}; only numbers can be set.", where=place(parameter))
+    if local(typed) == "Boolean" and typed.get("value") in _BOOLEANS:
+        return Bound(_BOOLEANS[typed.get("value")], None, place(parameter))
+    return Bound(number(typed, "value"), units.get(typed.get("unit", "")), place(parameter))

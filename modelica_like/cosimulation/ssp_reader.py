@@ -4,36 +4,17 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import chain, count
 from math import isfinite
 from pathlib import Path
 from typing import Any
 
+from modelica_like.cosimulation import ssp_elements as ssp
 from modelica_like.cosimulation.described import UnitDefinition, described
 from modelica_like.cosimulation.ssp_document import COSIMULATION, NAMES
-from modelica_like.cosimulation.ssp_elements import (
-    Element,
-    ElementPath,
-    Files,
-    local,
-    needed,
-    number,
-    place,
-    read_element,
-    unit_definitions,
-)
-from modelica_like.cosimulation.ssp_values import Bound, Target, bound_values
-from modelica_like.cosimulation.system import (
-    Bond,
-    Link,
-    Port,
-    Settings,
-    System,
-    Unit,
-    check_system,
-    find_bonds,
-)
+from modelica_like.cosimulation.ssp_elements import Element, ElementPath, Files, Target, needed, number, place
+from modelica_like.cosimulation.system import Bond, Link, Port, Settings, System, Unit, check_system, find_bonds
 from modelica_like.errors import DuplicateName, NetlistError, Source
 from modelica_like.fmi.unpack import SSP
 
@@ -56,16 +37,7 @@ class _Drive:
 
 
 def read_structure(name: str, folder: Path) -> System:
-    """Read the system of an unpacked SSP.
-
-    Args:
-        name: of the SSP, for messages.
-        folder: where it is unpacked.
-
-    Raises:
-        NetlistError, UnknownName, DuplicateName: something in it cannot be run, or is wrong.
-        FmuRefused: an FMU of it is unsafe to unpack.
-    """
+    """Read the system of the SSP of this name that is unpacked in a folder; see `load_ssp`."""
     files = Files(name, folder)
     top = files.root(folder / SSP.description)
     if top.tag != f"{{{NAMES['ssd']}}}SystemStructureDescription":
@@ -75,7 +47,7 @@ def read_structure(name: str, folder: Path) -> System:
     inside = top.find("ssd:System", NAMES)
     if inside is None:
         raise NetlistError(f"{name} has no system.", where=place(top))
-    return _Reader(top, read_element(inside, (), files), files).system()
+    return _Reader(top, ssp.read_element(inside, (), files), files).system()
 
 
 class _Reader:
@@ -88,10 +60,10 @@ class _Reader:
     def __init__(self, top: Any, root: Element, files: Files) -> None:
         self.top, self.root, self.files = top, root, files
         self.elements = {one.path: one for one in root.walk()}
-        self.components = [one for one in root.walk() if one.file is not None]
-        self.names = _flat_names(self.components)
-        self.fmus = {one.path: described(one.file) for one in self.components if one.file is not None}
-        self.units = unit_definitions(top)
+        self.files_of = {one.path: one.file for one in root.walk() if one.file is not None}
+        self.names = _flat_names([self.elements[path] for path in self.files_of])
+        self.fmus = {path: described(file) for path, file in self.files_of.items()}
+        self.units = ssp.unit_definitions(top)
         self.drives: dict[Target, _Drive] = {}
         for element in root.walk():
             for connection in element.xml.iterfind("ssd:Connections/ssd:Connection", NAMES):
@@ -105,11 +77,7 @@ class _Reader:
         links = self._links(between, own=note is not None)
         outer = {target: way[-1].source for target, way in targets.items() if target not in between}
         parameters = self._parameters(outer)
-        units = tuple(
-            Unit(self.names[one.path], one.file, parameters[one.path])
-            for one in self.components
-            if one.file is not None
-        )
+        units = tuple(Unit(self.names[path], file, parameters[path]) for path, file in self.files_of.items())
         bonds = find_bonds(links) if note is None else tuple(map(_bond, note.iterfind("ml:Bond", NAMES)))
         own = note is not None and note.get("ownNames") == "true"
         title = self.top.get("name") or self.root.xml.get("name") or Path(self.files.name).stem
@@ -121,9 +89,9 @@ class _Reader:
 
     def _connect(self, system: Element, xml: Any) -> None:
         for one in xml:
-            if local(one).endswith("Transformation") and not _is_identity(one):
+            if ssp.local(one).endswith("Transformation") and not _is_identity(one):
                 raise NetlistError(
-                    f"A connection with a {local(one)} is not supported.", where=place(xml),
+                    f"A connection with a {ssp.local(one)} is not supported.", where=place(xml),
                     advice="Let one of both FMUs do the conversion.",
                 )  # fmt: skip
         ends = [self._end(system, xml, which) for which in ("start", "end")]
@@ -148,7 +116,7 @@ class _Reader:
         if name and name not in system.children:
             raise NetlistError(f"{system.label} has no element '{name}'.", where=place(xml))
         element = system.children[name] if name else system
-        element.connector(connector, place(xml))
+        element.check_connector(connector, place(xml))
         return element.path, connector
 
     def _gives(self, system: Element, end: Target) -> bool | None:
@@ -197,42 +165,40 @@ class _Reader:
     def _units_of(self, end: Target) -> list[UnitDefinition]:
         path, name = end
         own = self.fmus[path].unit_of(name) if path in self.fmus else None
-        said = self.units.get(self.elements[path].connectors[name].unit)
-        return [unit for unit in (own, said) if unit is not None]
+        return [unit for unit in (own, self._unit_of(end)) if unit is not None]
 
     # -- values ------------------------------------------------------------------------------------------------------
 
     def _parameters(self, outer: Mapping[Target, Target]) -> dict[ElementPath, dict[str, float]]:
         """Return the values of each component: those bound to it, and those bound to what drives it from outside."""
-        bound = bound_values(self.root, self.files, self.units)
+        bound = ssp.bound_values(self.root, self.files, self.units)
         found: dict[ElementPath, dict[str, float]] = {path: {} for path in self.fmus}
-        sources = {target: source for target, source in outer.items() if source in bound}
-        passed = {target: self._in_its_unit(bound[source], source) for target, source in sources.items()}
-        for (path, name), given in (bound | passed).items():
-            fmu = self.fmus.get(path)
-            if fmu is None or name not in fmu.variables:  # the standard lets values go that nothing takes
-                continue
-            own = fmu.unit_of(name)
-            value = given.unit.convert(given.value, own) if given.unit and own else given.value
+        for target in {**bound, **outer}:
+            source = outer[target] if outer.get(target) in bound else target
+            (path, name), fmu = target, self.fmus.get(target[0])
+            if source not in bound or fmu is None or name not in fmu.variables:
+                continue  # the standard lets values go that nothing takes
+            given, own = bound[source], fmu.unit_of(name)
+            # A value that was given for a connector of a system is in the connector's unit if it has none.
+            unit = given.unit if source == target else given.unit or self._unit_of(source)
+            value = unit.convert(given.value, own) if unit and own else given.value
             if not isfinite(value):
-                raise NetlistError(f"{_text((path, name))} = {value:g} is not finite.", where=given.place)
+                raise NetlistError(f"{_text(target)} = {value:g} is not finite.", where=given.place)
             found[path][name] = value
         return found
 
-    def _in_its_unit(self, given: Bound, end: Target) -> Bound:
-        """Return a value that was given for a connector of a system, in the connector's unit if it has none."""
-        return replace(given, unit=given.unit or self.units.get(self.elements[end[0]].connectors[end[1]].unit))
+    def _unit_of(self, end: Target) -> UnitDefinition | None:
+        """Return the unit that a connector says it has."""
+        return self.units.get(self.elements[end[0]].connectors[end[1]].unit)
 
     def _settings(self, note: Any) -> Settings:
         experiment = self.top.find("ssd:DefaultExperiment", NAMES)
-        until = None
-        if experiment is not None:
-            if number(experiment, "startTime", 0.0) != 0.0:
-                raise NetlistError(
-                    f"{self.files.name} starts at t = {experiment.get('startTime')} s; co-simulations start at 0 s.",
-                    where=place(experiment),
-                )
-            until = number(experiment, "stopTime") if experiment.get("stopTime") else None
+        until = None if experiment is None or not experiment.get("stopTime") else number(experiment, "stopTime")
+        if experiment is not None and number(experiment, "startTime", 0.0) != 0.0:
+            raise NetlistError(
+                f"{self.files.name} starts at t = {experiment.get('startTime')} s; co-simulations start at 0 s.",
+                where=place(experiment),
+            )
         if note is None:
             return Settings(until=until)
         step, tolerance = (number(note, name) if note.get(name) else None for name in ("step", "tolerance"))
@@ -240,7 +206,7 @@ class _Reader:
 
 
 def _is_identity(transformation: Any) -> bool:
-    linear = local(transformation) == "LinearTransformation"
+    linear = ssp.local(transformation) == "LinearTransformation"
     return linear and number(transformation, "factor", 1.0) == 1.0 and number(transformation, "offset", 0.0) == 0.0
 
 

@@ -5,19 +5,23 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal, get_args
+from typing import Literal, NamedTuple, get_args
 
 from modelica_like.errors import ModelicaLikeError, NetlistError, UnknownName, did_you_mean, raise_together_or_one
 
 Master = Literal["jacobi", "gauss-seidel"]
 Inputs = Literal["hold", "linear"]
 
-POWERS = (("tau", "w"), ("f", "v"), ("i", "v"))
-"""Last names of a flow and of the rate or potential that make a power together."""
+
+def powers() -> tuple[tuple[str, str], ...]:
+    """Return names of a flow and of the rate or potential that make a power together, as adaptors declare them."""
+    from modelica_like.netlist.registry import library_types  # the process of the FMUs needs no library
+
+    terminals = (kind.terminal for kind in library_types().values())
+    return tuple(dict.fromkeys(one.power for one in terminals if one and one.power))
 
 
-@dataclass(frozen=True)
-class Port:
+class Port(NamedTuple):
     """A variable of an FMU in a system."""
 
     unit: str
@@ -42,8 +46,7 @@ class Unit:
     parameters: Mapping[str, float] = field(default_factory=dict)
 
 
-@dataclass(frozen=True)
-class Link:
+class Link(NamedTuple):
     """An output and the inputs that take its value at every communication point."""
 
     name: str
@@ -54,8 +57,7 @@ class Link:
         return f"{self.source} → {', '.join(map(str, self.targets))}"
 
 
-@dataclass(frozen=True)
-class Bond:
+class Bond(NamedTuple):
     """A shaft, slide or wire between two FMUs, through which power flows.
 
     Attributes:
@@ -158,17 +160,14 @@ def check_system(system: System) -> None:
     if not system.units:
         errors.append(NetlistError(f"{system.name} has no FMU.", advice="Declare them in [fmus]."))
     known = [unit.name for unit in system.units]
-    ports = [port for link in system.links for port in (link.source, *link.targets)]
-    for port in ports:
+    for port in (port for link in system.links for port in (link.source, *link.targets)):
         if port.unit not in known:
             errors.append(UnknownName(f"{system.name} has no FMU '{port.unit}'{did_you_mean(port.unit, known) or '.'}"))
     driven: dict[Port, str] = {}
-    for link in system.links:
-        for target in link.targets:
-            if target in driven:
-                both = f"{driven[target]} and {link.name}"
-                errors.append(NetlistError(f"{system.name}: {target} is driven twice, by {both}."))
-            driven[target] = link.name
+    for name, target in ((link.name, target) for link in system.links for target in link.targets):
+        if target in driven:
+            errors.append(NetlistError(f"{system.name}: {target} is driven twice, by {driven[target]} and {name}."))
+        driven[target] = name
     names = [link.name for link in system.links]
     for bond in system.bonds:
         for name in {bond.flow, bond.rate} - set(names):
@@ -180,10 +179,11 @@ def check_system(system: System) -> None:
 
 def find_bonds(links: Iterable[Link]) -> tuple[Bond, ...]:
     """Return the bonds that follow from names: `a.x.tau` to `b.y.tau`, and `b.y.w` back to `a.x.w`."""
+    known = powers()
     by_ends = {(link.source, target): link for link in links for target in link.targets}
     bonds: list[Bond] = []
     for (source, target), link in by_ends.items():
-        for flow, rate in POWERS:
+        for flow, rate in known:
             stem, _, last = source.variable.rpartition(".")
             other, _, its_last = target.variable.rpartition(".")
             if last != flow or its_last != flow:

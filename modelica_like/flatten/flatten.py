@@ -25,7 +25,7 @@ from modelica_like.language.component import Component
 from modelica_like.language.declared import Declared
 from modelica_like.language.expr import TIME, flagged_motion
 from modelica_like.language.fields import Discrete, Input, Output, Parameter, Variable
-from modelica_like.units import ONE
+from modelica_like.units import ONE, coherent
 
 _WIRE = Source("")
 
@@ -65,8 +65,9 @@ class _Flattener:
 
     def run(self) -> FlatModel:
         templates = self._elaborate()
+        used = {self._owner(component, name) for component, template in templates for name in template.discretes}
         for component, _ in templates:
-            self._declare(component)
+            self._declare(component, used)
         self.nodes = [(k, 0) for k in range(len(self.variables))]
         instances = [self._instance(component, template) for component, template in templates]
         self._connect()
@@ -108,7 +109,7 @@ class _Flattener:
 
     # -- declarations ------------------------------------------------------------------------------------------------
 
-    def _declare(self, component: Component) -> None:
+    def _declare(self, component: Component, used: set[tuple[int, str]]) -> None:
         path = component.path
         prefix = f"{path}." if path else ""
         for name, field in component.fields.items():
@@ -119,7 +120,8 @@ class _Flattener:
                 self._declare_discrete(component, name, prefix + name, field)
             elif isinstance(field, Parameter):
                 self.parameters.declare(component, name, prefix + name)
-        for name, mode in component.modes.items():
+        # What nothing asks for and nothing changes, as where a table has one row only, is no part of the model.
+        for name, mode in ((n, m) for n, m in component.modes.items() if (id(component), n) in used):
             self.discrete_of[id(component), name] = len(self.discretes)
             start = mode.number(component.start_mode(name))
             self.discretes.append(FlatDiscrete(prefix + name, ONE, mode.description, start, mode.names))
@@ -132,7 +134,7 @@ class _Flattener:
 
     def _declare_variable(self, owner: Declared, name: str, path: str, kind: str, field: Variable) -> None:
         self.variable_of[id(owner), name] = len(self.variables)
-        unit = self.wiring.inferred.get((id(owner), name)) or unit_of_field(owner, name)
+        unit = coherent(self.wiring.inferred.get((id(owner), name)) or unit_of_field(owner, name))
         self.variables.append(
             FlatVariable(
                 path, unit, field.description, kind, field.state, field.guess, field.nominal, field.min, field.max
@@ -145,7 +147,7 @@ class _Flattener:
         with component.at_its_place(name):
             start = 0.0 if value is None else self.parameters.evaluate(value, scope or component, path)
         self.discrete_of[id(component), name] = len(self.discretes)
-        self.discretes.append(FlatDiscrete(path, field.unit, field.description, start))
+        self.discretes.append(FlatDiscrete(path, coherent(field.unit), field.description, start))
 
     # -- instances ---------------------------------------------------------------------------------------------------
 
@@ -228,13 +230,8 @@ class _Flattener:
                 value = self.parameters.q(self.parameters.declare(component, name, path))
                 self.linear.append(LinearEquation(((node, 1.0),), -value, Origin(path, "value", _WIRE)))
             else:
-                self.errors.append(
-                    MissingValue(
-                        f"{path} is an input without a value.",
-                        where=component.place_of(),
-                        advice="Connect it or give it a value.",
-                    )
-                )
+                what, advice = f"{path} is an input without a value.", "Connect it or give it a value."
+                self.errors.append(MissingValue(what, where=component.place_of(), advice=advice))
 
     def _relate_inputs(self, component: Component) -> None:
         """Say which open inputs of an adaptor are derivatives of each other."""

@@ -62,7 +62,10 @@ SECTIONS: dict[str, Any] = {
     **dict.fromkeys(("state_names", "implicit_names", "singular_names"), _INTEGER),
     "variables": [("reference", "<u4"), *_record("type kind index start tunable name count")],
     "rising": _record("below above below_name above_name"),
-    "transitions": [*_record("mode target timed index first_reset n_resets name notice"), ("sources", "<u8")],
+    "transitions": [
+        *_record("mode target"), ("timed", "<i2"), ("fails", "<i2"),
+        *_record("index first_reset n_resets name notice"), ("sources", "<u8"),
+    ],
     "guard_transition": _INTEGER,
     "resets": _record("kind index value target", "factor"),
     "reset_nodes": _INTEGER,
@@ -194,7 +197,7 @@ def _events(model: CompiledDae, text: _Text) -> dict[str, Any]:
         path = model.flat_discretes[one.mode].path
         changes = (len(resets), len(one.resets), text(path), text(_notice(path, one.notice)))
         sources = sum(1 << source for source in one.sources)
-        transitions.append((one.mode, one.target, int(one.timed), one.index, *changes, sources))
+        transitions.append((one.mode, one.target, int(one.timed), int(one.fails), one.index, *changes, sources))
         resets += [(_RESETS.index(r.kind), r.index, r.value, r.target, r.factor) for r in one.resets]
     guards = {one.index: k for k, one in enumerate(model.transitions) if not one.timed}
     names = [text(name) for one in model.flat_discretes for name in one.names]

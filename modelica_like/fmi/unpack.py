@@ -9,9 +9,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
+import lxml.etree as etree
+
 from modelica_like.errors import FmuRefused
 
 _ENCRYPTED = 0x1
+_LONGEST, _LONGEST_PART = 500, 255
+"""Characters of a path inside, bytes of a name: what lies 1,500 folders deep can be neither made nor removed."""
 
 
 @dataclass(frozen=True)
@@ -70,6 +74,8 @@ def unpack(path: Path, target: Path, limits: Limits = LIMITS, kind: Kind = FMU) 
         raise FmuRefused(
             f"{path.name} is no {kind.name}: it is not a sound zip archive.", why=_sentence(error)
         ) from None
+    except (IsADirectoryError, NotADirectoryError, FileExistsError):
+        raise FmuRefused(f"{path.name} is refused: a file in it has the name of a folder.") from None
     refuse_document_type(path.name, target / kind.description)
     return target
 
@@ -80,7 +86,13 @@ def refuse_document_type(name: str, file: Path) -> None:
     Raises:
         FmuRefused: it does.
     """
-    if b"<!DOCTYPE" in file.read_bytes():
+    # In UTF-16 or UTF-7 no search for bytes would find it.
+    parser, content = etree.XMLParser(resolve_entities=False, no_network=True), file.read_bytes()
+    try:
+        declared = etree.fromstring(content, parser).getroottree().docinfo.internalDTD is not None
+    except etree.XMLSyntaxError:  # who reads it will tell
+        declared = b"<!DOCTYPE" in content
+    if declared:
         raise FmuRefused(
             f"{name} is refused: its {file.name} declares a document type.",
             why="A model description needs none; it can make a small file enormous, or read other files.",
@@ -117,6 +129,8 @@ def _objection(member: zipfile.ZipInfo, seen: set[str]) -> str:
         return "is an absolute path"
     if ".." in PurePosixPath(inside.replace("\\", "/")).parts:
         return "leads out of the archive"
+    if len(inside) > _LONGEST or any(len(part.encode(errors="replace")) > _LONGEST_PART for part in inside.split("/")):
+        return "has a longer name than file systems take"
     if "\\" in inside:
         return "has a backslash where the standard asks for a slash"
     if kind == stat.S_IFLNK:

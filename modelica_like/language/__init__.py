@@ -4,6 +4,7 @@ from modelica_like.errors import LanguageError as LanguageError
 from modelica_like.language.assembly import Assembly as Assembly
 from modelica_like.language.component import Component as Component
 from modelica_like.language.declared import Connector as Connector
+from modelica_like.language.declared import Domain as Domain
 from modelica_like.language.equation import Equations as Equations
 from modelica_like.language.equation import connect as connect
 from modelica_like.language.equation import free as free
@@ -46,6 +47,8 @@ from modelica_like.language.functions import tanh as tanh
 from modelica_like.language.functions import where as where
 from modelica_like.language.hold import UNLIMITED as UNLIMITED
 from modelica_like.language.hold import Hold as Hold
+from modelica_like.language.icon import Icon as Icon
+from modelica_like.language.icon import Stroke as Stroke
 from modelica_like.language.mode import BoundMode as BoundMode
 from modelica_like.language.mode import Mode as Mode
 from modelica_like.language.tables import column as column

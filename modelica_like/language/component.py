@@ -7,10 +7,11 @@ from contextlib import contextmanager
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar, cast, dataclass_transform
 
-from modelica_like.errors import DuplicateName, LanguageError, ModelicaLikeError, NetlistError, Source
+from modelica_like.errors import DuplicateName, LanguageError, ModelicaLikeError, NetlistError, Source, did_you_mean
 from modelica_like.language.declared import Connector, Declared, unknown
 from modelica_like.language.expr import TIME, Expr
 from modelica_like.language.fields import Discrete, Field, Input, Output, Parameter, Value, param, require_identifier
+from modelica_like.language.icon import Icon
 from modelica_like.language.mode import Mode
 from modelica_like.language.places import NOWHERE, caller
 from modelica_like.language.tables import REQUIRED, Rows, both_given, frozen_rows, rows
@@ -32,6 +33,7 @@ class Component(Declared):
     inlet: ClassVar[str] = ""
     outlet: ClassVar[str] = ""
     terminal: ClassVar[Terminal | None] = None
+    icon: ClassVar[Icon | None] = None
     _partial: ClassVar[bool] = True
     _class_connectors: ClassVar[dict[str, Connector]] = {}
     _class_parts: ClassVar[dict[str, Component | list[Component]]] = {}
@@ -87,6 +89,8 @@ class Component(Declared):
         for name, part in self._class_parts.items():
             setattr(self, name, values.pop(name) if name in values and name in self._replaceable else part)
         for name, default in self._structural.items():
+            if name in values and name not in self._tables:
+                self.check_structural(name, values[name])
             self._set_structural(name, values.pop(name, default))
         for name, value in values.items():
             self.give(name, value)
@@ -192,10 +196,13 @@ class Component(Declared):
         if type(value) is int and abs(value) > _MOST:
             # It may be a number of parts, which would be made.
             raise NetlistError(f"{cls.__name__}.{name} is larger than {_MOST}; no drive has as many parts.")
+        hint = next(str(_annotated(base)[name]) for base in cls.__mro__ if name in _annotated(base))
+        if hint.startswith("Literal[") and value not in (choices := hint[9:-2].split("', '")):
+            hints = did_you_mean(str(value), choices) or "."
+            raise NetlistError(f"{cls.__name__}.{name} = {value!r} must be {' or '.join(choices)}{hints}")
         wanted = cast("type[object]", type(cls._structural[name]))
         if cls._structural[name] is REQUIRED:
-            hint = next(_annotated(base)[name] for base in cls.__mro__ if name in _annotated(base))
-            wanted = next((kind for kind in _PLAIN if hint in (kind, kind.__name__)), object)
+            wanted = next((kind for kind in _PLAIN if hint == kind.__name__), object)
         if wanted not in _PLAIN or (isinstance(value, wanted) and isinstance(value, bool) == (wanted is bool)):
             return
         if not (wanted is float and isinstance(value, int) and not isinstance(value, bool)):
@@ -288,8 +295,10 @@ class Component(Declared):
         return NOWHERE
 
     def place_of(self, name: str = "") -> Source:
-        """Return where this part of a netlist stands, or one of the netlist's own parameters."""
-        own = self.source_of(f"parameters.{name}")
+        """Return where this part of a netlist stands, one of the netlist's own parameters, or a value given later."""
+        root, path = self.root, f"{self.path}.{name}".lstrip(".")
+        own = root.source_of(f"set.{path}") if isinstance(root, Component) else NOWHERE
+        own = own if own.file else self.source_of(f"parameters.{name}")
         if own.file or not isinstance(self._owner, Component):
             return own
         # All elements of an array stand in one line.

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, cast
 
 import casadi as ca
@@ -45,7 +46,7 @@ def prescribed(motion: Expr) -> Expr:
         motion: a speed of the component, whose derivative stands in the same equation.
 
     Raises:
-        LanguageError: it is no variable.
+        LanguageError: it is not a variable.
     """
     if not isinstance(motion, Symbol) or motion is TIME or motion.order:
         raise LanguageError(f"prescribed({motion}): only a variable can be prescribed.")
@@ -57,59 +58,33 @@ def _rate(symbol: Symbol) -> Expr | float:
     return 0.0 if constant else symbol.derivative()
 
 
-def sin(x: Scalar) -> Expr:
-    """Sine of an angle in rad."""
-    return ca.sin(_sx(x))
+def _elementary(function: Callable[[Any], Any], doc: str) -> Callable[[Scalar], Expr]:
+    """Return a function of an expression or a number."""
+
+    def of(x: Scalar) -> Expr:
+        return function(_sx(x))
+
+    of.__name__, of.__doc__ = function.__name__, doc
+    return of
 
 
-def cos(x: Scalar) -> Expr:
-    """Cosine of an angle in rad."""
-    return ca.cos(_sx(x))
-
-
-def tan(x: Scalar) -> Expr:
-    """Tangent of an angle in rad."""
-    return ca.tan(_sx(x))
+sin = _elementary(ca.sin, "Sine of an angle in rad.")
+cos = _elementary(ca.cos, "Cosine of an angle in rad.")
+tan = _elementary(ca.tan, "Tangent of an angle in rad.")
+exp = _elementary(ca.exp, "Exponential function.")
+log = _elementary(ca.log, "Natural logarithm.")
+sqrt = _elementary(ca.sqrt, "Square root.")
+tanh = _elementary(ca.tanh, "Hyperbolic tangent.")
+absolute = _elementary(ca.fabs, "Absolute value.")
+sign = _elementary(ca.sign, "Sign: -1, 0 or 1.")
+floor = _elementary(
+    ca.floor, "Return the largest whole number that is not above a value, without an event: for what changes at events."
+)
 
 
 def atan2(y: Scalar, x: Scalar) -> Expr:
     """Angle in rad of the point (x, y)."""
     return ca.atan2(_sx(y), _sx(x))
-
-
-def exp(x: Scalar) -> Expr:
-    """Exponential function."""
-    return ca.exp(_sx(x))
-
-
-def log(x: Scalar) -> Expr:
-    """Natural logarithm."""
-    return ca.log(_sx(x))
-
-
-def sqrt(x: Scalar) -> Expr:
-    """Square root."""
-    return ca.sqrt(_sx(x))
-
-
-def tanh(x: Scalar) -> Expr:
-    """Hyperbolic tangent."""
-    return ca.tanh(_sx(x))
-
-
-def absolute(x: Scalar) -> Expr:
-    """Absolute value."""
-    return ca.fabs(_sx(x))
-
-
-def sign(x: Scalar) -> Expr:
-    """Sign: -1, 0 or 1."""
-    return ca.sign(_sx(x))
-
-
-def floor(x: Scalar) -> Expr:
-    """Return the largest whole number that is not above a value, without an event: for what changes at events."""
-    return ca.floor(_sx(x))
 
 
 def minimum(x: Scalar, y: Scalar) -> Expr:
@@ -123,24 +98,24 @@ def maximum(x: Scalar, y: Scalar) -> Expr:
 
 
 def where(condition: Expr | bool, then: Scalar, otherwise: Scalar) -> Expr:
-    """Choose by a condition, without an event; the branch not taken may be undefined."""
+    """Choose by a condition, without an event; the branch not taken may be undefined.
+
+    Args:
+        condition: a relation, or several joined with `all_of` and the like.
+        then: value where it holds.
+        otherwise: value where it does not.
+    """
     return ca.if_else(condition, _sx(then), _sx(otherwise))
 
 
 def all_of(*conditions: Expr) -> Expr:
     """All conditions hold."""
-    result: Any = conditions[0]
-    for condition in conditions[1:]:
-        result = ca.logic_and(result, condition)
-    return result
+    return functools.reduce(ca.logic_and, conditions)
 
 
 def any_of(*conditions: Expr) -> Expr:
     """At least one condition holds."""
-    result: Any = conditions[0]
-    for condition in conditions[1:]:
-        result = ca.logic_or(result, condition)
-    return result
+    return functools.reduce(ca.logic_or, conditions)
 
 
 def negate(condition: Expr) -> Expr:
@@ -148,7 +123,13 @@ def negate(condition: Expr) -> Expr:
     return ca.logic_not(condition)
 
 
-def interpolate(x: Scalar, xs: Sequence[float], ys: Sequence[float], smooth: bool = False) -> Expr:
+BEYOND = ("hold", "linear", "error")
+"""What may be beyond the ends of a table."""
+
+
+def interpolate(
+    x: Scalar, xs: Sequence[float], ys: Sequence[float], smooth: bool = False, extrapolate: str = "linear"
+) -> Expr:
     """Interpolate in a table.
 
     Args:
@@ -157,13 +138,15 @@ def interpolate(x: Scalar, xs: Sequence[float], ys: Sequence[float], smooth: boo
         ys: values at the abscissae.
         smooth: False: piecewise linear. True: continuous slope (cubic Hermite with Fritsch-Carlson slopes, no
             overshoot).
-
-    Beyond the ends the last slope goes on.
+        extrapolate: beyond the ends `hold`: the last value; `linear`: the last slope goes on; `error`: the last value,
+            too: that a run must end there, an event of the component says.
 
     Raises:
-        LanguageError: lengths differ, or `xs` does not increase.
+        LanguageError: lengths differ, `xs` does not increase, or `extrapolate` is none of the three.
     """
     known = not any(is_expression(x) for x in xs)
+    if extrapolate not in BEYOND:
+        raise LanguageError(f"A table has extrapolate = '{extrapolate}', which is not {', '.join(BEYOND)}.")
     if len(xs) != len(ys) or not xs or (known and any(b <= a for a, b in itertools.pairwise(xs))):
         raise LanguageError(
             f"A table has the abscissae {list(xs)} and the values {list(ys)}.",
@@ -171,13 +154,13 @@ def interpolate(x: Scalar, xs: Sequence[float], ys: Sequence[float], smooth: boo
         )
     if len(xs) == 1:
         return _sx(ys[0])
-    slopes = _monotone_slopes(xs, ys) if smooth else None
-    x = _sx(x)
+    slopes = _monotone_slopes(xs, ys) if smooth and len(xs) > 2 else None
+    x = _sx(x) if extrapolate == "linear" else ca.fmin(ca.fmax(_sx(x), xs[0]), xs[-1])
     pieces = [_piece(x, xs, ys, slopes, k) for k in range(len(xs) - 1)]
     result: Any = pieces[0]
     for start, piece in zip(xs[1:-1], pieces[1:], strict=True):
         result = ca.if_else(x < start, result, piece)
-    if slopes is not None:
+    if slopes is not None and extrapolate == "linear":
         result = ca.if_else(x < xs[0], ys[0] + slopes[0] * (x - xs[0]), result)
         result = ca.if_else(x > xs[-1], ys[-1] + slopes[-1] * (x - xs[-1]), result)
     return result

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, cast
 
-from modelica_like.errors import ModelicaLikeError, NetlistError
+from modelica_like.errors import ModelicaLikeError, NetlistError, ValueOutOfRange
 from modelica_like.language.expr import Expr
 from modelica_like.language.fields import Field
 from modelica_like.language.places import caller
@@ -27,6 +28,8 @@ class Column:
     scale: str
     rising: bool
     text: bool
+    min: float
+    max: float
 
     def unit_in(self, fields: Mapping[str, Field]) -> Unit:
         """Return the unit of the numbers: that of the parameter that says what counts as 1, or its own."""
@@ -67,7 +70,7 @@ class Rows:
             The table, in SI units, and the parameters that say what counts as 1 in columns with quantities.
 
         Raises:
-            NetlistError: it has not the shape of the table, or a column does not rise.
+            NetlistError: it does not have the shape of the table, or a column does not rise.
             UnitError, ValueOutOfRange: a cell has another dimension or is not finite.
         """
         wanted = [one.described(fields) for one in self.columns]
@@ -131,7 +134,11 @@ def _cell(label: str, column: Column, fields: Mapping[str, Field], given: Any) -
         plain = "a text" if column.text else "a number"
         kind = plain if column.text or str(unit) in "1*" else f"{plain} or a quantity in {unit}"
         raise NetlistError(f"{label}: {_short(given)} must be {kind}.")
-    return to_si(given, unit, label)
+    value = to_si(given, unit, label)
+    if not column.min <= value <= column.max:
+        limit = f"below {column.min:g}" if value < column.min else f"above {column.max:g}"
+        raise ValueOutOfRange(f"{label}: {_short(given)} is {limit}.")
+    return value
 
 
 def _short(given: Any) -> str:
@@ -158,7 +165,10 @@ def both_given(label: str, scale: str) -> ModelicaLikeError:
     )
 
 
-def column(what: str, unit: str = "1", *, scale: str = "", rising: bool = False, text: bool = False) -> Column:
+def column(
+    what: str, unit: str = "1", *, scale: str = "", rising: bool = False, text: bool = False,
+    min: float = -math.inf, max: float = math.inf,
+) -> Column:  # fmt: skip
     """Declare a column of a table.
 
     Args:
@@ -167,8 +177,10 @@ def column(what: str, unit: str = "1", *, scale: str = "", rising: bool = False,
         scale: parameter that says what counts as 1 in numbers, with its unit; quantities need none.
         rising: every value is above the one before.
         text: it holds texts, not numbers.
+        min: smallest permitted value, in units of the scale or in SI units.
+        max: largest permitted value.
     """
-    return Column(what, unit, scale, rising, text)
+    return Column(what, unit, scale, rising, text, min, max)
 
 
 def rows(*columns: Column, default: Any = REQUIRED, flat: bool = False, more: bool = False) -> Any:
@@ -177,7 +189,7 @@ def rows(*columns: Column, default: Any = REQUIRED, flat: bool = False, more: bo
     Args:
         columns: what stands in a row.
         default: rows; without it they must be given.
-        flat: the rows are no lists, but single values.
+        flat: the rows are single values instead of lists.
         more: there may be more columns like the last.
     """
     return Rows(columns, default, flat, more)

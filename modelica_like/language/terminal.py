@@ -15,8 +15,10 @@ class Terminal:
         takes: what comes from outside: the `flow` (torque, force, current, heat flow) or the `potential` (angle,
             position, voltage, temperature).
         rates: pairs of an input and the input that is its time derivative.
+        power: the flow and the signal whose product is the power through it, such as torque and speed.
     """
 
     kind: str
     takes: Literal["flow", "potential"]
     rates: tuple[tuple[str, str], ...] = ()
+    power: tuple[str, str] | None = None

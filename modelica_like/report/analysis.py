@@ -10,16 +10,16 @@ from rich.console import Group, RenderableType
 from rich.markup import escape
 from rich.table import Table
 
-from modelica_like.analyse.sensitivity.report import SHOWN, left_out, relative_text, unit_text
+from modelica_like.analyse.sensitivity.result import COLUMNS, SHOWN
 from modelica_like.report.types import table
 
 if TYPE_CHECKING:
     import xarray
 
-    from modelica_like.analyse.linear.modes import Mode, Modes
+    from modelica_like.analyse.linear.model import Mode, Modes
     from modelica_like.analyse.operating.curves import Curves
     from modelica_like.analyse.operating.steady import OperatingPoint
-    from modelica_like.analyse.sensitivity.derivatives import Sensitivities
+    from modelica_like.analyse.sensitivity.result import Sensitivities
 
 _FAILURES_TOLD = 3
 _SMALL = 1e-9
@@ -69,7 +69,7 @@ def modes_report(modes: Modes) -> RenderableType:
     made = table(
         "modes", ">", "eigenvalue in rad/s>", "frequency in Hz>", "damping>", "time constant in s>", "energy in",
         "lost in",
-        rows=[(str(k), *_numbers(mode), _shares(mode.stored), _shares(mode.lost)) for k, mode in enumerate(modes, 1)],
+        rows=[(str(k), *_numbers(mode), shares(mode.stored), shares(mode.lost)) for k, mode in enumerate(modes, 1)],
     )  # fmt: skip
     parts: list[RenderableType] = [head, "", made]
     if linear.held:
@@ -85,8 +85,9 @@ def _numbers(mode: Mode) -> tuple[str, str, str, str]:
     return f"{value.real:.5g}", "", "", f"{mode.time_constant:.3g}" if value else ""
 
 
-def _shares(shares: dict[str, float]) -> str:
-    shown = [(path, share) for path, share in shares.items() if abs(share) >= _LEAST_SHARE][:_SHARES_SHOWN]
+def shares(found: dict[str, float]) -> str:
+    """Return the largest shares of components as text."""
+    shown = [(path, share) for path, share in found.items() if abs(share) >= _LEAST_SHARE][:_SHARES_SHOWN]
     return ", ".join(f"{path} {100 * share:.0f} %" for path, share in shown)
 
 
@@ -94,17 +95,12 @@ def sensitivity_report(result: Sensitivities) -> RenderableType:
     """Return one ranking table per output, the most important parameters first."""
     parts: list[RenderableType] = []
     for output in result.outputs:
-        title = f"{output.name} = {output.value:.9g} {unit_text(output.unit)}".rstrip()
-        rows = [
-            (one.name, f"{one.value:.6g}", unit_text(one.unit), f"{derivative:.6g}", relative_text(relative))
-            for one, derivative, relative in result.ranking(output.name)
-        ]
-        columns = "parameter", "value>", "unit", "derivative>", "relative>"
-        parts += [table(title, *columns, rows=rows, most=SHOWN), ""]
+        title, rows = result.table(output.name)
+        parts += [table(title, *COLUMNS, rows=rows, most=SHOWN), ""]
     parts += [
         f"{escape(name)}: {rows.shape[0]} times, see Sensitivities.series" for name, rows in result.series.items()
     ]
-    parts += [escape(sentence) for sentence in left_out(result)]
+    parts += [escape(sentence) for sentence in result.notes()]
     parts.append(f"[dim]derivatives in SI units; relative: percent per percent; {result.method} method[/]")
     return Group(*parts)
 

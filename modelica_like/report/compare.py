@@ -11,11 +11,11 @@ from rich.table import Table
 from modelica_like.report.sources import trajectories
 from modelica_like.report.types import table
 from modelica_like.solve.curves import Curves, compare_solutions
-from modelica_like.solve.solution import Solution
+from modelica_like.solve.trajectories import Trajectories
 
 _SHOWN = 20
 
-Source = str | Path | Solution
+Source = str | Path | Trajectories
 
 
 class Comparison(Curves):
@@ -54,7 +54,7 @@ def compare(
 
 
 def _label(source: Source) -> str:
-    return source.model.name if isinstance(source, Solution) else Path(source).name
+    return source.model.name if isinstance(source, Trajectories) else Path(source).name
 
 
 def comparison_report(comparison: Comparison) -> RenderableType:

@@ -13,7 +13,7 @@ import numpy as np
 
 from modelica_like.errors import NetlistError, missing_extra
 from modelica_like.solve.plot import unit_of
-from modelica_like.solve.solution import Solution
+from modelica_like.solve.trajectories import Trajectories
 from modelica_like.writing import check_writable, replacing
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ def check_table(path: Path) -> None:
     check_writable(path)
 
 
-def write_solution(solution: Solution, path: Path, *, units: bool = False) -> None:
+def write_solution(solution: Trajectories, path: Path, *, units: bool = False) -> None:
     """Write all trajectories as a table; its ending chooses the format.
 
     A repeated time is an event's left and right value.
@@ -93,7 +93,7 @@ def _write(
                     rows(file)
 
 
-def _rows(solution: Solution, file: TextIO, *, units: bool) -> None:
+def _rows(solution: Trajectories, file: TextIO, *, units: bool) -> None:
     columns = [solution.time, *solution.together(*solution.names).values()]
     writer = csv.writer(file)
     writer.writerow(["time", *solution.names])

@@ -7,20 +7,20 @@ from pathlib import Path
 
 import numpy as np
 
-from modelica_like.cosimulation.load import describes_system
+from modelica_like.cosimulation.files import describes_system
 from modelica_like.cosimulation.run import cosim
 from modelica_like.errors import NetlistError
 from modelica_like.fmi.run import run_fmu
 from modelica_like.simulation import build, simulate
 from modelica_like.solve.recorded import RecordedModel, RecordedSolution, RecordedVariable
-from modelica_like.solve.solution import Solution
+from modelica_like.solve.trajectories import Trajectories
 
 _POINTS = 500
 
 
 def trajectories(
-    source: str | Path | Solution, until: float | None = None, points: int = _POINTS, tolerance: float | None = None
-) -> Solution:
+    source: str | Path | Trajectories, until: float | None = None, points: int = _POINTS, tolerance: float | None = None
+) -> Trajectories:
     """Return the trajectories of a netlist, an FMU, a system of FMUs or a CSV file; a solution is returned as it is.
 
     Args:
@@ -34,7 +34,7 @@ def trajectories(
         ModelicaLikeError: the run fails.
         OSError: the file cannot be read.
     """
-    if isinstance(source, Solution):
+    if isinstance(source, Trajectories):
         return source
     path = Path(source)
     kind = path.suffix.lower()

@@ -7,13 +7,14 @@ import importlib.util
 import inspect
 from collections.abc import Callable, Iterator, Mapping
 from functools import lru_cache
-from importlib.metadata import entry_points
+from importlib.metadata import EntryPoint, entry_points
 from types import MappingProxyType, ModuleType
-from typing import Any, get_args, get_type_hints
+from typing import Any, get_args
 
 from modelica_like.errors import NetlistError, UnknownName, did_you_mean
-from modelica_like.netlist.registry import GROUP, imported
-from modelica_like.units import ONE, Unit, parse_unit
+from modelica_like.language.results import Result, hints, quantity, quantity_of
+from modelica_like.netlist.registry import GROUP, imported, library_module
+from modelica_like.units import Unit, parse_unit
 
 Check = Callable[..., Any]
 
@@ -22,30 +23,28 @@ Check = Callable[..., Any]
 def design_checks() -> Mapping[str, Check]:
     """Return the design checks of all installed libraries by name, sorted.
 
-    A library `gears` has its checks in the package `gears.sizing`: the functions of `__all__` that return a class with
-    the method `lines`.
+    A library `gears` has its checks in the package `gears.sizing`: the functions of `__all__` that return a `Result`.
 
     Raises:
         NetlistError: a library cannot be imported, or two libraries have a check of one name.
     """
     checks: dict[str, Check] = {}
     for entry in sorted(entry_points(group=GROUP), key=lambda entry: entry.name):
-        for name, function in _checks_of(entry.value, entry.name):
+        for name, function in _checks_of(entry):
             if checks.setdefault(name, function) is not function:
                 raise NetlistError(f"Two libraries have a design check '{name}': {checks[name].__module__} and "
                                    f"{function.__module__}.")  # fmt: skip
     return MappingProxyType(dict(sorted(checks.items())))
 
 
-def _checks_of(library: str, entry: str) -> Iterator[tuple[str, Check]]:
-    package = imported(library, f"The library '{entry}'")
-    name = f"{library}.sizing"
+def _checks_of(entry: EntryPoint) -> Iterator[tuple[str, Check]]:
+    package, name = library_module(entry), f"{entry.value}.sizing"
     if not hasattr(package, "__path__") or importlib.util.find_spec(name) is None:
         return
-    module: ModuleType = imported(name, f"The design checks of the library '{entry}'")
+    module: ModuleType = imported(name, f"The design checks of the library '{entry.name}'")
     for member in getattr(module, "__all__", ()):
         function = getattr(module, member)
-        if inspect.isfunction(function) and hasattr(_hints(function).get("return"), "lines"):
+        if inspect.isfunction(function) and is_result(hints(function).get("return")):
             yield member, function
 
 
@@ -81,13 +80,13 @@ class Argument:
 
 def arguments_of(check: Any) -> dict[str, Argument]:
     """Return the arguments of a check or the fields of a dataclass that is an argument, by name."""
-    hints = _hints(check)
+    kinds = hints(check)
     if dataclasses.is_dataclass(check):
         return {
-            field.name: Argument(field.name, hints[field.name], _required(field)) for field in dataclasses.fields(check)
+            field.name: Argument(field.name, kinds[field.name], _required(field)) for field in dataclasses.fields(check)
         }
     return {
-        name: Argument(name, hints[name], parameter.default is parameter.empty, parameter.default)
+        name: Argument(name, kinds[name], parameter.default is parameter.empty, parameter.default)
         for name, parameter in inspect.signature(check).parameters.items()
     }
 
@@ -96,21 +95,20 @@ def _required(field: dataclasses.Field[Any]) -> bool:
     return field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING
 
 
-@lru_cache(maxsize=512)
-def _hints(kind: Any) -> dict[str, Any]:
-    return get_type_hints(kind, include_extras=True)
+def is_result(kind: Any) -> bool:
+    """Tell whether an annotation is a type of results."""
+    return isinstance(kind, type) and issubclass(kind, Result)
 
 
 def unit_of_kind(kind: Any) -> Unit | None:
     """Return the unit of a number's annotation, or None if it is none."""
-    extras = getattr(kind, "__metadata__", ())
-    found = next((extra.unit for extra in extras if hasattr(extra, "unit")), None)
-    return None if found is None else parse_unit(found)
+    found = quantity(kind)
+    return None if found is None else parse_unit(found.unit)
 
 
 def unit_of_line(result: Any, name: str) -> Unit:
     """Return the unit of a line of a result, that of a plain number if it has none."""
-    return unit_of_kind(_hints(type(result)).get(name)) or ONE
+    return parse_unit(quantity_of(type(result), name).unit)
 
 
 def without_none(kind: Any) -> Any:

@@ -17,7 +17,7 @@ from modelica_like.errors import (
     UnknownName,
     did_you_mean,
 )
-from modelica_like.sizing.checks import arguments_of, unit_of_kind, without_none
+from modelica_like.sizing.checks import arguments_of, is_result, unit_of_kind, without_none
 from modelica_like.sizing.document import placed
 from modelica_like.sizing.formulas import Lookup, Value, read_value
 from modelica_like.units import Unit, coherent, read_quantity, same_dimension, to_si
@@ -95,13 +95,15 @@ class Converter:
         if not isinstance(result, kind):
             raise NetlistError(
                 f"{where} must be a table: {{ {_example(kind)} }}.",
-                advice=f"Or name a check whose result is a {kind.__name__}." if hasattr(kind, "lines") else "",
+                advice=f"Or name a check whose result is a {kind.__name__}." if is_result(kind) else "",
             )
         return result
 
     def quantity(self, unit: Unit, value: Any, where: str) -> Any:
         """Return a number, or an array from a list, in SI."""
         if isinstance(value, list):
+            if not value or any(isinstance(item, list) for item in value):
+                raise NetlistError(f"{where} must be a list of numbers, neither empty nor of lists.")
             return np.array([self.quantity(unit, item, f"{where}[{k}]") for k, item in enumerate(value)], dtype=float)
         if isinstance(value, dict):
             return _fitting(self.simulated(value, where), unit, where)

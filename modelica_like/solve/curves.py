@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from fnmatch import fnmatchcase
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from modelica_like.compile.compiled import Vector
-from modelica_like.errors import UnknownName, ValueOutOfRange, did_you_mean
-from modelica_like.solve.plot import unit_of
+from modelica_like.errors import UnknownName, ValueOutOfRange
+from modelica_like.solve.plot import fitting, plot_curves, unit_of
 from modelica_like.solve.ranges import ranges
 from modelica_like.solve.recorder import Event
-from modelica_like.solve.solution import Solution
+from modelica_like.solve.trajectories import Trajectories
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -81,8 +80,8 @@ class Curves:
         interpolated: the results lie at different times; the second is interpolated in between, which costs precision.
     """
 
-    first: Solution
-    second: Solution
+    first: Trajectories
+    second: Trajectories
     deviations: tuple[Deviation, ...]
     events: tuple[EventDifference, ...]
     labels: tuple[str, str]
@@ -108,13 +107,11 @@ class Curves:
 
     def plot(self, *patterns: str) -> Figure:
         """Draw both over each other, and their difference below; by default the signals that deviate most."""
-        from modelica_like.solve.curves_plot import plot_curves
-
         return plot_curves(self, patterns)
 
 
 def compare_solutions(
-    first: Solution, second: Solution, signals: Sequence[str], labels: tuple[str, str], least: float = 1e-6
+    first: Trajectories, second: Trajectories, signals: Sequence[str], labels: tuple[str, str], least: float = 1e-6
 ) -> Curves:
     """Compare two solutions by the names of their signals.
 
@@ -143,20 +140,14 @@ def compare_solutions(
     return Curves(first, second, ordered, events, labels, grid.interpolated)
 
 
-def _signals(first: Solution, second: Solution, labels: tuple[str, str], patterns: Sequence[str]) -> list[str]:
+def _signals(first: Trajectories, second: Trajectories, labels: tuple[str, str], patterns: Sequence[str]) -> list[str]:
     common = [name for name in first.names if name in first.model.position and name in second.model.position]
     if not common:
         raise UnknownName(
             f"{' and '.join(labels)} have no signal in common.",
             advice="Signals are compared by their names, such as clutch.tau.",
         )
-    chosen: dict[str, None] = {}
-    for pattern in patterns:
-        fitting = [name for name in common if name == pattern or fnmatchcase(name, pattern)]
-        if not fitting:
-            raise UnknownName(f"They have no common signal '{pattern}'{did_you_mean(pattern, common) or '.'}")
-        chosen.update(dict.fromkeys(fitting))
-    return list(chosen) or common
+    return fitting(common, patterns, "They have no common signal") or common
 
 
 def _instants(events: Sequence[Event], start: float, known: set[str]) -> dict[str, list[tuple[float, str]]]:
@@ -171,7 +162,7 @@ def _instants(events: Sequence[Event], start: float, known: set[str]) -> dict[st
     return by_mode
 
 
-def _match_events(first: Solution, second: Solution) -> list[EventDifference]:
+def _match_events(first: Trajectories, second: Trajectories) -> list[EventDifference]:
     """Pair the changes of each mode that both have, in their order."""
     known = set(first.model.discrete_position) & set(second.model.discrete_position)
     ours, theirs = (_instants(run.events, float(run.time[0]), known) for run in (first, second))
@@ -208,7 +199,7 @@ class _Grid:
     interpolated: bool
 
     @classmethod
-    def of(cls, first: Solution, second: Solution, events: Sequence[EventDifference]) -> _Grid:
+    def of(cls, first: Trajectories, second: Trajectories, events: Sequence[EventDifference]) -> _Grid:
         """Take the times that both have, or those of the first where they have few in common."""
         time, other = first.time, second.time
         once = np.flatnonzero(_single(time) & (time >= other[0]) & (time <= other[-1]))
@@ -237,12 +228,12 @@ def _between(times: Vector, events: Sequence[EventDifference]) -> _Marks:
     return inside
 
 
-def _difference(first: Solution, second: Solution, name: str, grid: _Grid) -> Vector:
+def _difference(first: Trajectories, second: Trajectories, name: str, grid: _Grid) -> Vector:
     other = np.interp(grid.times, second.time, second[name]) if grid.interpolated else second[name][grid.partners]
     return other - first[name][grid.rows]
 
 
-def _deviation(first: Solution, second: Solution, name: str, grid: _Grid, scale: float) -> Deviation:
+def _deviation(first: Trajectories, second: Trajectories, name: str, grid: _Grid, scale: float) -> Deviation:
     difference = np.abs(_difference(first, second, name, grid))
     difference = np.where(np.isnan(difference), np.inf, difference)
     k = int(np.argmax(difference))

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, CompiledTransition, Vector
-from modelica_like.errors import Chattering
+from modelica_like.errors import Chattering, LimitPassed
 from modelica_like.initialize import (
     Point,
     Strike,
@@ -21,6 +21,7 @@ from modelica_like.initialize import (
     solve_implicit,
     variable_slopes,
 )
+from modelica_like.language.transition import NAME_IN_NOTICE
 from modelica_like.solve.guards import Guards
 from modelica_like.solve.options import Options
 from modelica_like.solve.recorder import Event, Recorder
@@ -90,6 +91,7 @@ class Instants:
 
         Raises:
             Chattering: there is no end of it, or events follow each other ever faster.
+            LimitPassed: what fires ends the run.
             SingularAtStart: the equations have no unique solution after it.
         """
         if not wanting:
@@ -131,15 +133,20 @@ class Instants:
 
     def _fire(self, now: Point, wanting: list[CompiledTransition]) -> None:
         """Carry out transitions together; of one mode only the one declared first."""
-        values = call(self.model, self.model.resets, now)
         chosen: dict[int, CompiledTransition] = {}
         for transition in sorted(wanting, key=self._number):
             if _is_source(now, transition):
                 chosen.setdefault(transition.mode, transition)
         targets: list[tuple[int, float]] = []
+        resets = any(transition.resets for transition in chosen.values())
+        values = call(self.model, self.model.resets, now) if resets else ()
         x, d = now.x.copy(), now.d.copy()
         for transition in chosen.values():
             self._note(now, transition.mode, transition.target, self._number(transition))
+            if transition.fails:
+                owner = self.record.events[-1].mode.rpartition(".")[0] or self.model.name
+                told = NAME_IN_NOTICE.sub(r"\1", transition.notice)
+                raise LimitPassed(f"At {now.t:.9g} s {owner} {told}.")
             d[transition.mode] = transition.target
             for reset in transition.resets:
                 if reset.kind == "state":

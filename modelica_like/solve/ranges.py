@@ -7,12 +7,12 @@ from collections.abc import Iterable
 import numpy as np
 
 from modelica_like.solve.plot import unit_of
-from modelica_like.solve.solution import Solution
+from modelica_like.solve.trajectories import Trajectories
 
 _NOISE = 1e-6
 
 
-def ranges(solution: Solution, names: Iterable[str], least: float = _NOISE) -> dict[str, float]:
+def ranges(solution: Trajectories, names: Iterable[str], least: float = _NOISE) -> dict[str, float]:
     """Return the range of each signal, largest minus smallest value.
 
     The slip of a clutch that sticks is rounding noise and has no range of its own. So what moves less than a share of

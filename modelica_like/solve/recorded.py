@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, cast
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from modelica_like.compile.compiled import Vector
 from modelica_like.errors import MissingValue, Source, UnknownName, did_you_mean
 from modelica_like.solve.energy import EnergyBalance, EnergyRow
-from modelica_like.solve.options import Options
 from modelica_like.solve.recorder import Event
-from modelica_like.solve.solution import ENERGY_TERMS, Solution, Statistics, Values
+from modelica_like.solve.trajectories import ENERGY_TERMS, Statistics, Trajectories, Values
 
 
 @dataclass(frozen=True)
@@ -44,27 +44,27 @@ class RecordedModel:
     flat_discretes: tuple[RecordedVariable, ...]
     parameters: Mapping[str, float]
 
-    @property
+    @cached_property
     def position(self) -> dict[str, int]:
         """Row of each continuous variable."""
         return {variable.path: k for k, variable in enumerate(self.flat_variables)}
 
-    @property
+    @cached_property
     def discrete_position(self) -> dict[str, int]:
         """Row of each mode or discrete value."""
         return {variable.path: k for k, variable in enumerate(self.flat_discretes)}
 
-    @property
+    @cached_property
     def components(self) -> tuple[str, ...]:
         """Paths that have an energy term."""
         owners = (path.rpartition(".") for path in self.position)
         return tuple(dict.fromkeys(owner for owner, _, term in owners if term in ENERGY_TERMS))
 
 
-class RecordedSolution(Solution):
+class RecordedSolution(Trajectories):
     """Trajectories of an FMU or of a table.
 
-    Whatever needs no equations works as for any solution: `[...]`, `plot`, `at`, `final`, `events`, `to_pandas`. The
+    Whatever needs no equations works as for a `Solution`: `[...]`, `plot`, `at`, `final`, `events`, `to_pandas`. The
     energy balance is the integral of the columns `….loss_power`, `….stored_energy` and `….source_power`, where there
     are such.
 
@@ -78,14 +78,9 @@ class RecordedSolution(Solution):
 
     def __init__(self, model: RecordedModel, time: Vector, values: Vector, discretes: Vector, seconds: float) -> None:
         self._time, self._values_table, self._discretes = time, values, discretes
-        events = tuple(mode_changes(model.flat_discretes, time, discretes))
-        statistics = Statistics(len(time), 0, 0, len(events), seconds)
-        super().__init__(cast("Any", model), Options(points=max(len(time) - 1, 1)), (), events, statistics)
-
-    @property
-    def recorded(self) -> RecordedModel:
-        """What is known about the model."""
-        return cast("RecordedModel", self.model)
+        self.model: RecordedModel = model
+        self.events = tuple(mode_changes(model.flat_discretes, time, discretes))
+        self.statistics = Statistics(len(time), 0, 0, len(self.events), seconds)
 
     @property
     def time(self) -> Vector:
@@ -93,7 +88,7 @@ class RecordedSolution(Solution):
         return self._time
 
     def __getitem__(self, key: str | Any) -> Vector:
-        path, model = self.path(key), self.recorded
+        path, model = self.path(key), self.model
         if path == "time":
             return self._time
         if path in model.position:
@@ -105,13 +100,8 @@ class RecordedSolution(Solution):
         known = [*self.names, *model.parameters]
         raise UnknownName(f"{model.name} has no variable '{path}'{did_you_mean(path, known) or '.'}")
 
-    def together(self, *keys: str | Any) -> dict[str, Vector]:
-        """Return several columns by path."""
-        return {self.path(key): self[key] for key in keys}
-
     def __contains__(self, key: object) -> bool:
-        path = self.path(key)
-        model = self.recorded
+        path, model = self.path(key), self.model
         return any(path in known for known in (model.position, model.discrete_position, model.parameters))
 
     def at(self, t: float) -> Values:
@@ -142,12 +132,12 @@ class RecordedSolution(Solution):
         Raises:
             MissingValue: there is no energy term.
         """
-        if not self.recorded.components:
+        if not self.model.components:
             raise MissingValue(
-                f"{self.recorded.name} tells no energies.",
+                f"{self.model.name} tells no energies.",
                 why="None of its variables is called ….stored_energy, ….loss_power or ….source_power.",
             )
-        rows = tuple(self._energy_row(component) for component in self.recorded.components)
+        rows = tuple(self._energy_row(component) for component in self.model.components)
         throughput = max(
             sum(abs(row.inflow) for row in rows), sum(abs(row.source) for row in rows), sum(abs(r.lost) for r in rows)
         )
@@ -165,9 +155,7 @@ class RecordedSolution(Solution):
 
     def __repr__(self) -> str:
         span = f"t = {self._time[0]:g} … {self._time[-1]:g} s"
-        return (
-            f"<Solution of {self.recorded.name}: {len(self.names)} variables, {span}, {len(self.events)} mode changes>"
-        )
+        return f"<Solution of {self.model.name}: {len(self.names)} variables, {span}, {len(self.events)} mode changes>"
 
 
 def mode_changes(discretes: Sequence[RecordedVariable], time: Vector, values: Vector) -> list[Event]:

@@ -2,93 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, Vector
-from modelica_like.errors import UnknownName, ValueOutOfRange, did_you_mean, missing_extra
+from modelica_like.errors import UnknownName, did_you_mean
 from modelica_like.initialize import Impact, Point
-from modelica_like.language.expr import Symbol
-from modelica_like.language.mode import BoundMode
 from modelica_like.solve.energy import EnergyBalance, energy_balance
 from modelica_like.solve.idas import Integrator
 from modelica_like.solve.options import Options
 from modelica_like.solve.rates import differentiated, rate_along
 from modelica_like.solve.reading import TOGETHER, blocks, energy_term, variables
 from modelica_like.solve.recorder import Event, Segment
-
-if TYPE_CHECKING:
-    import pandas
-    import xarray
-    from matplotlib.figure import Figure
-
-ENERGY_TERMS = ("stored_energy", "loss_power", "source_power")
-
-
-@dataclass(frozen=True)
-class Statistics:
-    """What a run took.
-
-    Attributes:
-        steps: integrator steps.
-        evaluations: evaluations of the equations.
-        integrations: calls of the integrator (panels and event locations).
-        events: mode changes.
-        seconds: wall time of initialisation and integration.
-    """
-
-    steps: int
-    evaluations: int
-    integrations: int
-    events: int
-    seconds: float
-
-
-class Values(Mapping[str, float]):
-    """All variables at one instant, by path."""
-
-    def __init__(
-        self, solution: Solution, time: float, column: Vector, discrete: Vector, point: Point | None = None
-    ) -> None:
-        self.time = time
-        self._point = point
-        self._solution = solution
-        self._column = column
-        self._discrete = discrete
-
-    def __getitem__(self, key: str | Any) -> float:
-        path = self._solution.path(key)
-        model = self._solution.model
-        if path in model.position:
-            return float(self._column[model.position[path]])
-        if path in model.discrete_position:
-            return float(self._discrete[model.discrete_position[path]])
-        if self._point is not None and (name := differentiated(path)):
-            now = self._point
-            return float(rate_along(model, name, np.array([now.t]), *(v[:, None] for v in (now.x, now.z, now.d)))[0])
-        owner, _, term = path.rpartition(".")
-        if self._point is not None and term in ENERGY_TERMS and owner in model.components:
-            terms = model.energy(self._point.t, self._point.x, self._point.z, model.p, model.u, self._point.d)
-            return float(terms[model.components.index(owner), ENERGY_TERMS.index(term)])
-        return float(self._solution[path][0])
-
-    def __iter__(self) -> Iterator[str]:
-        model = self._solution.model
-        yield from model.position
-        yield from model.discrete_position
-
-    def __len__(self) -> int:
-        return len(self._solution.model.flat_variables) + len(self._solution.model.flat_discretes)
-
-    def __repr__(self) -> str:
-        return f"<{len(self)} values at t = {self.time:g} s>"
+from modelica_like.solve.trajectories import ENERGY_TERMS, Statistics, Trajectories, Values
 
 
 @dataclass(eq=False)
-class Solution:
+class Solution(Trajectories):
     """Trajectories of all variables of the unreduced model, in SI units.
 
     Attributes:
@@ -108,7 +41,7 @@ class Solution:
     statistics: Statistics
     impacts: tuple[Impact, ...] = ()
     notices: tuple[str, ...] = ()
-    _cache: dict[str, Any] = field(default_factory=dict, repr=False)
+    _cache: dict[Any, Any] = field(default_factory=dict, repr=False)
 
     @property
     def time(self) -> Vector:
@@ -116,16 +49,6 @@ class Solution:
         if "time" not in self._cache:
             self._cache["time"] = np.concatenate([s.times for s in self.segments])
         return self._cache["time"]
-
-    def path(self, key: Any) -> str:
-        """Return the path of a variable given by its path, as `drive.clutch.tau` or `drive.clutch.mode`."""
-        if isinstance(key, BoundMode):
-            key = key.symbol
-        if isinstance(key, Symbol):
-            owner = key.owner.path
-            name = f"{owner}.{key.name}" if owner else key.name
-            return f"{'der(' * key.order}{name}{')' * key.order}"
-        return str(key)
 
     def __getitem__(self, key: str | Any) -> Vector:
         """Return a trajectory, shape (len(time),).
@@ -166,11 +89,6 @@ class Solution:
         return any(path in one for one in known) or differentiated(path) in model.position
 
     @property
-    def names(self) -> tuple[str, ...]:
-        """Paths of all variables, modes and discrete values."""
-        return (*self.model.position, *self.model.discrete_position)
-
-    @property
     def _small(self) -> bool:
         return len(self.time) * len(self.model.flat_variables) <= TOGETHER
 
@@ -190,11 +108,6 @@ class Solution:
         rows = [self.model.position[path] for path in found]
         known = dict(zip(found, variables(self.model, self.segments, rows), strict=True)) if found else {}
         return {path: known[path] if path in known else self[path] for path in paths}
-
-    def _check_within(self, t: float) -> None:
-        first, last = float(self.time[0]), float(self.time[-1])
-        if not first <= t <= last:
-            raise ValueOutOfRange(f"t = {t:g} s is not within the run, {first:g} s to {last:g} s.")
 
     def at(self, t: float) -> Values:
         """Return all variables at a time, integrated there from the result before (right side of an event).
@@ -230,55 +143,37 @@ class Solution:
         column = np.array(self.model.variables(t, x, z, self.model.p, self.model.u, d)).ravel()
         return Values(self, t, column, d, Point(t, np.ravel(x), np.ravel(z), d))
 
-    def energy(self) -> EnergyBalance:
-        """Return the energy balance of every component over the run."""
-        if "balance" not in self._cache:
-            self._cache["balance"] = energy_balance(self.model, self.segments, self.options, self.events, self.impacts)
-        return self._cache["balance"]
-
-    def plot(self, *patterns: str, title: str = "") -> Figure:
-        """Draw trajectories over time, one panel per unit, with events as dotted lines.
+    def energy(self, begin: float | None = None, end: float | None = None) -> EnergyBalance:
+        """Return the energy balance of every component over the run, or over a part of it.
 
         Args:
-            patterns: names or patterns (`*.w`) of what to draw; by default speeds, torques and forces of the parts.
-            title: heading; by default the name of the model.
+            begin: time in s; what happens at once at that time counts.
+            end: time in s; what happens at once at that time does not, unless the run ends there.
 
         Raises:
-            UnknownName: nothing fits a pattern.
+            ValueOutOfRange: a time is not within the run.
         """
-        from modelica_like.solve.plot import plot
+        key = "balance", begin, end
+        if key not in self._cache:
+            first, last = (self.time[k] if t is None else float(t) for k, t in ((0, begin), (-1, end)))
+            segments = self.segments if (begin, end) == (None, None) else tuple(self._part(first, last))
+            until = np.inf if last == self.time[-1] else last
+            events = [one for one in self.events if first <= one.time < until]
+            impacts = [one for one in self.impacts if first <= one.time < until]
+            self._cache[key] = energy_balance(self.model, segments, self.options, events, impacts)
+        return self._cache[key]
 
-        return plot(self, patterns, title=title)
-
-    def to_pandas(self) -> pandas.DataFrame:
-        """Return a table with time as index and one column per variable.
-
-        Raises:
-            MissingExtra: pandas is not installed.
-        """
-        try:
-            import pandas
-        except ImportError:
-            raise missing_extra("pandas", "data") from None
-        columns = self.together(*self.names)
-        return pandas.DataFrame(columns, index=pandas.Index(self.time, name="time"))
-
-    def to_xarray(self) -> xarray.Dataset:
-        """Return a dataset over time, with units and descriptions as attributes.
-
-        Raises:
-            MissingExtra: xarray is not installed.
-        """
-        try:
-            import xarray
-        except ImportError:
-            raise missing_extra("xarray", "data") from None
-        info = {
-            v.path: {"units": str(v.unit), "long_name": v.description}
-            for v in (*self.model.flat_variables, *self.model.flat_discretes)
-        }
-        arrays = {name: ("time", values, info[name]) for name, values in self.together(*self.names).items()}
-        return xarray.Dataset(arrays, coords={"time": ("time", self.time, {"units": "s"})})
+    def _part(self, begin: float, end: float) -> Iterator[Segment]:
+        """Go through the segments between two times."""
+        edges = {t: self.point(t) for t in (begin, end)}
+        for one in self.segments:
+            inside = (one.times >= begin) & (one.times <= end)
+            cuts = [edges[t] for t in (begin, end) if one.times[0] < t < one.times[-1] and t not in one.times[inside]]
+            times = np.concatenate([one.times[inside], [cut.t for cut in cuts]])
+            order = np.argsort(times, kind="stable")
+            if len(order) > 1:
+                x, z = (np.column_stack([getattr(one, n)[:, inside], *(getattr(c, n) for c in cuts)]) for n in "xz")
+                yield Segment(times[order], x[:, order], z[:, order], one.d)
 
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "_cache": {}}

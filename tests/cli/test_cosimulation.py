@@ -57,6 +57,12 @@ def test_cosim_writes_a_table_and_a_picture(parts: Path, tmp_path: Path) -> None
             ["cosim", "{folder}/system.toml", "--set", "wheel.J2.K=1"],
             "wheel (wheel.fmu) has no variable 'J2.K'; did you",
         ),
+        (
+            ["cosim", "{folder}/system.toml", "--until", "1e9s", "--show", "J9.w"],
+            "two_mass has no variable 'J9.w'; did",
+        ),
+        (["cosim", "{folder}/system.toml", "--until", "1e9s", "--plot", "x.foo"], "'x.foo': a picture can be"),
+        (["cosim", "{folder}/system.toml", "--until", "1e9s", "--csv", "x.foo"], "'x.foo': a table can be"),
         (["cosim", "{folder}/none.toml"], "The netlist '"),
         (["cosim", "{folder}/system.toml", "--set", "wheel.J2.J=1 kg"], "Usage:"),
     ],

@@ -208,10 +208,31 @@ def test_an_interrupted_export_leaves_the_old_fmu(tmp_path: Path) -> None:
 
 def test_an_interrupted_cosimulation_ends_its_process(tmp_path: Path) -> None:
     system = split(DRIVE, "shaft", tmp_path, names=("motor", "wheel"), check=False).path
-    with pytest.raises(KeyboardInterrupt):
+    with pytest.raises(KeyboardInterrupt) as told:
         cosim(system, "1000 s", step="0.1 ms", progress=press)
+    kept, whole = vars(told.value)["run"], cosim(system, "0.01 s", step="0.1 ms")
+    assert 0.01 < kept.time[-1] < 1000
+    assert kept.time[-1] == pytest.approx(1e-4 * kept.steps)
+    assert len(kept.time) == kept.steps + 1
+    for name in ("J2.w", "shaft.power", "shaft.residual_energy"):
+        assert np.array_equal(kept[name][:101], whole[name])
     children = subprocess.run(["pgrep", "-P", str(os.getpid()), "-f", "cosimulation/child.py"], check=False)
     assert children.returncode == 1
+
+
+@pytest.mark.parametrize(("until", "kept"), [("1000s", "run.csv, run.png"), ("1000s", "")])
+def test_an_interrupted_cosim_command_says_what_it_kept(until: str, kept: str, tmp_path: Path) -> None:
+    system = split(DRIVE, "shaft", tmp_path, names=("motor", "wheel"), check=False).path
+    files = ["--csv", "run.csv", "--plot", "run.png"] if kept else []
+    result = command(tmp_path, "-c", PRESSED, "0.01", "cosim", str(system), "--until", until, "--step", "0.1ms", *files)
+    what = f"is in {kept}" if kept else "is lost: no --csv or --plot was asked for"
+    said = re.fullmatch(rf"Interrupted\. What was computed up to t = ([0-9.]+) s {what}\.\n", result.stderr)
+    assert (result.returncode, bool(said)) == (130, True), result.stderr
+    assert "communication steps of 0.0001 s" in result.stdout
+    if kept and said:
+        rows = (tmp_path / "run.csv").read_text().splitlines()
+        assert float(rows[-1].partition(",")[0]) == pytest.approx(float(said[1]), rel=1e-5)
+        assert (tmp_path / "run.png").stat().st_size > 1000
 
 
 def test_an_interrupted_calibration_is_no_failed_start() -> None:

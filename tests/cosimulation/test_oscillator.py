@@ -1,16 +1,22 @@
 """The two-mass oscillator in two FMUs against its closed form: orders of the masters, variable steps, energies."""
 
+import os
+import signal
+import subprocess
 from dataclasses import replace
+from functools import partial
 from math import log2, sqrt
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from modelica_like import Solution
+from modelica_like import Trajectories
 from modelica_like.cosimulation.run import cosim
 from modelica_like.cosimulation.split import Split, split
 from modelica_like.cosimulation.system import System
+from modelica_like.errors import FmuCrashed, FmuFailed, FmuTimeout
 
 M, J1, J2, C, D = 5.0, 0.02, 0.08, 400.0, 0.2
 MASTERS = pytest.mark.parametrize("master", ["jacobi", "gauss-seidel"])
@@ -29,7 +35,7 @@ def closed_form(time: np.ndarray) -> dict[str, np.ndarray]:
     return {"J2.w": M / total * time + J1 / total * rate, "shaft.tau": C * twist + D * rate}
 
 
-def error(run: Solution) -> float:
+def error(run: Trajectories) -> float:
     """Largest deviation from the closed form, in parts of a signal's range."""
     truth = closed_form(run.time)
     return max(float(np.abs(run[name] - truth[name]).max() / np.ptp(truth[name])) for name in SIGNALS)
@@ -126,11 +132,39 @@ def test_fmi_3(oscillator: Split, tmp_path: Path) -> None:
         assert third[name] == pytest.approx(second[name], abs=1e-5 * np.ptp(second[name]))
 
 
-def test_the_result_is_a_solution_like_any_other(oscillator: Split) -> None:
+def test_the_result_is_read_like_any_solution(oscillator: Split) -> None:
     run = cosim(oscillator.path, until="0.1 s", step="1 ms")
-    assert isinstance(run, Solution)
+    assert isinstance(run, Trajectories)
     assert len(run.time) == 101
     assert run.at(0.05)["J2.w"] == pytest.approx(float(np.interp(0.05, run.time, run["J2.w"])))
     assert run["J2.J"][0] == J2
     assert {"J1.w", "J2.w", "shaft.tau", "shaft.power", "shaft.residual_energy"} <= set(run.names)
     assert run.steps == 100
+
+
+def killed(pressed: list[float], time: float) -> None:
+    """Kill the process of the FMUs, once."""
+    if time > 0.01 and not pressed:
+        pressed.append(time)
+        found = subprocess.run(["pgrep", "-P", str(os.getpid()), "-f", "cosimulation/child.py"], capture_output=True)
+        os.kill(int(found.stdout), signal.SIGKILL)
+
+
+@pytest.mark.parametrize("how", ["timeout", "killed", "failed"])
+def test_a_run_that_fails_keeps_what_it_has_come_to(how: str, oscillator: Split) -> None:
+    """A step far too long for the spring: what the FMUs exchange grows until it is infinite."""
+    errors = {"timeout": FmuTimeout, "killed": FmuCrashed, "failed": FmuFailed}
+    options: dict[str, Any] = {"step": "1 s" if how == "failed" else "10 us"}
+    if how == "timeout":
+        options["timeout"] = 3.0
+    if how == "killed":
+        if os.name != "posix":
+            pytest.skip("processes are found and killed as in POSIX")
+        options["progress"] = partial(killed, [])
+    with pytest.raises(errors[how]) as told:
+        cosim(oscillator.system, "100000 s", **options)
+    kept = told.value.run
+    assert kept.steps == len(kept.time) - 1
+    whole = cosim(oscillator.system, until=float(kept.time[10]), step=options["step"])
+    for name in ("J2.w", "shaft.power", "shaft.residual_energy"):
+        assert np.array_equal(kept[name][:11], whole[name])

@@ -9,12 +9,12 @@ from hypothesis import strategies as st
 
 from modelica_like import load, simulate
 from modelica_like.cosimulation.cut import cut_netlist, part_of
-from modelica_like.cosimulation.files import write_system
-from modelica_like.cosimulation.load import load_system
+from modelica_like.cosimulation.files import load_system, write_system
 from modelica_like.cosimulation.run import cosim
 from modelica_like.cosimulation.split import Split, split
-from modelica_like.cosimulation.system import find_bonds
-from modelica_like.netlist import loads
+from modelica_like.cosimulation.system import Bond, Link, Port, find_bonds
+from modelica_like.language import Component, Terminal
+from modelica_like.netlist import loads, registry
 from modelica_like.report.compare import compare
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -35,8 +35,8 @@ def test_every_part_and_wire_is_in_one_group_or_cut(count: int, data: st.DataObj
     assert len(found.wires) == 2 * count - len(places)
     assert all(found.group_of(wire.ends[0]) == found.group_of(wire.ends[1]) for wire in found.wires)
     for cut, place in zip(found.cuts, places, strict=True):
-        assert part_of(cut.near[0]) == place
-        assert found.group_of(cut.near[0]) != found.group_of(cut.far[0])
+        assert part_of(cut.near) == place
+        assert found.group_of(cut.near) != found.group_of(cut.far[0])
 
 
 @pytest.mark.parametrize("place", ["shaft", "shaft.flange_b", "J2.flange_a", "J2"])
@@ -60,6 +60,18 @@ def test_bonds_follow_from_names(oscillator: Split) -> None:
     (given_bond,) = oscillator.system.bonds
     (found,) = find_bonds(oscillator.system.links)
     assert (found.flow, found.rate) == (given_bond.flow, given_bond.rate)
+
+
+def test_a_library_declares_which_signals_make_a_power(monkeypatch: pytest.MonkeyPatch) -> None:
+    class PressureToFlow(Component):
+        terminal = Terminal("org.my_company.pipe", takes="potential", power=("q", "p"))
+
+    links = [
+        Link("q", Port("a", "pipe.q"), (Port("b", "in.q"),)), Link("p", Port("b", "in.p"), (Port("a", "pipe.p"),)),
+    ]  # fmt: skip
+    assert find_bonds(links) == ()
+    monkeypatch.setattr(registry, "library_types", lambda: {"PressureToFlow": PressureToFlow})
+    assert find_bonds(links) == (Bond("pipe", "q", "p"),)
 
 
 def test_a_system_is_compared_with_its_drive(oscillator: Split) -> None:
@@ -103,3 +115,11 @@ def test_a_signal_is_cut_at_its_output(tmp_path: Path) -> None:
     )
     run = cosim(split(drive, "wire", tmp_path, check=False).path, step=0.5)
     assert run["double.y"] == pytest.approx([6.0, 6.0, 6.0])
+
+
+def test_a_folder_that_cannot_be_written_is_told_before_anything_is_compiled(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("here already")
+    told: list[str] = []
+    with pytest.raises(NotADirectoryError):
+        split(EXAMPLES / "two_mass.toml", "shaft", tmp_path / "file", report=told.append)
+    assert told == []

@@ -72,7 +72,7 @@ def test_agrees_with_idas(case: Case, version: str, kind: str, reference_fmus: B
     )  # fmt: skip
     comparison = compare(by_idas(case.netlist), theirs)
     assert not comparison.interpolated
-    expected = set(theirs.recorded.position) - {"clutch.loss_power", "limit"}
+    expected = set(theirs.model.position) - {"clutch.loss_power", "limit"}
     assert {row.signal for row in comparison.deviations} == {name for name in expected if not name.startswith("der(")}
     assert comparison.largest <= WITHIN
     assert len(comparison.events) == case.events

@@ -1,4 +1,4 @@
-"""Mutates the examples, formulas, units and options, and tells what ends in anything but a sentence.
+"""Mutates netlists, formulas, units, options, sizing files, systems, SSPs and FMUs: does all end in a sentence?
 
 Run with `python tests/fuzz/fuzzer.py COUNT [FIRST]`; input number k is the same everywhere, and
 `python tests/fuzz/fuzzer.py 1 K` repeats it with its traceback.
@@ -7,21 +7,23 @@ Run with `python tests/fuzz/fuzzer.py COUNT [FIRST]`; input number k is the same
 from __future__ import annotations
 
 import contextlib
-import datetime
 import io
-import math
 import os
 import random
 import signal
 import sys
+import tempfile
 import tomllib
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from copy import deepcopy
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
+
+from files import fmu, folder, sizing, ssp, system
+from inputs import STRANGE, document, mutated_text, mutated_tree, pieces
 
 from components import Inertia
 from modelica_like import build, simulate
@@ -35,29 +37,9 @@ from modelica_like.units import parse_unit, read_quantity, to_si
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 SECONDS = 5
+"""Time of the processor for one input."""
 LARGEST = 4000
 """Characters of the netlists that are mutated."""
-STRANGE: tuple[Any, ...] = (
-    0, -1, 1, 3, 10**20, 10**400, 1e308, -1e308, 5e-324, -0.0, math.nan, math.inf, -math.inf, True, False, "", " ", "0",
-    "1", "-1", "1e400", "nan", "inf", "1 N.m", "1 rad/s", "2 %", "0 degC", "-300 degC", "1 ms", "1 kg.m2", "J", "2*J",
-    "J/0", "1/0", "0*(1/0)", "log(0)", "sqrt(-1)", "2**9999", "(-1)**0.5", "x = 1", "a.b", "a..b", "[1]", "a[0]",
-    "a" * 3000, "(" * 200 + "1" + ")" * 200, "\x00", "\ud7ff", "é", "10 kg.m²", "∞", "''", '"', "{}", "%s", "[bold]",
-    "../../x.toml", "./two_mass.toml", ".", "no_such:Class", "json:JSONDecoder", "math:pi", "Inertia", "Fixed",
-    "Clutch", "Sine", "flange_a", "flange", "y", "steady", "rest", "given", "locked", [], [[]], [0], [[0]], [[0, "1"]],
-    [[0, [1]]], [[0, 1], [0, 2]], [[0, 1], [1, 2]], [["0 rad/s", 0.1]], [[math.nan, 1]], ["a", "b"], ["a.b"], {},
-    {"a": 1}, {"is": "Inertia"}, {"is": "Inertia", "J": 1}, {"is": []}, datetime.date(1979, 5, 27),
-    datetime.time(7, 32),
-)  # fmt: skip
-KEYS = (
-    "is", "count", "J", "w", "phi", "c", "d", "mu_pos", "table", "until", "start", "rtol", "points", "parts", "series",
-    "connect", "guess", "expose", "free", "parameters", "name", "description", "a.b", "", " ", "a[1]", "a[2].J", "é",
-)  # fmt: skip
-PIECES = (
-    "1", "2.5", "1e3", "J", "c", "pi", "sqrt", "min", "max", "(", ")", "+", "-", "*", "/", "**", ",", " ", ".", "N.m",
-    "rpm", "rad/s", "kg.m2", "kgm2", "%", "°", "degC", "^", "^2", "2", "-1", "e", "1e", "'", '"', "[", "]", "{", "}",
-    "lambda", "if", "else", "for", "import", "__class__", "=", "==", ":", ";", "\n", "\t", "\\", "#", "0x1", "1_0",
-    "é", "µm", "Ω", "١", "²", "∞", "1j", "not", "and",
-)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -74,87 +56,15 @@ class Hang(BaseException):
     """An input takes too long; no `except Exception` catches it."""
 
 
+class Touched(BaseException):
+    """An input ran a command, or wrote a file where it had not to."""
+
+
 @cache
 def examples() -> list[tuple[Path, dict[str, Any], str]]:
     """Return the netlists of examples/ that are not long."""
     found = [(path, path.read_text(encoding="utf-8")) for path in sorted(EXAMPLES.rglob("*.toml"))]
     return [(path, tomllib.loads(text), text) for path, text in found if "[parts" in text and len(text) < LARGEST]
-
-
-# -- inputs ------------------------------------------------------------------------------------------------------------
-
-
-def toml(value: Any) -> str:
-    """Write a value as TOML, on one line."""
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, str):
-        return '"' + "".join(c if c.isprintable() and c not in '"\\' else f"\\u{ord(c):04x}" for c in value) + '"'
-    if isinstance(value, dict):
-        return "{" + ", ".join(f"{toml(str(key))} = {toml(one)}" for key, one in value.items()) + "}"
-    if isinstance(value, list):
-        return "[" + ", ".join(map(toml, value)) + "]"
-    return value.isoformat() if isinstance(value, datetime.date | datetime.time) else repr(value)
-
-
-def document(tree: dict[str, Any]) -> str:
-    """Write a whole tree, with a header for each table."""
-    tables = {name: value for name, value in tree.items() if isinstance(value, dict)}
-    lines = [f"{toml(name)} = {toml(value)}" for name, value in tree.items() if name not in tables]
-    for name, table in tables.items():
-        lines += [f"[{toml(name)}]", *(f"{toml(str(key))} = {toml(value)}" for key, value in table.items())]
-    return "\n".join(lines) + "\n"
-
-
-def nodes(tree: Any) -> Iterator[tuple[Any, Any]]:
-    """Yield all places of a tree: the container and the key."""
-    keys = list(tree) if isinstance(tree, dict) else range(len(tree)) if isinstance(tree, list) else ()
-    for key in keys:
-        yield tree, key
-        yield from nodes(tree[key])
-
-
-def mutated_tree(chance: random.Random, tree: dict[str, Any]) -> None:
-    """Change one thing in a tree."""
-    places = list(nodes(tree))
-    container, key = chance.choice(places)
-    other, other_key = chance.choice(places)
-    match chance.randrange(7):
-        case 0:
-            del container[key]
-        case 1 if isinstance(container, dict):
-            container[chance.choice(KEYS)] = container.pop(key)
-        case 2 if isinstance(container, dict):
-            container[chance.choice(KEYS)] = deepcopy(chance.choice(STRANGE))
-        case 3:
-            container[key] = chance.choice([[container[key]], {"is": container[key]}, str(container[key])])
-        case 4 if not isinstance(other[other_key], dict | list):
-            container[key] = other[other_key]
-        case _:
-            container[key] = deepcopy(chance.choice(STRANGE))
-
-
-def mutated_text(chance: random.Random, text: str) -> str:
-    """Change some characters or lines of a text."""
-    lines = text.split("\n")
-    at = chance.randrange(len(lines))
-    place = chance.randrange(len(text) + 1)
-    match chance.randrange(5):
-        case 0:
-            return text[:place] + chance.choice(PIECES) + text[place:]
-        case 1:
-            return text[:place] + text[place + chance.randrange(1, 9) :]
-        case 2:
-            return "\n".join([*lines[:at], lines[chance.randrange(len(lines))], *lines[at:]])
-        case 3:
-            return "\n".join([*lines[:at], *lines[at + 1 :]])
-        case _:
-            return text[:place]
-
-
-def pieces(chance: random.Random) -> str:
-    """Join some words of formulas and units."""
-    return "".join(chance.choices(PIECES, k=chance.randrange(1, 12)))
 
 
 # -- what is done with them --------------------------------------------------------------------------------------------
@@ -251,7 +161,7 @@ def option(chance: random.Random) -> tuple[str, Callable[[], object]]:
     return " ".join(words), run
 
 
-KINDS = {netlist: 50, part: 30, formula: 9, unit: 9, option: 2}
+KINDS = {netlist: 30, part: 20, formula: 7, unit: 7, option: 2, sizing: 12, system: 7, ssp: 8, fmu: 7}
 
 
 def attempt(number: int) -> Crash | None:
@@ -259,23 +169,41 @@ def attempt(number: int) -> Crash | None:
     chance = random.Random(number)
     (make,) = chance.choices(list(KINDS), list(KINDS.values()))
     given, run = make(chance)
-    if hasattr(signal, "SIGALRM"):
-        signal.signal(signal.SIGALRM, _hangs)
-        signal.setitimer(signal.ITIMER_REAL, SECONDS)
+    if hasattr(signal, "SIGPROF"):
+        signal.signal(signal.SIGPROF, _hangs)
+        signal.setitimer(signal.ITIMER_PROF, SECONDS)
     try:
         run()
     except (ModelicaLikeError, WrongUse):
         return None
-    except (Exception, Hang) as error:  # noqa: BLE001 - whatever it is
+    except OSError as error:
+        # The command line names the file and the reason, if the file is one that was asked for.
+        asked = str(error.filename or "").startswith((str(folder()), str(EXAMPLES)))
+        return None if asked else Crash(number, make.__name__, given, error)
+    except (Exception, Hang, Touched) as error:  # noqa: BLE001 - whatever it is
         return Crash(number, make.__name__, given, error)
     finally:
-        if hasattr(signal, "SIGALRM"):
-            signal.setitimer(signal.ITIMER_REAL, 0)
+        if hasattr(signal, "SIGPROF"):
+            signal.setitimer(signal.ITIMER_PROF, 0)
     return None
 
 
 def _hangs(*_: object) -> None:
     raise Hang(f"more than {SECONDS} s")
+
+
+def watch() -> None:
+    """From now on, commands that are run and files that are written elsewhere end the input they belong to."""
+    allowed = (str(folder()), tempfile.gettempdir(), os.devnull)
+
+    def look(event: str, arguments: tuple[Any, ...]) -> None:
+        if event == "open" and isinstance(arguments[1], str) and set(arguments[1]) & set("wax+"):
+            if not str(arguments[0]).startswith(allowed):
+                raise Touched(f"{arguments[0]} is written")
+        elif event in ("os.system", "os.exec", "os.posix_spawn", "socket.connect", "webbrowser.open"):
+            raise Touched(f"{event} {arguments}")
+
+    sys.addaudithook(look)
 
 
 def main() -> None:
@@ -299,4 +227,5 @@ def main() -> None:
 
 if __name__ == "__main__":
     os.environ.setdefault("MPLBACKEND", "agg")
+    watch()
     main()

@@ -1,15 +1,23 @@
 """No input ends in anything but a sentence; what the fuzzer has found stays found."""
 
+import contextlib
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
+from time import process_time
 
 import pytest
 from fuzzer import attempt
 
+from components import Inertia
 from modelica_like import simulate
-from modelica_like.errors import ModelicaLikeError
+from modelica_like.analyse.sweeps.ranges import read_range
+from modelica_like.cosimulation.described import described
+from modelica_like.cosimulation.files import load_system
+from modelica_like.errors import FmuRefused, ModelicaLikeError
 from modelica_like.netlist import loads
 from modelica_like.netlist.write import dumps
+from modelica_like.sizing import size
 
 BATCHES = 6
 INPUTS = 3000
@@ -44,7 +52,7 @@ FOUND: dict[str, tuple[Callable[[], object], str]] = {
     ),
     "a run shorter than times": (
         lambda: simulate(loads(WHEEL), 5e-324),
-        "A run of 4.94066e-324 s is too short: no times can be told apart in it.",
+        "A run of 4.94066e-324 s is too short: its times cannot be distinguished.",
     ),
 }
 
@@ -55,6 +63,98 @@ def test_found_by_the_fuzzer(name: str) -> None:
     with pytest.raises(ModelicaLikeError) as caught:
         act()
     assert caught.value.what.startswith(told)
+
+
+LIFE = """[checks.k]
+is = "bearing_life"
+radial_load = "150 N"
+speed = "1333 rpm"
+dynamic_rating = "2600 N"
+static_rating = "1060 N"
+"""
+RING = """[checks.k]
+is = "ravigneaux_gear"
+input_speed = "1000 rpm"
+input_torque = "100 N.m"
+teeth = { small_sun = 21, large_sun = 39, short_planet = 13, long_planet = 10, ring = 3 }
+"""
+SIZINGS = {
+    "a published list": (LIFE + 'published = { life = ["1 h"] }\n', "checks.k.published.life compares one number"),
+    "a limit that is a list": (LIFE + "limits = { life = { min = [[0, 1]] } }\n", "checks.k.limits.life compares"),
+    "a list of lists": (LIFE.replace('"150 N"', '["1 N", ["2 N"]]'), "checks.k.radial_load must be a list of numbers"),
+    "a ring inside of its planets": (RING, "checks.k cannot be worked out: A ring of 3 teeth cannot hold planets of"),
+    "teeth without the ring": (RING.replace(", ring = 3", ""), "checks.k.teeth needs ring."),
+    "a list without numbers": (LIFE.replace('"150 N"', "[]"), "checks.k.radial_load must be a list of numbers"),
+    "an array in published": (LIFE + "published = [1, 2]\n", "checks.k.published must be a table by line"),
+}
+
+
+@pytest.mark.parametrize("name", SIZINGS)
+def test_sizing_files_found_by_the_fuzzer(name: str, tmp_path: Path) -> None:
+    text, told = SIZINGS[name]
+    (tmp_path / "bad.toml").write_text(text)
+    with pytest.raises(ModelicaLikeError) as caught:
+        size(tmp_path / "bad.toml")
+    assert caught.value.what.startswith(told)
+
+
+MANY = 100_000
+LONG = {
+    "a sum": "+".join(MANY // 2 * ["1"]), "names": "a." * (MANY // 2) + "b", "brackets": "(" * MANY + "1" + ")" * MANY,
+    "spaces in a unit": "1 N.m" + " " * MANY + "x", "spaces behind": "1 kg.m2" + " " * MANY + "\t",
+    "units": "1 " + "kg." * MANY + "kg", "digits": "1" * MANY, "an exponent": "1 m^" + "9" * MANY, "dots": "1." * MANY,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", LONG)
+def test_long_texts_take_no_time(name: str) -> None:
+    """Spaces within a unit took time with the square of their number: 41 s for these."""
+    begin = process_time()
+    with contextlib.suppress(ModelicaLikeError):
+        Inertia(J=LONG[name])
+    assert process_time() - begin < 1.0
+
+
+def test_ranges_are_refused_before_anything_is_built() -> None:
+    with pytest.raises(ModelicaLikeError) as caught:
+        read_range("J2.J=0:1:99999999999")
+    assert caught.value.what == "J2.J: a sweep has at most 10000000 runs."
+
+
+SYSTEM = """name = "two"
+[fmus]
+a = {{ file = "a.fmu", parameters = {{ J = {} }} }}
+"""
+LARGE = "1" + 400 * "0"
+
+
+@pytest.mark.parametrize(("given", "told"), [(LARGE, "is larger than any number that"), ("nan", "must be a finite")])
+def test_values_of_fmus_are_finite_numbers(given: str, told: str, tmp_path: Path) -> None:
+    (tmp_path / "two.toml").write_text(SYSTEM.format(given))
+    with pytest.raises(ModelicaLikeError) as caught:
+        load_system(tmp_path / "two.toml", tmp_path)
+    assert caught.value.what.startswith(f"fmus.a.J {told}")
+
+
+DEEP = {"1,500 folders": "a/" * 1500 + "b", "a name of 300 letters": "a" * 300, "700 letters": "a/" * 350}
+
+
+@pytest.mark.parametrize("name", DEEP)
+def test_names_that_no_file_system_takes(name: str, tmp_path: Path) -> None:
+    with zipfile.ZipFile(tmp_path / "deep.fmu", "w") as archive:
+        archive.writestr("modelDescription.xml", "<fmiModelDescription/>")
+        archive.writestr(DEEP[name], "")
+    with pytest.raises(FmuRefused, match="has a longer name than file systems take"):
+        described(tmp_path / "deep.fmu")
+
+
+@pytest.mark.parametrize("name", [".", "modelDescription.xml/a"])
+def test_a_file_with_the_name_of_a_folder(name: str, tmp_path: Path) -> None:
+    with zipfile.ZipFile(tmp_path / "odd.fmu", "w") as archive:
+        archive.writestr("modelDescription.xml", "<fmiModelDescription/>")
+        archive.writestr(name, "")
+    with pytest.raises(FmuRefused, match=r"^odd\.fmu is refused: a file in it has the name of a folder\.$"):
+        described(tmp_path / "odd.fmu")
 
 
 @pytest.mark.parametrize("name", ["description", "simulate", "origin"])

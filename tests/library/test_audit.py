@@ -270,7 +270,7 @@ class CapacitorWithoutHalf(Capacitor):
         return self.C * self.v**2
 
 
-BELT: dict[str, Any] = {"r_a": 0.1, "r_b": 0.1, "c": 2e3, "d": 20.0, "x": 0.0}
+BELT: dict[str, Any] = {"r_a": 0.1, "r_b": 0.1, "c": 2e3, "d": 20.0, "F_0": 1e4, "x": 0.0}
 TABLE: dict[str, Any] = {"m": 20.0, "f_friction": 30.0, "f_load": 20.0, "s": 0.0, "v": 0.0}
 SET: dict[str, Any] = {"i0": -2.5, "efficiency": 0.97}
 

@@ -43,6 +43,18 @@ def belt_slip(run: Solution) -> None:
 
 
 @numbers
+def dogs(run: Solution) -> None:
+    engaged = run.impacts[0]
+    assert (engaged.component, engaged.time) == ("dogs", close(2.0))
+    assert engaged.energy == close(0.5 * 1 * 0.25 / 1.25 * 25)
+    # From there the shaft and its sleeve turn with 5/1.25 rad/s, braked by 2/1.25 rad/s²: 0.1 rad later the claws meet.
+    meeting = (4 - sqrt(16 - 2 * 1.6 * 0.1)) / 1.6
+    assert run.impacts[1].time == close(2 + meeting)
+    speed = 4 - 1.6 * meeting
+    assert run.impacts[1].energy == close(0.5 * 1.25 * 3 / 4.25 * speed**2 * (1 - 0.5**2))
+
+
+@numbers
 def screw_lift(run: Solution) -> None:
     ideal = 2000 * 0.01 / (2 * pi)
     assert -run.at(0.3)["motor.flange.tau"] == close(ideal / 0.9)

@@ -221,6 +221,20 @@ def test_limited_pi_does_not_wind_up() -> None:
     assert np.max(speed_loop(free, "4 s")["rotor.w"]) == pytest.approx(10 * (1 + exp(-2)), rel=1e-4)
 
 
+def test_a_limited_integral_goes_back_with_its_time_constant() -> None:
+    """At the limit Ni·Ti·der(I) = I_end - I with I_end = y_max/k - (1 - Ni)·e: back-calculation on paper."""
+    k, Ti, Ni, e, y_max = 4.0, 0.5, 0.3, 2.0, 3.0
+    parts: dict[str, Component] = {
+        "error": Constant(k=e), "none": Constant(k=0.0),
+        "part": PI(k=k, Ti=Ti, Ni=Ni, y_max=y_max, u_ff=0.0, integral=1.0),
+    }  # fmt: skip
+    wires = {"set": ["error.y", "part.u_s"], "measured": ["none.y", "part.u_m"]}
+    run = simulate(Assembly("limited", parts=parts, connect=wires), 0.4, rtol=1e-9)
+    end = y_max / k - (1 - Ni) * e
+    np.testing.assert_allclose(run["part.integral"], end + (1.0 - end) * np.exp(-run.time / (Ni * Ti)), atol=1e-7)
+    assert set(run["part.y"]) == {y_max}
+
+
 def test_pid_against_scipy() -> None:
     run = speed_loop(PID(k="4 N.m.s/rad", Ti=0.5, Td=0.05, Nd=10.0, integral=0.0, smoothed=0.0), "2 s")
 

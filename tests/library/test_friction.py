@@ -267,7 +267,8 @@ def test_housing_feels_the_friction(kind: type[Component]) -> None:
 
 
 def test_bearing_with_viscous_part() -> None:
-    run = simulate(shaft(mass=still(5.0, J=2.0), bearing=BearingFriction(tau_pos=((0, 1), (1, 2)))), "5 s", **TIGHT)
+    bearing = BearingFriction(tau_pos=((0, 1), (1, 2)), extrapolate="linear")
+    run = simulate(shaft(mass=still(5.0, J=2.0), bearing=bearing), "5 s", **TIGHT)
     stop = 2.0 * log(6.0)
     assert run.events[-1].time == pytest.approx(stop, abs=1e-8)
     slides = run.time < stop
@@ -278,8 +279,8 @@ def test_bearing_with_viscous_part() -> None:
 @pytest.mark.parametrize("kind", [BearingFriction, Brake])
 def test_friction_that_vanishes_at_standstill(kind: type[Component], sign: int) -> None:
     """Without static friction the mass never sticks: a purely viscous bearing, or plates with mu(0) = 0."""
-    viscous = BearingFriction(tau_pos=((0, 0), (1, 2)))
-    plates = Brake(fn_max=4.0, mu_pos=((0, 0), (1, 0.5)))
+    viscous = BearingFriction(tau_pos=((0, 0), (1, 2)), extrapolate="linear")
+    plates = Brake(fn_max=4.0, mu_pos=((0, 0), (1, 0.5)), extrapolate="linear")
     friction = viscous if kind is BearingFriction else plates
     run = simulate(shaft(mass=still(sign * 5.0), friction=friction), "1 s", **TIGHT)
     np.testing.assert_allclose(run["mass.w"], sign * 5.0 * np.exp(-2.0 * run.time), rtol=1e-8)

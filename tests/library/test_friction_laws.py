@@ -28,8 +28,7 @@ def mu_linear(v: float) -> float:
 
 @pytest.mark.parametrize("kind", [Clutch, Brake])
 def test_coefficient_from_a_table(kind: type[Component]) -> None:
-    """Beyond the last row the last slope goes on."""
-    brake = kind(fn_max=2.0, cgeo=1.5, mu_pos=MU)
+    brake = kind(fn_max=2.0, cgeo=1.5, mu_pos=MU, extrapolate="linear")
     parts = {"mass": still(30.0), "brake": brake}
     run = simulate(shaft(**parts, **({"wall": ConstantSpeed(w_fixed=0.0)} if kind is Clutch else {})), "40 s", **TIGHT)
     stop = run.events[-1].time

@@ -6,6 +6,9 @@ import pytest
 from components import (
     Brake,
     Clutch,
+    ConstantForce,
+    ConstantTorque,
+    DogClutch,
     Fixed,
     Freewheel,
     IdealGear,
@@ -13,7 +16,9 @@ from components import (
     Mass,
     MassWithStopAndFriction,
     OneWayClutch,
+    RigidBacklash,
     SpringDamper,
+    Step,
     TranslationalSpring,
 )
 from components.interfaces import LinearCompliantWithRelativeStates
@@ -130,3 +135,53 @@ def test_a_stop_on_an_elastic_shaft() -> None:
     assert drive["hub.w"][0] == 0.0
     assert drive["flywheel.w"][0] == pytest.approx(-1.0, rel=1e-12)
     assert drive.final["flywheel.w"] == pytest.approx(0.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
+def test_flanks_part_with_what_restitution_leaves(e: float) -> None:
+    """Play of 1 rad: the first impact at 1/6 s, the way back takes 1/(3·e) s, 1/e times as long as the one before."""
+    parts = {"a": Inertia(J=1.0, phi=0, w=3.0), "play": RigidBacklash(b=1.0, e=e), "b": Inertia(J=2.0, w=0.0)}
+    drive = run(parts, 1.0, rtol=1e-9)
+    momentum = drive["a.w"] + 2 * drive["b.w"]
+    np.testing.assert_allclose(momentum, 3.0, rtol=1e-9)
+    meetings = [event.time for event in drive.events if event.before == "gap"]
+    wanted = {0.0: [1 / 6], 0.5: [1 / 6, 5 / 6], 1.0: [1 / 6, 1 / 2, 5 / 6]}[e]
+    np.testing.assert_allclose(meetings, wanted, rtol=1e-8)
+    np.testing.assert_allclose(drive.final["b.w"] - drive.final["a.w"], -3.0 * (-e) ** len(meetings), atol=1e-9)
+    assert drive.energy().lost == pytest.approx(0.5 * (2 / 3) * 9 * (1 - e ** (2 * len(meetings))), abs=1e-9)
+
+
+def test_a_mass_bounces_at_its_stop_until_it_rests() -> None:
+    """3 N push 2 kg with 4 m/s against a stop 1 m ahead: v² = 16 + 3; then e times as fast, 2·v·m/F each time."""
+    mass = MassWithStopAndFriction(m=2.0, smin=-100.0, smax=1.0, s=0.0, v=4.0, e=0.5)
+    drive = run({"push": ConstantForce(f_constant=3.0), "mass": mass}, 10.0, rtol=1e-9)
+    first, v = (19**0.5 - 4) / 1.5, 0.5 * 19**0.5
+    wanted = first + np.array([0.0, *np.cumsum(v * 0.5 ** np.arange(3) * 4 / 3)])
+    np.testing.assert_allclose([one.time for one in drive.impacts[:4]], wanted, rtol=1e-7)
+    np.testing.assert_allclose([one.energy for one in drive.impacts[:4]], 19 * 0.75 * 0.25 ** np.arange(4), rtol=1e-7)
+    assert (drive.final["mass.s"], drive.final["mass.v"]) == (1.0, 0.0)
+
+
+def test_dogs_go_in_at_a_small_slip() -> None:
+    """1 kg m² slows down by 2 rad/s²: its slip of 9 rad/s is 5 at 2 s; then both turn with 5/(1 + 3) rad/s."""
+    parts = {
+        "brake": ConstantTorque(tau_constant=-2.0), "a": Inertia(J=1.0, phi=0, w=9.0),
+        "dogs": DogClutch(w_max=5.0), "b": Inertia(J=3.0, w=0.0),
+    }  # fmt: skip
+    drive = run(parts, 2.0 + 1e-6, rtol=1e-9)
+    (impact,) = drive.impacts
+    assert impact.time == pytest.approx(2.0, rel=1e-9)
+    assert impact.energy == pytest.approx(0.5 * 0.75 * 25, rel=1e-9)
+    assert drive.final["b.w"] == pytest.approx(1.25, rel=1e-5)
+
+
+def test_dogs_that_are_pulled_out_carry_nothing() -> None:
+    parts = {
+        "drive": ConstantTorque(tau_constant=4.0), "a": Inertia(J=1.0, phi=0, w=0.0),
+        "dogs": DogClutch(), "b": Inertia(J=3.0, w=0.0),
+    }  # fmt: skip
+    out = Step(offset=1.0, height=-1.0, start_time=1.0)
+    wired = {"e": ["out.y", "dogs.engage"]}
+    drive = simulate(Assembly("d", parts={**parts, "out": out}, series={"s": [*parts]}, connect=wired), 2.0)
+    np.testing.assert_allclose([drive.final["a.w"], drive.final["b.w"]], [5.0, 1.0], rtol=1e-8)
+    assert drive.impacts == ()

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from components import ConstantForce, ConstantTorque, Inertia, MachineTable, SpeedDependentLoad
+from components import ConstantForce, ConstantSpeed, ConstantTorque, Inertia, MachineTable, SpeedDependentLoad
 from modelica_like import Assembly, Component, simulate
 
 TIGHT = {"rtol": 1e-10, "atol": 1e-12}
@@ -61,6 +61,23 @@ def test_load_with_any_exponent(p: float) -> None:
     reference = solve_ivp(rates, (0, 3), [0.0], "DOP853", rtol=1e-11, atol=1e-12, t_eval=[0.1, 1.0, 3.0])
     for t, w in zip(reference.t, reference.y[0], strict=True):
         assert run.at(t)["mass.w"] == pytest.approx(w, rel=1e-7)
+
+
+@pytest.mark.parametrize("p", [0.0, 1e-3, 0.1, 2 / 3])
+@pytest.mark.parametrize("speed", [1.0, 0.5, 1e-6, -1.0])
+def test_load_of_a_small_exponent(p: float, speed: float) -> None:
+    """1 N.m + 5 N.m·|w|^p, also where p is so small that the law is nearly a step."""
+    load = SpeedDependentLoad(a=1.0, b=5.0, p=p)
+    run = simulate(shaft(motor=ConstantSpeed(w_fixed=speed), load=load), "0.1 s")
+    assert run.final["load.tau"] == pytest.approx(np.sign(speed) * (1 + 5 * abs(speed) ** p), rel=1e-12)
+
+
+@pytest.mark.parametrize(("p", "torque", "moves"), [(0.0, 5.9, False), (0.0, 6.1, True), (0.5, 1.1, True)])
+def test_load_holds_with_what_it_has_at_standstill(p: float, torque: float, moves: bool) -> None:
+    run = simulate(
+        shaft(push=ConstantTorque(tau_constant=torque), mass=still(), load=SpeedDependentLoad(a=1.0, b=5.0, p=p)), 0.1
+    )
+    assert bool(run.final["mass.w"] > 0) is moves
 
 
 def test_load_holds_at_standstill_and_is_free_without_a_constant_part() -> None:

@@ -48,10 +48,13 @@ def driven(source: Component, entry: str, signal: Component, *elements: Componen
 
 
 FRICTION: dict[str, tuple[Any, str]] = {
-    "bearing": (lambda: BearingFriction(tau_pos=((0, 2), (1, 5)), peak=1.5), "tau"),
-    "brake": (lambda: Brake(fn_max=4.0, mu_pos=((0, 0.5), (1, 1.25))), "tau"),
+    "bearing": (lambda: BearingFriction(tau_pos=((0, 2), (1, 5)), peak=1.5, extrapolate="linear"), "tau"),
+    "brake": (lambda: Brake(fn_max=4.0, mu_pos=((0, 0.5), (1, 1.25)), extrapolate="linear"), "tau"),
     "load": (lambda: SpeedDependentLoad(a=2.0, b=3.0), "tau"),
-    "gear": (lambda: LossyGear(ratio=2.0, loss_table=((0, 1, 1, 2, 2), (1, 1, 1, 5, 5))), "tau_loss"),
+    "gear": (
+        lambda: LossyGear(ratio=2.0, loss_table=((0, 1, 1, 2, 2), (1, 1, 1, 5, 5)), extrapolate="linear"),
+        "tau_loss",
+    ),
 }
 """Each with the friction 2 N.m + 3 N.m.s/rad·|w|, and the name of it."""
 

@@ -131,7 +131,7 @@ def test_mass_pressed_against_a_stop_starts_there(friction: float) -> None:
 # -- friction ----------------------------------------------------------------------------------------------------------
 
 FRICTIONS: dict[str, Component] = {
-    "table": SupportFriction(f_pos=((0.0, 4.0), (1.0, 4.0))), "stribeck": StribeckFriction(F_Coulomb=4.0),
+    "table": SupportFriction(f_pos=((0.0, 4.0), (5.0, 4.0))), "stribeck": StribeckFriction(F_Coulomb=4.0),
     "brake": TranslationalBrake(fn_max=8.0),
 }  # fmt: skip
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from modelica_like.cosimulation.load import load_system
+from modelica_like.cosimulation.files import load_system
 from modelica_like.cosimulation.ssp import write_ssp
 from modelica_like.cosimulation.ssp_document import NAMES
 from modelica_like.cosimulation.system import Link, Port, System, Unit
@@ -199,7 +199,7 @@ SYSTEMS: dict[str, tuple[str, str, str]] = {
     ),
     "not finite": (
         values('<ssv:Parameter name="J"><ssv:Real value="INF"/></ssv:Parameter>'), "",
-        f"a.J = inf is not finite.\n  in {IN_SYSTEM}:4 `<Parameter name=\"J\">`",
+        f"Real: value = 'INF' is not finite.\n  in {IN_SYSTEM}:4 `<Real value=\"INF\">`",
     ),
     "start time": (
         elements(A), '<ssd:DefaultExperiment startTime="5"/>',

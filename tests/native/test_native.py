@@ -13,6 +13,7 @@ from modelica_like import build, sensitivities, simulate
 from modelica_like.errors import (
     Chattering,
     ContradictingStart,
+    ExportError,
     ModelicaLikeError,
     SingularAtStart,
     StepFailed,
@@ -190,6 +191,27 @@ def test_errors_are_those_of_idas(part, kind):
         with pytest.raises(kind) as caught:
             simulate(drive, 2.0, solver=solver)
         assert caught.value.run.time[-1] == pytest.approx(1.0, abs=0.01)
+
+
+def test_a_run_that_idas_gives_up_is_done_by_the_run_time(monkeypatch):
+    """At 1e-13 the equations of a step of the gearbox do not converge; at 1e-9 IDAS itself runs, for comparison."""
+    gearbox = build(EXAMPLES / "lepelletier.toml")
+    run, near = simulate(gearbox, rtol=1e-13, atol=1e-15), simulate(gearbox, rtol=1e-9, atol=1e-11)
+    assert [(one.mode, one.after) for one in run.events] == [(one.mode, one.after) for one in near.events]
+    for name in gearbox.states:
+        np.testing.assert_allclose(run[name][-1], near[name][-1], rtol=0, atol=1e-7 * np.abs(near[name]).max())
+    (told,) = run.notices
+    assert told.startswith("IDAS gave up at about t = ")
+    assert told.endswith("The whole run was done by the compiled run-time instead (solver native).")
+
+    def missing():
+        raise ExportError("There is no run-time.")
+
+    monkeypatch.setattr(model, "library", missing)
+    gearbox._cache.clear()
+    with pytest.raises(StepFailed, match=r"^IDAS gave up at about t = ") as caught:
+        simulate(gearbox, rtol=1e-13, atol=1e-15)
+    assert caught.value.run.time[-1] > 1.0
 
 
 def test_messages_become_the_same_errors():

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from modelica_like import simulate
-from modelica_like.errors import ModelicaLikeError
+from modelica_like import linearize, sensitivities, simulate, steady
+from modelica_like.errors import ModelicaLikeError, NetlistError
 from modelica_like.report.compare import Comparison, compare
 from modelica_like.report.files import write_solution
 from modelica_like.report.sources import read_csv, trajectories
@@ -171,3 +171,17 @@ def test_other_files() -> None:
         "'drive.txt' has no trajectories.\n"
         "Netlists and systems of FMUs (.toml), FMUs (.fmu), SSPs (.ssp) and tables (.csv) have."
     )
+
+
+def test_what_needs_equations_says_so_of_recorded_data(tmp_path: Path) -> None:
+    table = read_csv(write(tmp_path / "a.csv", "time,x", "0,0", "1,2"))
+    needing = (
+        lambda: linearize(table),
+        lambda: sensitivities(table, "x"),
+        lambda: simulate(table),
+        lambda: steady(DIRECT, near=table),
+        lambda: table.point(0.5),
+    )
+    for run in needing:
+        with pytest.raises(NetlistError, match="a: this needs the drive with its equations, not trajectories"):
+            run()

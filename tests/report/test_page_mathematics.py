@@ -1,30 +1,23 @@
-"""The formulas of every page, read back from LaTeX, are worth what the equations, events and energy terms are worth."""
+"""Every expression of every component type, read back from its LaTeX, is worth what Python makes of it."""
 
-import random
+import ast
+import inspect
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import lru_cache
+from hashlib import sha256
 from math import pi
-from pathlib import Path
+from textwrap import dedent
+from types import FunctionType
 from typing import Any
 
-import casadi as ca
 import numpy as np
 import pytest
 
-from modelica_like.errors import LanguageError
 from modelica_like.language import Component
-from modelica_like.language.equation import Equation, as_statement
-from modelica_like.language.expr import Symbol, symbols_in
-from modelica_like.language.places import located
-from modelica_like.language.transition import as_event
 from modelica_like.netlist import library_types
 from modelica_like.report.component_pages import latex_names
-from modelica_like.report.component_pages.library import examples_by_type
-from modelica_like.report.component_pages.named_calls import any_table
-from modelica_like.report.component_pages.page import structure_of
-from modelica_like.report.component_pages.statements import Statements, statements
+from modelica_like.report.component_pages.latex import Path, Unwritable, Writer
 
 # -- a reader of LaTeX -------------------------------------------------------------------------------------------------
 
@@ -37,11 +30,6 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {
     r"\sin": np.sin, r"\cos": np.cos, r"\tan": np.tan, r"\exp": np.exp, r"\ln": np.log, r"\tanh": np.tanh,
     r"\text{sgn}": np.sign, r"\text{atan2}": np.arctan2, r"\max": max, r"\min": min, r"\text{floor}": np.floor,
 }  # fmt: skip
-NAMED = re.compile(
-    r"[a-zA-Z]|\\text.*|\\(varphi|omega|dot|ddot|rate|pi|infty|frac|tfrac|sqrt|left|begin|max|min|sin|cos|tan|exp|ln|tanh|"
-    + "|".join(latex_names.GREEK) + ")"
-)  # fmt: skip
-"""What a factor can begin with."""
 
 
 def tokens_of(latex: str) -> list[str]:
@@ -51,15 +39,12 @@ def tokens_of(latex: str) -> list[str]:
 
 @dataclass
 class Formulas:
-    """Numbers of the names, active modes, and what is defined: formal arguments and right side, or a table."""
+    """Formulas whose names have numbers that follow from them; some modes are active."""
 
-    values: Mapping[str, float]
     modes: Mapping[str, str]
-    definitions: Mapping[str, tuple[list[str], str]]
-    tables: Mapping[str, Callable[[float], float]]
 
-    def worth(self, latex: str, arguments: Mapping[str, float] | None = None) -> Any:
-        reader = Reader(self, tokens_of(latex), {**self.values, **(arguments or {})})
+    def worth(self, latex: str) -> Any:
+        reader = Reader(self, tokens_of(latex))
         result = reader.disjunction()
         assert reader.at == len(reader.tokens), (latex, reader.tokens[reader.at :])
         return result
@@ -69,7 +54,6 @@ class Formulas:
 class Reader:
     formulas: Formulas
     tokens: list[str]
-    values: Mapping[str, float]
     at: int = 0
 
     @property
@@ -114,10 +98,8 @@ class Reader:
 
     def product(self) -> Any:
         value = self.power()
-        while self.token == r"\cdot" or NAMED.fullmatch(self.token):
-            if self.token == r"\cdot":
-                self.take()
-            value = value * self.power()
+        while self.token in (r"\cdot", r"\bmod"):
+            value = value * self.power() if self.take() == r"\cdot" else value % self.power()
         return value
 
     def power(self) -> Any:
@@ -181,13 +163,7 @@ class Reader:
 
     def named(self) -> Any:
         name = self.name()
-        if name in self.values:
-            return self.values[name]
-        arguments = self.bracketed() if self.token == r"\left" else []
-        if name in self.formulas.tables:
-            return self.formulas.tables[name](*arguments)
-        formal, right = self.formulas.definitions[name]
-        return self.formulas.worth(right, dict(zip(formal, arguments, strict=True)))
+        return called(name, *(self.bracketed() if self.token == r"\left" else []))
 
     def name(self) -> str:
         begin = self.at
@@ -204,114 +180,142 @@ class Reader:
         return "".join(self.tokens[begin : self.at])
 
 
-# -- a component with numbers ------------------------------------------------------------------------------------------
+# -- Python with the same numbers --------------------------------------------------------------------------------------
 
 
-@lru_cache
-def examples() -> Any:
-    return examples_by_type(Path(__file__).parents[2] / "examples")
+def called(name: str, *arguments: Any) -> float:
+    """Return a number for a name, or for a function of its arguments."""
+    if name in (r"\text{false}", r"\text{true}"):
+        return float(name == r"\text{true}")
+    number = 0.2 + int.from_bytes(sha256(name.encode()).digest()[:4]) / 2**33
+    return number * (1 + sum(0.1 * k * float(one) for k, one in enumerate(arguments, 1)))
 
 
-def path_of(symbol: Symbol, root: Component) -> str:
-    names, owner = [symbol.name], symbol.owner
-    while owner is not root:
-        names.append(owner._name)
-        owner = owner._owner
-    return ".".join(reversed(names))
+class Number(float):
+    """The number of a path; what lies below it is a number again, and it can be called."""
+
+    path: str
+    modes: Mapping[str, str]
+
+    def __new__(cls, path: str, modes: Mapping[str, str], dots: int = 0) -> "Number":
+        made = super().__new__(cls, called("".join(tokens_of(latex_names.name(path.lstrip("_"), dots)))))
+        made.path, made.modes, made.dots = path, modes, dots
+        return made
+
+    def __getattr__(self, name: str) -> Any:
+        path = f"{self.path}.{name}".removeprefix(".")
+        if name == "used":
+            return called(rf"\text{{{self.path.replace('_', ' ')} is connected}}")
+        return called("t") if path == "time" else Number(path, self.modes)
+
+    def __call__(self, *arguments: float, **options: float) -> float:
+        return called("".join(tokens_of(latex_names.name(self.path.lstrip("_")))), *arguments, *options.values())
+
+    def given(self, name: str) -> float:
+        return called(rf"\text{{{name.replace('_', ' ')} is given}}")
+
+    def is_(self, *names: str) -> bool:
+        return self.modes[self.path] in names
+
+    def choose(self, otherwise: float | None = None, **values: float) -> float | None:
+        return values.get(self.modes[self.path], otherwise)
 
 
-class Numbers:
-    """A component whose symbols all have a number, and its pages' formulas with the same numbers."""
-
-    def __init__(self, kind: type[Component], structure: Mapping[str, Any], active: int, option: str = "") -> None:
-        self.random = random.Random(f"{kind.__name__} {active}")
-        self.tables = {
-            name: tuple((x, *(self.random.uniform(0.2, 0.9) for _ in values)) for x, *values in rows)
-            for name, rows in any_table(kind).items()
-        }
-        self.component = component = kind(**{**self.tables, **structure})
-        component.__dict__["given"] = lambda name: name == option or Component.given(component, name)
-        if option in component.connectors:
-            component.connectors[option]._used = True
-        self.active = {name: active % len(mode.names) for name, mode in kind._class_modes.items()}
-        self.known: dict[str, float] = {}
-
-    def of(self, expression: Any) -> float:
-        """Return what an expression of the component is worth."""
-        expression = ca.SX(expression)
-        leaves = symbols_in(expression)  # type: ignore[arg-type]
-        if not leaves:
-            return float(expression)
-        function = ca.Function("worth", [ca.SX(leaf) for leaf in leaves], [expression])
-        return float(function(*(self.number(leaf) for leaf in leaves)))
-
-    def number(self, symbol: Symbol) -> float:
-        path = "t" if symbol.owner is None else path_of(symbol, self.component)
-        if path in self.active:
-            return float(self.active[path])
-        latex = "".join(tokens_of(latex_names.name(path, symbol.order)))
-        return self.known.setdefault(latex, self.random.uniform(0.2, 0.9))
-
-    def formulas(self, definitions: Any) -> Formulas:
-        defined: dict[str, tuple[list[str], str]] = {}
-        for term in definitions:
-            name, _, arguments = term.left.partition(r"\left(")
-            formal = ["".join(tokens_of(one)) for one in arguments.removesuffix(r"\right)").split(", ") if one]
-            defined["".join(tokens_of(name))] = formal, term.right
-        return Formulas(self.known, self.modes(), defined, self.lookups())
-
-    def modes(self) -> dict[str, str]:
-        return {name: mode.names[self.active[name]] for name, mode in self.component.modes.items()}
-
-    def lookups(self) -> dict[str, Callable[[float], float]]:
-        found: dict[str, Callable[[float], float]] = {}
-        for name, (first, second) in self.tables.items():
-            latex = "".join(tokens_of(latex_names.name(name)))
-            for column in range(1, len(first)):
-                slope = (second[column] - first[column]) / (second[0] - first[0])
-                number = f"_{{{column + 1}}}" if len(first) > 2 else ""
-                found[latex + number] = lambda x, a=first[0], y=first[column], s=slope: y + s * (x - a)
-            if len(first) == 2:
-                self.known |= {f"{latex}_{{1}}": first[0], f"{latex}_{{2}}": second[0]}
-        return found
+def rate(what: Number) -> Number:
+    return Number(what.path, what.modes, what.dots + 1)
 
 
-def same(ours: Any, theirs: Any) -> bool:
-    return ours == pytest.approx(theirs, rel=2e-5, abs=1e-9, nan_ok=True)
+KNOWN: dict[str, Any] = {
+    "der": rate, "where": lambda holds, then, other: then if holds else other, "negate": lambda holds: not holds,
+    "all_of": lambda *conditions: all(conditions), "any_of": lambda *conditions: any(conditions),
+    "prescribed": lambda what: called("".join(tokens_of(latex_names.name(f"prescribed({what.path})")))),
+    "maximum": max, "minimum": min, "absolute": abs, "sign": np.sign, "float": float, "exp": np.exp, "log": np.log,
+    "sqrt": np.sqrt, "sin": np.sin, "cos": np.cos, "tan": np.tan, "tanh": np.tanh, "atan2": np.arctan2,
+    "floor": np.floor,
+}  # fmt: skip
+STRUCTURES = (
+    ast.Lambda, ast.Starred, ast.Tuple, ast.List, ast.Subscript, ast.JoinedStr, ast.Dict, ast.ListComp, ast.In,
+    ast.GeneratorExp, ast.NotIn,
+)  # fmt: skip
 
 
-def compare(page: Statements, numbers: Numbers) -> None:
-    component, name = numbers.component, type(numbers.component).__name__
-    said = [as_statement(one, source, name) for one, source in located(component.equations())]
-    residuals = [numbers.of(ca.SX(one.left) - ca.SX(one.right)) for one in said if isinstance(one, Equation)]
-    energies = {term: numbers.of(getattr(component, term)()) for term in page.energy}
-    events = [as_event(one, source, name) for one, source in located(component.events())]
-    moments = [numbers.of(one.when if getattr(one, "at", None) is None else one.at) for one in events]
-    resets = [numbers.of(value) for one in events for value in getattr(one, "reset", {}).values()]
-    formulas = numbers.formulas(page.definitions)
-    for term, residual in zip(page.equations, residuals, strict=True):
-        written = formulas.worth(term.left) - formulas.worth(term.right)
-        assert same(abs(written), abs(residual)), (term, numbers.active)
-    for term, energy in energies.items():
-        assert same(formulas.worth(page.energy[term].right), energy), page.energy[term]
-    for event, moment in zip(page.events, moments, strict=True):
-        assert same(formulas.worth(event.when.removeprefix("t = ")), moment), event
-    for latex, value in zip((reset for event in page.events for reset in event.resets), resets, strict=True):
-        assert same(formulas.worth(latex.partition(" := ")[2]), value), latex
+def functions(kind: type[Component]) -> Iterator[FunctionType]:
+    for base in kind.__mro__:
+        if issubclass(base, Component) and base not in Component.__mro__:
+            members = (one.fget if isinstance(one, property) else one for one in vars(base).values())
+            yield from (one for one in members if isinstance(one, FunctionType) and one.__name__ != "build")
 
 
-@pytest.mark.parametrize("name", sorted(library_types()))
-@pytest.mark.filterwarnings("ignore::RuntimeWarning")  # a branch that is not taken may divide by zero
-def test_formulas_are_worth_what_the_class_says(name: str) -> None:
-    kind = library_types()[name]
-    structure = structure_of(kind, examples()[name])
-    page = statements(kind, structure)
-    for active in range(max((len(mode.names) for mode in kind._class_modes.values()), default=1)):
-        compare(page, Numbers(kind, structure, active))
-    for option in (*page.asked, *(one for one, end in kind._class_connectors.items() if end.optional)):
+def is_formula(node: ast.expr) -> bool:
+    """Tell whether an expression is one of numbers only."""
+    for one in ast.walk(node):
+        text = isinstance(one, ast.Constant) and isinstance(one.value, str)
+        if isinstance(one, STRUCTURES) or (text and not isinstance(node, ast.Call)):
+            return False
+        if isinstance(one, ast.Call) and ast.unparse(one.func) in ("interpolate", "connect", "super", "zip", "series"):
+            return False
+        if isinstance(one, ast.Call) and ast.unparse(one.func) == "der" and not is_path(one.args[0]):
+            return False
+    return True
+
+
+def is_path(node: ast.expr) -> bool:
+    inner = isinstance(node, ast.Call) and ast.unparse(node.func) == "der"
+    return is_path(node.args[0]) if inner else isinstance(node, ast.Name | ast.Attribute)  # type: ignore[attr-defined]
+
+
+def expressions(code: ast.FunctionDef) -> Iterator[ast.expr]:
+    """Yield what is returned, assigned, on both sides of equations, and when events happen."""
+    for one in ast.walk(code):
+        match one:
+            case ast.Return(value=ast.expr() as value) | ast.Assign(targets=[ast.Name()], value=value):
+                yield value
+            case ast.Yield(value=ast.Compare(left=left, comparators=[right])):
+                yield from (left, right)
+            case ast.keyword(arg="when" | "at", value=value):
+                yield value
+            case _:
+                pass
+
+
+def compare(function: FunctionType, modes: Mapping[str, str]) -> int:
+    """Compare all formulas of a function; return how many there are."""
+    (code,) = ast.parse(dedent(inspect.getsource(function))).body
+    assert isinstance(code, ast.FunctionDef)
+    local = {one.arg for one in code.args.args} | {
+        one.id for one in ast.walk(code) if isinstance(one, ast.Name) and isinstance(one.ctx, ast.Store)
+    }
+    aliases = {name: Path(name, own=False) for name in local - {"self"}}
+    numbers = {name: Number("" if name == "self" else name, modes) for name in local}
+    library = {name: Number(name, modes) for name, one in function.__globals__.items() if isinstance(one, FunctionType)}
+    count = 0
+    for node in filter(is_formula, expressions(code)):
         try:
-            other = statements(kind, structure, given=frozenset({option}), used=frozenset({option}) - set(page.asked))
-        except LanguageError:
-            assert option == "mesh_efficiency"  # an efficiency needs losses
+            latex = Writer(function.__globals__, dict(aliases)).latex(node)
+            worth = eval(  # the library's own source text
+                compile(ast.Expression(node), "formula", "eval"),
+                {**function.__globals__, **library, **KNOWN, **numbers},
+            )
+        except (Unwritable, KeyError):  # a mode that an alias means
             continue
-        compare(other, Numbers(kind, structure, 1, option))
+        if not isinstance(worth, int | float | np.number | np.bool_):  # a part, a mode
+            continue
+        read = Formulas(modes).worth(latex)
+        assert read == pytest.approx(float(worth), rel=1e-5, abs=1e-9, nan_ok=True), (ast.unparse(node), latex)
+        count += 1
+    return count
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")  # a branch that is not taken may divide by zero
+def test_formulas_are_worth_what_the_class_says() -> None:
+    seen: set[tuple[FunctionType, tuple[tuple[str, str], ...]]] = set()
+    count = 0
+    for kind in library_types().values():
+        for active in range(max((len(mode.names) for mode in kind._class_modes.values()), default=1)):
+            modes = {name: mode.names[active % len(mode.names)] for name, mode in kind._class_modes.items()}
+            for function in functions(kind):
+                key = function, tuple(modes.items())
+                if key not in seen:
+                    seen.add(key)
+                    count += compare(function, modes)
+    assert count > 1500

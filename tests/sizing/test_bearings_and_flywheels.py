@@ -7,6 +7,7 @@ import pytest
 
 from components.sizing import (
     bearing_life,
+    cylinder_inertia,
     deflection,
     flywheel,
     flywheel_for_time,
@@ -45,7 +46,7 @@ NUMBERS = {
     "T2 b St 1.0": (wheel(1.0, STEEL)[1], 56, 85.00665, +51.798),
     "40 J_ZM": (BUILT.inertia * 1e6, 1183, 1182.613, -0.033),
     "m_ZM": (BUILT.mass, 1.1, 1.168013, +6.183),
-    "J from m=1.1": (1.1 * 45**2 / 2, None, 1113.75, None),
+    "J from m=1.1": (cylinder_inertia(1.1, 0.045) * 1e6, None, 1113.75, None),
     "m_St": (HEAVY.mass, 3.4, 3.345949, -1.590),
     "47 u_max": (deflection(HEAVY.mass, 0.105, 0.008).sag * 1e6, 11, 11.04376, +0.398),
     "47 u_max l=175": (deflection(HEAVY.mass, 0.175, 0.008).sag * 1e6, None, 51.12853, None),

@@ -13,8 +13,8 @@ from modelica_like.sizing import checks, size
 from modelica_like.sizing.checks import GROUP, design_checks, find_check
 
 LEVER = '''
-from components.sizing.quantities import Force, Length, Torque
-from components.sizing.result import Result, line
+from modelica_like.language.quantities import Force, Length, Torque
+from modelica_like.language.results import Result, line
 
 __all__ = ["Lever", "half", "lever"]
 

@@ -48,12 +48,7 @@ NUMBERS = {
     "M_stall": (SUMMARY.stall_torque, None, 1.361063, None),
     "I_stall line": (SUMMARY.stall_current, None, 28.28126, None),
     "eta_max": (SUMMARY.best_efficiency, None, 0.6981316, None),
-    "n=180 U at 22V": (180.0 * 22, 3960, 3960, 0.0),
-    "n clutch": (180.0 * 22 / 3, 1320, 1320, 0.0),
-    "k_e from 22V & 4500": (22 / (4500 * RPM), None, 0.04668545, None),
-    "k_e implied by n=180U": (1 / (180 * RPM), None, 0.05305165, None),
     "M at 3960": (torque_at_speed(LINES, 3960 * RPM), 0.24, 0.2231322, -7.028),
-    "slip 49": ((4550 - 4459) / 4550, 0.02, 0.02, 0.0),
     "I_gen overload": (overload_current(0.6, 3.0, SET_A), None, 3.223672, None),
 }
 

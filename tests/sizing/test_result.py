@@ -13,9 +13,9 @@ from components.sizing import (
     clutch_selection,
     comparison,
     flywheel_for_time,
-    quantities,
     shaft_statics,
 )
+from modelica_like.language import quantities
 from modelica_like.units import parse_unit
 
 COUNTS = ("", "teeth", "1e6 rev")

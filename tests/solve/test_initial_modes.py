@@ -99,6 +99,7 @@ def test_the_first_condition_that_holds_wins_and_start_is_the_last_resort(start)
             yield self.mode.initially("high", when=self.x > 2)
             yield self.mode.initially("middle", when=self.x > 1)
             yield self.mode.initially("low", when=self.x < 0)
+            yield self.plain.go("second", "first", when=self.x > 5)
 
     found = {x: start(Choosy(x=x))["mode"] for x in (-1.0, 0.5, 1.5, 3.0)}
     assert found == {-1.0: "low", 0.5: "none", 1.5: "middle", 3.0: "high"}

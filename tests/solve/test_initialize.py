@@ -116,6 +116,33 @@ def test_two_start_values_of_one_motion_that_contradict(start):
     assert start(Rigid(), two__w=1.0)["two.w"] == 1.0
 
 
+@pytest.mark.parametrize(
+    ("one", "other"), [(1e6, 1e6 * (1 + 3e-8)), (1e6, 1e6 * (1 - 3e-8)), (0.0, 3e-8), (-1e-3, -1e-3 + 3e-8)]
+)
+def test_start_values_agree_to_eight_digits_or_to_1e_8(start, one, other):
+    """Compared as states (one shaft) and behind a gear; a tenth of the difference is rounding."""
+
+    class Rigid(Component):
+        one, two = Inertia(J=1.0, phi=0.0), Inertia(J=1.0)
+
+        def equations(self) -> Equations:
+            yield from series(self.one, self.two)
+
+    class Drive(Component):
+        motor, rotor = ConstantSpeed(w_fixed=1.0), Inertia(J=1.0)
+
+        def equations(self) -> Equations:
+            yield from series(self.motor, self.rotor)
+
+    near = one + 0.1 * (other - one)
+    assert start(Rigid(), one__w=one, two__w=near)["one.w"] == one
+    assert start(Drive(), motor__w_fixed=one, rotor__w=near)["rotor.w"] == one
+    with pytest.raises(ContradictingStart):
+        start(Rigid(), one__w=one, two__w=other)
+    with pytest.raises(ContradictingStart):
+        start(Drive(), motor__w_fixed=one, rotor__w=other)
+
+
 def test_a_start_value_against_a_constant(start):
     class Driven(Component):
         motor, rotor = ConstantSpeed(w_fixed=5.0), Inertia(J=1.0, w=6.0)
@@ -241,7 +268,7 @@ def test_the_steady_state_depends_on_the_mode_the_guess_chooses(start):
         push, rotor, bearing = (
             ConstantTorque(tau_constant=5.0),
             Inertia(J=1.0),
-            BearingFriction(tau_pos=((0, 1), (1, 2))),
+            BearingFriction(tau_pos=((0, 1), (1, 2)), extrapolate="linear"),
         )
 
         def equations(self) -> Equations:
@@ -307,3 +334,23 @@ def test_a_guess_outside_the_domain_of_the_equations_is_told(start):
 def test_an_unknown_kind_of_start_is_refused(start):
     with pytest.raises(UnknownName, match=r"^There is no start 'stedy'; did you mean 'steady'\?"):
         start(Elastic(), "stedy")
+
+
+def test_a_steady_start_keeps_a_momentum_beside_implicit_equations(start):
+    """A free shaft keeps its speed; beside it, v + v³ = w brakes another one to rest."""
+
+    class Both(Component):
+        free = Inertia(J=2.0, phi=0.0, w=3.0)
+        v: Variable = var("1", "implicit")
+        w: Variable = var("rad/s", "speed that is braked")
+        T: Parameter = param("rad", "time constant times speed", default=0.5)
+        unit: Parameter = param("rad/s", "unit", default=1.0)
+
+        def equations(self) -> Equations:
+            yield self.T * der(self.w) == -self.v * self.unit**2
+            yield self.unit * (self.v + self.v**3) == self.w
+
+    drive = Both(w=guess(1.0))
+    found = start(drive, "steady")
+    assert found["free.w"] == pytest.approx(3.0, rel=1e-12)
+    assert (found["v"], found["w"]) == pytest.approx((0.0, 0.0), abs=1e-12)

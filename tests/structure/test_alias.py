@@ -1,5 +1,7 @@
 """Alias elimination against linear algebra."""
 
+from dataclasses import replace
+
 import casadi as ca
 import numpy as np
 from hypothesis import given, settings
@@ -132,3 +134,28 @@ def test_an_equation_between_two_derivatives_is_no_alias_of_one_node():
     found = find_aliases(made)
     assert found.root[0] != found.root[1]
     assert found.remaining == [0]
+
+
+def test_an_input_that_is_the_derivative_of_one_unknown_is_not_that_of_another():
+    """der(x0) = u and der(x1) = u: the integrals differ by a constant, so the second equation stays."""
+    made = replace(model([1, 1, 0], [{3: 1.0, 2: -1.0}, {4: 1.0, 2: -1.0}]), inputs=[2])
+    found = find_aliases(made)
+    assert found.root[3] == found.root[2] == 2
+    assert found.remaining == [1]
+    assert found.root[4] != 2
+    assert found.derivative[found.root[0]][0] == 2
+    assert found.derivative[found.root[1]][0] == found.root[4]
+
+
+def test_what_represents_a_class():
+    """An input before a derivative, a derivative before what wants to be a state, of equals the first one named."""
+    plain = model([0, 0], [{1: 2.0, 0: -1.0}])
+    assert find_aliases(plain).root == [1, 1]
+    assert find_aliases(plain).factor == [2.0, 1.0]
+    wanted = replace(plain, variables=[replace(plain.variables[0], state="prefer"), plain.variables[1]])
+    assert find_aliases(wanted).root == [0, 0]
+    assert find_aliases(wanted).factor == [1.0, 0.5]
+    assert find_aliases(replace(wanted, inputs=[1])).root == [1, 1]
+    derivative = model([1, 0], [{1: 1.0, 2: -1.0}])
+    derivative = replace(derivative, variables=[derivative.variables[0], replace(plain.variables[1], state="always")])
+    assert find_aliases(derivative).root == [0, 2, 2]

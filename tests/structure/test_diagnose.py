@@ -1,11 +1,15 @@
 """Systems without a unique solution: what is told of equations that are too many, and where."""
 
+from dataclasses import replace
+from pathlib import Path
+
 import pytest
 
 from components import ConstantSpeed, ConstantTorque, Fixed, IdealGear, Inertia, Speed
 from modelica_like import simulate
-from modelica_like.errors import Overdetermined
+from modelica_like.errors import Overdetermined, Underdetermined
 from modelica_like.flatten import flatten
+from modelica_like.flatten.model import FlatModel
 from modelica_like.language import Assembly, Component, Equations, Parameter, Variable, exp, param, sin, var
 from modelica_like.structure import reduce
 
@@ -84,3 +88,59 @@ def test_too_many_equations_here_and_too_few_there():
     with pytest.raises(Overdetermined, match=r"2 equations determine only 1 unknown \(x\): Mistaken\.") as caught:
         reduce(flatten(Mistaken()))
     assert caught.value.why == "On the other hand y lacks an equation."
+    assert {one.line for one in caught.value.where} == {line_of("self.x == sin"), line_of("2 * self.x == exp")}
+
+
+class Term(Component):
+    x: Variable = var("1", "a part of a sum")
+
+    def equations(self) -> Equations:
+        yield exp(self.x) == 2
+
+
+class Sum(Component):
+    count: int = 2
+    total: Variable = var("1", "sum")
+
+    def build(self) -> None:
+        self.terms = [Term() for _ in range(self.count)]
+
+    def equations(self) -> Equations:
+        yield sin(self.total) == sum(sin(term.x) for term in self.terms)
+
+
+def without_terms(component: Component) -> FlatModel:
+    """The equations of a component without those of its terms."""
+    flat = flatten(component)
+    return replace(flat, general=[one for one in flat.general if flat.origin(*one).kind != "Term"])
+
+
+def test_too_few_equations_are_told_with_the_one_that_there_is() -> None:
+    with pytest.raises(Underdetermined) as caught:
+        reduce(without_terms(Sum()))
+    assert caught.value.what == (
+        "Sum: 1 equations, 3 unknowns. total, terms[1].x, terms[2].x occur only in the equations below, "
+        "1 for 3 unknowns."
+    )
+    assert [(Path(one.file).name, one.line) for one in caught.value.where] == [
+        (Path(__file__).name, line_of("sin(term.x)"))
+    ]
+    assert caught.value.advice == "2 more equations are needed: connect what is open, or fix it."
+
+
+def test_of_many_unknowns_the_first_are_named() -> None:
+    with pytest.raises(Underdetermined, match=r"terms\[5\]\.x, … \(9 in all\) occur only .* 1 for 9") as caught:
+        reduce(without_terms(Sum(count=8)))
+    assert caught.value.advice == "8 more equations are needed: connect what is open, or fix it."
+
+
+def test_an_unknown_without_any_equation() -> None:
+    with pytest.raises(Underdetermined) as caught:
+        reduce(without_terms(Term()))
+    assert caught.value.what == "Term: 0 equations, 1 unknowns. x occurs in no equation."
+    assert caught.value.where == ()
+
+
+def line_of(text: str) -> int:
+    """The first line of this file with a text."""
+    return next(n for n, line in enumerate(Path(__file__).read_text().splitlines(), 1) if text in line)

@@ -2,6 +2,9 @@
 
 from components import Constant, FirstOrder, Inertia, Torque
 from modelica_like import Assembly, build
+from modelica_like.flatten import flatten
+from modelica_like.language import Component, Equations, Parameter, Variable, der, param, var
+from modelica_like.structure import reduce
 
 
 def test_a_state_is_what_its_name_says() -> None:
@@ -14,3 +17,16 @@ def test_a_state_is_what_its_name_says() -> None:
     for name, k in at.items():
         assert float(values[model.position[name]]) == k + 1.0
     assert "lag.y" in at
+
+
+def test_of_equal_names_the_one_that_wants_to_be_a_state_counts() -> None:
+    class Twice(Component):
+        first: Variable = var("1", "as the second")
+        second: Variable = var("1", "as the first", state="prefer")
+        T: Parameter = param("s", "time constant", default=1.0)
+
+        def equations(self) -> Equations:
+            yield self.first == self.second
+            yield self.T * der(self.first) == -self.second
+
+    assert reduce(flatten(Twice())).states == ("second",)

@@ -17,7 +17,7 @@ from components.shift_report import ShiftReport, shift_report
 from components.sizing import lepelletier_gear
 from modelica_like import Assembly, CompiledDae, Solution, build, simulate
 from modelica_like.netlist import load
-from modelica_like.solve.solution import Values
+from modelica_like.solve.trajectories import Values
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 NETLIST, GEARS = EXAMPLES / "lepelletier.toml", EXAMPLES / "lepelletier_gears.toml"
@@ -252,12 +252,40 @@ def test_friction_work_of_the_shifts(run: Solution, report: ShiftReport) -> None
     assert balance.drift < 1e-6
 
 
+def test_the_page_has_the_table_of_its_snippet(report: ShiftReport) -> None:
+    page = (EXAMPLES.parent / "docs" / "examples" / "lepelletier.md").read_text(encoding="utf-8")
+    assert 'print(shift_report(simulate("examples/lepelletier.toml")))' in page
+    table = page[page.index("| shift | element |") :].split("\n\n")[0].splitlines()[2:]
+    gear, told = "", {}
+    for shift, element, *numbers in ([cell.strip() for cell in line.strip("|").split("|")] for line in table):
+        gear = "1" if shift == "start" else shift.partition("–")[2] or gear
+        told[gear, "_".join(element.split()[:2]).lower()] = [float(number) for number in numbers]
+    found = {(row.gear, row.element): [row.slipping, row.torque, row.work] for row in report.shifts}
+    assert told.keys() == found.keys()
+    for key, numbers in told.items():
+        for value, number, digit in zip(found[key], numbers, (1e-3, 0.1, 1.0), strict=True):
+            assert value == pytest.approx(number, abs=digit), key
+
+
 def test_torques_of_the_shifts(report: ShiftReport) -> None:
     """While an element slips its torque is what the schedule presses it with: at most its capacity."""
     assert {row.gear for row in report.shifts} == set("123456")
     for row in report.shifts:
         assert 0 < row.torque <= CAPACITY[row.element] * (1 + 1e-9)
         assert 0 < row.slipping < 1.5
+
+
+def test_a_report_needs_no_close_results(model: CompiledDae, report: ShiftReport) -> None:
+    """What opens slips first where it breaks away: with its capacity times the pressure that falls there in 0.8 s."""
+    run = simulate(model)
+    coarse = shift_report(run)
+    for ours, theirs in zip(coarse.shifts, report.shifts, strict=True):
+        assert (ours.element, ours.slipping) == (theirs.element, pytest.approx(theirs.slipping, rel=1e-4))
+        assert ours.work == pytest.approx(theirs.work, rel=1e-4, abs=1e-7 * report.work)
+        assert ours.torque == pytest.approx(theirs.torque, rel=1e-4)
+    opening = next(row for row in coarse.shifts if row.element == "brake_d")
+    begins = next(one.time for one in run.events if (one.mode, one.before) == ("box.brake_d.mode", "stuck"))
+    assert opening.torque == pytest.approx(900.0 * (1 - (begins - 3.2) / 0.8), rel=1e-9)
 
 
 def test_launch_work_exceeds_what_the_car_gets(report: ShiftReport, run: Solution) -> None:

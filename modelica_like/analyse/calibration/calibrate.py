@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -16,10 +17,10 @@ from modelica_like.errors import (
     SolveError,
     UnknownName,
     ValueOutOfRange,
-    missing_extra,
+    extra_module,
 )
 from modelica_like.simulation import Model, build
-from modelica_like.units import coherent, to_si
+from modelica_like.units import to_si
 
 __all__ = ["Calibration", "Numbers", "OperatingPoints", "Trajectories", "calibrate"]
 
@@ -155,17 +156,17 @@ class _Problem:
         self, model: CompiledDae, data: Sequence[Measurement], parameters: Mapping[str, tuple[Any, Any]]
     ) -> None:
         self.model, self.data, self.names = model, data, tuple(parameters)
-        units = {one.path: coherent(one.unit) for one in model.flat_parameters}
         for name in self.names:
             # Tells what is wrong with a name.
             model.with_parameters({name: parameters[name][0]})
-        self.units = tuple(str(units[name]) for name in self.names)
-        bounds = np.array([[to_si(v, units[name], name) for v in parameters[name]] for name in self.names])
+        self.units = tuple(str(model.units[name]) for name in self.names)
+        bounds = np.array([[to_si(v, model.units[name], name) for v in parameters[name]] for name in self.names])
         self.low, self.high = bounds.T
         for name, low, high in zip(self.names, self.low, self.high, strict=True):
             if not low < high:
                 raise ValueOutOfRange(f"{name}: the lower bound {low:g} is not below the upper bound {high:g}.")
         self.span = self.high - self.low
+        self.labels: tuple[str, ...] = ()
         self._at: tuple[bytes, Matrix, Matrix] | None = None
 
     def starts(self, guess: Mapping[str, Any], count: int, seed: int) -> list[Matrix]:
@@ -181,13 +182,8 @@ class _Problem:
 
     def solve(self, begin: Matrix) -> Any:
         """Run the least-squares solver from one start."""
-        try:
-            from scipy.optimize import least_squares
-        except ImportError:
-            raise missing_extra("scipy", "analyse") from None
-        slopes: Any = lambda q: self.evaluate(q)[1]  # noqa: E731 - scipy's stubs know names only
-        return least_squares(
-            lambda q: self.evaluate(q)[0], begin, slopes, bounds=(0.0, 1.0), x_scale="jac",
+        return extra_module("scipy.optimize", "analyse").least_squares(
+            lambda q: self.evaluate(q)[0], begin, lambda q: self.evaluate(q)[1], bounds=(0.0, 1.0), x_scale="jac",
             ftol=1e-14, xtol=1e-12, gtol=1e-12,
         )  # fmt: skip
 
@@ -196,10 +192,9 @@ class _Problem:
         key = q.tobytes()
         if self._at is None or self._at[0] != key:
             model = self.at(q)
-            parts = [one.residuals(model, self.names) for one in self.data]
-            residuals = np.concatenate([r for r, _ in parts])
-            slopes = np.concatenate([j for _, j in parts]) * self.span
-            self._at = key, residuals, slopes
+            residuals, slopes, labels = zip(*(one.residuals(model, self.names) for one in self.data), strict=True)
+            self.labels = tuple(chain(*labels))
+            self._at = key, np.concatenate(residuals), np.concatenate(slopes) * self.span
         return self._at[1], self._at[2]
 
     def at(self, q: Matrix) -> CompiledDae:
@@ -220,10 +215,9 @@ class _Problem:
             {name: float(w) for name, w in zip(self.names, row, strict=True) if abs(w) > 1e-3} for row in right[~known]
         )
         edges = tuple(name for name, q in zip(self.names, found.x, strict=True) if q <= 1e-9 or q >= 1 - 1e-9)
-        labels = tuple(label for one in self.data for label in one.labels())
         return Calibration(
-            self.at(found.x), self.names, values, self.units, residuals, labels, covariance, int(known.sum()), lost,
-            edges, costs,
+            self.at(found.x), self.names, values, self.units, residuals, self.labels, covariance,
+            int(known.sum()), lost, edges, costs,
         )  # fmt: skip
 
     def _covariance(self, right: Matrix, singular: Matrix, known: Any, residuals: Matrix, sizes: Matrix) -> Matrix:

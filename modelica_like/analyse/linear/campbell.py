@@ -8,14 +8,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from modelica_like.analyse.linear.linearize import LinearModel, linearize
+from modelica_like.analyse.linear.linearize import linearize
 from modelica_like.analyse.linear.points import At
 from modelica_like.errors import ValueOutOfRange
 from modelica_like.initialize import call
 from modelica_like.simulation import Model, build
+from modelica_like.solve.style import COLOURS, picture
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+_RPM = 30 / np.pi
 
 
 @dataclass(frozen=True)
@@ -35,8 +38,8 @@ class Crossing:
     frequency: float
 
     def __str__(self) -> str:
-        rpm = self.speed * 30 / np.pi
-        return f"order {self.order:g} meets mode {self.mode + 1} at {self.frequency:.4g} Hz, {rpm:.5g} rpm"
+        where = f"{self.frequency:.4g} Hz, {self.speed * _RPM:.5g} rpm"
+        return f"order {self.order:g} meets mode {self.mode + 1} at {where}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,15 +85,24 @@ class Campbell:
 
     def plot(self) -> Figure:
         """Draw frequencies over speed with the lines of the orders and their crossings."""
-        from modelica_like.analyse.linear.pictures import draw_campbell
-
-        return draw_campbell(self)
+        rpm, top = self.speeds * _RPM, 1.1 * float(np.nanmax(self.frequencies, initial=1.0))
+        with picture(f"Campbell diagram of {self.name}", 1, 4.2) as (figure, (axes,)):
+            for mode, curve in enumerate(self.frequencies):
+                axes.plot(rpm, curve, color=COLOURS[mode % len(COLOURS)], label=f"mode {mode + 1}")
+            for order in self.orders:
+                axes.plot(rpm, order * rpm / 60, color="#888888", linewidth=0.9, linestyle="--")
+                place = 0.97 * min(rpm[-1], 60 * top / order)
+                at = {"xytext": (-4, 2), "textcoords": "offset points", "fontsize": 8, "ha": "right"}
+                axes.annotate(f"{order:g}×", (place, order * place / 60), **at)
+            for one in self.crossings():
+                axes.plot(one.speed * _RPM, one.frequency, "o", color="#000000", markersize=4)
+            axes.set(xlabel=f"{self.speed} in rpm", ylabel="frequency in Hz", ylim=(0, top), xlim=(rpm[0], rpm[-1]))
+            axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
+        return figure
 
     def __str__(self) -> str:
-        low, high = (float(value) * 30 / np.pi for value in (self.speeds[0], self.speeds[-1]))
-        head = (
-            f"Campbell diagram of {self.name}: {len(self.eigenvalues)} modes, {self.speed} = {low:.4g} … {high:.4g} rpm"
-        )
+        over = f"{self.speed} = {self.speeds[0] * _RPM:.4g} … {self.speeds[-1] * _RPM:.4g} rpm"
+        head = f"Campbell diagram of {self.name}: {len(self.eigenvalues)} modes, {over}"
         return "\n".join([head, *(f"  {one}" for one in self.crossings())])
 
 
@@ -121,19 +133,12 @@ def campbell(
     row = model.position[speed]
     speeds = np.array([call(one.model, one.model.variables, one.point)[row] for one in linear])
     order = np.argsort(speeds, kind="stable")
-    curves = _follow([linear[k] for k in order])
-    return Campbell(model.name, speed, speeds[order], curves, tuple(float(one) for one in orders))
-
-
-def _follow(linear: Sequence[LinearModel]) -> Any:
-    """Join the oscillating eigenvalues of successive points: each goes on as the nearest one."""
-    sets = [one.eigenvalues() for one in linear]
-    first = np.array(sorted((v for v in sets[0] if v.imag > 0), key=lambda v: v.imag))
-    curves = [first]
-    for values in sets[1:]:
-        ahead = values[values.imag > 0]
-        curves.append(_nearest(curves[-1], ahead))
-    return np.array(curves).T
+    ahead = [(values := linear[k].eigenvalues())[values.imag > 0] for k in order]
+    # Each mode goes on as the nearest one.
+    curves = [ahead[0][np.argsort(ahead[0].imag, kind="stable")]]
+    for values in ahead[1:]:
+        curves.append(_nearest(curves[-1], values))
+    return Campbell(model.name, speed, speeds[order], np.array(curves).T, tuple(float(one) for one in orders))
 
 
 def _nearest(before: Any, after: Any) -> Any:

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-import casadi as ca
 import numpy as np
 
+from modelica_like.analyse.slopes import slopes
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.initialize import Point, holding, share, variable_slopes
 
@@ -47,16 +47,11 @@ class Motions:
         return Motions([self.keep[n] for n in free], self.shape @ follow)
 
 
-def free_motions(model: CompiledDae, point: Point, a: Matrix) -> Motions:
+def free_motions(model: CompiledDae, point: Point) -> Motions:
     """Return the motions that the present modes leave free.
 
     A mode declares the motion that it holds, such as the slip speed of a clutch that is stuck; with the speed the slip
     angle stands still.
-
-    Args:
-        model: the compiled model.
-        point: where it is linearised.
-        a: slopes of the rates by the states there, shape (states, states).
     """
     count = len(model.states)
     motions = Motions(list(range(count)), np.eye(count))
@@ -64,31 +59,33 @@ def free_motions(model: CompiledDae, point: Point, a: Matrix) -> Motions:
     if not len(speeds):
         return motions
     motions = motions.without(speeds)
-    angles = _held_angles(model, point, a, motions)
+    angles = _held_angles(model, point, motions)
     return motions.without(angles) if len(angles) else motions
 
 
 def _held_speeds(model: CompiledDae, point: Point) -> Iterator[Vector]:
     """Slopes (by the states) of the motions that the present modes hold."""
     held = [model.holds[k] for k in holding(model, point)]
+    if not held:
+        return
     free = point.copy()
     for one in held:
         free.d[one.mode] = free.d[one.mode] if one.loose < 0 else one.loose
     share(model, free)
-    for slope in variable_slopes(model, point, [one.motion for one in held]) if held else ():
+    rates = _rate_slopes(model, point), _rate_slopes(model, free)
+    for slope in variable_slopes(model, point, [one.motion for one in held]):
         # What creeps follows its torque: its rate depends on something, here compared with that of what is let go.
-        present, let_go = (np.abs(_rate_slopes(model, here, slope)).max() for here in (point, free))
+        present, let_go = (np.abs(slope @ one).max() for one in rates)
         if np.any(slope) and not present > _ZERO * let_go:
             yield slope / np.linalg.norm(slope)
 
 
-def _held_angles(model: CompiledDae, point: Point, a: Matrix, motions: Motions) -> Matrix:
+def _held_angles(model: CompiledDae, point: Point, motions: Motions) -> Matrix:
     """Combinations of the kept states whose rates depended only on speeds that are held, shape (combinations, kept)."""
-    gone = [k for k in range(len(model.states)) if k not in set(motions.keep)]
-    rows = [n for n, k in enumerate(motions.keep) if np.any(a[k, gone])]
-    count = len(model.states)
-    units = np.eye(count)[[motions.keep[n] for n in rows]]
-    full = np.array([_rate_slopes(model, point, one) for one in units]).reshape(len(rows), -1)
+    count, full = len(model.states), _rate_slopes(model, point)
+    gone = [k for k in range(count) if k not in set(motions.keep)]
+    rows = [n for n, k in enumerate(motions.keep) if np.any(full[k, gone])]
+    full = full[[motions.keep[n] for n in rows]]
     scale = np.abs(full).max(axis=1, keepdims=True, initial=1e-300)
     by_states = (full[:, :count] / model.nominals) @ motions.shape * model.nominals[motions.keep]
     left = np.hstack([by_states, full[:, count:]]) / scale
@@ -120,28 +117,8 @@ def _independent(slopes: list[Vector]) -> Matrix:
     return np.array(kept)
 
 
-def _rate_slopes(model: CompiledDae, point: Point, combination: Vector) -> Vector:
-    """Slopes of the rate of a combination of states by [x, u, p, t], times the sizes of those."""
-    if "rate_slopes" not in model._cache:
-        model._cache["rate_slopes"] = _reverse(model)
-    arguments = point.t, point.x, point.z, model.p, model.u, point.d
-    follow = np.zeros(len(model.implicit))
-    if model.implicit:
-        by_z = np.asarray(model._cache["rate_slopes"](*arguments, combination, follow)[0]).ravel()
-        follow = -np.linalg.solve(np.asarray(model.alg_jacobian(*arguments).full()).T, by_z)
-    _, *parts = (np.asarray(one).ravel() for one in model._cache["rate_slopes"](*arguments, combination, follow))
-    sizes = model.nominals, _sizes(model.u), _sizes(model.p), max(1.0, abs(point.t))
-    return np.concatenate([part * size for part, size in zip(parts, sizes, strict=True)])
-
-
-def _reverse(model: CompiledDae) -> ca.Function:
-    symbols = model.arguments
-    arguments = list(symbols.values())
-    rates, residuals = ca.SX.sym("rates", len(model.states)), ca.SX.sym("residuals", len(model.implicit))
-    weighted = ca.dot(rates, model.ode(*arguments)) + ca.dot(residuals, model.alg(*arguments))
-    slopes = [ca.densify(ca.gradient(weighted, symbols[name])) for name in ("z", "x", "u", "p", "t")]
-    return ca.Function("rate_slopes", [*arguments, rates, residuals], slopes)
-
-
-def _sizes(values: Vector) -> Vector:
-    return np.where(values == 0.0, 1.0, np.abs(values))
+def _rate_slopes(model: CompiledDae, point: Point) -> Matrix:
+    """Slopes of the rates by [x, p, u, t], times the sizes of those, shape (states, …)."""
+    rates, fixed = slopes(model, point, "ode"), np.concatenate([model.p, model.u])
+    sizes = np.concatenate([model.nominals, np.where(fixed == 0.0, 1.0, np.abs(fixed)), [max(1.0, abs(point.t))]])
+    return np.hstack([rates.x, rates.theta[:, : len(fixed)], rates.t[:, None]]) * sizes

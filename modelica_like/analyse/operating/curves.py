@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from modelica_like.analyse.operating.steady import OperatingPoint, steady
-from modelica_like.errors import InitializationError, ValueOutOfRange
+from modelica_like.errors import InitializationError, UnknownName, ValueOutOfRange, did_you_mean
 from modelica_like.simulation import Model, build
 from modelica_like.solve.solution import Solution
+from modelica_like.solve.style import COLOURS, picture, with_unit
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -44,17 +45,25 @@ class Curves:
             paths: what to draw.
             over: the horizontal axis; by default what was varied.
         """
-        from modelica_like.analyse.operating.pictures import draw_curves
-
-        return draw_curves(self, paths, over or self.over)
+        over, number = over or self.over, max(len(paths), 1)
+        with picture(self.points[0].model.name, number, 0.8 + 1.9 * number) as (figure, rows):
+            for k, path in enumerate(paths):
+                rows[k].plot(self[over], self[path], color=COLOURS[k % len(COLOURS)])
+                rows[k].set_ylabel(with_unit(path, self.unit(path)))
+            rows[-1].set_xlabel(with_unit(over, self.unit(over)))
+        return figure
 
     def unit(self, path: str) -> str:
-        """Return the coherent SI unit of a column."""
+        """Return the coherent SI unit of a column.
+
+        Raises:
+            UnknownName: there is no such column.
+        """
         if path in ("efficiency", "loss"):
             return "1" if path == "efficiency" else "W"
-        model = self.points[0].model
-        known = (*model.flat_variables, *model.flat_parameters, *model.flat_derived, *model.flat_discretes)
-        return next(str(one.unit) for one in known if one.path == path)
+        if path not in (known := self.points[0].model.units):
+            raise UnknownName(f"There is no '{path}' in these curves{did_you_mean(path, known) or '.'}")
+        return str(known[path])
 
     def __len__(self) -> int:
         return len(self.points)
@@ -90,11 +99,9 @@ def characteristic(
     points: list[OperatingPoint] = []
     for value in values:
         near = points[-1] if points else near
+        wanted: dict[str, Any] = {"hold": {path: value}, "by": by} if by else {"parameters": {path: value}}
         try:
-            if by:
-                points.append(steady(model, {path: value}, by, near=near))
-            else:
-                points.append(steady(model, parameters={path: value}, near=near))
+            points.append(steady(model, **wanted, near=near))
         except InitializationError as error:
             error.what = f"At {path} = {value}: {error.what}"
             raise

@@ -8,19 +8,18 @@ from typing import Any
 
 import numpy as np
 
-from modelica_like.analyse.linear.linearize import held_by, slopes_at
-from modelica_like.compile.compiled import CompiledDae
+from modelica_like.analyse.slopes import Sizes, columns_of, nodes_of, slopes, steady_change
+from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import InitializationError, UnknownName, ValueOutOfRange, did_you_mean
 from modelica_like.initialize import Point, call, holding, initialize
-from modelica_like.initialize.kept import find_kept, solve_kept
-from modelica_like.initialize.steady import check_modes_hold, moving_states, solve_steady
+from modelica_like.initialize.steady import check_modes_hold, solve_steady
 from modelica_like.simulation import Model, build
-from modelica_like.solve.solution import Solution
+from modelica_like.solve.trajectories import Trajectories
 from modelica_like.units import to_si
 
 _MAX_NEWTON = 40
 _HALVINGS = 20
-_CLOSE = 1e-12
+_CLOSE, _CLOSE_ENOUGH = 1e-12, 1e-9
 _ENERGY_LOSS, _ENERGY_SOURCE = 1, 2
 
 
@@ -90,7 +89,7 @@ class OperatingPoint(Mapping[str, float]):
 
 def steady(
     drive: Model, hold: Mapping[str, Any] | None = None, by: Sequence[str] | str = (), *,
-    parameters: Mapping[str, Any] | None = None, near: OperatingPoint | Solution | None = None,
+    parameters: Mapping[str, Any] | None = None, near: OperatingPoint | Trajectories | None = None,
 ) -> OperatingPoint:  # fmt: skip
     """Find a steady state of a drive: all derivatives zero, except of states that nothing depends on.
 
@@ -114,29 +113,14 @@ def steady(
     if parameters:
         model = model.with_parameters(dict(parameters))
     free = [by] if isinstance(by, str) else list(by)
-    targets = _targets(model, hold or {}, free)
+    target = _Target(model, hold or {}, free)
     if isinstance(near, OperatingPoint) and free:
         model = model.with_parameters({name: near[name] for name in free})
-    begin = near.point(float(near.time[-1])) if isinstance(near, Solution) else near.point if near else None
+    begin = near.point(float(near.time[-1])) if isinstance(near, Trajectories) else near.point if near else None
     point = _settle(model, begin)
     if free:
-        model, point = _hold(model, point, targets, free)
+        model, point = target.reach(model, point)
     return _operating_point(model, point)
-
-
-def _targets(model: CompiledDae, hold: Mapping[str, Any], free: Sequence[str]) -> dict[str, float]:
-    if len(hold) != len(free):
-        held, found = ", ".join(hold) or "nothing", ", ".join(free) or "nothing"
-        raise ValueOutOfRange(
-            f"{model.name}: {held} cannot be held by {found}: each held variable takes one parameter.",
-            advice='Say for example steady(drive, {"motor.w": "3000 rpm"}, by="load.tau_constant").',
-        )
-    targets: dict[str, float] = {}
-    for path, value in hold.items():
-        if path not in model.position:
-            raise UnknownName(f"{model.name} has no variable '{path}'{did_you_mean(path, model.position) or '.'}")
-        targets[path] = to_si(value, model.flat_variables[model.position[path]].unit, path)
-    return targets
 
 
 def _settle(model: CompiledDae, near: Point | None) -> Point:
@@ -152,82 +136,82 @@ def _settle(model: CompiledDae, near: Point | None) -> Point:
     return point
 
 
-def _hold(
-    model: CompiledDae, point: Point, targets: Mapping[str, float], free: Sequence[str]
-) -> tuple[CompiledDae, Point]:
-    """Newton's method on the parameters, each step to a steady state, halved while it gets worse."""
-    paths = list(targets)
-    rows = [model.position[path] for path in paths]
-    sizes = np.array(
-        [model.flat_variables[row].nominal + abs(targets[path]) for row, path in zip(rows, paths, strict=True)]
-    )
-    wanted = np.array(list(targets.values()))
-    for _ in range(_MAX_NEWTON):
-        miss = call(model, model.variables, point)[rows] - wanted
-        if np.max(np.abs(miss) / sizes) < _CLOSE:
+class _Target:
+    """Variables with given values, and the parameters that are to bring them there.
+
+    Raises:
+        ValueOutOfRange: not as many parameters as variables.
+        UnknownName: there is no such variable.
+    """
+
+    def __init__(self, model: CompiledDae, hold: Mapping[str, Any], free: Sequence[str]) -> None:
+        if len(hold) != len(free):
+            held, found = ", ".join(hold) or "nothing", ", ".join(free) or "nothing"
+            raise ValueOutOfRange(
+                f"{model.name}: {held} cannot be held by {found}: each held variable takes one parameter.",
+                advice='Say for example steady(drive, {"motor.w": "3000 rpm"}, by="load.tau_constant").',
+            )
+        self.paths, self.free = list(hold), list(free)
+        self.rows = nodes_of(model, self.paths)
+        self.wanted = np.array([to_si(value, model.units[path], path) for path, value in hold.items()])
+        self.sizes = np.array([model.flat_variables[row].nominal for row in self.rows]) + np.abs(self.wanted)
+
+    def reach(self, model: CompiledDae, point: Point) -> tuple[CompiledDae, Point]:
+        """Newton's method on the parameters, each step to a steady state, halved while it gets worse."""
+        miss = self._miss(model, point)
+        for _ in range(_MAX_NEWTON):
+            if np.max(np.abs(miss)) < _CLOSE:
+                return model, point
+            by = steady_slopes(model, point, self.paths, self.free) / self.sizes[:, None]
+            if np.linalg.matrix_rank(by) < len(self.free):
+                raise self._undetermined(model)
+            better = self._closer(model, point, np.linalg.solve(by, -miss), float(np.max(np.abs(miss))))
+            if better is None:
+                break
+            model, point, miss = better
+        if np.max(np.abs(miss)) < _CLOSE_ENOUGH:
             return model, point
-        slopes = steady_slopes(model, point, paths, free)
-        if np.linalg.matrix_rank(slopes) < len(free):
-            raise _undetermined(model, paths, free)
-        step = np.linalg.solve(slopes, -miss)
-        better = _line_search(model, point, step, free, rows, wanted, sizes)
-        if better is None:
-            break
-        model, point = better
-    miss = call(model, model.variables, point)[rows] - wanted
-    if np.max(np.abs(miss) / sizes) < 1e-9:
-        return model, point
-    worst = paths[int(np.argmax(np.abs(miss) / sizes))]
-    raise InitializationError(
-        f"{model.name}: no {' and '.join(free)} was found that holds {worst} at {targets[worst]:.6g}.",
-        advice="Give the parameters values near the solution, or hold something that they can reach.",
-    )
+        worst = int(np.argmax(np.abs(miss)))
+        raise InitializationError(
+            f"{model.name}: no {' and '.join(self.free)} was found that holds {self.paths[worst]} at "
+            f"{self.wanted[worst]:.6g}.",
+            advice="Give the parameters values near the solution, or hold something that they can reach.",
+        )
+
+    def _miss(self, model: CompiledDae, point: Point) -> Vector:
+        """What variables miss, over their sizes."""
+        return (call(model, model.variables, point)[self.rows] - self.wanted) / self.sizes
+
+    def _closer(
+        self, model: CompiledDae, point: Point, step: Any, before: float
+    ) -> tuple[CompiledDae, Point, Vector] | None:
+        now = np.concatenate([model.p, model.u])[[model.fixed_position[name] for name in self.free]]
+        for _ in range(_HALVINGS):
+            try:
+                other = model.with_parameters(dict(zip(self.free, now + step, strict=True)))
+                there = _settle(other, point)
+                if np.max(np.abs(miss := self._miss(other, there))) < before:
+                    return other, there, miss
+            except (InitializationError, ValueOutOfRange):
+                # No steady state that far away: a shorter step may have one.
+                pass
+            step = step / 2
+        return None
+
+    def _undetermined(self, model: CompiledDae) -> InitializationError:
+        many = len(self.free) > 1
+        return InitializationError(
+            f"{model.name}: {', '.join(self.paths)} cannot be held by {', '.join(self.free)}: in steady state "
+            f"{'they do' if many else 'it does'} not depend on {'those' if many else 'it'}.",
+            advice="Choose a parameter that changes it, such as the torque of a load.",
+        )
 
 
-def _line_search(
-    model: CompiledDae, point: Point, step: Any, free: Sequence[str], rows: Sequence[int], wanted: Any, sizes: Any
-) -> tuple[CompiledDae, Point] | None:
-    before = _distance(model, point, rows, wanted, sizes)
-    now = np.array([_value(model, name) for name in free])
-    for _ in range(_HALVINGS):
-        try:
-            other = model.with_parameters(dict(zip(free, now + step, strict=True)))
-            there = _settle(other, point)
-            if _distance(other, there, rows, wanted, sizes) < before:
-                return other, there
-        except (InitializationError, ValueOutOfRange):
-            # No steady state that far away: a shorter step may have one.
-            pass
-        step = step / 2
-    return None
-
-
-def _distance(model: CompiledDae, point: Point, rows: Sequence[int], wanted: Any, sizes: Any) -> float:
-    return float(np.max(np.abs(call(model, model.variables, point)[rows] - wanted) / sizes))
-
-
-def steady_slopes(model: CompiledDae, point: Point, paths: Sequence[str], free: Sequence[str]) -> Any:
+def steady_slopes(model: CompiledDae, point: Point, paths: Sequence[str], free: Sequence[str]) -> Vector:
     """Total derivative of variables of steady states by parameters, shape (variables, parameters)."""
-    a, b, c, d = slopes_at(model, point, free, paths)
-    moving = moving_states(model)
-    inner = a[np.ix_(moving, moving)]
-    kept = find_kept(model, point, moving, inner)
-    move = solve_kept(kept, inner, -b[moving], -held_by(model, point, kept, free))
-    return c[:, moving] @ move + d
-
-
-def _undetermined(model: CompiledDae, paths: Sequence[str], free: Sequence[str]) -> InitializationError:
-    return InitializationError(
-        f"{model.name}: {', '.join(paths)} cannot be held by {', '.join(free)}: in steady state "
-        f"{'they do' if len(free) > 1 else 'it does'} not depend on {'those' if len(free) > 1 else 'it'}.",
-        advice="Choose a parameter that changes it, such as the torque of a load.",
-    )
-
-
-def _value(model: CompiledDae, name: str) -> float:
-    if name in model.parameter_position:
-        return float(model.p[model.parameter_position[name]])
-    return float(model.u[[model.flat_variables[k].path for k in model.inputs].index(name)])
+    variables = slopes(model, point, "variables", nodes_of(model, paths))
+    theta = np.eye(Sizes.of(model).theta)[:, columns_of(model, free)]
+    return variables.x @ steady_change(model, point, theta) + variables.theta @ theta
 
 
 def _operating_point(model: CompiledDae, point: Point) -> OperatingPoint:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from modelica_like.analyse.replay.chain import Replay
 from modelica_like.analyse.replay.jumps import Jump
-from modelica_like.analyse.replay.slopes import slopes
 from modelica_like.analyse.replay.sweeps import Reading
+from modelica_like.analyse.slopes import slopes
 from modelica_like.compile.buffers import Vector
 from modelica_like.errors import NoGradient
 from modelica_like.solve.guards import Guards
@@ -44,17 +44,18 @@ class Edge:
         return (changes > self.least) & (abs(self.reading.value) <= _STILL * changes)
 
 
-def edges(chain: Replay, timed: Collection[int | None]) -> list[Edge]:
+def edges(chain: Replay, readings: Sequence[Reading]) -> list[Edge]:
     """Find where a run may be on an edge.
 
     Args:
         chain: the run.
-        timed: positions of jumps whose times are asked for.
+        readings: what is asked for; it may depend on the times of jumps.
     """
+    timed = {id(node) for one in readings for node, _ in one.parts}
     found = [
-        Edge(Reading(0.0, k, one.x, one.theta), one.size, one.reason)
-        for k, jump in chain.jumps
-        for one in (jump.apart if jump.matters or k in timed else ())
+        Edge(Reading(0.0, ((jump.before, one.by),)), one.size, one.reason)
+        for _, jump in chain.jumps
+        for one in (jump.apart if jump.matters or id(jump.before) in timed else ())
     ]
     return found + _ties(chain)
 
@@ -88,10 +89,10 @@ def _ties(chain: Replay) -> list[Edge]:
 
 def _tie(chain: Replay, guards: Guards, guard: int, first: int, last: int) -> Edge:
     model, point, one = chain.model, chain.nodes[last], guards.state_events[guard]
-    k, mode = one.index, model.flat_discretes[one.mode]
-    part = slopes(model, point, f"guard {k}", lambda: model.guards(*model.arguments.values())[k])
-    x, theta = np.max([np.abs(node.x) for node in chain.nodes], axis=0), np.concatenate([model.p, model.u, point.d])
-    terms = np.abs(part.x[0]) @ (x + model.nominals) + np.abs(part.theta[0]) @ np.abs(theta)
+    mode = model.flat_discretes[one.mode]
+    part = slopes(model, point, "guards", [one.index])
+    x = np.max([np.abs(node.x) for node in chain.nodes], axis=0) + model.nominals
+    terms = np.abs(part.by[0]) @ np.abs(np.concatenate([x, model.p, model.u, point.d]))
     error = NoGradient(
         f"No gradient from t = {chain.nodes[first].t:.9g} s on: {mode.path} stays {mode.names[int(point.d[one.mode])]} "
         f"just at the limit at which it becomes {mode.names[one.target]}.",
@@ -99,4 +100,4 @@ def _tie(chain: Replay, guards: Guards, guard: int, first: int, last: int) -> Ed
         why="A small change of a parameter decides whether it does, so the derivatives of both sides differ.",
         advice="Move the parameters away from this limit.",
     )
-    return Edge(Reading(float(part.value[0]), last, part.x[0], part.theta[0]), _ROUNDING * float(terms), error)
+    return Edge(Reading(float(part.value[0]), ((point, part.by[0]),)), _ROUNDING * float(terms), error)

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from typing import Any
 
-import casadi as ca
 import numpy as np
 
-from modelica_like.analyse.replay.holds import impact, share_slopes
-from modelica_like.analyse.replay.slopes import _NONE, Sizes, slopes
+from modelica_like.analyse.replay.holds import impact, projection, share_slopes
+from modelica_like.analyse.slopes import Sizes, slopes
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae, CompiledTransition
 from modelica_like.errors import NoGradient
@@ -29,13 +28,11 @@ class Trigger:
 
     Attributes:
         shift: numerical difference to the recorded time; rounding of the location.
-        x: derivative of the time by the states before the event, shape (nx,).
-        theta: derivative by (p, u, d) before the event.
+        by: derivative of the time by (x, theta) before the event, shape (nx + ntheta,).
     """
 
     shift: float
-    x: Vector
-    theta: Vector
+    by: Vector
 
 
 @dataclass(frozen=True)
@@ -43,14 +40,12 @@ class Apart:
     """Something that happens at the same instant as an event, but for a different reason.
 
     Attributes:
-        x: derivative of the distance in time by the states before the event, shape (nx,).
-        theta: derivative by (p, u, d), shape (ntheta,).
+        by: derivative of the distance in time by (x, theta) before the event, shape (nx + ntheta,).
         size: what is rounding is measured by, in s.
         reason: what to say where they do not stay together.
     """
 
-    x: Vector
-    theta: Vector
+    by: Vector
     size: float
     reason: NoGradient
 
@@ -99,6 +94,23 @@ class Jump:
             raise self.reason
         return self.trigger
 
+    @property
+    def by_time(self) -> Vector:
+        """Derivative of its time by (x, theta) before it; zero where nothing moves it."""
+        return np.zeros(self.x.shape[1]) if self.trigger is None else self.trigger.by
+
+    def forward(self, whole: Vector) -> tuple[Vector, Vector]:
+        """Carry derivatives of (x, theta) behind it; shapes (nx + ntheta, columns) and (quadratures, columns)."""
+        fixed = whole[len(self.x) : len(whole) - len(self.d)]
+        return np.vstack([self.x @ whole, fixed, self.d @ whole]), np.outer(self.gain, self.by_time @ whole)
+
+    def adjoint(self, whole: Vector, Q: Vector) -> Vector:
+        """Carry derivatives by (x, theta) to before it; Q are those by the quadratures."""
+        nx, fixed = len(self.x), len(whole) - len(self.d)
+        back = self.x.T @ whole[:nx] + self.d.T @ whole[fixed:] + np.outer(self.by_time, self.gain @ Q)
+        back[nx:fixed] += whole[nx:fixed]
+        return back
+
 
 def make_jump(
     model: CompiledDae, before: Point, events: tuple[Event, ...], begin: Point, integrands: Any, *, first: bool
@@ -116,17 +128,14 @@ def make_jump(
     Raises:
         NoGradient: the states after the event have no derivative.
     """
-    size = Sizes.of(model)
-    columns = size.x + size.theta
     work = Work.at(model, before)
     rate_before = slopes(model, before, "ode").value
     when = When(None) if first else event_time(model, before, events, begin)
     trigger = when.trigger
-    time = np.zeros(columns) if trigger is None else np.concatenate([trigger.x, trigger.theta])
     if trigger is not None:
-        work.x += np.outer(rate_before, time)
+        work.x += np.outer(rate_before, trigger.by)
         work.point.x = before.x + rate_before * trigger.shift
-        work.time = time
+        work.time = trigger.by
     work.share()
     for number in sorted({event.round for event in events}):
         work.fire([event for event in events if event.round == number])
@@ -136,7 +145,7 @@ def make_jump(
     if when.reason is not None and matters:
         raise when.reason
     if trigger is not None:
-        work.x -= np.outer(rate_after, time)
+        work.x -= np.outer(rate_after, trigger.by)
         work.point.x = work.point.x - rate_after * trigger.shift
         solve_implicit(model, work.point)
     return Jump(before, work.point, events, trigger, work.x, work.d, when.reason, gain, when.apart, matters)
@@ -174,43 +183,41 @@ def event_time(model: CompiledDae, before: Point, events: tuple[Event, ...], beg
         found.append((event, trigger))
     first, trigger = found[0]
     theta = np.concatenate([model.p, model.u, before.d])
-    weights = np.maximum(np.abs(before.x), model.nominals), np.maximum(np.abs(theta), 1.0)
-    size = max(before.t - begin.t, abs(before.t), *(float(np.max(np.abs(one.x) * weights[0])) for _, one in found))
+    weights = np.concatenate([np.maximum(np.abs(before.x), model.nominals), np.maximum(np.abs(theta), 1.0)])
+    nx = len(before.x)
+    spans = [float(np.max(np.abs(one.by[:nx]) * weights[:nx])) for _, one in found]
+    size = _SAME * max(before.t - begin.t, abs(before.t), *spans)
     apart: list[Apart] = []
     for other, second in found[1:]:
-        parts = _difference(model, before, trigger, second)
-        if any(np.any(np.abs(part) * weight > _SAME * size) for part, weight in zip(parts, weights, strict=True)):
-            apart.append(Apart(*parts, _SAME * size, _coincidence(first, other)))
+        by = _difference(model, before, trigger.by - second.by)
+        if np.any(np.abs(by) * weights > size):
+            apart.append(Apart(by, size, _coincidence(first, other)))
     return When(trigger, None, tuple(apart))
 
 
-def _difference(model: CompiledDae, before: Point, one: Trigger, other: Trigger) -> tuple[Vector, Vector]:
+def _difference(model: CompiledDae, before: Point, by: Vector) -> Vector:
     """By what two triggers differ, but for motions that modes hold: nothing moves those."""
-    x, theta = one.x - other.x, one.theta - other.theta
     nodes = [model.holds[k].motion for k in holding(model, before)]
-    if not nodes or not np.any(x):
-        return x, theta
-    held = slopes(model, before, f"held {nodes}", lambda: model.variables(*model.arguments.values())[nodes])
-    parts = np.linalg.lstsq(held.x.T, x, rcond=None)[0]
-    return x - held.x.T @ parts, theta - held.theta.T @ parts
+    if not nodes or not np.any(by[: len(before.x)]):
+        return by
+    held = slopes(model, before, "variables", nodes)
+    return by - held.by.T @ np.linalg.lstsq(held.x.T, by[: len(before.x)], rcond=None)[0]
 
 
 def _moment(model: CompiledDae, before: Point, transition: CompiledTransition) -> Trigger:
-    k = transition.index
-    part = slopes(model, before, f"moment {k}", lambda: model.moments(*model.arguments.values())[k])
-    return Trigger(float(part.value[0]) - before.t, part.x[0], part.theta[0])
+    part = slopes(model, before, "moments", [transition.index])
+    return Trigger(float(part.value[0]) - before.t, part.by[0])
 
 
 def _crossing(model: CompiledDae, before: Point, transition: CompiledTransition, begin: Point) -> Trigger | None:
     """Event time of a guard: it moves by minus its change over its rate; None if it only grazes zero."""
-    k = transition.index
-    part = slopes(model, before, f"guard {k}", lambda: model.guards(*model.arguments.values())[k])
-    rate = float(part.t[0] + part.x[0] @ slopes(model, before, "ode").value)
-    change = abs(float(call(model, model.guards, begin)[k]))
+    part = slopes(model, before, "guards", [transition.index])
+    rate = float(part.rate[0])
+    change = abs(float(call(model, model.guards, begin)[transition.index]))
     terms = float(np.abs(part.x[0]) @ (np.abs(before.x) + model.nominals))
     if not rate * (before.t - begin.t) > _GRAZING * change + _ROUNDING * terms:
         return None
-    return Trigger(-float(part.value[0]) / rate, -part.x[0] / rate, -part.theta[0] / rate)
+    return Trigger(-float(part.value[0]) / rate, -part.by[0] / rate)
 
 
 def _grazing(event: Event) -> NoGradient:
@@ -253,13 +260,13 @@ class Work:
         return cls(model, point.copy(), np.eye(size.x, columns), np.eye(size.d, columns, size.x + size.fixed))
 
     def _total(
-        self, name: str, expression: Any = None, constants: Vector = _NONE, *, at: Point | None = None
-    ) -> tuple[Vector, Vector]:
-        """Value of a function and its derivatives by (x, theta) before the event."""
-        part = slopes(self.model, at or self.point, name, expression, constants)
-        fixed = self.x.shape[1] - self.x.shape[0] - self.d.shape[0]
+        self, name: str, rows: Sequence[int] | None = None, function: Any = None, *constants: Vector,
+        at: Point | None = None,
+    ) -> tuple[Vector, Vector]:  # fmt: skip
+        """Value of a function (see `slopes`) and its derivatives by (x, theta) before the event."""
+        part = slopes(self.model, at or self.point, name, rows, function, *constants)
+        nx, fixed = len(self.x), len(self.model.fixed_position)
         total = part.x @ self.x + part.theta[:, fixed:] @ self.d
-        nx = self.x.shape[0]
         total[:, nx : nx + fixed] += part.theta[:, :fixed]
         if self.time is not None:
             total += np.outer(part.t, self.time)
@@ -329,7 +336,7 @@ class Work:
         solve_implicit(model, trial)
         struck = [k for k in entering if k not in strike.knocked]
         if struck:
-            self.x = self.x + impact(model, trial, struck, partial(self._total, at=trial))
+            self.x = self.x + self._total(f"impact {struck}", None, lambda: impact(model, struck), at=trial)[1]
         self.point = strike.point
 
     def _begin_again(self, entering: list[int]) -> list[int]:
@@ -346,8 +353,7 @@ class Work:
         return sorted(self.entered)
 
     def _reset(self, number: int) -> tuple[float, Vector]:
-        make = lambda: self.model.resets(*self.model.arguments.values())[number]  # noqa: E731
-        value, slope = self._total(f"reset {number}", make)
+        value, slope = self._total("resets", [number])
         return float(value[0]), slope[0]
 
     def _project(self, targets: list[int], values: list[tuple[float, Vector]]) -> None:
@@ -355,23 +361,9 @@ class Work:
         model = self.model
         nodes = [model.reset_nodes[k] for k in targets]
         solve_implicit(model, self.point)
-        name = f"nodes {nodes}"
-        present, slope = self._total(name, lambda: model.variables(*model.arguments.values())[nodes])
-        back = np.linalg.pinv(slopes(model, self.point, name).x)
+        present, slope = self._total("variables", nodes)
+        back = np.linalg.pinv(slopes(model, self.point, "variables", nodes).x)
         missing = np.array([value for value, _ in values]) - present
-        change, turn = self._total(f"projection {nodes}", lambda r: _projection(model, nodes, r), missing)
+        change, turn = self._total(f"projection {nodes}", None, lambda: projection(model, nodes), missing)
         self.point = replace(self.point, x=self.point.x + change)
         self.x = self.x + turn + back @ (np.array([one for _, one in values]) - slope)
-
-
-def _projection(model: CompiledDae, nodes: list[int], missing: Any) -> Any:
-    """Smallest change of the states that changes variables by `missing`."""
-    given = model.arguments
-    x, z = given["x"], given["z"]
-    variables, alg = model.variables(*given.values())[nodes], model.alg(*given.values())
-    slope = ca.jacobian(variables, x)
-    if z.numel():
-        follow = ca.solve(ca.densify(ca.jacobian(alg, z)), ca.densify(ca.jacobian(alg, x)))
-        slope = slope - ca.mtimes(ca.jacobian(variables, z), follow)
-    slope = ca.densify(slope)
-    return ca.mtimes(slope.T, ca.solve(ca.mtimes(slope, slope.T), missing))

@@ -8,142 +8,98 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from modelica_like.analyse.linear.linearize import held_by
-from modelica_like.analyse.replay.slopes import Sizes
+from modelica_like.analyse.slopes import Sizes, steady_change
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae
-from modelica_like.initialize import Point, StartKind, start_plan
-from modelica_like.initialize.kept import find_kept, solve_kept
-from modelica_like.initialize.start import StartProblem
-from modelica_like.initialize.steady import moving_states
+from modelica_like.initialize import Point, StartKind, StartPlan, start_plan
 
 _MAX_NEWTON = 50
 
 
-class StartSlopes:
-    """Derivatives of the start by (p, u).
+def start_slopes(model: CompiledDae, point: Point, kind: StartKind) -> tuple[Vector, Vector]:
+    """Differentiate the states and the discrete values of a start by (p, u).
 
     Args:
         model: the compiled model.
         point: the consistent start, before events.
-        start: the kind of start of the run.
+        kind: the kind of start of the run.
 
-    Attributes:
-        x: shape (nx, np + nu).
-        d: shape (nd, np + nu).
+    Returns:
+        Shapes (nx, np + nu) and (nd, np + nu).
     """
+    size, plan, given = Sizes.of(model), start_plan(model, kind, point), (model.p, model.u, point.d)
+    jacobians = [
+        model.once(("by parameters", name), lambda name=name: _by_parameters(model, name))(
+            point.t, point.x, point.z, *given
+        )
+        for name in ("discrete_starts", "start_values")
+    ]
+    system = () if kind == "steady" else _start_system(model, plan, point)
+    # Of many parameters few have a part in the start: only their columns are followed.
+    parts = [*jacobians, *system[1:2]]
+    moved = sorted({column for one in parts for column in _columns(one)}) if system else list(range(size.fixed))
+    starts, values = (np.asarray(one[:, moved].full()) for one in jacobians)
+    states = np.zeros((size.x, len(moved)))
+    if kind == "steady":
+        # What equilibrium leaves open keeps to its start value, or default.
+        for number, entry in enumerate(model.starts):
+            if entry.strength == "default" and entry.state is not None:
+                states[entry.state[0]] = values[number] / entry.state[1]
+    for state, number in plan.direct:
+        states[state] = values[number] / (model.starts[number].state or (state, 1.0))[1]
+    if kind == "steady":
+        theta = np.concatenate([np.eye(size.fixed), starts])
+        states = steady_change(model, point, theta, states)
+    elif plan.columns and moved:
+        _follow(plan, system, moved, states, starts, values)
+    x, d = np.zeros((size.x, size.fixed)), np.zeros((size.d, size.fixed))
+    x[:, moved], d[:, moved] = states, starts
+    return x, d
 
-    def __init__(self, model: CompiledDae, point: Point, start: StartKind) -> None:
-        self.model = model
-        self.point = point
-        self.size = Sizes.of(model)
-        given = point.t, point.x, point.z, model.p, model.u, point.d
-        jacobians = [self._of_parameters(name, given) for name in ("discrete_starts", "start_values")]
-        self.plan = start_plan(model, start, point)
-        jacobians += [] if start == "steady" else [self._start_system()[1]]
-        # Of many parameters few have a part in the start: only their columns are followed.
-        moved = range(self.size.fixed) if start == "steady" else sorted({c for one in jacobians for c in _columns(one)})
-        self.moved = list(moved)
-        starts, values = (np.asarray(one[:, self.moved].full()) for one in jacobians[:2])
-        self.starts, self.values = starts, values
-        problem = StartProblem(model, point.copy())
-        self.rows = {id(entry): k for k, entry in enumerate(model.starts)}
-        states = self._steady(problem, given) if start == "steady" else self._given(problem)
-        self.x, self.d = np.zeros((self.size.x, self.size.fixed)), np.zeros((self.size.d, self.size.fixed))
-        self.x[:, self.moved], self.d[:, self.moved] = states, starts
 
-    def _of_parameters(self, name: str, given: Any) -> Any:
-        """Derivatives of a function by (p, u), sparse."""
-        model = self.model
-        key = "slopes by parameters", name
-        if key not in model._cache:
-            arguments = model.arguments
-            value = getattr(model, name)(*arguments.values())
-            fixed = ca.vertcat(arguments["p"], arguments["u"])
-            model._cache[key] = ca.Function("slopes", list(arguments.values()), [ca.jacobian(value, fixed)])
-        return model._cache[key](*given)
+def _by_parameters(model: CompiledDae, name: str) -> ca.Function:
+    """Derivatives of a function by (p, u), sparse."""
+    given = model.arguments
+    fixed = ca.vertcat(given["p"], given["u"])
+    return ca.Function("slopes", [*given.values()], [ca.jacobian(getattr(model, name)(*given.values()), fixed)])
 
-    def _direct(self, problem: StartProblem) -> Vector:
-        """Derivatives of the states that have start values of their own."""
-        slopes = np.zeros((self.size.x, len(self.moved)))
-        for position, entry in problem.direct.items():
-            assert entry.state is not None
-            slopes[position] = self.values[self.rows[id(entry)]] / entry.state[1]
-        return slopes
 
-    def _given(self, problem: StartProblem) -> Vector:
-        """Implicit function theorem on the start system."""
-        size, plan = self.size, self.plan
-        slopes = self._direct(problem)
-        if not plan.columns or not self.moved:
-            return slopes
-        wanted, columns = list(plan.wanted), list(plan.columns)
-        by_unknowns, by_fixed, by_d = self._start_system()
-        fixed = np.asarray(by_fixed[wanted, self.moved].full()) + np.asarray(by_d[wanted, :].full()) @ self.starts
-        known = ca.mtimes(by_unknowns[wanted, : size.x], ca.DM(slopes))
-        right = plan.targets(self.values) - fixed - np.asarray(known.full())
-        if right.size:
-            solved = np.asarray(ca.solve(by_unknowns[wanted, columns], ca.DM(right)).full())
-            for row, column in enumerate(columns):
-                if column < size.x:
-                    slopes[column] = solved[row]
-        return slopes
+def _follow(
+    plan: StartPlan, system: tuple[Any, ...], moved: list[int], states: Vector, starts: Vector, values: Vector
+) -> None:
+    """Add the derivatives of the other states: the implicit function theorem on the start system."""
+    by_unknowns, by_fixed, by_d = (one[list(plan.wanted), :] for one in system)
+    known = np.asarray(by_d.full()) @ starts + np.asarray(ca.mtimes(by_unknowns[:, : len(states)], ca.DM(states)))
+    right = plan.targets(values) - np.asarray(by_fixed[:, moved].full()) - known
+    if right.size:
+        solved = np.asarray(ca.solve(by_unknowns[:, list(plan.columns)], ca.DM(right)).full())
+        of_states = [(row, column) for row, column in enumerate(plan.columns) if column < len(states)]
+        for row, column in of_states:
+            states[column] = solved[row]
 
-    def _start_system(self) -> tuple[Any, Any, Any]:
-        """Jacobians of the start system by its unknowns (x, y, z), by (p, u) and by d, sparse."""
-        model, point, system = self.model, self.point, self.plan.system.function
-        key = "start slopes", self.plan.kind
-        if key not in model._cache:
-            names = system.name_in()
-            arguments = [ca.SX.sym(name, system.size1_in(k)) for k, name in enumerate(names)]
-            _, jacobian, values = system(*arguments)
-            by_d = ca.jacobian(values, arguments[6])
-            fixed = ca.jacobian(values, ca.vertcat(arguments[4], arguments[5]))
-            model._cache[key] = ca.Function("start_slopes", arguments, [jacobian, fixed, by_d])
-        given = point.t, point.x, self._start_variables(), point.z, model.p, model.u, point.d
-        return model._cache[key](*given)
 
-    def _start_variables(self) -> Vector:
-        """The variables y of the start system: its first equations, solved."""
-        model, point, system = self.model, self.point, self.plan.system.function
-        count = system.size1_out(0)
-        y = np.zeros(count)
-        if not count:
-            return y
-        own, places = list(range(count)), list(range(self.size.x, self.size.x + count))
-        for _ in range(_MAX_NEWTON):
-            _, jacobian, values = system(point.t, point.x, y, point.z, model.p, model.u, point.d)
-            step = np.array(ca.solve(jacobian[own, places], -values[own])).ravel()
-            y = y + step
-            if np.max(np.abs(step) / (1.0 + np.abs(y))) < 1e-13:
-                break
-        return y
+def _start_system(model: CompiledDae, plan: StartPlan, point: Point) -> tuple[Any, ...]:
+    """Jacobians of the start system by its unknowns (x, y, z), by (p, u) and by d, sparse."""
+    system = plan.system.function
 
-    def _steady(self, problem: StartProblem, given: Any) -> Vector:
-        """Implicit function theorem on the steady state; what that leaves open is held, or keeps to the guess."""
-        model, size = self.model, self.size
-        guess = self._direct(problem)
-        for entry in model.starts:
-            if entry.strength == "default" and entry.state is not None and entry.state[0] not in problem.direct:
-                guess[entry.state[0]] = self.values[self.rows[id(entry)]] / entry.state[1]
-        arguments = model.arguments
-        x, z = arguments["x"], arguments["z"]
-        symbols = list(arguments.values())
-        equations = ca.vertcat(model.ode(*symbols), model.alg(*symbols))
-        moving = moving_states(model)
-        chosen = equations[[*moving, *range(size.x, size.x + size.z)]]
-        fixed = ca.vertcat(arguments["p"], arguments["u"])
-        by = ca.vertcat(*(x[k] for k in moving), z), fixed, arguments["d"]
-        function = ca.Function("steady", symbols, [ca.jacobian(chosen, one) for one in by])
-        unknowns, by_fixed, by_d = (np.asarray(part.full()) for part in function(*given))
-        before = np.concatenate([guess[moving], np.zeros((size.z, len(self.moved)))])
-        kept = find_kept(model, self.point, moving, unknowns)
-        names = [*model.parameter_position, *(model.flat_variables[k].path for k in model.inputs)]
-        of_held = held_by(model, self.point, kept, names)[:, self.moved]
-        of_held = -of_held - kept.rows[: len(kept.held)] @ guess[moving]
-        right = -(by_fixed + by_d @ self.starts + unknowns @ before)
-        guess[moving] += solve_kept(kept, unknowns, right, of_held)[: len(moving)]
-        return guess
+    def make() -> ca.Function:
+        arguments = [ca.SX.sym(name, system.size1_in(k)) for k, name in enumerate(system.name_in())]
+        _, jacobian, values = system(*arguments)
+        by = ca.vertcat(arguments[4], arguments[5]), arguments[6]
+        return ca.Function("start_slopes", arguments, [jacobian, *(ca.jacobian(values, one) for one in by)])
+
+    def at(function: ca.Function, y: Vector) -> tuple[Any, ...]:
+        return function(point.t, point.x, y, point.z, model.p, model.u, point.d)
+
+    # The variables y are its first equations, solved.
+    y, rows = np.zeros(system.size1_out(0)), list(range(system.size1_out(0)))
+    for _ in range(_MAX_NEWTON if rows else 0):
+        _, jacobian, values = at(system, y)
+        step = np.array(ca.solve(jacobian[rows, [len(point.x) + k for k in rows]], -values[rows])).ravel()
+        y = y + step
+        if np.max(np.abs(step) / (1.0 + np.abs(y))) < 1e-13:
+            break
+    return at(model.once(("start slopes", plan.kind), make), y)
 
 
 def _columns(matrix: Any) -> list[int]:

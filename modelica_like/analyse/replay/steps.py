@@ -5,6 +5,7 @@ Source: E. Hairer, G. Wanner: Solving Ordinary Differential Equations II, sectio
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
 
@@ -12,7 +13,7 @@ import casadi as ca
 import numpy as np
 
 from modelica_like.analyse.replay.tableau import radau
-from modelica_like.compile.buffers import Vector, buffered
+from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.initialize import Point
 
@@ -42,7 +43,7 @@ class StepFunctions:
         self.size = stages * (self.nx + self.nz)
 
     def _cached(self, key: Any, make: Any) -> Any:
-        return buffered(self.model._cache, ("replay", self.name, self.tableau.nodes.size, key), make)
+        return self.model.fast(("replay", self.name, self.tableau.nodes.size, key), make)
 
     @cached_property
     def _names(self) -> list[Any]:
@@ -52,72 +53,67 @@ class StepFunctions:
         return [ca.MX.sym(name, size) for name, size in zip("thxWpud", sizes, strict=True)]
 
     @cached_property
-    def _symbols(self) -> tuple[list[Any], list[Any], list[Any]]:
-        """SX arguments of a step, its stages, and the arguments of the model's functions at each stage."""
-        t, h = ca.SX.sym("t"), ca.SX.sym("h")
-        x, p, u, d = (ca.SX.sym(name, self.model.arguments[name].numel()) for name in "xpud")
-        stages = [ca.SX.sym(f"w{k}", self.nx + self.nz) for k in range(len(self.tableau.nodes))]
-        inner = [
-            [t + c * h, w[: self.nx], w[self.nx :], p, u, d] for c, w in zip(self.tableau.nodes, stages, strict=True)
-        ]
-        return [t, h, x, ca.vertcat(*stages), p, u, d], stages, inner
+    def _symbols(self) -> list[Any]:
+        """The same as SX."""
+        return [ca.SX.sym(name, one.shape[0]) for name, one in zip("thxWpud", self._names, strict=True)]
 
     def _at_stages(self, function: ca.Function) -> list[Any]:
-        """Results of a function at each stage: one, or several as a tuple."""
-        return [function(*given) for given in self._symbols[2]]
+        """Results of a function at all stages, one list for each."""
+        (t, h, _, W, p, u, d), own = self._symbols, self.nx + self.nz
+        begins = zip(self.tableau.nodes, range(0, self.size, own), strict=True)
+        given = ([t + c * h, W[k : k + self.nx], W[k + self.nx : k + own], p, u, d] for c, k in begins)
+        return list(zip(*(function.call(one) for one in given), strict=True))
 
-    def _weighted(self, weights: Vector, values: list[Any]) -> Any:
+    def _weighted(self, weights: Vector, values: Sequence[Any]) -> Any:
         """Sum over the stages, times the length of the step."""
-        h = self._symbols[0][1]
+        h = self._symbols[1]
         return sum((h * w * one for w, one in zip(weights[1:], values[1:], strict=True)), h * weights[0] * values[0])
+
+    @cached_property
+    def _of_states(self) -> ca.DM:
+        """Picks the states out of (x, z), shape (nx + nz, nx + nz)."""
+        return ca.sparsify(ca.diag(ca.DM([1.0] * self.nx + [0.0] * self.nz)))
+
+    def _collocated(self, values: Any) -> Any:
+        """What (ode, alg) at the stages, or their derivatives, add to the residual."""
+        count, of_z = len(self.tableau.nodes), ca.sparsify(ca.DM.eye(self.nx + self.nz) - self._of_states)
+        integrals = ca.kron(self._symbols[1] * ca.SX(ca.DM(self.tableau.matrix)), ca.SX(self._of_states))
+        return ca.mtimes(ca.kron(ca.DM.eye(count), of_z) - integrals, values)
 
     @cached_property
     def _residual(self) -> ca.Function:
         """Residual of the stages; unless the stages come apart, its Jacobian by W."""
-        arguments, stages, _ = self._symbols
-        x = arguments[2]
-        values = self._at_stages(self._equations)
-        residuals: list[Any] = []
-        rows: list[Any] = []
-        for i, w in enumerate(stages):
-            residuals += [w[: self.nx] - x - self._weighted(self.tableau.matrix[i], [one[0] for one in values])]
-            residuals += [values[i][1]]
-            rows += [] if self._constant else [self._row(i, arguments[1], values)]
-        return ca.Function("residual", arguments, [ca.densify(ca.vertcat(*residuals)), ca.vertcat(*rows)])
-
-    def _row(self, i: int, h: Any, values: list[Any]) -> Any:
-        """Block row of the Jacobian of stage i."""
-        blocks: list[Any] = []
-        for j, (_, _, ode_x, ode_z, alg_x, alg_z) in enumerate(values):
-            a = h * self.tableau.matrix[i, j]
-            own = ca.SX.eye(self.nx) if i == j else ca.SX(self.nx, self.nx)
-            implicit = [alg_x, alg_z] if i == j else [ca.SX(self.nz, self.nx), ca.SX(self.nz, self.nz)]
-            blocks.append(ca.vertcat(ca.horzcat(own - a * ode_x, -a * ode_z), ca.horzcat(*implicit)))
-        return ca.horzcat(*blocks)
+        count, (_, _, x, W, *_) = len(self.tableau.nodes), self._symbols
+        equations, slopes, *_ = self._at_stages(self._equations)
+        states = ca.kron(ca.DM.eye(count), self._of_states)
+        begin = ca.repmat(ca.vertcat(x, ca.SX(self.nz, 1)), count, 1)
+        residual = ca.mtimes(states, W - begin) + self._collocated(ca.vertcat(*equations))
+        by_w = ca.SX(self.size, 0) if self._constant else states + self._collocated(ca.diagcat(*slopes))
+        return ca.Function("residual", self._symbols, [ca.densify(residual), by_w])
 
     @cached_property
     def _sources(self) -> ca.Function:
-        """Jacobians of ode and alg at the stages by (p, u, d); of the quadratures by W and by (p, u, d)."""
-        values = self._at_stages(self._parameters)
-        by_theta = [part for one in values for part in one[:2]]
-        h, weights = self._symbols[0][1], self.tableau.weights
-        by_w = ca.horzcat(*(h * b * one[2] for b, one in zip(weights, values, strict=True)))
-        outputs = [ca.vertcat(*by_theta), by_w, self._weighted(weights, [one[3] for one in values])]
-        return ca.Function("sources", self._symbols[0], outputs)
+        """Jacobians of the residual by (p, u, d); of the quadratures by W and by (p, u, d)."""
+        by_theta, q_w, q_theta = self._at_stages(self._parameters)
+        h, weights = self._symbols[1], self.tableau.weights
+        by_w = ca.horzcat(*(h * b * one for b, one in zip(weights, q_w, strict=True)))
+        outputs = [self._collocated(ca.vertcat(*by_theta)), by_w, self._weighted(weights, q_theta)]
+        return ca.Function("sources", self._symbols, outputs)
 
     @cached_property
     def _ending(self) -> ca.Function:
         """Weighted rates of the error estimate, and quadratures."""
-        rates = [one[0] for one in self._at_stages(self._equations)]
-        powers = self._at_stages(self._integrands)
-        outputs = [self._weighted(self.tableau.estimate, rates), self._weighted(self.tableau.weights, powers)]
-        return ca.Function("ending", self._symbols[0], outputs)
+        rates, powers = (self._at_stages(one)[0] for one in (self._equations, self._integrands))
+        outputs = [
+            self._weighted(self.tableau.estimate, rates)[: self.nx],
+            self._weighted(self.tableau.weights, powers),
+        ]
+        return ca.Function("ending", self._symbols, outputs)
 
     @cached_property
     def _node_order(self) -> list[int]:
         """Order of (x, z) that keeps the factors of a sparse system sparse."""
-        _, _, *blocks = (self._equations.sparsity_out(k) for k in range(6))
-        pattern = ca.vertcat(ca.horzcat(*blocks[:2]), ca.horzcat(*blocks[2:])) + ca.Sparsity.diag(self.nx + self.nz)
+        pattern = self._equations.sparsity_out(1) + ca.Sparsity.diag(self.nx + self.nz)
         return list((pattern + pattern.T).amd())
 
     @cached_property
@@ -130,11 +126,20 @@ class StepFunctions:
 
     @cached_property
     def _equations(self) -> ca.Function:
-        """ode, alg, and their Jacobians by x and z."""
-        model, given = self.model, self.model.arguments
-        ode, alg = model.ode(*given.values()), model.alg(*given.values())
-        by = [ca.jacobian(one, given[name]) for one in (ode, alg) for name in "xz"]
-        return self._function("equations", ode, alg, *by)
+        """(ode, alg) and its Jacobian by (x, z)."""
+        value, (w, _) = self._values, self._unknowns
+        return self._function("equations", value, ca.jacobian(value, w))
+
+    @cached_property
+    def _values(self) -> Any:
+        given = self.model.arguments.values()
+        return ca.vertcat(self.model.ode(*given), self.model.alg(*given))
+
+    @cached_property
+    def _unknowns(self) -> tuple[Any, Any]:
+        """(x, z), and (p, u, d)."""
+        given = self.model.arguments
+        return ca.vertcat(given["x"], given["z"]), ca.vertcat(given["p"], given["u"], given["d"])
 
     @cached_property
     def _integrands(self) -> ca.Function:
@@ -142,12 +147,10 @@ class StepFunctions:
 
     @cached_property
     def _parameters(self) -> ca.Function:
-        """Jacobians of ode and alg by (p, u, d), of the quadratures by (x, z) and (p, u, d)."""
-        model, given = self.model, self.model.arguments
-        theta = ca.vertcat(given["p"], given["u"], given["d"])
-        by = [ca.jacobian(one(*given.values()), theta) for one in (model.ode, model.alg)]
-        w = ca.vertcat(given["x"], given["z"])
-        return self._function("parameters", *by, *(ca.jacobian(self.quadratures, one) for one in (w, theta)))
+        """Jacobians of (ode, alg) by (p, u, d), of the quadratures by (x, z) and (p, u, d)."""
+        w, theta = self._unknowns
+        by = ((self._values, theta), (self.quadratures, w), (self.quadratures, theta))
+        return self._function("parameters", *(ca.jacobian(value, unknown) for value, unknown in by))
 
     @property
     def linear(self) -> bool:
@@ -161,15 +164,14 @@ class StepFunctions:
 
     @property
     def _dependence(self) -> tuple[bool, bool]:
-        """Whether the Jacobians depend on x and z, and on time."""
-        known = self.model._cache
-        if "replay dependence" not in known:
+        """Whether the Jacobian depends on x and z, and on time."""
+
+        def find() -> tuple[bool, bool]:
             given = self.model.arguments
-            _, _, *jacobians = self._equations(*given.values())
-            entries = ca.veccat(*(one.nz[:] for one in jacobians))
-            states = ca.vertcat(given["x"], given["z"])
-            known["replay dependence"] = ca.depends_on(entries, states), ca.depends_on(entries, given["t"])
-        return known["replay dependence"]
+            entries = self._equations(*given.values())[1].nz[:]
+            return ca.depends_on(entries, self._unknowns[0]), ca.depends_on(entries, given["t"])
+
+        return self.model.once("replay dependence", find)
 
     def integrands(self, point: Point) -> Vector:
         """Return the integrands of the quadratures at a point."""
@@ -187,49 +189,38 @@ class StepFunctions:
     @property
     def finish(self) -> Any:
         """Function of (t, h, x, W, p, u, d, z) of the beginning and the solved W: error estimate and quadratures."""
-        return self._cached("finish", self._make_finish)
-
-    def _make_finish(self) -> ca.Function:
         z = ca.MX.sym("z", self.nz)
-        return ca.Function("finish", [*self._names, z], self._end(self._names[3], z))
+        return self._cached("finish", lambda: ca.Function("finish", [*self._names, z], self._end(self._names[3], z)))
 
     @property
     def whole(self) -> Any:
         """The same of any W, for linear equations: the solved W, error estimate and quadratures."""
-        return self._cached("whole", self._make_whole)
 
-    def _make_whole(self) -> ca.Function:
-        z = ca.MX.sym("z", self.nz)
-        W = self._names[3] + self._correction()
-        return ca.Function("whole", [*self._names, z], [W, *self._end(W, z)])
+        def make() -> ca.Function:
+            z, W = ca.MX.sym("z", self.nz), self._names[3] + self._correction()
+            return ca.Function("whole", [*self._names, z], [W, *self._end(W, z)])
+
+        return self._cached("whole", make)
 
     def _end(self, W: Any, z: Any) -> list[Any]:
         """Error estimate and quadratures of a step with the stages W that begins with z."""
         t, h, x, _, p, u, d = self._names
         rates, quadratures = self._ending(t, h, x, W, p, u, d)
-        ode = self._equations(t, x, z, p, u, d)[0]
+        ode = self._equations(t, x, z, p, u, d)[0][: self.nx]
         matrix = self._shifted("estimate", np.array([[self.tableau.gamma]]))(t, h, x, z, p, u, d)
         right = ca.vertcat(rates + self.tableau.gamma * h * ode, ca.MX(self.nz, 1))
         return [_solve(matrix, right, self._node_order)[: self.nx], ca.densify(quadratures)]
 
     def _shifted(self, name: str, *blocks: Vector) -> ca.Function:
         """I ⊗ E - h B ⊗ F for each block, of the linearised equations E y' = F y at the beginning of the step."""
-        arguments = self._symbols[0]
-        t, h, x, _, p, u, d = arguments
-        z = ca.SX.sym("z", self.nz)
-        _, _, ode_x, ode_z, alg_x, alg_z = self._equations(t, x, z, p, u, d)
-        own = ca.blockcat([[ca.SX.eye(self.nx), ca.SX(self.nx, self.nz)], [alg_x, alg_z]])
-        rate = ca.blockcat([[ode_x, ode_z], [ca.SX(self.nz, self.nx), ca.SX(self.nz, self.nz)]])
-        shifted = [ca.kron(ca.SX.eye(len(one)), own) - h * ca.kron(ca.SX(ca.DM(one)), rate) for one in blocks]
+        t, h, x, _, p, u, d = self._symbols
+        z, of_x = ca.SX.sym("z", self.nz), ca.SX(self._of_states)
+        slopes = self._equations(t, x, z, p, u, d)[1]
+        rate = ca.mtimes(of_x, slopes)
+        shifted = [
+            ca.kron(ca.SX.eye(len(one)), of_x + slopes - rate) - h * ca.kron(ca.SX(ca.DM(one)), rate) for one in blocks
+        ]
         return ca.Function(name, [t, h, x, z, p, u, d], shifted)
-
-    def _residuals(self, values: Any, *, transposed: bool = False) -> Any:
-        """What changes of ode and alg at the stages make of the residual, or the transpose of that."""
-        stages, h = len(self.tableau.nodes), self._names[1]
-        rows = [ca.diag(ca.DM([a] * self.nx + [b] * self.nz)) for a, b in ((1.0, 0.0), (0.0, 1.0))]
-        matrix = self.tableau.matrix.T if transposed else self.tableau.matrix
-        ode = ca.mtimes(ca.kron(ca.DM(matrix), ca.sparsify(rows[0])), values)
-        return ca.mtimes(ca.kron(ca.DM.eye(stages), ca.sparsify(rows[1])), values) - h * ode
 
     def _solve_stages(self, right: Any, *, transposed: bool = False) -> Any:
         """Solve with the Jacobian of the residual by W, or its transpose.
@@ -238,7 +229,7 @@ class StepFunctions:
         """
         if not self._constant:
             by_w = self._residual(*self._names)[1]
-            return _solve(by_w.T if transposed else by_w, right, self._order)
+            return _solve(by_w, right, self._order, transposed=transposed)
         own = self.nx + self.nz
         basis, blocks = self.tableau.real_form
         back, there = (np.linalg.inv(basis).T, basis.T) if transposed else (basis, np.linalg.inv(basis))
@@ -249,7 +240,7 @@ class StepFunctions:
         for block, matrix in zip(blocks, shifted, strict=True):
             end = begin + own * len(block)
             order = [k * own + node for node in self._node_order for k in range(len(block))]
-            solved.append(_solve(matrix.T if transposed else matrix, mixed[begin:end, :], order))
+            solved.append(_solve(matrix, mixed[begin:end, :], order, transposed=transposed))
             begin = end
         return ca.mtimes(ca.kron(ca.DM(back), ca.DM.eye(own)), ca.vertcat(*solved))
 
@@ -264,7 +255,7 @@ class StepFunctions:
         S, P = ca.MX.sym("S", self.nx, columns), ca.MX.sym("P", self.nt, columns)
         by_theta, q_w, q_theta = self._sources(*self._names)
         begin = ca.repmat(ca.vertcat(S, ca.MX(self.nz, columns)), len(self.tableau.nodes), 1)
-        change = self._solve_stages(begin - self._residuals(ca.mtimes(by_theta, P)))
+        change = self._solve_stages(begin - ca.mtimes(by_theta, P))
         last = change[self.size - self.nx - self.nz : self.size - self.nz, :]
         quadratures = ca.mtimes(q_w, change) + ca.mtimes(q_theta, P)
         return ca.Function("forward", [*self._names, S, P], [last, ca.densify(quadratures)])
@@ -283,16 +274,20 @@ class StepFunctions:
         before = self.size - self.nx - self.nz
         seed = ca.vertcat(ca.MX(before, columns), L, ca.MX(self.nz, columns)) + ca.mtimes(q_w.T, Q)
         multiplier = self._solve_stages(seed, transposed=True)
-        own = self.nx + self.nz
-        begin = sum((multiplier[k * own : k * own + self.nx, :] for k in range(1, len(self.tableau.nodes))),
-                    multiplier[: self.nx, :])  # fmt: skip
-        gradient = ca.mtimes(q_theta.T, Q) - ca.mtimes(by_theta.T, self._residuals(multiplier, transposed=True))
+        stages = ca.vertsplit(multiplier, self.nx + self.nz)
+        begin = sum((one[: self.nx, :] for one in stages[1:]), stages[0][: self.nx, :])
+        gradient = ca.mtimes(q_theta.T, Q) - ca.mtimes(by_theta.T, multiplier)
         return ca.Function("adjoint", [*self._names, L, Q], [ca.densify(begin), ca.densify(gradient)])
 
 
-def _solve(matrix: Any, right: Any, order: list[int]) -> Any:
-    """Solve a linear system: a small one as dense, a large one in an order that keeps it sparse."""
+def _solve(matrix: Any, right: Any, order: list[int], *, transposed: bool = False) -> Any:
+    """Solve a linear system or its transpose: a small one as dense, a large one in an order that keeps it sparse.
+
+    Both use the factors of the matrix itself: where nothing depends on an angle, its column has one entry, and the
+    multiplier of the angle stays exactly zero. Pivoting in the transpose would let rounding in.
+    """
     if matrix.size1() <= _DENSE:
-        return ca.solve(matrix, ca.densify(right), "lapacklu")
-    back = np.argsort(order).tolist()
-    return ca.solve(matrix[order, order], ca.densify(right)[order, :], "csparse")[back, :]
+        return ca.Linsol("solver", "lapacklu", matrix.sparsity()).solve(matrix, ca.densify(right), transposed)
+    back, ordered = np.argsort(order).tolist(), matrix[order, order]
+    linsol = ca.Linsol("solver", "csparse", ordered.sparsity())
+    return linsol.solve(ordered, ca.densify(right)[order, :], transposed)[back, :]

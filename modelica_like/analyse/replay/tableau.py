@@ -56,15 +56,16 @@ class Tableau:
     def _coefficients(self) -> Vector:
         return np.asarray(np.linalg.inv(np.vander(self.nodes, increasing=True)), np.float64)
 
-    def continued(self, stages: Vector, ratio: float) -> Vector:
-        """Values of the polynomial through the stages of a step, at the stages of the next one.
+    def continued(self, stages: Vector, begin: float, ratio: float) -> Vector:
+        """Values of the polynomial through the stages of a step, at the stages of another one.
 
         Args:
-            stages: shape (s, n).
-            ratio: length of the next step over that of this one.
+            stages: those of the step, one after the other.
+            begin: where the other one begins, in lengths of this one.
+            ratio: its length over that of this one.
         """
-        places = 1.0 + self.nodes * ratio
-        return np.vander(places, len(self.nodes), increasing=True) @ (self._coefficients @ stages)
+        values = np.vander(begin + self.nodes * ratio, len(self.nodes), increasing=True) @ self._coefficients
+        return (values @ stages.reshape(len(self.nodes), -1)).ravel()
 
 
 @cache

@@ -3,136 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 
-from modelica_like.analyse.replay.chain import Replay, Tolerances, replay
+from modelica_like.analyse.replay.chain import Replay, replay
 from modelica_like.analyse.replay.edges import Edge, edges
-from modelica_like.analyse.replay.slopes import Sizes
+from modelica_like.analyse.replay.step import Tolerances
 from modelica_like.analyse.replay.sweeps import adjoint, forward
 from modelica_like.analyse.sensitivity.formulas import Freed, bound_by_formula, equal_to, free_formulas
-from modelica_like.analyse.sensitivity.outputs import Output, listed, quadratures, read_off, read_output, value_at
+from modelica_like.analyse.sensitivity.outputs import Output, listed, quadratures, read_output
+from modelica_like.analyse.sensitivity.replayed import read_off, value_at
+from modelica_like.analyse.sensitivity.result import Quantity
+from modelica_like.analyse.sensitivity.result import Sensitivities as Sensitivities
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae
-from modelica_like.errors import LanguageError, NoGradient, UnknownName, did_you_mean, missing_extra
+from modelica_like.errors import LanguageError, NoGradient, UnknownName, did_you_mean
 from modelica_like.initialize import StartKind
 from modelica_like.simulation import Model, simulate
 from modelica_like.solve.options import Options
 from modelica_like.solve.solution import Solution
-from modelica_like.units import Unit, coherent
-
-if TYPE_CHECKING:
-    import pandas
-    from matplotlib.figure import Figure
 
 Method = Literal["auto", "forward", "adjoint"]
 _NAMED = 3
 """Largest number of parameters that an error names."""
-
-
-@dataclass(frozen=True)
-class Quantity:
-    """A number with its name and unit, in SI."""
-
-    name: str
-    value: float
-    unit: Unit
-
-
-@dataclass(frozen=True, eq=False)
-class Sensitivities:
-    """Derivatives of outputs by parameters, in SI units.
-
-    Attributes:
-        model: name of the model.
-        outputs: what was differentiated, with its values.
-        parameters: by what, with their values.
-        derivatives: shape (outputs, parameters).
-        method: `forward` or `adjoint`.
-        time: times of the series in s, both sides of events included; empty without series.
-        series: of each series its derivatives over time, shape (times, parameters).
-        left_out: parameters nobody named, by which there is no derivative, with the reasons.
-    """
-
-    model: str
-    outputs: tuple[Quantity, ...]
-    parameters: tuple[Quantity, ...]
-    derivatives: Vector
-    method: str
-    time: Vector = field(default_factory=lambda: np.zeros(0))
-    series: Mapping[str, Vector] = field(default_factory=dict)
-    left_out: Mapping[str, str] = field(default_factory=dict)
-
-    def __getitem__(self, key: tuple[str, str]) -> float:
-        """Derivative of an output by a parameter.
-
-        Raises:
-            UnknownName: it was not asked for.
-        """
-        output, parameter = key
-        return float(self.derivatives[self._row(output), self._column(parameter)])
-
-    def _row(self, output: str) -> int:
-        return _position([one.name for one in self.outputs], output, "output")
-
-    def _column(self, parameter: str) -> int:
-        return _position([one.name for one in self.parameters], parameter, "parameter")
-
-    @property
-    def normalised(self) -> Vector:
-        """Relative change of each output per relative change of each parameter; nan where the output is zero."""
-        values = np.array([one.value for one in self.outputs])[:, None]
-        weights = np.array([one.value for one in self.parameters])[None, :]
-        return np.divide(
-            self.derivatives * weights, values, out=np.full(self.derivatives.shape, np.nan), where=values != 0
-        )
-
-    def ranking(self, output: str) -> tuple[tuple[Quantity, float, float], ...]:
-        """Parameters with derivative and normalised derivative of an output, the most important first."""
-        row = self._row(output)
-        weights = np.array([one.value for one in self.parameters])
-        order = np.argsort(-np.abs(self.derivatives[row] * weights), kind="stable")
-        return tuple(
-            (self.parameters[k], float(self.derivatives[row, k]), float(self.normalised[row, k])) for k in order
-        )
-
-    def tornado(self, output: str, *, change: float = 0.1, most: int = 12) -> Figure:
-        """Draw what a relative change of each parameter makes of an output, to first order.
-
-        Args:
-            output: which.
-            change: relative change of the parameters.
-            most: largest number of parameters.
-        """
-        from modelica_like.analyse.sensitivity.report import tornado
-
-        return tornado(self, output, change=change, most=most)
-
-    def to_pandas(self) -> pandas.DataFrame:
-        """Return a table with outputs as rows and parameters as columns.
-
-        Raises:
-            MissingExtra: pandas is not installed.
-        """
-        try:
-            import pandas
-        except ImportError:
-            raise missing_extra("pandas", "data") from None
-        rows, columns = ([one.name for one in side] for side in (self.outputs, self.parameters))
-        return pandas.DataFrame(self.derivatives, index=rows, columns=columns)
-
-    def __str__(self) -> str:
-        from modelica_like.analyse.sensitivity.report import text
-
-        return text(self)
-
-
-def _position(names: list[str], name: str, what: str) -> int:
-    if name not in names:
-        raise UnknownName(f"There is no {what} '{name}' in these sensitivities{did_you_mean(name, names) or '.'}")
-    return names.index(name)
 
 
 def sensitivities(
@@ -178,7 +72,8 @@ def sensitivities(
     outputs = [read_output(model, name) for name in of]
     chosen = _chosen(model, to)
     column, name = quadratures(model, outputs)
-    stops = solution.time if any(one.kind == "series" for one in outputs) else ()
+    moments = [one.moment for one in outputs if one.kind == "at"]
+    stops = [*moments, *solution.time] if any(one.kind == "series" for one in outputs) else moments
     chain = replay(solution, column, name, start=start, stops=stops, tolerances=Tolerances(precision))
     return _differentiate(solution, chain, outputs, chosen, method, freed, named=bool(to))
 
@@ -186,27 +81,25 @@ def sensitivities(
 def _chosen(model: CompiledDae, names: Sequence[str]) -> list[tuple[int, Quantity]]:
     """Positions in (p, u) of parameters and inputs."""
     values = np.concatenate([model.p, model.u])
-    inputs = {model.flat_variables[k].path: len(model.p) + n for n, k in enumerate(model.inputs)}
-    known = {**model.parameter_position, **inputs}
-    tunable = [one.path for one in model.flat_parameters if one.tunable]
-    units = [one.unit for one in model.flat_parameters] + [model.flat_variables[k].unit for k in model.inputs]
+    known = model.fixed_position
+    fixed = {one.path for one in model.flat_parameters if not one.tunable}
     found: list[tuple[int, Quantity]] = []
-    for name in names or [*tunable, *inputs]:
+    for name in names or [name for name in known if name not in fixed]:
         if name in model.derived_position:
             equal = equal_to(model, name)
             if equal is None:
                 raise bound_by_formula(model, name)
             name = equal
         if name not in known:
-            everything = [*known, *model.derived_position]
-            raise UnknownName(f"{model.name} has no parameter '{name}'{did_you_mean(name, everything) or '.'}")
-        k = known[name]
-        if k < len(model.p) and not model.flat_parameters[k].tunable:
+            near = did_you_mean(name, [*known, *model.derived_position])
+            raise UnknownName(f"{model.name} has no parameter '{name}'{near or '.'}")
+        if name in fixed:
             raise LanguageError(
                 f"{name} cannot change after compilation, so nothing can be differentiated by it.",
                 advice="Compare runs of models that were built with other values.",
             )
-        found.append((k, Quantity(name, float(values[k]), coherent(units[k]))))
+        k = known[name]
+        found.append((k, Quantity(name, float(values[k]), model.units[name])))
     return found
 
 
@@ -214,13 +107,12 @@ def _differentiate(
     solution: Solution, chain: Replay, outputs: list[Output], chosen: list[tuple[int, Quantity]], method: Method,
     freed: Freed, *, named: bool,
 ) -> Sensitivities:  # fmt: skip
-    size = Sizes.of(chain.model)
     plain = [one for one in outputs if one.kind != "series"]
     series = [one for one in outputs if one.kind == "series"]
+    nodes = [*chain.nodes] if series else []
     readings = read_off(solution, chain, plain)
-    nodes = range(len(chain.nodes)) if series else range(0)
-    over_time = [value_at(chain, one.path, k) for one in series for k in nodes]
-    on_edge = edges(chain, {reading.jump for reading in readings})
+    over_time = [value_at(chain, one.path, node) for one in series for node in nodes]
+    on_edge = edges(chain, readings)
     total = [*readings, *over_time, *(edge.reading for edge in on_edge)]
     positions = [k for k, _ in chosen]
     # A column costs about the same in both directions.
@@ -228,9 +120,7 @@ def _differentiate(
     if way == "adjoint":
         derivatives = adjoint(chain, total)[:, positions]
     else:
-        directions = np.zeros((size.fixed, len(positions)))
-        directions[positions, range(len(positions))] = 1.0
-        derivatives = forward(chain, total, directions)
+        derivatives = forward(chain, total, np.eye(len(chain.model.fixed_position))[:, positions])
     # By parameters that nobody named the others are answered all the same.
     kept, left_out = _by_existence(on_edge, derivatives[len(total) - len(on_edge) :], [one for _, one in chosen], named)
     derivatives, chosen = derivatives[: len(total) - len(on_edge), kept], [chosen[k] for k in kept]
@@ -244,7 +134,7 @@ def _differentiate(
         tuple(quantity for _, quantity in chosen),
         derivatives[:count],
         way,
-        np.array([chain.nodes[k].t for k in nodes]),
+        np.array([node.t for node in nodes]),
         {one.name: table for one, table in zip(series, rows, strict=True)},
         left_out,
     )

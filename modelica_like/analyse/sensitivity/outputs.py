@@ -1,4 +1,4 @@
-"""What sensitivities are asked of: names such as `table.s`, `max(shaft.tau)`, `clutch.lock_time`, read off a replay."""
+"""What sensitivities are asked of: names such as `table.s`, `max(shaft.tau)`, `clutch.lock_time`."""
 
 from __future__ import annotations
 
@@ -8,17 +8,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
-import numpy as np
 
-from modelica_like.analyse.replay.chain import Replay, Step
-from modelica_like.analyse.replay.slopes import slopes
-from modelica_like.analyse.replay.sweeps import Reading
-from modelica_like.analyse.sensitivity.peaks import peak
 from modelica_like.compile.compiled import CompiledDae
-from modelica_like.errors import NoGradient, UnknownName, ValueOutOfRange, did_you_mean
+from modelica_like.errors import UnknownName, ValueOutOfRange, did_you_mean
 from modelica_like.solve.recorder import Event
-from modelica_like.solve.solution import Solution
-from modelica_like.units import Unit, coherent, parse_unit, to_si
+from modelica_like.units import Unit, parse_unit, to_si
 
 _CALL = re.compile(r"\s*(max|min|integral|at|series|time)\s*\((.*)\)\s*$")
 _CHANGE = re.compile(
@@ -48,6 +42,11 @@ class Output:
     path: str
     moment: float = 0.0
     change: tuple[str, str, int] = ("", "", 1)
+
+    def is_change(self, event: Event) -> bool:
+        """Tell whether an event is such a mode change."""
+        before, after, _ = self.change
+        return event.mode == self.path and before in ("", event.before) and after in ("", event.after)
 
 
 def listed(names: str | Sequence[str], what: str) -> list[str]:
@@ -135,7 +134,7 @@ def expression_of(model: CompiledDae, path: str) -> tuple[Callable[[], Any], Uni
     arguments = model.arguments.values()
     if path in model.position:
         k = model.position[path]
-        return lambda: model.variables(*arguments)[k], coherent(model.flat_variables[k].unit)
+        return lambda: model.variables(*arguments)[k], model.units[path]
     owner, _, last = path.rpartition(".")
     columns = _POWERS | _ENERGY
     if last in columns and owner in model.components:
@@ -158,91 +157,3 @@ def quadratures(model: CompiledDae, outputs: Sequence[Output]) -> tuple[Any, str
     paths = [one.path for one in outputs if one.kind == "integral"]
     column = ca.vertcat(*(expression_of(model, path)[0]() for path in paths)) if paths else ca.SX(0, 1)
     return column, ";".join(paths)
-
-
-def read_off(solution: Solution, replay: Replay, outputs: Sequence[Output]) -> list[Reading]:
-    """Return the readings of outputs other than series, one each.
-
-    Raises:
-        UnknownName: a mode change does not happen.
-        NoGradient: it has no derivative.
-    """
-    integrals = [one for one in outputs if one.kind == "integral"]
-    _check_impacts(solution, integrals)
-    return [
-        _integral(replay, integrals.index(one), len(integrals)) if one.kind == "integral"
-        else _event_time(solution, replay, one) if one.kind == "time"
-        else _peak(replay, one) if one.kind in ("max", "min")
-        else _at(replay, one) if one.kind == "at"
-        else value_at(replay, one.path, len(replay.nodes) - 1)
-        for one in outputs
-    ]  # fmt: skip
-
-
-def _check_impacts(solution: Solution, integrals: Sequence[Output]) -> None:
-    """Refuse energies of which an impact takes a part at once: an integral knows nothing of it."""
-    for output in integrals:
-        owner, _, last = output.path.rpartition(".")
-        found = [one for one in solution.impacts if owner in ("", one.component)] if last == "loss_energy" else []
-        if found:
-            raise NoGradient(
-                f"No gradient of {output.name}: {found[0].component} loses {found[0].energy:.6g} J in an impact at "
-                f"t = {found[0].time:.9g} s.",
-                why="Only the loss of power over time is differentiated, not what an impact takes at once.",
-                advice=f"Ask for integral({output.path.removesuffix('energy')}power), which leaves impacts out, or for "
-                "speeds after the impact.",
-            )
-
-
-def value_at(replay: Replay, path: str, node: int, probe: Step | None = None, jump: int | None = None) -> Reading:
-    """Read a variable at a node, after a probe from there, or at a jump that carries it along."""
-    model = replay.model
-    point = replay.nodes[node] if probe is None else probe.after
-    part = slopes(model, point, f"value of {path}", expression_of(model, path)[0])
-    rate = 0.0
-    if jump is not None:
-        rate = float(part.t[0] + part.x[0] @ slopes(model, point, "ode").value)
-    return Reading(float(part.value[0]), node, part.x[0], part.theta[0], probe, jump, rate)
-
-
-def _integral(replay: Replay, number: int, count: int) -> Reading:
-    return Reading(float(replay.quadratures[number]), quadratures=np.eye(count)[number])
-
-
-def _event_time(solution: Solution, replay: Replay, output: Output) -> Reading:
-    before, after, number = output.change
-    found: list[tuple[int, Event]] = []
-    for k, jump in replay.jumps:
-        for event in jump.events:
-            if event.mode == output.path and before in ("", event.before) and after in ("", event.after):
-                found.append((k, event))
-    if len(found) < number:
-        raise _no_such_event(solution, output)
-    k, _ = found[number - 1]
-    jump = replay.moves[k]
-    assert not isinstance(jump, Step)
-    return Reading(jump.before.t + jump.time().shift, jump=k, rate=1.0)
-
-
-def _no_such_event(solution: Solution, output: Output) -> UnknownName:
-    changes = [f"{e.before} → {e.after} at {e.time:.6g} s" for e in solution.events if e.mode == output.path]
-    told = f"{output.path} changes: {', '.join(changes[:6])}{', …' if len(changes) > 6 else ''}." if changes else (
-        f"{output.path} does not change in this run."
-    )  # fmt: skip
-    return UnknownName(f"'{output.name}' does not happen after the start of the run.", why=told)
-
-
-def _at(replay: Replay, output: Output) -> Reading:
-    first, last = replay.nodes[0].t, replay.nodes[-1].t
-    if not first <= output.moment <= last:
-        raise ValueOutOfRange(f"{output.name}: the run goes from {first:g} s to {last:g} s.")
-    node = max(k for k, point in enumerate(replay.nodes) if point.t <= output.moment)
-    if replay.nodes[node].t == output.moment:
-        return value_at(replay, output.path, node)
-    return value_at(replay, output.path, node, replay.probe(node, output.moment))
-
-
-def _peak(replay: Replay, output: Output) -> Reading:
-    make = expression_of(replay.model, output.path)[0]
-    found = peak(replay, f"value of {output.path}", make, 1.0 if output.kind == "max" else -1.0)
-    return value_at(replay, output.path, found.node, found.probe, found.jump)

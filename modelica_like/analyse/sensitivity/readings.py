@@ -10,7 +10,8 @@ import numpy as np
 from modelica_like.analyse.sensitivity.outputs import Output
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import UnknownName
-from modelica_like.solve.solution import ENERGY_TERMS, Solution
+from modelica_like.solve.solution import Solution
+from modelica_like.solve.trajectories import ENERGY_TERMS
 
 
 def read(solution: Solution, output: Output) -> float:
@@ -46,12 +47,7 @@ def _value(model: CompiledDae, values: Any, path: str) -> Any:
 
 
 def _time(solution: Solution, output: Output) -> float:
-    before, after, number = output.change
-    found = [
-        event.time
-        for event in solution.events
-        if event.mode == output.path and before in ("", event.before) and after in ("", event.after)
-    ]
+    found, number = [event.time for event in solution.events if output.is_change(event)], output.change[2]
     if len(found) < number:
         raise UnknownName(f"'{output.name}' does not happen in this run.")
     return found[number - 1]

@@ -12,7 +12,7 @@ import numpy as np
 
 from modelica_like.analyse.sweeps.plan import Plan
 from modelica_like.analyse.sweeps.workers import Chunk, Done, Job
-from modelica_like.errors import CheckpointMismatch, missing_extra
+from modelica_like.errors import CheckpointMismatch, extra_module
 from modelica_like.writing import write_text
 
 
@@ -34,7 +34,7 @@ class Checkpoint:
     """
 
     def __init__(self, path: str | Path, job: Job, plan: Plan, size: int) -> None:
-        zarr = _zarr()
+        zarr = extra_module("zarr", "analyse")
         self.path = Path(path)
         key = _fingerprint(job, plan, size)
         if (self.path / "zarr.json").exists():
@@ -94,11 +94,3 @@ def _fingerprint(job: Job, plan: Plan, size: int) -> str:
     return hashlib.sha256(
         job.identity.encode() + text.encode() + np.ascontiguousarray(plan.points).tobytes()
     ).hexdigest()
-
-
-def _zarr() -> Any:
-    try:
-        import zarr
-    except ImportError:
-        raise missing_extra("zarr", "analyse") from None
-    return zarr

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 
 from modelica_like.analyse.sweeps.plan import Samples
 from modelica_like.analyse.sweeps.sweep import sweep
-from modelica_like.errors import UnknownName, ValueOutOfRange, missing_extra
+from modelica_like.errors import UnknownName, ValueOutOfRange, extra_module
 from modelica_like.simulation import Model
 
 Kind = Literal["sobol", "morris"]
@@ -119,13 +119,7 @@ def _check_complete(name: str, column: Any, failures: Sequence[str]) -> None:
 
 
 def _salib(method: str) -> tuple[Any, Any]:
-    try:
-        from SALib.analyze import morris as analyse_morris
-        from SALib.analyze import sobol as analyse_sobol
-        from SALib.sample import morris as sample_morris
-        from SALib.sample import sobol as sample_sobol
-    except ImportError:
-        raise missing_extra("SALib", "analyse") from None
-    if method not in ("sobol", "morris"):
+    if method not in get_args(Kind):
         raise UnknownName(f"There is no method '{method}'. There are sobol and morris.")
-    return (sample_sobol, analyse_sobol) if method == "sobol" else (sample_morris, analyse_morris)
+    sample, analyse = (extra_module(f"SALib.{part}.{method}", "analyse") for part in ("sample", "analyze"))
+    return sample, analyse

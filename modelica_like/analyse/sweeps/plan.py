@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from modelica_like.analyse.slopes import columns_of
 from modelica_like.analyse.sweeps.ranges import MOST_RUNS, too_many
 from modelica_like.compile.compiled import CompiledDae
-from modelica_like.errors import LanguageError, UnknownName, ValueOutOfRange, did_you_mean, missing_extra
-from modelica_like.units import Unit, coherent, to_si
+from modelica_like.errors import LanguageError, ValueOutOfRange, extra_module
+from modelica_like.units import Unit, to_si
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,18 +131,11 @@ def make_plan(model: CompiledDae, over: Mapping[str, Iterable[Any]], sampling: S
 
 
 def _unit(model: CompiledDae, name: str) -> Unit:
-    known = {one.path: one.unit for one in model.flat_parameters}
-    known.update({model.flat_variables[k].path: model.flat_variables[k].unit for k in model.inputs})
     if name in model.derived_position:
         raise LanguageError(f"{name} follows from other parameters.", advice="Vary those, or sweep the netlist itself.")
-    if name not in known:
-        raise UnknownName(f"{model.name} has no parameter '{name}'{did_you_mean(name, known) or '.'}")
-    return coherent(known[name])
+    columns_of(model, [name])
+    return model.units[name]
 
 
 def _qmc() -> Any:
-    try:
-        from scipy.stats import qmc
-    except ImportError:
-        raise missing_extra("scipy", "analyse") from None
-    return qmc
+    return extra_module("scipy.stats", "analyse").qmc

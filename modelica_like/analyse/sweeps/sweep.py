@@ -26,7 +26,7 @@ from modelica_like.analyse.sweeps.workers import (
     on_cluster,
 )
 from modelica_like.compile.compiled import CompiledDae
-from modelica_like.errors import ModelicaLikeError, ValueOutOfRange, missing_extra
+from modelica_like.errors import ModelicaLikeError, ValueOutOfRange, extra_module
 from modelica_like.simulation import Model, Solver, build
 
 if TYPE_CHECKING:
@@ -185,10 +185,6 @@ def _collect(
 def _dataset(
     model: CompiledDae, plan: Plan, units: Mapping[str, str], values: Any, failures: Mapping[int, str]
 ) -> xarray.Dataset:
-    try:
-        import xarray
-    except ImportError:
-        raise missing_extra("xarray", "data") from None
     # Not as long as the longest sentence for each of many runs.
     told = np.full(len(plan), "", object)
     told[list(failures)] = list(failures.values())
@@ -202,4 +198,4 @@ def _dataset(
         name: (name if plan.axes is not None else "sample", column, {"units": unit})
         for name, unit, column in zip(plan.names, plan.units, columns, strict=True)
     }
-    return xarray.Dataset(data, coords=coords, attrs={"model": model.name})
+    return extra_module("xarray", "data").Dataset(data, coords=coords, attrs={"model": model.name})

@@ -23,7 +23,7 @@ from modelica_like.analyse.sensitivity.outputs import read_output
 from modelica_like.analyse.sensitivity.readings import read_all
 from modelica_like.analyse.sweeps.native_runs import NativeRuns
 from modelica_like.compile.compiled import CompiledDae
-from modelica_like.errors import ModelicaLikeError, WorkersLost, missing_extra
+from modelica_like.errors import ModelicaLikeError, WorkersLost, extra_module
 from modelica_like.simulation import plan, simulate
 
 _RESTARTS = 3
@@ -259,13 +259,9 @@ def on_cluster(job: Job, chunks: Sequence[Chunk], scheduler: str) -> Generator[D
         MissingExtra: Dask is not installed.
         WorkersLost: the scheduler is not there, or gave up a part of the runs.
     """
+    dask = extra_module("distributed", "cluster", "Dask")
     try:
-        from distributed import Client, as_completed
-        from distributed.scheduler import KilledWorker
-    except ImportError:
-        raise missing_extra("Dask", "cluster") from None
-    try:
-        client = Client(scheduler, set_as_default=False, timeout=_PATIENCE)
+        client = dask.Client(scheduler, set_as_default=False, timeout=_PATIENCE)
     except (OSError, ValueError):
         raise WorkersLost(
             f"There is no Dask scheduler at {scheduler}.", advice="Its address looks like tcp://host:8786."
@@ -275,11 +271,11 @@ def on_cluster(job: Job, chunks: Sequence[Chunk], scheduler: str) -> Generator[D
         futures = [client.submit(run_chunk, shared, first, points, pure=False) for first, points in chunks]
         left = dict(chunks)
         try:
-            for future in as_completed(futures, loop=client.loop):
+            for future in dask.as_completed(futures, loop=client.loop):
                 done = future.result()
                 del left[done.first]
                 yield done
-        except KilledWorker as error:
+        except dask.scheduler.KilledWorker as error:
             raise _lost(left, f"Dask gave up: {error}") from None
         finally:
             client.cancel(futures)

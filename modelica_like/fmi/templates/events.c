@@ -100,8 +100,8 @@ void note_change(Instance *c, int name, int transition, int mode, int target) {
             text_of(m, names[(int)before]), text_of(m, names[target]));
 }
 
-/* Carry out transitions together; of one mode only the one declared first. */
-static void fire(Instance *c, const unsigned char *wanting, Impacts *impacts) {
+/* Carry out transitions together; of one mode only the one declared first. An error if one of them ends the run. */
+static Result fire(Instance *c, const unsigned char *wanting, Impacts *impacts) {
     const Model *m = c->model;
     State *s = &c->state;
     Work *w = &c->work;
@@ -115,6 +115,7 @@ static void fire(Instance *c, const unsigned char *wanting, Impacts *impacts) {
         if (!wanting[k] || changed[one->mode]) continue;
         changed[one->mode] = 1;
         note_change(c, one->name, k, one->mode, one->target);
+        if (one->fails) return report(c, LOG_ERROR, RESULT_ERROR, "t = %.9g s: %s", s->t, text_of(m, one->notice));
         if (*text_of(m, one->notice))
             report(c, LOG_WARNING, RESULT_OK, "t = %.9g s: %s", s->t, text_of(m, one->notice));
         d[one->mode] = one->target;
@@ -132,6 +133,7 @@ static void fire(Instance *c, const unsigned char *wanting, Impacts *impacts) {
     }
     memcpy(c->d, d, (size_t)m->n_d * sizeof(double));
     if (count > 0) move_states(c, w->targets, w->target_values, count);
+    return RESULT_OK;
 }
 
 /* Notes an instant; an error where the last ones came ever faster. */
@@ -182,7 +184,7 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
         }
         c->round = round;
         memcpy(before, c->d, (size_t)m->n_d * sizeof(double));
-        fire(c, wanting, impacts);
+        if (fire(c, wanting, impacts) != RESULT_OK) return RESULT_ERROR;
         share(c);
         c->variables_valid = 0;
         if (solve_now(c, 0) != RESULT_OK || stop_motions(c, before, impacts) != RESULT_OK ||

@@ -65,7 +65,9 @@ typedef struct {
     double factor;
 } Reset;
 typedef struct {
-    int mode, target, timed, index, first_reset, n_resets, name, notice;
+    int mode, target;
+    short timed, fails;
+    int index, first_reset, n_resets, name, notice;
     uint64_t sources;
 } Transition;
 typedef struct {

@@ -40,11 +40,9 @@ def component_pages(folder: Path, examples: Path | None = None, types: Sequence[
 
 
 def write_component_pages(folder: Path, examples: Path | None = None, types: Sequence[str] | None = None) -> list[Path]:
-    """Write pages about component types; other files in the folder are left alone.
+    """Write pages about component types, see `component_pages`; other files in the folder are left alone.
 
     Raises:
-        UnknownName: there is no such type.
-        NetlistError: a library or an example cannot be read.
         OSError: a file cannot be written.
     """
     pages = component_pages(folder, examples, types)
@@ -69,7 +67,7 @@ def examples_by_type(folder: Path) -> dict[str, list[Example]]:
         if "[parts" in contents[file]:
             netlist = parse(contents[file], str(file))
             for part in _parts(netlist.parts):
-                example = Example(file, netlist.description or netlist.name, part)
+                example = Example(file, netlist.description or netlist.name)
                 found.setdefault(part["is"], {}).setdefault(file, example)
     return {name: list(examples.values()) for name, examples in found.items()}
 

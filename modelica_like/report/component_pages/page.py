@@ -4,34 +4,31 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from textwrap import dedent
+from typing import NamedTuple
 
-from modelica_like.errors import LanguageError
 from modelica_like.language import Component
 from modelica_like.report.component_pages import latex_names as names
-from modelica_like.report.component_pages.markdown import cell, markdown, module_title, relative, source_link, table
-from modelica_like.report.component_pages.named_calls import any_table
+from modelica_like.report.component_pages.markdown import (
+    cell,
+    markdown,
+    module_title,
+    page_link,
+    relative,
+    source_link,
+    table,
+)
 from modelica_like.report.component_pages.sections import written
-from modelica_like.report.component_pages.statements import Statements, statements
-from modelica_like.report.component_pages.variants import value_for, variants
-from modelica_like.report.declared import Notation, declared, has_default
+from modelica_like.report.component_pages.source import Source
+from modelica_like.report.declared import Notation, declared
 
 
-@dataclass(frozen=True)
-class Example:
-    """A netlist in which a type occurs.
-
-    Attributes:
-        path: the file.
-        title: its description.
-        structure: values it gives to structural fields.
-    """
+class Example(NamedTuple):
+    """A netlist in which a type occurs, and its description."""
 
     path: Path
     title: str
-    structure: Mapping[str, Any]
 
 
 def page(kind: type[Component], file: Path, examples: Sequence[Example] = ()) -> str:
@@ -40,18 +37,22 @@ def page(kind: type[Component], file: Path, examples: Sequence[Example] = ()) ->
     Args:
         kind: the type.
         file: where the page will be; links are relative to it.
-        examples: netlists in which it occurs; the first gives structural fields without default their values.
+        examples: netlists in which it occurs.
     """
-    try:
-        optional, mathematics = _said(kind, structure_of(kind, examples))
-    except LanguageError as error:
-        optional, mathematics = {}, [f"The equations depend on structural values: {error.what}"]
+    source = Source(kind)
+    equations, events = (written(source.says(name)) for name in ("equations", "events"))
+    energy = written(source.energy())
+    definitions = written(source.definitions())
     sections = [
         f"# {kind.__name__}",
         f"[All components](../README.md) · {module_title(kind.__module__)} · {source_link(kind, file)}",
         markdown(inspect.cleandoc(kind.__doc__ or "")),
-        *(table(title.capitalize(), head, rows) for title, head, rows in declared(kind, _notation(optional))),
-        *mathematics,
+        *(table(title.capitalize(), head, rows) for title, head, rows in declared(kind, _notation(_optional(source)))),
+        *_parts(kind),
+        equations and f"## Equations\n\n{equations}",
+        definitions and f"where\n\n{definitions}",
+        events and f"## Events\n\n{events}",
+        energy and f"## Energy\n\n{energy}",
         *_example_links(examples, file),
         *_bases(kind, file),
     ]
@@ -68,40 +69,28 @@ def _notation(optional: Mapping[str, str]) -> Notation:
     )
 
 
-def _said(kind: type[Component], structure: Mapping[str, Any]) -> tuple[dict[str, str], list[str]]:
-    said = statements(kind, structure)
-    others = variants(kind, structure, said)
-    return _optional(kind, said, others), written(structure, said, others)
-
-
-def structure_of(kind: type[Component], examples: Sequence[Example]) -> dict[str, Any]:
-    """Return structural values of an example for a type that has no equations without any.
-
-    Tables that are only looked up along straight lines need none.
-    """
-    if not examples:
-        return {}
-    given = {name: examples[0].structure[name] for name in kind._structural if name in examples[0].structure}
-    plain = {name: value for name, value in given.items() if name not in any_table(kind)}
-    if all(has_default(default) or name in any_table(kind) for name, default in kind._structural.items()):
-        plain = {}
-    try:
-        statements(kind, plain)
-    except LanguageError:
-        return given
-    return plain
-
-
-def _optional(kind: type[Component], said: Statements, others: Mapping[str, Statements]) -> dict[str, str]:
-    """Return what to say of parameters that need no value, or not always."""
-    told = dict.fromkeys(said.asked, "optional")
-    for name in kind._class_fields:
-        instead = [
-            asked for asked in said.asked if (one := others.get(value_for(asked))) and name not in one.parameters
-        ]
-        if name in said.parameters and instead and name not in told:
+def _optional(source: Source) -> dict[str, str]:
+    """Return what to say of parameters that need no value, or only where others have none."""
+    told = dict.fromkeys(source.asked, "optional")
+    for name, uses in source.uses.items():
+        instead = [asked for asked in source.asked if all(use.get(asked) is False for use in uses)]
+        if instead and name not in told:
             told[name] = "required without " + ", ".join(f"`{one}`" for one in instead)
     return told
+
+
+def _parts(kind: type[Component]) -> list[str]:
+    """Return the parts that the class declares, and how it builds others."""
+    found = {name: part if isinstance(part, list) else [part] for name, part in kind._class_parts.items()}
+    rows = ((f"`{name}`", page_link(type(one)), _values(one)) for name, part in found.items() for one in part)
+    code = dedent(inspect.getsource(kind.build)).strip() if kind.build is not Component.build else ""
+    parts = [table("", ("part", "type", "values"), rows), code and f"```python\n{code}\n```"]
+    return ["## Parts", *parts] if any(parts) else []
+
+
+def _values(part: Component) -> str:
+    given = ", ".join(f"{name} = {value.given}" for name, value in part._values.items())
+    return f"`{given}`" if given else ""
 
 
 def _bases(kind: type[Component], file: Path) -> list[str]:

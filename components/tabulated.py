@@ -1,0 +1,47 @@
+"""Laws that are measured tables, and what happens beyond their rows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal
+
+from modelica_like.language import Component, Events, Expr, Mode, all_of, any_of, interpolate
+
+
+class Tabulated(Component, partial=True):
+    """Element with tables that were measured in a range.
+
+    Beyond it the last value is a guess, which the report of a run tells; who asks for the last slope means a law.
+    """
+
+    smooth: bool = False
+    """Interpolate in tables with a continuous slope."""
+    extrapolate: Literal["hold", "linear", "error"] = "hold"
+    """Beyond a table's rows: `hold` its last value, let its last slope go on (`linear`), or end the run (`error`)."""
+    range = Mode("kept", "left", description="whether it was always inside the rows of its tables")
+
+    def look_up(self, x: Expr | float, table: Sequence[Sequence[float]], column: int = 1) -> Expr:
+        """Return a value of a table at x, which counts like its first column."""
+        return interpolate(x, [r[0] for r in table], [r[column] for r in table], self.smooth, self.extrapolate)
+
+    def leaving(
+        self, name: str, x: Expr, table: Sequence[Sequence[float]], *conditions: Expr, least: float = 0.0
+    ) -> Events:
+        """Yield the event that tells that x leaves a table.
+
+        Args:
+            name: of the table.
+            x: counts like its first column.
+            table: rows.
+            conditions: on which it matters.
+            least: what x is never below.
+        """
+        if len(table) > 1 and self.extrapolate != "linear":
+            told = ": its last value holds" if self.extrapolate == "hold" else ""
+            first, last = table[0][0], table[-1][0]
+            above = isinstance(first, float | int) and first <= least
+            outside = x > last if above else any_of(x > last, x < first)
+            yield self.range.go(
+                "kept", "left", when=all_of(outside, *conditions), fails=self.extrapolate == "error",
+                notice=f"leaves the rows of {name}{told}",
+            )  # fmt: skip

@@ -1,0 +1,179 @@
+"""One smooth step of the replay: solved, differentiated, and shortened up to where something changes its sign."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from modelica_like.analyse.replay.steps import StepFunctions
+from modelica_like.compile.buffers import Vector
+from modelica_like.errors import StepFailed, ValueOutOfRange
+from modelica_like.initialize import Point
+
+_ITERATIONS = 12
+_CONVERGED = 1e-2
+_ABSOLUTE = 1e-2
+_ORDERS = 0.75
+_FINEST, _COARSEST = 1e-13, 1e-3
+_TRIALS = 40
+CLOSE = 2e-13
+"""How far before an event or a kink a step ends, relative to the time."""
+
+
+@dataclass(frozen=True)
+class Tolerances:
+    """How precisely to integrate again: relative to the states, or to a hundredth of their nominal values.
+
+    What a step can estimate is the error of order s that its s stages leave; its end is of order 2 s - 1. The estimate
+    may therefore be larger than the error that is wanted: by the power `_ORDERS`, where the orders alone would allow
+    (s + 1)/(2 s), because for stiff motions the end loses order.
+    """
+
+    rtol: float = 1e-8
+
+    def __post_init__(self) -> None:
+        if not _FINEST <= self.rtol <= _COARSEST:
+            raise ValueOutOfRange(
+                f"The precision of a replay, {self.rtol:g}, is out of range: "
+                f"it must be between {_FINEST:g} and {_COARSEST:g}."
+            )
+
+    def norm(self, error: Vector, before: Point, after: Point, nominals: Vector) -> float:
+        """Estimated error of a step over what is allowed."""
+        scale = np.maximum(np.abs(before.x), np.abs(after.x)) + _ABSOLUTE * nominals
+        return float(np.linalg.norm(error / scale)) / (len(error) ** 0.5 * self.rtol**_ORDERS)
+
+
+@dataclass(frozen=True)
+class Step:
+    """A smooth step from `before` over `h` seconds with the solved stages W."""
+
+    functions: StepFunctions
+    before: Point
+    after: Point
+    h: float
+    stages: Vector
+    quadratures: Vector
+
+    def inside(self) -> list[Point]:
+        """Return the points at the stages but the last, which is the end."""
+        nx, nodes = len(self.before.x), self.functions.tableau.nodes
+        values = zip(nodes[:-1], self.stages.reshape(len(nodes), -1), strict=False)
+        return [Point(self.before.t + c * self.h, w[:nx], w[nx:], self.before.d) for c, w in values]
+
+    def forward(self, whole: Vector) -> tuple[Vector, Vector]:
+        """Carry derivatives of (x, theta) to the end; shapes (nx + ntheta, columns) and (quadratures, columns)."""
+        nx, columns = len(self.before.x), whole.shape[1]
+        fast = self.functions.forward(columns)
+        end, gained = fast(*self._arguments, whole[:nx].ravel("F"), whole[nx:].ravel("F"))
+        return np.vstack([end.reshape(columns, -1).T, whole[nx:]]), gained.reshape(columns, -1).T
+
+    def adjoint(self, whole: Vector, Q: Vector) -> Vector:
+        """Carry derivatives by (x, theta) to the beginning; Q are those by the quadratures."""
+        nx, columns = len(self.before.x), whole.shape[1]
+        parts = self.functions.adjoint(columns)(*self._arguments, whole[:nx].ravel("F"), Q.ravel("F"))
+        begin, more = (part.reshape(columns, -1).T for part in parts)
+        return np.vstack([begin, whole[nx:] + more])
+
+    @property
+    def _arguments(self) -> tuple[object, ...]:
+        model, here = self.functions.model, self.before
+        return here.t, self.h, here.x, self.stages, model.p, model.u, here.d
+
+
+def try_step(
+    functions: StepFunctions, point: Point, h: float, last: Step | None, tolerances: Tolerances
+) -> tuple[Step | None, float]:
+    """Make a step; return it and its error relative to the tolerances, or None if it did not converge.
+
+    Args:
+        functions: of the model.
+        point: its beginning.
+        h: its length in s.
+        last: the step before, or one from the same beginning, which tells where to look for it.
+        tolerances: what the error is relative to.
+    """
+    model, nx, nz = functions.model, functions.nx, functions.nz
+    theta = model.p, model.u, point.d
+    W = np.concatenate([point.x, point.z] * len(functions.tableau.nodes))
+    if functions.linear:
+        W, error, quadratures = functions.whole(point.t, h, point.x, W, *theta, point.z)
+    else:
+        if last is not None:
+            begin = 0.0 if last.before is point else 1.0
+            W = functions.tableau.continued(last.stages, begin, h / last.h)
+        W = _solved(functions, point, h, W, tolerances.rtol)
+        if W is None:
+            return None, np.inf
+        error, quadratures = functions.finish(point.t, h, point.x, W, *theta, point.z)
+    after = Point(point.t + h, W[-nx - nz : W.size - nz].copy(), W[W.size - nz :].copy(), point.d)
+    norm = tolerances.norm(error, point, after, model.nominals)
+    return (Step(functions, point, after, h, W, quadratures), norm) if norm < np.inf else (None, np.inf)
+
+
+def _solved(functions: StepFunctions, point: Point, h: float, W: Vector, rtol: float) -> Vector | None:
+    """The stages by Newton's method, or None if it does not converge."""
+    model = functions.model
+    scale = np.concatenate([np.abs(point.x) + _ABSOLUTE * model.nominals, 1.0 + np.abs(point.z)])
+    weights = np.concatenate([rtol * scale] * len(functions.tableau.nodes))
+    size = np.inf
+    for _ in range(_ITERATIONS):
+        correction = functions.newton(point.t, h, point.x, W, model.p, model.u, point.d)[0]
+        W = W + correction
+        before, size = size, float(np.abs(correction / weights).max(initial=0.0))
+        if not np.isfinite(size):
+            return None
+        # Newton's method converges quadratically: the next correction is far below this one.
+        if size <= _CONVERGED or size * size <= _CONVERGED * before < np.inf:
+            return W
+    return None
+
+
+def stuck(point: Point) -> StepFailed:
+    """Return the error about steps that do not converge."""
+    return StepFailed(
+        f"The replay of the run stalled at t = {point.t:.9g} s: its steps do not converge.",
+        advice="Look for a function without a slope there, or for a mode that should have changed.",
+    )
+
+
+def shortened(
+    step: Step, value: Callable[[Point], float], low: tuple[float, float], high: tuple[float, float],
+    tolerances: Tolerances, zero: float = 0.0,
+) -> Step | None:  # fmt: skip
+    """Shorten a step so that it ends just before a function of its end changes its sign: regula falsi (Illinois).
+
+    Args:
+        step: the step.
+        value: the function.
+        low: a length and the function there, before the change.
+        high: the same behind it.
+        tolerances: of the step.
+        zero: what is zero for the function, on either side, relative to its values at `low` and `high`.
+
+    Returns:
+        The step, or None if it would have no length or does not converge.
+    """
+    (a, f_a), (b, f_b) = low, high
+    found: Step | None = None
+    side: bool | None = None
+    small, enough = CLOSE * max(1.0, abs(step.before.t)), zero * (abs(f_a) + abs(f_b))
+    for _ in range(_TRIALS):
+        if b - a <= small:
+            break
+        h = min(max(b - f_b * (b - a) / (f_b - f_a), a + 0.5 * small), b - 0.5 * small)
+        made, _ = try_step(step.functions, step.before, h, step, tolerances)
+        if made is None:
+            break
+        f = value(made.after)
+        if abs(f) < enough:
+            return made
+        # What stays where it is twice weighs half as much.
+        if near := f * f_a > 0.0:
+            a, f_a, found, f_b = h, f, made, f_b * (0.5 if side == near else 1.0)
+        else:
+            b, f_b, f_a = h, f, f_a * (0.5 if side == near else 1.0)
+        side = near
+    return found

@@ -1,0 +1,152 @@
+"""Numbers read off a replay, with what they depend on: values, peaks, integrals, times of mode changes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+
+import casadi as ca
+import numpy as np
+
+from modelica_like.analyse.replay.chain import Replay
+from modelica_like.analyse.replay.jumps import Jump
+from modelica_like.analyse.replay.step import Step, shortened
+from modelica_like.analyse.replay.sweeps import Reading
+from modelica_like.analyse.sensitivity.outputs import Output, expression_of
+from modelica_like.analyse.slopes import Slopes, slopes
+from modelica_like.compile.buffers import Vector
+from modelica_like.compile.compiled import CompiledDae
+from modelica_like.errors import NoGradient, UnknownName, ValueOutOfRange
+from modelica_like.initialize import Point
+from modelica_like.solve.solution import Solution
+
+_NEAR = 0.05
+_FLAT = 1e-12
+_STILL = 1e-11
+
+
+def read_off(solution: Solution, replay: Replay, outputs: Sequence[Output]) -> list[Reading]:
+    """Return the readings of outputs other than series, one each.
+
+    Raises:
+        UnknownName: a mode change does not happen.
+        NoGradient: it has no derivative.
+    """
+    _check_impacts(solution, outputs)
+    integrals = [one for one in outputs if one.kind == "integral"]
+    by_integral = np.eye(len(integrals))
+    found: list[Reading] = []
+    for one in outputs:
+        if one.kind == "integral":
+            number = integrals.index(one)
+            found.append(Reading(float(replay.quadratures[number]), quadratures=by_integral[number]))
+        elif one.kind == "time":
+            found.append(_event_time(solution, replay, one))
+        elif one.kind in ("max", "min"):
+            found.append(_peak(replay, one))
+        else:
+            found.append(value_at(replay, one.path, _node_of(replay, one)))
+    return found
+
+
+def value_at(replay: Replay, path: str, node: Point, jump: Jump | None = None) -> Reading:
+    """Read a variable at a node, or at a jump that carries it along."""
+    part = _slopes(replay, path, node)
+    parts = [(node, part.by[0])]
+    if jump is not None:
+        parts.append((jump.before, float(part.rate[0]) * jump.time().by))
+    return Reading(float(part.value[0]), tuple(parts))
+
+
+def _slopes(replay: Replay, path: str, node: Point) -> Slopes:
+    return slopes(replay.model, node, f"value of {path}", None, lambda: _function(replay.model, path))
+
+
+def _function(model: CompiledDae, path: str) -> ca.Function:
+    return ca.Function("value", [*model.arguments.values()], [ca.densify(ca.SX(expression_of(model, path)[0]()))])
+
+
+def _check_impacts(solution: Solution, outputs: Sequence[Output]) -> None:
+    """Refuse energies of which an impact takes a part at once: an integral knows nothing of it."""
+    for output in outputs:
+        owner, _, last = output.path.rpartition(".")
+        lost = output.kind == "integral" and last == "loss_energy"
+        found = [one for one in solution.impacts if owner in ("", one.component)] if lost else []
+        if found:
+            raise NoGradient(
+                f"No gradient of {output.name}: {found[0].component} loses {found[0].energy:.6g} J in an impact at "
+                f"t = {found[0].time:.9g} s.",
+                why="Only the loss of power over time is differentiated, not what an impact takes at once.",
+                advice=f"Ask for integral({output.path.removesuffix('energy')}power), which leaves impacts out, or for "
+                "speeds after the impact.",
+            )
+
+
+def _event_time(solution: Solution, replay: Replay, output: Output) -> Reading:
+    found = [jump for _, jump in replay.jumps for event in jump.events if output.is_change(event)]
+    number = output.change[2]
+    if len(found) < number:
+        changes = [f"{e.before} → {e.after} at {e.time:.6g} s" for e in solution.events if e.mode == output.path]
+        told = f"{', '.join(changes[:6])}{', …' if len(changes) > 6 else ''}"
+        raise UnknownName(
+            f"'{output.name}' does not happen after the start of the run.",
+            why=f"{output.path} changes: {told}." if changes else f"{output.path} does not change in this run.",
+        )
+    jump = found[number - 1]
+    trigger = jump.time()
+    return Reading(jump.before.t + trigger.shift, ((jump.before, trigger.by),))
+
+
+def _node_of(replay: Replay, output: Output) -> Point:
+    first, last = replay.nodes[0].t, replay.nodes[-1].t
+    if output.kind == "end":
+        return replay.nodes[-1]
+    if not first <= output.moment <= last:
+        raise ValueOutOfRange(f"{output.name}: the run goes from {first:g} s to {last:g} s.")
+    return replay.at(output.moment)
+
+
+def _peak(replay: Replay, output: Output) -> Reading:
+    """Read the largest or smallest value along a replay.
+
+    Candidates are the nodes and the stages in between; near the best of them zeros of the rate are sought.
+    """
+    sign = 1.0 if output.kind == "max" else -1.0
+    rate: Callable[[Point], float] = lambda point: sign * float(_slopes(replay, output.path, point).rate[0])  # noqa: E731
+    values: Callable[[list[Point]], Vector] = lambda points: sign * _along(replay, output.path, points)  # noqa: E731
+    at_nodes = values(replay.nodes)
+    inside = [values(move.inside()) if isinstance(move, Step) else np.zeros(0) for move in replay.moves]
+    everything = np.concatenate([at_nodes, *inside])
+    level = float(np.max(everything) - _NEAR * np.ptp(everything))
+    best, top, found = int(np.argmax(at_nodes)), float(np.max(at_nodes)), None
+    for k, (move, between) in enumerate(zip(replay.moves, inside, strict=True)):
+        if isinstance(move, Step) and max(at_nodes[k], at_nodes[k + 1], *between) >= level:
+            for step in _tops(replay, move, rate):
+                value = float(values([step.after])[0])
+                if value > top + _FLAT * abs(top):
+                    best, top, found = k, value, step
+    if found is not None:
+        return value_at(replay, output.path, replay.split(best, found))
+    # Beside a jump, the event may move.
+    beside = (replay.moves[k] for k in (best, best - 1) if 0 <= k < len(replay.moves))
+    jump = next((move for move in beside if isinstance(move, Jump)), None)
+    return value_at(replay, output.path, replay.nodes[best], jump)
+
+
+def _along(replay: Replay, path: str, points: list[Point]) -> Vector:
+    """Values of a variable at points."""
+    model = replay.model
+    fast = model.fast(("only", path), lambda: _function(model, path))
+    return np.array([fast(o.t, o.x, o.z, model.p, model.u, o.d)[0][0] for o in points])
+
+
+def _tops(replay: Replay, step: Step, rate: Callable[[Point], float]) -> list[Step]:
+    """Shorten a step to where a rate passes zero from above."""
+    points = [step.before, *step.inside(), step.after]
+    rates = [(point.t - step.before.t, rate(point)) for point in points]
+    found = [
+        shortened(step, rate, low, high, replay.tolerances, _STILL)
+        for low, high in pairwise(rates)
+        if low[1] > 0.0 >= high[1] or low[1] >= 0.0 > high[1]
+    ]
+    return [one for one in found if one is not None]

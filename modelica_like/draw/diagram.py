@@ -1,0 +1,263 @@
+"""What a schematic shows: parts with their ports, and the nets between them."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import cast
+
+from modelica_like.language.component import Component
+from modelica_like.language.declared import Connector, Declared
+from modelica_like.language.equation import Connection
+from modelica_like.language.expr import Symbol
+from modelica_like.language.fields import Output
+from modelica_like.language.icon import PLAIN, SIGNAL, Icon, Side, Stroke
+
+_USUAL: dict[str, Side] = {
+    "flange_b": "E", "n": "E", "port_b": "E", "flange_t": "E", "support": "S", "heat_port": "S",
+}  # fmt: skip
+_BESIDE = 9.0
+_OPPOSITE: dict[Side, Side] = {"W": "E", "E": "W", "N": "N", "S": "S"}
+
+
+@dataclass(eq=False)
+class Port:
+    """A connector or signal of a node that something is joined to.
+
+    Attributes:
+        name: path inside the node.
+        node: whose it is.
+        side: where it leaves the symbol.
+        along: place along the side, from its middle.
+        stroke: how its connections are drawn.
+        signal: 1 for an output, -1 for an input, 0 for a connector.
+        mark: icon drawn here, such as a ground.
+    """
+
+    name: str
+    node: Node
+    side: Side
+    along: float
+    stroke: Stroke
+    signal: int = 0
+    mark: Icon | None = None
+
+    @property
+    def way(self) -> Side:
+        """Where its line leaves the node: signals come from the west, and what is in the south goes east."""
+        if self.side in ("W", "E"):
+            return self.side
+        return "W" if self.signal < 0 or (self.side == "N" and not self.signal) else "E"
+
+
+@dataclass(eq=False)
+class Node:
+    """A part, or an outer connector of an assembly (then without component).
+
+    Attributes:
+        name: its name.
+        component: the part.
+        icon: its symbol; none for a box.
+        inside: what an open assembly consists of.
+        ports: what something is joined to, by name.
+        border: for an outer connector the side of the box at which it lies.
+    """
+
+    name: str
+    component: Component | None
+    icon: Icon | None = None
+    inside: Diagram | None = None
+    ports: dict[str, Port] = field(default_factory=dict)
+    border: Side | None = None
+
+    def turn(self) -> None:
+        """Exchange west and east; signals stay, as they are read from left to right."""
+        if self.inside:
+            return
+        for port in self.ports.values():
+            if not port.signal:
+                port.side = _OPPOSITE[port.side]
+            if port.side in ("N", "S"):
+                port.along = -port.along
+        self.turned = not self.turned
+
+    turned: bool = False
+
+
+@dataclass(eq=False)
+class Net:
+    """Ports that are joined."""
+
+    ports: list[Port]
+
+    @property
+    def stroke(self) -> Stroke:
+        """How it is drawn."""
+        return self.ports[0].stroke
+
+
+@dataclass(eq=False)
+class Diagram:
+    """Nodes and nets of an assembly."""
+
+    nodes: list[Node]
+    nets: list[Net]
+
+
+def diagram(component: Component, depth: int) -> Diagram:
+    """Collect what the schematic of a component shows.
+
+    Args:
+        component: a drive, or a part of one.
+        depth: how many levels of assemblies are open.
+    """
+    nodes = {
+        name: Node(name, part, _icon(part), diagram(part, depth - 1) if _opens(part, depth) else None)
+        for name, part in component.parts.items()
+    }
+    outer = dict[str, Node]()
+    nets = [Net([_port(end, component, nodes, outer) for end in ends]) for ends in _joined(component)]
+    for net in nets:
+        _mark(net)
+    kept = [node for node in nodes.values() if not (node.icon and node.icon.at_ports)]
+    made = Diagram([*kept, *outer.values()], [net for net in nets if len(net.ports) > 1])
+    for node in kept:
+        if node.icon is None:
+            _box(node)
+    _orient(made)
+    for node in kept:
+        _spread(node)
+    for node in outer.values():
+        (port,) = node.ports.values()
+        node.border = _OPPOSITE[port.side]
+    return made
+
+
+def _opens(part: Component, depth: int) -> bool:
+    return depth > 0 and _icon(part) is None and bool(part.parts) and any(_joined(part))
+
+
+def _icon(part: Component) -> Icon | None:
+    return part.icon
+
+
+def _joined(component: Component) -> Iterator[list[Connector | Symbol]]:
+    """Yield what is joined, each set once."""
+    sets: list[dict[tuple[int, str], Connector | Symbol]] = []
+    for statement in component.equations():
+        if isinstance(statement, Connection):
+            new = {_identity(end): end for end in statement.ends}
+            for old in [one for one in sets if one.keys() & new.keys()]:
+                new = old | new
+                sets.remove(old)
+            sets.append(new)
+    yield from (list(one.values()) for one in sets)
+
+
+def _identity(end: Connector | Symbol) -> tuple[int, str]:
+    return (id(end.owner), end.name) if isinstance(end, Symbol) else (id(end), "")
+
+
+def _port(end: Connector | Symbol, scope: Component, nodes: dict[str, Node], outer: dict[str, Node]) -> Port:
+    """The port of a part, or of a node for an outer connector."""
+    names = [end.name if isinstance(end, Symbol) else end._name]
+    owner = cast("Declared", end.owner if isinstance(end, Symbol) else end._owner)
+    while owner is not scope:
+        names.append(owner._name)
+        owner = cast("Declared", owner._owner)
+    *_, first = names
+    inner = first in nodes and len(names) > 1
+    node = nodes[first] if inner else outer.setdefault(first, Node(first, None))
+    name = ".".join(reversed(names[: len(names) - inner]))
+    if name not in node.ports:
+        drives = 0
+        if isinstance(end, Symbol):
+            drives = 1 if isinstance(end.owner.fields[end.name], Output) else -1
+        stroke = SIGNAL if isinstance(end, Symbol) else end.stroke or PLAIN
+        side, along = _place(node.icon, name, drives)
+        node.ports[name] = Port(name, node, side, along, stroke, drives)
+    return node.ports[name]
+
+
+def _place(icon: Icon | None, name: str, drives: int) -> tuple[Side, float]:
+    given = icon.ports.get(name) if icon else None
+    if given is not None:
+        return (given, 0.0) if isinstance(given, str) else given
+    return _USUAL.get(name, "E" if drives > 0 else "W"), 0.0
+
+
+def _mark(net: Net) -> None:
+    """Draw grounds where they are used."""
+    marks = [port for port in net.ports if port.node.icon and port.node.icon.at_ports]
+    if marks:
+        net.ports = [port for port in net.ports if port not in marks]
+        for port in net.ports:
+            port.mark = marks[0].node.icon
+        net.ports.clear()
+
+
+def _box(node: Node) -> None:
+    """Distribute the ports of a box over its sides."""
+    if node.inside:
+        for outer in node.inside.nodes:
+            if outer.border and outer.name in node.ports:
+                node.ports[outer.name].side = outer.border
+        return
+    for port in node.ports.values():
+        if port.side in ("N", "S"):
+            port.side = "W"
+    for side in ("W", "E"):
+        there = [port for port in node.ports.values() if port.side == side]
+        for k, port in enumerate(there):
+            port.along = 18.0 * (k - (len(there) - 1) / 2)
+
+
+def _spread(node: Node) -> None:
+    """Ports at one place of a symbol are drawn side by side."""
+    places: dict[tuple[Side, float], list[Port]] = {}
+    for port in node.ports.values():
+        places.setdefault((port.side, port.along), []).append(port)
+    for there in places.values():
+        for k, port in enumerate(there):
+            port.along += _BESIDE * (k - (len(there) - 1) / 2)
+
+
+def _orient(made: Diagram) -> None:
+    """Turn nodes so that power goes from west to east: from the first part on, each net is entered from the west."""
+    nets_of: dict[Node, list[Net]] = {node: [] for node in made.nodes}
+    for net in made.nets:
+        for port in net.ports:
+            nets_of[port.node].append(net)
+    known = set[Node]()
+    for node in made.nodes:
+        for port in node.ports.values() if node.component is None else ():
+            port.side = _OPPOSITE[port.side]
+    for first in sorted(made.nodes, key=_rank):
+        if first in known or (first.component is None and any(one.side == "W" for one in _ends(first))):
+            continue
+        known.add(first)
+        pending = deque([first])
+        while pending:
+            node = pending.popleft()
+            for port in sorted(_ends(node), key=lambda one: one.side != "E"):
+                for other in (other for net in nets_of[node] if port in net.ports for other in net.ports):
+                    if other.node in known or other.node.component is None or other.signal:
+                        continue
+                    if other.side == port.side and other.side in ("W", "E"):
+                        other.node.turn()
+                    known.add(other.node)
+                    pending.append(other.node)
+
+
+def _rank(node: Node) -> int:
+    """Outside comes first, then sources: all their connectors are in the east."""
+    if node.component is None:
+        return 0
+    sides = {_place(node.icon, name, 0)[0] for name in node.component.connectors} - {"N", "S"}
+    return 1 if sides == {"E"} else 2
+
+
+def _ends(node: Node) -> list[Port]:
+    """Ports that carry power along the drive."""
+    return [port for port in node.ports.values() if not port.signal and port.side in ("W", "E")]

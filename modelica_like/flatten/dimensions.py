@@ -1,0 +1,205 @@
+"""Dimensions along every equation."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
+from fractions import Fraction
+from typing import Any, cast
+
+import casadi as ca
+
+from modelica_like.errors import LanguageError, Source, UnitMismatch
+from modelica_like.language.expr import Expr
+from modelica_like.units import ANY, ONE, Unit, same_dimension
+
+UnitOf = Callable[[Any], Unit]
+"""Gives the unit of a leaf (a symbolic `casadi.SX`)."""
+
+_SUMS = {ca.OP_ADD, ca.OP_SUB, ca.OP_FMIN, ca.OP_FMAX, ca.OP_FMOD, ca.OP_HYPOT, ca.OP_COPYSIGN, ca.OP_REMAINDER}
+_SAME = {ca.OP_NEG, ca.OP_FABS, ca.OP_TWICE, ca.OP_ASSIGN}
+_RELATIONS = {ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE}
+_PLAIN = {ca.OP_NOT, ca.OP_AND, ca.OP_OR, ca.OP_SIGN}
+_POWERS = {ca.OP_SQ: Fraction(2), ca.OP_SQRT: Fraction(1, 2), ca.OP_INV: Fraction(-1)}
+
+
+_MIXED = Unit((("different units in different modes", 1),))
+"""Sum of a mode's branches that differ in unit: only good for an equation with zero."""
+
+
+class _Clash(Exception):
+    """Two terms of a sum or a relation differ."""
+
+    def __init__(self, left: Unit, right: Unit, what: str) -> None:
+        super().__init__(what)
+        self.left, self.right, self.what = left, right, what
+
+
+class _NotANumber(Exception):
+    """A number in an expression is nan: nothing can follow from it."""
+
+
+class Dimensions:
+    """Units of expressions; what was looked at once is remembered.
+
+    Args:
+        unit_of: gives the unit of a leaf.
+    """
+
+    def __init__(self, unit_of: UnitOf) -> None:
+        self._unit_of = unit_of
+        self._known: dict[int, tuple[Any, Unit]] = {}
+
+    def unit(self, expression: Expr | float) -> Unit:
+        """Return the unit of an expression; zero and what cannot be known fit everything."""
+        root: Any = expression if isinstance(expression, ca.SX) else ca.SX(cast(Any, expression))
+        pending = [root]
+        while pending:
+            node = pending[-1]
+            key = node.element_hash()
+            if key in self._known:
+                pending.pop()
+                continue
+            operands = [] if node.is_leaf() else [node.dep(k) for k in range(node.n_dep())]
+            open_operands = [dep for dep in operands if dep.element_hash() not in self._known]
+            if open_operands:
+                pending.extend(open_operands)
+                continue
+            units = [self._known[dep.element_hash()][1] for dep in operands]
+            # The node itself is kept too, so that its identity cannot be taken over by another one.
+            self._known[key] = (node, self._of_node(node, operands, units))
+            pending.pop()
+        return self._known[root.element_hash()][1]
+
+    def unit_or_any(self, expression: Expr | float) -> Unit:
+        """Return the unit of an expression, or `ANY` if its terms clash (the equation's own check tells that)."""
+        try:
+            return self.unit(expression)
+        except (_Clash, _NotANumber):
+            return ANY
+
+    def _of_node(self, node: Any, operands: list[Any], units: list[Unit]) -> Unit:
+        if node.is_symbolic():
+            return self._unit_of(node)
+        if not operands:
+            if math.isnan(float(node)):
+                raise _NotANumber
+            return ANY if float(node) == 0.0 else ONE
+        operation = node.op()
+        if operation == ca.OP_ADD and all(map(_is_choice, operands)):
+            return units[0] if _MIXED not in units and same_dimension(*units) else _MIXED
+        if operation in _SUMS:
+            return _common(units[0], units[1], "the terms of a sum")
+        if operation == ca.OP_ATAN2:
+            _common(units[0], units[1], "the coordinates of an angle")
+            return ONE
+        if operation in _RELATIONS:
+            _common(units[0], units[1], "the sides of a comparison")
+            return ONE
+        if operation in _PLAIN:
+            return ONE
+        if operation in _SAME:
+            return units[0]
+        if operation == ca.OP_MUL:
+            return _times(units[0], units[1])
+        if operation == ca.OP_DIV:
+            return _times(units[0], units[1] if units[1] == ANY else units[1] ** -1)
+        if operation in _POWERS:
+            return ANY if units[0] == ANY else units[0] ** _POWERS[operation]
+        if operation == ca.OP_IF_ELSE_ZERO:
+            return units[1]
+        if operation in (ca.OP_POW, ca.OP_CONSTPOW):
+            return _power(units[0], units[1], operands[1])
+        for unit in units:
+            _common(unit, ONE, "the argument of a function and a number")
+        return ONE
+
+
+def _is_choice(node: Any) -> bool:
+    """Tell whether a term comes from `Mode.choose`."""
+    while node.op() == ca.OP_ADD:
+        node = node.dep(1)
+    return node.op() == ca.OP_IF_ELSE_ZERO
+
+
+def _common(left: Unit, right: Unit, what: str) -> Unit:
+    if (_MIXED in (left, right) and ANY not in (left, right)) or not same_dimension(left, right):
+        raise _Clash(left, right, what)
+    return right if left == ANY else left
+
+
+def _times(left: Unit, right: Unit) -> Unit:
+    if _MIXED in (left, right):
+        raise _Clash(left, right, "the factors of a product")
+    return ANY if ANY in (left, right) else left * right
+
+
+def _power(base: Unit, exponent_unit: Unit, exponent: Any) -> Unit:
+    _common(exponent_unit, ONE, "an exponent and a number")
+    if exponent.is_constant():
+        return ANY if base == ANY else base ** Fraction(float(exponent)).limit_denominator(60)
+    return _common(base, ONE, "the base of a variable power and a number")
+
+
+def check_equation(left: Expr, right: Expr, dimensions: Dimensions, component: str, source: Source) -> None:
+    """Check that both sides of an equation have the same dimension.
+
+    Args:
+        left: one side.
+        right: the other.
+        dimensions: knows the units of the leaves.
+        component: name of the class, for messages.
+        source: where the equation stands.
+
+    Raises:
+        UnitMismatch: they differ, or a side is a sum of different things.
+        LanguageError: a number is nan.
+    """
+    place = f"{component}, {source}" if source.file else component
+    with _told(place, (), component, source):
+        units = dimensions.unit(left), dimensions.unit(right)
+    if _MIXED in units and ANY not in units:
+        raise UnitMismatch(
+            f"{place}: the branches of choose(…) or where(…) differ in unit; they only stand in `… == 0`."
+        )
+    if not same_dimension(*units):
+        raise UnitMismatch(f"{place}: left {units[0]}, right {units[1]}.")
+
+
+def check_expression(
+    expression: Expr | float, expected: Unit, dimensions: Dimensions, label: str, source: Source | None = None
+) -> None:
+    """Check that an expression has the expected dimension.
+
+    Args:
+        expression: what is checked.
+        expected: its unit, or one of the same dimension.
+        dimensions: knows the units of the leaves.
+        label: what messages call it.
+        source: where it stands.
+
+    Raises:
+        UnitMismatch: it has another one.
+        LanguageError: a number is nan.
+    """
+    where = (source,) if source else ()
+    with _told(label, where, label, source):
+        unit = dimensions.unit(expression)
+    if not same_dimension(unit, expected):
+        raise UnitMismatch(f"{label} expects {expected}; the expression is {unit}.", where=where)
+
+
+@contextmanager
+def _told(label: str, where: tuple[Source, ...], owner: str, source: Source | None) -> Generator[None]:
+    """Tell in sentences why an expression has no unit: terms clash, or a number of the owner is nan."""
+    try:
+        yield
+    except _Clash as clash:
+        raise UnitMismatch(f"{label}: {clash.what} differ: {clash.left} and {clash.right}.", where=where) from None
+    except _NotANumber:
+        raise LanguageError(
+            f"{owner}: a number in it is nan.",
+            where=source or (),
+            advice="Functions of `math` do not understand symbols: take sqrt, sin and so on from the language.",
+        ) from None

@@ -1,0 +1,68 @@
+"""How components and connections appear in a schematic."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+Side = Literal["W", "E", "N", "S"]
+"""West, where power usually comes from; east, where it goes; north; south."""
+
+
+@dataclass(frozen=True, slots=True)
+class Icon:
+    """The symbol of a component, around (0, 0), with y downwards, in units of 1/96 inch.
+
+    Attributes:
+        width: of the symbol.
+        height: of the symbol.
+        paper: SVG path data of areas in the colour of the paper, with an outline.
+        solid: of filled areas with an outline.
+        lines: of thin lines.
+        heavy: of thick lines.
+        text: letters in the middle.
+        ports: sides of connectors and signals, `"W"`, or side and place along it, `("W", -14)`. Without an entry,
+            inputs and what is called flange_a, p or port_a are in the west, outputs and the second ends in the east,
+            supports and heat ports in the south.
+        key: parameters of which the first given one is written below the name.
+        named: the names of the ports are written beside them.
+        at_ports: the symbol is drawn at each connector it is joined to, as a ground is, instead of as a part.
+    """
+
+    width: float
+    height: float
+    paper: str = ""
+    solid: str = ""
+    lines: str = ""
+    heavy: str = ""
+    text: str = ""
+    ports: Mapping[str, Side | tuple[Side, float]] = field(default_factory=dict[str, Side | tuple[Side, float]])
+    key: tuple[str, ...] = ()
+    named: bool = False
+    at_ports: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Stroke:
+    """How the connections of a kind of connector are drawn.
+
+    Attributes:
+        name: what is carried, a word for legends.
+        colour: on light paper, `#rrggbb`.
+        dark: on dark paper.
+        width: in 1/96 inch.
+        dashed: broken line.
+        weight: how much it matters that it is short and straight.
+    """
+
+    name: str
+    colour: str
+    dark: str
+    width: float = 2.0
+    dashed: bool = False
+    weight: int = 4
+
+
+SIGNAL = Stroke("signal", "#7c3aed", "#b794f6", 1.5, dashed=True, weight=1)
+PLAIN = Stroke("connection", "#1f2937", "#d7dde6")

@@ -1,0 +1,191 @@
+"""Results of design checks: frozen dataclasses that print as tables, with a verdict where a line has a limit."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, cast, dataclass_transform, get_type_hints
+
+import numpy as np
+
+from modelica_like.language.quantities import Number, Quantity, is_symbolic
+
+_ROUNDING = 1e-9
+_WIDE = 9
+Limits = Mapping[str, tuple[Number | None, Number | None]]
+"""Smallest and largest value, by name of the line; None where there is no such limit."""
+
+
+def line(description: str, *, at_most: str = "", at_least: str = "", required: bool = False) -> Any:
+    """Declare a line of a result; its unit is that of the annotation.
+
+    Args:
+        description: what it is, in the terms of the field.
+        at_most: name of another line that this one must not exceed.
+        at_least: name of another line that this one must reach.
+        required: this line, a truth value, has to be true.
+    """
+    limits = {"at_most": at_most, "at_least": at_least, "required": required}
+    return dataclasses.field(metadata={"description": description, **limits})
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """One line of a printed result.
+
+    Attributes:
+        name: name of the field.
+        value: the value as text, in the unit.
+        unit: the unit it is shown in.
+        description: what it is.
+        verdict: `ok`, by how much a limit is missed, or empty where there is no limit.
+        exceeded: a limit is missed.
+    """
+
+    name: str
+    value: str
+    unit: str
+    description: str
+    verdict: str
+    exceeded: bool
+
+
+@dataclass_transform(frozen_default=True, field_specifiers=(line,))
+class Result:
+    """Base of all results of design checks; every subclass is a frozen dataclass."""
+
+    def __init_subclass__(cls) -> None:
+        dataclass(frozen=True)(cls)
+
+    def lines(self, limits: Limits | None = None) -> tuple[Line, ...]:
+        """Return the lines of the table.
+
+        Args:
+            limits: smallest and largest values in SI by name of the line, beside those of the check itself.
+        """
+        chosen = (field for field in _fields(type(self)) if not is_rows(getattr(self, field.name)))
+        return tuple(self._line(field, (limits or {}).get(field.name, (None, None))) for field in chosen)
+
+    def tables(self) -> dict[str, tuple[Result, ...]]:
+        """Return the parts of the result that are rows of a table, by description."""
+        values = {field.metadata["description"]: getattr(self, field.name) for field in _fields(type(self))}
+        return {description: value for description, value in values.items() if is_rows(value)}
+
+    def _line(self, field: dataclasses.Field[Any], limit: tuple[Number | None, Number | None]) -> Line:
+        value, quantity, about = getattr(self, field.name), quantity_of(type(self), field.name), field.metadata
+        verdicts = [_required(value)] if about["required"] else []
+        for sort, other in zip(("at_least", "at_most"), limit, strict=True):
+            bounds = [getattr(self, about[sort])] if about[sort] else []
+            for bound in [*bounds, *([] if other is None else [other])]:
+                verdicts.append(_verdict(value, bound, quantity, above=sort == "at_most"))
+        missed = [text for text in verdicts if text not in ("", "ok")]
+        verdict = "; ".join(missed) or next(filter(None, verdicts), "")
+        return Line(field.name, shown(value, quantity), quantity.shown, about["description"], verdict, bool(missed))
+
+    def __str__(self) -> str:
+        text = _aligned([(line.name, line.value, line.unit, line.description, line.verdict) for line in self.lines()])
+        parts = [type(self).__name__, text]
+        for title, rows in self.tables().items():
+            parts += ["", title, _grid(rows)]
+        return "\n".join(parts)
+
+
+def is_rows(value: object) -> bool:
+    """Tell whether a value is a tuple of results."""
+    return isinstance(value, tuple) and isinstance(next(iter(cast("tuple[Any, ...]", value)), None), Result)
+
+
+def _fields(kind: Any) -> tuple[dataclasses.Field[Any], ...]:
+    return dataclasses.fields(kind)
+
+
+@lru_cache(maxsize=512)
+def hints(kind: Any) -> dict[str, Any]:
+    """Return the annotations of a function or a dataclass, with what they are annotated with."""
+    return get_type_hints(kind, include_extras=True)
+
+
+def quantity(hint: Any) -> Quantity | None:
+    """Return what a number of an annotation measures, None if it says nothing."""
+    return next((extra for extra in getattr(hint, "__metadata__", ()) if isinstance(extra, Quantity)), None)
+
+
+def quantity_of(kind: type, name: str) -> Quantity:
+    """Return what a field of a dataclass measures; a text or a truth value is a plain number here."""
+    return quantity(hints(kind).get(name)) or Quantity("1", "")
+
+
+def shown(value: Any, quantity: Quantity) -> str:
+    """Return a value as text in its unit of display, six digits."""
+    if isinstance(value, bool | np.bool_):
+        return "yes" if value else "no"
+    if isinstance(value, str) or is_symbolic(value):
+        return str(value)
+    if isinstance(value, tuple):
+        return ", ".join(shown(item, quantity) for item in cast("tuple[Any, ...]", value))
+    numbers = np.ravel(np.asarray(value, dtype=float)) / quantity.factor + 0.0
+    return ", ".join(f"{number:.6g}" for number in numbers)
+
+
+def titled(line: Line) -> str:
+    """Return the heading of a line that is a column: its name with the unit."""
+    return f"{line.name} [{line.unit}]" if line.unit else line.name
+
+
+def _grid(rows: tuple[Result, ...]) -> str:
+    """Return results of one kind as rows; of many lines each is a row instead."""
+    lines = [row.lines() for row in rows]
+    heading = tuple(map(titled, lines[0]))
+    table = [heading, *(tuple(line.value for line in each) for each in lines)]
+    return _aligned(table if len(heading) <= _WIDE else list(zip(*table, strict=True)))
+
+
+def _required(value: Any) -> str:
+    if is_symbolic(value):
+        return ""
+    return "ok" if np.all(value) else "not fulfilled"
+
+
+def _verdict(value: Number, bound: Number, quantity: Quantity, *, above: bool) -> str:
+    if is_symbolic(value, bound):
+        return ""
+    values, bounds = np.broadcast_arrays(np.ravel(np.asarray(value, float)), np.ravel(np.asarray(bound, float)))
+    excess = values - bounds if above else bounds - values
+    worst = int(np.argmax(np.where(np.isfinite(excess), excess, np.inf)))
+    if excess[worst] <= _ROUNDING * abs(bounds[worst]):
+        return "ok"
+    share = f" ({100 * excess[worst] / abs(bounds[worst]):.3g} %)" if bounds[worst] else ""
+    unit = f" {quantity.shown}".rstrip()
+    limit, difference = shown(bounds[worst], quantity), f"{excess[worst] / quantity.factor:.4g}"
+    return f"{'above' if above else 'below'} the limit {limit}{unit} by {difference}{unit}{share}"
+
+
+def _aligned(rows: list[tuple[str, ...]]) -> str:
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    padded = (
+        "  ".join(text.rjust(width) if _is_number(text) else text.ljust(width)
+                  for text, width in zip(row, widths, strict=True))
+        for row in rows
+    )  # fmt: skip
+    return "\n".join(f"  {text}".rstrip() for text in padded)
+
+
+def _is_number(text: str) -> bool:
+    return text[:1].isdigit() or (text[:1] == "-" and text[1:2].isdigit())
+
+
+def comparison(**results: Result) -> str:
+    """Return results of one kind side by side, one column each.
+
+    Args:
+        results: results of the same check, by heading.
+    """
+    return _aligned([("", *results, "", ""), *beside(result.lines() for result in results.values())])
+
+
+def beside(columns: Iterable[Sequence[Line]]) -> list[tuple[str, ...]]:
+    """Return lines of results of one kind side by side: their name, the values, the unit and the description."""
+    rows = zip(*columns, strict=True)
+    return [(one[0].name, *(line.value for line in one), one[0].unit, one[0].description) for one in rows]

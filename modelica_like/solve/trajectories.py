@@ -1,0 +1,214 @@
+"""Trajectories over time, wherever they come from: what can be read from them needs no equations."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from modelica_like.compile.compiled import Vector
+from modelica_like.errors import NetlistError, ValueOutOfRange, missing_extra
+from modelica_like.initialize import Point
+from modelica_like.language.expr import Symbol
+from modelica_like.language.mode import BoundMode
+from modelica_like.solve.rates import differentiated, rate_along
+from modelica_like.solve.recorder import Event
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+    from matplotlib.figure import Figure
+
+    from modelica_like.solve.energy import EnergyBalance
+
+ENERGY_TERMS = ("stored_energy", "loss_power", "source_power")
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """What a run took.
+
+    Attributes:
+        steps: integrator steps.
+        evaluations: evaluations of the equations.
+        integrations: calls of the integrator (panels and event locations).
+        events: mode changes.
+        seconds: wall time of initialisation and integration.
+    """
+
+    steps: int
+    evaluations: int
+    integrations: int
+    events: int
+    seconds: float
+
+
+class Values(Mapping[str, float]):
+    """All variables at one instant, by path."""
+
+    def __init__(
+        self, solution: Trajectories, time: float, column: Vector, discrete: Vector, point: Point | None = None
+    ) -> None:
+        self.time = time
+        self._point = point
+        self._solution = solution
+        self._column = column
+        self._discrete = discrete
+
+    def __getitem__(self, key: str | Any) -> float:
+        path = self._solution.path(key)
+        model = self._solution.model
+        if path in model.position:
+            return float(self._column[model.position[path]])
+        if path in model.discrete_position:
+            return float(self._discrete[model.discrete_position[path]])
+        if self._point is not None and (name := differentiated(path)):
+            now = self._point
+            return float(rate_along(model, name, np.array([now.t]), *(v[:, None] for v in (now.x, now.z, now.d)))[0])
+        owner, _, term = path.rpartition(".")
+        if self._point is not None and term in ENERGY_TERMS and owner in model.components:
+            terms = model.energy(self._point.t, self._point.x, self._point.z, model.p, model.u, self._point.d)
+            return float(terms[model.components.index(owner), ENERGY_TERMS.index(term)])
+        return float(self._solution[path][0])
+
+    def __iter__(self) -> Iterator[str]:
+        model = self._solution.model
+        yield from model.position
+        yield from model.discrete_position
+
+    def __len__(self) -> int:
+        return len(self._solution.model.flat_variables) + len(self._solution.model.flat_discretes)
+
+    def __repr__(self) -> str:
+        return f"<{len(self)} values at t = {self.time:g} s>"
+
+
+class Trajectories(ABC):
+    """Trajectories of all variables, in SI units: a `Solution`, or recorded data of an FMU or a table.
+
+    Attributes:
+        model: names, units and parameters.
+        events: mode changes.
+        statistics: what the run took.
+        notices: what should be known about the run, as sentences.
+    """
+
+    model: Any
+    events: tuple[Event, ...]
+    statistics: Statistics
+    notices: tuple[str, ...] = ()
+
+    @property
+    @abstractmethod
+    def time(self) -> Vector:
+        """Times of the results in s."""
+
+    @abstractmethod
+    def __getitem__(self, key: str | Any) -> Vector: ...
+
+    @abstractmethod
+    def __contains__(self, key: object) -> bool: ...
+
+    @abstractmethod
+    def at(self, t: float) -> Values:
+        """Return all variables at a time."""
+
+    @property
+    @abstractmethod
+    def final(self) -> Values:
+        """All variables at the end."""
+
+    @abstractmethod
+    def energy(self) -> EnergyBalance:
+        """Return the energy balance over the run."""
+
+    def point(self, t: float) -> Point:
+        """Return states, implicit unknowns and modes at a time.
+
+        Raises:
+            NetlistError: they are not known, as in recorded data.
+        """
+        raise needs_equations(self)
+
+    def path(self, key: Any) -> str:
+        """Return the path of a variable given by its path, as `drive.clutch.tau` or `drive.clutch.mode`."""
+        if isinstance(key, BoundMode):
+            key = key.symbol
+        if isinstance(key, Symbol):
+            owner = key.owner.path
+            name = f"{owner}.{key.name}" if owner else key.name
+            return f"{'der(' * key.order}{name}{')' * key.order}"
+        return str(key)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Paths of all variables, modes and discrete values."""
+        return (*self.model.position, *self.model.discrete_position)
+
+    def together(self, *keys: str | Any) -> dict[str, Vector]:
+        """Return several trajectories by path.
+
+        Raises:
+            UnknownName: there is no such variable.
+        """
+        return {self.path(key): self[key] for key in keys}
+
+    def _check_within(self, t: float) -> None:
+        first, last = float(self.time[0]), float(self.time[-1])
+        if not first <= t <= last:
+            raise ValueOutOfRange(f"t = {t:g} s is not within the run, {first:g} s to {last:g} s.")
+
+    def plot(self, *patterns: str, title: str = "") -> Figure:
+        """Draw trajectories over time, one panel per unit, with events as dotted lines.
+
+        Args:
+            patterns: names or patterns (`*.w`) of what to draw; by default speeds, torques and forces of the parts.
+            title: heading; by default the name of the model.
+
+        Raises:
+            UnknownName: nothing fits a pattern.
+        """
+        from modelica_like.solve.plot import plot
+
+        return plot(self, patterns, title=title)
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """Return a table with time as index and one column per variable.
+
+        Raises:
+            MissingExtra: pandas is not installed.
+        """
+        try:
+            import pandas
+        except ImportError:
+            raise missing_extra("pandas", "data") from None
+        columns = self.together(*self.names)
+        return pandas.DataFrame(columns, index=pandas.Index(self.time, name="time"))
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Return a dataset over time, with units and descriptions as attributes.
+
+        Raises:
+            MissingExtra: xarray is not installed.
+        """
+        try:
+            import xarray
+        except ImportError:
+            raise missing_extra("xarray", "data") from None
+        info = {
+            v.path: {"units": str(v.unit), "long_name": v.description}
+            for v in (*self.model.flat_variables, *self.model.flat_discretes)
+        }
+        arrays = {name: ("time", values, info[name]) for name, values in self.together(*self.names).items()}
+        return xarray.Dataset(arrays, coords={"time": ("time", self.time, {"units": "s"})})
+
+
+def needs_equations(run: Trajectories) -> NetlistError:
+    """Return the error about trajectories that are given where equations are needed."""
+    return NetlistError(
+        f"{run.model.name}: this needs the drive with its equations, not trajectories.",
+        advice="Give the netlist, the component or the compiled model.",
+    )

@@ -1,0 +1,167 @@
+"""What tables do beyond their rows: hold, go on, or end the run; and what they cannot contain."""
+
+from math import log
+
+import numpy as np
+import pytest
+
+from components import (
+    BearingFriction,
+    Brake,
+    Clutch,
+    ConstantSpeed,
+    ConstantTorque,
+    Inertia,
+    LossyGear,
+    SupportFriction,
+    Table,
+    TorqueConverter,
+)
+from modelica_like import Assembly, Component, ModelicaLikeError, Solution, simulate
+from modelica_like.errors import LimitPassed
+from modelica_like.report.run import notices
+
+TIGHT = {"rtol": 1e-10, "atol": 1e-12}
+
+
+def shaft(**parts: Component) -> Assembly:
+    return Assembly("drive", parts=parts, series={"shaft": list(parts)})
+
+
+def spun_up(**more: object) -> Assembly:
+    clutch = Clutch(fn_max=100.0, mu_pos=((0, 0.3), (100, 0.1)), **more)
+    return shaft(source=ConstantSpeed(w_fixed=200.0), clutch=clutch, load=Inertia(J=1.0, phi=0.0, w=0.0))
+
+
+def test_a_clutch_beyond_its_table_holds_the_last_friction() -> None:
+    """10 N.m until the slip is 100 rad/s, at 10 s; then 30 N.m - 0.2 N.m s slip to the lock after 5·ln(3) s more."""
+    run = simulate(spun_up(), 20.0, **TIGHT)
+    assert run.at(10.0)["load.w"] == pytest.approx(100.0, rel=1e-9)
+    lock = next(event.time for event in run.events if event.after == "stuck")
+    assert lock == pytest.approx(10.0 + 5.0 * log(3.0), rel=1e-8)
+    # Whatever the law of friction, half of the source's work is lost.
+    assert run.energy()["clutch"].lost == pytest.approx(0.5 * 200.0**2, rel=1e-8)
+    assert run.energy().notices == ()
+    assert notices(run) == ["At 0 s clutch leaves the rows of mu_pos: its last value holds."]
+
+
+def test_inside_its_rows_a_table_tells_nothing() -> None:
+    run = simulate(
+        shaft(rotor=Inertia(J=1.0, phi=0.0, w=100.0), brake=Brake(fn_max=1.0, mu_pos=((0, 0.3), (100, 0.1)))), 1.0
+    )
+    assert notices(run) == []
+    assert run.events == ()
+
+
+def test_open_plates_may_slip_as_fast_as_they_like() -> None:
+    run = simulate(spun_up(f_normalized=0.0), 1.0)
+    assert notices(run) == []
+
+
+def test_the_first_time_is_told_once() -> None:
+    """2 N.m on 1 kg m²: 10 rad/s after 5 s."""
+    bearing = BearingFriction(tau_pos=((0, 0), (10, 0)))
+    run = simulate(
+        shaft(push=ConstantTorque(tau_constant=2.0), rotor=Inertia(J=1.0, phi=0.0, w=0.0), bearing=bearing), 8.0
+    )
+    assert notices(run) == ["At 5 s bearing leaves the rows of tau_pos: its last value holds."]
+
+
+def test_an_efficiency_beyond_its_table_stays() -> None:
+    """1 kg m² at flange_a is driven with 10 N.m through an efficiency that would reach 1.1 at 20 rad/s."""
+    table = ((0, 0.9, 0.9, 0, 0), (10, 1.0, 1.0, 0, 0))
+    gear = LossyGear(ratio=1.0, loss_table=table)
+    run = simulate(shaft(motor=ConstantSpeed(w_fixed=20.0), gear=gear, load=ConstantTorque(tau_constant=-10.0)), 1.0)
+    assert run.final["gear.flange_a.tau"] == pytest.approx(10.0, rel=1e-12)
+    assert run.energy().notices == ()
+
+
+def test_the_last_slope_goes_on_where_it_is_asked_for() -> None:
+    """3 N.m + 1 N.m s w against 1 kg m² from 5 rad/s: w = 8·exp(-t) - 3 rad/s."""
+    bearing = BearingFriction(tau_pos=((0, 3), (1, 4)), extrapolate="linear")
+    run = simulate(shaft(rotor=Inertia(J=1.0, phi=0.0, w=5.0), bearing=bearing), 0.5, **TIGHT)
+    np.testing.assert_allclose(run["rotor.w"], 8 * np.exp(-run.time) - 3, rtol=1e-8)
+    assert notices(run) == []
+
+
+def test_the_run_ends_where_it_is_asked_for() -> None:
+    bearing = BearingFriction(tau_pos=((0, 0), (10, 0)), extrapolate="error")
+    drive = shaft(push=ConstantTorque(tau_constant=2.0), rotor=Inertia(J=1.0, phi=0.0, w=0.0), bearing=bearing)
+    with pytest.raises(LimitPassed, match=r"At 5 s bearing leaves the rows of tau_pos\.") as caught:
+        simulate(drive, 8.0)
+    run: Solution = caught.value.run
+    assert run.time[-1] == pytest.approx(5.0, rel=1e-9)
+    assert run.final["rotor.w"] == pytest.approx(10.0, rel=1e-9)
+
+
+@pytest.mark.parametrize(("how", "expected"), [("linear", 4.0), ("hold", 2.0)])
+@pytest.mark.parametrize("smooth", [False, True])
+def test_a_signal_beyond_its_table(how: str, expected: float, smooth: bool) -> None:
+    run = simulate(Assembly("d", parts={"s": Table(table=((0, 0), (1, 2)), extrapolate=how, smooth=smooth)}), 2.0)
+    assert run.final["s.y"] == pytest.approx(expected, rel=1e-12)
+
+
+def test_a_signal_that_ends_the_run() -> None:
+    signal = Assembly("d", parts={"s": Table(table=((0, 0), (1, 2)), extrapolate="error")})
+    assert simulate(signal, 1.0).final["s.y"] == 2.0
+    with pytest.raises(LimitPassed, match="At 1 s s has no more rows"):
+        simulate(signal, 2.0)
+
+
+WRONG = {
+    "LossyGear.loss_table, row 1, eta_mf1: 1.1 is above 1": lambda: LossyGear(ratio=1, loss_table=((0, 1.1, 1, 0, 0),)),
+    "LossyGear.loss_table, row 1, eta_mf2: 1.2 is above 1": lambda: LossyGear(ratio=1, loss_table=((0, 1, 1.2, 0, 0),)),
+    "row 2, sliding friction coefficient: -0.1 is below 0": lambda: Clutch(fn_max=1, mu_pos=((0, 0.1), (1, -0.1))),
+    "friction force: '-1 N' is below 0": lambda: SupportFriction(f_pos=((0, "-1 N"),)),
+    "extrapolate = 'holt' must be hold or linear or error; did you mean 'hold'": lambda: Brake(extrapolate="holt"),
+}
+
+
+@pytest.mark.parametrize("told", WRONG)
+def test_what_a_table_cannot_contain(told: str) -> None:
+    with pytest.raises(ModelicaLikeError) as caught:
+        WRONG[told]()
+    assert told in str(caught.value)
+
+
+CAPACITY = ((0.0, 2e-3), (0.8, 1.5e-3), (1.0, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("ratio", "at", "worst"),
+    [
+        (((0.0, 2.0), (0.85, 1.2)), "1", "1.2"),  # it holds up to the speed ratio 1
+        (((0.0, 2.5), (1.0, 1.0)), "0.8333", "1.25"),  # the top of x·(2.5 - 1.5 x)
+        (((0.0, 1.5), (0.5, 2.2), (1.0, 0.0)), "0.5", "2.2"),
+    ],
+)
+def test_no_converter_gives_more_than_it_takes(ratio: tuple[tuple[float, float], ...], at: str, worst: str) -> None:
+    converter = TorqueConverter(capacity=CAPACITY, torque_ratio=ratio)
+    with pytest.raises(ModelicaLikeError, match=f"torque ratio {worst} at the speed ratio {at} the turbine gives"):
+        simulate(shaft(pump=ConstantSpeed(w_fixed=100.0), part=converter, load=ConstantSpeed(w_fixed=90.0)), 1.0)
+
+
+def test_a_converter_has_no_jump_at_any_speed_of_its_pump() -> None:
+    """The pump passes through standstill, and both turn against each other with the same speed."""
+
+    def torques(pump: float, turbine: float) -> np.ndarray:
+        converter = TorqueConverter(capacity=CAPACITY, torque_ratio=((0.0, 1.9), (0.8, 1.0)))
+        run = simulate(
+            shaft(pump=ConstantSpeed(w_fixed=pump), part=converter, load=ConstantSpeed(w_fixed=turbine)), 0.1
+        )
+        assert run["part.loss_power"][-1] > 0
+        assert run.energy().imbalance == 0
+        return np.array([run.final[f"part.flange_{end}.tau"] for end in "ab"])
+
+    for pump, turbine in ((0.0, 100.0), (-100.0, 100.0), (0.0, -50.0), (100.0, -100.0)):
+        before, after = torques(pump - 1e-5, turbine), torques(pump + 1e-5, turbine)
+        np.testing.assert_allclose(before, after, atol=2e-5)
+    # Standing pump, turning turbine: C(0)·w² brakes the turbine and drives the pump.
+    np.testing.assert_allclose(torques(0.0, 100.0), [-20.0, 20.0], rtol=1e-12)
+
+
+def test_the_compiled_run_time_ends_there_too() -> None:
+    bearing = BearingFriction(tau_pos=((0, 0), (10, 0)), extrapolate="error")
+    drive = shaft(push=ConstantTorque(tau_constant=2.0), rotor=Inertia(J=1.0, phi=0.0, w=0.0), bearing=bearing)
+    with pytest.raises(ModelicaLikeError, match=r"t = 5 s: bearing leaves the rows of tau_pos"):
+        simulate(drive, 8.0, solver="native")

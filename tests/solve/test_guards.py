@@ -1,0 +1,80 @@
+"""Guards: which may fire in which mode, and where they are looked for."""
+
+import numpy as np
+import pytest
+
+from modelica_like import simulate
+from modelica_like.initialize import Point
+from modelica_like.language import Component, Equations, Events, Mode, Parameter, Variable, der, param, var
+from modelica_like.solve.guards import Candidate, locate
+
+
+class Steps(Component):
+    """x rises by one per second; from `first` or `second` it goes on at once when x has passed the threshold."""
+
+    mode = Mode("begin", "first", "second", "done")
+    x: Variable = var("s", "time passed")
+    unit: Parameter = param("s", "unit", default=1.0)
+    threshold: Parameter = param("s", "where `done` begins", default=0.25)
+    way: str = "first"
+
+    def equations(self) -> Equations:
+        yield der(self.x) == 1
+
+    def events(self) -> Events:
+        yield self.mode.go("begin", self.way, when=self.x > 0.5 * self.unit)
+        yield self.mode.go(("first", "second"), "done", when=self.x > self.threshold)
+
+
+@pytest.mark.parametrize("way", ["first", "second"])
+@pytest.mark.parametrize("threshold", [0.25, 0.75])
+def test_a_transition_from_two_modes_fires_in_either(way: str, threshold: float) -> None:
+    run = simulate(Steps(way=way, x=0.0, threshold=threshold), 1.0)
+    assert [event.after for event in run.events] == [way, "done"]
+    assert [event.time for event in run.events] == pytest.approx([0.5, max(0.5, threshold)], abs=1e-12)
+
+
+class Known:
+    """A guard that is a known function of time, and how often it was asked for."""
+
+    def __init__(self, value: np.poly1d) -> None:
+        self.value, self.asked = value, 0
+
+    def __call__(self, time: float) -> tuple[Point, list[np.ndarray]]:
+        self.asked += 1
+        now = [np.array([one]) for one in (self.value(time), self.value.deriv()(time), self.value(time + 1e-10))]
+        nothing = np.zeros(0)
+        return Point(time, nothing, nothing, nothing), now
+
+    def ends(self, span: float) -> dict[int, tuple[float, float, float, float]]:
+        rate = self.value.deriv()
+        return {0: (self.value(0.0), self.value(span), span * rate(0.0), span * rate(span))}
+
+
+TOP = np.poly1d([-1.0, 0.0, 0.0, 0.0, 1.0])
+
+
+@pytest.mark.parametrize("height", [1e-3, 1e-6])
+def test_a_double_root_is_found_at_its_first_zero(height: float) -> None:
+    """(t - 0.4)² = height has the zeros 0.4 ± √height."""
+    guard = Known(np.poly1d([-1.0, 0.8, height - 0.16]))
+    found = locate(guard, 1.0, guard.ends(1.0), [Candidate(0, 0, inside=True)], 0.0)
+    assert found is not None
+    assert found.guards == [0]
+    assert found.point.t == pytest.approx(0.4 - np.sqrt(height), abs=1e-10)
+
+
+def test_a_top_below_zero_is_given_up_soon() -> None:
+    """1 - t⁴ moved down to -0.02, whose top is at 0.3: the cubic between the ends has it elsewhere."""
+    guard = Known(np.polyval(TOP - 1.02, np.poly1d([1.0, -0.3])))
+    assert locate(guard, 1.0, guard.ends(1.0), [Candidate(0, 0, inside=True)], 0.0) is None
+    assert guard.asked < 20
+
+
+def test_the_earliest_of_two_tops_counts() -> None:
+    """A guard that rises through zero in a straight line is met at its zero, to 1e-13 of the time."""
+    guard = Known(np.poly1d([3.0, -1.0]))
+    found = locate(guard, 1.0, guard.ends(1.0), [Candidate(0, 0, inside=False)], 0.0)
+    assert found is not None
+    assert found.point.t == pytest.approx(1 / 3, abs=2e-13)
+    assert guard.asked < 5
