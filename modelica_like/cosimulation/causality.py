@@ -24,13 +24,7 @@ _MOST = 8
 
 @dataclass(frozen=True)
 class End:
-    """An open end of a group of parts.
-
-    Attributes:
-        adaptor: name of the adaptor that is added for it.
-        path: of a connector at the cut.
-        takes: what comes from the other side.
-    """
+    """An open end of a group: the adaptor that is added for it, its path, and what comes from the other side."""
 
     adaptor: str
     path: str
@@ -51,13 +45,10 @@ def ends_of(cut: Cut, near_takes: Takes) -> tuple[End, End]:
 
 
 def orient(found: CutNetlist, make: Make) -> dict[Cut, Takes]:
-    """Decide for each cut shaft what its near side takes.
+    """Decide for each cut shaft what its near side takes, or raise a NetlistError that says why there is no choice.
 
     The side with a spring or damper at the cut is told angle and speed, and gives a torque that depends on no
     acceleration; the side with an inertia is told the torque, and its angle and speed are states.
-
-    Raises:
-        NetlistError: there is no such choice.
     """
     cuts = [cut for cut in found.cuts if not cut.signal]
     if len(cuts) > _MOST:

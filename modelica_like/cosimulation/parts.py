@@ -24,11 +24,7 @@ class Maker:
         self.assembly, self.found = assembly, found
 
     def bare(self, group: int, ends: Sequence[End]) -> Assembly:
-        """Return a group with adaptors at its open ends, with the start values that its parts were given.
-
-        Raises:
-            NetlistError: it needs a parameter of a part in another group.
-        """
+        """Return a group with adaptors at its open ends, with the start values that its parts were given."""
         names = self.found.groups[group]
         parts: dict[str, Any] = {name: self.assembly._parts[name] for name in names}
         wires = {wire.name: wire.ends for wire in self.found.wires if part_of(wire.ends[0]) in names}
@@ -61,13 +57,7 @@ class Maker:
         return {f"{end.adaptor}.{name}": 0.0 for end in takers for name in signals_of(self.adaptor(end)[0])[2]}
 
     def started(self, group: int, ends: Sequence[End], values: Mapping[str, float]) -> Assembly:
-        """Return a group that starts where the whole drive does.
-
-        Args:
-            group: its number.
-            ends: its open ends.
-            values: all variables of the whole drive at its start, in SI units.
-        """
+        """Return a group that starts where the whole drive does; `values` are those of the drive, in SI units."""
         made = self.bare(group, ends)
         model = compile(reduce(flatten(made, open_inputs=True)))
         given: set[int] = set()

@@ -32,13 +32,7 @@ class Example(NamedTuple):
 
 
 def page(kind: type[Component], file: Path, examples: Sequence[Example] = ()) -> str:
-    """Return the page of a component type.
-
-    Args:
-        kind: the type.
-        file: where the page will be; links are relative to it.
-        examples: netlists in which it occurs.
-    """
+    """Return the page of a component type with the netlists in which it occurs; links are relative to its file."""
     source = Source(kind)
     equations, events = (written(source.says(name)) for name in ("equations", "events"))
     energy = written(source.energy())
