@@ -14,8 +14,7 @@ from modelica_like.cosimulation.ssp_document import Version, ssd
 from modelica_like.cosimulation.ssp_reader import read_structure
 from modelica_like.cosimulation.system import System, check_system
 from modelica_like.errors import UnknownName, did_you_mean
-from modelica_like.fmi.export import _target, _version
-from modelica_like.fmi.package import write_archive
+from modelica_like.fmi.package import known_version, target_file, write_archive
 from modelica_like.fmi.unpack import SSP, unpack
 from modelica_like.language import Component
 
@@ -41,7 +40,7 @@ def write_ssp(system: System, path: str | Path, version: Version | str = "1.0") 
         FmuRefused: a file is no FMU.
         OSError: a file cannot be read or written.
     """
-    target, chosen = _target(path, ".ssp", "An SSP"), _version(version, "SSP", Version)
+    target, chosen = target_file(path, ".ssp", "An SSP"), known_version(version, Version, "SSP")
     check_system(system)
     fmus = {unit.name: described(unit.file) for unit in system.units}
     _check_variables(system, fmus)
@@ -70,7 +69,7 @@ def split_to_ssp(
     Raises:
         ModelicaLikeError: see `split` and `write_ssp`.
     """
-    target, chosen = _target(path, ".ssp", "An SSP"), _version(ssp_version, "SSP", Version)
+    target, chosen = target_file(path, ".ssp", "An SSP"), known_version(ssp_version, Version, "SSP")
     with tempfile.TemporaryDirectory(prefix="modelica_like_") as folder:
         done = split(drive, at, folder, **options)
         return replace(done, path=write_ssp(done.system, target, chosen))

@@ -86,7 +86,7 @@ MISDEEDS: dict[str, tuple[float, type[ModelicaLikeError], str]] = {
     "leave": (3.0, FmuCrashed, f"{BAD} ended its process by itself, with exit code 0, after t = 0.49 s.\n{OWN}"),
     "hang": (
         2.0, FmuTimeout,
-        "bench has not come to its end within 3 s, and was stopped after t = 0.49 s.\n"
+        "bench did not finish within 3 s, and was stopped after t = 0.49 s.\n"
         f"{BAD} was at work.\nGive it more time with `timeout`, or a shorter run.",
     ),
     "fail": (
