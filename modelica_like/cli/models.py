@@ -22,10 +22,11 @@ def check(
     """Check a netlist: equations, unknowns, states, index, blocks, energy terms."""
     with told(debug):
         assembly = load_netlist(netlist, assignments)
-        from modelica_like.report.check import start_report, structure_report
+        from modelica_like.report.structure import structure_report
 
         out().print(structure_report(assembly))
         if start:
+            from modelica_like.report.start import start_report
             from modelica_like.simulation import build
 
             out().print("", start_report(assembly, build(assembly)))
