@@ -57,8 +57,7 @@ def cosim(
     Args:
         system: a system, its TOML file, an SSP, or a netlist with FMUs as parts.
         until: end time, a number in s or a quantity; by default what the system says.
-        step: communication step, a number in s or a quantity; by default what the system says, or a thousandth of
-            the run.
+        step: communication step, likewise; by default what the system says, or a thousandth of the run.
         master: `jacobi` or `gauss-seidel`.
         inputs: `linear` (FMUs are told the slopes of their inputs, where they can take them) or `hold`.
         tolerance: relative tolerance of the signals between FMUs; with it the step varies.
@@ -84,12 +83,7 @@ def cosim(
             )  # fmt: skip
     check_system(system)
     system = _with_parameters(system, parameters or {})
-    if until is None and system.settings.until is None:
-        raise ValueOutOfRange(
-            f"{system.name}: there is no end time.",
-            advice="Give `until`, or put it under [simulate] in the system's file.",
-        )
-    settings = _settings(system.settings, until, step, master, inputs, tolerance)
+    settings = _settings(system, until, step, master, inputs, tolerance)
     if timeout <= 0:
         raise ValueOutOfRange(f"{system.name}: the time limit must be positive, not {timeout:g} s.")
     if fmu_tolerance is None and settings.tolerance is not None:
@@ -135,9 +129,15 @@ def _with_parameters(system: System, given: Mapping[str, float]) -> System:
 
 
 def _settings(
-    base: Settings, until: float | str | None, step: float | str | None, master: str | None, inputs: str | None,
+    system: System, until: float | str | None, step: float | str | None, master: str | None, inputs: str | None,
     tolerance: float | None,
 ) -> Settings:  # fmt: skip
+    base = system.settings
+    if until is None and base.until is None:
+        raise ValueOutOfRange(
+            f"{system.name}: there is no end time.",
+            advice="Give `until`, or put it under [simulate] in the system's file.",
+        )
     end = seconds(until if until is not None else base.until)
     chosen = tolerance if tolerance is not None else base.tolerance
     part = _FIXED_PART if chosen is None else _FIRST_PART
