@@ -54,7 +54,7 @@ def simulate(
     show: Annotated[list[str] | None, Option(metavar="PATTERN", help="What to draw, e.g. '*.w'.")] = None,
     sankey: Annotated[Path | None, Option(metavar="FILE", help="Draw where the energy went.")] = None,
     energy: Annotated[bool, Option(help="Tell the energy balance.")] = True,
-    solver: Annotated[Solver, Option(help="IDAS, or the compiled run-time of FMUs.")] = Solver.IDAS,
+    solver: Annotated[Solver | None, Option(help="IDAS only, or only the compiled run-time of FMUs.")] = None,
     debug: Debug = False,
 ) -> None:  # fmt: skip
     """Simulate a netlist: events, energy balance, results as table and picture."""
@@ -72,9 +72,9 @@ def simulate(
         model = build(assembly)
         matching(model, show or ())
         with Bar(until or model.settings.get("until")) as bar:
-            begin = start.value if start else None
+            begin, chosen = start.value if start else None, solver.value if solver else None
             made = Outcome(
-                lambda: run(model, until, start=begin, points=points, progress=bar, solver=solver.value), debug=debug
+                lambda: run(model, until, start=begin, points=points, progress=bar, solver=chosen), debug=debug
             )
         energy = energy and made.stopped is None and made.attempt("The energy balance", made.solution.energy)
         made.tell(lambda one: run_report(one, energy=energy), csv)
