@@ -146,7 +146,7 @@ class Instants:
             if transition.fails:
                 owner = self.record.events[-1].mode.rpartition(".")[0] or self.model.name
                 told = NAME_IN_NOTICE.sub(r"\1", transition.notice)
-                raise LimitPassed(f"At {now.t:.9g} s {owner} {told}.", where=transition.source)
+                raise LimitPassed(f"At {now.t:.9g} s {owner} {told}.")
             d[transition.mode] = transition.target
             for reset in transition.resets:
                 if reset.kind == "state":

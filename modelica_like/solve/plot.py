@@ -173,6 +173,11 @@ def unit_of(solution: Trajectories, name: str) -> str:
     return str(model.flat_discretes[model.discrete_position[name]].unit)
 
 
+def quantity(unit: str) -> str:
+    """Return what is measured in a unit, for titles."""
+    return _QUANTITIES.get(unit, "value")
+
+
 def _by_unit(solution: Trajectories, names: Sequence[str]) -> dict[str, list[str]]:
     groups: dict[str, list[str]] = {}
     for name in names:
@@ -184,7 +189,7 @@ def _draw(axes: Axes, solution: Trajectories, unit: str, names: Sequence[str]) -
     for k, (name, values) in enumerate(solution.together(*names).items()):
         style = "-" if k < len(COLOURS) else "--"
         axes.plot(solution.time, values, style, label=name, color=COLOURS[k % len(COLOURS)])
-    axes.set_ylabel(with_unit(_QUANTITIES.get(unit, "value"), unit))
+    axes.set_ylabel(with_unit(quantity(unit), unit))
     axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
 
 
