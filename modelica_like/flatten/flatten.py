@@ -230,13 +230,8 @@ class _Flattener:
                 value = self.parameters.q(self.parameters.declare(component, name, path))
                 self.linear.append(LinearEquation(((node, 1.0),), -value, Origin(path, "value", _WIRE)))
             else:
-                self.errors.append(
-                    MissingValue(
-                        f"{path} is an input without a value.",
-                        where=component.place_of(),
-                        advice="Connect it or give it a value.",
-                    )
-                )
+                what, advice = f"{path} is an input without a value.", "Connect it or give it a value."
+                self.errors.append(MissingValue(what, where=component.place_of(), advice=advice))
 
     def _relate_inputs(self, component: Component) -> None:
         """Say which open inputs of an adaptor are derivatives of each other."""

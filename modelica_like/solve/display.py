@@ -36,13 +36,13 @@ class Display:
         wanted = {**getattr(model, "settings", {}).get("display", {}), **(chosen or {})}
         self._quantities: dict[str, str] = {}
         self._paths: dict[str, str] = {}
-        named = {name: unit for unit, name in QUANTITIES.items()} | {unit: unit for unit in self._own.values()}
+        named = {name: unit for unit, name in QUANTITIES.items()}
+        named |= {unit: unit for unit in (*self._own.values(), *QUANTITIES)}
         for key, text in wanted.items():
             unit = parse_unit(text)
-            if key in named or key in QUANTITIES:
-                own = named[key] if key in named else key
-                _check(key, own, unit)
-                self._quantities[own] = text
+            if key in named:
+                _check(key, named[key], unit)
+                self._quantities[named[key]] = text
                 continue
             fitting = [path for path in self._own if path == key or fnmatchcase(path, key)]
             if not fitting:

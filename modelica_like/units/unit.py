@@ -154,7 +154,7 @@ def parse_unit(text: str) -> Unit:
         text: the unit; `1` or an empty text is the unit of a number, `*` the wildcard `ANY`.
 
     Raises:
-        UnitError: the text is no unit, or a name in it is unknown.
+        UnitError: the text is not a unit, or a name in it is unknown.
     """
     stripped = text.strip()
     if stripped == "*":

@@ -220,7 +220,7 @@ case(
     "a mode holds what is no variable",
     lambda: flatten(Nothing()),
     """\
-Nothing.plates holds the motion 'w_slip', which is no variable of Nothing.
+Nothing.plates holds the motion 'w_slip', which is not a variable of Nothing.
 Name a variable, or a property that returns one.""",
 )
 case(
@@ -294,7 +294,7 @@ case(
     "a notice names what is no parameter",
     lambda: flatten(Alarm(bell="xmax")),
     """\
-Alarm: the notice of an event names xmax, which is no parameter; did you mean 'x_max'?
+Alarm: the notice of an event names xmax, which is not a parameter; did you mean 'x_max'?
   in test_component_messages.py:{alarm} \
 `yield self.alarm.go("quiet", "ringing", when=self.x > self.x_max, notice=notice)`""",
 )
