@@ -216,8 +216,8 @@ class _Problem:
         )
         edges = tuple(name for name, q in zip(self.names, found.x, strict=True) if q <= 1e-9 or q >= 1 - 1e-9)
         return Calibration(
-            self.at(found.x), self.names, values, self.units, residuals, self.labels, covariance, int(known.sum()),
-            lost, edges, costs,
+            self.at(found.x), self.names, values, self.units, residuals, self.labels, covariance,
+            int(known.sum()), lost, edges, costs,
         )  # fmt: skip
 
     def _covariance(self, right: Matrix, singular: Matrix, known: Any, residuals: Matrix, sizes: Matrix) -> Matrix:
