@@ -16,6 +16,7 @@ from modelica_like.language.mode import Mode
 from modelica_like.language.places import NOWHERE, caller
 from modelica_like.language.tables import REQUIRED, Rows, both_given, frozen_rows, rows
 from modelica_like.language.terminal import Terminal
+from modelica_like.upper import upper
 
 if TYPE_CHECKING:
     from modelica_like.language.equation import Equations
@@ -326,6 +327,10 @@ class Component(Declared):
     def terminal_members(self) -> tuple[str, ...]:
         """Return the names of the signals that form the terminal of an adaptor."""
         return tuple(name for name, field in self.fields.items() if isinstance(field, Input | Output))
+
+    def _repr_svg_(self) -> str:
+        """Return the schematic, for notebooks."""
+        return upper("schematic")(self)
 
     def _end(self, which: str, usual: tuple[str, ...]) -> Connector:
         names = (getattr(type(self), which),) if getattr(type(self), which) else usual
