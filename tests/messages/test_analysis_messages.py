@@ -14,8 +14,7 @@ from modelica_like import build
 from modelica_like.analyse.calibration.calibrate import Numbers, OperatingPoints, Trajectories, calibrate
 from modelica_like.analyse.calibration.measurements import read_table
 from modelica_like.analyse.linear.campbell import campbell
-from modelica_like.analyse.linear.linearize import linearize
-from modelica_like.analyse.linear.points import when
+from modelica_like.analyse.linear.linearize import linearize, when
 from modelica_like.analyse.operating.curves import characteristic
 from modelica_like.analyse.operating.steady import steady
 from modelica_like.analyse.sweeps.importance import importance
@@ -135,7 +134,7 @@ mass.w has no value in 6 of 12 runs: mass.J = -0.09687008894979954 is out of ran
 Narrow the ranges until all runs succeed."""),
     "a method": (UnknownName, lambda: importance(model(), {"mass.J": (1.0, 2.0)}, ["mass.w"], method="fast"), """\
 There is no method 'fast'. There are sobol and morris."""),
-    "SALib": (MissingExtra, lambda: missing("SALib.sample", lambda: importance(model(), {"mass.J": (1.0, 2.0)}, ["mass.w"], until=1.0)), """\
+    "SALib": (MissingExtra, lambda: missing("SALib.sample.sobol", lambda: importance(model(), {"mass.J": (1.0, 2.0)}, ["mass.w"])), """\
 SALib is not installed.
 Install it with: pip install "modelica-like[analyse]\""""),
     "no data": (ValueOutOfRange, lambda: fitted([]), """\

@@ -9,7 +9,7 @@ import numpy as np
 
 from modelica_like.analyse.replay.chain import Replay, replay
 from modelica_like.analyse.replay.edges import Edge, edges
-from modelica_like.analyse.replay.step import Tolerances
+from modelica_like.analyse.replay.steps import Tolerances
 from modelica_like.analyse.replay.sweeps import adjoint, forward
 from modelica_like.analyse.sensitivity.formulas import Freed, bound_by_formula, equal_to, free_formulas
 from modelica_like.analyse.sensitivity.outputs import Output, listed, quadratures, read_output
