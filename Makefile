@@ -1,11 +1,14 @@
 # make demo   the machine-table and machine-tool start-ups, computed against published values
 # make test   everything that continuous integration runs
+# make docs   the pages of all component types
+# make release   the wheel for all platforms and the sdist, in dist/, tried in a new environment
+# make try   the wheel in dist/, in a new environment
 # make fmus   the reference FMUs, from their C sources, to build/fmus
 # make benchmark   times as ratios to hand-written baselines of the same run
 
 PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11; do \
 	$$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$p && break; done)
-BIN := .venv/bin
+BIN := .venv/$(if $(filter Windows_NT,$(OS)),Scripts,bin)
 C := $(wildcard modelica_like/fmi/templates/*.[ch] fmus/*/*.[ch] tests/fmi/*.c tests/fmus/*/*.c)
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
 
@@ -13,7 +16,7 @@ PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constr
 COMPILED := ls modelica_like/fmi/runtimes/* >/dev/null 2>&1 || echo "No C compiler was found: the run-time of FMUs is \
 compiled at first use. Install cc, gcc or clang, or zig by $(BIN)/pip install 'modelica-like[cross]'."
 
-.PHONY: demo test lint types layers pytest benchmark fmus format clean
+.PHONY: demo test lint types layers pytest benchmark docs release try fmus format clean
 
 demo: .venv/installed
 	$(BIN)/modelica-like demo
@@ -44,6 +47,17 @@ benchmark: .venv/installed-dev
 	$(BIN)/python benchmarks/gradient.py
 	$(BIN)/python benchmarks/linearize.py 100 1000
 	$(BIN)/python benchmarks/sweep.py 900
+
+docs: .venv/installed
+	$(BIN)/modelica-like docs -o docs/components --examples examples
+
+release: .venv/installed-dev
+	rm -rf dist
+	MODELICA_LIKE_PLATFORMS=all $(BIN)/python -m build
+	$(MAKE) try
+
+try: .venv/installed-dev
+	MODELICA_LIKE_PLATFORMS=all MODELICA_LIKE_WHEEL=$$(ls dist/*.whl) $(BIN)/python -m pytest -q -n 0 tests/wheel
 
 fmus: .venv/installed
 	$(BIN)/python fmus/build.py

@@ -1,4 +1,4 @@
-"""Puts the compiled run-time of FMUs into the wheel: for this machine, or for the platforms of a release.
+"""Puts the compiled run-time of FMUs into the wheel, for this machine or for the platforms of a release, and examples.
 
 `MODELICA_LIKE_PLATFORMS` chooses: names with commas, `all`, `none`, or by default this machine's platform if there is a
 compiler. The wheel is tagged for the platforms that it has a library for; without any it is pure Python.
@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import os
 import re
-import shutil
 import sys
 from pathlib import Path
 from typing import Any
@@ -33,14 +32,13 @@ class RuntimeHook(BuildHookInterface):  # pyright: ignore[reportMissingTypeArgum
         return ["fmpy>=0.3.20", *(["ziglang>=0.13"] if release else [])]
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
-        """Compile, and tell hatch what to take along."""
+        """Compile, and tell hatch what to take along. Frontends that ask for the metadata first call this twice."""
         sys.path.insert(0, self.root)
         from modelica_like.errors import ModelicaLikeError
         from modelica_like.fmi.build import BROWSER, RUNTIMES, native_platform
         from modelica_like.fmi.runtime import SHIPPED, build_runtime
 
         asked = os.environ.get("MODELICA_LIKE_PLATFORMS", "")
-        shutil.rmtree(SHIPPED, ignore_errors=True)
         try:
             named = asked or native_platform()
             names = () if named == "none" else tuple(RUNTIMES) if named == "all" else tuple(named.split(","))
@@ -50,6 +48,10 @@ class RuntimeHook(BuildHookInterface):  # pyright: ignore[reportMissingTypeArgum
                 raise
             self.app.display_warning(f"The run-time of FMUs is not compiled now, but at first use. {error}")
             built = []
+        for old in {*SHIPPED.glob("*/*")} - {*built}:
+            old.unlink()
+        if version == "standard":
+            build_data["force_include"][str(Path(self.root) / "examples")] = "modelica_like/examples"
         if built:
             tags = [wheel_tag(library) for library in built if library.parent.name != BROWSER.name]
             if tags:

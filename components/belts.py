@@ -89,10 +89,10 @@ class TimingBelt(Lossy, TwoFlanges):
 
     def events(self) -> Events:
         if self.given("mu"):
-            yield self.grip.go("sticking", "forward", when=self.f > self.slip_force)
-            yield self.grip.go("sticking", "backward", when=self.f < -self.slip_force)
-            yield self.grip.go("forward", "sticking", when=self.v_rel < der(self.x))
-            yield self.grip.go("backward", "sticking", when=self.v_rel > der(self.x))
+            yield self.grip.go("sticking", "forward", when=self.f > self.slip_force, because="slip force exceeded")
+            yield self.grip.go("sticking", "backward", when=self.f < -self.slip_force, because="slip force exceeded")
+            yield self.grip.go("forward", "sticking", when=self.v_rel < der(self.x), because="slip reached zero")
+            yield self.grip.go("backward", "sticking", when=self.v_rel > der(self.x), because="slip reached zero")
         else:
             least = self.F_0 - absolute(self.c * self.x + self.d * der(self.x))
             notice = "has a slack strand: its pre-tension is too small for the torque"

@@ -7,6 +7,7 @@ from components.thermal import Lossy
 from modelica_like.language import (
     Component,
     Connector,
+    Domain,
     Equations,
     Events,
     Expr,
@@ -28,6 +29,7 @@ from modelica_like.language import (
 class Pin(Connector):
     """Electrical terminal: potential, and the current into the component."""
 
+    domain = Domain("current", "voltage", "a resistor", reference="Ground")
     stroke = icons.CIRCUIT
     v: Variable = var("V", "potential")
     i: Variable = flow("A", "current, positive into the component")

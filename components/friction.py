@@ -115,14 +115,14 @@ class Sticking(Lossy, partial=True):
 
     def events(self) -> Events:
         mode, slip = self.mode, self.slip
-        yield mode.go("stuck", "start_forward", when=self.breaks_forward())
-        yield mode.go("stuck", "start_backward", when=self.breaks_backward())
-        yield mode.go("start_forward", "forward", when=slip > 0)
-        yield mode.go("start_backward", "backward", when=slip < 0)
-        yield mode.go("start_forward", "stuck", when=der(slip) < 0)
-        yield mode.go("start_backward", "stuck", when=der(slip) > 0)
-        yield mode.go("forward", "stuck", when=self.stops(1))
-        yield mode.go("backward", "stuck", when=self.stops(-1))
+        yield mode.go("stuck", "start_forward", when=self.breaks_forward(), because="friction limit exceeded")
+        yield mode.go("stuck", "start_backward", when=self.breaks_backward(), because="friction limit exceeded")
+        yield mode.go("start_forward", "forward", when=slip > 0, because="slip begins")
+        yield mode.go("start_backward", "backward", when=slip < 0, because="slip begins")
+        yield mode.go("start_forward", "stuck", when=der(slip) < 0, because="no slip follows")
+        yield mode.go("start_backward", "stuck", when=der(slip) > 0, because="no slip follows")
+        yield mode.go("forward", "stuck", when=self.stops(1), because="slip reached zero")
+        yield mode.go("backward", "stuck", when=self.stops(-1), because="slip reached zero")
 
     def dissipation(self) -> Expr:
         return self.friction * self.slip
@@ -189,10 +189,13 @@ class DryFriction(Sticking, partial=True):
         yield mode.initially("forward", when=all_of(pressed, slip > 0))
         yield mode.initially("backward", when=all_of(pressed, slip < 0))
         yield mode.initially("stuck", when=pressed)
-        yield mode.go(("stuck", "start_forward", "start_backward", "forward", "backward"), "free", when=negate(pressed))
-        yield mode.go("free", "forward", when=all_of(pressed, slip > 0))
-        yield mode.go("free", "backward", when=all_of(pressed, slip < 0))
-        yield mode.go("free", "stuck", when=pressed)
+        yield mode.go(
+            ("stuck", "start_forward", "start_backward", "forward", "backward"), "free", when=negate(pressed),
+            because="no pressure",
+        )  # fmt: skip
+        yield mode.go("free", "forward", when=all_of(pressed, slip > 0), because="pressed while slipping")
+        yield mode.go("free", "backward", when=all_of(pressed, slip < 0), because="pressed while slipping")
+        yield mode.go("free", "stuck", when=pressed, because="pressed without slip")
         yield from super().events()
 
 

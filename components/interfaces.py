@@ -8,12 +8,13 @@ those of `flange_b` minus those of `flange_a`, and the torque or force of a comp
 from __future__ import annotations
 
 from components import icons
-from modelica_like.language import Component, Connector, Equations, Expr, Variable, der, flow, var
+from modelica_like.language import Component, Connector, Domain, Equations, Expr, Variable, der, flow, var
 
 
 class Flange(Connector):
     """End of a shaft: angle, and the torque in a cut through it."""
 
+    domain = Domain("torque", "motion", "a spring or clutch", converters={"LinearFlange": "A spindle or rack"})
     stroke = icons.SHAFT
     phi: Variable = var("rad", "angle")
     tau: Variable = flow("N.m", "cut torque, positive into the component")
@@ -25,6 +26,7 @@ class Flange(Connector):
 class LinearFlange(Connector):
     """End of a rod or slide: position, and the force in a cut through it."""
 
+    domain = Domain("force", "motion", "a spring or brake", converters={"Flange": "A spindle or rack"})
     stroke = icons.SLIDE
     s: Variable = var("m", "position")
     f: Variable = flow("N", "cut force, positive into the component")

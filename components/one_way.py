@@ -51,10 +51,10 @@ class Freewheel(CompliantWithRelativeStates):
 
     def events(self) -> Events:
         yield self.mode.initially("locked", when=all_of(self.w_rel <= 0, self.w_rel >= 0))
-        yield self.mode.go("locked", "overrunning", when=self.tau > self.faint)
+        yield self.mode.go("locked", "overrunning", when=self.tau > self.faint, because="the torque would reverse")
         # Just after the release the speed is zero but for rounding; whether it falls decides.
         falling = all_of(self.w_rel < 0, any_of(self.soon * der(self.w_rel) < -self.slow, self.w_rel < -self.slow))
-        yield self.mode.go("overrunning", "locked", when=falling)
+        yield self.mode.go("overrunning", "locked", when=falling, because="overrunning speed reached zero")
 
 
 class OneWayClutch(Clutch):
@@ -91,10 +91,10 @@ class OneWayClutch(Clutch):
         mode, w = self.mode, self.w_rel
         yield mode.initially("forward", when=any_of(w > 0, w < 0))
         yield mode.initially("stuck", when=w >= 0)
-        yield mode.go("stuck", "start_forward", when=self.breaks_forward())
-        yield mode.go("start_forward", "forward", when=w > 0)
-        yield mode.go("start_forward", "stuck", when=der(w) < 0)
-        yield mode.go("forward", "stuck", when=w < 0)
+        yield mode.go("stuck", "start_forward", when=self.breaks_forward(), because="friction limit exceeded")
+        yield mode.go("start_forward", "forward", when=w > 0, because="slip begins")
+        yield mode.go("start_forward", "stuck", when=der(w) < 0, because="no slip follows")
+        yield mode.go("forward", "stuck", when=w < 0, because="slip reached zero")
         yield from self.measured()
 
 

@@ -271,11 +271,15 @@ class MassWithStopAndFriction(SlideSticking, DryFriction):
             yield mode.initially("stuck", when=there)
             yield stop.initially(side, when=there)
             moving = ("free", "start_forward", "start_backward", "forward", "backward")
-            yield mode.go(moving, "stuck", when=beyond, reset={self.s: end})
-            yield stop.go("none", side, when=beyond)
+            yield mode.go(moving, "stuck", when=beyond, reset={self.s: end}, because="end stop reached")
+            yield stop.go("none", side, when=beyond, because="end stop reached")
         # While it is held, its velocity is nothing but rounding.
-        yield stop.go("left", "none", when=all_of(negate(mode.is_("stuck")), self.v > 0))
-        yield stop.go("right", "none", when=all_of(negate(mode.is_("stuck")), self.v < 0))
+        yield stop.go(
+            "left", "none", when=all_of(negate(mode.is_("stuck")), self.v > 0), because="moves away from the stop"
+        )
+        yield stop.go(
+            "right", "none", when=all_of(negate(mode.is_("stuck")), self.v < 0), because="moves away from the stop"
+        )
         yield from super().events()
 
     def stored_energy(self) -> Expr:

@@ -6,6 +6,7 @@ from components import icons
 from modelica_like.language import (
     Component,
     Connector,
+    Domain,
     Equations,
     Expr,
     Output,
@@ -24,6 +25,7 @@ _ROOM = 293.15
 class HeatPort(Connector):
     """Where heat enters: temperature, and the heat flow into the component."""
 
+    domain = Domain("heat flow", "temperature", "a thermal conductor")
     stroke = icons.HEAT
     T: Variable = var("K", "temperature", guess=_ROOM, nominal=300.0)
     Q_flow: Variable = flow("W", "heat flow, positive into the component")

@@ -8,6 +8,8 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from modelica_like.upper import provide
+
 if TYPE_CHECKING:
     from modelica_like.analyse.calibration.calibrate import calibrate as calibrate
     from modelica_like.analyse.linear.campbell import campbell as campbell
@@ -69,35 +71,7 @@ _HOME = {
     "validate_fmu": "modelica_like.fmi.validate",
 }
 
-__all__ = [
-    "Assembly",
-    "CompiledDae",
-    "Component",
-    "ModelicaLikeError",
-    "Native",
-    "Options",
-    "Solution",
-    "Trajectories",
-    "build",
-    "calibrate",
-    "campbell",
-    "characteristic",
-    "compare",
-    "cosim",
-    "export_fmu",
-    "export_html",
-    "importance",
-    "linearize",
-    "load",
-    "run_fmu",
-    "sensitivities",
-    "simulate",
-    "simulation_function",
-    "split",
-    "steady",
-    "sweep",
-    "validate_fmu",
-]
+__all__ = [*_HOME]  # pyright: ignore[reportUnsupportedDunderAll]
 
 
 def __getattr__(name: str) -> Any:
@@ -105,3 +79,8 @@ def __getattr__(name: str) -> Any:
     if name in _HOME:
         return getattr(import_module(_HOME[name]), name)
     raise AttributeError(f"module 'modelica_like' has no attribute '{name}'")
+
+
+_OFFERED = {"simulation_function": _HOME["simulation_function"], "Native": _HOME["Native"],
+            "NativeLoop": "modelica_like.native.run"}  # fmt: skip
+provide(tuple(_OFFERED), lambda name: getattr(import_module(_OFFERED[name]), name))

@@ -9,7 +9,6 @@ import time
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import replace
-from importlib import import_module
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -35,6 +34,7 @@ from modelica_like.solve.solution import Solution
 from modelica_like.solve.trajectories import Statistics, Trajectories, needs_equations
 from modelica_like.structure import reduce
 from modelica_like.units import parse_unit, to_si
+from modelica_like.upper import upper
 
 _SECOND = parse_unit("s")
 _SHORTEST = 1e-12
@@ -48,9 +48,9 @@ def build(drive: Model, free: Iterable[str] = (), *, tables: Iterable[str] = ())
 
     Args:
         drive: the model.
-        free: parameters that shall be independent: what follows from others by a formula keeps the formula's value,
-            but can be varied on its own. Not possible in a compiled model.
-        tables: patterns of tables whose numbers shall be parameters, such as `clutch.mu_pos`: see
+        free: parameters to decouple from their formulas: each keeps its formula's value, but can be varied on its own.
+            Not possible in a compiled model.
+        tables: patterns of tables whose numbers become parameters, such as `clutch.mu_pos`: see
             `with_tunable_tables`. Not possible in a compiled model.
 
     Raises:
@@ -153,7 +153,7 @@ def plan(
     if end <= t0:
         raise ValueOutOfRange(f"The end time {end:g} s is not after the start time {t0:g} s.")
     if end - t0 < _SHORTEST * max(1.0, abs(t0)):
-        raise ValueOutOfRange(f"A run of {end - t0:g} s is too short: no times can be told apart in it.")
+        raise ValueOutOfRange(f"A run of {end - t0:g} s is too short: its times cannot be distinguished.")
     return end, chosen
 
 
@@ -162,8 +162,7 @@ def _loop(solver: str) -> Any:
     if solver == "idas":
         return EventLoop
     if solver == "native":
-        # It stands above this layer.
-        return import_module("modelica_like.native.run").NativeLoop
+        return upper("NativeLoop")
     raise UnknownName(
         f"There is no solver '{solver}'{did_you_mean(solver, get_args(Solver)) or '.'}",
         advice="There are idas (the reference) and native (the compiled run-time of FMUs).",

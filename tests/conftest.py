@@ -1,6 +1,15 @@
 """For all tests."""
 
+import os
 import signal
+
+# Signals, limits on files, pipes of a browser, nm, sanitizers, an FMU that crashes: not on Windows.
+_POSIX = [
+    "cli/test_interrupts.py", "exact/test_random_drives_exactly.py", "fmi/test_build.py", "fmi/test_codegen.py",
+    "fmi/test_runtime.py", "fmi/test_sanitized.py", "fmus/test_safety.py", "messages/test_fmu_messages.py", "page",
+    "report/test_writing.py",
+]  # fmt: skip
+collect_ignore = _POSIX if os.name == "nt" else []
 
 
 def pytest_configure() -> None:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 # Modules and their commands, in the order in which the help lists them.
 _GROUPS = {
     "models": ("check", "simulate"),
-    "pictures": ("draw",),
+    "pictures": ("draw", "report"),
     "analysis": ("modes",),
     "sweeps": ("steady", "sweep"),
     "sensitivity": ("sensitivity",),
@@ -43,8 +43,7 @@ def __getattr__(name: str) -> Any:
 
 
 def main() -> None:
-    """Run the command line; classes of modules in the working directory can be used in netlists."""
-    sys.path.insert(0, "")
+    """Run the command line."""
     try:
         if not _ran(sys.argv[1:]):
             __getattr__("app")()

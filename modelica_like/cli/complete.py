@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import Annotated, Any, get_args, get_type_hints
 
 import typer
+from rich.markup import escape
 
 from modelica_like.cli.declare import Argument, Option, WrongUse
 
@@ -34,7 +35,7 @@ def _for_typer(command: Callable[..., None]) -> Callable[..., None]:
         except WrongUse as error:
             raise typer.BadParameter(str(error), param_hint=error.option) from None
 
-    run.__annotations__ = told
+    run.__annotations__, run.__doc__ = told, escape(command.__doc__ or "")
     signature = inspect.signature(command)
     parameters = [one.replace(annotation=told[one.name]) for one in signature.parameters.values()]
     run.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
@@ -43,7 +44,7 @@ def _for_typer(command: Callable[..., None]) -> Callable[..., None]:
 
 def _annotation(hint: Any) -> Any:
     kind, declared = get_args(hint)
-    told = {"metavar": declared.metavar, "help": declared.help, "show_default": declared.show_default}
+    told = {"metavar": declared.metavar, "help": escape(declared.help or ""), "show_default": declared.show_default}
     if isinstance(declared, Option):
         return Annotated[kind, typer.Option(*declared.names, **told)]
     assert isinstance(declared, Argument)

@@ -2,26 +2,16 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from modelica_like.cli.declare import Argument, Option, WrongUse
-from modelica_like.cli.shared import Assignments, Debug, Netlist, load_netlist, out, told
+from modelica_like.cli.shared import Assignments, Debug, Netlist, load_netlist, say, told
 
-
-class MasterName(StrEnum):
-    """In which order the FMUs step."""
-
-    JACOBI = "jacobi"
-    GAUSS_SEIDEL = "gauss-seidel"
-
-
-class InputsName(StrEnum):
-    """How inputs move between communication points."""
-
-    LINEAR = "linear"
-    HOLD = "hold"
+Master = Literal["jacobi", "gauss-seidel"]
+"""In which order FMUs step."""
+Inputs = Literal["linear", "hold"]
+"""How inputs move between communication points."""
 
 
 def split(
@@ -57,7 +47,7 @@ def split(
                 )
             else:
                 done = run(assembly, at, output, names=names or (), version=fmi, check=check, report=status.update)
-        out().print(str(done), soft_wrap=True)
+        say(str(done))
 
 
 def cosim(
@@ -72,8 +62,8 @@ def cosim(
     tolerance: Annotated[
         float | None, Option(metavar="RTOL", help="Relative tolerance of the coupling: the step varies.")
     ] = None,
-    master: Annotated[MasterName | None, Option(help="All at once, or one after the other.")] = None,
-    inputs: Annotated[InputsName | None, Option(help="Inputs on straight lines, or held.")] = None,
+    master: Annotated[Master | None, Option(help="All at once, or one after the other.")] = None,
+    inputs: Annotated[Inputs | None, Option(help="Inputs on straight lines, or held.")] = None,
     csv: Annotated[Path | None, Option(metavar="FILE", help="Write a table: .csv, .parquet, .nc.")] = None,
     units: Annotated[bool, Option("--units", help="Units in a second header line of the table.")] = False,
     plot: Annotated[Path | None, Option(metavar="FILE", help="Draw the results: .png, .svg or .pdf.")] = None,

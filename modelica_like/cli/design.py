@@ -9,8 +9,9 @@ from modelica_like.cli.declare import Argument, Option
 from modelica_like.cli.shared import SOLVE_FAILED, Debug, out, told
 from modelica_like.errors import NetlistError
 
-DEMO = Path(__file__).parents[2] / "examples" / "demo.py"
-"""Lies beside its netlists, in copies of the source only."""
+_HOMES = (Path(__file__).parents[1], Path(__file__).parents[2])
+DEMO = next((home / "examples/demo.py" for home in _HOMES if (home / "examples").is_dir()), Path("examples/demo.py"))
+"""Lies beside its netlists: in the package, or in a copy of the source next to it."""
 
 
 def size(

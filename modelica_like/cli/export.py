@@ -5,27 +5,16 @@ from __future__ import annotations
 import gc
 from collections.abc import Iterator
 from contextlib import contextmanager
-from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from modelica_like.cli.declare import Option
-from modelica_like.cli.shared import Assignments, Debug, Netlist, load_netlist, out, told
+from modelica_like.cli.shared import Assignments, Debug, Netlist, load_netlist, say, told
 
-
-class Takes(StrEnum):
-    """What open ends take from outside."""
-
-    FLOW = "flow"
-    POTENTIAL = "potential"
-
-
-class Modes(StrEnum):
-    """What modes are in an FMU."""
-
-    OUTPUT = "output"
-    LOCAL = "local"
-    INTEGER = "integer"
+Takes = Literal["flow", "potential"]
+"""What open ends take from outside."""
+Modes = Literal["output", "local", "integer"]
+"""What modes are in an FMU."""
 
 
 def export(
@@ -47,13 +36,11 @@ def export(
     ends: Annotated[
         list[str] | None, Option("--open", metavar="PATH", help="A free connector that is open, e.g. J.flange_b.")
     ] = None,
-    takes: Annotated[Takes, Option(help="What open ends take: flow (torque) or potential (angle).")] = Takes.FLOW,
+    takes: Annotated[Takes, Option(help="What open ends take: flow (torque) or potential (angle).")] = "flow",
     embed: Annotated[
         bool, Option("--embed", help="Compile the model into the binary, for importers that do not name resources.")
     ] = False,
-    modes: Annotated[Modes, Option(help="Modes as enumeration outputs, as local ones, or as integer outputs.")] = (
-        Modes.OUTPUT
-    ),
+    modes: Annotated[Modes, Option(help="Modes as enumeration outputs, local ones, or integer outputs.")] = "output",
     fixed_step: Annotated[
         str | None, Option(metavar="TIME", help="Co-Simulation in steps of this size, with bounded work: 1ms.")
     ] = None,
@@ -76,15 +63,15 @@ def export(
                 from modelica_like.native.page import export_html
 
                 page = export_html(assembly, html, show=outputs or (), report=status.update)
-                out().print(str(page), soft_wrap=True)
+                say(str(page))
             if html is not None and output is None:
                 return
             done = export_fmu(
                 assembly, output or Path(f"{netlist.stem}.fmu"), fmi, _listed(kind), _listed(platforms),
-                outputs=outputs or (), ends=ends or (), takes=takes.value, embed=embed, modes=modes.value,
+                outputs=outputs or (), ends=ends or (), takes=takes, embed=embed, modes=modes,
                 fixed_step=fixed_step, tables=tables or (), check=check, strict=strict, report=status.update,
             )  # fmt: skip
-        out().print(str(done), soft_wrap=True)
+        say(str(done))
 
 
 @contextmanager
@@ -103,7 +90,7 @@ def runtimes(
     ] = "none",
     debug: Debug = False,
 ) -> None:  # fmt: skip
-    """Tell for which platforms the run-time of FMUs is there; compile it for others."""
+    """List the platforms for which the run-time of FMUs is available; compile it for others."""
     with told(debug):
         from rich.console import Console
 
@@ -115,7 +102,7 @@ def runtimes(
                 runtime_library(name, status.update)
         for name in RUNTIMES:
             library = found_runtime(name)
-            out().print(f"{name:16}{library or 'not compiled'}", soft_wrap=True)
+            say(f"{name:16}{library or 'not compiled'}")
 
 
 def _listed(text: str) -> tuple[str, ...]:

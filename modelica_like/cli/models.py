@@ -2,32 +2,21 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from modelica_like.cli.declare import Option
 from modelica_like.cli.shared import Assignments, Debug, Netlist, load_netlist, out, told
 
-
-class Start(StrEnum):
-    """What stands for start values that are not given."""
-
-    GIVEN = "given"
-    REST = "rest"
-    STEADY = "steady"
-
-
-class Solver(StrEnum):
-    """What integrates."""
-
-    IDAS = "idas"
-    NATIVE = "native"
+Start = Literal["given", "rest", "steady"]
+"""What stands for start values that are not given."""
+Solver = Literal["idas", "native"]
+"""What integrates."""
 
 
 def check(
     netlist: Netlist, assignments: Assignments = None, *,
-    start: Annotated[bool, Option("--start", help="Tell the start values, and where each comes from.")] = False,
+    start: Annotated[bool, Option("--start", help="Print the start values and where each comes from.")] = False,
     debug: Debug = False,
 ) -> None:  # fmt: skip
     """Check a netlist: equations, unknowns, states, index, blocks, energy terms."""
@@ -53,8 +42,8 @@ def simulate(
     plot: Annotated[Path | None, Option(metavar="FILE", help="Draw the results: .png, .svg or .pdf.")] = None,
     show: Annotated[list[str] | None, Option(metavar="PATTERN", help="What to draw, e.g. '*.w'.")] = None,
     sankey: Annotated[Path | None, Option(metavar="FILE", help="Draw where the energy went.")] = None,
-    energy: Annotated[bool, Option(help="Tell the energy balance.")] = True,
-    solver: Annotated[Solver, Option(help="IDAS, or the compiled run-time of FMUs.")] = Solver.IDAS,
+    energy: Annotated[bool, Option(help="Print the energy balance.")] = True,
+    solver: Annotated[Solver, Option(help="IDAS, or the compiled run-time of FMUs.")] = "idas",
     debug: Debug = False,
 ) -> None:  # fmt: skip
     """Simulate a netlist: events, energy balance, results as table and picture."""
@@ -72,11 +61,10 @@ def simulate(
         model = build(assembly)
         matching(model, show or ())
         with Bar(until or model.settings.get("until")) as bar:
-            begin = start.value if start else None
             made = Outcome(
-                lambda: run(model, until, start=begin, points=points, progress=bar, solver=solver.value), debug=debug
+                lambda: run(model, until, start=start, points=points, progress=bar, solver=solver), debug=debug
             )
         energy = energy and made.stopped is None and made.attempt("The energy balance", made.solution.energy)
-        made.tell(lambda one: run_report(one, energy=energy), csv)
+        made.tell(lambda one: run_report(one, energy=energy, debug=debug), csv)
         pictures = (plot, lambda one: draw(one, show or ())), (sankey, lambda one: one.energy().sankey(model.name))
         made.write(csv, units=units, pictures=pictures)

@@ -6,9 +6,8 @@ import inspect
 import os
 import re
 from collections.abc import Callable, Mapping, Sequence
-from enum import Enum
 from pathlib import Path
-from typing import Any, get_args, get_origin, get_type_hints
+from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 from modelica_like.cli.declare import Option
 
@@ -47,8 +46,8 @@ class _Parameter:
             return int(text)
         if self.kind is float and _NUMBER.fullmatch(text):
             return float(text)
-        if issubclass(self.kind, Enum) and text in [one.value for one in self.kind]:
-            return self.kind(text)
+        if get_origin(self.kind) is Literal and text in get_args(self.kind):
+            return text
         raise _Unusual
 
 

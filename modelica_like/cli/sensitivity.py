@@ -27,7 +27,7 @@ def sensitivity(
         from modelica_like.report.analysis import sensitivity_report
         from modelica_like.solve.plot import save_plot
 
-        result = sensitivities(assembly, of, to or (), until=until, start=start.value if start else None)
+        result = sensitivities(assembly, of, to or (), until=until, start=start)
         out().print(sensitivity_report(result))
         if tornado:
             save_plot(result.tornado(of[0]), tornado)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 from modelica_like.cli.declare import Argument, Option, WrongUse
-from modelica_like.errors import InitializationError, ModelicaLikeError, SolveError
+from modelica_like.errors import InitializationError, ModelicaLikeError, SolveError, Source
 from modelica_like.writing import check_writable
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ DEFECTS = (
 )  # fmt: skip
 
 Netlist = Annotated[Path, Argument(metavar="NETLIST", help="TOML file", show_default=False)]
-Debug = Annotated[bool, Option("--debug", help="Show where in the code an error was raised.")]
+Debug = Annotated[bool, Option("--debug", help="Show where in the code errors are raised and events declared.")]
 Assignments = Annotated[
     list[str] | None, Option("--set", metavar="PATH=VALUE", help='Set a value, e.g. --set clutch.mu="0.3".')
 ]
@@ -53,7 +53,7 @@ def told(
     except KeyboardInterrupt as error:
         if debug:
             raise
-        _fail(" ".join(["Interrupted.", *(_notes(error) or ["What was not finished is not written."])]), INTERRUPTED)
+        _fail(" ".join(["Interrupted.", *(_notes(error) or ["Unfinished results are not written."])]), INTERRUPTED)
     except ModelicaLikeError as error:
         if debug:
             raise
@@ -121,8 +121,16 @@ def out(*, stderr: bool = False) -> Console:
     return Console(highlight=False, emoji=False, stderr=stderr, width=None if stream.isatty() else 160)
 
 
+def say(text: str) -> None:
+    """Print a text as it is, with all brackets, on lines of any length."""
+    from rich.markup import escape
+
+    out().print(escape(text), soft_wrap=True)
+
+
 def load_netlist(netlist: Path, assignments: list[str] | None) -> Any:
     """Load a netlist and give it the values of `--set`."""
+    from modelica_like.language import Assembly
     from modelica_like.netlist import load
 
     assembly = load(netlist)
@@ -130,7 +138,13 @@ def load_netlist(netlist: Path, assignments: list[str] | None) -> Any:
         path, equals, value = assignment.partition("=")
         if not equals:
             raise WrongUse(f"'{assignment}' is not PATH=VALUE.", "--set")
-        assembly.set(path.strip(), _value(value.strip()))
+        place = Source("--set", text=assignment)
+        try:
+            assembly.set(path.strip(), _value(value.strip()))
+        except ModelicaLikeError as error:
+            error.where = (place,)
+            raise
+        Assembly.place(assembly, f"set.{path.strip()}", place)
     return assembly
 
 

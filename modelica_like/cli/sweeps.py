@@ -54,7 +54,7 @@ def sweep(
     checkpoint: Annotated[Path | None, Option(metavar="FOLDER", help="Keeps what is done.")] = None,
     processes: Annotated[int | None, Option(metavar="N", help="At once on this machine; else one per core.")] = None,
     scheduler: Annotated[str | None, Option(metavar="ADDRESS", help="Dask, e.g. tcp://host:8786.")] = None,
-    solver: Annotated[Solver, Option(help="The compiled run-time of FMUs, or IDAS.")] = Solver.NATIVE,
+    solver: Annotated[Solver, Option(help="The compiled run-time of FMUs, or IDAS.")] = "native",
     output: Annotated[Path | None, Option("--output", "-o", metavar="FILE", help=".csv, .parquet, .nc.")] = None,
     debug: Debug = False,
 ) -> None:  # fmt: skip
@@ -70,7 +70,7 @@ def sweep(
         with Bar(title="runs") as bar:
             found = run(
                 assembly, dict(read_range(text) for text in over), of, until=until, checkpoint=checkpoint,
-                processes=processes, scheduler=scheduler, progress=bar, solver=solver.value,
+                processes=processes, scheduler=scheduler, progress=bar, solver=solver,
             )  # fmt: skip
         out(stderr=output == STDOUT).print(sweep_report(found))
         if output:

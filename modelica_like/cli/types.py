@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Annotated
 
 from modelica_like.cli.declare import Argument, Option
-from modelica_like.cli.shared import Debug, out, told
+from modelica_like.cli.shared import Debug, out, say, told
 
 
 def describe(
@@ -57,4 +57,4 @@ def docs(
         from modelica_like.report.component_pages.library import write_component_pages
 
         pages = write_component_pages(output, examples, types)
-        out().print(f"{len(pages)} page{'s' if len(pages) > 1 else ''} in {output}")
+        say(f"{len(pages)} page{'s' if len(pages) > 1 else ''} in {output}")

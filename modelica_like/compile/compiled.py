@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from importlib import import_module
 from typing import Any, TypeVar
 
 import casadi as ca
@@ -16,7 +15,9 @@ from modelica_like.compile.start_system import StartSystem as StartSystem
 from modelica_like.errors import LanguageError, Source, UnknownName, ValueOutOfRange, did_you_mean
 from modelica_like.flatten.model import FlatDiscrete, FlatParameter, FlatVariable, Origin
 from modelica_like.structure.holds import Circuit as Circuit
-from modelica_like.units import Unit, coherent, to_si
+from modelica_like.structure.holds import HeldMotion as HeldMotion
+from modelica_like.units import Unit, to_si
+from modelica_like.upper import upper
 
 Made = TypeVar("Made")
 
@@ -43,6 +44,7 @@ class CompiledTransition:
         timed: whether `index` is a position in the moments rather than in the guards.
         resets: what else changes.
         notice: what the user is told when it happens.
+        because: why it happens, in words.
         fails: whether the run ends there, with an error.
     """
 
@@ -53,8 +55,9 @@ class CompiledTransition:
     index: int
     resets: tuple[Reset, ...]
     source: Source
-    notice: str = ""
-    fails: bool = False
+    notice: str
+    because: str
+    fails: bool
 
 
 @dataclass(frozen=True)
@@ -64,31 +67,6 @@ class StartEntry:
     node: int
     state: tuple[int, float] | None
     strength: str
-
-
-@dataclass(frozen=True)
-class CompiledHold:
-    """A motion that a mode holds at zero.
-
-    Attributes:
-        component: path of the component.
-        mode: position of the mode in d.
-        number: number of the mode that holds.
-        loose: number of a mode that does not, or -1.
-        motion: variable that is held.
-        state: (state, factor) if it is one.
-        reaction: variable that holds it, or -1.
-        approach: position in d of the derivative that the motion is to have; zero but in impacts.
-    """
-
-    component: str
-    mode: int
-    number: int
-    loose: int
-    motion: int
-    state: tuple[int, float] | None
-    reaction: int
-    approach: int
 
 
 @dataclass(frozen=True)
@@ -159,7 +137,7 @@ class CompiledDae:
     transitions: tuple[CompiledTransition, ...]
     start_modes: tuple[tuple[int, int, Source], ...]
     starts: tuple[StartEntry, ...]
-    holds: tuple[CompiledHold, ...]
+    holds: tuple[HeldMotion, ...]
     circuits: tuple[Circuit, ...]
     singular: tuple[tuple[tuple[str, ...], tuple[Origin, ...]], ...]
     differentiated: tuple[Origin, ...]
@@ -210,7 +188,7 @@ class CompiledDae:
     def units(self) -> dict[str, Unit]:
         """Coherent SI unit of every variable, parameter, mode and discrete value by its path."""
         named = (*self.flat_discretes, *self.flat_variables, *self.flat_derived, *self.flat_parameters)
-        return {one.path: coherent(one.unit) for one in named}
+        return {one.path: one.unit for one in named}
 
     @cached_property
     def derived_position(self) -> dict[str, int]:
@@ -278,10 +256,10 @@ class CompiledDae:
                     raise LanguageError(
                         f"{path} cannot change after compilation.", advice="Set it in the model and build that again."
                     )
-                p[self.parameter_position[path]] = one.checked(to_si(value, coherent(one.unit), path), value)
+                p[self.parameter_position[path]] = one.checked(to_si(value, one.unit, path), value)
             elif path in inputs:
                 unit = self.flat_variables[self.inputs[inputs[path]]].unit
-                u[inputs[path]] = to_si(value, coherent(unit), path)
+                u[inputs[path]] = to_si(value, unit, path)
             elif path in self.derived_position:
                 raise LanguageError(f"{path} follows from other parameters.", advice="Set those.")
             else:
@@ -319,8 +297,7 @@ class CompiledDae:
             outputs: numbers read off the run.
             run: further arguments of `modelica_like.simulation_function`, which says more.
         """
-        # Analysis stands above this layer: only the face of the package knows where.
-        return import_module("modelica_like").simulation_function(self, inputs, outputs, **run)
+        return upper("simulation_function")(self, inputs, outputs, **run)
 
     def native(self, inputs: Sequence[str] = (), outputs: Sequence[str] = (), **how: Any) -> Any:
         """Return a handle for control loops: an instance that steps at the speed of C.
@@ -330,7 +307,7 @@ class CompiledDae:
             outputs: variables and modes that its steps read.
             how: further arguments of `modelica_like.Native`, which says more.
         """
-        return import_module("modelica_like").Native(self, inputs, outputs, **how)
+        return upper("Native")(self, inputs, outputs, **how)
 
     def __getstate__(self) -> dict[str, Any]:
         if self._make_energy is not None:

@@ -10,7 +10,6 @@ import numpy as np
 
 from modelica_like.compile.compiled import (
     CompiledDae,
-    CompiledHold,
     CompiledTerminal,
     CompiledTransition,
     Reset,
@@ -33,15 +32,14 @@ _SMALLEST = 1e-20
 """What the solution of a start leaves of zeros is far below it; a drive at rest has nothing larger to compare with."""
 _SOURCE_POWER = 2
 _EFFORTS = ("N", "N.m")
+StartModes = tuple[tuple[int, int, Source], ...]
 
 
 def compile(reduced: ReducedDae) -> CompiledDae:
     """Build the functions of a reduced system."""
     flat = reduced.flat
     build = _Builder(reduced)
-    guards, moments, transitions, resets, targets = build.transitions()
-    conditions, start_modes = build.start_modes()
-    determinants = ca.vertcat(*(expression for _, _, expression in reduced.determinants))
+    functions, transitions, targets, start_modes = build.functions()
     return CompiledDae(
         name=flat.name,
         states=reduced.states,
@@ -51,26 +49,13 @@ def compile(reduced: ReducedDae) -> CompiledDae:
         flat_derived=tuple(flat.derived),
         flat_discretes=tuple(_plain(one) for one in flat.discretes),
         inputs=tuple(flat.inputs),
-        ode=build.function("ode", reduced.ode),
-        alg=build.function("alg", reduced.alg),
-        alg_jacobian=build.function("alg_jacobian", ca.jacobian(reduced.alg, reduced.z)),
-        variables=build.function("variables", reduced.values[: len(flat.variables)]),
-        guards=build.function("guards", guards),
-        guard_rates=build.function("guard_rates", reduced.total_derivative(guards)),
-        guards_soon=build.function("guards_soon", guards_soon(reduced, guards)),
-        moments=build.function("moments", moments),
-        resets=build.function("resets", resets),
-        reset_nodes=tuple(targets),
-        start_conditions=build.function("start_conditions", conditions),
-        hold_terms=build.function("hold_terms", ca.vec(hold_terms(flat, reduced.values).T)),
-        start_values=build.function("start_values", ca.vertcat(*(ca.SX(s.value) for s in flat.starts))),
-        discrete_starts=build.function("discrete_starts", _discrete_starts(flat)),
+        **functions,
         derived=ca.Function("derived", [flat.p], [ca.densify(ca.SX(flat.formulas))], ["p"], ["derived"]),
-        determinants=build.function("determinants", determinants),
+        reset_nodes=tuple(targets),
         transitions=transitions,
         start_modes=start_modes,
         starts=tuple(StartEntry(s.node, reduced.node_states[s.node], s.strength) for s in flat.starts),
-        holds=_holds(reduced),
+        holds=reduced.holds,
         circuits=reduced.circuits,
         singular=tuple((names, origins) for names, origins, _ in reduced.determinants),
         differentiated=reduced.differentiated,
@@ -94,16 +79,6 @@ def compile(reduced: ReducedDae) -> CompiledDae:
 def _discrete_starts(flat: FlatModel) -> Any:
     starts = [ca.SX(one.start) for one in flat.discretes]
     return ca.vertcat(*starts, ca.SX.zeros(flat.d.numel() - len(starts)))
-
-
-def _holds(reduced: ReducedDae) -> tuple[CompiledHold, ...]:
-    return tuple(
-        CompiledHold(
-            one.path, one.mode, one.number, one.loose, one.motion, reduced.node_states[one.motion], one.reaction,
-            one.approach,
-        )
-        for one in reduced.holds
-    )  # fmt: skip
 
 
 def _places(flat: FlatModel) -> dict[str, Source]:
@@ -161,6 +136,30 @@ class _Builder:
         result = expression if name == "alg_jacobian" else ca.densify(ca.SX(expression))
         return ca.Function(name, self.arguments, [result], ["t", "x", "z", "p", "u", "d"], [name])
 
+    def functions(self) -> tuple[dict[str, ca.Function], tuple[CompiledTransition, ...], list[int], StartModes]:
+        """Return the functions of (t, x, z, p, u, d) by name, and the tables that go with those of events."""
+        reduced, flat = self.reduced, self.reduced.flat
+        guards, moments, transitions, resets, targets = self.transitions()
+        conditions, start_modes = self.start_modes()
+        expressions = {
+            "ode": reduced.ode,
+            "alg": reduced.alg,
+            "alg_jacobian": ca.jacobian(reduced.alg, reduced.z),
+            "variables": reduced.values[: len(flat.variables)],
+            "guards": guards,
+            "guard_rates": reduced.total_derivative(guards),
+            "guards_soon": guards_soon(reduced, guards),
+            "moments": moments,
+            "resets": resets,
+            "start_conditions": conditions,
+            "hold_terms": ca.vec(hold_terms(flat, reduced.values).T),
+            "start_values": ca.vertcat(*(ca.SX(s.value) for s in flat.starts)),
+            "discrete_starts": _discrete_starts(flat),
+            "determinants": ca.vertcat(*(expression for _, _, expression in reduced.determinants)),
+        }
+        functions = {name: self.function(name, expression) for name, expression in expressions.items()}
+        return functions, transitions, targets, start_modes
+
     def transitions(self) -> tuple[Any, Any, tuple[CompiledTransition, ...], Any, list[int]]:
         """Return guards, moments, transitions, reset values and reset nodes of all instances."""
         reduced, flat = self.reduced, self.reduced.flat
@@ -187,7 +186,7 @@ class _Builder:
     ) -> CompiledTransition:
         return CompiledTransition(
             self.place[prefix + form.mode], form.sources, form.target, form.timed, index, resets, form.source,
-            form.notice, form.fails,
+            form.notice, form.because, form.fails,
         )  # fmt: skip
 
     def _reset(self, path: str, value: int, targets: list[int]) -> Reset:
@@ -200,7 +199,7 @@ class _Builder:
         targets.append(node)
         return Reset("value", -1, 1.0, value, len(targets) - 1)
 
-    def start_modes(self) -> tuple[Any, tuple[tuple[int, int, Source], ...]]:
+    def start_modes(self) -> tuple[Any, StartModes]:
         flat = self.reduced.flat
         columns = evaluate(flat, "start_conditions", self._without_rounding())
         conditions: list[Any] = []

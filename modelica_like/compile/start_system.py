@@ -33,8 +33,8 @@ def start_system(reduced: ReducedDae, rest: bool = False) -> StartSystem:
     """Build the start system.
 
     A variable such as the speed of the last mass of a chain is the sum of all relative speeds. Written out, N such
-    variables are N^2 terms; with the
-    variables in between as unknowns y of their own, the system stays as sparse as the chain.
+    variables are N^2 terms; with the variables in between as unknowns y of their own, the system stays as sparse as
+    the chain.
 
     Args:
         reduced: the reduced system.

@@ -13,8 +13,7 @@ from modelica_like.compile.compiled import CompiledDae
 from modelica_like.cosimulation.cut import Cut, CutNetlist, as_name
 from modelica_like.errors import ModelicaLikeError, NetlistError, StructureError
 from modelica_like.flatten import flatten
-from modelica_like.fmi.dependencies import Dependencies
-from modelica_like.fmi.interface import Interface
+from modelica_like.fmi.dependencies import Following
 from modelica_like.language import Assembly, Component
 from modelica_like.language.fields import Input, Output
 from modelica_like.structure import reduce
@@ -114,7 +113,7 @@ def _bad_end(model: CompiledDae, assembly: Assembly, end: End) -> str:
     """Return what the answer of an end must not depend on, but does."""
     outputs, inputs, second = signals_of(assembly.parts[end.adaptor])
     wrong = second if end.takes == "potential" else inputs
-    depends = Dependencies(model, Interface(model.name, (), (), (), (), ()))
+    depends = Following(model)
     names = [model.flat_variables[k].path for k in model.inputs]
     for name in outputs:
         follows = {names[k] for k in depends.inputs_of(model.position[f"{end.adaptor}.{name}"])}

@@ -1,15 +1,11 @@
-"""Runs a system of FMUs in a process of its own: python -m modelica_like.cosimulation.child FOLDER.
+"""Runs a system of FMUs in a process of its own: python child.py FOLDER.
 
-The folder holds `job.json` and the unpacked FMUs in `0`, `1`, … What comes out is left there as it comes: before the
-first step `columns.json`, which becomes `meta.json` at the end; `rows`, doubles of the time, the columns, the energies
-and the counts; or `error.json`. `progress` holds the time reached and the number of the FMU that was called last.
+What comes out is left in the folder as it comes: before the first step `columns.json`, which becomes `meta.json` at the
+end; `rows`, doubles of the time, the columns, the energies and the counts.
 """
 
 from __future__ import annotations
 
-import json
-import mmap
-import struct
 import sys
 from array import array
 from fnmatch import fnmatchcase
@@ -17,29 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from modelica_like.cosimulation.master import Balance, Master, Signal
-from modelica_like.cosimulation.slaves import REAL, Refused, Slave
-
-PLACE = struct.Struct("dq")
-"""The time reached and the number of an FMU, as they stand in `progress`."""
-
-
-class Board:
-    """Tells outside how far the run is, and which FMU it is in."""
-
-    def __init__(self, folder: Path) -> None:
-        with (folder / "progress").open("r+b") as file:
-            file.truncate(PLACE.size)
-            self._shared = mmap.mmap(file.fileno(), PLACE.size)
-        self.unit = 0
-
-    def reach(self, time: float) -> None:
-        """Tell the time reached."""
-        self._shared[:8] = struct.pack("d", time)
-
-    def call(self, unit: int) -> None:
-        """Tell which FMU is called now."""
-        self.unit = unit
-        self._shared[8:] = struct.pack("q", unit)
+from modelica_like.cosimulation.slaves import Slave
+from modelica_like.fmi.inside import Job, Messages, Refused, about
 
 
 class Recorder:
@@ -54,10 +29,10 @@ class Recorder:
     """
 
     def __init__(
-        self, slaves: list[Slave], outputs: list[list[str]], master: Master, interval: float, board: Board, file: Path
+        self, slaves: list[Slave], outputs: list[list[str]], master: Master, interval: float, job: Job, file: Path
     ) -> None:
         self._readers = [slave.reader(names) for slave, names in zip(slaves, outputs, strict=True)]
-        self._master, self._interval, self._board, self._last = master, interval, board, -float("inf")
+        self._master, self._interval, self._job, self._last = master, interval, job, -float("inf")
         self._file = file.open("wb", buffering=0)
 
     def look(self, time: float) -> list[float]:
@@ -73,7 +48,7 @@ class Recorder:
 
     def keep(self, row: list[float]) -> None:
         """Keep a row."""
-        self._board.reach(row[0])
+        self._job.reach(row[0])
         if len(row) > 1:
             self._last = row[0]
             self._file.write(array("d", [*row, *vars(self._master.counts).values()]))
@@ -85,14 +60,16 @@ class Recorder:
             self.keep(self.look(time))
 
 
-def open_slaves(folder: Path, job: dict[str, Any], board: Board) -> list[Slave]:
+def open_slaves(job: Job) -> list[Slave]:
     """Instantiate all FMUs, and check the names."""
     slaves: list[Slave] = []
-    for k, unit in enumerate(job["units"]):
-        slaves.append(Slave(unit["name"], folder / str(k), lambda k=k: board.call(k)))
+    for k, unit in enumerate(job.asked["units"]):
+        name, messages = unit["name"], Messages()
+        job.messages[name] = messages
+        slaves.append(Slave(name, job.folder / str(k), messages, lambda k=k, name=name: job.call(k, name)))
         for name in unit["parameters"]:
             check_name(slaves[-1], name, "parameters")
-    for link in job["links"]:
+    for link in job.asked["links"]:
         (n, name), *targets = link["ends"]
         check_name(slaves[n], name, "outputs")
         for n, name in targets:
@@ -100,7 +77,7 @@ def open_slaves(folder: Path, job: dict[str, Any], board: Board) -> list[Slave]:
             if (causality := slaves[n].all[name].causality) != "input":
                 known = [v for v, about in slaves[n].all.items() if about.causality == "input"]
                 raise Refused(kind="no input", unit=slaves[n].name, name=name, causality=causality, known=known)
-    if job["tolerance"] is not None and (unable := [slave.name for slave in slaves if not slave.can_save]):
+    if job.asked["tolerance"] is not None and (unable := [slave.name for slave in slaves if not slave.can_save]):
         raise Refused(kind="no rollback", unit=unable[0])
     return slaves
 
@@ -153,28 +130,23 @@ def start(slaves: list[Slave], master: Master, job: dict[str, Any]) -> None:
     master.begin(job["start"])
 
 
-def run(folder: Path) -> None:
+def run(job: Job) -> None:
     """Run the job of a folder."""
-    job = json.loads((folder / "job.json").read_text())
-    board = Board(folder)
-    slaves: list[Slave] = []
-    sys.excepthook = reporter(folder, job, board, slaves)
-    slaves += open_slaves(folder, job, board)
-    outputs = choose(slaves, job["outputs"], own_names=job["own_names"])
-    master = connect(slaves, job)
-    start(slaves, master, job)
-    recorder = Recorder(slaves, outputs, master, job["interval"], board, folder / "rows")
-    recorder.keep(recorder.look(job["start"]))
+    asked, slaves, folder = job.asked, open_slaves(job), job.folder
+    outputs = choose(slaves, asked["outputs"], own_names=asked["own_names"])
+    master = connect(slaves, asked)
+    start(slaves, master, asked)
+    recorder = Recorder(slaves, outputs, master, asked["interval"], job, folder / "rows")
+    recorder.keep(recorder.look(asked["start"]))
     width = (folder / "rows").stat().st_size // 8
-    known = {"units": columns_of(slaves, outputs), "open": open_inputs(slaves, job), "width": width}
-    (folder / "draft").write_text(json.dumps(known))
-    columns = (folder / "draft").rename(folder / "columns.json")
-    span = job["start"], job["until"], job["step"]
-    if job["tolerance"] is None:
+    known = {"units": columns_of(slaves, outputs), "open": open_inputs(slaves, asked), "width": width}
+    columns = job.leave(known, "columns.json")
+    span = asked["start"], asked["until"], asked["step"]
+    if asked["tolerance"] is None:
         master.run_fixed(*span, recorder)
     else:
-        master.run_variable(*span, job["tolerance"], recorder)
-    recorder.close(job["until"])
+        master.run_variable(*span, asked["tolerance"], recorder)
+    recorder.close(asked["until"])
     for slave in slaves:
         slave.close()
     columns.rename(folder / "meta.json")
@@ -203,38 +175,11 @@ def open_inputs(slaves: list[Slave], job: dict[str, Any]) -> list[dict[str, Any]
     return found
 
 
-def about(variable: Any) -> dict[str, Any]:
-    """Return what is to be known about a column, by the names of `RecordedVariable`."""
-    items = getattr(variable.declaredType, "items", None) or ()
-    return {
-        "path": variable.name,
-        "unit": variable.unit or getattr(variable.declaredType, "unit", None) or "1",
-        "description": variable.description or "",
-        "kind": (variable.causality or "local") if variable.type in REAL else "discrete",
-        "names": [(int(item.value), item.name) for item in items],
-    }
-
-
 def constants(slave: Slave) -> dict[str, float]:
     """Return the values of the parameters."""
     names = [name for name, v in slave.all.items() if v.causality == "parameter"]
     return dict(zip(names, slave.reader(names)(), strict=True))
 
 
-def reporter(folder: Path, job: dict[str, Any], board: Board, slaves: list[Slave]) -> Any:
-    """Return an exception hook that leaves the error in the folder."""
-
-    def report(kind: type[BaseException], error: BaseException, trace: Any) -> None:
-        if isinstance(error, Refused):
-            detail = error.detail
-        else:
-            messages = slaves[board.unit].messages if board.unit < len(slaves) else []
-            unit = job["units"][board.unit]["name"]
-            detail = {"kind": "failed", "unit": unit, "text": str(error) or kind.__name__, "messages": messages}
-        (folder / "error.json").write_text(json.dumps(detail))
-
-    return report
-
-
 if __name__ == "__main__":
-    run(Path(sys.argv[1]))
+    run(Job(Path(sys.argv[1])))

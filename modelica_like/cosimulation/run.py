@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import tempfile
 import threading
 import time as clock
 from collections.abc import Mapping, Sequence
@@ -14,14 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from modelica_like.cosimulation.child import PLACE
 from modelica_like.cosimulation.failures import tell_error, tell_loss
 from modelica_like.cosimulation.files import opened
 from modelica_like.cosimulation.solution import CosimSolution, Coupling
 from modelica_like.cosimulation.system import Inputs, Master, Settings, System, check_system
 from modelica_like.errors import FmuCrashed, FmuTimeout, SolveError, UnknownName, ValueOutOfRange, did_you_mean
-from modelica_like.fmi.process import run_child
-from modelica_like.fmi.unpack import unpack
+from modelica_like.fmi.inside import PLACE
+from modelica_like.fmi.process import run_child, workplace
 from modelica_like.simulation import seconds
 from modelica_like.solve.events import Progress
 
@@ -33,7 +30,6 @@ _FIRST_PART = 1e-6
 _INNER_PART = 0.1
 _WATCH = 0.1
 _CHILD = Path(__file__).with_name("child.py")
-_PACKAGES = Path(__file__).parents[2]
 
 
 def cosim(
@@ -85,15 +81,15 @@ def cosim(
     settings = _settings(system.settings, until, step, master, inputs, tolerance)
     if timeout <= 0:
         raise ValueOutOfRange(f"{system.name}: the time limit must be positive, not {timeout:g} s.")
+    if fmu_tolerance is None and settings.tolerance is not None:
+        fmu_tolerance = _INNER_PART * settings.tolerance  # errors of the FMUs must not look like those of the coupling
+    job = _job(system, settings) | {"fmu_tolerance": fmu_tolerance, "interval": interval, "outputs": outputs}
+    return _solution(system, job, timeout, progress)
+
+
+def _solution(system: System, job: dict[str, Any], timeout: float, progress: Progress | None) -> CosimSolution:
     begin = clock.perf_counter()
-    with tempfile.TemporaryDirectory(prefix="modelica_like_", ignore_cleanup_errors=True) as work:
-        folder = Path(work)
-        for k, unit in enumerate(system.units):
-            (folder / str(k)).mkdir()
-            unpack(unit.file, folder / str(k))
-        inner = fmu_tolerance if fmu_tolerance is not None else _inner(settings.tolerance)
-        job = _job(system, settings) | {"fmu_tolerance": inner, "interval": interval, "outputs": outputs}
-        (folder / "job.json").write_text(json.dumps(job))
+    with workplace(job, [unit.file for unit in system.units]) as folder:
         try:
             _run(system, folder, timeout, progress)
         except (SolveError, KeyboardInterrupt) as error:
@@ -103,7 +99,7 @@ def cosim(
 
 
 def _so_far(system: System, folder: Path, begin: float) -> CosimSolution | None:
-    """Return what a run has come to that has not come to its end, if it has made a step."""
+    """Return what an unfinished run has computed, if it has made a step."""
     if not (folder / "columns.json").exists():
         return None
     columns, table = _left(folder, "columns.json")
@@ -143,11 +139,6 @@ def _settings(
     return Settings(end, min(size, end), master or base.master, inputs or base.inputs, chosen)
 
 
-def _inner(tolerance: float | None) -> float | None:
-    """Return the tolerance of the FMUs, whose errors must not look like those of the coupling."""
-    return None if tolerance is None else _INNER_PART * tolerance
-
-
 def _job(system: System, settings: Settings) -> dict[str, Any]:
     number = {unit.name: k for k, unit in enumerate(system.units)}
     links = {link.name: k for k, link in enumerate(system.links)}
@@ -162,13 +153,11 @@ def _job(system: System, settings: Settings) -> dict[str, Any]:
 
 
 def _run(system: System, folder: Path, timeout: float, progress: Progress | None) -> None:
-    paths = [str(_PACKAGES), os.environ.get("PYTHONPATH", "")]
-    environment = {"PYTHONPATH": os.pathsep.join(filter(None, paths))}
     done = threading.Event()
     watcher = threading.Thread(target=_watch, args=(folder, done, progress), daemon=True)
     watcher.start()
     try:
-        run_child(system.name, _CHILD, folder, timeout, environment)
+        run_child(system.name, _CHILD, folder, timeout)
     except (FmuCrashed, FmuTimeout) as error:
         raise tell_loss(system, _place(folder)[1], error) from None
     finally:
@@ -187,6 +176,4 @@ def _watch(folder: Path, done: threading.Event, progress: Progress | None) -> No
 
 def _place(folder: Path) -> tuple[float, int]:
     """Return the time reached, and the number of the FMU that was called last."""
-    file = folder / "progress"
-    told = file.read_bytes() if file.exists() else b""
-    return PLACE.unpack(told) if len(told) == PLACE.size else (np.nan, 0)
+    return PLACE.unpack((folder / "progress").read_bytes())

@@ -9,21 +9,9 @@ from typing import Any
 import fmpy
 from fmpy.simulation import instantiate_fmu
 
-REAL = ("Real", "Float64", "Float32")
-_STORED = {
-    "Real": "Real", "Integer": "Integer", "Enumeration": "Integer", "Boolean": "Boolean", "Float64": "Float64",
-    "Float32": "Float32", "Int8": "Int8", "UInt8": "UInt8", "Int16": "Int16", "UInt16": "UInt16", "Int32": "Int32",
-    "UInt32": "UInt32", "Int64": "Int64", "UInt64": "UInt64",
-}  # fmt: skip
-_MESSAGES = 20
+from modelica_like.fmi.inside import DISCRETE, REAL, Messages, Refused
 
-
-class Refused(Exception):
-    """A system cannot be run as asked; `detail` says why, for the process that asked."""
-
-    def __init__(self, **detail: Any) -> None:
-        super().__init__(str(detail))
-        self.detail = detail
+_STORED = {name: name for name in (*REAL, *DISCRETE)} | {"Enumeration": "Integer"}
 
 
 class Slave:
@@ -32,41 +20,43 @@ class Slave:
     Args:
         name: its name in the system.
         folder: the unpacked FMU.
+        messages: keeps what it says.
         notice: called before the FMU itself is.
 
     Attributes:
         variables: FMPy's descriptions of the scalar variables by name, without parameters.
         slopes: it takes the slopes of its inputs.
-        can_save: its state can be saved and restored, and its steps may vary.
+        can_save: its state can be saved and restored (`save`, `load`, `free`), and its steps may vary.
     """
 
-    def __init__(self, name: str, folder: Path, notice: Callable[[], None] = lambda: None) -> None:
+    def __init__(self, name: str, folder: Path, messages: Messages, notice: Callable[[], None]) -> None:
         self.name, self.notice = name, notice
-        self.messages: list[str] = []
+        notice()
         self.description: Any = fmpy.read_model_description(str(folder), validate=False)
         about = self.description.coSimulation
         if self.description.fmiVersion == "1.0" or about is None:
-            raise Refused(kind="no co-simulation", unit=name, version=self.description.fmiVersion)
+            old = self.description.fmiVersion == "1.0"
+            raise Refused(kind="too old" if old else "no co-simulation", unit=name)
         second = self.description.fmiVersion == "2.0"
-        known = (v for v in self.description.modelVariables if v.type in (*_STORED, "Boolean") and not v.shape)
+        known = (v for v in self.description.modelVariables if v.type in _STORED and not v.shape)
         self.all = {v.name: v for v in known if v.causality != "independent"}
         self.variables = {n: v for n, v in self.all.items() if "arameter" not in (v.causality or "")}
         self.slopes = second and bool(about.canInterpolateInputs)
         self.can_save = bool(about.canGetAndSetFMUstate and about.canHandleVariableCommunicationStepSize)
-        notice()
         self._fmu: Any = instantiate_fmu(
-            str(folder), self.description, "CoSimulation", logger=self._log, event_mode_used=False
+            str(folder), self.description, "CoSimulation", logger=messages, event_mode_used=False
         )
-        self._save, self._load, self._free = (
-            (self._fmu.getFMUstate, self._fmu.setFMUstate, self._fmu.freeFMUstate)
-            if second
-            else (self._fmu.getFMUState, self._fmu.setFMUState, self._fmu.freeFMUState)
+        state = "FMUstate" if second else "FMUState"
+        self.save, self.load, self.free = (
+            self._noticed(getattr(self._fmu, f"{verb}{state}")) for verb in ("get", "set", "free")
         )
 
-    def _log(self, *arguments: Any) -> None:
-        text = arguments[-1]
-        self.messages.append(text.decode(errors="replace") if isinstance(text, bytes) else str(text))
-        del self.messages[:-_MESSAGES]
+    def _noticed(self, function: Callable[..., Any]) -> Callable[..., Any]:
+        def call(*arguments: Any) -> Any:
+            self.notice()
+            return function(*arguments)
+
+        return call
 
     def enter_initialization(self, start: float, stop: float, tolerance: float | None) -> None:
         """Enter the initialization mode."""
@@ -127,21 +117,6 @@ class Slave:
                                 noSetFMUStatePriorToCurrentPoint=not self.can_save)  # fmt: skip
         if isinstance(done, tuple) and done[1]:
             raise Refused(kind="ends", unit=self.name, time=time)
-
-    def save(self) -> Any:
-        """Save the state."""
-        self.notice()
-        return self._save()
-
-    def load(self, state: Any) -> None:
-        """Go back to a saved state."""
-        self.notice()
-        self._load(state)
-
-    def free(self, state: Any) -> None:
-        """Give a saved state back."""
-        self.notice()
-        self._free(state)
 
     def close(self) -> None:
         """Terminate the FMU."""

@@ -6,14 +6,12 @@ Both versions have the same namespaces; 2.0 knows the types of FMI 3.0.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Literal
-
-import lxml.etree as etree
+from typing import Literal
 
 from modelica_like.cosimulation.described import DescribedFmu, FmuVariable, UnitDefinition
 from modelica_like.cosimulation.system import Port, System, Unit
 from modelica_like.errors import NetlistError
-from modelica_like.fmi.xml import element
+from modelica_like.fmi.xml import Element, document, element
 
 Version = Literal["1.0", "2.0"]
 
@@ -32,12 +30,6 @@ FMU_TYPE = "application/x-fmu-sharedlibrary"
 _REAL = ("Real", "Float64", "Float32")
 
 
-def tag(name: str) -> str:
-    """Return the full name of an element such as `ssd:System`."""
-    prefix, _, local = name.partition(":")
-    return f"{{{NAMES[prefix]}}}{local}"
-
-
 def ssd(system: System, fmus: Mapping[str, DescribedFmu], sources: Mapping[str, str], version: Version) -> bytes:
     """Write a system.
 
@@ -50,9 +42,10 @@ def ssd(system: System, fmus: Mapping[str, DescribedFmu], sources: Mapping[str, 
     Raises:
         NetlistError: two FMUs mean different units by one name.
     """
-    top = etree.Element(tag("ssd:SystemStructureDescription"), {"version": version, "name": system.name}, NAMES)
-    inside = element(top, tag("ssd:System"), name=system.name)
-    parts = element(inside, tag("ssd:Elements"))
+    spaces = {f"xmlns:{prefix}": home for prefix, home in NAMES.items()}
+    top = Element("ssd:SystemStructureDescription", {**spaces, "version": version, "name": system.name})
+    inside = element(top, "ssd:System", name=system.name)
+    parts = element(inside, "ssd:Elements")
     ports = list(dict.fromkeys(port for link in system.links for port in (link.source, *link.targets)))
     for unit in system.units:
         _component(parts, unit, fmus[unit.name], sources[unit.name], ports, version)
@@ -60,43 +53,41 @@ def ssd(system: System, fmus: Mapping[str, DescribedFmu], sources: Mapping[str, 
         _connections(inside, system)
     _units(top, [(fmus[port.unit], port.variable) for port in _with_parameters(ports, system)])
     if system.settings.until is not None:
-        element(top, tag("ssd:DefaultExperiment"), startTime=0.0, stopTime=system.settings.until)
+        element(top, "ssd:DefaultExperiment", startTime=0.0, stopTime=system.settings.until)
     _annotation(top, system)
-    return etree.tostring(top, encoding="UTF-8", xml_declaration=True, pretty_print=True)
+    return document(top).encode()
 
 
 def _component(
-    parts: Any, unit: Unit, fmu: DescribedFmu, source: str, ports: list[Port], version: Version
+    parts: Element, unit: Unit, fmu: DescribedFmu, source: str, ports: list[Port], version: Version
 ) -> None:  # fmt: skip
-    one = element(
-        parts, tag("ssd:Component"), name=unit.name, type=FMU_TYPE, source=source, implementation="CoSimulation"
-    )
+    one = element(parts, "ssd:Component", name=unit.name, type=FMU_TYPE, source=source, implementation="CoSimulation")
     own = [fmu.variables[port.variable] for port in ports if port.unit == unit.name]
     if own:
-        connectors = element(one, tag("ssd:Connectors"))
+        connectors = element(one, "ssd:Connectors")
         for variable in own:
-            connector = element(connectors, tag("ssd:Connector"), name=variable.name, kind=variable.causality)
+            connector = element(connectors, "ssd:Connector", name=variable.name, kind=variable.causality)
             _type(connector, "ssc", variable, version)
     if unit.parameters:
-        binding = element(element(one, tag("ssd:ParameterBindings")), tag("ssd:ParameterBinding"))
-        values = element(binding, tag("ssd:ParameterValues"))
-        group = element(values, tag("ssv:ParameterSet"), version=version, name=PARAMETER_SET)
-        given = element(group, tag("ssv:Parameters"))
+        binding = element(element(one, "ssd:ParameterBindings"), "ssd:ParameterBinding")
+        values = element(binding, "ssd:ParameterValues")
+        group = element(values, "ssv:ParameterSet", version=version, name=PARAMETER_SET)
+        given = element(group, "ssv:Parameters")
         for name, value in unit.parameters.items():
-            parameter = element(given, tag("ssv:Parameter"), name=name)
+            parameter = element(given, "ssv:Parameter", name=name)
             _type(parameter, "ssv", fmu.variables[name], version, value)
 
 
-def _type(parent: Any, prefix: str, variable: FmuVariable, version: Version, value: float | None = None) -> None:
+def _type(parent: Element, prefix: str, variable: FmuVariable, version: Version, value: float | None = None) -> None:
     """Append the type of a variable, with a value if there is one."""
     kind = _kind(variable.kind, version)
     if kind is None and value is None:
         return
     if kind in (None, "Integer", "Boolean") or "Int" in (kind or ""):
         whole = None if value is None else bool(value) if kind == "Boolean" else round(value)
-        element(parent, tag(f"{prefix}:{kind or 'Integer'}"), value=whole)
+        element(parent, f"{prefix}:{kind or 'Integer'}", value=whole)
     else:
-        element(parent, tag(f"{prefix}:{kind}"), value=value, unit=variable.unit or None)
+        element(parent, f"{prefix}:{kind}", value=value, unit=variable.unit or None)
 
 
 def _kind(kind: str, version: Version) -> str | None:
@@ -108,12 +99,12 @@ def _kind(kind: str, version: Version) -> str | None:
     return "Real" if kind in _REAL else "Integer"
 
 
-def _connections(inside: Any, system: System) -> None:
-    group = element(inside, tag("ssd:Connections"))
+def _connections(inside: Element, system: System) -> None:
+    group = element(inside, "ssd:Connections")
     for link in system.links:
         for target in link.targets:
             element(
-                group, tag("ssd:Connection"), description=link.name, startElement=link.source.unit,
+                group, "ssd:Connection", description=link.name, startElement=link.source.unit,
                 startConnector=link.source.variable, endElement=target.unit, endConnector=target.variable,
             )  # fmt: skip
 
@@ -122,7 +113,7 @@ def _with_parameters(ports: list[Port], system: System) -> list[Port]:
     return [*ports, *(Port(unit.name, name) for unit in system.units for name in unit.parameters)]
 
 
-def _units(top: Any, used: list[tuple[DescribedFmu, str]]) -> None:
+def _units(top: Element, used: list[tuple[DescribedFmu, str]]) -> None:
     """Write the units of all variables that are mentioned."""
     known: dict[str, UnitDefinition] = {}
     for fmu, name in used:
@@ -133,22 +124,22 @@ def _units(top: Any, used: list[tuple[DescribedFmu, str]]) -> None:
         if known.setdefault(unit, definition) != definition:
             raise NetlistError(f"Two FMUs mean different units by '{unit}', which an SSP cannot say.")
     if known:
-        group = element(top, tag("ssd:Units"))
+        group = element(top, "ssd:Units")
         for name in sorted(known):
             one = known[name]
             base: dict[str, object] = dict(one.exponents)
             base |= {} if one.factor == 1.0 else {"factor": one.factor}
             base |= {} if one.offset == 0.0 else {"offset": one.offset}
-            element(element(group, tag("ssc:Unit"), name=name), tag("ssc:BaseUnit"), **base)
+            element(element(group, "ssc:Unit", name=name), "ssc:BaseUnit", **base)
 
 
-def _annotation(top: Any, system: System) -> None:
+def _annotation(top: Element, system: System) -> None:
     """Write how the system is run, and where power flows."""
     settings = system.settings
-    note = element(element(top, tag("ssd:Annotations")), tag("ssc:Annotation"), type=COSIMULATION)
+    note = element(element(top, "ssd:Annotations"), "ssc:Annotation", type=COSIMULATION)
     inner = element(
-        note, tag("ml:Cosimulation"), master=settings.master, inputs=settings.inputs, step=settings.step,
+        note, "ml:Cosimulation", master=settings.master, inputs=settings.inputs, step=settings.step,
         tolerance=settings.tolerance, ownNames=system.own_names,
     )  # fmt: skip
     for bond in system.bonds:
-        element(inner, tag("ml:Bond"), name=bond.name, flow=bond.flow, rate=bond.rate)
+        element(inner, "ml:Bond", name=bond.name, flow=bond.flow, rate=bond.rate)

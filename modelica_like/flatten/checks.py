@@ -7,12 +7,12 @@ from typing import Any, cast
 import casadi as ca
 
 from modelica_like.errors import ComponentUnbalanced, ModelicaLikeError, raise_together_or_one
+from modelica_like.flatten.dimensions import Dimensions, check_equation, check_expression
 from modelica_like.language.component import Component
 from modelica_like.language.declared import Declared
 from modelica_like.language.equation import Equation
 from modelica_like.language.expr import TIME, symbols_in
 from modelica_like.language.fields import Field, Input, Parameter, Variable
-from modelica_like.unitcheck import Dimensions, check_equation, check_expression
 from modelica_like.units import ANY, ONE, Unit, parse_unit
 
 _SECOND = parse_unit("s")
@@ -32,7 +32,7 @@ def check_balance(component: Component, equations: list[Equation]) -> None:
     """Check that a component has as many equations as unknowns of its own.
 
     Raises:
-        ComponentUnbalanced: it has not.
+        ComponentUnbalanced: it does not.
     """
     own = [n for n, f in component.fields.items() if isinstance(f, Variable) and not isinstance(f, Input)]
     flows: list[str] = []
@@ -45,17 +45,33 @@ def check_balance(component: Component, equations: list[Equation]) -> None:
     unknowns = [*own, *flows]
     kind = type(component).__name__
     count = f"{len(equations)} equation{'s' if len(equations) != 1 else ''}"
-    what = f"{kind} declares {count} for {len(unknowns)} unknowns ({', '.join(unknowns)})."
+    listed = f"{len(unknowns)} unknowns ({', '.join(unknowns)})" if unknowns else "no unknowns of its own"
+    what = f"{kind} declares {count} for {listed}."
     base = type(component).__mro__[1]
+    driven = _driven_input(component, equations) if len(equations) > len(unknowns) else ""
     missing = len(equations) < len(unknowns) and base is not Component and issubclass(base, Component)
     if missing and base.equations is not Component.equations:
         advice = f"Its base {base.__name__} has equations of its own: is `yield from super().equations()` missing?"
+    elif driven:
+        advice = (
+            f"{driven} is an input of a part: inputs are connected, not set by equations. "
+            f"Declare an output in {kind}, and yield connect(self.…, self.{driven})."
+        )
     elif len(equations) < len(unknowns):
         advice = "Each own variable, output and flow needs one: is a `yield` missing?"
     else:
         advice = "Each own variable, output and flow takes one: remove an equation, or declare the missing unknown."
     where = equations[-1].source if equations else ()
     raise ComponentUnbalanced(what, where=where, advice=advice)
+
+
+def _driven_input(component: Component, equations: list[Equation]) -> str:
+    """Return an input of a part that stands in an equation, relative to the component; nothing if there is none."""
+    leaves = (symbol for e in equations for side in (e.left, e.right) for symbol in symbols_in(side))
+    foreign = (one for one in leaves if one is not TIME and one.owner is not component)
+    own = component.path
+    paths = (f"{one.owner.path}.{one.name}" for one in foreign if isinstance(one.owner.fields.get(one.name), Input))
+    return next((path.removeprefix(f"{own}.") for path in paths), "")
 
 
 def check_units(component: Component, equations: list[Equation], events: list[Any]) -> dict[str, Unit]:

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import casadi as ca
 
-from modelica_like.errors import Source, ValueOutOfRange
+from modelica_like.errors import Source
 from modelica_like.flatten.template import Template
 from modelica_like.language.component import Component
-from modelica_like.language.fields import StatePreference
+from modelica_like.language.fields import StatePreference, in_range
 from modelica_like.units import Unit
 
 
@@ -49,15 +48,7 @@ class FlatParameter:
         Raises:
             ValueOutOfRange: it is not.
         """
-        if not math.isfinite(number):
-            raise ValueOutOfRange(f"{self.path} must be a finite number, not {number:g}.")
-        low = -math.inf if self.min is None else self.min
-        high = math.inf if self.max is None else self.max
-        if low <= number <= high:
-            return number
-        bound = f"at least {low:g}" if number < low else f"at most {high:g}"
-        unit = "" if str(self.unit) in ("1", "*") else f" {self.unit}"
-        raise ValueOutOfRange(f"{self.path} = {given} is out of range: it must be {bound}{unit}.")
+        return in_range(number, given, self.path, str(self.unit), (self.min, self.max))
 
 
 @dataclass(frozen=True, slots=True)

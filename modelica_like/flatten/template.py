@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import Any, cast
 
@@ -14,16 +14,11 @@ from modelica_like.flatten.conditions import guard_of
 from modelica_like.flatten.holds import HoldForm, hold_forms
 from modelica_like.language.component import Component
 from modelica_like.language.declared import Declared
-from modelica_like.language.equation import (
-    Connection,
-    Equation,
-    FreeEnd,
-    as_statement,
-)
+from modelica_like.language.equation import Connection, Equation, FreeEnd, as_statement
 from modelica_like.language.expr import TIME, Symbol, flagged_motion, is_expression, symbol_of, symbols_in
 from modelica_like.language.fields import Parameter, Variable
 from modelica_like.language.places import located
-from modelica_like.language.transition import StartMode, Transition, as_event
+from modelica_like.language.transition import EventStatement, StartMode, Transition, as_event
 from modelica_like.language.tunable import symbols_in_tables
 from modelica_like.units import ANY, Unit
 
@@ -63,6 +58,7 @@ class TransitionForm:
         index: position in the guards, or in the moments.
         resets: pairs of what is reset (slot path) and the position in the resets.
         notice: what the user is told when it happens.
+        because: why it happens, in words.
         fails: whether the run ends there, with an error.
     """
 
@@ -74,6 +70,7 @@ class TransitionForm:
     resets: tuple[tuple[str, int], ...]
     source: Source
     notice: str
+    because: str
     fails: bool
 
 
@@ -144,7 +141,16 @@ class Names:
 
 
 def relative_path(owner: Declared, root: Component, name: str) -> str:
-    """Return the dotted path of a field of `owner`, seen from `root`."""
+    """Return the dotted path of a field, seen from a component above it.
+
+    Args:
+        owner: declares the field.
+        root: where the path begins.
+        name: of the field.
+
+    Raises:
+        LanguageError: the owner is not below the root.
+    """
     names = [name]
     node: Declared | None = owner
     while node is not root:
@@ -196,17 +202,10 @@ def _build(component: Component) -> Template:
     check_balance(component, equations)
     inferred = check_units(component, equations, events)
     residuals = [e.left - e.right for e in equations]
-    transitions = [e for e in events if isinstance(e, Transition)]
-    starts = [e for e in events if isinstance(e, StartMode)]
-    guards = [ca.SX(0) if t.when is None else guard_of(t.when, t.source) for t in transitions]
-    moments = [ca.SX(0) if t.at is None else t.at for t in transitions]
-    resets = [(target, value) for t in transitions for target, value in t.reset.items()]
+    changes = _Changes(component, events)
     holds, hold_terms = hold_forms(component, residuals)
     names = Names(component)
-    names.add(
-        [*residuals, *hold_terms, *guards, *moments, *(x for pair in resets for x in pair), *(s.when for s in starts)]
-    )
-    names.add(ca.SX(s.mode.symbol) for s in (*transitions, *starts))
+    names.add([*residuals, *hold_terms, *changes.expressions()])
     names.add(ca.SX(symbol_of(component, name)) for one in holds for name in (one.motion, one.reaction) if name)
     energy, energy_terms = Names(component), _energy_terms(component, wiring)
     energy.parameters, energy.discretes = names.parameters, names.discretes
@@ -223,12 +222,9 @@ def _build(component: Component) -> Template:
         incidence=_rows(residual.jac_sparsity(0, 0)),
         linear=linear,
         coefficients=coefficients,
-        transitions=_transition_forms(component, transitions),
-        guards=names.function("guards", guards),
-        moments=names.function("moments", moments),
-        resets=names.function("resets", [value for _, value in resets]),
-        start_modes=tuple((_mode_path(component, s), s.mode.mode.number(s.target), s.source) for s in starts),
-        start_conditions=names.function("start_conditions", [s.when for s in starts]),
+        **changes.functions(names),
+        transitions=changes.transition_forms(),
+        start_modes=changes.start_modes(),
         holds=holds,
         hold_terms=names.function("hold_terms", hold_terms),
         energy_slots=tuple(energy.variables),
@@ -238,35 +234,56 @@ def _build(component: Component) -> Template:
     )
 
 
-def _mode_path(component: Component, statement: Transition | StartMode) -> str:
-    symbol = statement.mode.symbol
-    return relative_path(symbol.owner, component, symbol.name)
+class _Changes:
+    """What the events of a component change, and when."""
 
+    def __init__(self, component: Component, events: list[EventStatement]) -> None:
+        self.component = component
+        self.transitions = [e for e in events if isinstance(e, Transition)]
+        self.starts = [e for e in events if isinstance(e, StartMode)]
+        self.guards = [ca.SX(0) if t.when is None else guard_of(t.when, t.source) for t in self.transitions]
+        self.moments = [ca.SX(0) if t.at is None else t.at for t in self.transitions]
+        self.resets = [pair for t in self.transitions for pair in t.reset.items()]
 
-def _transition_forms(component: Component, transitions: list[Transition]) -> tuple[TransitionForm, ...]:
-    forms: list[TransitionForm] = []
-    position = 0
-    for index, t in enumerate(transitions):
-        resets: list[tuple[str, int]] = []
-        for target in t.reset:
-            symbol = symbols_in(target)[0]
-            resets.append((relative_path(symbol.owner, component, symbol.name), position))
-            position += 1
-        numbers = tuple(t.mode.mode.number(name) for name in t.sources)
-        forms.append(
-            TransitionForm(
-                _mode_path(component, t),
-                numbers,
-                t.mode.mode.number(t.target),
-                t.at is not None,
-                index,
-                tuple(resets),
-                t.source,
-                t.notice,
-                t.fails,
-            )
-        )
-    return tuple(forms)
+    def expressions(self) -> Iterator[Any]:
+        """Yield all expressions, and the symbols of the modes."""
+        yield from (*self.guards, *self.moments)
+        for pair in self.resets:
+            yield from pair
+        yield from (s.when for s in self.starts)
+        yield from (ca.SX(s.mode.symbol) for s in (*self.transitions, *self.starts))
+
+    def functions(self, names: Names) -> dict[str, ca.Function]:
+        """Return their functions by name."""
+        outputs = {
+            "guards": self.guards,
+            "moments": self.moments,
+            "resets": [value for _, value in self.resets],
+            "start_conditions": [s.when for s in self.starts],
+        }
+        return {name: names.function(name, output) for name, output in outputs.items()}
+
+    def start_modes(self) -> tuple[tuple[str, int, Source], ...]:
+        """Return path and number of the modes at the start."""
+        return tuple((self._mode(s), s.mode.mode.number(s.target), s.source) for s in self.starts)
+
+    def transition_forms(self) -> tuple[TransitionForm, ...]:
+        """Return the transitions without their expressions."""
+        forms: list[TransitionForm] = []
+        position = 0
+        for index, t in enumerate(self.transitions):
+            symbols = [symbols_in(target)[0] for target in t.reset]
+            paths = [relative_path(one.owner, self.component, one.name) for one in symbols]
+            resets = tuple((path, position + k) for k, path in enumerate(paths))
+            position += len(paths)
+            numbers, target = tuple(t.mode.mode.number(name) for name in t.sources), t.mode.mode.number(t.target)
+            words = t.source, t.notice, t.reason(), t.fails
+            forms.append(TransitionForm(self._mode(t), numbers, target, t.at is not None, index, resets, *words))
+        return tuple(forms)
+
+    def _mode(self, statement: Transition | StartMode) -> str:
+        symbol = statement.mode.symbol
+        return relative_path(symbol.owner, self.component, symbol.name)
 
 
 def _energy_terms(component: Component, wiring: Iterable[Connection | FreeEnd]) -> list[Any]:

@@ -7,11 +7,12 @@ from dataclasses import dataclass, field
 
 from modelica_like.errors import FreeFlange, ModelicaLikeError, Source, WrongConnection
 from modelica_like.flatten.checks import unit_of_field
+from modelica_like.language.assembly import Assembly
 from modelica_like.language.component import Component
 from modelica_like.language.declared import Connector, Declared
 from modelica_like.language.equation import Connection, FreeEnd
 from modelica_like.language.expr import Symbol
-from modelica_like.language.fields import Input, Output, Variable
+from modelica_like.language.fields import Input, Output
 from modelica_like.units import Unit, same_dimension
 
 End = tuple[int, bool]
@@ -34,33 +35,32 @@ class Wiring:
     def add(self, scope: Component, statement: Connection | FreeEnd) -> None:
         """Take in what a component says about the connectors of its parts and its own."""
         ends = (statement.connector,) if isinstance(statement, FreeEnd) else statement.ends
-        for end in ends:
-            if not _is_within(end, scope):
-                label = _name(end) if isinstance(end, Symbol) else end.label
-                self.errors.append(
-                    WrongConnection(
-                        f"{scope.label} connects {label} of a component that is not part of it.",
-                        where=statement.source,
-                        advice="Name parts as self.…, so that the copy of this owner is meant.",
-                    )
-                )
-                return
-        if isinstance(statement, FreeEnd):
+        foreign = [end for end in ends if not _is_within(end, scope)]
+        if foreign:
+            self._refuse(
+                f"{scope.label} connects {_name(foreign[0])} of a component that is not part of it.", statement.source,
+                "Name parts as self.…, so that the copy of this owner is meant.",
+            )  # fmt: skip
+        elif isinstance(statement, FreeEnd):
             self.freed.add(id(statement.connector))
-            return
-        if any(isinstance(end, Symbol) for end in statement.ends):
+        elif any(isinstance(end, Symbol) for end in ends):
             self._add_signals(scope, statement)
-            return
-        ends = [end for end in statement.ends if isinstance(end, Connector)]
+        else:
+            self._join(scope, [end for end in ends if isinstance(end, Connector)], statement.source)
+
+    def _join(self, scope: Component, ends: list[Connector], source: Source) -> None:
         for end in ends:
             if type(end) is not type(ends[0]):
-                self.errors.append(_different_kinds(ends[0], end, statement.source))
+                self.errors.append(_different_kinds(ends[0], end, source))
                 # That they are not connected now is a consequence, not another mistake.
                 self.freed.update(id(one) for one in ends)
                 return
-        keys = [self._key(scope, end, statement.source) for end in ends]
+        keys = [self._key(scope, end, source) for end in ends]
         for key in keys[1:]:
             self.parent[self._root(key)] = self._root(keys[0])
+
+    def _refuse(self, what: str, where: Source | tuple[Source, ...], advice: str) -> None:
+        self.errors.append(WrongConnection(what, where=where, advice=advice))
 
     def _key(self, scope: Component, connector: Connector, source: Source) -> End:
         connector.__dict__["_used"] = True
@@ -90,51 +90,30 @@ class Wiring:
     def _add_signals(self, scope: Component, statement: Connection) -> None:
         signals = [end for end in statement.ends if isinstance(end, Symbol)]
         others = [end for end in statement.ends if not isinstance(end, Symbol)]
-        if others:
-            self.errors.append(
-                WrongConnection(
-                    f"connect joins the signal {_name(signals[0])} with the connector {others[0].label}.",
-                    where=statement.source,
-                    advice="Signals go to signals: use a sensor or a source between.",
-                )
-            )
-            return
         wrong = [s for s in signals if not isinstance(s.owner.fields.get(s.name), Input | Output)]
-        if wrong:
-            self.errors.append(
-                WrongConnection(
-                    f"connect joins {_name(wrong[0])}, which is neither an input nor an output.",
-                    where=statement.source,
-                    advice="Connect one output with any number of inputs; a sensor makes a signal of a variable.",
-                )
-            )
+        drivers = [] if wrong else [s for s in signals if _drives(scope, s)]
+        if others:
+            what = f"connect joins the signal {_name(signals[0])} with the connector {_name(others[0])}."
+            advice = "Signals go to signals: use a sensor or a source between."
+        elif wrong:
+            what = f"connect joins {_name(wrong[0])}, which is neither an input nor an output."
+            advice = "Connect one output with any number of inputs; a sensor makes a signal of a variable."
+        elif len(drivers) != 1:
+            count = f"{len(drivers)} outputs ({', '.join(map(_name, drivers))})" if drivers else "no output"
+            what = f"The connection of {', '.join(map(_name, signals))} has {count}."
+            advice = "Connect one output with any number of inputs."
+        else:
+            for sink in signals:
+                if sink is not drivers[0]:
+                    self._drive(sink, drivers[0], statement.source)
             return
-        drivers = [s for s in signals if _drives(scope, s)]
-        if len(drivers) != 1:
-            names = ", ".join(_name(s) for s in signals)
-            what = "no output" if not drivers else f"{len(drivers)} outputs ({', '.join(map(_name, drivers))})"
-            self.errors.append(
-                WrongConnection(
-                    f"The connection of {names} has {what}.",
-                    where=statement.source,
-                    advice="Connect one output with any number of inputs.",
-                )
-            )
-            return
-        for sink in signals:
-            if sink is not drivers[0]:
-                self._drive(sink, drivers[0], statement.source)
+        self._refuse(what, statement.source, advice)
 
     def _drive(self, sink: Symbol, driver: Symbol, source: Source) -> None:
         key = (id(sink.owner), sink.name)
         if key in self.driven:
-            self.errors.append(
-                WrongConnection(
-                    f"The input {_name(sink)} is connected twice.",
-                    where=(source, self.driven[key]),
-                    advice="Keep one connection; add signals in a component of their own.",
-                )
-            )
+            advice = "Keep one connection; add signals in a component of their own."
+            self._refuse(f"The input {_name(sink)} is connected twice.", (source, self.driven[key]), advice)
             return
         self.driven[key] = source
         self.signals.append((driver, sink, source))
@@ -144,13 +123,8 @@ class Wiring:
         for driver, sink, source in self.signals:
             units = [self._unit(symbol) for symbol in (driver, sink)]
             if not same_dimension(*units):
-                self.errors.append(
-                    WrongConnection(
-                        f"{_name(driver)} is in {units[0]}, {_name(sink)} expects {units[1]}.",
-                        where=source,
-                        advice="Give the source's parameters in that unit.",
-                    )
-                )
+                what = f"{_name(driver)} is in {units[0]}, {_name(sink)} expects {units[1]}."
+                self._refuse(what, source, "Give the source's parameters in that unit.")
 
     def _unit(self, symbol: Symbol) -> Unit:
         return self.inferred.get((id(symbol.owner), symbol.name)) or unit_of_field(symbol.owner, symbol.name)
@@ -160,14 +134,14 @@ class Wiring:
         for name, connector in component.connectors.items():
             if connector.may_be_free or self.is_connected(connector) or id(connector) in self.freed:
                 continue
-            flows = [n for n, f in connector.fields.items() if isinstance(f, Variable) and f.is_flow]
-            carries = "torque" if "tau" in flows else "force" if "f" in flows else "flow"
-            label = component.label
+            label, end, flow = component.label, f"{component._name}.{name}", connector.domain.flow
+            listed = isinstance(component._owner, Assembly)
+            say = f'list it: free = ["{end}"]' if listed else f"yield free(self.{end})"
             self.errors.append(
                 FreeFlange(
-                    f"{label}.{name} is free, so {label} ({type(component).__name__}) carries no {carries}.",
+                    f"{label}.{name} is free, so {label} ({type(component).__name__}) carries no {flow}.",
                     where=component.place_of(),
-                    advice=f"Connect it, or say free({label}.{name}).",
+                    advice=f"Connect it, or {say}." if component._owner else "Connect it in a drive.",
                 )
             )
 
@@ -184,17 +158,14 @@ def _drives(scope: Component, symbol: Symbol) -> bool:
     return isinstance(kind, Input) if symbol.owner is scope else isinstance(kind, Output)
 
 
-def _name(symbol: Symbol) -> str:
-    owner = symbol.owner.path
-    return f"{owner}.{symbol.name}" if owner else symbol.name
+def _name(end: Connector | Symbol) -> str:
+    return end.label if isinstance(end, Connector) else ".".join(filter(None, (end.owner.path, end.name)))
 
 
 def _different_kinds(first: Connector, second: Connector, source: Source) -> WrongConnection:
     kinds = [f"{type(c).__name__} ({', '.join(f.unit_text for f in c.fields.values())})" for c in (first, second)]
-    names = {type(first).__name__, type(second).__name__}
-    between = (
-        "A spindle or rack goes between." if names == {"Flange", "LinearFlange"} else "Join connectors of one kind."
-    )
+    converter = first.domain.converters.get(type(second).__name__)
+    between = f"{converter} goes between." if converter else "Join connectors of one kind."
     article = "An" if kinds[0][0] in "AEIOU" else "A"
     return WrongConnection(
         f"connect({first.label}, {second.label}): {article.lower()} {kinds[0]} cannot join a {kinds[1]}. {between}",

@@ -182,7 +182,9 @@ def compiler_command(platform: str) -> list[str]:
 
 
 def _run(command: list[str], folder: str, platform: str) -> None:
-    result = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    # What is compiled on a Mac runs on older ones, too, as its wheel says.
+    environment = {**os.environ, "MACOSX_DEPLOYMENT_TARGET": "11.0"}
+    result = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
     if result.returncode != 0:
         lines = [line for line in result.stderr.splitlines() if "error" in line] or result.stderr.splitlines()
         raise ExportError(

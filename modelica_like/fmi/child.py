@@ -1,54 +1,25 @@
-"""Runs one FMU with FMPy, in a process of its own: python child.py FOLDER.
-
-The folder holds `job.json` and the unpacked FMU in `fmu`. What came out is left there: `result.npy` and `meta.json`, or
-`error.json`; `progress` holds the time reached. Nothing of the package is imported here: the process starts fast.
-"""
+"""Runs one FMU with FMPy, in a process of its own: python child.py FOLDER."""
 
 from __future__ import annotations
 
-import json
 import math
-import mmap
-import struct
 import sys
 from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Literal
 
 import fmpy
 import numpy as np
 from fmpy.simulation import Recorder
 
+from modelica_like.fmi.inside import DISCRETE, REAL, Job, Messages, Refused, about
+
 Side = Literal["left", "right"]
 KINDS = {"me": "ModelExchange", "cs": "CoSimulation"}
-NUMBERS = ("Real", "Float32", "Float64")
-DISCRETE = (
-    "Integer",
-    "Enumeration",
-    "Boolean",
-    "Int8",
-    "UInt8",
-    "Int16",
-    "UInt16",
-    "Int32",
-    "UInt32",
-    "Int64",
-    "UInt64",
-)
 POINTS = 500
 """Number of equal intervals where nobody says anything, as in simulations."""
-_MESSAGES = 20
 _TIME_RESOLUTION = 1e-12
-
-
-class Refusal(Exception):
-    """What the caller asked for cannot be done; `detail` goes to `error.json`."""
-
-    def __init__(self, **detail: Any) -> None:
-        super().__init__(str(detail))
-        self.detail = detail
 
 
 class EventLocator:
@@ -120,49 +91,31 @@ class EventLocator:
             self.begin(time)
 
 
-def variables(description: Any) -> list[dict[str, Any]]:
-    """Return what is to be known about every scalar variable."""
-    found: list[dict[str, Any]] = []
-    for variable in description.modelVariables:
-        if variable.shape or variable.name == "time" or variable.type not in (*NUMBERS, *DISCRETE):
-            continue
-        declared = variable.declaredType
-        items = [(int(item.value), item.name) for item in getattr(declared, "items", None) or ()]
-        found.append(
-            {
-                "name": variable.name,
-                "unit": variable.unit or getattr(declared, "unit", None) or "1",
-                "description": variable.description or "",
-                "causality": variable.causality or "local",
-                "discrete": variable.type in DISCRETE,
-                "start": variable.start,
-                "items": items,
-            }
-        )
-    return found
-
-
 def choose_kind(description: Any, kind: str | None) -> str:
     """Return me or cs."""
     has = {"cs": description.coSimulation is not None, "me": description.modelExchange is not None}
     chosen = kind or ("cs" if has["cs"] else "me")
     if not any(has.values()):
-        raise Refusal(kind="scheduled")
+        raise Refused(kind="scheduled")
     if not has[chosen]:
-        raise Refusal(kind="no kind", wanted=KINDS[chosen])
+        raise Refused(kind="no kind", wanted=KINDS[chosen])
     return chosen
 
 
-def check_names(job: dict[str, Any], found: list[dict[str, Any]]) -> None:
-    """Refuse parameters, inputs and outputs that the FMU does not have."""
-    causality = {variable["name"]: variable["causality"] for variable in found}
+def check_names(job: dict[str, Any], causality: dict[str, str]) -> None:
+    """Refuse parameters, inputs and outputs that the FMU does not have.
+
+    Args:
+        job: what was asked for.
+        causality: of every variable.
+    """
     for name in [*job["parameters"], *(job["outputs"] or ()), *job["inputs"]]:
         if name not in causality:
-            raise Refusal(kind="unknown", name=name, known=list(causality))
+            raise Refused(kind="unknown", name=name, known=list(causality))
     for name in job["inputs"]:
         if causality[name] != "input":
             known = [n for n, c in causality.items() if c == "input"]
-            raise Refusal(kind="no input", name=name, causality=causality[name], known=known)
+            raise Refused(kind="no input", name=name, causality=causality[name], known=known)
 
 
 def interpolate(series: Any, times: Any, side: Side) -> Any:
@@ -285,14 +238,12 @@ def can_locate(description: Any, kind: str) -> bool:
     return bool(able) and not getattr(cs, "hasEventMode", False)
 
 
-def watcher(folder: Path, description: Any, kind: str) -> Callable[[float, Recorder], bool]:
+def watcher(job: Job, description: Any, kind: str) -> Callable[[float, Recorder], bool]:
     """Return what is to be done after every step: tell the time, locate mode changes."""
-    file = (folder / "progress").open("r+b")
-    memory = mmap.mmap(file.fileno(), 8)
     locators: list[EventLocator] = []
 
     def after_step(time: float, recorder: Recorder) -> bool:
-        memory[:8] = struct.pack("d", time)
+        job.reach(time)
         if can_locate(description, kind):
             if not locators:
                 locators.append(EventLocator(recorder, description.fmiVersion))
@@ -302,65 +253,48 @@ def watcher(folder: Path, description: Any, kind: str) -> Callable[[float, Recor
     return after_step
 
 
-def run(folder: Path) -> None:
+def run(job: Job) -> None:
     """Run the job of a folder."""
-    job = json.loads((folder / "job.json").read_text())
-    description: Any = fmpy.read_model_description(str(folder / "fmu"), validate=False)
-    found = variables(description)
-    kind = choose_kind(description, job["kind"])
-    check_names(job, found)
+    asked, fmu = job.asked, str(job.folder / "0")
+    description: Any = fmpy.read_model_description(fmu, validate=False)
+    kind = choose_kind(description, asked["kind"])
+    scalars = [v for v in description.modelVariables if v.type in (*REAL, *DISCRETE) and not v.shape]
+    known = {v.name: v for v in scalars if v.name != "time"}
+    check_names(asked, {name: v.causality or "local" for name, v in known.items()})
+    outputs = asked["outputs"] or [name for name, v in known.items() if v.causality != "parameter"]
+    np.save(job.folder / "result.npy", np.asarray(simulate(job, description, kind, outputs)))
+    parameters = {name: v.start for name, v in known.items() if v.causality == "parameter"}
+    constants = {name: start for name, start in parameters.items() if start not in (None, "true", "false")}
+    job.leave({"name": description.modelName, "variables": [*map(about, known.values())], "constants": constants})
+
+
+def simulate(job: Job, description: Any, kind: str, outputs: list[str]) -> Any:
+    """Run the FMU by FMPy; return its table."""
+    asked, fmu = job.asked, str(job.folder / "0")
     experiment = description.defaultExperiment
-    stop = job["stop"] if job["stop"] is not None else getattr(experiment, "stopTime", None)
-    stop = float(stop) if stop is not None else job["start"] + 1.0
-    step = output_step(job, stop, getattr(experiment, "stepSize", None))
-    inputs = {n: np.array(v if isinstance(v, list) else [[0.0, v]]) for n, v in job["inputs"].items()}
-    outputs = job["outputs"] or [v["name"] for v in found if v["causality"] != "parameter"]
+    stop = asked["stop"] if asked["stop"] is not None else getattr(experiment, "stopTime", None)
+    stop = float(stop) if stop is not None else asked["start"] + 1.0
+    step = output_step(asked, stop, getattr(experiment, "stepSize", None))
+    inputs = {n: np.array(v if isinstance(v, list) else [[0.0, v]]) for n, v in asked["inputs"].items()}
     event_mode = bool(getattr(description.coSimulation, "hasEventMode", False))
-    messages: list[str] = []
-
-    def log(*arguments: Any) -> None:
-        text = arguments[-1]
-        messages.append(text.decode(errors="replace") if isinstance(text, bytes) else str(text))
-        del messages[:-_MESSAGES]
-
-    sys.excepthook = reporter(folder, messages)
-    simulate: Any = fmpy.simulate_fmu
+    job.messages[""] = Messages()
     make: Any = fmpy.instantiate_fmu
-    fmu = make(
-        str(folder / "fmu"), description, KINDS[kind], logger=log, early_return_allowed=event_mode,
+    instance = make(
+        fmu, description, KINDS[kind], logger=job.messages[""], early_return_allowed=event_mode,
         event_mode_used=event_mode, require_functions=False,
     )  # fmt: skip
     if any(np.ptp(series[:, 1]) for series in inputs.values()):
-        Ramps(fmu, description, inputs, kind, job["start"])
-    result = simulate(
-        str(folder / "fmu"), validate=False, model_description=description, fmi_type=KINDS[kind],
-        start_time=job["start"], stop_time=stop, solver=job["solver"], relative_tolerance=job["tolerance"],
-        step_size=step if job["solver"] == "Euler" else None, output_interval=step,
-        start_values=job["parameters"], input=input_table(inputs), output=outputs,
-        use_event_mode=event_mode, early_return_allowed=event_mode, fmu_instance=fmu,
-        step_finished=watcher(folder, description, kind),
+        Ramps(instance, description, inputs, kind, asked["start"])
+    go: Any = fmpy.simulate_fmu
+    return go(
+        fmu, validate=False, model_description=description, fmi_type=KINDS[kind], start_time=asked["start"],
+        stop_time=stop, solver=asked["solver"], relative_tolerance=asked["tolerance"],
+        step_size=step if asked["solver"] == "Euler" else None, output_interval=step,
+        start_values=asked["parameters"], input=input_table(inputs), output=outputs,
+        use_event_mode=event_mode, early_return_allowed=event_mode, fmu_instance=instance,
+        step_finished=watcher(job, description, kind),
     )  # fmt: skip
-    np.save(folder / "result.npy", np.asarray(result))
-    meta = {
-        "name": description.modelName, "version": description.fmiVersion, "kind": kind, "variables": found,
-        "messages": messages,
-    }  # fmt: skip
-    (folder / "meta.json").write_text(json.dumps(meta))
-
-
-def reporter(folder: Path, messages: list[str]) -> Callable[..., None]:
-    """Return an exception hook that leaves the error in the folder."""
-
-    def report(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
-        if isinstance(error, Refusal):
-            detail = error.detail
-        else:
-            detail = {"kind": "failed", "text": str(error) or kind.__name__, "messages": messages}
-        (folder / "error.json").write_text(json.dumps(detail))
-
-    return report
 
 
 if __name__ == "__main__":
-    sys.excepthook = reporter(Path(sys.argv[1]), [])
-    run(Path(sys.argv[1]))
+    run(Job(Path(sys.argv[1])))

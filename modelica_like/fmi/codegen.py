@@ -35,5 +35,5 @@ def generate(
         MissingStart, ContradictingStart: the start values do not determine all states.
         LanguageError: a function has no counterpart in C.
     """
-    data = model_file(make_tables(model), interface.variables, token, tolerance, fixed_step)
+    data = model_file(make_tables(model, interface.start), interface.variables, token, tolerance, fixed_step)
     return runtime_sources((version,)) | {"model_data.c": as_c(data)}

@@ -12,7 +12,7 @@ import casadi as ca
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.fmi.interface import FmuVariable, Interface
 from modelica_like.fmi.reach import Reach
-from modelica_like.fmi.start_tables import AT_REST, StartTables, start_tables
+from modelica_like.fmi.start_tables import AT_REST, StartTables
 
 Known = tuple[str, int]
 """An argument of the model's functions: its name (t, x, p, u, start) and a position."""
@@ -21,10 +21,40 @@ Rows = list[set[Known]]
 
 
 @dataclass(frozen=True)
-class Dependencies:
-    """Dependencies of a model's unknowns on what an importer sets, by value references."""
+class Following:
+    """What follows what at once, through the implicit equations of a model."""
 
     model: CompiledDae
+
+    def inputs_of(self, position: int) -> set[int]:
+        """Numbers of the inputs that a variable follows at once."""
+        return {k for name, k in self._through_implicit(self._row("variables", position)) if name == "u"}
+
+    @cached_property
+    def _reaches(self) -> dict[str, Reach]:
+        return {}
+
+    def _row(self, name: str, position: int) -> set[Known]:
+        if name not in self._reaches:
+            self._reaches[name] = Reach(getattr(self.model, name))
+        return set(self._reaches[name].elements(position))
+
+    @cached_property
+    def _implicit(self) -> Rows:
+        """What each implicit unknown depends on, by its own block and those before."""
+        rows = sparsity_rows(self.model.alg)
+        own = [{k for name, k in row if name == "z"} for row in rows]
+        return solved_rows(own, [{one for one in row if one[0] != "z"} for row in rows], len(rows))
+
+    def _through_implicit(self, row: set[Known]) -> set[Known]:
+        found = {one for one in row if one[0] != "z"}
+        return found.union(*(self._implicit[k] for name, k in row if name == "z"))
+
+
+@dataclass(frozen=True)
+class Dependencies(Following):
+    """Dependencies of a model's unknowns on what an importer sets, by value references."""
+
     interface: Interface
 
     def continuous(self, unknown: FmuVariable) -> list[int]:
@@ -38,49 +68,17 @@ class Dependencies:
         found = self._initial_states[index] if kind == "state" else self._at_start(self._own(unknown))
         return self._references(found, ("t", "p", "u", "start", "discrete"))
 
-    def inputs_of(self, position: int) -> set[int]:
-        """Numbers of the inputs that a variable follows at once."""
-        return {k for name, k in self._through_implicit(self._rows("variables")[position]) if name == "u"}
-
-    # -- rows of functions -------------------------------------------------------------------------------------------
+    @cached_property
+    def _reaches(self) -> dict[str, Reach]:
+        return {"variables": self.interface.reach}
 
     def _own(self, unknown: FmuVariable) -> set[Known]:
         kind, index = unknown.slot
-        rows = {"der": "ode", "variable": "variables", "guard": "guards"}
+        rows = {"der": "ode", "variable": "variables", "guard": "guards", "derived": "derived"}
         if kind in rows:
-            return self._rows(rows[kind])[index]
-        if kind == "derived":
-            return self._derived[index]
-        if kind == "discrete":
-            return {("d", index)}
-        names = {"state": "x", "input": "u", "parameter": "p", "time": "t"}
+            return self._row(rows[kind], index)
+        names = {"state": "x", "input": "u", "parameter": "p", "time": "t", "discrete": "d"}
         return {(names[kind], index)}
-
-    @cached_property
-    def _tables(self) -> dict[str, Rows]:
-        return {}
-
-    def _rows(self, name: str) -> Rows:
-        if name not in self._tables:
-            self._tables[name] = sparsity_rows(getattr(self.model, name))
-        return self._tables[name]
-
-    @cached_property
-    def _derived(self) -> Rows:
-        return sparsity_rows(self.model.derived)
-
-    # -- implicit equations ------------------------------------------------------------------------------------------
-
-    @cached_property
-    def _implicit(self) -> Rows:
-        """What each implicit unknown depends on, by its own block and those before."""
-        rows = self._rows("alg")
-        own = [{k for name, k in row if name == "z"} for row in rows]
-        return solved_rows(own, [{one for one in row if one[0] != "z"} for row in rows], len(rows))
-
-    def _through_implicit(self, row: set[Known]) -> set[Known]:
-        found = {one for one in row if one[0] != "z"}
-        return found.union(*(self._implicit[k] for name, k in row if name == "z"))
 
     # -- initialization ----------------------------------------------------------------------------------------------
 
@@ -103,10 +101,10 @@ class Dependencies:
         for circuit in self.model.circuits:
             count = len(circuit.members)
             rows[circuit.first : circuit.first + count * (1 + count)] = [self._everything] * (count * (1 + count))
-        starts = self._rows("discrete_starts")
+        starts = sparsity_rows(self.model.discrete_starts)
         for k, one in enumerate(self.model.flat_discretes):
             rows[k] = {("discrete", k)} if not one.names else {d for d in starts[k] if d[0] in "tpu"}
-        conditions = self._rows("start_conditions")
+        conditions = sparsity_rows(self.model.start_conditions)
         for row, (mode, _, _) in zip(conditions, self.model.start_modes, strict=True):
             for name, k in self._through_implicit(row):
                 if name != "d":
@@ -115,11 +113,11 @@ class Dependencies:
 
     def _start_value(self, position: int) -> set[Known]:
         """A start value: what an importer sets, or the formula behind it."""
-        return {("start", position)} | {one for one in self._rows("start_values")[position] if one[0] in "tpu"}
+        return {("start", position)} | {one for one in self._row("start_values", position) if one[0] in "tpu"}
 
     @cached_property
     def _initial_states(self) -> Rows:
-        model, tables = self.model, start_tables(self.model)
+        model, tables = self.model, self.interface.start
         everything = self._everything
         if tables.steady is not None:
             return [everything for _ in model.states]

@@ -1,7 +1,6 @@
 """Runs one Co-Simulation FMU with somebody else's importer: python importers.py FOLDER.
 
-The folder holds `job.json`; the values at the end are left in `meta.json`, or what went wrong in `error.json`. Nothing
-of the package is imported here.
+The folder is as `inside.py` says; the values at the end are left in `meta.json`.
 """
 
 from __future__ import annotations
@@ -9,12 +8,12 @@ from __future__ import annotations
 import ctypes
 import importlib.metadata
 import importlib.util
-import json
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from types import TracebackType
 from typing import Any
+
+from modelica_like.fmi.inside import Job
 
 PACKAGES = {"ecos": "ecospy", "libcosim": "libcosimpy"}
 _INSTANCE = "model"
@@ -82,22 +81,6 @@ RUN: dict[str, Callable[[str, float, int, list[str]], dict[str, float]]] = {
 }
 
 
-def reporter(folder: Path) -> Callable[..., None]:
-    """Return an exception hook that leaves the error in the folder."""
-
-    def report(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
-        (folder / "error.json").write_text(json.dumps({"text": str(error) or kind.__name__}))
-
-    return report
-
-
-def main(folder: Path) -> None:
-    """Run the job of a folder."""
-    sys.excepthook = reporter(folder)
-    job = json.loads((folder / "job.json").read_text())
-    values = RUN[job["importer"]](job["fmu"], job["step"], job["steps"], job["names"])
-    (folder / "meta.json").write_text(json.dumps(values))
-
-
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    _job = Job(Path(sys.argv[1]))
+    _job.leave(RUN[_job.asked["importer"]](*(_job.asked[name] for name in ("fmu", "step", "steps", "names"))))

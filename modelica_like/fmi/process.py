@@ -3,23 +3,45 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import os
 import signal
 import struct
 import subprocess
 import sys
-from collections.abc import Sequence
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
 from math import isnan, nan
 from pathlib import Path
+from typing import Any
 
 from modelica_like.errors import FmuCrashed, FmuTimeout
+from modelica_like.fmi.inside import PLACE
+from modelica_like.fmi.unpack import unpack
+
+_PACKAGES = Path(__file__).parents[2]
+
+
+@contextlib.contextmanager
+def workplace(job: Mapping[str, Any], fmus: Sequence[Path] = ()) -> Iterator[Path]:
+    """Yield a folder with a job and unpacked FMUs (`0`, `1`, …), as `inside.py` wants it.
+
+    Raises:
+        FmuRefused: a file is no FMU, or is unsafe to unpack.
+        OSError: a file cannot be read.
+    """
+    with tempfile.TemporaryDirectory(prefix="modelica_like_", ignore_cleanup_errors=True) as work:
+        folder = Path(work)
+        for k, fmu in enumerate(fmus):
+            (folder / str(k)).mkdir()
+            unpack(fmu, folder / str(k))
+        (folder / "job.json").write_text(json.dumps(job))
+        (folder / "progress").write_bytes(PLACE.pack(nan, 0))
+        yield folder
 
 
 def run_child(name: str, script: Path, folder: Path, timeout: float, environment: dict[str, str] | None = None) -> None:
-    """Run a Python script on a folder and wait for its end.
-
-    The script leaves `meta.json` or `error.json` in the folder when it comes to its end, and the time it has reached
-    in `progress`.
+    """Run a Python script on a workplace and wait for its end.
 
     Args:
         name: what to call the FMU in messages.
@@ -32,13 +54,13 @@ def run_child(name: str, script: Path, folder: Path, timeout: float, environment
         FmuCrashed: the process ended before the script did.
         FmuTimeout: the time limit was reached; the process is ended.
     """
-    (folder / "progress").write_bytes(struct.pack("d", nan))
+    paths = os.pathsep.join(filter(None, (str(_PACKAGES), os.environ.get("PYTHONPATH", ""))))
     # -P: the script's own folder is no place to import from.
     command = [sys.executable, "-P", str(script), str(folder)]
-    code = _wait(command, folder, timeout, {**os.environ, **(environment or {})})
+    code = _wait(command, folder, timeout, {**os.environ, "PYTHONPATH": paths, **(environment or {})})
     if code is None:
         raise FmuTimeout(
-            f"{name} has not come to its end within {timeout:g} s, and was stopped{_reached(folder)}.",
+            f"{name} did not finish within {timeout:g} s, and was stopped{_reached(folder)}.",
             advice="Give it more time with `timeout`, or a shorter run.",
         )
     if not any((folder / file).exists() for file in ("meta.json", "error.json")):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import tempfile
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -11,9 +10,9 @@ from typing import Any, Literal
 
 import numpy as np
 
-from modelica_like.errors import FmuFailed, FmuRefused, UnknownName, ValueOutOfRange, did_you_mean
-from modelica_like.fmi.process import run_child
-from modelica_like.fmi.unpack import printable, unpack
+from modelica_like.errors import ValueOutOfRange
+from modelica_like.fmi.failures import tell_error
+from modelica_like.fmi.process import run_child, workplace
 from modelica_like.solve.recorded import RecordedModel, RecordedSolution, RecordedVariable
 
 Kind = Literal["me", "cs"]
@@ -67,13 +66,9 @@ def run_fmu(
     }  # fmt: skip
     _check_times(path.name, start, stop, step, timeout)
     begin = time.perf_counter()
-    with tempfile.TemporaryDirectory(prefix="modelica_like_", ignore_cleanup_errors=True) as work:
-        folder = Path(work)
-        (folder / "fmu").mkdir()
-        unpack(path, folder / "fmu")
-        (folder / "job.json").write_text(json.dumps(job))
+    with workplace(job, [path]) as folder:
         run_child(path.name, _CHILD, folder, timeout)
-        _tell_error(path.name, folder)
+        tell_error(folder, {"": path.name})
         table = np.load(folder / "result.npy", max_header_size=_HEADER)  # names of all columns
         meta = json.loads((folder / "meta.json").read_text())
     return _solution(meta, table, job["parameters"], time.perf_counter() - begin)
@@ -101,53 +96,11 @@ def _check_times(name: str, start: float, stop: float | None, step: float | None
         raise ValueOutOfRange(f"{name}: the time limit must be positive, not {timeout:g} s.")
 
 
-def _tell_error(name: str, folder: Path) -> None:
-    """Raise what the child has left to tell."""
-    if not (folder / "error.json").exists():
-        return
-    error = json.loads((folder / "error.json").read_text())
-    kind = error["kind"]
-    if kind == "unknown":
-        hint = did_you_mean(error["name"], error["known"])
-        raise UnknownName(f"{name} has no variable '{error['name']}'{hint or '.'}")
-    if kind == "no input":
-        has = f"It has {', '.join(error['known'])}." if error["known"] else "It has none."
-        raise UnknownName(f"{name}: '{error['name']}' is no input but {article(error['causality'])}. {has}")
-    if kind == "scheduled":
-        raise FmuRefused(
-            f"{name} is for Scheduled Execution only: its importer activates its tasks one by one, by a schedule.",
-            advice="Export it for Model Exchange or Co-Simulation, too.",
-        )
-    if kind == "no kind":
-        raise FmuRefused(f"{name} has no {error['wanted']} part.", advice="Ask for the other kind, or for none.")
-    said = [printable(text) for text in error["messages"]]
-    raise FmuFailed(
-        f"{name} failed: {printable(error['text']).rstrip('.')}.",
-        why="\n".join(f"It said: {text}" for text in said[-3:]),
-    )
-
-
-def article(word: str) -> str:
-    """Return a word with its indefinite article."""
-    return f"{'an' if word[0] in 'aeiou' else 'a'} {word}"
-
-
 def _solution(meta: dict[str, Any], table: Any, given: Mapping[str, float], seconds: float) -> RecordedSolution:
-    recorded = [v for v in meta["variables"] if v["name"] in table.dtype.names]
-    columns = [RecordedVariable(v["name"], v["unit"], v["description"], _kind(v), dict(v["items"])) for v in recorded]
-    continuous = tuple(column for column in columns if column.kind != "discrete")
-    discrete = tuple(column for column in columns if column.kind == "discrete")
-    constants = {v["name"]: float(given.get(v["name"], v["start"])) for v in meta["variables"] if _constant(v)}
-    model = RecordedModel(meta["name"], continuous, discrete, constants)
-    values, modes = (np.array([table[c.path] for c in part], dtype=float) for part in (continuous, discrete))
-    count = len(table)
-    return RecordedSolution(model, table["time"].copy(), values.reshape(-1, count), modes.reshape(-1, count), seconds)
-
-
-def _kind(variable: Mapping[str, Any]) -> str:
-    return "discrete" if variable["discrete"] else str(variable["causality"])
-
-
-def _constant(variable: Mapping[str, Any]) -> bool:
-    known = variable["start"] not in (None, "true", "false")
-    return variable["causality"] == "parameter" and known
+    known = (RecordedVariable(**{**one, "names": dict(one["names"])}) for one in meta["variables"])
+    columns = [one for one in known if one.path in table.dtype.names]
+    parts = [tuple(one for one in columns if (one.kind == "discrete") is modes) for modes in (False, True)]
+    constants = {name: float(given.get(name, value)) for name, value in meta["constants"].items()}
+    model = RecordedModel(meta["name"], parts[0], parts[1], constants)
+    values, modes = (np.array([table[one.path] for one in part], float).reshape(-1, len(table)) for part in parts)
+    return RecordedSolution(model, table["time"].copy(), values, modes, seconds)

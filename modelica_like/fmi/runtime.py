@@ -55,8 +55,10 @@ def found_runtime(platform: str) -> Path | None:
 
 
 def build_runtime(platform: str, folder: Path) -> Path:
-    """Compile the run-time for a platform into a folder; a library that others may be reading is replaced at once."""
+    """Compile the run-time for a platform into a folder, unless it is there; others may be reading in that folder."""
     library = folder / _library_name(platform)
+    if library.is_file():
+        return library
     with TemporaryDirectory(prefix="modelica_like_") as place:
         write_bytes(library, build(runtime_sources(_faces(platform)), platform, Path(place)).read_bytes())
     return library

@@ -60,9 +60,7 @@ def start_tables(model: CompiledDae) -> StartTables:
     point = Point(0.0, model.guesses.copy(), model.z_guesses.copy(), np.zeros(model.discrete_size))
     point.d = call(model, model.discrete_starts, point)
     share(model, point)
-    problem = StartProblem(model, point)
-    for position, entry in problem.direct.items():
-        point.x[position] = problem.state_value(entry)
+    StartProblem(model, point).fix(point)
     plan = start_plan(model, model.settings.get("start", "given"), point)
     own = plan.system.function.size1_out(0) + len(model.implicit)
     row_of = {node: own + k for k, node in enumerate(plan.system.nodes)}

@@ -42,14 +42,18 @@ class Tables:
         return any(0 in operation[1:] for operation in self.tapes["rates"].operations)
 
 
-def make_tables(model: CompiledDae) -> Tables:
+def make_tables(model: CompiledDae, start: StartTables | None = None) -> Tables:
     """Write the functions of a model as tapes and analyse its sparsity.
+
+    Args:
+        model: the compiled model.
+        start: its start tables, where they are known.
 
     Raises:
         MissingStart, ContradictingStart: the start values do not determine all states.
         LanguageError: a function has no counterpart in C.
     """
-    start = start_tables(model)
+    start = start or start_tables(model)
     functions, jacobian, start_pattern = _functions(model, start)
     states = len(model.states)
     diagonal = ca.Sparsity(jacobian.size1(), jacobian.size2())

@@ -7,7 +7,7 @@ list. Compile time and size grow with the number of operations only.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import groupby
+from itertools import accumulate, groupby
 from typing import Any
 
 import casadi as ca
@@ -67,15 +67,6 @@ class Slots:
     sizes: dict[str, int]
     constants: tuple[float, ...]
 
-    def first(self, argument: str) -> int:
-        """First slot of an argument."""
-        return sum(self.sizes[name] for name in ARGUMENTS[: ARGUMENTS.index(argument)])
-
-    @property
-    def results(self) -> int:
-        """First slot of the results."""
-        return sum(self.sizes.values()) + len(self.constants)
-
 
 def write_tapes(functions: dict[str, Any], sizes: dict[str, int]) -> tuple[Slots, tuple[Tape, ...]]:
     """Write CasADi functions, each with one dense or sparse result, as tapes.
@@ -87,48 +78,55 @@ def write_tapes(functions: dict[str, Any], sizes: dict[str, int]) -> tuple[Slots
     Raises:
         LanguageError: a function uses an operation that has no counterpart in C.
     """
-    constants = {0.0: None} | {value: None for function in functions.values() for value in _constants(function)}
-    slots = Slots(sizes, tuple(constants))
+    first: dict[str, int] = dict(
+        zip(ARGUMENTS, accumulate((sizes[name] for name in ARGUMENTS), initial=0), strict=False)
+    )
     base = sum(sizes.values())
-    places = {value: base + k for k, value in enumerate(constants)}
-    return slots, tuple(_tape(name, function, slots, places) for name, function in functions.items())
+    constants = {0.0: -1}
+    read = [_read(name, function, first, base, constants) for name, function in functions.items()]
+    places = {number: base + k for k, number in enumerate(constants.values())}
+    return Slots(sizes, tuple(constants)), tuple(_sorted(tape, places, base) for tape in read)
 
 
-def _constants(function: Any) -> list[float]:
-    count = function.n_instructions()
-    return [function.instruction_constant(k) for k in range(count) if function.instruction_id(k) == ca.OP_CONST]
-
-
-def _tape(name: str, function: Any, slots: Slots, places: dict[float, int]) -> Tape:
-    first = [slots.first(argument) for argument in function.name_in()]
+def _read(name: str, function: Any, first: dict[str, int], base: int, constants: dict[float, int]) -> Tape:
+    """Read a function as it stands: results follow the arguments, and constants have numbers below zero."""
+    starts = [first[argument] for argument in function.name_in()]
     held: dict[int, int] = {}
     operations: list[tuple[str, int, int]] = []
-    outputs = [places[0.0]] * function.nnz_out(0)
+    outputs = [constants[0.0]] * function.nnz_out(0)
+    instruction, constant = function.instruction_id, function.instruction_constant
+    reads, writes = function.instruction_input, function.instruction_output
     for k in range(function.n_instructions()):
-        code = function.instruction_id(k)
-        read, written = function.instruction_input(k), function.instruction_output(k)
-        if code == ca.OP_INPUT:
-            held[written[0]] = first[read[0]] + read[1]
-        elif code == ca.OP_CONST:
-            held[written[0]] = places[function.instruction_constant(k)]
+        code = instruction(k)
+        if code == ca.OP_CONST:
+            held[writes(k)[0]] = constants.setdefault(constant(k), -1 - len(constants))
         elif code == ca.OP_OUTPUT:
-            outputs[written[1]] = held[read[0]]
+            outputs[writes(k)[1]] = held[reads(k)[0]]
+        elif code == ca.OP_INPUT:
+            argument, element = reads(k)
+            held[writes(k)[0]] = starts[argument] + element
         elif code in _COPIES:
-            held[written[0]] = held[read[0]]
+            held[writes(k)[0]] = held[reads(k)[0]]
         elif code in _NAMES:
-            operands = [held[register] for register in read]
-            operations.append((_NAMES[code], operands[0], operands[-1]))
-            held[written[0]] = slots.results + len(operations) - 1
+            operands = reads(k)
+            operations.append((_NAMES[code], held[operands[0]], held[operands[-1]]))
+            held[writes(k)[0]] = base + len(operations) - 1
         else:
             raise LanguageError(
                 f"The function {name} of the model uses an operation that FMUs do not have (CasADi number {code}).",
                 advice="Write it with elementary functions.",
             )
-    return _sorted(Tape(name, tuple(operations), tuple(outputs)), slots.results)
+    return Tape(name, tuple(operations), tuple(outputs))
 
 
-def _sorted(tape: Tape, base: int) -> Tape:
-    """Reorder operations to long runs of equal ones: always those of which most are ready."""
+def _sorted(tape: Tape, places: dict[int, int], base: int) -> Tape:
+    """Reorder operations to long runs of equal ones: always those of which most are ready.
+
+    Args:
+        tape: as `_read` returns it.
+        places: slots of the constants.
+        base: slot of the first constant; results follow the last one.
+    """
     users: list[list[int]] = [[] for _ in tape.operations]
     missing: list[int] = []
     ready: dict[str, list[int]] = {}
@@ -149,7 +147,8 @@ def _sorted(tape: Tape, base: int) -> Tape:
                 if not missing[user]:
                     ready.setdefault(tape.operations[user][0], []).append(user)
         chosen.clear()
-    place = {base + k: base + position for position, k in enumerate(order)}
+    results = base + len(places)
+    place = places | {base + k: results + position for position, k in enumerate(order)}
     moved = tuple(
         (name, place.get(left, left), place.get(right, right))
         for name, left, right in (tape.operations[k] for k in order)

@@ -7,8 +7,7 @@ from typing import Literal
 
 from modelica_like.compile.compiled import CompiledTerminal
 from modelica_like.errors import ExportError
-from modelica_like.fmi.icons import icon_name
-from modelica_like.fmi.xml import document, element, root
+from modelica_like.fmi.xml import Element, document, element
 from modelica_like.language import Assembly, Component, Connector, Equations, connect
 from modelica_like.language.declared import unknown
 from modelica_like.language.equation import FreeEnd
@@ -16,6 +15,7 @@ from modelica_like.netlist.registry import library_types
 
 Takes = Literal["flow", "potential"]
 
+_FAMILIES = ("rotational", "translational", "electrical", "thermal")
 _WIDTH = 100.0
 _MARGIN = 10.0
 
@@ -103,10 +103,15 @@ def adaptor_for(connector: Connector, takes: Takes) -> tuple[type[Component], st
     )
 
 
+def icon_name(kind: str) -> str:
+    """Return the name of the picture for a kind of terminal."""
+    return next((family for family in _FAMILIES if family in kind), "terminal")
+
+
 def terminals_and_icons(terminals: Sequence[CompiledTerminal]) -> str:
     """Write terminalsAndIcons.xml: the icon of the FMU, and its terminals along the right side."""
     height = _WIDTH
-    top = root("fmiTerminalsAndIcons", fmiVersion="3.0")
+    top = Element("fmiTerminalsAndIcons", {"fmiVersion": "3.0"})
     picture = element(top, "GraphicalRepresentation")
     corners = {"x1": 0.0, "y1": 0.0, "x2": _WIDTH, "y2": height}
     element(picture, "CoordinateSystem", **corners, suggestedScalingFactorTo_mm=0.1)

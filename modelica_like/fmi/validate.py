@@ -17,7 +17,8 @@ import numpy as np
 
 from modelica_like.errors import FmuFailed, FmuRefused, ModelicaLikeError
 from modelica_like.fmi import importers
-from modelica_like.fmi.process import run_child
+from modelica_like.fmi.failures import tell_error
+from modelica_like.fmi.process import run_child, workplace
 from modelica_like.fmi.run import TIMEOUT, Kind, Solver, run_fmu
 from modelica_like.fmi.unpack import unpack
 from modelica_like.solve.ranges import ranges
@@ -251,19 +252,13 @@ def _importer_check(name: str, importer: str, subject: _Subject, known: Recorded
 
 
 def _run_importer(importer: str, subject: _Subject, names: Sequence[str]) -> dict[str, float]:
-    with tempfile.TemporaryDirectory(prefix="modelica_like_", ignore_cleanup_errors=True) as work:
-        folder = Path(work)
-        job = {
-            "importer": importer, "fmu": str(subject.path), "step": subject.step, "steps": _STEPS, "names": list(names),
-        }  # fmt: skip
-        (folder / "job.json").write_text(json.dumps(job))
+    job = {"importer": importer, "fmu": str(subject.path), "step": subject.step, "steps": _STEPS, "names": list(names)}
+    with workplace(job) as folder:
         # libcosim unpacks into the temporary folder, and leaves it there when it crashes.
-        run_child(
-            f"{subject.path.name} in {importer}", Path(importers.__file__), folder, subject.timeout, {"TMPDIR": work}
-        )
-        if (folder / "error.json").exists():
-            text = json.loads((folder / "error.json").read_text())["text"]
-            raise FmuFailed(f"{importer} says: {text.strip().rstrip('.')}.")
+        elsewhere = {"TMPDIR": str(folder)}
+        name = f"{subject.path.name} in {importer}"
+        run_child(name, Path(importers.__file__), folder, subject.timeout, elsewhere)
+        tell_error(folder, {}, {"failed": (FmuFailed, f"{importer} says: {{text}}.", "", "")})
         return json.loads((folder / "meta.json").read_text())
 
 

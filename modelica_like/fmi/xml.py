@@ -2,60 +2,66 @@
 
 from __future__ import annotations
 
+import re
 from functools import cache
-from typing import Any
-
-import lxml.etree as etree
 
 from modelica_like.units import ANY, ONE, Unit
 
 INLINE = ("ScalarVariable", "Float64", "Unit")
 """Elements that stand in one line with all that is in them."""
+_ESCAPED = {"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;"}
+_PLAIN = re.compile(r"[ !#-%'-;=?-~]*")
 
 
-def element(parent: Any, tag: str, /, **attributes: object) -> Any:
+class Element:
+    """An element: its tag with attributes as text, and what is in it."""
+
+    __slots__ = ("head", "inner", "tag")
+
+    def __init__(self, tag: str, attributes: dict[str, object]) -> None:
+        texts = [f' {name}="{_text(value)}"' for name, value in attributes.items() if value is not None]
+        self.tag, self.head = tag, f"<{tag}{''.join(texts)}"
+        self.inner: list[Element] | None = None  # most have nothing in them: no list to look after
+
+
+def element(parent: Element, tag: str, /, **attributes: object) -> Element:
     """Append an element; attributes that are None are left out, numbers are written so that they read back exactly."""
-    texts = {name: _text(value) for name, value in attributes.items() if value is not None}
-    return etree.SubElement(parent, tag, texts)
+    one = Element(tag, attributes)
+    if parent.inner is None:
+        parent.inner = []
+    parent.inner.append(one)
+    return one
 
 
-def root(tag: str, /, **attributes: object) -> Any:
-    """Begin a document."""
-    return etree.Element(tag, {name: _text(value) for name, value in attributes.items() if value is not None})
-
-
-def document(top: Any) -> str:
+def document(top: Element) -> str:
     """Write a document, with one line per element; variables and units stand in one line."""
-    return '<?xml version="1.0" encoding="UTF-8"?>\n' + "".join(_lines(top, ""))
+    return '<?xml version="1.0" encoding="UTF-8"?>\n' + "".join(_lines(top, "", "\n"))
 
 
-def _lines(one: Any, indent: str) -> list[str]:
-    if len(one) == 0 or one.tag in INLINE:
-        return [f"{indent}{etree.tostring(one, encoding='unicode')}\n"]
-    empty = etree.Element(one.tag, dict(one.attrib))
-    opening = etree.tostring(empty, encoding="unicode").removesuffix("/>") + ">"
-    inner = [line for child in one for line in _lines(child, indent + "  ")]
-    return [f"{indent}{opening}\n", *inner, f"{indent}</{one.tag}>\n"]
+def _lines(one: Element, indent: str, end: str) -> list[str]:
+    if not one.inner:
+        return [f"{indent}{one.head}/>{end}"]
+    inside = ("", "") if not end or one.tag in INLINE else (f"{indent}  ", end)
+    inner = [line for child in one.inner for line in _lines(child, *inside)]
+    return [f"{indent}{one.head}>{inside[1]}", *inner, f"{indent if inside[1] else ''}</{one.tag}>{end}"]
 
 
 def _text(value: object) -> str:
-    if isinstance(value, str):  # control characters are no XML
-        return value if value.isprintable() else "".join(c if c.isprintable() else " " for c in value)
+    if isinstance(value, str):
+        return value if _PLAIN.fullmatch(value) else "".join(map(_character, value))
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, float):
         return repr(value + 0.0)  # no negative zero
-    if isinstance(value, list | tuple):
-        return " ".join(map(_text, value))
-    return str(value)
+    return " ".join(map(str, value)) if isinstance(value, list | tuple) else str(value)
+
+
+def _character(one: str) -> str:
+    """Control characters are no XML."""
+    return _ESCAPED.get(one, one) if one.isprintable() else " "
 
 
 @cache
 def unit_name(unit: Unit) -> str | None:
     """Return the name of a unit in a description, or None for a plain number."""
     return None if unit in (ONE, ANY) else str(unit)
-
-
-def number(value: float | None, *, whole: bool = False) -> int | float | None:
-    """Return a number for an attribute, as a whole one for integers."""
-    return None if value is None else int(value) if whole else float(value)

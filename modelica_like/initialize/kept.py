@@ -46,20 +46,22 @@ def find_kept(model: CompiledDae, point: Point, states: list[int], jacobian: Mat
     silent = left[:, sizes <= RANK * sizes.max(initial=0.0)].T[:, : len(states)]
     conserved = _orthonormal(silent)
     held: list[int] = []
-    missing: list[float] = []
     rows = np.zeros((0, len(states)))
     for k in holding(model, point) if len(conserved) else ():
-        node = model.holds[k].motion
-        row = variable_slopes(model, point, [node])[0][states]
-        size = float(np.linalg.norm(row))
-        inside = size > 0.0 and np.linalg.norm(row - conserved.T @ (conserved @ row)) <= _SAME * size
-        if inside and np.linalg.matrix_rank(np.vstack([rows, row]), tol=_SAME * size) > len(rows):
-            held.append(node)
-            missing.append(-float(call(model, model.variables, point)[node]))
+        row = variable_slopes(model, point, [model.holds[k].motion])[0][states]
+        if _lies_in(conserved, row) and not _lies_in(_orthonormal(rows), row):
+            held.append(model.holds[k].motion)
             rows = np.vstack([rows, row])
     known = _orthonormal(rows)
-    rest = _orthonormal(conserved - conserved @ known.T @ known)
-    return Kept(tuple(held), np.array(missing), np.vstack([rows, rest]))
+    others = _orthonormal(conserved - conserved @ known.T @ known)
+    missing = -call(model, model.variables, point)[held] if held else np.zeros(0)
+    return Kept(tuple(held), missing, np.vstack([rows, others]))
+
+
+def _lies_in(basis: Matrix, row: Vector) -> bool:
+    """Tell whether a row is a combination of orthonormal ones; a row of zeros says nothing, and is none."""
+    size = float(np.linalg.norm(row))
+    return size > 0.0 and bool(np.linalg.norm(row - basis.T @ (basis @ row)) <= _SAME * size)
 
 
 def solve_kept(kept: Kept, jacobian: Matrix, right: Matrix, of_held: Matrix) -> Any:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Literal
@@ -13,8 +12,8 @@ import numpy as np
 from modelica_like.compile.buffers import buffered
 from modelica_like.compile.compiled import CompiledDae, StartEntry, StartSystem, Vector
 from modelica_like.errors import MissingStart
-from modelica_like.initialize.matching import Elimination, Matching
 from modelica_like.initialize.point import Point
+from modelica_like.structure.matching import Elimination, Matching
 
 StartKind = Literal["given", "rest", "steady"]
 _DENSE = 100
@@ -92,10 +91,7 @@ def start_plan(model: CompiledDae, kind: StartKind, point: Point) -> StartPlan:
     Raises:
         MissingStart: the start values do not determine all states.
     """
-    key = "start plan", kind
-    if key not in model._cache:
-        model._cache[key] = _Choice(model, kind).plan(None)
-    plan: StartPlan = model._cache[key]
+    plan = model.once(("start plan", kind), lambda: _Choice(model, kind).plan(None))
     if plan.columns and not _is_regular(model, plan, point):
         matrix = _generic_matrix(model, plan.system, point)
         if matrix is not None:
@@ -105,32 +101,29 @@ def start_plan(model: CompiledDae, kind: StartKind, point: Point) -> StartPlan:
 
 def _is_regular(model: CompiledDae, plan: StartPlan, point: Point) -> bool:
     """Tell whether the plan's matrix is far from singular; one that was found to be is not looked at again."""
-    pattern, numbers = _pattern(model, plan)
     function = plan.system.function
     fast = buffered(model._cache, ("start matrix", plan.kind), lambda: function, (1,))
     y = np.zeros(function.size1_out(0))
-    entries = fast(point.t, point.x, y, point.z, model.p, model.u, point.d)[0][numbers]
+    entries = fast(point.t, point.x, y, point.z, model.p, model.u, point.d)[0]
+    entries = plan.entries(entries)
     key = "regular start", plan.kind
     if np.array_equal(model._cache.get(key, ()), entries):
         return True
-    regular = _regular(ca.DM(pattern, entries), entries)
+    regular = _regular(plan.matrix(entries), entries)
     if regular:
         model._cache[key] = entries
     return regular
 
 
-def _pattern(model: CompiledDae, plan: StartPlan) -> tuple[Any, Any]:
-    """Pattern of the plan's matrix, and which entries of the start system's Jacobian it has."""
-    key = "start pattern", plan.kind
-    if key not in model._cache:
-        pattern = plan.system.function.sparsity_out(1)
-        own = ca.DM(pattern, np.arange(float(pattern.nnz())))[list(plan.wanted), list(plan.columns)]
-        model._cache[key] = own.sparsity(), np.array(own.nonzeros(), int)
-    return model._cache[key]
-
-
 def matrix_and_values(model: CompiledDae, system: StartSystem, point: Point, y: Vector) -> tuple[Any, Vector]:
-    """Jacobian of the whole start system by (x, y, z), sparse, and its values."""
+    """Return the Jacobian of the whole start system by (x, y, z), sparse, and its values.
+
+    Args:
+        model: the compiled model.
+        system: the start system.
+        point: where.
+        y: the variables that start values need.
+    """
     _, jacobian, values = system.function(point.t, point.x, y, point.z, model.p, model.u, point.d)
     return jacobian, np.asarray(values.full()).ravel()
 
@@ -163,6 +156,15 @@ def _generic_matrix(model: CompiledDae, system: StartSystem, point: Point) -> An
     return matrix if np.all(np.isfinite(matrix.nonzeros())) else None
 
 
+def direct_starts(model: CompiledDae) -> dict[int, int]:
+    """Return the number of the first fixed start value of every state that has one, by state."""
+    found: dict[int, int] = {}
+    for number, entry in enumerate(model.starts):
+        if entry.strength == "fixed" and entry.state is not None:
+            found.setdefault(entry.state[0], number)
+    return found
+
+
 class _Choice:
     """Start values are taken as long as they say something new: fixed ones, defaults, zeros."""
 
@@ -170,10 +172,7 @@ class _Choice:
         self.model = model
         self.kind: StartKind = kind
         self.system = model.rest_system if kind == "rest" else model.start_system
-        self.direct: dict[int, int] = {}
-        for number, entry in enumerate(model.starts):
-            if entry.strength == "fixed" and entry.state is not None:
-                self.direct.setdefault(entry.state[0], number)
+        self.direct = direct_starts(model)
         nx, ny, nz = len(model.states), self.system.function.size1_out(0), len(model.implicit)
         self.free = [k for k in range(nx) if k not in self.direct]
         self.columns = [*self.free, *range(nx, nx + ny + nz)]
@@ -216,19 +215,16 @@ class _Choice:
         if matrix is None:  # every one has an unknown of its own, by whatever structure solves it
             for row in range(self.own):
                 self.entries[row][len(self.free) + row] = 1.0
-        added = [self._add(self.entries[row]) for row in range(self.own)]
+        added = [self.choice.add(self.entries[row]) for row in range(self.own)]
         return [row for row, new in enumerate(added) if new or matrix is None]
 
     def _keep(self, some: bool) -> list[int]:
         """Implicit unknowns that stay as they are."""
         implicit = self.columns[len(self.columns) - len(self.model.implicit) :] if some else []
-        return [column for column in implicit if self._add({self.place[column]: 1.0})]
-
-    def _add(self, row: Mapping[int, float]) -> bool:
-        return self.choice.add(row)
+        return [column for column in implicit if self.choice.add({self.place[column]: 1.0})]
 
     def _accept(self, node: int) -> bool:
-        return self._add(self.entries[self.row_of[node]])
+        return self.choice.add(self.entries[self.row_of[node]])
 
     def _defaults(self) -> list[int]:
         """Defaults in an order that no order of lines changes."""
@@ -242,32 +238,27 @@ class _Choice:
         for node, state in self.system.rest:
             if state is None and self._accept(node):
                 resting.append(node)
-            elif state is not None and state in self.place and self._add({self.place[state]: 1.0}):
+            elif state is not None and state in self.place and self.choice.add({self.place[state]: 1.0}):
                 zero.append(state)
         return resting, zero
 
     def _missing(self) -> MissingStart:
-        states = [self.free[k] for k in self.choice.undetermined() if k < len(self.free)]
-        return _missing(self.model, states, len(self.columns) - self.choice.size)
+        model, count = self.model, len(self.columns) - self.choice.size
+        names = [model.states[self.free[k]] for k in self.choice.undetermined() if k < len(self.free)]
+        if count == 1:
+            what = f"one equation: give {' or '.join(names[:4]) + (' …' if len(names) > 4 else '')} a start value"
+        else:
+            shown = ", ".join(names[:8]) + (", …" if len(names) > 8 else "")
+            which = "" if count == len(names) else f"{count} of "
+            what = f"{count} equations: give {which}{shown} start values"
+        parts = dict.fromkeys(name.removeprefix("der(").rstrip(")").rpartition(".")[0] for name in names)
+        return MissingStart(
+            f"Initialisation (not the model) lacks {what}.",
+            where=[model.places[part] for part in parts if part in model.places][:3],
+            advice='Or start from rest (start = "rest") or in the steady state (start = "steady").',
+        )
 
 
 def start_name(model: CompiledDae, entry: StartEntry) -> str:
     """Path of the variable of a start value."""
     return model.flat_variables[entry.node].path
-
-
-def _missing(model: CompiledDae, states: Collection[int], count: int) -> MissingStart:
-    names = [model.states[k] for k in states]
-    if count == 1:
-        shown = " or ".join(names[:4]) + (" …" if len(names) > 4 else "")
-        what = f"one equation: give {shown} a start value"
-    else:
-        shown = ", ".join(names[:8]) + (", …" if len(names) > 8 else "")
-        which = "" if count == len(names) else f"{count} of "
-        what = f"{count} equations: give {which}{shown} start values"
-    parts = dict.fromkeys(name.removeprefix("der(").rstrip(")").rpartition(".")[0] for name in names)
-    return MissingStart(
-        f"Initialisation (not the model) lacks {what}.",
-        where=[model.places[part] for part in parts if part in model.places][:3],
-        advice='Or start from rest (start = "rest") or in the steady state (start = "steady").',
-    )

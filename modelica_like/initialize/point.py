@@ -11,14 +11,11 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from modelica_like.compile.buffers import buffered
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import InitializationError, SingularAtStart
-from modelica_like.initialize.singular import implicit_singular, is_regular, singular_block
+from modelica_like.initialize.singular import VANISHES, implicit_singular, is_regular, singular_block
 
 _MAX_NEWTON = 50
-_VANISHES = 1e-12
-"""Relative determinants below which a block is singular."""
 _ROUNDING = 1e-14
 _FEW = 3
 """Implicit unknowns up to which a step of Newton's method is written out."""
@@ -41,9 +38,9 @@ class Point:
 
 
 def call(model: CompiledDae, function: Any, point: Point) -> Vector:
-    """Evaluate a function of the model at a point; the result is flat."""
+    """Evaluate a function of a model at a point; the result is flat, columns one after the other."""
     # By identity: asking a CasADi function for its name costs as much as evaluating a small one.
-    fast = buffered(model._cache, id(function), lambda: function)
+    fast = model.fast(id(function), lambda: function)
     return fast(point.t, point.x, point.z, model.p, model.u, point.d)[0]
 
 
@@ -56,7 +53,7 @@ def solve_implicit(model: CompiledDae, point: Point) -> None:
     """
     if not model.implicit:
         return
-    fast = buffered(model._cache, "newton", lambda: newton_at(model, look=True))
+    fast = model.fast("newton", lambda: newton_at(model, look=True))
     change = np.inf
     for _ in range(_MAX_NEWTON):
         new, condition = fast(point.t, point.x, point.z, model.p, model.u, point.d)
@@ -101,9 +98,8 @@ def newton_at(model: CompiledDae, *, look: bool) -> ca.Function:
 
 def is_linear(model: CompiledDae) -> bool:
     """Whether the implicit equations are linear in z: then one step of Newton's method solves them."""
-    if "linear" not in model._cache:
-        model._cache["linear"] = not model.alg_jacobian.jac_sparsity(0, model.alg_jacobian.index_in("z")).nnz()
-    return model._cache["linear"]
+    at = model.alg_jacobian.index_in("z")
+    return model.once("linear", lambda: not model.alg_jacobian.jac_sparsity(0, at).nnz())
 
 
 def _check_regular(model: CompiledDae, point: Point) -> None:
@@ -112,26 +108,26 @@ def _check_regular(model: CompiledDae, point: Point) -> None:
     Raises:
         SingularAtStart: it is.
     """
-    fast, size = buffered(model._cache, "residual at", lambda: implicit_at(model)), len(model.implicit)
+    fast, size = model.fast("residual at", lambda: implicit_at(model)), len(model.implicit)
     residual, entries = fast(point.t, point.x, point.z, model.p, model.u, point.d)
     jacobian = entries.reshape(size, size).T
-    if not (np.isfinite(residual).all() and np.isfinite(jacobian).all() and is_regular(jacobian)):
-        raise implicit_singular(model, point.t, point.d, jacobian)
+    if not (np.isfinite(residual).all() and is_regular(jacobian)):
+        raise implicit_singular(model, point)
 
 
 def check_singular(model: CompiledDae, point: Point) -> None:
     """Check that every block has a unique solution.
 
     Raises:
-        SingularAtStart: one has not.
+        SingularAtStart: one does not have one.
     """
-    fast = buffered(model._cache, "regular", lambda: _regular(model))
+    fast = model.fast("regular", lambda: _regular(model))
     if not fast(point.t, point.x, point.z, model.p, model.u, point.d)[0][0]:
         return
     determinants = call(model, model.determinants, point)
-    regular = np.isfinite(determinants) & (np.abs(determinants) >= _VANISHES)
+    regular = np.isfinite(determinants) & (np.abs(determinants) >= VANISHES)
     if not regular.all():
-        raise singular_block(model, point.t, point.d, int(np.argmin(regular)))
+        raise singular_block(model, point, int(np.argmin(regular)))
     finite = np.isfinite(call(model, model.ode, point))
     raise SingularAtStart(
         f"The derivative of {model.states[int(np.argmin(finite))]} is not finite at t = {point.t:.9g} s.",
@@ -143,14 +139,32 @@ def _regular(model: CompiledDae) -> ca.Function:
     """Return the number of determinants that vanish and of derivatives that are not finite."""
     arguments = list(model.arguments.values())
     sizes, rates = ca.fabs(model.determinants(*arguments)), ca.fabs(model.ode(*arguments))
-    wrong = ca.vertcat(0, ca.logic_not(ca.logic_and(sizes >= _VANISHES, sizes < np.inf)), ca.logic_not(rates < np.inf))
+    wrong = ca.vertcat(0, ca.logic_not(ca.logic_and(sizes >= VANISHES, sizes < np.inf)), ca.logic_not(rates < np.inf))
     return ca.Function("regular", arguments, [ca.cse(ca.densify(ca.sum1(wrong)))])
 
 
 def variable_slopes(model: CompiledDae, point: Point, nodes: list[int]) -> Vector:
-    """Total derivative of variables by the states at a point, z following the states; shape (nodes, states)."""
-    fast = buffered(model._cache, ("slopes", tuple(nodes)), lambda: _slopes(model, nodes))
+    """Return the total derivative of variables by the states at a point, z following the states.
+
+    Args:
+        model: the compiled model.
+        point: where.
+        nodes: positions of the variables.
+
+    Returns:
+        Shape (nodes, states).
+
+    Raises:
+        SingularAtStart: a slope is not finite.
+    """
+    fast = model.fast(("slopes", tuple(nodes)), lambda: _slopes(model, nodes))
     results = fast(point.t, point.x, point.z, model.p, model.u, point.d)
+    if not all(np.isfinite(part).all() for part in results):
+        names = ", ".join(model.flat_variables[node].path for node in nodes)
+        raise SingularAtStart(
+            f"The slopes of {names} are not finite at t = {point.t:.9g} s.",
+            advice="Look for a mass, inertia or ratio of zero, or a function outside its domain.",
+        )
     shapes = [(rows, columns) for rows in (len(nodes), len(point.z)) for columns in (len(point.x), len(point.z))]
     by_x, by_z, alg_x, alg_z = (v.reshape(shape, order="F") for v, shape in zip(results, shapes, strict=True))
     # Reactions whose split is undetermined make the equations for z singular; what depends on them is left out.

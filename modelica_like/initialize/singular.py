@@ -2,56 +2,95 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable, Container
+from typing import Any, Protocol
 
 import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import SingularAtStart
+from modelica_like.flatten.model import Origin
+
+VANISHES = 1e-12
+"""Relative determinants below which a block is singular."""
+_ANOTHER = 0.7
 
 
-def singular_block(model: CompiledDae, t: float, d: Vector, number: int, *, implicit: bool = False) -> SingularAtStart:
-    """Return the error for one block.
+class Place(Protocol):
+    """Where a block is singular: time, states, implicit unknowns, modes and discrete values."""
 
-    Args:
-        model: the compiled model.
-        t: time in s.
-        d: modes and discrete values.
-        number: of the block, from 0, among those with a determinant or among those that are implicit.
-        implicit: which of the two.
-    """
-    names, origins = (model.implicit_blocks if implicit else model.singular)[number]
+    t: float
+    x: Vector
+    z: Vector
+    d: Vector
+
+
+def singular_block(model: CompiledDae, point: Place, number: int) -> SingularAtStart:
+    """Return the error for one of the blocks with a determinant, counted from 0."""
+
+    def regular(p: Vector) -> bool:
+        value = model.determinants(point.t, point.x, point.z, p, model.u, point.d).full()[number, 0]
+        return bool(abs(value) >= VANISHES)
+
+    return _singular(model, point, number, model.singular[number], regular)
+
+
+def implicit_singular(model: CompiledDae, point: Place) -> SingularAtStart:
+    """Return the error for the first of the implicit blocks that is singular."""
+
+    def jacobian(p: Vector) -> Any:
+        return model.alg_jacobian(point.t, point.x, point.z, p, model.u, point.d).full()
+
+    begin, whole = 0, jacobian(model.p)
+    for number, block in enumerate(model.implicit_blocks):
+        own = slice(begin, begin + sum(name in block[0] for name in model.implicit[begin:]))
+        if not is_regular(whole[own, own]):
+            return _singular(model, point, number, block, lambda p, own=own: is_regular(jacobian(p)[own, own]))
+        begin = own.stop
+    return SingularAtStart(
+        f"The equations for {', '.join(model.implicit)} have no finite value at t = {point.t:.9g} s.",
+        advice="Look for a mass, inertia or ratio of zero, or a function outside its domain.",
+    )
+
+
+def _singular(
+    model: CompiledDae, point: Place, number: int, block: tuple[tuple[str, ...], tuple[Origin, ...]],
+    regular: Callable[[Vector], bool],
+) -> SingularAtStart:  # fmt: skip
+    """Return the error for a block of unknowns and origins; `regular` tells whether it is for other parameters."""
+    names, origins = block
     owners = dict.fromkeys(origin.path for origin in origins)
-    holding = [path for path in owners if _holds(model, d, path)]
+    holding = [path for path in owners if _holds(model, point.d, path)]
     held = [name for name in names if name.rpartition(".")[0] in holding]
     told = held if len(holding) > 1 and held else [name for name in names if name in model.implicit] or names
     why, advice = _reason(model, holding, held, alone=len(origins) == 1)
+    if zeros := [] if len(holding) > 1 else _zeros(model, owners, regular):
+        why = f"{_and(zeros)} {'is' if len(zeros) == 1 else 'are'} zero: that leaves these unknowns open."
+        advice = f"Give {'it' if len(zeros) == 1 else 'one of them'} another value."
     shown = ", ".join(told[:6]) + (", …" if len(told) > 6 else "")
     return SingularAtStart(
-        f"The Jacobian is singular at t = {t:.9g} s in block {number + 1} ({shown}).",
+        f"The Jacobian is singular at t = {point.t:.9g} s in block {number + 1} ({shown}).",
         where=tuple(dict.fromkeys(origin.source for origin in origins)),
         why=why,
         advice=advice,
     )
 
 
-def implicit_singular(model: CompiledDae, t: float, d: Vector, jacobian: Any) -> SingularAtStart:
-    """Return the error for the first of the implicit blocks that is singular."""
-    begin = 0
-    for number, (names, _) in enumerate(model.implicit_blocks):
-        end = begin + sum(name in names for name in model.implicit[begin:])
-        inner = jacobian[begin:end, begin:end]
-        if not np.all(np.isfinite(inner)) or not is_regular(inner):
-            return singular_block(model, t, d, number, implicit=True)
-        begin = end
-    return SingularAtStart(
-        f"The equations for {', '.join(model.implicit)} have no finite value at t = {t:.9g} s.",
-        advice="Look for a mass, inertia or ratio of zero, or a function outside its domain.",
-    )
+def _zeros(model: CompiledDae, owners: Container[str], regular: Callable[[Vector], bool]) -> list[str]:
+    """Parameters of some components that are zero where any other number makes the block regular."""
+    found: list[str] = []
+    for k, one in enumerate(model.flat_parameters):
+        if model.p[k] == 0.0 and one.path.rpartition(".")[0] in owners:
+            p = model.p.copy()
+            p[k] = _ANOTHER
+            found += [one.path] if regular(p) else []
+    return found
 
 
 def is_regular(matrix: Any) -> bool:
-    """Tell whether a finite square matrix is regular, whatever the units of its rows and columns are."""
+    """Tell whether a square matrix is finite and regular, whatever the units of its rows and columns are."""
+    if not np.isfinite(matrix).all():
+        return False
     for axis in (1, 0):
         sizes = np.abs(matrix).max(axis=axis, keepdims=True, initial=0.0)
         matrix = matrix / np.where(sizes > 0.0, sizes, 1.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import casadi as ca
@@ -10,57 +11,48 @@ import numpy as np
 from modelica_like.compile.buffers import buffered
 from modelica_like.compile.compiled import CompiledDae, StartEntry, Vector
 from modelica_like.errors import ContradictingStart, InitializationError
-from modelica_like.initialize.plan import StartKind, StartPlan, start_name, start_plan
-from modelica_like.initialize.point import Point, call, solve_implicit
+from modelica_like.initialize.plan import StartKind, StartPlan, direct_starts, start_name, start_plan
+from modelica_like.initialize.point import Point, call, check_singular, solve_implicit
 
 _CONSISTENT = 1e-8
 _MAX_NEWTON = 50
 _DENSE = 100
+_STRENGTHS = ("fixed", "guess", "default")
 _EPS = float(np.finfo(float).eps)
 
 
 class _Places:
     """Start values, and where they go: (number, position, factor) of each."""
 
-    def __init__(self, places: list[tuple[int, int, float]]) -> None:
-        self._numbers, self._positions = (np.array([place[k] for place in places], int) for k in (0, 1))
-        self._factors = np.array([factor for *_, factor in places], float)
+    def __init__(self, places: Iterable[tuple[int, int, float]]) -> None:
+        self._numbers, self._positions, self._factors = np.array([*places], float).reshape(-1, 3).T
+        self._numbers, self._positions = self._numbers.astype(int), self._positions.astype(int)
 
     def put(self, unknowns: Vector, given: Vector) -> None:
         """Write them into the states, or implicit unknowns; of several for one the last counts."""
         unknowns[self._positions] = given[self._numbers] / self._factors
 
 
-class _Entries:
+class _Sorted:
     """Start values of a model, sorted by what they do.
 
     Attributes:
-        numbers: position of every one, by its identity.
-        direct: by state, the first fixed one.
-        fixed, guesses, defaults: of states.
+        fixed, guesses, defaults: of states; of several fixed ones of one state the first.
+        again: the others, each with the first.
         implicit: guesses and fixed ones of implicit unknowns, which begin where they are to be.
-        again: fixed ones of states that another has fixed before.
     """
 
     def __init__(self, model: CompiledDae) -> None:
-        self.numbers = {id(entry): k for k, entry in enumerate(model.starts)}
-        of_states = [entry for entry in model.starts if entry.state is not None]
-        self.direct: dict[int, StartEntry] = {}
-        for entry in of_states:
-            if entry.strength == "fixed" and entry.state is not None:
-                self.direct.setdefault(entry.state[0], entry)
-        first = {id(entry) for entry in self.direct.values()}
-        self.again = [entry for entry in of_states if entry.strength == "fixed" and id(entry) not in first]
-        self.fixed = self._of_states(list(self.direct.values()))
-        self.guesses = self._of_states([e for e in of_states if e.strength == "guess"])
-        self.defaults = self._of_states([e for e in of_states if e.strength == "default"])
+        direct = direct_starts(model)
+        states = [(k, *entry.state) for k, entry in enumerate(model.starts) if entry.state is not None]
+        of = {kind: [one for one in states if model.starts[one[0]].strength == kind] for kind in _STRENGTHS}
+        self.again = [(k, direct[state]) for k, state, _ in of["fixed"] if direct[state] != k]
+        self.fixed = _Places(one for one in of["fixed"] if direct[one[1]] == one[0])
+        self.guesses, self.defaults = _Places(of["guess"]), _Places(of["default"])
         position = {name: k for k, name in enumerate(model.implicit)}
-        begins = [e for e in model.starts if e.state is None and e.strength in ("guess", "fixed")]
-        named = [(self.numbers[id(e)], start_name(model, e)) for e in begins]
-        self.implicit = _Places([(number, position[name], 1.0) for number, name in named if name in position])
-
-    def _of_states(self, chosen: list[StartEntry]) -> _Places:
-        return _Places([(self.numbers[id(entry)], *entry.state) for entry in chosen if entry.state is not None])
+        near = [k for k, one in enumerate(model.starts) if one.state is None and one.strength != "default"]
+        begins = [(k, start_name(model, model.starts[k])) for k in near]
+        self.implicit = _Places((k, position[name], 1.0) for k, name in begins if name in position)
 
 
 class StartProblem:
@@ -68,51 +60,42 @@ class StartProblem:
 
     Those of states are taken as they are; those of other variables are equations for the states that are left.
     The equations are solved together with the explicit equations between states and those variables (as sparse as the
-    model itself), and with
-    the implicit ones.
+    model itself), and with the implicit ones.
+
+    Attributes:
+        given: start values in SI units, one for each in `CompiledDae.starts`.
     """
 
     def __init__(self, model: CompiledDae, point: Point) -> None:
         self.model = model
         self.given = call(model, model.start_values, point)
         self._solved: StartPlan | None = None
-        if "start entries" not in model._cache:
-            model._cache["start entries"] = _Entries(model)
-        self._entries: _Entries = model._cache["start entries"]
-        self.direct = self._entries.direct
-        self._entries.guesses.put(point.x, self.given)
-        self._entries.implicit.put(point.z, self.given)
-        for entry in self._entries.again:
-            self._compare(entry)
+        self._sorted = model.once("start entries", lambda: _Sorted(model))
+        self._sorted.guesses.put(point.x, self.given)
+        self._sorted.implicit.put(point.z, self.given)
+        for pair in self._sorted.again:
+            self._compare(*pair)
 
-    def value(self, entry: StartEntry) -> float:
-        """Start value in SI units."""
-        return float(self.given[self._entries.numbers[id(entry)]])
+    def _told(self, number: int) -> str:
+        return f"{start_name(self.model, self.model.starts[number])} = {self.given[number]:g}"
 
-    def _name(self, entry: StartEntry) -> str:
-        return start_name(self.model, entry)
-
-    def state_value(self, entry: StartEntry) -> float:
-        """Value of the state that the variable is up to a factor."""
-        assert entry.state is not None
-        return self.value(entry) / entry.state[1]
-
-    def _compare(self, entry: StartEntry) -> None:
+    def _compare(self, number: int, earlier: int) -> None:
         """Compare a start value with the earlier one of the same motion."""
-        assert entry.state is not None
-        earlier = self.direct[entry.state[0]]
-        number, other = self.state_value(entry), self.state_value(earlier)
-        if abs(number - other) > _CONSISTENT * (1.0 + abs(other)):
+        value, other = (self.given[k] / (self.model.starts[k].state or (0, 1.0))[1] for k in (number, earlier))
+        if abs(value - other) > _CONSISTENT * (1.0 + abs(other)):
             raise ContradictingStart(
-                f"{self._name(earlier)} = {self.value(earlier):g} and {self._name(entry)} = {self.value(entry):g} "
-                "contradict each other: they are the same motion.",
+                f"{self._told(earlier)} and {self._told(number)} contradict each other: they are the same motion.",
                 advice="Remove one of the two start values.",
             )
 
+    def fix(self, point: Point) -> None:
+        """Give states their own start values."""
+        self._sorted.fixed.put(point.x, self.given)
+
     def apply(self, point: Point) -> None:
         """Give states their own start values, or defaults."""
-        self._entries.defaults.put(point.x, self.given)
-        self._entries.fixed.put(point.x, self.given)
+        self._sorted.defaults.put(point.x, self.given)
+        self.fix(point)
 
     def solve(self, point: Point, kind: StartKind) -> None:
         """Determine all states.
@@ -120,14 +103,14 @@ class StartProblem:
         Raises:
             MissingStart, ContradictingStart, InitializationError: the start values do not determine them.
         """
-        self._entries.fixed.put(point.x, self.given)
+        self.fix(point)
         plan = start_plan(self.model, kind, point)
         if plan.columns and not (plan is self._solved and _is_free_of_modes(self.model, plan)):
             self._solve(plan, point)
             self._solved = plan
         solve_implicit(self.model, point)
         for number in plan.dependent:
-            self._check_dependent(point, self.model.starts[number])
+            self._check_dependent(point, number)
 
     def _solve(self, plan: StartPlan, point: Point) -> None:
         """Newton's method on the sparse system."""
@@ -157,7 +140,9 @@ class StartProblem:
         point.x, point.z = state[:nx], state[nx + ny :]
 
     def _not_found(self, plan: StartPlan, point: Point) -> InitializationError:
-        solve_implicit(self.model, point)  # where the implicit equations are singular, that is the reason
+        # Where the equations are singular, that is the reason.
+        solve_implicit(self.model, point)
+        check_singular(self.model, point)
         given = [start_name(self.model, self.model.starts[k]) for k in plan.rows]
         resting = [self.model.flat_variables[k].path for k in plan.resting if k < len(self.model.flat_variables)]
         have = f"{', '.join(given[:6])} {'have' if len(given) > 1 else 'has'} the value asked for" if given else ""
@@ -167,19 +152,18 @@ class StartProblem:
             advice="Give guesses near the solution, or start values of states.",
         )
 
-    def _check_dependent(self, point: Point, entry: StartEntry) -> None:
-        present = call(self.model, self.model.variables, point)
-        actual, value = present[entry.node], self.value(entry)
+    def _check_dependent(self, point: Point, number: int) -> None:
+        starts, present = self.model.starts, call(self.model, self.model.variables, point)
+        entry, value = starts[number], self.given[number]
+        actual = present[entry.node]
         if abs(actual - value) <= _CONSISTENT * (1.0 + abs(value)):
             return
-        fixed = [e for e in self.model.starts if e.strength == "fixed" and e is not entry]
-        partners = [f"{self._name(e)} = {present[e.node]:g}" for e in fixed if self._coupled(entry, e)]
-        what = f"{self._name(entry)} = {value:g}"
-        together = (
-            f"{' and '.join([*partners[:2], what])} contradict each other" if partners else f"{what} cannot be met"
-        )
+        fixed = [e for e in starts if e.strength == "fixed" and e is not entry and self._coupled(entry, e)]
+        partners = [f"{start_name(self.model, e)} = {present[e.node]:g}" for e in fixed[:2]]
+        wrong = "contradict each other" if partners else "cannot be met"
         raise ContradictingStart(
-            f"{together}: {self._name(entry)} follows to be {actual:g}.",
+            f"{' and '.join([*partners, self._told(number)])} {wrong}: {start_name(self.model, entry)} "
+            f"follows to be {actual:g}.",
             where=[o.source for o in self.model.differentiated if o.source.file][:3],
             advice="Remove one of the start values, or make one a guess.",
         )
@@ -207,12 +191,9 @@ class _Evaluation:
 
 
 def _is_free_of_modes(model: CompiledDae, plan: StartPlan) -> bool:
-    key = "start free of modes", plan.kind
-    if key not in model._cache:
-        function = plan.system.function
-        values, modes = function.name_out().index("values"), function.name_in().index("d")
-        model._cache[key] = not function.jac_sparsity(values, modes).nnz()
-    return model._cache[key]
+    function = plan.system.function
+    values, modes = function.name_out().index("values"), function.name_in().index("d")
+    return model.once(("free of modes", plan.kind), lambda: not function.jac_sparsity(values, modes).nnz())
 
 
 def _dense_values(system: ca.Function) -> ca.Function:

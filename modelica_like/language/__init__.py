@@ -4,6 +4,7 @@ from modelica_like.errors import LanguageError as LanguageError
 from modelica_like.language.assembly import Assembly as Assembly
 from modelica_like.language.component import Component as Component
 from modelica_like.language.declared import Connector as Connector
+from modelica_like.language.declared import Domain as Domain
 from modelica_like.language.equation import Equations as Equations
 from modelica_like.language.equation import connect as connect
 from modelica_like.language.equation import free as free

@@ -295,8 +295,10 @@ class Component(Declared):
         return NOWHERE
 
     def place_of(self, name: str = "") -> Source:
-        """Return where this part of a netlist stands, or one of the netlist's own parameters."""
-        own = self.source_of(f"parameters.{name}")
+        """Return where this part of a netlist stands, one of the netlist's own parameters, or a value given later."""
+        root, path = self.root, f"{self.path}.{name}".lstrip(".")
+        own = root.source_of(f"set.{path}") if isinstance(root, Component) else NOWHERE
+        own = own if own.file else self.source_of(f"parameters.{name}")
         if own.file or not isinstance(self._owner, Component):
             return own
         # All elements of an array stand in one line.

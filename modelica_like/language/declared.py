@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 from typing import Any, ClassVar, Self
 
 from modelica_like.errors import UnknownName, did_you_mean
@@ -45,6 +46,14 @@ class Declared:
         return ".".join(reversed(names))
 
     @property
+    def root(self) -> Declared:
+        """The whole tree."""
+        node: Declared = self
+        while node._owner is not None:
+            node = node._owner
+        return node
+
+    @property
     def label(self) -> str:
         """Name for messages: the path, or the type for the root."""
         return self.path or self._name or type(self).__name__
@@ -60,8 +69,29 @@ class Declared:
         return twin
 
 
+@dataclass(frozen=True)
+class Domain:
+    """Words of a physical domain, by which messages speak about connectors of one kind.
+
+    Attributes:
+        flow: what connectors carry, such as `torque`.
+        potential: what is equal where they are joined, such as `voltage`.
+        separator: what goes between two parts that fix the same potential.
+        reference: component type that every network of such connectors needs, such as `Ground`.
+        converters: by the name of another kind of connector, what goes between the two.
+    """
+
+    flow: str = "flow"
+    potential: str = "potential"
+    separator: str = "a compliant part"
+    reference: str = ""
+    converters: Mapping[str, str] = field(default_factory=dict[str, str])
+
+
 class Connector(Declared):
     """Where components are joined: potentials (`var`) become equal, flows (`flow`) sum to zero.
+
+    A kind of connector says to which `domain` it belongs.
 
     Args:
         description: which end of the component this is.
@@ -69,6 +99,7 @@ class Connector(Declared):
         optional: it exists only where something is connected to it.
     """
 
+    domain: ClassVar[Domain] = Domain()
     stroke: ClassVar[Stroke | None] = None
     """How its connections are drawn."""
 
@@ -91,8 +122,15 @@ class Connector(Declared):
         return f"<{type(self).__name__} {self.label}>"
 
 
-def unknown(kind: str, label: str, name: str, known: Iterator[str] | list[str]) -> UnknownName:
-    """Build the error for a name that does not exist."""
+def unknown(kind: str, label: str, name: str, known: Iterable[str]) -> UnknownName:
+    """Return the error about a name that does not exist.
+
+    Args:
+        kind: what it should name, such as `part`.
+        label: what has no such thing.
+        name: the name.
+        known: the names that exist.
+    """
     names = list(known)
     listing = f" It has {', '.join(names)}." if names else " It has none."
     return UnknownName(f"{label} has no {kind} '{name}'{did_you_mean(name, names) or '.'}{listing}")

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any, Protocol, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import casadi as ca
 
@@ -14,6 +14,9 @@ from modelica_like.errors import LanguageError, Source
 from modelica_like.language.declared import Connector
 from modelica_like.language.expr import Expr, Symbol
 from modelica_like.language.places import NOWHERE
+
+if TYPE_CHECKING:
+    from modelica_like.language.component import Component
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,19 +67,7 @@ def connect(first: Connector | Expr, *others: Connector | Expr) -> Connection:
     return Connection(cast(Any, ends))
 
 
-class HasEnds(Protocol):
-    """A part that `series` can join."""
-
-    def inlet_connector(self) -> Connector:
-        """Connector to the part before."""
-        ...
-
-    def outlet_connector(self) -> Connector:
-        """Connector to the part after."""
-        ...
-
-
-def series(*parts: HasEnds) -> Equations:
+def series(*parts: Component) -> Equations:
     """Connect the outlet of each part with the inlet of the next."""
     for left, right in pairwise(parts):
         yield connect(left.outlet_connector(), right.inlet_connector())
@@ -98,6 +89,11 @@ def free(connector: Any) -> FreeEnd:
 
 def as_equation(item: Any, source: Source, component: str) -> Equation:
     """Take `left == right` apart.
+
+    Args:
+        item: what `equations()` yielded.
+        source: where.
+        component: name of the class, for messages.
 
     Raises:
         LanguageError: the item is not an equation, or both sides are the same.
@@ -133,7 +129,7 @@ def _is_turned(left: Any, right: Any, text: str) -> bool:
 
 
 def as_statement(item: Any, source: Source, component: str) -> Statement:
-    """Read what `equations()` yielded."""
+    """Read what `equations()` yielded; the arguments are those of `as_equation`."""
     if isinstance(item, Connection | FreeEnd):
         return item if item.source is not NOWHERE else replace(item, source=source)
     return as_equation(item, source, component)

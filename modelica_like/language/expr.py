@@ -77,7 +77,13 @@ def leaf_id(leaf: Expr) -> int:
 
 
 def symbol_of(owner: Any, name: str, order: int = 0) -> Symbol:
-    """Return the symbol for a field of `owner`, always the same one."""
+    """Return the symbol for a field, always the same one.
+
+    Args:
+        owner: the component or connector.
+        name: of the field.
+        order: how often it is differentiated in time.
+    """
     cache: dict[tuple[str, int], Symbol] = owner.__dict__.setdefault("_symbols", {})
     if (name, order) not in cache:
         cache[name, order] = Symbol(owner, name, order)

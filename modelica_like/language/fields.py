@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, Self, overload
@@ -109,13 +110,30 @@ class Field:
             raise UnitError(f"{self.label} = '{text}': {error.what}", advice=error.advice) from None
 
     def _checked(self, number: float, given: Any) -> float:
-        low = -float("inf") if self.min is None else self.min
-        high = float("inf") if self.max is None else self.max
-        if low <= number <= high:
-            return number
-        bound = f"at least {low:g}" if number < low else f"at most {high:g}"
-        unit = "" if self.unit_text in ("1", "*") else f" {self.unit_text}"
-        raise ValueOutOfRange(f"{self.label} = {given} is out of range: it must be {bound}{unit}.")
+        return in_range(number, given, self.label, self.unit_text, (self.min, self.max))
+
+
+def in_range(number: float, given: object, label: str, unit: str, bounds: tuple[float | None, float | None]) -> float:
+    """Return a number that is finite and not outside its bounds.
+
+    Args:
+        number: in SI units.
+        given: how it was written, for messages.
+        label: what messages call it.
+        unit: of the bounds, likewise.
+        bounds: smallest and largest value, in SI units; None where there is none.
+
+    Raises:
+        ValueOutOfRange: it is not.
+    """
+    if not math.isfinite(number):
+        raise ValueOutOfRange(f"{label} must be a finite number, not {number:g}.")
+    low, high = bounds
+    if (low is not None and number < low) or (high is not None and number > high):
+        bound = f"at least {low:g}" if low is not None and number < low else f"at most {high:g}"
+        shown = "" if unit in ("1", "*") else f" {unit}"
+        raise ValueOutOfRange(f"{label} = {given} is out of range: it must be {bound}{shown}.")
+    return number
 
 
 if TYPE_CHECKING:
@@ -225,26 +243,49 @@ def var(
 
 
 def flow(unit: str, description: str = "", *, nominal: float = 1.0) -> Any:
-    """Declare a flow variable of a connector, positive into the component."""
+    """Declare a flow variable of a connector, positive into the component.
+
+    Args:
+        unit: in Modelica notation.
+        description: one phrase.
+        nominal: order of magnitude, SI.
+    """
     return Variable(unit, description, is_flow=True, nominal=nominal)
 
 
 def signal_in(
     unit: str, description: str = "", *, default: Any = None, min: float | None = None, max: float | None = None
 ) -> Any:
-    """Declare a causal input; `default` is its value when nothing is connected."""
+    """Declare a causal input.
+
+    Args:
+        unit: in Modelica notation; `*` takes the unit of what is connected.
+        description: one phrase.
+        default: its value where nothing is connected; without it one must be given.
+        min: smallest allowed value, SI.
+        max: largest allowed value, SI.
+    """
     return Input(unit, description, default=default, min=min, max=max)
 
 
 def signal_out(unit: str, description: str = "", *, nominal: float = 1.0) -> Any:
-    """Declare a causal output."""
+    """Declare a causal output.
+
+    Args:
+        unit: in Modelica notation; `*` takes the unit of its equation.
+        description: one phrase.
+        nominal: order of magnitude, SI.
+    """
     return Output(unit, description, nominal=nominal)
 
 
 def discrete(unit: str, description: str = "", *, start: Any = 0.0) -> Any:
     """Declare a number that changes only at events.
 
-    `start` is a number, a quantity or a formula of the component's parameters.
+    Args:
+        unit: in Modelica notation.
+        description: one phrase.
+        start: a number, a quantity or a formula of the component's parameters.
     """
     return Discrete(unit, description, default=start)
 

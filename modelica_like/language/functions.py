@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, cast
 
 import casadi as ca
@@ -45,7 +46,7 @@ def prescribed(motion: Expr) -> Expr:
         motion: a speed of the component, whose derivative stands in the same equation.
 
     Raises:
-        LanguageError: it is no variable.
+        LanguageError: it is not a variable.
     """
     if not isinstance(motion, Symbol) or motion is TIME or motion.order:
         raise LanguageError(f"prescribed({motion}): only a variable can be prescribed.")
@@ -57,59 +58,33 @@ def _rate(symbol: Symbol) -> Expr | float:
     return 0.0 if constant else symbol.derivative()
 
 
-def sin(x: Scalar) -> Expr:
-    """Sine of an angle in rad."""
-    return ca.sin(_sx(x))
+def _elementary(function: Callable[[Any], Any], doc: str) -> Callable[[Scalar], Expr]:
+    """Return a function of an expression or a number."""
+
+    def of(x: Scalar) -> Expr:
+        return function(_sx(x))
+
+    of.__name__, of.__doc__ = function.__name__, doc
+    return of
 
 
-def cos(x: Scalar) -> Expr:
-    """Cosine of an angle in rad."""
-    return ca.cos(_sx(x))
-
-
-def tan(x: Scalar) -> Expr:
-    """Tangent of an angle in rad."""
-    return ca.tan(_sx(x))
+sin = _elementary(ca.sin, "Sine of an angle in rad.")
+cos = _elementary(ca.cos, "Cosine of an angle in rad.")
+tan = _elementary(ca.tan, "Tangent of an angle in rad.")
+exp = _elementary(ca.exp, "Exponential function.")
+log = _elementary(ca.log, "Natural logarithm.")
+sqrt = _elementary(ca.sqrt, "Square root.")
+tanh = _elementary(ca.tanh, "Hyperbolic tangent.")
+absolute = _elementary(ca.fabs, "Absolute value.")
+sign = _elementary(ca.sign, "Sign: -1, 0 or 1.")
+floor = _elementary(
+    ca.floor, "Return the largest whole number that is not above a value, without an event: for what changes at events."
+)
 
 
 def atan2(y: Scalar, x: Scalar) -> Expr:
     """Angle in rad of the point (x, y)."""
     return ca.atan2(_sx(y), _sx(x))
-
-
-def exp(x: Scalar) -> Expr:
-    """Exponential function."""
-    return ca.exp(_sx(x))
-
-
-def log(x: Scalar) -> Expr:
-    """Natural logarithm."""
-    return ca.log(_sx(x))
-
-
-def sqrt(x: Scalar) -> Expr:
-    """Square root."""
-    return ca.sqrt(_sx(x))
-
-
-def tanh(x: Scalar) -> Expr:
-    """Hyperbolic tangent."""
-    return ca.tanh(_sx(x))
-
-
-def absolute(x: Scalar) -> Expr:
-    """Absolute value."""
-    return ca.fabs(_sx(x))
-
-
-def sign(x: Scalar) -> Expr:
-    """Sign: -1, 0 or 1."""
-    return ca.sign(_sx(x))
-
-
-def floor(x: Scalar) -> Expr:
-    """Return the largest whole number that is not above a value, without an event: for what changes at events."""
-    return ca.floor(_sx(x))
 
 
 def minimum(x: Scalar, y: Scalar) -> Expr:
@@ -123,24 +98,24 @@ def maximum(x: Scalar, y: Scalar) -> Expr:
 
 
 def where(condition: Expr | bool, then: Scalar, otherwise: Scalar) -> Expr:
-    """Choose by a condition, without an event; the branch not taken may be undefined."""
+    """Choose by a condition, without an event; the branch not taken may be undefined.
+
+    Args:
+        condition: a relation, or several joined with `all_of` and the like.
+        then: value where it holds.
+        otherwise: value where it does not.
+    """
     return ca.if_else(condition, _sx(then), _sx(otherwise))
 
 
 def all_of(*conditions: Expr) -> Expr:
     """All conditions hold."""
-    result: Any = conditions[0]
-    for condition in conditions[1:]:
-        result = ca.logic_and(result, condition)
-    return result
+    return functools.reduce(ca.logic_and, conditions)
 
 
 def any_of(*conditions: Expr) -> Expr:
     """At least one condition holds."""
-    result: Any = conditions[0]
-    for condition in conditions[1:]:
-        result = ca.logic_or(result, condition)
-    return result
+    return functools.reduce(ca.logic_or, conditions)
 
 
 def negate(condition: Expr) -> Expr:

@@ -10,6 +10,7 @@ import casadi as ca
 from modelica_like.errors import LanguageError, UnknownName, did_you_mean
 from modelica_like.language.expr import Expr, Scalar, Symbol, symbol_of
 from modelica_like.language.hold import Hold
+from modelica_like.language.places import NOWHERE
 from modelica_like.language.transition import StartMode, Transition
 
 
@@ -129,13 +130,20 @@ class BoundMode:
 
     def go(
         self, source: str | tuple[str, ...], target: str, *, when: Expr | None = None, at: Scalar | None = None,
-        reset: Mapping[Expr, Scalar] | None = None, notice: str = "", fails: bool = False,
+        reset: Mapping[Expr, Scalar] | None = None, notice: str = "", because: str = "", fails: bool = False,
     ) -> Transition:  # fmt: skip
         """Declare a transition: a state event (`when`) or a time event (`at`).
 
-        With a `notice`, such as "exceeds {w_max} rad/s", the report of a run says that it happened: the name of the
-        component comes first, and values of its parameters stand for their names. With `fails` the run ends there, with
-        the notice as an error.
+        Args:
+            source: the mode that it leaves, several of them, or `*` for all.
+            target: the mode that it enters.
+            when: it happens as soon as this condition holds.
+            at: it happens at this time in s, which parameters and discrete values determine.
+            reset: new values of variables and discrete values, in SI units.
+            notice: what the report of a run says, such as "exceeds {w_max} rad/s": the name of the component comes
+                first, and values of its parameters stand for their names.
+            because: why it happens, in a few words, such as "slip reached zero"; else the condition as it is written.
+            fails: the run ends there, with the notice as an error.
 
         Raises:
             UnknownName: a mode does not exist.
@@ -147,7 +155,7 @@ class BoundMode:
         if (when is None) == (at is None):
             raise LanguageError(f"{self.mode.label}.go(…, '{target}') needs either `when=` or `at=`.")
         moment = None if at is None else cast(Expr, ca.SX(cast(Any, at)))
-        return Transition(self, sources, target, when, moment, dict(reset or {}), notice=notice, fails=fails)
+        return Transition(self, sources, target, when, moment, dict(reset or {}), NOWHERE, notice, because, fails)
 
     def initially(self, target: str, *, when: Expr) -> StartMode:
         """Declare the mode at the start, if the condition holds there."""

@@ -2,40 +2,22 @@
 
 from __future__ import annotations
 
+import ast
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from modelica_like.errors import LanguageError, Source, did_you_mean
 from modelica_like.language.expr import TIME, Expr, Symbol, symbols_in
 from modelica_like.language.fields import Discrete, Input, Parameter, Variable
 from modelica_like.language.places import NOWHERE
 
+if TYPE_CHECKING:
+    from modelica_like.language.mode import BoundMode
+
 NAME_IN_NOTICE = re.compile(r"\{(\w+)\}")
 """A parameter in the notice of a transition."""
-
-
-class NamedModes(Protocol):
-    """The declaration of a mode."""
-
-    def number(self, name: str) -> int:
-        """Return the number of a mode."""
-        ...
-
-
-class ModeOf(Protocol):
-    """The mode of one component."""
-
-    @property
-    def mode(self) -> NamedModes:
-        """Its declaration."""
-        ...
-
-    @property
-    def symbol(self) -> Symbol:
-        """Its symbol."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,10 +32,11 @@ class Transition:
         at: time of a time event in s, or None.
         reset: new values of states and discrete values.
         notice: what the user is told when it happens, without the name of the component.
+        because: why it happens, in a few words.
         fails: the run ends there, with an error.
     """
 
-    mode: ModeOf
+    mode: BoundMode
     sources: tuple[str, ...]
     target: str
     when: Expr | None
@@ -61,14 +44,26 @@ class Transition:
     reset: Mapping[Expr, Any]
     source: Source = NOWHERE
     notice: str = ""
+    because: str = ""
     fails: bool = False
+
+    def reason(self) -> str:
+        """Return in words why it happens: as declared, or the condition as it is written."""
+        if self.because or self.at is not None:
+            return self.because or "its time has come"
+        try:
+            call: Any = ast.parse(self.source.text.removeprefix("yield ").strip(), mode="eval").body
+            written = next(one.value for one in call.keywords if one.arg == "when")
+        except (SyntaxError, AttributeError, StopIteration):  # not written as one call
+            return ""
+        return ast.unparse(written).replace("self.", "")
 
 
 @dataclass(frozen=True, eq=False)
 class StartMode:
     """Choice of a mode at the start."""
 
-    mode: ModeOf
+    mode: BoundMode
     target: str
     when: Expr
     source: Source = NOWHERE
@@ -81,6 +76,11 @@ Events = Iterator[EventStatement]
 
 def as_event(item: Any, source: Source, component: str) -> EventStatement:
     """Read what `events()` yielded.
+
+    Args:
+        item: what it yielded.
+        source: where.
+        component: name of the class, for messages.
 
     Raises:
         LanguageError: it is neither a transition nor a choice of the start mode.
@@ -98,11 +98,8 @@ def as_event(item: Any, source: Source, component: str) -> EventStatement:
 
 def _check_transition(transition: Transition, source: Source, component: str) -> None:
     """Check that the time of a time event is known ahead, and that only variables and discrete values are reset."""
-    moving = (
-        []
-        if transition.at is None
-        else [s for s in symbols_in(transition.at) if s is TIME or isinstance(_field(s), Variable)]
-    )
+    asked = () if transition.at is None else symbols_in(transition.at)
+    moving = [s for s in asked if s is TIME or isinstance(_field(s), Variable)]
     if moving:
         raise LanguageError(
             f"{component}: the time of an event depends on {moving[0].name}, so it is not known ahead.",
@@ -126,7 +123,7 @@ def _check_notice(transition: Transition, source: Source, component: str) -> Non
         if name not in parameters:
             raise LanguageError(
                 f"{component}: the notice of an event names {name}, "
-                f"which is no parameter{did_you_mean(name, parameters) or '.'}",
+                f"which is not a parameter{did_you_mean(name, parameters) or '.'}",
                 where=source,
             )
 

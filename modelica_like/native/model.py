@@ -62,15 +62,15 @@ class NativeModel:
 
     def __init__(self, model: CompiledDae, start: StartKind | None = None, fixed_step: float = 0.0) -> None:
         twin = model.twin(settings={**model.settings, **({"start": start} if start else {})})
-        variables = interface(twin).variables
-        data = model_file(make_tables(twin), variables, "{native}", Options.rtol, fixed_step)
+        face = interface(twin)
+        data = model_file(make_tables(twin, face.start), face.variables, "{native}", Options.rtol, fixed_step)
         self.library = library()
         message = ctypes.create_string_buffer(MESSAGE_LENGTH)
         self.address = self.library.open(data, len(data), message)
         if not self.address:
             raise ModelicaLikeError(message.value.decode())
         weakref.finalize(self, self.library.close, self.address)
-        self.variables = {one.name: one for one in variables}
+        self.variables = {one.name: one for one in face.variables}
         self.name, self.sizes = model.name, (len(model.states), len(model.implicit), model.discrete_size)
 
     @staticmethod

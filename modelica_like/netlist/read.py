@@ -33,7 +33,7 @@ def load(path: str | Path) -> Assembly:
         path: a TOML file.
 
     Raises:
-        NetlistError: the file cannot be read, or is no netlist.
+        NetlistError: the file cannot be read, or is not a netlist.
         CyclicAssembly: it contains itself.
         ModelicaLikeError: types, values or paths in it are wrong; several errors come as `WiringErrors`.
     """
@@ -155,7 +155,7 @@ class _Task:
         if kind.endswith(".toml"):
             part: Component = self.loader.load(Path(self.document.lines.file).parent / kind, self.chain).copy()
         else:
-            part = new_component(find_type(kind), values)
+            part = new_component(find_type(kind, Path(self.document.lines.file).parent), values)
         for key, value in values.items():
             self._give(part, key, value, f"{name}.{key}")
         self.loader.count(table.get("count", 1) * sum(1 for _ in part.walk()))

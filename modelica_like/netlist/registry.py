@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Mapping
+import sys
+import traceback
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
-from importlib.metadata import entry_points
+from importlib.machinery import PathFinder
+from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
 from types import MappingProxyType, ModuleType
 
 from modelica_like.errors import NetlistError, UnknownName, did_you_mean
@@ -13,6 +17,10 @@ from modelica_like.language import Component
 
 GROUP = "modelica_like.libraries"
 """Entry-point group by which libraries make themselves known; each entry is a module with `__all__`."""
+_HOME = str(Path(__file__).parents[2])
+"""Where this package lies, and beside it the library that comes with it."""
+_FAILURES = (ImportError, SyntaxError, NameError, AttributeError, TypeError, ValueError, LookupError, ArithmeticError)
+"""What the lines of a module may raise while it is imported."""
 
 
 @lru_cache(maxsize=1)
@@ -31,13 +39,31 @@ def _libraries() -> Mapping[str, Mapping[str, ModuleType]]:
     """Return the libraries of each public name; a library need not import what nobody asks for."""
     libraries: dict[str, dict[str, ModuleType]] = {}
     for entry in sorted(entry_points(group=GROUP), key=lambda entry: entry.name):
-        module = imported(entry.value, f"The library '{entry.name}'")
+        module = library_module(entry)
         for name in getattr(module, "__all__", ()):
             libraries.setdefault(name, {})[entry.name] = module
     for name, modules in libraries.items():
         if len(modules) > 1:
             _type_in(name, modules)
     return libraries
+
+
+def library_module(entry: EntryPoint) -> ModuleType:
+    """Import an installed library, whatever modules of the same name lie in a user's folder.
+
+    Raises:
+        NetlistError: it cannot be imported, or a user's program has taken its name.
+    """
+    distribution = getattr(entry, "dist", None)
+    homes = [*([str(distribution.locate_file(""))] if distribution else []), _HOME]
+    module = imported(entry.value, f"The library '{entry.name}'", homes)
+    spec = PathFinder.find_spec(entry.value, homes)
+    if spec is not None and spec.origin not in (None, _place(module)):
+        raise NetlistError(
+            f"The library '{entry.name}' is hidden by '{_place(module)}', which has taken its name '{entry.value}'.",
+            advice="Give that module another name.",
+        )
+    return module
 
 
 def _library_type(name: str) -> type[Component] | None:
@@ -66,38 +92,53 @@ def _type_in(name: str, modules: Mapping[str, ModuleType]) -> type[Component] | 
     return kinds[0] if kinds else None
 
 
-def imported(module: str, what: str) -> ModuleType:
+def imported(module: str, what: str, folders: Sequence[str] = ()) -> ModuleType:
     """Import a module.
 
     Args:
         module: its full name.
         what: how to call it in a message.
+        folders: where to look first.
 
     Raises:
         NetlistError: it cannot be imported.
     """
+    importlib.invalidate_caches()
+    before = list(sys.path)
+    sys.path[:0] = folders
     try:
         return importlib.import_module(module)
-    except (ImportError, SyntaxError) as error:
+    except _FAILURES as error:
         raise _not_imported(what, error) from error
+    finally:
+        sys.path[:] = before
 
 
 def _not_imported(what: str, error: Exception) -> NetlistError:
-    return NetlistError(f"{what} cannot be imported: {error}.")
+    if isinstance(error, ImportError | SyntaxError):
+        return NetlistError(f"{what} cannot be imported: {error}.")
+    frame = traceback.extract_tb(error.__traceback__)[-1]
+    place = f"{Path(frame.filename).name}:{frame.lineno}"
+    return NetlistError(f"{what} cannot be imported: {type(error).__name__}: {error} ({place}).")
 
 
-def find_type(name: str) -> type[Component]:
+def _place(module: ModuleType) -> str:
+    return getattr(module, "__file__", None) or next(iter(getattr(module, "__path__", ())), "the program")
+
+
+def find_type(name: str, folder: Path | None = None) -> type[Component]:
     """Return the component type that a netlist means by `is`.
 
     Args:
         name: a type of an installed library (`Clutch`), or a class of a module (`my_parts:Coupling`).
+        folder: of the netlist; modules are looked for there, in the current directory, and among what is installed.
 
     Raises:
         UnknownName: there is no such type.
-        NetlistError: the module cannot be imported, or the class is no component.
+        NetlistError: the module cannot be imported, or the class is not a component.
     """
     if ":" in name:
-        return _class_of_module(name)
+        return _class_of_module(name, folder or Path())
     kind = _library_type(name)
     if kind is None:
         types = library_types()
@@ -107,11 +148,11 @@ def find_type(name: str) -> type[Component]:
     return kind
 
 
-def _class_of_module(name: str) -> type[Component]:
+def _class_of_module(name: str, folder: Path) -> type[Component]:
     module_name, _, class_name = name.partition(":")
     if not all(part.isidentifier() for part in module_name.split(".")):
-        raise NetlistError(f"'{name}' is no class of a module.", advice='Write "package.module:Class".')
-    module = imported(module_name, f"The module '{module_name}'")
+        raise NetlistError(f"'{name}' is not a class of a module.", advice='Write "package.module:Class".')
+    module = _own_module(module_name, [str(one.resolve()) for one in (folder, Path())])
     kind = getattr(module, class_name, None)
     if kind is None:
         known = [key for key, value in vars(module).items() if isinstance(value, type) and issubclass(value, Component)]
@@ -121,6 +162,27 @@ def _class_of_module(name: str) -> type[Component]:
     if not (isinstance(kind, type) and issubclass(kind, Component)):
         raise NetlistError(f"'{name}' is not a component class.")
     return kind
+
+
+def _own_module(name: str, folders: list[str]) -> ModuleType:
+    """Import a module that may lie beside the netlist; one that is loaded from elsewhere is not taken for it."""
+    _libraries()  # loaded first, they cannot be hidden
+    importlib.invalidate_caches()
+    top = name.partition(".")[0]
+    home = next((one for one in folders if PathFinder.find_spec(top, [one]) is not None), None)
+    known = sys.modules.get(top)
+    ours = {"modelica_like", *(entry.value.partition(".")[0] for entry in entry_points(group=GROUP))}
+    if home is None or top in ours:
+        return imported(name, f"The module '{name}'")
+    if known is not None and Path(_place(known)).resolve().parent not in (Path(home), Path(home) / top):
+        raise NetlistError(
+            f"The module '{top}' of '{home}' cannot be used: '{_place(known)}' is loaded under this name.",
+            advice="Give one of the two another name.",
+        )
+    module = imported(name, f"The module '{name}'", [home])
+    if home not in sys.path:
+        sys.path.append(home)  # other processes, which are given the path, find it, too
+    return module
 
 
 def type_name(kind: type[Component]) -> str:

@@ -11,6 +11,7 @@ from rich.table import Table
 
 from modelica_like.language.transition import NAME_IN_NOTICE
 from modelica_like.report.types import table
+from modelica_like.solve.recorder import Event
 from modelica_like.solve.trajectories import Trajectories
 
 if TYPE_CHECKING:
@@ -19,14 +20,15 @@ if TYPE_CHECKING:
 _SHOWN = 20
 
 
-def run_report(solution: Trajectories, *, energy: bool = True) -> RenderableType:
+def run_report(solution: Trajectories, *, energy: bool = True, debug: bool = False) -> RenderableType:
     """Return events, energy balance and statistics of a run.
 
     Args:
         solution: the run.
         energy: False: leave out the energy balance.
+        debug: name the line of every event's transition.
     """
-    parts = _head(solution, notices(solution))
+    parts = _head(solution, notices(solution), debug=debug)
     if energy:
         parts += ["", energy_table(solution), f"[dim]{closure_line(solution)}[/]"]
         parts += [f"[bold]{escape(notice)}[/]" for notice in solution.energy().notices]
@@ -34,28 +36,32 @@ def run_report(solution: Trajectories, *, energy: bool = True) -> RenderableType
     return Group(*parts)
 
 
-def _head(solution: Trajectories, notices: Iterable[str]) -> list[RenderableType]:
+def _head(solution: Trajectories, notices: Iterable[str], *, debug: bool = False) -> list[RenderableType]:
     span = f"{solution.time[0]:g} s to {solution.time[-1]:g} s"
     parts: list[RenderableType] = [f"[bold]{escape(solution.model.name)}[/]  {span}"]
-    parts += ["", events_table(solution)] if solution.events else []
+    parts += ["", events_table(solution, debug=debug)] if solution.events else []
     return parts + [f"[bold]{escape(notice)}[/]" for notice in notices]
 
 
-def events_table(solution: Trajectories) -> Table:
-    """Return the mode changes; of many only the first and the last."""
-    rows = [
-        (f"{event.time:.9g}", event.mode, event.before, event.after, f"{event.source}".partition(" `")[0])
-        for event in solution.events
-    ]
+def events_table(solution: Trajectories, *, debug: bool = False) -> Table:
+    """Return the mode changes; of many only the first and the last. `debug` names the lines of their transitions."""
+    columns = 6 if debug else 5
+    rows = [_event_row(solution, event)[:columns] for event in solution.events]
     if len(rows) > _SHOWN:
-        rows[_SHOWN // 2 : -_SHOWN // 2] = [("…", "", "", "", "")]
-    return table(_mode_changes(len(solution.events)), "time in s>", "mode", "from", "to", "because of", rows=rows)
+        rows[_SHOWN // 2 : -_SHOWN // 2] = [("…", *[""] * (len(rows[0]) - 1))]
+    heads = ("time in s>", "mode", "from", "to", "because", "declared in")[:columns]
+    return table(_mode_changes(len(solution.events)), *heads, rows=rows)
+
+
+def _event_row(solution: Trajectories, event: Event) -> tuple[str, ...]:
+    reason = "an impact" if event.transition < 0 else solution.model.transitions[event.transition].because
+    return f"{event.time:.9g}", event.mode, event.before, event.after, reason, f"{event.source}".partition(" `")[0]
 
 
 def notices(solution: Trajectories) -> list[str]:
     """Return what a run and its events have to say: one sentence for each kind of event, with the time of the first."""
     told: dict[tuple[str, str], str] = {}
-    for event in solution.events:
+    for event in (one for one in solution.events if one.transition >= 0):
         notice, (component, dot, _) = solution.model.transitions[event.transition].notice, event.mode.rpartition(".")
         if notice and (component, notice) not in told:
             values = NAME_IN_NOTICE.sub(lambda name, owner=component + dot: f"{solution[owner + name[1]][0]:g}", notice)

@@ -29,7 +29,7 @@ def structure_report(component: Component) -> RenderableType:
     flat = flatten(component)
     reduced = reduce(flat)
     parts: list[RenderableType] = [_sizes(flat, reduced), "", _energy(flat)]
-    parts += ["", *(f"[dim]{escape(notice.text)}[/]" for notice in reduced.notices)] if reduced.notices else []
+    parts += ["", *(f"[dim]{escape(notice)}[/]" for notice in reduced.notices)] if reduced.notices else []
     return Group(*parts)
 
 

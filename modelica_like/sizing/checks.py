@@ -7,13 +7,13 @@ import importlib.util
 import inspect
 from collections.abc import Callable, Iterator, Mapping
 from functools import lru_cache
-from importlib.metadata import entry_points
+from importlib.metadata import EntryPoint, entry_points
 from types import MappingProxyType, ModuleType
 from typing import Any, get_args
 
 from modelica_like.errors import NetlistError, UnknownName, did_you_mean
 from modelica_like.language.results import Result, hints, quantity, quantity_of
-from modelica_like.netlist.registry import GROUP, imported
+from modelica_like.netlist.registry import GROUP, imported, library_module
 from modelica_like.units import Unit, parse_unit
 
 Check = Callable[..., Any]
@@ -30,19 +30,18 @@ def design_checks() -> Mapping[str, Check]:
     """
     checks: dict[str, Check] = {}
     for entry in sorted(entry_points(group=GROUP), key=lambda entry: entry.name):
-        for name, function in _checks_of(entry.value, entry.name):
+        for name, function in _checks_of(entry):
             if checks.setdefault(name, function) is not function:
                 raise NetlistError(f"Two libraries have a design check '{name}': {checks[name].__module__} and "
                                    f"{function.__module__}.")  # fmt: skip
     return MappingProxyType(dict(sorted(checks.items())))
 
 
-def _checks_of(library: str, entry: str) -> Iterator[tuple[str, Check]]:
-    package = imported(library, f"The library '{entry}'")
-    name = f"{library}.sizing"
+def _checks_of(entry: EntryPoint) -> Iterator[tuple[str, Check]]:
+    package, name = library_module(entry), f"{entry.value}.sizing"
     if not hasattr(package, "__path__") or importlib.util.find_spec(name) is None:
         return
-    module: ModuleType = imported(name, f"The design checks of the library '{entry}'")
+    module: ModuleType = imported(name, f"The design checks of the library '{entry.name}'")
     for member in getattr(module, "__all__", ()):
         function = getattr(module, member)
         if inspect.isfunction(function) and is_result(hints(function).get("return")):

@@ -62,8 +62,7 @@ class BlockSolver:
         residual: column of residuals.
         unknowns: column of symbols to solve for.
         volatile: column of the symbols that change during a run (states, unknowns, modes, time); a coefficient
-            without them, of
-            parameters only, is a safe divisor.
+            without them, of parameters only, is a safe divisor.
     """
 
     def __init__(self, residual: Any, unknowns: Any, volatile: Any) -> None:
@@ -124,10 +123,7 @@ class BlockSolver:
     def _tear(
         self, rows: tuple[int, ...], columns: tuple[int, ...]
     ) -> tuple[list[tuple[int, int]], list[int], list[int]]:
-        """Find a sequence of (equation.
-
-        Unknown) to solve one after the other, the torn unknowns, and the equations left.
-        """
+        """Return pairs (equation, unknown) to solve one after the other, the torn unknowns, and the equations left."""
         inside = set(columns)
         open_unknowns = {r: {c for c in self.rows[r] if c in inside} for r in rows}
         users: dict[int, list[int]] = {}

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import casadi as ca
 
 from modelica_like.errors import Overdetermined, Source, Underdetermined
-from modelica_like.flatten.model import Origin
+from modelica_like.flatten.model import FlatModel, Origin
+from modelica_like.language.declared import Domain
 from modelica_like.structure.system import System
 
 _SHOWN = 6
@@ -13,6 +16,11 @@ _SHOWN = 6
 
 def check_solvable(system: System, incidence: list[list[int]], contradictions: list[Origin]) -> None:
     """Check that the equations can determine every variable, derivatives aside.
+
+    Args:
+        system: the equations.
+        incidence: level numbers in each equation.
+        contradictions: where the equations come from that the alias elimination found to say too much.
 
     Raises:
         Underdetermined: some unknowns have too few equations.
@@ -34,9 +42,9 @@ def check_solvable(system: System, incidence: list[list[int]], contradictions: l
     under_rows, under_cols = rows[coarse_rows[3] :], cols[coarse_cols[2] :]
     if len(over_rows) > len(over_cols):
         over, under = ([_chain_name(system, chains[c]) for c in block] for block in (over_cols, under_cols))
-        raise _overdetermined([system.origins[r] for r in over_rows], over, under)
+        raise _overdetermined(system.model, [system.origins[r] for r in over_rows], over, under)
     if contradictions:
-        raise _contradiction(contradictions)
+        raise _contradiction(system.model, contradictions)
     if len(under_cols) > len(under_rows):
         raise _underdetermined(
             system,
@@ -56,7 +64,7 @@ def _list(names: list[str]) -> str:
     return f"{shown}, … ({len(names)} in all)" if len(names) > _SHOWN else shown
 
 
-def _places(origins: list[Origin]) -> list[Source]:
+def _places(origins: Sequence[Origin]) -> list[Source]:
     return list(dict.fromkeys(o.source for o in origins if o.source.file))[:_SHOWN]
 
 
@@ -76,25 +84,64 @@ def _underdetermined(
     )
 
 
-def _overdetermined(origins: list[Origin], over: list[str], under: list[str]) -> Overdetermined:
-    parts = list(dict.fromkeys(o.path or o.kind for o in origins))
+def _overdetermined(model: FlatModel, origins: list[Origin], over: list[str], under: list[str]) -> Overdetermined:
+    parts = _parts(origins)
     unknowns = f"{len(over)} unknown{'s' if len(over) != 1 else ''} ({_list(over) or 'none'})"
     what = f"{len(origins)} equations determine only {unknowns}: {_list(parts)}."
-    where = _places(origins)
-    if len(parts) > 1 or not under:
-        why, advice = "Two rigid parts fix the same speed or torque.", "Remove one, or put a spring or clutch between."
-    else:
+    if len(parts) == 1 and under:
         why = f"On the other hand {_list(under)} lack{'s' if len(under) == 1 else ''} an equation."
         advice = f"Look at the equations of {parts[0]}: is another variable meant in one of them?"
-    return Overdetermined(what, where=where, why=why, advice=advice)
+        return Overdetermined(what, where=_places(origins), why=why, advice=advice)
+    return doubly_fixed(model, origins, what, "Two rigid parts fix the same {potential} or {flow}.")
 
 
-def _contradiction(origins: list[Origin]) -> Overdetermined:
-    parts = list(dict.fromkeys(o.path or o.kind for o in origins))
-    fix = "fixes" if len(parts) == 1 else "fix"
-    return Overdetermined(
-        f"{_list(parts)} {fix} the same angle, speed or torque more than once.",
-        where=_places(origins),
-        why="Two parts prescribe it, or rigid parts form a loop.",
-        advice="Remove one, or put a spring or clutch between.",
-    )
+def _contradiction(model: FlatModel, origins: list[Origin]) -> Overdetermined:
+    parts = _parts(origins)
+    what = f"{_list(parts)} {'fixes' if len(parts) == 1 else 'fix'} the same {{potential}} or {{flow}} more than once."
+    return doubly_fixed(model, origins, what, "Two parts prescribe it, or rigid parts form a loop.")
+
+
+def doubly_fixed(model: FlatModel, origins: Sequence[Origin], what: str, why: str) -> Overdetermined:
+    """Return the error about equations that fix the same more than once.
+
+    Args:
+        model: the flat model.
+        origins: where the equations come from.
+        what: what is wrong, with {potential} and {flow} in the place of the domain's words.
+        why: the usual reason, likewise.
+    """
+    domain, network = _domain(model, origins)
+    words = {"potential": domain.potential, "flow": domain.flow}
+    where = _places(origins)
+    advice = f"Remove one, or put {domain.separator} between."
+    if domain.reference and network and not any(_kind(model, path) == domain.reference for path in network):
+        where = [model.components[path].place_of() for path in network][:_SHOWN]
+        what = f"The network of {_list(network)} has no {domain.reference}."
+        why = f"Every {domain.potential} in it counts from another one; none is zero."
+        advice = f'Connect a part that is = "{domain.reference}" to it.'
+    return Overdetermined(what.format(**words), where=where, why=why.format(**words), advice=advice)
+
+
+def _parts(origins: Sequence[Origin]) -> list[str]:
+    return list(dict.fromkeys(o.path or o.kind for o in origins))
+
+
+def _kind(model: FlatModel, path: str) -> str:
+    return type(model.components[path]).__name__
+
+
+def _domain(model: FlatModel, origins: Sequence[Origin]) -> tuple[Domain, list[str]]:
+    """Return the domain of what equations come from, and the parts that its connections join to that, in order."""
+    ends = {f"{path}.{name}" if path else name: (path, connector)
+            for path, part in model.components.items() for name, connector in part.connectors.items()}  # fmt: skip
+    named = {path for origin in origins for path in origin.path.split(" – ")}
+    found = [one for end, one in ends.items() if not named.isdisjoint((end, one[0]))]
+    if not found:
+        return Domain(), []
+    domain = found[0][1].domain
+    sets = [origin.path.split(" – ") for one in model.linear if (origin := one.origin).kind == "connection"]
+    joined = [{ends[end][0] for end in one} for one in sets if one[0] in ends and ends[one[0]][1].domain is domain]
+    network = {path for path, connector in found if connector.domain is domain}
+    while larger := [one for one in joined if not (one <= network or one.isdisjoint(network))]:
+        network = network.union(*larger)
+    return domain, [path for path in model.components if path in network]

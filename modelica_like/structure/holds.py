@@ -30,7 +30,7 @@ class HeldMotion:
     """A motion that a mode of a component holds.
 
     Attributes:
-        path: the component.
+        component: path of the component.
         mode: position of the mode in d.
         number: number of the mode that holds.
         loose: number of a mode that does not, or -1.
@@ -38,10 +38,11 @@ class HeldMotion:
         reaction: variable that holds it, or -1.
         row: position of its equation in the residual.
         rigid: the equation says nothing but der(motion) = 0.
-        approach: position of its approach in d.
+        approach: position in d of the derivative that the motion is to have; zero but in impacts.
+        state: (state, factor) if the motion is one.
     """
 
-    path: str
+    component: str
     mode: int
     number: int
     loose: int
@@ -50,6 +51,7 @@ class HeldMotion:
     row: int
     rigid: bool
     approach: int
+    state: tuple[int, float] | None = None
 
 
 @dataclass(frozen=True)

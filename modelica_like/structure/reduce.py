@@ -19,13 +19,6 @@ from modelica_like.structure.states import select_states
 from modelica_like.structure.system import System, build_system
 
 
-@dataclass(frozen=True)
-class Notice:
-    """Something worth knowing about the structure that is not an error."""
-
-    text: str
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class ReducedDae:
     """Index-1 system: der(x) = ode(x, z, p, d, t), 0 = alg(x, z, p, d, t).
@@ -108,19 +101,14 @@ class ReducedDae:
         )
 
     @property
-    def notices(self) -> tuple[Notice, ...]:
+    def notices(self) -> tuple[str, ...]:
         """What a reader should know: a high index and the states that were kept."""
         if not self.differentiated:
             return ()
-        places = list(dict.fromkeys(o.path or o.kind for o in self.differentiated))
-        couple = "couples" if len(places) == 1 else "couple"
-        count = len(self.differentiated)
-        return (
-            Notice(
-                f"Index {self.index}: {' and '.join(places[:4])}{' …' if len(places) > 4 else ''} {couple} motions. "
-                f"{count} constraint{'s' if count > 1 else ''} differentiated; states kept: {', '.join(self.states)}."
-            ),
-        )
+        places, count = list(dict.fromkeys(o.path or o.kind for o in self.differentiated)), len(self.differentiated)
+        named = f"{' and '.join(places[:4])}{' …' if len(places) > 4 else ''} couple{'s' if len(places) == 1 else ''}"
+        text = f"{count} constraint{'s' if count > 1 else ''} differentiated; states kept: {', '.join(self.states)}."
+        return (f"Index {self.index}: {named} motions. {text}",)
 
 
 def reduce(flat: FlatModel) -> ReducedDae:
@@ -143,14 +131,15 @@ def reduce(flat: FlatModel) -> ReducedDae:
     unknowns = _unknowns(system, states)
     if flags.settle(residual, unknowns):
         residual, origins = _differentiate(system, counts)
-    solved = BlockSolver(residual, _column(system, unknowns), _volatile(system)).run()
+    solved = BlockSolver(residual, system.column(unknowns), _volatile(system)).run()
     order = [(system.symbols[unknowns[k]], expression) for k, expression in solved.order]
     circuits = find_circuits(system, holds, order, states)
     if circuits:
         residual = share_reactions(system, holds, circuits, residual)
-        solved = BlockSolver(residual, _column(system, unknowns), _volatile(system)).run()
+        solved = BlockSolver(residual, system.column(unknowns), _volatile(system)).run()
     reduced = _assemble(system, counts, states, unknowns, origins, solved)
-    return replace(reduced, holds=holds, circuits=tuple(circuits))
+    held = tuple(replace(one, state=reduced.node_states[one.motion]) for one in holds)
+    return replace(reduced, holds=held, circuits=tuple(circuits))
 
 
 def _check_input_rates(system: System) -> None:
@@ -165,17 +154,13 @@ def _check_input_rates(system: System) -> None:
             )
 
 
-def _column(system: System, levels: list[int]) -> Any:
-    return system.column(levels)
-
-
 def _volatile(system: System) -> Any:
-    return ca.vertcat(_column(system, list(range(len(system.symbols)))), system.model.d, system.model.time)
+    return ca.vertcat(system.everything, system.model.d, system.model.time)
 
 
 def _incidence(system: System) -> list[list[int]]:
     """Level numbers in each residual."""
-    symbols = _column(system, list(range(len(system.symbols))))
+    symbols = system.everything
     function = ca.Function("residual", [symbols, system.model.p, system.model.d, system.model.time], [system.residual])
     rows: list[list[int]] = [[] for _ in range(system.residual.numel())]
     for row, column in zip(*function.jac_sparsity(0, 0).get_triplet(), strict=True):
@@ -190,7 +175,7 @@ def _top_slopes(system: System, counts: list[int]) -> list[dict[int, float]]:
     if not rows:
         return slopes
     model = system.model
-    symbols = _column(system, list(range(len(system.symbols))))
+    symbols = system.everything
     # d e^(c) / d v^(d) equals d e / d v^(d - c), so the original equations are enough.
     jacobian = ca.jacobian(system.residual[rows], symbols)
     function = ca.Function("slopes", [symbols, model.p, model.d, model.time], [jacobian])
@@ -218,9 +203,9 @@ def _differentiate(system: System, counts: list[int]) -> tuple[Any, list[Origin]
         current, rows = current[keep], [rows[k] for k in keep]
         _check_inputs(system, current, rows)
         moving = [n for n in range(len(system.levels)) if system.derivative(n) is not None]
-        rates = _column(system, [number for n in moving if (number := system.derivative(n)) is not None])
+        rates = system.column([number for n in moving if (number := system.derivative(n)) is not None])
         by_time = ca.jtimes(current, model.time, ca.SX(1))
-        current = ca.jtimes(current, _column(system, moving), rates) + by_time
+        current = ca.jtimes(current, system.column(moving), rates) + by_time
         residuals.append(current)
         origins += [system.origins[row] for row in rows]
         times += 1
@@ -231,7 +216,7 @@ def _check_inputs(system: System, equations: Any, rows: list[int]) -> None:
     unknown_rates = [level for level in system.inputs if system.derivative(level) is None]
     if not unknown_rates:
         return
-    inputs = _column(system, unknown_rates)
+    inputs = system.column(unknown_rates)
     for place, depends in enumerate(ca.which_depends(equations, inputs, 1, True)):
         if depends:
             origin = system.origins[rows[place]]
@@ -251,30 +236,33 @@ def _unknowns(system: System, states: list[int]) -> list[int]:
 def _assemble(
     system: System, counts: list[int], states: list[int], unknowns: list[int], origins: list[Origin], solved: Solved
 ) -> ReducedDae:
+    """Put the parts of the reduced system together.
+
+    Args:
+        system: the equations over levels.
+        counts: how often each of them is differentiated.
+        states: levels that are states.
+        unknowns: levels that were solved for; positions in `solved` are positions in this list.
+        origins: of all equations, differentiated ones included; positions in blocks are positions in this list.
+        solved: the blocks.
+    """
     model, levels = system.model, system.levels
-    symbols = [system.symbols[unknowns[k]] for k, _ in solved.order]
-    determinants = [expression for _, expression in solved.determinants]
-    everything = _column(system, list(range(len(levels))))
-    results: list[Any] = [everything, *solved.alg, *determinants]
-    if symbols:
-        _, results = ca.substitute_inplace(symbols, [e for _, e in solved.order], results, False)
-    level_values = results[0]
-    alg = results[1 : 1 + len(solved.alg)]
-    place = ca.Function("nodes", [everything, model.p], [system.node_values])
+    level_values, alg, determinants = _written_out(system, unknowns, solved)
+    place = ca.Function("nodes", [system.everything, model.p], [system.node_values])
     z_levels = [unknowns[k] for k in solved.z]
     rates = [level_values[n] for s in states if (n := system.derivative(s)) is not None]
-    blocks = solved.blocks
     told = [
         (tuple(levels[unknowns[k]].name for k in block.unknowns), tuple(origins[k] for k in block.equations))
-        for block in blocks
+        for block in solved.blocks
     ]
+    numbers = [number for number, _ in solved.determinants]
     return ReducedDae(
         flat=model,
         states=tuple(levels[s].name for s in states),
         implicit=tuple(levels[n].name for n in z_levels),
-        x=_column(system, states),
-        z=_column(system, z_levels),
-        u=_column(system, system.inputs),
+        x=system.column(states),
+        z=system.column(z_levels),
+        u=system.column(system.inputs),
         ode=ca.vertcat(*rates) if rates else ca.SX(0, 1),
         alg=ca.vertcat(*alg) if alg else ca.SX(0, 1),
         values=place(level_values, model.p),
@@ -282,17 +270,25 @@ def _assemble(
         guesses=tuple(levels[s].guess for s in states),
         nominals=tuple(levels[s].nominal for s in states),
         z_guesses=tuple(levels[n].guess for n in z_levels),
-        blocks=tuple(blocks),
-        determinants=tuple(
-            (*told[number], results[1 + len(solved.alg) + k]) for k, (number, _) in enumerate(solved.determinants)
-        ),
+        blocks=tuple(solved.blocks),
+        determinants=tuple((*told[number], one) for number, one in zip(numbers, determinants, strict=True)),
         index=max(counts, default=0) + 1,
         differentiated=tuple(system.origins[k] for k, count in enumerate(counts) if count),
         system=system,
-        implicit_blocks=tuple(pair for pair, block in zip(told, blocks, strict=True) if block.kind == "implicit"),
+        implicit_blocks=tuple(pair for pair, one in zip(told, solved.blocks, strict=True) if one.kind == "implicit"),
         level_values=level_values,
         explicit=tuple((unknowns[k], expression) for k, expression in solved.order),
     )
+
+
+def _written_out(system: System, unknowns: list[int], solved: Solved) -> tuple[Any, list[Any], list[Any]]:
+    """Values of all levels, residuals of z and determinants, in states, z and inputs instead of explicit unknowns."""
+    results: list[Any] = [system.everything, *solved.alg, *(expression for _, expression in solved.determinants)]
+    if solved.order:
+        symbols, expressions = [system.symbols[unknowns[k]] for k, _ in solved.order], [e for _, e in solved.order]
+        _, results = ca.substitute_inplace(symbols, expressions, results, False)
+    end = 1 + len(solved.alg)
+    return results[0], results[1:end], results[end:]
 
 
 def _node_states(system: System, states: list[int]) -> tuple[tuple[int, float] | None, ...]:

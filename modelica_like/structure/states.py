@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from modelica_like.errors import Overdetermined
+from modelica_like.structure.diagnose import doubly_fixed
+from modelica_like.structure.matching import Elimination
 from modelica_like.structure.system import System
-
-_TINY = 1e-9
 
 
 def select_states(system: System, counts: list[int], slopes: list[dict[int, float]]) -> list[int]:
@@ -53,42 +53,17 @@ def _independent(rows: list[int], columns: list[int], slopes: list[dict[int, flo
         for column, slope in slopes[row].items():
             if column in entries and slope:
                 entries[column][row] = slope
-    reduced: dict[int, dict[int, float]] = {}
-    chosen: dict[int, int] = {}
+    found, chosen = Elimination(len(rows)), dict[int, int]()
     for column in columns:
-        if len(chosen) == len(rows):
+        if found.size == len(rows):
             break
-        vector = _reduce(dict(entries[column]), reduced)
-        if vector:
-            pivot = max(vector, key=lambda r: abs(vector[r]))
-            reduced[pivot] = vector
-            chosen[column] = pivot
+        if found.add(entries[column]):
+            chosen[column] = found.pivot
     return chosen
-
-
-def _reduce(vector: dict[int, float], reduced: dict[int, dict[int, float]]) -> dict[int, float]:
-    """Eliminate the pivot rows of earlier columns; what is left is independent of them."""
-    scale = max((abs(value) for value in vector.values()), default=0.0)
-    done: set[int] = set()
-    while pivots := [row for row in vector if row in reduced and row not in done]:
-        pivot = pivots[0]
-        done.add(pivot)
-        factor = vector[pivot] / reduced[pivot][pivot]
-        for row, value in reduced[pivot].items():
-            vector[row] = vector.get(row, 0.0) - factor * value
-            if row in done and row != pivot:
-                done.discard(row)
-        vector.pop(pivot)
-        vector = {row: value for row, value in vector.items() if abs(value) > _TINY * scale}
-    return vector
 
 
 def _dependent(system: System, equations: list[int]) -> Overdetermined:
     origins = [system.origins[e] for e in equations]
     places = ", ".join(dict.fromkeys(o.path or o.kind for o in origins))
-    return Overdetermined(
-        f"The motion is constrained twice: the constraint of {places} follows from others.",
-        where=[o.source for o in origins],
-        why="Rigid parts form a loop, or two parts fix the same speed.",
-        advice="Remove one, or put a spring or clutch between.",
-    )
+    what = f"The motion is constrained twice: the constraint of {places} follows from others."
+    return doubly_fixed(system.model, origins, what, "Rigid parts form a loop, or two parts fix the same {potential}.")

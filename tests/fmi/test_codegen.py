@@ -3,6 +3,7 @@
 import ctypes
 import subprocess
 from collections.abc import Callable
+from itertools import accumulate
 from pathlib import Path
 from typing import Any
 
@@ -59,7 +60,11 @@ class Inside:
             getattr(self.library, name).restype = ctypes.c_void_p
         self.read = ctypes.c_void_p(self.library.read_model())
         assert self.read.value
-        self.size = self.tables.slots.results + max(len(t.operations) for t in self.tables.tapes.values())
+        slots = self.tables.slots
+        self.first = dict(zip(ARGUMENTS, accumulate((slots.sizes[n] for n in ARGUMENTS), initial=0), strict=False))
+        self.constants = sum(slots.sizes.values())
+        longest = max(len(t.operations) for t in self.tables.tapes.values())
+        self.size = self.constants + len(slots.constants) + longest
 
     def tape(self, name: str) -> Any:
         return ctypes.c_void_p(self.library.tape(self.read, TAPES.index(name)))
@@ -67,11 +72,8 @@ class Inside:
     def slots(self, arguments: dict[str, np.ndarray]) -> np.ndarray:
         slots = np.zeros(self.size)
         for name, values in arguments.items():
-            first = self.tables.slots.first(name)
-            slots[first : first + len(values)] = values
-        slots[self.tables.slots.first("y") + self.tables.slots.sizes["y"] :][: len(self.tables.slots.constants)] = (
-            self.tables.slots.constants
-        )
+            slots[self.first[name] : self.first[name] + len(values)] = values
+        slots[self.constants :][: len(self.tables.slots.constants)] = self.tables.slots.constants
         return slots
 
     def random(self, seed: int) -> dict[str, np.ndarray]:
@@ -129,7 +131,7 @@ def test_tangents_and_adjoints_are_those_of_casadi(inside, drive):
     code = inside(drive)
     function, everything = rates_function(code)
     jacobian = ca.Function("jacobian", everything, [ca.jacobian(function(*everything), ca.vertcat(*everything))])
-    given = code.tables.slots.first("y")
+    given = code.first["y"]
     count = function.numel_out(0)
     for seed in range(3):
         values = code.random(seed)

@@ -215,18 +215,17 @@ def test_one_library_has_the_functions_of_both_versions_and_of_native_runs_only(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("platforms", "tag"), [("none", "any"), (NATIVE, "manylinux_2_17_x86_64")])
-def test_a_wheel_is_tagged_for_what_is_in_it(platforms, tag, tmp_path):
+def test_a_wheel_without_a_library_is_pure_python(tmp_path):
+    """With one: tests/wheel."""
     root, copy = Path(__file__).parents[2], tmp_path / "copy"
     copy.mkdir()
-    for name in ("modelica_like", "components"):
+    for name in ("modelica_like", "components", "examples"):
         shutil.copytree(root / name, copy / name, ignore=shutil.ignore_patterns("__pycache__", "runtimes"))
     for name in ("pyproject.toml", "hatch_build.py", "README.md", "LICENSE"):
         shutil.copy(root / name, copy / name)
     command = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--wheel-dir", str(tmp_path), str(copy)]
-    subprocess.run(command, check=True, env={**os.environ, "MODELICA_LIKE_PLATFORMS": platforms}, timeout=600)
+    subprocess.run(command, check=True, env={**os.environ, "MODELICA_LIKE_PLATFORMS": "none"}, timeout=600)
     (wheel,) = tmp_path.glob("*.whl")
-    assert wheel.stem.endswith(f"-py3-none-{tag}")
+    assert wheel.stem.endswith("-py3-none-any")
     with zipfile.ZipFile(wheel) as archive:
-        names = [name for name in archive.namelist() if "/runtimes/" in name]
-    assert [Path(name).parent.name for name in names] == ([] if platforms == "none" else [NATIVE])
+        assert not [name for name in archive.namelist() if "/runtimes/" in name]

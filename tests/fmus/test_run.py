@@ -6,11 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from modelica_like import Solution, simulate
+from modelica_like import simulate
 from modelica_like.errors import MissingValue, UnknownName, ValueOutOfRange
 from modelica_like.fmi.export import export_fmu
 from modelica_like.fmi.run import run_fmu
 from modelica_like.netlist import loads
+from modelica_like.solve.trajectories import Trajectories
 
 Built = Mapping[tuple[str, str], Path]
 VERSIONS = pytest.mark.parametrize("version", ["2.0", "3.0"])
@@ -19,7 +20,7 @@ VERSIONS = pytest.mark.parametrize("version", ["2.0", "3.0"])
 @VERSIONS
 def test_is_a_solution(version: str, reference_fmus: Built) -> None:
     run = run_fmu(reference_fmus["stick_slip", version])
-    assert isinstance(run, Solution)
+    assert isinstance(run, Trajectories)
     assert len(run["mass.s"]) == len(run.time)
     assert run["friction.mode"].max() == 5
     assert run["mass.m"][0] == 1.0

@@ -285,17 +285,17 @@ FAILURES: dict[str, tuple[dict[str, Any], str]] = {
         "b (b.fmu): 'w' is no input but an output. It has none.",
     ),
     "FMI 1.0": (
-        {"kind": "no co-simulation", "unit": "a", "version": "1.0"},
+        {"kind": "too old", "unit": "a"},
         "a (a.fmu) is an FMU of FMI 1.0.\nCo-simulation takes FMI 2.0 and 3.0.",
     ),
     "model exchange": (
-        {"kind": "no co-simulation", "unit": "a", "version": "2.0"},
+        {"kind": "no co-simulation", "unit": "a"},
         "a (a.fmu) has no Co-Simulation part.\nExport it as a Co-Simulation FMU.",
     ),
     "no rollback": (
         {"kind": "no rollback", "unit": "a"},
         "a (a.fmu) cannot go back to a saved state, or does not take steps of any length, so the step cannot vary.\n"
-        "It has not both of canGetAndSetFMUState and canHandleVariableCommunicationStepSize.\n"
+        "It needs both canGetAndSetFMUState and canHandleVariableCommunicationStepSize.\n"
         "Run with a fixed step, without tolerance.",
     ),
     "loop": (
@@ -306,7 +306,7 @@ FAILURES: dict[str, tuple[dict[str, Any], str]] = {
     ),
     "no number": (
         {"kind": "not finite", "unit": "a", "name": "tau", "time": 0.25},
-        "a (a.fmu): tau is no finite number at t = 0.25 s.\n"
+        "a (a.fmu): tau is not finite at t = 0.25 s.\n"
         "If the values before it grow without bounds, take a shorter step.",
     ),
     "step": (

@@ -139,7 +139,7 @@ case(
     """\
 planet.ring is free, so planet (IdealPlanetary) carries no torque.
   in test_drive_messages.py:{wired} `parts.planet`
-Connect it, or say free(planet.ring).""",
+Connect it, or list it: free = ["planet.ring"].""",
 )
 case(
     errors.WiringErrors,
@@ -151,16 +151,16 @@ A spindle or rack goes between.
   in test_drive_messages.py:{wire} `yield wire(self)`
 
 sensor.flange_a is free, so sensor (TorqueSensor) carries no torque.
-Connect it, or say free(sensor.flange_a).
+Connect it, or yield free(self.sensor.flange_a).
 
 sensor.flange_b is free, so sensor (TorqueSensor) carries no torque.
-Connect it, or say free(sensor.flange_b).
+Connect it, or yield free(self.sensor.flange_b).
 
 gear.carrier is free, so gear (IdealPlanetary) carries no torque.
-Connect it, or say free(gear.carrier).
+Connect it, or yield free(self.gear.carrier).
 
 gear.ring is free, so gear (IdealPlanetary) carries no torque.
-Connect it, or say free(gear.ring).""",
+Connect it, or yield free(self.gear.ring).""",
 )
 case(
     errors.WrongConnection,
@@ -258,7 +258,7 @@ case(
     """\
 2 equations determine only 1 unknown (rotor.phi): second, motor.
   in sources.py:{sources.py:yield self.w == self.speed()} `yield self.w == self.speed()`
-Two rigid parts fix the same speed or torque.
+Two rigid parts fix the same motion or torque.
 Remove one, or put a spring or clutch between.""",
 )
 case(
@@ -266,7 +266,7 @@ case(
     "a shaft fixed twice",
     lambda: reduce(flatten(drive(a="wall.flange rotor.flange_a", b="other.flange rotor.flange_b"))),
     """\
-other, wall fix the same angle, speed or torque more than once.
+other, wall fix the same motion or torque more than once.
   in fixed.py:{fixed.py:yield self.flange.phi == self.phi0} `yield self.flange.phi == self.phi0`
 Two parts prescribe it, or rigid parts form a loop.
 Remove one, or put a spring or clutch between.""",
@@ -281,7 +281,7 @@ case(
 The motion is constrained twice: the constraint of twin follows from others.
   in gears.py:{gears.py:yield a.phi - self.phi_support == self.ratio * (b.phi - self.phi_support)} \
 `yield a.phi - self.phi_support == self.ratio * (b.phi - self.phi_support)`
-Rigid parts form a loop, or two parts fix the same speed.
+Rigid parts form a loop, or two parts fix the same motion.
 Remove one, or put a spring or clutch between.""",
 )
 case(
@@ -354,9 +354,9 @@ a speed; an operating point can begin from the end of a run, too.""",
 
 
 def test_a_high_index_is_a_notice():
-    assert [notice.text for notice in reduce(flatten(Geared())).notices] == [
-        "Index 3: gear couples motions. 1 constraint differentiated; states kept: a.phi, a.w."
-    ]
+    assert reduce(flatten(Geared())).notices == (
+        "Index 3: gear couples motions. 1 constraint differentiated; states kept: a.phi, a.w.",
+    )
 
 
 @pytest.mark.parametrize("name", CASES)

@@ -6,8 +6,9 @@ from pathlib import Path
 import pytest
 
 from modelica_like.errors import FmuCrashed, FmuFailed, FmuRefused, FmuTimeout, ModelicaLikeError
-from modelica_like.fmi.process import run_child
-from modelica_like.fmi.run import _tell_error, run_fmu
+from modelica_like.fmi.failures import tell_error
+from modelica_like.fmi.process import run_child, workplace
+from modelica_like.fmi.run import run_fmu
 
 ENDS = {
     "crashes": (
@@ -23,7 +24,7 @@ ENDS = {
     "hangs": (
         "while True: pass",
         pytest.raises(FmuTimeout),
-        "drive.fmu has not come to its end within 0.5 s, and was stopped before its first step had ended.\n"
+        "drive.fmu did not finish within 0.5 s, and was stopped before its first step had ended.\n"
         "Give it more time with `timeout`, or a shorter run.",
     ),
 }
@@ -33,8 +34,8 @@ ENDS = {
 def test_a_process_that(end: str, tmp_path: Path) -> None:
     script, expected, sentence = ENDS[end]
     (tmp_path / "script.py").write_text(script)
-    with expected as told:
-        run_child("drive.fmu", tmp_path / "script.py", tmp_path, 0.5 if end == "hangs" else 30.0)
+    with expected as told, workplace({}) as folder:
+        run_child("drive.fmu", tmp_path / "script.py", folder, 0.5 if end == "hangs" else 30.0)
     assert str(told.value) == sentence
 
 
@@ -42,7 +43,7 @@ def test_what_an_fmu_says(tmp_path: Path) -> None:
     error = {"kind": "failed", "text": "fmi2DoStep failed.", "messages": ["x is \x1b[31mnan", "giving up"]}
     (tmp_path / "error.json").write_text(json.dumps(error))
     with pytest.raises(FmuFailed) as told:
-        _tell_error("drive.fmu", tmp_path)
+        tell_error(tmp_path, {"": "drive.fmu"})
     assert str(told.value) == (
         "drive.fmu failed: fmi2DoStep failed.\nIt said: x is \N{REPLACEMENT CHARACTER}[31mnan\nIt said: giving up"
     )

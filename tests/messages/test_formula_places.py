@@ -34,7 +34,7 @@ PUSH = '  in bench.toml:7 `push = { is = "Torque" }`'
         (
             {},
             "push.flange is free, so push (Torque) carries no torque.\n"
-            f"{PUSH}\nConnect it, or say free(push.flange).\n\n"
+            f'{PUSH}\nConnect it, or list it: free = ["push.flange"].\n\n'
             f"push.tau is an input without a value.\n{PUSH}\nConnect it or give it a value.",
         ),
     ],

@@ -29,7 +29,7 @@ ROOT = Path(__file__).parents[2]
 FOLDERS = ("components", *(f"modelica_like/{name}" for name in (
     "structure", "initialize", "solve", "flatten", "compile",
 )))  # fmt: skip
-PICTURES = ("plot.py", "curves_plot.py", "sankey.py", "style.py")
+PICTURES = ("plot.py", "sankey.py", "style.py")
 """They draw; what they draw is looked at."""
 NARROW = {
     "components/sizing": ["sizing"],

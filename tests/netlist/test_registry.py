@@ -1,18 +1,21 @@
 """Libraries of components: what they offer, and that only what is used is loaded."""
 
 import ast
+import os
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 
 import pytest
 
 import components
+import modelica_like
 from components import Clutch
 from modelica_like.errors import NetlistError, UnknownName
 from modelica_like.language import Component
-from modelica_like.netlist import find_type, library_types, registry, type_name
+from modelica_like.netlist import find_type, library_types, load, registry, type_name
 
 
 def test_the_stub_tells_type_checkers_what_the_library_has():
@@ -24,6 +27,14 @@ def test_the_stub_tells_type_checkers_what_the_library_has():
     assert sorted(told) == components.__all__
     assert set(components.__all__) <= set(dir(components))
     assert all(getattr(components, name).__name__ == name for name in components.__all__)
+
+
+def test_the_contract_of_libraries_forbids_all_but_the_language():
+    root = Path(modelica_like.__file__).parent
+    contracts = tomllib.loads((root.parent / "pyproject.toml").read_text())["tool"]["importlinter"]["contracts"]
+    forbidden = next(one for one in contracts if one["name"] == "libraries use the language only")["forbidden_modules"]
+    every = {file.stem for file in root.iterdir() if file.suffix == ".py" or (file / "__init__.py").is_file()}
+    assert {f"modelica_like.{name}" for name in every - {"__init__", "__main__", "language"}} == set(forbidden)
 
 
 def test_a_name_or_module_that_the_library_has_not_is_an_attribute_error():
@@ -93,4 +104,96 @@ def test_a_library_that_fails_where_it_is_used_is_named(libraries):
     broken.__dict__.update(__all__=["Wheel"], __getattr__=missing)
     libraries(broken=broken)
     with pytest.raises(NetlistError, match="The library 'broken' cannot be imported: No module named 'gone'"):
+        find_type("Wheel")
+
+
+OWN = """
+from components import Inertia
+from modelica_like.language import Component
+from {helper} import BASE
+
+
+class Disc(Inertia):
+    BASE = BASE
+"""
+
+
+@pytest.fixture
+def imports(monkeypatch):
+    """Let modules and the path be as they were."""
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    known = set(sys.modules)
+    yield
+    for name in set(sys.modules) - known:
+        if not name.startswith(("components", "modelica_like")):
+            del sys.modules[name]
+
+
+def _drive(folder: Path, module: str, helper: str) -> Path:
+    folder.mkdir(exist_ok=True)
+    (folder / f"{module}.py").write_text(OWN.format(helper=helper))
+    (folder / f"{helper}.py").write_text("BASE = 3\n")
+    netlist = folder / "drive.toml"
+    netlist.write_text(f'[parts]\nd = {{ is = "{module}:Disc", J = 1 }}\n')
+    return netlist
+
+
+@pytest.mark.usefixtures("imports")
+def test_own_modules_are_found_beside_the_netlist_wherever_one_works(tmp_path, monkeypatch):
+    netlist = _drive(tmp_path / "drives", "own_discs", "own_helper")
+    monkeypatch.chdir(tmp_path)
+    kind = type(load(netlist).d)
+    assert kind.BASE == 3
+    assert type_name(kind) == "own_discs:Disc"
+    assert sys.path[0] != str(tmp_path / "drives")  # nothing there hides what is imported later
+    assert type(load(netlist).d) is kind
+    _drive(tmp_path, "near_discs", "near_helper")
+    assert find_type("near_discs:Disc").BASE == 3
+
+
+@pytest.mark.usefixtures("imports")
+def test_a_module_of_another_netlist_is_not_taken_for_ones_own(tmp_path):
+    first, second = (_drive(tmp_path / name, "same_name", f"help_{name}") for name in "ab")
+    load(first)
+    with pytest.raises(NetlistError, match=r"The module 'same_name' of '.*b' cannot be used: '.*same_name.py' is load"):
+        load(second)
+
+
+@pytest.mark.usefixtures("imports")
+def test_a_mistake_in_an_own_module_is_told_with_its_line(tmp_path):
+    netlist = _drive(tmp_path, "wrong_discs", "wrong_helper")
+    (tmp_path / "wrong_helper.py").write_text("\nBASE = tree\n")
+    with pytest.raises(NetlistError) as caught:
+        load(netlist)
+    assert str(caught.value).splitlines() == [
+        "The module 'wrong_discs' cannot be imported: NameError: name 'tree' is not defined (wrong_helper.py:2).",
+        '  in drive.toml:2 `d = { is = "wrong_discs:Disc", J = 1 }`',
+    ]
+
+
+@pytest.mark.parametrize("name", ["components", "modelica_like"])
+def test_no_folder_of_a_user_hides_the_library(tmp_path, name):
+    """Neither where the command runs nor beside the netlist."""
+    _drive(tmp_path / name, "__init__", "own_helper")
+    _drive(tmp_path, "own_discs", "own_helper")
+    (tmp_path / "drive.toml").write_text(
+        '[parts]\na = { is = "Inertia", J = 1 }\nb = { is = "own_discs:Disc", J = 1 }\n[series]\nab = ["a", "b"]\n'
+        '[simulate]\nstart = "rest"\nuntil = 1\n'
+    )
+    command = "import sys; from modelica_like.cli import main; sys.argv[1:] = ['check', 'drive.toml']; main()"
+    environment = {**os.environ, "PYTHONPATH": str(Path(components.__file__).parents[1])}
+    script = tmp_path.parent / f"run_{name}.py"
+    script.write_text(command)
+    done = subprocess.run(
+        [sys.executable, str(script)], capture_output=True, text=True, cwd=tmp_path, env=environment, check=False
+    )
+    assert (done.stderr, done.returncode) == ("", 0)
+    assert "Inertia, Disc" in done.stdout
+
+
+def test_a_program_that_took_the_name_of_the_library_is_told(libraries):
+    taken = ModuleType("components")
+    taken.__file__ = "/home/me/components.py"
+    libraries(components=taken)
+    with pytest.raises(NetlistError, match=r"The library 'components' is hidden by '/home/me/components\.py', which"):
         find_type("Wheel")

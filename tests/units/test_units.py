@@ -13,8 +13,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from modelica_like.errors import UnitError, ValueOutOfRange
-from modelica_like.unit_atoms import ATOMS, BASE, PINT_NAMES, find_atom, pint_registry
 from modelica_like.units import ANY, ONE, Unit, coherent, in_unit, parse_unit, read_quantity, same_dimension, to_si
+from modelica_like.units.atoms import ATOMS, BASE, PINT_NAMES, find_atom, pint_registry
 
 NAMES = st.sampled_from(["kg", "m", "s", "A", "K", "rad", "N", "J", "W", "V", "Ohm", "mm", "min", "rpm", "deg", "%"])
 EXPONENTS = st.one_of(
@@ -106,8 +106,8 @@ def test_products_keep_the_declared_names() -> None:
     ("text", "message"),
     [
         ("Nm", "Unknown unit 'Nm'; did you mean 'N.m'?"),
-        ("kgm2", "Unknown unit 'kgm' in 'kgm2'; did you mean 'kg.m'?"),
-        ("N.radn", "Unknown unit 'radn' in 'N.radn'; did you mean 'rad'?"),
+        ("kgm2", "Unknown unit 'kgm' in 'kgm2'; did you mean 'kg.m2'?"),
+        ("N.radn", "Unknown unit 'radn' in 'N.radn'; did you mean 'N.rad'?"),
         ("J/kg.K", "'J/kg.K' is ambiguous: put what stands after the '/' in parentheses, as in J/(kg.K)."),
         ("dB", "Unit 'dB' is logarithmic; give a plain number."),
         ("m+s", "'m+s' is not a unit."),
@@ -226,7 +226,7 @@ def test_values_in_si(value: object, unit: str, si: float) -> None:
         (True, "1", "Inertia.J expects 1; True is not a number."),
         (None, "m", "Inertia.J expects m; None is not a number."),
         ([1], "m", "Inertia.J expects m; [1] is not a number."),
-        (pint.Quantity(1, "s"), "m", "Inertia.J expects m; '1 second' is second."),
+        (pint.Quantity(1, "s"), "m", "Inertia.J expects m; '1 second' is s."),
     ],
 )
 def test_wrong_values_are_told(value: object, unit: str, message: str) -> None:
@@ -248,7 +248,9 @@ def test_a_conversion_that_overflows_is_refused() -> None:
 
 def test_coherent_names() -> None:
     assert str(coherent(parse_unit("kg.cm"))) == "kg.m"
-    assert str(coherent(parse_unit("kN.mm"))) == "kg.m2/s2"
+    assert str(coherent(parse_unit("kN.mm"))) == "N.m"
+    assert str(coherent(parse_unit("kN.m/deg"))) == "N.m/rad"
+    assert [str(coherent(parse_unit(name))) for name in ("rpm", "bar", "degC", "kJ")] == ["rad/s", "Pa", "K", "J"]
     assert str(coherent(parse_unit("N.m"))) == "N.m"
 
 

@@ -292,7 +292,7 @@ class Writer:
     def _where_of(self, condition: ast.expr, then: ast.expr, other: ast.expr) -> Written:
         return otherwise(self.latex(condition), self.write(then), self.write(other))
 
-    def _interpolate_of(self, x: ast.expr, xs: ast.expr, ys: ast.expr) -> Written:
+    def _interpolate_of(self, x: ast.expr, xs: ast.expr, ys: ast.expr, *how: ast.expr) -> Written:
         values = self._column_of(ys)
         if self._column_of(xs) is None or values is None:
             raise Unwritable

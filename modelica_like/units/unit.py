@@ -1,4 +1,4 @@
-"""Units and quantities: `"8.5 kg.cm2"` to SI, dimensions, and products that keep their declared names."""
+"""Units: products that keep their declared names, their dimensions, and how they are written."""
 
 from __future__ import annotations
 
@@ -9,11 +9,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
-from numbers import Real
-from typing import Any
 
-from modelica_like.errors import UnitError, ValueOutOfRange
-from modelica_like.unit_atoms import BASE, Exponent, find_atom, simplify
+from modelica_like.errors import UnitError
+from modelica_like.units.atoms import ATOMS, BASE, Exponent, find_atom, simplify
 
 _MAX_LENGTH = 200
 _MAX_EXPONENT = 20
@@ -119,6 +117,22 @@ def _resolve(unit: Unit) -> tuple[tuple[Exponent, ...], float, float]:
     return tuple(simplify(exponent) for exponent in exponents), factor, offset
 
 
+@lru_cache(maxsize=4096)
+def coherent(unit: Unit) -> Unit:
+    """Return the unit with its names replaced by SI ones of the same dimension: `N.m` for `kN.m`, `rad/s` for `rpm`."""
+    if unit == ANY:
+        return unit
+    return Unit(_collect((base, power) for name, old in unit.atoms for base, power in _base_powers(name, old)))
+
+
+def _base_powers(name: str, power: Exponent) -> list[tuple[str, Exponent]]:
+    atom = find_atom(name)
+    plain = {"bar": "Pa", "degC": "K"}.get(name, name if atom.factor == 1.0 else name[1:])
+    if plain in ATOMS and ATOMS[plain].factor == 1.0 and ATOMS[plain].exponents == atom.exponents:
+        return [(plain, power)]
+    return [(base, power * own) for base, own in zip(BASE, atom.exponents, strict=True)]
+
+
 # --- text -----------------------------------------------------------------------------------------------------------
 
 _TOKEN = re.compile(
@@ -140,7 +154,7 @@ def parse_unit(text: str) -> Unit:
         text: the unit; `1` or an empty text is the unit of a number, `*` the wildcard `ANY`.
 
     Raises:
-        UnitError: the text is no unit, or a name in it is unknown.
+        UnitError: the text is not a unit, or a name in it is unknown.
     """
     stripped = text.strip()
     if stripped == "*":
@@ -159,7 +173,9 @@ def _check_name(name: str, text: str) -> None:
     except UnitError as error:
         if name == text:
             raise
-        raise UnitError(error.what.replace(f"'{name}'", f"'{name}' in '{text}'", 1)) from None
+        what = error.what.replace(f"'{name}'", f"'{name}' in '{text}'", 1)
+        meant = re.sub(r"mean '(.*)'", lambda match: f"mean '{text.replace(name, match[1], 1)}'", what)
+        raise UnitError(meant) from None
 
 
 class _Parser:
@@ -236,124 +252,3 @@ def _plain(text: str) -> str:
     for typographic, plain in _SPELLINGS.items():
         text = text.replace(typographic, plain)
     return text
-
-
-# --- quantities -----------------------------------------------------------------------------------------------------
-
-_NUMBER = re.compile(
-    r"([+-]?(?:(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?|(?:nan|inf)(?![A-Za-z0-9_.])))\s*(.*)", re.DOTALL
-)
-
-
-def read_quantity(text: str) -> tuple[float, Unit] | None:
-    """Read `8.5 kg.cm2`, `6000 rpm`, `20 degC` or `1e-3`.
-
-    Returns:
-        The number and its unit (`ONE` if there is none), or None if the text is not a number with at most a unit
-        behind it: then it is an expression, such as `2*J`.
-
-    Raises:
-        UnitError: a number is followed by something that should be a unit and is none.
-    """
-    match = _NUMBER.fullmatch(text.strip())
-    if match is None:
-        return None
-    number, unit = match.groups()
-    if unit and not (unit[0].isalpha() or unit[0] in "%\u00b0(1"):
-        return None
-    return float(number), parse_unit(unit)
-
-
-def to_si(value: object, unit: Unit, name: str) -> float:
-    """Return the value of a parameter or variable in coherent SI units.
-
-    Args:
-        value: a number in `unit`, a text such as `"8.5 kg.cm2"`, or a `pint.Quantity`.
-        unit: the declared unit.
-        name: the declared name, such as `Inertia.J`, for messages.
-
-    Raises:
-        UnitError: the value has another dimension, or is no quantity.
-        ValueOutOfRange: the value is not finite.
-    """
-    number, given = _quantity(value, unit, name)
-    if not same_dimension(given, unit):
-        raise UnitError(f"{name} expects {unit}; '{value}' is {coherent(given)}.")
-    if _counts_turns(given, unit):
-        raise UnitError(f"{name} expects {unit}; '{value}' does not say whether it counts turns or radians.",
-                        advice="Write rpm or rad/s for a speed, Hz for a frequency.")  # fmt: skip
-    result = number * given.factor + given.offset
-    if not math.isfinite(result):
-        raise ValueOutOfRange(f"{name} must be a finite number, not {value}.")
-    return result
-
-
-def coherent(unit: Unit) -> Unit:
-    """Return the unit with its names replaced by SI ones of the same dimension: `kg.m` for `kg.cm`, `s` for `min`."""
-    if unit == ANY or all(find_atom(name).factor == 1.0 for name, _ in unit.atoms):
-        return unit
-    return Unit(_collect((base, power) for name, old in unit.atoms for base, power in _base_powers(name, old)))
-
-
-def _base_powers(name: str, power: Exponent) -> list[tuple[str, Exponent]]:
-    atom = find_atom(name)
-    if atom.factor == 1.0:
-        return [(name, power)]
-    return [(base, power * own) for base, own in zip(BASE, atom.exponents, strict=True)]
-
-
-def _counts_turns(given: Unit, unit: Unit) -> bool:
-    """50 Hz, 6000 1/min and 314 rad/s have one dimension, but a factor of 2 pi lies between a turn and a radian."""
-    rate = tuple(-1 if name == "s" else 0 for name in BASE[:-1])
-    if ANY in (given, unit) or given == unit or unit.dimension != rate:
-        return False
-    turning, expected = given.exponents["rad"] != 0, unit.exponents["rad"] != 0
-    return turning != expected and not (turning and str(unit) == "1/s")
-
-
-def _quantity(value: object, unit: Unit, name: str) -> tuple[float, Unit]:
-    if isinstance(value, str):
-        return _text_quantity(value, unit, name)
-    if isinstance(value, bool) or value is None:
-        raise UnitError(f"{name} expects {unit}; {value} is not a number.")
-    if isinstance(value, Real):
-        try:
-            return float(value), unit
-        except OverflowError:
-            raise ValueOutOfRange(f"{name} is larger than any number that computes.") from None
-    return _foreign(value, unit, name)
-
-
-def _text_quantity(text: str, unit: Unit, name: str) -> tuple[float, Unit]:
-    try:
-        read = read_quantity(text)
-    except UnitError as error:
-        raise UnitError(f"{name} = '{text}': {error.what}", advice=error.advice) from None
-    if read is None:
-        raise UnitError(f"{name} expects {unit}; '{text}' is not a quantity.")
-    match = _NUMBER.fullmatch(text.strip())
-    return read if match is not None and match.group(2) else (read[0], unit)
-
-
-def _foreign(value: Any, unit: Unit, name: str) -> tuple[float, Unit]:
-    """Read a pint.Quantity or a zero-dimensional array, without importing either package."""
-    try:
-        if hasattr(value, "magnitude") and hasattr(value, "units"):
-            return float(value.magnitude), parse_unit(_from_pint(value))
-        return float(value.item()), unit
-    except (AttributeError, TypeError, ValueError):
-        raise UnitError(f"{name} expects {unit}; {value!r} is not a number.") from None
-
-
-def _from_pint(value: Any) -> str:
-    return ".".join(f"{name}^({Fraction(power).limit_denominator(100)})" for name, power in value.unit_items())
-
-
-def in_unit(value_si: float, unit_text: str) -> float:
-    """Return an SI value in another unit for display: `in_unit(628.3, "rpm")` is about 6000.
-
-    Raises:
-        UnitError: the text is no unit.
-    """
-    unit = parse_unit(unit_text)
-    return (value_si - unit.offset) / unit.factor

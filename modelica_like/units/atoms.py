@@ -95,8 +95,8 @@ def find_atom(name: str) -> Atom:
     """
     if name in ATOMS:
         return ATOMS[name]
-    if name == "Nm":
-        raise UnitError("Unknown unit 'Nm'; did you mean 'N.m'?")
+    if name in ("Nm", "Nms"):  # pint takes the first for a number of threads
+        raise UnitError(f"Unknown unit '{name}'{_suggestion(name)}")
     return _ask_pint(name)
 
 
@@ -105,7 +105,8 @@ def pint_registry() -> Any:
     """Return pint's registry of units; it is created by the first call, in about half a second."""
     import pint
 
-    return pint.get_application_registry().get()
+    found: Any = pint.get_application_registry
+    return found().get()
 
 
 def _ask_pint(name: str) -> Atom:

@@ -92,6 +92,11 @@ class Elimination:
         """Number of determined columns."""
         return len(self._rows)
 
+    @property
+    def pivot(self) -> int:
+        """Column that the row accepted last determines."""
+        return self._rows[-1][0]
+
     def add(self, row: Mapping[int, float]) -> bool:
         """Add a row, entries by columns; False if it depends on the rows so far."""
         values = dict(row)

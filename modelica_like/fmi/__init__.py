@@ -1,0 +1,1 @@
+"""Models as FMUs: export, import, run-time, checks."""
