@@ -171,7 +171,17 @@ def _groups(together: Any) -> list[list[int]]:
 
 
 def share_reactions(system: System, holds: tuple[HeldMotion, ...], circuits: list[Circuit], residual: Any) -> Any:
-    """Let equations of circuits be switched to the sharing of the reactions; returns the new residual."""
+    """Let equations of circuits be switched to the sharing of the reactions.
+
+    Args:
+        system: the equations; its model gets the switches and shares.
+        holds: the held motions.
+        circuits: those that depend on each other.
+        residual: column of all equations, differentiated ones included.
+
+    Returns:
+        The new residual, of the same size.
+    """
     slope, rows = gains(system), ca.vertsplit(residual)
     for circuit in circuits:
         count = len(circuit.members)
