@@ -6,18 +6,17 @@ import tempfile
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 from modelica_like.cosimulation.described import DescribedFmu, described
 from modelica_like.cosimulation.split import Split, split
 from modelica_like.cosimulation.ssp_document import Version, ssd
 from modelica_like.cosimulation.ssp_reader import read_structure
 from modelica_like.cosimulation.system import System, check_system
-from modelica_like.errors import NetlistError, UnknownName, did_you_mean
-from modelica_like.fmi.package import write_archive
+from modelica_like.errors import UnknownName, did_you_mean
+from modelica_like.fmi.package import known_version, target_file, write_archive
 from modelica_like.fmi.unpack import SSP, unpack
 from modelica_like.language import Component
-from modelica_like.writing import check_writable
 
 
 def write_ssp(system: System, path: str | Path, version: Version | str = "1.0") -> Path:
@@ -36,11 +35,12 @@ def write_ssp(system: System, path: str | Path, version: Version | str = "1.0") 
 
     Raises:
         UnknownName: there is no such version, or an FMU has not a variable of the system.
-        NetlistError: the file has another ending, its folder does not exist, or the system is not sound.
+        ExportError: the file has another ending, or its folder does not exist.
+        NetlistError: the system is not sound.
         FmuRefused: a file is no FMU.
         OSError: a file cannot be read or written.
     """
-    target, chosen = _target(path), _version(version)
+    target, chosen = target_file(path, ".ssp", "An SSP"), known_version(version, Version, "SSP")
     check_system(system)
     fmus = {unit.name: described(unit.file) for unit in system.units}
     _check_variables(system, fmus)
@@ -69,27 +69,10 @@ def split_to_ssp(
     Raises:
         ModelicaLikeError: see `split` and `write_ssp`.
     """
-    target, chosen = _target(path), _version(ssp_version)
+    target, chosen = target_file(path, ".ssp", "An SSP"), known_version(ssp_version, Version, "SSP")
     with tempfile.TemporaryDirectory(prefix="modelica_like_") as folder:
         done = split(drive, at, folder, **options)
         return replace(done, path=write_ssp(done.system, target, chosen))
-
-
-def _target(path: str | Path) -> Path:
-    target = Path(path)
-    if target.suffix.lower() != ".ssp":
-        raise NetlistError(f"An SSP is a file with the ending .ssp, not '{target.name}'.")
-    if not target.absolute().parent.is_dir():
-        raise NetlistError(f"There is no folder '{target.parent}' for {target.name}.", advice="Make it first.")
-    check_writable(target)
-    return target
-
-
-def _version(asked: str) -> Version:
-    for one in get_args(Version):
-        if asked == one:
-            return one
-    raise UnknownName(f"SSP {asked} is not supported.", advice="There are 1.0 and 2.0.")
 
 
 def _check_variables(system: System, fmus: dict[str, DescribedFmu]) -> None:

@@ -25,7 +25,7 @@ from modelica_like.language.component import Component
 from modelica_like.language.declared import Declared
 from modelica_like.language.expr import TIME, flagged_motion
 from modelica_like.language.fields import Discrete, Input, Output, Parameter, Variable
-from modelica_like.units import ONE
+from modelica_like.units import ONE, coherent
 
 _WIRE = Source("")
 
@@ -134,7 +134,7 @@ class _Flattener:
 
     def _declare_variable(self, owner: Declared, name: str, path: str, kind: str, field: Variable) -> None:
         self.variable_of[id(owner), name] = len(self.variables)
-        unit = self.wiring.inferred.get((id(owner), name)) or unit_of_field(owner, name)
+        unit = coherent(self.wiring.inferred.get((id(owner), name)) or unit_of_field(owner, name))
         self.variables.append(
             FlatVariable(
                 path, unit, field.description, kind, field.state, field.guess, field.nominal, field.min, field.max
@@ -147,7 +147,7 @@ class _Flattener:
         with component.at_its_place(name):
             start = 0.0 if value is None else self.parameters.evaluate(value, scope or component, path)
         self.discrete_of[id(component), name] = len(self.discretes)
-        self.discretes.append(FlatDiscrete(path, field.unit, field.description, start))
+        self.discretes.append(FlatDiscrete(path, coherent(field.unit), field.description, start))
 
     # -- instances ---------------------------------------------------------------------------------------------------
 

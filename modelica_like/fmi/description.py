@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import re
-from abc import ABC, abstractmethod
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.fmi.dependencies import Dependencies
 from modelica_like.fmi.interface import FmuVariable, Interface
-from modelica_like.fmi.xml import Element, document, element, number, unit_name
-from modelica_like.units import Unit, parse_unit
+from modelica_like.fmi.xml import Element, document, element, unit_name
+from modelica_like.units import parse_unit
 
 Version = Literal["2.0", "3.0"]
 Kind = Literal["me", "cs"]
@@ -71,7 +70,7 @@ def model_description(model: CompiledDae, variables: Interface, about: About) ->
         variables: its FMI variables.
         about: what else the description says.
     """
-    return document((_Fmi2 if about.version == "2.0" else _Fmi3)(model, variables, about).write())
+    return document(_Writer(model, variables, about).write())
 
 
 def build_description(name: str, sources: Sequence[str]) -> str:
@@ -84,138 +83,45 @@ def build_description(name: str, sources: Sequence[str]) -> str:
     return document(top)
 
 
-class _Writer(ABC):
-    """What both versions have in common."""
+class _Writer:
+    """The description's parts, in the words of its version: FMI 2.0 counts variables from one, 3.0 has references."""
 
-    def __init__(self, model: CompiledDae, variables: Interface, about: About) -> None:
-        self.model = model
-        self.about = about
-        self.interface = variables
-        self.variables = variables.variables
-        self.dependencies = Dependencies(model, variables)
-        self.types = {names: f"Mode_{k}_{'_'.join(names)}"[:120] for k, names in enumerate(self._mode_names(), 1)}
+    def __init__(self, model: CompiledDae, face: Interface, about: About) -> None:
+        self.model, self.face, self.about = model, face, about
+        self.second = about.version == "2.0"
+        self.dependencies = Dependencies(model, face)
+        # FMI 3.0 has arrays in place of their numbers.
+        self.arrays = {} if self.second else {k: one for one in face.arrays for k in one.elements}
+        names = dict.fromkeys(one.modes for one in face.variables if one.modes)
+        self.types = {one: f"Mode_{k}_{'_'.join(one)}"[:120] for k, one in enumerate(names, 1)}
 
     def write(self) -> Element:
         """Write all parts in the order of the schema."""
-        about = self.about
+        about, face = self.about, self.face
+        own = {"guid": about.token, "numberOfEventIndicators": len(face.indicators)}
         top = Element("fmiModelDescription", {
-            "fmiVersion": about.version, "modelName": self.model.name, **self._attributes(),
-            "description": about.description or None, "generationTool": about.tool,
-            "variableNamingConvention": "structured",
+            "fmiVersion": about.version, "modelName": self.model.name,
+            **(own if self.second else {"instantiationToken": about.token}), "description": about.description or None,
+            "generationTool": about.tool, "variableNamingConvention": "structured",
         })  # fmt: skip
-        self._kinds(top)
-        self.units(top)
-        if self.types:
-            definitions = element(top, "TypeDefinitions")
-            for names, title in self.types.items():
-                kind = self._type(definitions, title)
-                for value, name in enumerate(names):
-                    element(kind, "Item", name=name, value=value)
-        self.log_categories(top)
-        self.default_experiment(top)
-        listed = element(top, "ModelVariables")
-        for one in self.listed():
-            self._variable(listed, one)
-        self._structure(element(top, "ModelStructure"))
-        return top
-
-    def listed(self) -> Iterable[FmuVariable]:
-        """Variables in the order of the description."""
-        return self.variables
-
-    @abstractmethod
-    def _attributes(self) -> dict[str, Any]: ...
-
-    @abstractmethod
-    def _kinds(self, top: Element) -> None: ...
-
-    @abstractmethod
-    def _type(self, definitions: Element, title: str) -> Element: ...
-
-    @abstractmethod
-    def _variable(self, listed: Element, one: FmuVariable) -> None: ...
-
-    @abstractmethod
-    def _structure(self, structure: Element) -> None: ...
-
-    def _mode_names(self) -> list[tuple[str, ...]]:
-        return list(dict.fromkeys(one.modes for one in self.variables if one.modes))
-
-    def units(self, top: Element) -> None:
-        """Define every unit, with its base units, and how people read it."""
-        used = {name: one.unit for one in self.variables if (name := unit_name(one.unit)) is not None}
-        if not used:
-            return
-        definitions = element(top, "UnitDefinitions")
-        for name, unit in sorted(used.items()):
-            defined = element(definitions, "Unit", name=name)
-            exponents = {base: power for base, power in unit.exponents.items() if power}
-            if all(isinstance(power, int) for power in exponents.values()):
-                element(defined, "BaseUnit", **exponents, **_scale(unit))
-            for shown in DISPLAY_UNITS.get(name, ()):
-                other = parse_unit(shown)
-                offset = -other.offset / other.factor
-                element(defined, "DisplayUnit", name=shown, factor=1.0 / other.factor, offset=offset or None)
-
-    def log_categories(self, top: Element) -> None:
-        """List the log categories."""
+        (self._kinds2 if self.second else self._kinds3)(top)
+        self._units(top)
+        self._types(top)
         categories = element(top, "LogCategories")
-        for name, text in self.about.log_categories.items():
+        for name, text in about.log_categories.items():
             element(categories, "Category", name=name, description=text)
-
-    def default_experiment(self, top: Element) -> None:
-        """Suggest how to run."""
-        about = self.about
         element(
             top, "DefaultExperiment", startTime=0.0, stopTime=about.stop_time, tolerance=about.tolerance,
             stepSize=about.step_size,
         )  # fmt: skip
+        listed, write = element(top, "ModelVariables"), self._variable2 if self.second else self._variable3
+        for one in (*face.variables, *dict.fromkeys(self.arrays.values())):
+            if one.reference not in self.arrays:
+                write(listed, one)
+        self._structure(element(top, "ModelStructure"))
+        return top
 
-    def initial_unknowns(self) -> list[FmuVariable]:
-        """Outputs, calculated parameters, states and derivatives that initialization determines, by reference."""
-        own = {*self.interface.states, *self.interface.derivatives, *self.interface.outputs}
-        return [
-            one
-            for one in self.variables
-            if (one.reference in own and one.initial != "exact") or one.causality == "calculatedParameter"
-        ]
-
-    def known(self, one: FmuVariable, initial: bool = False) -> list[int] | None:
-        """Value references on which an unknown depends; None for all, where a list would be longer than useful."""
-        if one.slot[0] == "discrete" and not initial:
-            return None  # in event mode a mode depends on more than states and inputs
-        found = self.dependencies.initial(one) if initial else self.dependencies.continuous(one)
-        return found if len(found) <= _MOST_DEPENDENCIES else None
-
-    def attributes(self, one: FmuVariable) -> dict[str, Any]:
-        """Attributes that mean the same in both versions."""
-        name = unit_name(one.unit)
-        whole = one.type != "Float64"
-        return {
-            "unit": name,
-            "displayUnit": DISPLAY_UNITS[name][0] if name in _SUGGESTED else None,
-            "min": number(one.min, whole=whole),
-            "max": number(one.max, whole=whole),
-            "nominal": one.nominal,
-            "start": number(one.start, whole=whole),
-        }
-
-    def ordered(self, references: Sequence[int]) -> Iterator[FmuVariable]:
-        """Variables of value references, in the same order."""
-        return (self.variables[k] for k in references)
-
-
-def _scale(unit: Unit) -> dict[str, float]:
-    return {} if unit.factor == 1.0 else {"factor": unit.factor}
-
-
-class _Fmi2(_Writer):
-    """FMI 2.0: variables by their index, from one."""
-
-    def _attributes(self) -> dict[str, Any]:
-        return {"guid": self.about.token, "numberOfEventIndicators": len(self.interface.indicators)}
-
-    def _kinds(self, top: Element) -> None:
+    def _kinds2(self, top: Element) -> None:
         common = {
             "modelIdentifier": identifier(self.model.name), "canGetAndSetFMUstate": True, "canSerializeFMUstate": True,
             "providesDirectionalDerivative": True,
@@ -230,51 +136,7 @@ class _Fmi2(_Writer):
                 for name in self.about.sources:
                     element(files, "File", name=name)
 
-    def _type(self, definitions: Element, title: str) -> Element:
-        return element(element(definitions, "SimpleType", name=title), "Enumeration")
-
-    def _variable(self, listed: Element, one: FmuVariable) -> None:
-        scalar = element(
-            listed, "ScalarVariable", name=one.name, valueReference=one.reference,
-            description=one.description or None, causality=one.causality, variability=one.variability,
-            initial=one.initial,
-        )  # fmt: skip
-        attributes = self.attributes(one)
-        if one.type != "Float64":
-            kept = {key: attributes[key] for key in ("min", "max", "start")}
-            element(scalar, "Enumeration" if one.modes else "Integer", declaredType=self.types.get(one.modes), **kept)
-        else:
-            derivative = None if one.derivative_of is None else one.derivative_of + 1
-            element(scalar, "Real", **attributes, derivative=derivative)
-
-    def _structure(self, structure: Element) -> None:
-        interface = self.interface
-        lists = (
-            ("Outputs", self.ordered(interface.outputs), False),
-            ("Derivatives", self.ordered(interface.derivatives), False),
-            ("InitialUnknowns", self.initial_unknowns(), True),
-        )
-        for tag, unknowns, initial in lists:
-            found = list(unknowns)
-            if not found:
-                continue
-            group = element(structure, tag)
-            for one in found:
-                known = self.known(one, initial)
-                element(
-                    group, "Unknown", index=one.reference + 1,
-                    dependencies=None if known is None else [k + 1 for k in known],
-                    dependenciesKind=None if known is None else ["dependent"] * len(known),
-                )  # fmt: skip
-
-
-class _Fmi3(_Writer):
-    """FMI 3.0: variables by their value references."""
-
-    def _attributes(self) -> dict[str, Any]:
-        return {"instantiationToken": self.about.token}
-
-    def _kinds(self, top: Element) -> None:
+    def _kinds3(self, top: Element) -> None:
         common = {
             "modelIdentifier": identifier(self.model.name), "canGetAndSetFMUState": True, "canSerializeFMUState": True,
             "providesDirectionalDerivatives": True, "providesAdjointDerivatives": True,
@@ -290,42 +152,91 @@ class _Fmi3(_Writer):
                 fixedInternalStepSize=fixed or None,
             )  # fmt: skip
 
-    def _type(self, definitions: Element, title: str) -> Element:
-        return element(definitions, "EnumerationType", name=title)
+    def _units(self, top: Element) -> None:
+        """Define every unit, with its base units, and how people read it."""
+        used = {name: one.unit for one in self.face.variables if (name := unit_name(one.unit)) is not None}
+        definitions = element(top, "UnitDefinitions") if used else top
+        for name, unit in sorted(used.items()):
+            defined = element(definitions, "Unit", name=name)
+            exponents = {base: power for base, power in unit.exponents.items() if power}
+            if all(isinstance(power, int) for power in exponents.values()):
+                element(defined, "BaseUnit", **exponents, factor=None if unit.factor == 1.0 else unit.factor)
+            for shown in DISPLAY_UNITS.get(name, ()):
+                other = parse_unit(shown)
+                offset = -other.offset / other.factor
+                element(defined, "DisplayUnit", name=shown, factor=1.0 / other.factor, offset=offset or None)
 
-    def listed(self) -> Iterable[FmuVariable]:
-        inside = {k for array in self.interface.arrays for k in array.elements}
-        return (one for one in (*self.variables, *self.interface.arrays) if one.reference not in inside)
+    def _types(self, top: Element) -> None:
+        definitions = element(top, "TypeDefinitions") if self.types else top
+        for names, title in self.types.items():
+            if self.second:
+                kind = element(element(definitions, "SimpleType", name=title), "Enumeration")
+            else:
+                kind = element(definitions, "EnumerationType", name=title)
+            for value, name in enumerate(names):
+                element(kind, "Item", name=name, value=value)
 
-    def known(self, one: FmuVariable, initial: bool = False) -> list[int] | None:
-        arrays = {k: array.reference for array in self.interface.arrays for k in array.elements}
-        found = super().known(one, initial)
-        return found if found is None or not arrays else list(dict.fromkeys(arrays.get(k, k) for k in found))
-
-    def _variable(self, listed: Element, one: FmuVariable) -> None:
-        attributes = self.attributes(one)
+    def _attributes(self, one: FmuVariable) -> dict[str, Any]:
+        """Attributes that mean the same in both versions; whole numbers have no unit."""
+        limits = {"min": one.min, "max": one.max}
         if one.type != "Float64":
-            del attributes["unit"], attributes["displayUnit"], attributes["nominal"]
-        if one.elements:
-            attributes["start"] = [self.variables[k].start for k in one.elements]
+            return {
+                key: None if value is None else int(value) for key, value in (*limits.items(), ("start", one.start))
+            }
+        name = unit_name(one.unit)
+        start = [self.face.variables[k].start for k in one.elements] if one.elements else one.start
+        shown = DISPLAY_UNITS[name][0] if name in _SUGGESTED else None
+        return {"unit": name, "displayUnit": shown, **limits, "nominal": one.nominal, "start": start}
+
+    def _variable2(self, listed: Element, one: FmuVariable) -> None:
+        scalar = element(
+            listed, "ScalarVariable", name=one.name, valueReference=one.reference,
+            description=one.description or None, causality=one.causality, variability=one.variability,
+            initial=one.initial,
+        )  # fmt: skip
+        derivative = None if one.derivative_of is None else one.derivative_of + 1
+        kind = "Real" if one.type == "Float64" else "Enumeration" if one.modes else "Integer"
+        first = {"declaredType": self.types.get(one.modes)}
+        element(scalar, kind, **first, **self._attributes(one), derivative=derivative)
+
+    def _variable3(self, listed: Element, one: FmuVariable) -> None:
         written = element(
             listed, one.type, name=one.name, valueReference=one.reference, description=one.description or None,
             causality=one.causality, variability=one.variability, initial=one.initial,
-            declaredType=self.types.get(one.modes), **attributes, derivative=one.derivative_of,
+            declaredType=self.types.get(one.modes), **self._attributes(one), derivative=one.derivative_of,
         )  # fmt: skip
         for size in one.dimensions:
             element(written, "Dimension", start=size)
 
     def _structure(self, structure: Element) -> None:
-        interface = self.interface
-        lists = (
-            ("Output", self.ordered(interface.outputs), False),
-            ("ContinuousStateDerivative", self.ordered(interface.derivatives), False),
-            ("InitialUnknown", self.initial_unknowns(), True),
-            ("EventIndicator", self.ordered(interface.indicators), False),
+        face = self.face
+        own = {*face.states, *face.derivatives, *face.outputs}
+        initial = (
+            one.reference
+            for one in face.variables
+            if (one.reference in own and one.initial != "exact") or one.causality == "calculatedParameter"
         )
-        for tag, unknowns, initial in lists:
-            for one in unknowns:
-                known = self.known(one, initial)
-                kinds = None if known is None else " ".join(["dependent"] * len(known))
-                element(structure, tag, valueReference=one.reference, dependencies=known, dependenciesKind=kinds)
+        groups = (
+            ("Output", "Outputs", face.outputs), ("ContinuousStateDerivative", "Derivatives", face.derivatives),
+            ("InitialUnknown", "InitialUnknowns", tuple(initial)), ("EventIndicator", "", face.indicators),
+        )  # fmt: skip
+        for tag, group, references in groups:
+            if self.second and not (group and references):
+                continue
+            parent = element(structure, group) if self.second else structure
+            for one in (face.variables[k] for k in references):
+                known = self._known(one, tag == "InitialUnknown")
+                place = {"index": one.reference + 1} if self.second else {"valueReference": one.reference}
+                kinds = None if known is None else ["dependent"] * len(known)
+                element(parent, "Unknown" if self.second else tag, **place, dependencies=known, dependenciesKind=kinds)
+
+    def _known(self, one: FmuVariable, initial: bool) -> list[int] | None:
+        """On what an unknown depends; None for all, where a list would be longer than useful."""
+        if one.slot[0] == "discrete" and not initial:
+            return None  # in event mode a mode depends on more than states and inputs
+        found = self.dependencies.initial(one) if initial else self.dependencies.continuous(one)
+        if len(found) > _MOST_DEPENDENCIES:
+            return None
+        if self.second:
+            return [k + 1 for k in found]
+        return list(dict.fromkeys(self.arrays[k].reference if k in self.arrays else k for k in found))

@@ -20,21 +20,21 @@ from modelica_like.fmi.build import PLATFORMS, build, chosen_platforms, native_p
 from modelica_like.fmi.check import Check, communication_step, compare_with_idas, error_of_fixed_steps, problems
 from modelica_like.fmi.description import About, Kind, Version, build_description, identifier, model_description
 from modelica_like.fmi.documentation import Listing, index_page
-from modelica_like.fmi.icons import drive_icon, icon_name, terminal_icon
 from modelica_like.fmi.interface import Interface, ModesAs, interface
 from modelica_like.fmi.model_file import MODEL, as_c, model_file, with_token
-from modelica_like.fmi.package import write_archive
+from modelica_like.fmi.package import known_version, target_file, write_archive
 from modelica_like.fmi.runtime import runtime_library
 from modelica_like.fmi.sources import LOG_CATEGORIES, licenses, runtime_sources, source_files
 from modelica_like.fmi.tables import make_tables
-from modelica_like.fmi.terminals import Takes, terminals_and_icons, with_open_ends
+from modelica_like.fmi.terminals import Takes, icon_name, terminals_and_icons, with_open_ends
 from modelica_like.language.tunable import with_tunable_tables
 from modelica_like.simulation import Model, positive_step, seconds
 from modelica_like.solve.options import Options
 from modelica_like.solve.plot import save_plot
 from modelica_like.structure import reduce
-from modelica_like.writing import check_writable, write_bytes
+from modelica_like.writing import write_bytes
 
+_PICTURES = Path(__file__).parent / "pictures"
 _TOKEN = "{00000000-0000-0000-0000-000000000000}"
 
 Report = Callable[[str], None]
@@ -91,22 +91,17 @@ def export_fmu(
         outputs: patterns of further variables that are to be outputs, such as `*.w`.
         ends: free connectors of parts that are to be open, such as `load.flange_b`.
         takes: what open ends take from outside: the `flow` (torque, force, current, heat flow) or the `potential`.
-        embed: whether to compile the model into the binaries, for importers that do not tell where resources are; else
-            the binary is the run-time of all models and reads the model from `resources/`.
-        modes: `output` (enumerations), `local` (enumerations that are no outputs), or `integer` (outputs): some
-            importers know no enumerations.
+        embed: compile the model into the binaries, for importers that do not tell where resources are.
+        modes: `output` (enumerations), `local` (enumerations that are no outputs), or `integer` (outputs).
         fixed_step: step size of Co-Simulation in s, or a time such as "1 ms", for hardware in the loop: the work of a
-            step is bounded then, and a communication step is a whole number of them. By default steps are as long as
-            accuracy lets them be. The `check` of what is returned tells the error against IDAS over the whole run.
+            step is bounded, and a communication step is a whole number of them. By default accuracy chooses the steps.
         tables: patterns of tables whose numbers are to be tunable parameters, such as `clutch.mu_pos`: an array each in
             FMI 3, scalars `clutch.mu_pos[2,1]` in FMI 2.
-        check: whether to run the FMU against IDAS, where it has a binary for this machine. What it shows is told by the
-            `check` of what is returned; where they differ, a picture `…_check.png` is drawn next to the FMU.
-        strict: whether not to write an FMU that differs from IDAS.
+        check: run the FMU against IDAS, where it has a binary for this machine; the `check` of what is returned tells
+            what that shows, with fixed steps their error over the whole run. Where they differ, a picture
+            `…_check.png` is drawn next to the FMU.
+        strict: do not write an FMU that differs from IDAS.
         report: called with what is being done.
-
-    Returns:
-        What was exported.
 
     Raises:
         ExportError: it cannot be exported or compiled, or has a fault; nothing is written then.
@@ -114,14 +109,13 @@ def export_fmu(
         MissingExtra: binaries for other platforms need zig.
         ModelicaLikeError: something is wrong with the model.
     """
-    begin = time.perf_counter()
-    tell = report or _silent
-    target = _target(path)
-    chosen, kinds, names = _version(version), _kinds(kind), chosen_platforms(platforms)
+    begin, tell = time.perf_counter(), report or silent
+    target = target_file(path, ".fmu", "An FMU")
+    chosen, kinds, names = known_version(version, Version, "FMI"), _kinds(kind), chosen_platforms(platforms)
+    fixed, as_what = _fixed_step(fixed_step, kinds), _modes(modes)
     tell("compiling the model")
-    model, description, equations = _compiled(drive, ends, takes, tables)
-    fixed = _fixed_step(fixed_step, kinds)
-    variables = interface(model, outputs, _modes(modes))
+    model, description, equations = compiled_open(drive, ends, takes, tables)
+    variables = interface(model, outputs, as_what)
     tell("writing the model")
     files = _contents(model, variables, _about(model, chosen, kinds, description, fixed), equations, embed)
     with tempfile.TemporaryDirectory(prefix="modelica_like_") as folder:
@@ -132,8 +126,7 @@ def export_fmu(
         draft = Path(folder) / "draft.fmu"
         write_archive(draft, files)
         tell("checking")
-        _check_parts(draft)
-        checked = _compared(draft, model, kinds, fixed) if check and native_platform() in names else Check()
+        checked = _checked(draft, model, kinds, fixed, check and native_platform() in names)
         if strict and checked.differs:
             raise ExportError(checked.sentence, advice="Without `strict` it is written all the same, with a picture.")
         write_bytes(target, draft.read_bytes())
@@ -141,28 +134,11 @@ def export_fmu(
     return Export(target, chosen, kinds, names, target.stat().st_size, time.perf_counter() - begin, checked)
 
 
-def _silent(_: str) -> None:
-    pass
+def silent(_: str) -> None:
+    """Report nothing."""
 
 
 # -- what is asked for -------------------------------------------------------------------------------------------------
-
-
-def _target(path: str | Path, ending: str = ".fmu", what: str = "An FMU") -> Path:
-    target = Path(path)
-    if target.suffix != ending:
-        raise ExportError(f"{what} is a file with the ending {ending}, not '{target.name}'.")
-    if not target.absolute().parent.is_dir():
-        raise ExportError(f"There is no folder '{target.parent}' for {target.name}.", advice="Make it first.")
-    check_writable(target)
-    return target
-
-
-def _version(asked: str) -> Version:
-    for one in get_args(Version):
-        if asked == one:
-            return one
-    raise UnknownName(f"FMI {asked} is not supported.", advice="There are 2.0 and 3.0.")
 
 
 def _modes(asked: str) -> ModesAs:
@@ -196,10 +172,10 @@ def _fixed_step(asked: float | str | None, kinds: tuple[Kind, ...]) -> float:
 # -- the model ---------------------------------------------------------------------------------------------------------
 
 
-def _compiled(
+def compiled_open(
     drive: Model, ends: Sequence[str], takes: Takes, tables: Sequence[str] = ()
 ) -> tuple[CompiledDae, str, Listing]:
-    """Return the compiled model, its description and its equations."""
+    """Return a compiled model with its ends open, its description and its equations."""
     if isinstance(drive, CompiledDae):
         if ends or tables:
             what = "ends that could be opened" if ends else "tables whose numbers could become parameters"
@@ -216,12 +192,8 @@ def _compiled(
 
 
 def _equations(flat: FlatModel) -> Listing:
-    found: list[tuple[str, str, list[str]]] = []
-    for one in flat.instances:
-        lines = [source.text or str(source) for source in one.template.sources]
-        if lines:
-            found.append((one.path, one.template.component, lines))
-    return found
+    told = ((one, [source.text or str(source) for source in one.template.sources]) for one in flat.instances)
+    return [(one.path, one.template.component, lines) for one, lines in told if lines]
 
 
 def _about(model: CompiledDae, version: Version, kinds: tuple[Kind, ...], description: str, fixed_step: float) -> About:
@@ -232,12 +204,13 @@ def _about(model: CompiledDae, version: Version, kinds: tuple[Kind, ...], descri
     return About(
         version=version, kinds=frozenset(kinds), token=_TOKEN, description=description, stop_time=end,
         tolerance=float(settings.get("rtol", Options.rtol)), step_size=step,
-        sources=source_files(version), log_categories=LOG_CATEGORIES, tool=_tool(),
+        sources=source_files(version), log_categories=LOG_CATEGORIES, tool=tool(),
         fixed_step=fixed_step,
     )  # fmt: skip
 
 
-def _tool() -> str:
+def tool() -> str:
+    """Return name and version of this package."""
     try:
         return f"modelica-like {version('modelica-like')}"
     except PackageNotFoundError:
@@ -265,20 +238,21 @@ def _contents(
     texts |= {f"sources/{name}": text for name, text in runtime_sources((about.version,)).items()}
     texts["documentation/index.html"] = index_page(variables, about.description, about.tool, equations)
     texts["documentation/licenses/license.txt"] = licenses(about.version)
-    pictures = {"model.png": drive_icon("png")}
+    pictures = {"model.png": _PICTURES / "icon.png"}
     if about.version == "3.0":
         texts["sources/buildDescription.xml"] = build_description(model.name, about.sources)
         texts["terminalsAndIcons/terminalsAndIcons.xml"] = terminals_and_icons(model.terminals)
-        pictures = {f"terminalsAndIcons/icon.{suffix}": drive_icon(suffix) for suffix in ("png", "svg")}
-        for family in dict.fromkeys(icon_name(one.kind) for one in model.terminals):
-            pictures |= {f"terminalsAndIcons/{family}.{s}": terminal_icon(family, s) for s in ("png", "svg")}
+        icons = dict.fromkeys(("icon", *(icon_name(one.kind) for one in model.terminals)))
+        shown = [_PICTURES / f"{icon}.{suffix}" for icon in icons for suffix in ("png", "svg")]
+        pictures = {f"terminalsAndIcons/{picture.name}": picture for picture in shown}
     seen = variables.variables + (variables.arrays if about.version == "3.0" else ())
     data = model_file(make_tables(model, variables.start), seen, _TOKEN, about.tolerance, about.fixed_step)
     token = _token(texts, data)
     data = with_token(data, _TOKEN, token)
     texts |= {name: text.replace(_TOKEN, token) for name, text in texts.items()}
     texts["sources/model_data.c"] = as_c(data)
-    files: dict[str, bytes] = {name: text.encode() for name, text in texts.items()} | pictures
+    files: dict[str, bytes] = {name: text.encode() for name, text in texts.items()}
+    files |= {name: picture.read_bytes() for name, picture in pictures.items()}
     return files if embed else files | {MODEL: data}
 
 
@@ -291,15 +265,15 @@ def _token(texts: dict[str, str], data: bytes) -> str:
     return f"{{{digest[:8]}-{digest[8:12]}-{digest[12:16]}-{digest[16:20]}-{digest[20:32]}}}"
 
 
-def _check_parts(draft: Path) -> None:
+def _checked(draft: Path, model: CompiledDae, kinds: tuple[Kind, ...], fixed_step: float, run: bool) -> Check:
+    """Check the parts of an FMU, and run it against IDAS."""
     found = problems(draft)
     if found:
         raise ExportError(
             f"The FMU does not pass its checks: {'; '.join(found[:3])}.", why="This is a fault of the export."
         )
-
-
-def _compared(draft: Path, model: CompiledDae, kinds: tuple[Kind, ...], fixed_step: float) -> Check:
+    if not run:
+        return Check()
     return error_of_fixed_steps(draft, model, fixed_step) if fixed_step else compare_with_idas(draft, model, kinds[-1])
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
@@ -17,7 +16,7 @@ from modelica_like.errors import UnknownName, did_you_mean
 from modelica_like.flatten.model import FlatDiscrete, FlatParameter, FlatVariable
 from modelica_like.fmi.reach import Reach
 from modelica_like.fmi.start_tables import StartTables, start_tables
-from modelica_like.units import ONE, Unit, coherent, parse_unit
+from modelica_like.units import ONE, Unit, parse_unit
 
 Causality = Literal["independent", "parameter", "calculatedParameter", "input", "output", "local"]
 Variability = Literal["fixed", "tunable", "discrete", "continuous"]
@@ -119,9 +118,21 @@ def interface(model: CompiledDae, outputs: Sequence[str] = (), modes: ModesAs = 
     build = _Builder(model, outputs)
     build.parameters()
     build.continuous()
+    build.rates()
     build.discretes(modes)
     build.guards()
-    return build.result()
+    states = range(len(model.states))
+    return Interface(
+        model.name,
+        tuple(build.found),
+        tuple(build.states[k] for k in states),
+        tuple(build.derivatives[k] for k in states),
+        tuple(one.reference for one in build.found if one.causality == "output"),
+        tuple(build.indicators[k] for k in sorted(build.indicators)),
+        build.starts.tables,
+        build.reach,
+        tuple(build.arrays()),
+    )
 
 
 class _Builder:
@@ -130,13 +141,17 @@ class _Builder:
         self.found: list[FmuVariable] = []
         self.states: dict[int, int] = {}
         self.derivatives: dict[int, int] = {}
+        self.indicators: dict[int, int] = {}
         self.wanted = _matcher(model, outputs)
         self.starts = _Starts(model)
         self.reach = Reach(model.variables)
         self.depends = _dependence(self.reach, model.variables)
-        self.add("time", "Float64", "independent", "continuous", None, ("time", 0), unit=_SECOND, description="time")
+        self.add("time", ("time", 0), "independent", initial=None, unit=_SECOND, description="time")
 
-    def add(self, name: str, kind: Any, causality: Any, variability: Any, initial: Any, slot: Any, **rest: Any) -> int:
+    def add(
+        self, name: str, slot: Any, causality: Any = "local", variability: Any = "continuous",
+        initial: Any = "calculated", kind: Any = "Float64", **rest: Any,
+    ) -> int:  # fmt: skip
         """Append a variable; return its value reference."""
         reference = len(self.found)
         self.found.append(FmuVariable(name, reference, kind, causality, variability, initial, slot, **rest))
@@ -144,117 +159,76 @@ class _Builder:
 
     def parameters(self) -> None:
         """Independent parameters, and those that follow from others."""
-        model = self.model
-        for k, one in enumerate(model.flat_parameters):
-            variability = "tunable" if one.tunable else "fixed"
-            start = float(model.p[k])
-            self.add(one.path, "Float64", "parameter", variability, None, ("parameter", k), start=start, **_about(one))
-        for k, one in enumerate(model.flat_derived):
-            self.add(one.path, "Float64", "calculatedParameter", "tunable", "calculated", ("derived", k), **_about(one))
+        for k, one in enumerate(self.model.flat_parameters):
+            variability, start = "tunable" if one.tunable else "fixed", float(self.model.p[k])
+            self.add(one.path, ("parameter", k), "parameter", variability, None, start=start, **_about(one))
+        for k, one in enumerate(self.model.flat_derived):
+            self.add(one.path, ("derived", k), "calculatedParameter", "tunable", **_about(one))
 
     def continuous(self) -> None:
-        """Inputs, states with their derivatives, and all other variables."""
+        """Inputs, states, and all other variables."""
         model = self.model
         taken = {*model.parameter_position, *model.derived_position}
         inputs = {variable: k for k, variable in enumerate(model.inputs)}
         states = {name: k for k, name in enumerate(model.states)}
         for k, one in enumerate(model.flat_variables):
+            about, causality = _about(one), "output" if self.wanted(one) else "local"
             if k in inputs:
-                position = inputs[k]
-                start = float(model.u[position])
-                slot = ("input", position)
-                self.add(one.path, "Float64", "input", "continuous", None, slot, start=start, **_about(one))
+                start = float(model.u[inputs[k]])
+                self.add(one.path, ("input", inputs[k]), "input", initial=None, start=start, **about)
             elif one.path in states:
-                self._state(states[one.path], k, one)
+                slot, start = ("state", states[one.path]), self.starts.of_variable(k)
+                self.states[slot[1]] = self.add(one.path, slot, causality, **start, **about)
             elif one.path not in taken:  # the value of an input that a parameter gives is that parameter
-                self._variable(k, one)
-        self._rates()
+                start, variability = self.starts.of_variable(k), self.depends[k]
+                if start["initial"] != "calculated":
+                    variability = "continuous"
+                elif causality == "output" and variability == "tunable":
+                    variability = "discrete"  # an output cannot be less
+                self.add(one.path, ("variable", k), causality, variability, **start, **about)
 
-    def _state(self, position: int, k: int, one: FlatVariable) -> None:
-        start = self.starts.of_variable(k)
-        causality = "output" if self.wanted(one) else "local"
-        slot = ("state", position)
-        self.states[position] = self.add(
-            one.path, "Float64", causality, "continuous", slot=slot, **start, **_about(one)
-        )
-
-    def _variable(self, k: int, one: FlatVariable) -> None:
-        output = self.wanted(one)
-        variability = self.depends[k]
-        start = self.starts.of_variable(k)
-        if output and variability == "tunable":
-            variability = "discrete"  # an output cannot be less
-        if start["initial"] != "calculated":
-            variability = "continuous"
-        causality = "output" if output else "local"
-        self.add(one.path, "Float64", causality, variability, slot=("variable", k), **start, **_about(one))
-
-    def _rates(self) -> None:
+    def rates(self) -> None:
         """Derivatives of all states; states that are themselves derivatives and have no other name come first."""
-        model = self.model
-        unnamed = [k for k in range(len(model.states)) if k not in self.states]
-        units = {
-            name: model.flat_variables[model.position[name]].unit for name in model.states if name in model.position
-        }
-        for k in sorted(unnamed, key=lambda k: model.states[k].count("der(")):
-            base = model.states[k].removeprefix("der(").removesuffix(")")
-            unit = units[model.states[k]] = units[base] / _SECOND
-            below = self.states[model.states.index(base)]
-            self.states[k] = self.add(
-                fmi_name(model.states[k]), "Float64", "local", "continuous", "calculated", ("state", k),
-                unit=coherent(unit), derivative_of=below, nominal=float(model.nominals[k]),
+        model, names = self.model, self.model.states
+        units = {name: model.flat_variables[model.position[name]].unit for name in names if name in model.position}
+        unnamed = [k for k in range(len(names)) if k not in self.states]
+        for k in sorted(unnamed, key=lambda k: names[k].count("der(")):
+            base = names[k].removeprefix("der(").removesuffix(")")
+            units[names[k]] = units[base] / _SECOND
+            below = names.index(base)
+            self.states[k] = self.derivatives[below] = self.add(
+                fmi_name(names[k]), ("state", k), unit=units[names[k]], derivative_of=self.states[below],
+                nominal=float(model.nominals[k]),
             )  # fmt: skip
-            self.derivatives[model.states.index(base)] = self.states[k]
-        for k, name in enumerate(model.states):
+        for k, name in enumerate(names):
             if k not in self.derivatives:
-                self.derivatives[k] = self.add(
-                    fmi_name(f"der({name})"), "Float64", "local", "continuous", "calculated", ("der", k),
-                    unit=coherent(units[name] / _SECOND), derivative_of=self.states[k],
-                )  # fmt: skip
+                unit = units[name] / _SECOND
+                name = fmi_name(f"der({name})")
+                self.derivatives[k] = self.add(name, ("der", k), unit=unit, derivative_of=self.states[k])
 
     def discretes(self, modes: ModesAs) -> None:
         """Modes, and other discrete values, which are local."""
         for k, one in enumerate(self.model.flat_discretes):
-            slot, about = ("discrete", k), {"unit": coherent(one.unit), "description": _mode_text(one)}
+            slot, about = ("discrete", k), {"unit": one.unit, "description": _mode_text(one)}
             if one.names:
                 kind, names = ("Int64", ()) if modes == "integer" else ("Enumeration", one.names)
                 causality = "local" if modes == "local" else "output"
-                bounds = {"min": 0, "max": len(one.names) - 1, "modes": names}
-                self.add(one.path, kind, causality, "discrete", "calculated", slot, **about, **bounds)
+                about |= {"min": 0, "max": len(one.names) - 1, "modes": names}
+                self.add(one.path, slot, causality, "discrete", kind=kind, **about)
             else:
-                start = self.starts.discrete(k)
-                self.add(one.path, "Float64", "local", "discrete", "exact", slot, start=start, **about)
+                self.add(one.path, slot, "local", "discrete", "exact", start=self.starts.discrete[k], **about)
 
     def guards(self) -> None:
         """One event indicator per state event, named by its mode."""
-        model = self.model
-        self.indicators: dict[int, int] = {}
-        for one in model.transitions:
+        for one in self.model.transitions:
             if one.timed or one.index in self.indicators:
                 continue
-            mode = model.flat_discretes[one.mode]
-            leaving = (
-                "any mode" if len(one.sources) == len(mode.names) else " or ".join(mode.names[k] for k in one.sources)
-            )
-            self.indicators[one.index] = self.add(
-                f"event_indicator[{one.index + 1}]", "Float64", "local", "continuous", "calculated",
-                ("guard", one.index), description=f"{mode.path}: {leaving} → {mode.names[one.target]} above zero",
-            )  # fmt: skip
-
-    def result(self) -> Interface:
-        """Return the interface."""
-        count = len(self.model.states)
-        return Interface(
-            self.model.name,
-            tuple(self.found),
-            tuple(self.states[k] for k in range(count)),
-            tuple(self.derivatives[k] for k in range(count)),
-            tuple(one.reference for one in self.found if one.causality == "output"),
-            tuple(self.indicators[k] for k in sorted(self.indicators)),
-            self.starts.tables,
-            self.reach,
-            tuple(self.arrays()),
-        )
+            mode = self.model.flat_discretes[one.mode]
+            every = len(one.sources) == len(mode.names)
+            leaving = "any mode" if every else " or ".join(mode.names[k] for k in one.sources)
+            told = f"{mode.path}: {leaving} → {mode.names[one.target]} above zero"
+            name = f"event_indicator[{one.index + 1}]"
+            self.indicators[one.index] = self.add(name, ("guard", one.index), description=told)
 
     def arrays(self) -> Iterator[FmuVariable]:
         """Tables: parameters `clutch.mu_pos[2,1]` belong together."""
@@ -282,7 +256,7 @@ def fmi_name(name: str) -> str:
 
 
 def _about(one: FlatVariable | FlatParameter) -> dict[str, Any]:
-    about: dict[str, Any] = {"unit": coherent(one.unit), "description": one.description, "min": one.min, "max": one.max}
+    about: dict[str, Any] = {"unit": one.unit, "description": one.description, "min": one.min, "max": one.max}
     if isinstance(one, FlatVariable) and one.nominal != 1.0:
         about["nominal"] = abs(one.nominal)
     return about
@@ -294,17 +268,14 @@ def _mode_text(one: FlatDiscrete) -> str:
 
 
 def _matcher(model: CompiledDae, patterns: Sequence[str]) -> Callable[[FlatVariable], bool]:
-    paths = [one.path for one in model.flat_variables]
+    paths, chosen = [one.path for one in model.flat_variables], set[str]()
     for pattern in patterns:
-        if not any(fnmatchcase(path, _literal_brackets(pattern)) for path in paths):
-            raise UnknownName(
-                f"{model.name} has no variable '{pattern}' that could be an output{did_you_mean(pattern, paths) or '.'}"
-            )
-    return lambda one: one.kind == "output" or any(fnmatchcase(one.path, _literal_brackets(p)) for p in patterns)
-
-
-def _literal_brackets(pattern: str) -> str:
-    return re.sub(r"\[", "[[]", pattern)
+        found = [path for path in paths if fnmatchcase(path, pattern.replace("[", "[[]"))]
+        if not found:
+            hint = did_you_mean(pattern, paths) or "."
+            raise UnknownName(f"{model.name} has no variable '{pattern}' that could be an output{hint}")
+        chosen.update(found)
+    return lambda one: one.kind == "output" or one.path in chosen
 
 
 def _dependence(reach: Reach, variables: Any) -> list[Variability]:
@@ -315,25 +286,19 @@ def _dependence(reach: Reach, variables: Any) -> list[Variability]:
 
 
 class _Starts:
-    """Start values that an importer may replace, by state and by variable."""
+    """Start values that an importer may replace: of variables by their names, and `discrete` ones."""
 
     def __init__(self, model: CompiledDae) -> None:
-        self.model = model
-        self.tables: StartTables = start_tables(model)
+        self.model, tables = model, start_tables(model)
         arguments = (0.0, model.guesses, model.z_guesses, model.p, model.u)
-        zeros = np.zeros(model.discrete_size)
-        self._discrete = model.discrete_starts(*arguments, zeros).full().ravel()
-        self._values = model.start_values(*arguments, self._discrete).full().ravel()
-        tables = self.tables
-        used = {k for _, k, _ in (*tables.direct, *tables.x_guesses, *tables.z_guesses)} | {
-            k for k, _, _ in tables.rows
-        }
+        discrete = model.discrete_starts(*arguments, np.zeros(model.discrete_size)).full().ravel()
+        self._values = model.start_values(*arguments, discrete).full().ravel()
+        self.tables, self.discrete = tables, discrete.tolist()
+        used = {k for k, _, _ in tables.rows}
+        used |= {k for _, k, _ in (*tables.direct, *tables.x_guesses, *tables.z_guesses)}
         if tables.steady is not None:
             used |= {k for _, k, _ in tables.defaults}
-        self._of_variable: dict[int, int] = {}
-        for k, entry in enumerate(model.starts):
-            if k in used:
-                self._of_variable.setdefault(entry.node, k)
+        self._of_variable = {entry.node: k for k, entry in reversed([*enumerate(model.starts)]) if k in used}
 
     def of_variable(self, k: int) -> dict[str, Any]:
         """Start value of a flat variable: the one that was given for this very name."""
@@ -343,7 +308,3 @@ class _Starts:
         exact = self.model.starts[number].strength != "guess" and self.tables.steady is None
         start = float(self._values[number])
         return {"initial": "exact" if exact else "approx", "start": start, "start_entry": number}
-
-    def discrete(self, k: int) -> float:
-        """Start of a discrete value."""
-        return float(self._discrete[k])

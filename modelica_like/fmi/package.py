@@ -1,12 +1,14 @@
-"""FMU files: zip archives with the same bytes for the same content."""
+"""FMU files and other archives: what they may be called, and the same bytes for the same content."""
 
 from __future__ import annotations
 
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any, get_args
 
-from modelica_like.writing import replacing
+from modelica_like.errors import ExportError, UnknownName
+from modelica_like.writing import check_writable, replacing
 
 _LEVEL = 5  # 6 takes almost twice as long for files that are 2 % smaller
 _EPOCH = (1980, 1, 1, 0, 0, 0)
@@ -28,3 +30,35 @@ def write_archive(path: Path, files: Mapping[str, bytes]) -> None:
             entry.external_attr = _LIBRARY if name.startswith("binaries/") else _FILE
             entry.compress_type = zipfile.ZIP_DEFLATED
             archive.writestr(entry, files[name], compresslevel=_LEVEL)
+
+
+def target_file(path: str | Path, ending: str, what: str) -> Path:
+    """Return the path of a file that can be written.
+
+    Args:
+        path: the file.
+        ending: what its name must end with.
+        what: what it is to be, such as `An FMU`.
+
+    Raises:
+        ExportError: it has another ending, or there is no such folder.
+        OSError: it cannot be written.
+    """
+    target = Path(path)
+    if target.suffix.lower() != ending:
+        raise ExportError(f"{what} is a file with the ending {ending}, not '{target.name}'.")
+    if not target.absolute().parent.is_dir():
+        raise ExportError(f"There is no folder '{target.parent}' for {target.name}.", advice="Make it first.")
+    check_writable(target)
+    return target
+
+
+def known_version(asked: str, versions: Any, standard: str) -> Any:
+    """Return the version of a standard that is asked for, one of a `Literal`.
+
+    Raises:
+        UnknownName: there is no such version.
+    """
+    if asked in get_args(versions):
+        return asked
+    raise UnknownName(f"{standard} {asked} is not supported.", advice=f"There are {' and '.join(get_args(versions))}.")

@@ -7,7 +7,6 @@ from typing import Literal
 
 from modelica_like.compile.compiled import CompiledTerminal
 from modelica_like.errors import ExportError
-from modelica_like.fmi.icons import icon_name
 from modelica_like.fmi.xml import Element, document, element
 from modelica_like.language import Assembly, Component, Connector, Equations, connect
 from modelica_like.language.declared import unknown
@@ -16,6 +15,7 @@ from modelica_like.netlist.registry import library_types
 
 Takes = Literal["flow", "potential"]
 
+_FAMILIES = ("rotational", "translational", "electrical", "thermal")
 _WIDTH = 100.0
 _MARGIN = 10.0
 
@@ -101,6 +101,11 @@ def adaptor_for(connector: Connector, takes: Takes) -> tuple[type[Component], st
         f"its {takes}.",
         advice="Write one: a component with that connector, inputs and outputs, and `terminal = Terminal(…)`.",
     )
+
+
+def icon_name(kind: str) -> str:
+    """Return the name of the picture for a kind of terminal."""
+    return next((family for family in _FAMILIES if family in kind), "terminal")
 
 
 def terminals_and_icons(terminals: Sequence[CompiledTerminal]) -> str:

@@ -65,8 +65,3 @@ def _character(one: str) -> str:
 def unit_name(unit: Unit) -> str | None:
     """Return the name of a unit in a description, or None for a plain number."""
     return None if unit in (ONE, ANY) else str(unit)
-
-
-def number(value: float | None, *, whole: bool = False) -> int | float | None:
-    """Return a number for an attribute, as a whole one for integers."""
-    return None if value is None else int(value) if whole else float(value)

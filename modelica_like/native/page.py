@@ -17,15 +17,17 @@ from typing import Any
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.flatten.model import FlatParameter
 from modelica_like.fmi.build import BROWSER
-from modelica_like.fmi.export import Report, _compiled, _silent, _target, _tool
+from modelica_like.fmi.export import Report, compiled_open, silent, tool
 from modelica_like.fmi.interface import FmuVariable, interface
 from modelica_like.fmi.model_file import model_file
+from modelica_like.fmi.package import target_file
 from modelica_like.fmi.runtime import runtime_library
 from modelica_like.fmi.tables import make_tables
 from modelica_like.native.library import MESSAGE_LENGTH, Run
 from modelica_like.simulation import Model, seconds, simulate
 from modelica_like.solve.options import Options
-from modelica_like.solve.plot import _QUANTITIES, chosen
+from modelica_like.solve.plot import chosen
+from modelica_like.solve.plot import quantity as quantity_of
 from modelica_like.units import ANY, ONE, Unit, coherent
 from modelica_like.writing import write_bytes
 
@@ -77,7 +79,7 @@ class _Slider:
 
 def export_html(
     drive: Model, path: str | Path, until: float | str | None = None, *, show: Sequence[str] = (),
-    report: Report = _silent,
+    report: Report = silent,
 ) -> Page:  # fmt: skip
     """Write a drive as a page that simulates it in a browser: one file that asks for nothing else.
 
@@ -99,9 +101,9 @@ def export_html(
         ModelicaLikeError: something is wrong with the model, or it has no end time, or it cannot be simulated.
     """
     begin = time.perf_counter()
-    target = _target(path, ".html", "A page")
+    target = target_file(path, ".html", "A page")
     report("compiling the model")
-    model, description, _ = _compiled(drive, (), "flow", ())
+    model, description, _ = compiled_open(drive, (), "flow", ())
     report("simulating")
     end = seconds(until if until is not None else model.settings.get("until"))
     solution = simulate(model, end)
@@ -133,7 +135,7 @@ def _content(model: CompiledDae, names: Sequence[str], until: float, options: Op
     units = _Units()
     return {
         "model": _text(model_file(make_tables(model, variables.start), variables.variables, "{page}", options.rtol)),
-        "layout": _layout(), "message_length": MESSAGE_LENGTH, "tool": _tool(), "until": until,
+        "layout": _layout(), "message_length": MESSAGE_LENGTH, "tool": tool(), "until": until,
         "rtol": options.rtol, "atol": options.atol, "points": options.points, "most_events": options.max_events,
         "sliders": [asdict(end), *(asdict(one) for one in _sliders(model, variables.by_name))],
         "variables": list(_variables(model, variables.by_name, set(names), units)),
@@ -174,7 +176,7 @@ class _Units:
         """Return the position of a unit."""
         if unit not in self._numbers:
             self._numbers[unit] = len(self.rows)
-            quantity = _QUANTITIES.get(str(coherent(unit)), "value")
+            quantity = quantity_of(str(coherent(unit)))
             row = {"text": _spelled(unit), "factor": unit.factor, "offset": unit.offset, "quantity": quantity}
             self.rows.append(row)
         return self._numbers[unit]

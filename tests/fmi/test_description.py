@@ -226,9 +226,9 @@ def test_outputs_know_their_inputs() -> None:
             "c": ["motor.flange", "J.flange_a"],
         },
     )
-    from modelica_like.fmi.export import _compiled
+    from modelica_like.fmi.export import compiled_open
 
-    model, _, _ = _compiled(drive, (), "flow", ())
+    model, _, _ = compiled_open(drive, (), "flow", ())
     faces = interface(model)
     names = [faces.variables[k].name for k in Dependencies(model, faces).continuous(faces.by_name["end.tau"])]
     assert names == ["end.phi", "end.w"]
