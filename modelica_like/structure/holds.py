@@ -66,6 +66,17 @@ class Circuit:
     members: tuple[int, ...]
     first: int
 
+    @property
+    def entries(self) -> slice:
+        """Positions in d of switches and shares."""
+        count = len(self.members)
+        return slice(self.first, self.first + count * (1 + count))
+
+    def shares(self, d: Any) -> Any:
+        """Return the shares among the values of d; shape (members, members)."""
+        count = len(self.members)
+        return d[self.entries][count:].reshape(count, count)
+
 
 def add_approaches(system: System) -> tuple[HeldMotion, ...]:
     """Let every equation that holds a motion ask for an approach."""
