@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import gc
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from modelica_like.cli.declare import Option
 from modelica_like.cli.shared import Assignments, Debug, Netlist, load_netlist, say, told
@@ -19,9 +19,7 @@ Modes = Literal["output", "local", "integer"]
 
 def export(
     netlist: Netlist, assignments: Assignments = None, *,
-    output: Annotated[
-        Path | None, Option("-o", "--output", metavar="FILE", help="The FMU; else named after the netlist.")
-    ] = None,
+    output: Annotated[Path | None, Option("-o", "--output", metavar="FILE", help="The FMU; else NETLIST.fmu.")] = None,
     html: Annotated[
         Path | None, Option(metavar="FILE", help="A page that simulates in a browser; with -o besides the FMU.")
     ] = None,
@@ -60,10 +58,7 @@ def export(
 
         with Console(stderr=True).status("loading") as status:
             if html is not None:
-                from modelica_like.native.page import export_html
-
-                page = export_html(assembly, html, show=outputs or (), report=status.update)
-                say(str(page))
+                _page(assembly, html, outputs or (), status.update)
             if html is not None and output is None:
                 return
             done = export_fmu(
@@ -72,6 +67,12 @@ def export(
                 fixed_step=fixed_step, tables=tables or (), check=check, strict=strict, report=status.update,
             )  # fmt: skip
         say(str(done))
+
+
+def _page(assembly: Any, file: Path, show: Sequence[str], report: Callable[[str], None]) -> None:
+    from modelica_like.native.page import export_html
+
+    say(str(export_html(assembly, file, show=show, report=report)))
 
 
 @contextmanager
