@@ -17,7 +17,7 @@ from modelica_like.errors import ExportError, UnknownName
 from modelica_like.flatten import flatten
 from modelica_like.flatten.model import FlatModel
 from modelica_like.fmi.build import PLATFORMS, build, chosen_platforms, native_platform
-from modelica_like.fmi.check import Check, communication_step, compare_with_idas, error_of_fixed_steps, problems
+from modelica_like.fmi.check import Check, communication_step, compare_with_idas, problems
 from modelica_like.fmi.description import About, Kind, Version, build_description, identifier, model_description
 from modelica_like.fmi.documentation import Listing, index_page
 from modelica_like.fmi.interface import Interface, ModesAs, interface
@@ -274,7 +274,7 @@ def _checked(draft: Path, model: CompiledDae, kinds: tuple[Kind, ...], fixed_ste
         )
     if not run:
         return Check()
-    return error_of_fixed_steps(draft, model, fixed_step) if fixed_step else compare_with_idas(draft, model, kinds[-1])
+    return compare_with_idas(draft, model, kinds[-1], fixed_step)
 
 
 def _draw(check: Check, target: Path) -> Check:
