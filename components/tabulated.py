@@ -38,7 +38,9 @@ class Tabulated(Component, partial=True):
         """
         if len(table) > 1 and self.extrapolate != "linear":
             told = ": its last value holds" if self.extrapolate == "hold" else ""
-            outside = x > table[-1][0] if table[0][0] <= least else any_of(x > table[-1][0], x < table[0][0])
+            first, last = table[0][0], table[-1][0]
+            above = isinstance(first, float | int) and first <= least
+            outside = x > last if above else any_of(x > last, x < first)
             yield self.range.go(
                 "kept", "left", when=all_of(outside, *conditions), fails=self.extrapolate == "error",
                 notice=f"leaves the rows of {name}{told}",

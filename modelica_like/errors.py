@@ -75,7 +75,7 @@ class LanguageError(ModelicaLikeError):
 
 
 class ComponentUnbalanced(LanguageError):
-    """A component has not as many equations as unknowns of its own."""
+    """A component has more or fewer equations than unknowns of its own."""
 
 
 class UnitError(ModelicaLikeError):
@@ -213,7 +213,7 @@ class FmuCrashed(FmuFailed):
 
 
 class FmuTimeout(FmuFailed):
-    """An FMU did not come to an end in time."""
+    """An FMU did not finish in time."""
 
 
 class CalibrationFailed(SolveError):

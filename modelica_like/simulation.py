@@ -48,9 +48,9 @@ def build(drive: Model, free: Iterable[str] = (), *, tables: Iterable[str] = ())
 
     Args:
         drive: the model.
-        free: parameters that shall be independent: what follows from others by a formula keeps the formula's value,
-            but can be varied on its own. Not possible in a compiled model.
-        tables: patterns of tables whose numbers shall be parameters, such as `clutch.mu_pos`: see
+        free: parameters to decouple from their formulas: each keeps its formula's value, but can be varied on its own.
+            Not possible in a compiled model.
+        tables: patterns of tables whose numbers become parameters, such as `clutch.mu_pos`: see
             `with_tunable_tables`. Not possible in a compiled model.
 
     Raises:
@@ -153,7 +153,7 @@ def plan(
     if end <= t0:
         raise ValueOutOfRange(f"The end time {end:g} s is not after the start time {t0:g} s.")
     if end - t0 < _SHORTEST * max(1.0, abs(t0)):
-        raise ValueOutOfRange(f"A run of {end - t0:g} s is too short: no times can be told apart in it.")
+        raise ValueOutOfRange(f"A run of {end - t0:g} s is too short: its times cannot be distinguished.")
     return end, chosen
 
 

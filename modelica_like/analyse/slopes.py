@@ -18,8 +18,6 @@ from modelica_like.initialize import Point
 from modelica_like.initialize.kept import find_kept, solve_kept
 from modelica_like.initialize.steady import moving_states
 
-_NONE = np.zeros(0)
-
 
 @dataclass(frozen=True)
 class Sizes:
@@ -75,47 +73,52 @@ class Slopes:
 class _Partials:
     """Value and partial derivatives by x, z, t and (p, u, d), called sparse and given dense."""
 
-    def __init__(self, model: CompiledDae, value: Any, numbers: Any) -> None:
-        given = model.arguments
-        by = (given["x"], given["z"], given["t"], ca.vertcat(given["p"], given["u"], given["d"]))
-        outputs = [ca.densify(value), *(ca.jacobian(value, one) for one in by)]
-        self._fast = BufferedFunction(ca.Function("slopes", [*given.values(), numbers], outputs))
+    def __init__(self, symbols: list[Any], value: Any) -> None:
+        t, x, z, *theta = symbols[:6]
+        outputs = [ca.densify(value), *(ca.jacobian(value, one) for one in (x, z, t, ca.vertcat(*theta)))]
+        self._fast = BufferedFunction(ca.Function("slopes", symbols, outputs))
         patterns = [self._fast.function.sparsity_out(k) for k in range(len(outputs))]
-        self._places = [(one.shape, np.array(one.find(), int)) for one in patterns]
+        self._patterns = [(one.shape, one.find()) for one in patterns]
 
-    def __call__(self, model: CompiledDae, point: Point, constants: Vector = _NONE) -> list[Vector]:
-        found = self._fast(point.t, point.x, point.z, model.p, model.u, point.d, constants)
-        full: list[Vector] = []
-        for (shape, places), entries in zip(self._places, found, strict=True):
-            full.append(np.zeros(shape, order="F"))
-            full[-1].ravel("K")[places] = entries
-        return full
+    def __call__(self, model: CompiledDae, point: Point, *constants: Vector) -> list[Vector]:
+        found = self._fast(point.t, point.x, point.z, model.p, model.u, point.d, *constants)
+        return [_filled(entries, *pattern) for entries, pattern in zip(found, self._patterns, strict=True)]
+
+
+def _filled(entries: Vector, shape: tuple[int, int], places: list[int]) -> Vector:
+    """Fill a matrix column by column."""
+    if len(places) < shape[0] * shape[1]:
+        given, entries = entries, np.zeros(shape[0] * shape[1])
+        entries[places] = given
+    return entries.reshape(shape, order="F")
 
 
 def slopes(
     model: CompiledDae, point: Point, name: str, rows: Sequence[int] | None = None,
-    expression: Callable[..., Any] | None = None, constants: Vector = _NONE,
+    function: Callable[[], ca.Function] | None = None, *constants: Vector,
 ) -> Slopes:  # fmt: skip
     """Differentiate a function of the model.
 
     Args:
         model: the compiled model.
         point: where.
-        name: name of one of its functions, or of `expression` in the cache.
+        name: name of one of its functions, or of `function` in the cache.
         rows: which results of the function; by default all.
-        expression: makes an SX column in the model's arguments, of the symbols of `constants` if there are some.
-        constants: numbers in the expression that are not differentiated.
+        function: makes a function of the model's arguments, and of `constants`.
+        constants: numbers that are not differentiated.
     """
 
     def make() -> _Partials:
-        numbers = ca.SX.sym("constants", len(constants))
-        given = [numbers] if len(constants) else []
-        value = getattr(model, name)(*model.arguments.values()) if expression is None else expression(*given)
-        return _Partials(model, value if rows is None else value[list(rows)], numbers)
+        made: ca.Function = getattr(model, name) if function is None else function()
+        # Linear equations are solved in numbers.
+        as_numbers = function is not None and not made.is_a("SXFunction")
+        symbols = made.mx_in() if as_numbers else [*model.arguments.values()]
+        value = made(*symbols)
+        return _Partials(symbols, value if rows is None else value[list(rows)])
 
     chosen = None if rows is None else tuple(rows)
     partials = model.once(("slopes of", name, chosen, get_ident()), make)
-    value, x, z, t, theta = partials(model, point, constants)
+    value, x, z, t, theta = partials(model, point, *constants)
     if np.any(z):
         z_x, z_t, z_theta = implicit_slopes(model, point)
         x, t, theta = x + z @ z_x, t + z @ z_t, theta + z @ z_theta
@@ -124,7 +127,8 @@ def slopes(
 
 def implicit_slopes(model: CompiledDae, point: Point) -> tuple[Vector, Vector, Vector]:
     """Derivatives of z by x, t and theta; shapes (nz, nx), (nz, 1), (nz, ntheta)."""
-    make = lambda: _Partials(model, model.alg(*model.arguments.values()), ca.SX(0, 1))  # noqa: E731
+    symbols = [*model.arguments.values()]
+    make = lambda: _Partials(symbols, model.alg(*symbols))  # noqa: E731
     _, x, z, t, theta = model.once(("slopes of z", get_ident()), make)(model, point)
     solved = np.asarray(-np.linalg.solve(z, np.hstack([x, t, theta])), np.float64)
     columns = x.shape[1]

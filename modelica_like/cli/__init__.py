@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 # Modules and their commands, in the order in which the help lists them.
 _GROUPS = {
     "models": ("check", "simulate"),
-    "pictures": ("draw",),
+    "pictures": ("draw", "report"),
     "analysis": ("modes",),
     "sweeps": ("steady", "sweep"),
     "sensitivity": ("sensitivity",),

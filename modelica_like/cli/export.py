@@ -90,7 +90,7 @@ def runtimes(
     ] = "none",
     debug: Debug = False,
 ) -> None:  # fmt: skip
-    """Tell for which platforms the run-time of FMUs is there; compile it for others."""
+    """List the platforms for which the run-time of FMUs is available; compile it for others."""
     with told(debug):
         from rich.console import Console
 

@@ -16,7 +16,7 @@ Solver = Literal["idas", "native"]
 
 def check(
     netlist: Netlist, assignments: Assignments = None, *,
-    start: Annotated[bool, Option("--start", help="Tell the start values, and where each comes from.")] = False,
+    start: Annotated[bool, Option("--start", help="Print the start values and where each comes from.")] = False,
     debug: Debug = False,
 ) -> None:  # fmt: skip
     """Check a netlist: equations, unknowns, states, index, blocks, energy terms."""
@@ -42,7 +42,7 @@ def simulate(
     plot: Annotated[Path | None, Option(metavar="FILE", help="Draw the results: .png, .svg or .pdf.")] = None,
     show: Annotated[list[str] | None, Option(metavar="PATTERN", help="What to draw, e.g. '*.w'.")] = None,
     sankey: Annotated[Path | None, Option(metavar="FILE", help="Draw where the energy went.")] = None,
-    energy: Annotated[bool, Option(help="Tell the energy balance.")] = True,
+    energy: Annotated[bool, Option(help="Print the energy balance.")] = True,
     solver: Annotated[Solver, Option(help="IDAS, or the compiled run-time of FMUs.")] = "idas",
     debug: Debug = False,
 ) -> None:  # fmt: skip

@@ -53,7 +53,7 @@ def told(
     except KeyboardInterrupt as error:
         if debug:
             raise
-        _fail(" ".join(["Interrupted.", *(_notes(error) or ["What was not finished is not written."])]), INTERRUPTED)
+        _fail(" ".join(["Interrupted.", *(_notes(error) or ["Unfinished results are not written."])]), INTERRUPTED)
     except ModelicaLikeError as error:
         if debug:
             raise

@@ -77,8 +77,8 @@ def buffered(cache: dict[Any, Any], key: Any, make: Any, results: tuple[int, ...
     return cache[own]
 
 
-_BLOCKS = 4096, 64
-"""Points that are evaluated in one call: many, and the rest."""
+_BLOCKS = 4096, 512, 64
+"""Points that are evaluated in one call: many, about as many as a run has results, and the rest."""
 _GROUP, _SMALL = 8, 2000
 """Points whose operations are written out one after the other, and operations of one point up to which that is done."""
 
@@ -108,7 +108,7 @@ class Along:
         """Evaluate as a call does, into given arrays."""
         total, first = results[0].shape[1], 0
         for size in _BLOCKS:
-            while total - first >= (size if size > _BLOCKS[-1] else 1):
+            while total - first > (0.75 * size if size > _BLOCKS[-1] else 0):
                 last = min(first + size, total)
                 if size not in self._made:
                     self._made[size] = BufferedFunction(self._function.map(size // self._group))

@@ -16,7 +16,7 @@ from modelica_like.errors import LanguageError, Source, UnknownName, ValueOutOfR
 from modelica_like.flatten.model import FlatDiscrete, FlatParameter, FlatVariable, Origin
 from modelica_like.structure.holds import Circuit as Circuit
 from modelica_like.structure.holds import HeldMotion as HeldMotion
-from modelica_like.units import Unit, coherent, to_si
+from modelica_like.units import Unit, to_si
 from modelica_like.upper import upper
 
 Made = TypeVar("Made")
@@ -188,7 +188,7 @@ class CompiledDae:
     def units(self) -> dict[str, Unit]:
         """Coherent SI unit of every variable, parameter, mode and discrete value by its path."""
         named = (*self.flat_discretes, *self.flat_variables, *self.flat_derived, *self.flat_parameters)
-        return {one.path: coherent(one.unit) for one in named}
+        return {one.path: one.unit for one in named}
 
     @cached_property
     def derived_position(self) -> dict[str, int]:
@@ -256,10 +256,10 @@ class CompiledDae:
                     raise LanguageError(
                         f"{path} cannot change after compilation.", advice="Set it in the model and build that again."
                     )
-                p[self.parameter_position[path]] = one.checked(to_si(value, coherent(one.unit), path), value)
+                p[self.parameter_position[path]] = one.checked(to_si(value, one.unit, path), value)
             elif path in inputs:
                 unit = self.flat_variables[self.inputs[inputs[path]]].unit
-                u[inputs[path]] = to_si(value, coherent(unit), path)
+                u[inputs[path]] = to_si(value, unit, path)
             elif path in self.derived_position:
                 raise LanguageError(f"{path} follows from other parameters.", advice="Set those.")
             else:

@@ -42,7 +42,7 @@ _FAILURES: failures.Failures = failures.FAILURES | {
     "no rollback": (
         FmuRefused,
         "{unit} cannot go back to a saved state, or does not take steps of any length, so the step cannot vary.",
-        "It has not both of canGetAndSetFMUState and canHandleVariableCommunicationStepSize.",
+        "It needs both canGetAndSetFMUState and canHandleVariableCommunicationStepSize.",
         "Run with a fixed step, without tolerance.",
     ),
     "not settled": (
@@ -52,7 +52,7 @@ _FAILURES: failures.Failures = failures.FAILURES | {
         "Cut where a mass, a spring or a controller with a state is between the FMUs.",
     ),
     "not finite": (
-        FmuFailed, "{unit}: {name} is no finite number at t = {time:.6g} s.", "",
+        FmuFailed, "{unit}: {name} is not finite at t = {time:.6g} s.", "",
         "If the values before it grow without bounds, take a shorter step.",
     ),
     "step": (

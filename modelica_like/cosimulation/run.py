@@ -81,9 +81,14 @@ def cosim(
     settings = _settings(system.settings, until, step, master, inputs, tolerance)
     if timeout <= 0:
         raise ValueOutOfRange(f"{system.name}: the time limit must be positive, not {timeout:g} s.")
+    if fmu_tolerance is None and settings.tolerance is not None:
+        fmu_tolerance = _INNER_PART * settings.tolerance  # errors of the FMUs must not look like those of the coupling
+    job = _job(system, settings) | {"fmu_tolerance": fmu_tolerance, "interval": interval, "outputs": outputs}
+    return _solution(system, job, timeout, progress)
+
+
+def _solution(system: System, job: dict[str, Any], timeout: float, progress: Progress | None) -> CosimSolution:
     begin = clock.perf_counter()
-    inner = fmu_tolerance if fmu_tolerance is not None else _inner(settings.tolerance)
-    job = _job(system, settings) | {"fmu_tolerance": inner, "interval": interval, "outputs": outputs}
     with workplace(job, [unit.file for unit in system.units]) as folder:
         try:
             _run(system, folder, timeout, progress)
@@ -94,7 +99,7 @@ def cosim(
 
 
 def _so_far(system: System, folder: Path, begin: float) -> CosimSolution | None:
-    """Return what a run has come to that has not come to its end, if it has made a step."""
+    """Return what an unfinished run has computed, if it has made a step."""
     if not (folder / "columns.json").exists():
         return None
     columns, table = _left(folder, "columns.json")
@@ -132,11 +137,6 @@ def _settings(
     if chosen is not None and not 1e-12 <= chosen <= 0.1:
         raise ValueOutOfRange(f"tolerance = {chosen:g} must be a number from 1e-12 to 0.1.")
     return Settings(end, min(size, end), master or base.master, inputs or base.inputs, chosen)
-
-
-def _inner(tolerance: float | None) -> float | None:
-    """Return the tolerance of the FMUs, whose errors must not look like those of the coupling."""
-    return None if tolerance is None else _INNER_PART * tolerance
 
 
 def _job(system: System, settings: Settings) -> dict[str, Any]:

@@ -26,7 +26,7 @@ class Slave:
     Attributes:
         variables: FMPy's descriptions of the scalar variables by name, without parameters.
         slopes: it takes the slopes of its inputs.
-        can_save: its state can be saved and restored, and its steps may vary.
+        can_save: its state can be saved and restored (`save`, `load`, `free`), and its steps may vary.
     """
 
     def __init__(self, name: str, folder: Path, messages: Messages, notice: Callable[[], None]) -> None:
@@ -46,11 +46,17 @@ class Slave:
         self._fmu: Any = instantiate_fmu(
             str(folder), self.description, "CoSimulation", logger=messages, event_mode_used=False
         )
-        self._save, self._load, self._free = (
-            (self._fmu.getFMUstate, self._fmu.setFMUstate, self._fmu.freeFMUstate)
-            if second
-            else (self._fmu.getFMUState, self._fmu.setFMUState, self._fmu.freeFMUState)
+        state = "FMUstate" if second else "FMUState"
+        self.save, self.load, self.free = (
+            self._noticed(getattr(self._fmu, f"{verb}{state}")) for verb in ("get", "set", "free")
         )
+
+    def _noticed(self, function: Callable[..., Any]) -> Callable[..., Any]:
+        def call(*arguments: Any) -> Any:
+            self.notice()
+            return function(*arguments)
+
+        return call
 
     def enter_initialization(self, start: float, stop: float, tolerance: float | None) -> None:
         """Enter the initialization mode."""
@@ -111,21 +117,6 @@ class Slave:
                                 noSetFMUStatePriorToCurrentPoint=not self.can_save)  # fmt: skip
         if isinstance(done, tuple) and done[1]:
             raise Refused(kind="ends", unit=self.name, time=time)
-
-    def save(self) -> Any:
-        """Save the state."""
-        self.notice()
-        return self._save()
-
-    def load(self, state: Any) -> None:
-        """Go back to a saved state."""
-        self.notice()
-        self._load(state)
-
-    def free(self, state: Any) -> None:
-        """Give a saved state back."""
-        self.notice()
-        self._free(state)
 
     def close(self) -> None:
         """Terminate the FMU."""

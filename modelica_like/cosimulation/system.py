@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal, get_args
+from typing import Literal, NamedTuple, get_args
 
 from modelica_like.errors import ModelicaLikeError, NetlistError, UnknownName, did_you_mean, raise_together_or_one
 
@@ -21,8 +21,7 @@ def powers() -> tuple[tuple[str, str], ...]:
     return tuple(dict.fromkeys(one.power for one in terminals if one and one.power))
 
 
-@dataclass(frozen=True)
-class Port:
+class Port(NamedTuple):
     """A variable of an FMU in a system."""
 
     unit: str
@@ -47,8 +46,7 @@ class Unit:
     parameters: Mapping[str, float] = field(default_factory=dict)
 
 
-@dataclass(frozen=True)
-class Link:
+class Link(NamedTuple):
     """An output and the inputs that take its value at every communication point."""
 
     name: str
@@ -59,8 +57,7 @@ class Link:
         return f"{self.source} → {', '.join(map(str, self.targets))}"
 
 
-@dataclass(frozen=True)
-class Bond:
+class Bond(NamedTuple):
     """A shaft, slide or wire between two FMUs, through which power flows.
 
     Attributes:
@@ -163,17 +160,14 @@ def check_system(system: System) -> None:
     if not system.units:
         errors.append(NetlistError(f"{system.name} has no FMU.", advice="Declare them in [fmus]."))
     known = [unit.name for unit in system.units]
-    ports = [port for link in system.links for port in (link.source, *link.targets)]
-    for port in ports:
+    for port in (port for link in system.links for port in (link.source, *link.targets)):
         if port.unit not in known:
             errors.append(UnknownName(f"{system.name} has no FMU '{port.unit}'{did_you_mean(port.unit, known) or '.'}"))
     driven: dict[Port, str] = {}
-    for link in system.links:
-        for target in link.targets:
-            if target in driven:
-                both = f"{driven[target]} and {link.name}"
-                errors.append(NetlistError(f"{system.name}: {target} is driven twice, by {both}."))
-            driven[target] = link.name
+    for name, target in ((link.name, target) for link in system.links for target in link.targets):
+        if target in driven:
+            errors.append(NetlistError(f"{system.name}: {target} is driven twice, by {driven[target]} and {name}."))
+        driven[target] = name
     names = [link.name for link in system.links]
     for bond in system.bonds:
         for name in {bond.flow, bond.rate} - set(names):

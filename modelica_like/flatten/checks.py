@@ -32,7 +32,7 @@ def check_balance(component: Component, equations: list[Equation]) -> None:
     """Check that a component has as many equations as unknowns of its own.
 
     Raises:
-        ComponentUnbalanced: it has not.
+        ComponentUnbalanced: it does not.
     """
     own = [n for n, f in component.fields.items() if isinstance(f, Variable) and not isinstance(f, Input)]
     flows: list[str] = []

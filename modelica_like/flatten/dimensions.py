@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
 from fractions import Fraction
 from typing import Any, cast
 
@@ -37,13 +38,6 @@ class _Clash(Exception):
 
 class _NotANumber(Exception):
     """A number in an expression is nan: nothing can follow from it."""
-
-    def tell(self, label: str, source: Source | None) -> LanguageError:
-        return LanguageError(
-            f"{label}: a number in it is nan.",
-            where=source or (),
-            advice="Functions of `math` do not understand symbols: take sqrt, sin and so on from the language.",
-        )
 
 
 class Dimensions:
@@ -151,17 +145,20 @@ def _power(base: Unit, exponent_unit: Unit, exponent: Any) -> Unit:
 def check_equation(left: Expr, right: Expr, dimensions: Dimensions, component: str, source: Source) -> None:
     """Check that both sides of an equation have the same dimension.
 
+    Args:
+        left: one side.
+        right: the other.
+        dimensions: knows the units of the leaves.
+        component: name of the class, for messages.
+        source: where the equation stands.
+
     Raises:
         UnitMismatch: they differ, or a side is a sum of different things.
         LanguageError: a number is nan.
     """
     place = f"{component}, {source}" if source.file else component
-    try:
+    with _told(place, (), component, source):
         units = dimensions.unit(left), dimensions.unit(right)
-    except _Clash as clash:
-        raise UnitMismatch(f"{place}: {clash.what} differ: {clash.left} and {clash.right}.") from None
-    except _NotANumber as found:
-        raise found.tell(component, source) from None
     if _MIXED in units and ANY not in units:
         raise UnitMismatch(
             f"{place}: the branches of choose(…) or where(…) differ in unit; they only stand in `… == 0`."
@@ -175,16 +172,34 @@ def check_expression(
 ) -> None:
     """Check that an expression has the expected dimension.
 
+    Args:
+        expression: what is checked.
+        expected: its unit, or one of the same dimension.
+        dimensions: knows the units of the leaves.
+        label: what messages call it.
+        source: where it stands.
+
     Raises:
         UnitMismatch: it has another one.
         LanguageError: a number is nan.
     """
-    where = source or ()
-    try:
+    where = (source,) if source else ()
+    with _told(label, where, label, source):
         unit = dimensions.unit(expression)
-    except _Clash as clash:
-        raise UnitMismatch(f"{label}: {clash.what} differ: {clash.left} and {clash.right}.", where=where) from None
-    except _NotANumber as found:
-        raise found.tell(label, source) from None
     if not same_dimension(unit, expected):
         raise UnitMismatch(f"{label} expects {expected}; the expression is {unit}.", where=where)
+
+
+@contextmanager
+def _told(label: str, where: tuple[Source, ...], owner: str, source: Source | None) -> Generator[None]:
+    """Tell in sentences why an expression has no unit: terms clash, or a number of the owner is nan."""
+    try:
+        yield
+    except _Clash as clash:
+        raise UnitMismatch(f"{label}: {clash.what} differ: {clash.left} and {clash.right}.", where=where) from None
+    except _NotANumber:
+        raise LanguageError(
+            f"{owner}: a number in it is nan.",
+            where=source or (),
+            advice="Functions of `math` do not understand symbols: take sqrt, sin and so on from the language.",
+        ) from None

@@ -25,7 +25,7 @@ from modelica_like.language.component import Component
 from modelica_like.language.declared import Declared
 from modelica_like.language.expr import TIME, flagged_motion
 from modelica_like.language.fields import Discrete, Input, Output, Parameter, Variable
-from modelica_like.units import ONE
+from modelica_like.units import ONE, coherent
 
 _WIRE = Source("")
 
@@ -134,7 +134,7 @@ class _Flattener:
 
     def _declare_variable(self, owner: Declared, name: str, path: str, kind: str, field: Variable) -> None:
         self.variable_of[id(owner), name] = len(self.variables)
-        unit = self.wiring.inferred.get((id(owner), name)) or unit_of_field(owner, name)
+        unit = coherent(self.wiring.inferred.get((id(owner), name)) or unit_of_field(owner, name))
         self.variables.append(
             FlatVariable(
                 path, unit, field.description, kind, field.state, field.guess, field.nominal, field.min, field.max
@@ -147,7 +147,7 @@ class _Flattener:
         with component.at_its_place(name):
             start = 0.0 if value is None else self.parameters.evaluate(value, scope or component, path)
         self.discrete_of[id(component), name] = len(self.discretes)
-        self.discretes.append(FlatDiscrete(path, field.unit, field.description, start))
+        self.discretes.append(FlatDiscrete(path, coherent(field.unit), field.description, start))
 
     # -- instances ---------------------------------------------------------------------------------------------------
 
@@ -230,13 +230,8 @@ class _Flattener:
                 value = self.parameters.q(self.parameters.declare(component, name, path))
                 self.linear.append(LinearEquation(((node, 1.0),), -value, Origin(path, "value", _WIRE)))
             else:
-                self.errors.append(
-                    MissingValue(
-                        f"{path} is an input without a value.",
-                        where=component.place_of(),
-                        advice="Connect it or give it a value.",
-                    )
-                )
+                what, advice = f"{path} is an input without a value.", "Connect it or give it a value."
+                self.errors.append(MissingValue(what, where=component.place_of(), advice=advice))
 
     def _relate_inputs(self, component: Component) -> None:
         """Say which open inputs of an adaptor are derivatives of each other."""

@@ -78,7 +78,7 @@ def _variable(component: Component, mode: Mode, name: str, role: str) -> Symbol:
     if isinstance(found, Symbol) and _is_variable(found) and found.owner is component and not found.order:
         return found
     raise LanguageError(
-        f"{mode.label} holds the {role} '{name}', which is no variable of {type(component).__name__}.",
+        f"{mode.label} holds the {role} '{name}', which is not a variable of {type(component).__name__}.",
         advice="Name a variable, or a property that returns one.",
     )
 

@@ -16,7 +16,7 @@ from modelica_like.language.component import Component
 from modelica_like.language.declared import unknown
 from modelica_like.language.expr import leaf_id
 from modelica_like.language.fields import Input, Parameter, Value
-from modelica_like.units import ONE, Unit, read_quantity
+from modelica_like.units import ONE, Unit, coherent, read_quantity
 
 
 class Parameters:
@@ -63,7 +63,7 @@ class Parameters:
         field = component.fields[name]
         symbol = ca.SX.sym(path)
         self._by_leaf[leaf_id(symbol)] = len(self.flat)
-        unit = unit_of_field(component, name)
+        unit = coherent(unit_of_field(component, name))
         tunable, above = (field.tunable, field.above) if isinstance(field, Parameter) else (True, 0)
         number = value.number if value.number is not None else 0.0
         self.flat.append(FlatParameter(path, unit, field.description, number, field.min, field.max, tunable, above))
@@ -80,7 +80,8 @@ class Parameters:
         expression = self.evaluate(value, scope, path)
         self._open.pop()
         field = component.fields[name]
-        self.derived.append(FlatParameter(path, value.unit, field.description, math.nan, field.min, field.max, False))
+        unit = coherent(value.unit)
+        self.derived.append(FlatParameter(path, unit, field.description, math.nan, field.min, field.max, False))
         self._formulas.append(expression)
         return expression
 

@@ -16,7 +16,7 @@ from modelica_like.errors import UnknownName, did_you_mean
 from modelica_like.flatten.model import FlatDiscrete, FlatParameter, FlatVariable
 from modelica_like.fmi.reach import Reach
 from modelica_like.fmi.start_tables import StartTables, start_tables
-from modelica_like.units import ONE, Unit, coherent, parse_unit
+from modelica_like.units import ONE, Unit, parse_unit
 
 Causality = Literal["independent", "parameter", "calculatedParameter", "input", "output", "local"]
 Variability = Literal["fixed", "tunable", "discrete", "continuous"]
@@ -197,19 +197,19 @@ class _Builder:
             units[names[k]] = units[base] / _SECOND
             below = names.index(base)
             self.states[k] = self.derivatives[below] = self.add(
-                fmi_name(names[k]), ("state", k), unit=coherent(units[names[k]]), derivative_of=self.states[below],
+                fmi_name(names[k]), ("state", k), unit=units[names[k]], derivative_of=self.states[below],
                 nominal=float(model.nominals[k]),
             )  # fmt: skip
         for k, name in enumerate(names):
             if k not in self.derivatives:
-                unit = coherent(units[name] / _SECOND)
+                unit = units[name] / _SECOND
                 name = fmi_name(f"der({name})")
                 self.derivatives[k] = self.add(name, ("der", k), unit=unit, derivative_of=self.states[k])
 
     def discretes(self, modes: ModesAs) -> None:
         """Modes, and other discrete values, which are local."""
         for k, one in enumerate(self.model.flat_discretes):
-            slot, about = ("discrete", k), {"unit": coherent(one.unit), "description": _mode_text(one)}
+            slot, about = ("discrete", k), {"unit": one.unit, "description": _mode_text(one)}
             if one.names:
                 kind, names = ("Int64", ()) if modes == "integer" else ("Enumeration", one.names)
                 causality = "local" if modes == "local" else "output"
@@ -256,7 +256,7 @@ def fmi_name(name: str) -> str:
 
 
 def _about(one: FlatVariable | FlatParameter) -> dict[str, Any]:
-    about: dict[str, Any] = {"unit": coherent(one.unit), "description": one.description, "min": one.min, "max": one.max}
+    about: dict[str, Any] = {"unit": one.unit, "description": one.description, "min": one.min, "max": one.max}
     if isinstance(one, FlatVariable) and one.nominal != 1.0:
         about["nominal"] = abs(one.nominal)
     return about

@@ -57,7 +57,7 @@ SECTIONS: dict[str, Any] = {
     "text": _TEXT,
     "token": _TEXT,
     **dict.fromkeys(("constants", "parameters", "parameter_min", "parameter_max"), _DOUBLE),
-    **dict.fromkeys(("inputs", "guesses", "z_guesses", "nominals"), _DOUBLE),
+    **dict.fromkeys(("inputs", "guesses", "nominals"), _DOUBLE),
     **dict.fromkeys(("state_names", "implicit_names", "singular_names"), _INTEGER),
     "variables": [("reference", "<u4"), *_record("type kind index start tunable name count")],
     "rising": _record("below above below_name above_name"),
@@ -75,9 +75,9 @@ SECTIONS: dict[str, Any] = {
     "members": _INTEGER,
     "units": _INTEGER,
     "start_modes": _record("mode target"),
-    **dict.fromkeys(("start_direct", "start_default", "start_x_guess", "start_z_guess"), _START_OF),
+    **dict.fromkeys(("start_direct", "start_default", "start_guess"), _START_OF),
     **dict.fromkeys(("start_rows", "start_dependent"), _START_ROW),
-    **dict.fromkeys(("start_zero", "start_columns", "steady_states", "jacobian_to_step", "step_diagonal"), _INTEGER),
+    **dict.fromkeys(("start_zero", "start_columns", "steady", "jacobian_to_step", "step_diagonal"), _INTEGER),
     **{f"{matrix}.{field}": _INTEGER for matrix in ("step", "start") for field in _QR},
     **{
         f"tapes.{tape}.{field}": kind
@@ -171,8 +171,7 @@ def _contents(
         "parameter_min": [-math.inf if one.min is None else one.min for one in model.flat_parameters],
         "parameter_max": [math.inf if one.max is None else one.max for one in model.flat_parameters],
         "inputs": model.u,
-        "guesses": model.guesses,
-        "z_guesses": model.z_guesses,
+        "guesses": [*model.guesses, *model.z_guesses],
         "nominals": model.nominals,
         "state_names": [text(name) for name in model.states],
         "implicit_names": [text(name) for name in model.implicit],
@@ -182,7 +181,7 @@ def _contents(
         "jacobian_to_step": tables.to_step,
         "step_diagonal": tables.diagonal,
     }
-    contents |= _events(model, text) | _holds(model, text) | _starts(start)
+    contents |= _events(model, text) | _holds(model, text) | _starts(start, len(model.states), len(model.implicit))
     for name, pattern in (("step", tables.step), ("start", tables.start_pattern)):
         contents |= {f"{name}.{field}": pattern[field] for field in _QR}
     for tape in tables.tapes.values():
@@ -253,17 +252,16 @@ def _notice(path: str, notice: str) -> str:
     return f"{path.rpartition('.')[0]} {told}".strip() if notice else ""
 
 
-def _starts(start: StartTables) -> dict[str, Any]:
+def _starts(start: StartTables, n_x: int, n_z: int) -> dict[str, Any]:
     return {
         "start_direct": start.direct,
         "start_default": start.defaults,
-        "start_x_guess": start.x_guesses,
-        "start_z_guess": start.z_guesses,
+        "start_guess": [*start.x_guesses, *((n_x + z, *of) for z, *of in start.z_guesses)],
         "start_rows": start.rows,
         "start_dependent": start.dependent,
         "start_zero": start.zero,
         "start_columns": start.columns,
-        "steady_states": start.steady or (),
+        "steady": () if start.steady is None else (*start.steady, *range(n_x, n_x + n_z)),
     }
 
 

@@ -60,7 +60,7 @@ def run_child(name: str, script: Path, folder: Path, timeout: float, environment
     code = _wait(command, folder, timeout, {**os.environ, "PYTHONPATH": paths, **(environment or {})})
     if code is None:
         raise FmuTimeout(
-            f"{name} has not come to its end within {timeout:g} s, and was stopped{_reached(folder)}.",
+            f"{name} did not finish within {timeout:g} s, and was stopped{_reached(folder)}.",
             advice="Give it more time with `timeout`, or a shorter run.",
         )
     if not any((folder / file).exists() for file in ("meta.json", "error.json")):

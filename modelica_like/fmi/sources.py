@@ -30,6 +30,7 @@ RUNTIME = (
     "impacts.c",
     "events.c",
     "rosenbrock.c",
+    "locate.c",
     "integrate.c",
     "fixed.c",
     "values.c",
@@ -48,7 +49,7 @@ LOG_CATEGORIES = {
 _FACES = {
     "2.0": ("fmi.h", "fmi2.c"),
     "3.0": ("fmi.h", "fmi3.c"),
-    "native": ("native.h", "native.c", "batch.c"),
+    "native": ("native.c", "batch.c"),
 }
 _HEADERS = {
     "2.0": ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h"),

@@ -59,10 +59,14 @@ def rest(model: CompiledDae, point: Point) -> None:
         return
     variables = np.abs(call(model, model.variables, point))
     for one in states:
-        unit, nominal = model.flat_variables[one.motion].unit, model.flat_variables[one.motion].nominal
-        same = [k for k, variable in enumerate(model.flat_variables) if variable.unit == unit]
-        if one.state is not None and variables[one.motion] <= ROUNDING * max(nominal, variables[same].max()):
+        if one.state is not None and variables[one.motion] <= ROUNDING * _largest(model, variables, one.motion):
             point.x[one.state[0]] = 0.0
+
+
+def _largest(model: CompiledDae, sizes: Vector, motion: int) -> float:
+    """Return the largest size of the variables in the unit of a motion, at least its nominal value."""
+    own = model.flat_variables[motion]
+    return max(own.nominal, *(float(sizes[k]) for k, one in enumerate(model.flat_variables) if one.unit == own.unit))
 
 
 def holding(model: CompiledDae, point: Point) -> list[int]:
@@ -156,10 +160,9 @@ def _use(model: CompiledDae, point: Point, limits: Any) -> Vector:
 
 def _may_contradict(model: CompiledDae, members: list[int]) -> bool:
     """Whether something but states, such as a source of motion, moves what is held."""
-    if "moved" not in model._cache:
-        moving = (model.variables.name_in().index(name) for name in ("t", "u", "d"))
-        model._cache["moved"] = {row for k in moving for row in model.variables.jac_sparsity(0, k).row()}
-    return not model._cache["moved"].isdisjoint(model.holds[k].motion for k in members)
+    at = [model.variables.name_in().index(name) for name in ("t", "u", "d")]
+    rows = model.once("moved", lambda: {row for k in at for row in model.variables.jac_sparsity(0, k).row()})
+    return not rows.isdisjoint(model.holds[k].motion for k in members)
 
 
 def _yield_to_contradiction(
@@ -280,13 +283,8 @@ class Strike:
 
     def _stops(self, before: Vector, moving: list[int]) -> bool:
         """Whether more is stopped than what rounding and the location of events leave."""
-        model, variables = self.model, np.abs(call(self.model, self.model.variables, self.point))
-        for k in moving:
-            own = model.flat_variables[model.holds[k].motion]
-            same = [n for n, one in enumerate(model.flat_variables) if one.unit == own.unit]
-            if abs(before[k]) > ROUNDING * max(float(variables[same].max()), own.nominal):
-                return True
-        return False
+        model, sizes = self.model, np.abs(call(self.model, self.model.variables, self.point))
+        return any(abs(before[k]) > ROUNDING * _largest(model, sizes, model.holds[k].motion) for k in moving)
 
     def _book(self, before: Vector, impulses: dict[int, float], approaches: dict[int, float]) -> None:
         """Note what was lost, and what has got another motion."""

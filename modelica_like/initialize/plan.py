@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Literal
@@ -92,10 +91,7 @@ def start_plan(model: CompiledDae, kind: StartKind, point: Point) -> StartPlan:
     Raises:
         MissingStart: the start values do not determine all states.
     """
-    key = "start plan", kind
-    if key not in model._cache:
-        model._cache[key] = _Choice(model, kind).plan(None)
-    plan: StartPlan = model._cache[key]
+    plan = model.once(("start plan", kind), lambda: _Choice(model, kind).plan(None))
     if plan.columns and not _is_regular(model, plan, point):
         matrix = _generic_matrix(model, plan.system, point)
         if matrix is not None:
@@ -247,27 +243,22 @@ class _Choice:
         return resting, zero
 
     def _missing(self) -> MissingStart:
-        states = [self.free[k] for k in self.choice.undetermined() if k < len(self.free)]
-        return _missing(self.model, states, len(self.columns) - self.choice.size)
+        model, count = self.model, len(self.columns) - self.choice.size
+        names = [model.states[self.free[k]] for k in self.choice.undetermined() if k < len(self.free)]
+        if count == 1:
+            what = f"one equation: give {' or '.join(names[:4]) + (' …' if len(names) > 4 else '')} a start value"
+        else:
+            shown = ", ".join(names[:8]) + (", …" if len(names) > 8 else "")
+            which = "" if count == len(names) else f"{count} of "
+            what = f"{count} equations: give {which}{shown} start values"
+        parts = dict.fromkeys(name.removeprefix("der(").rstrip(")").rpartition(".")[0] for name in names)
+        return MissingStart(
+            f"Initialisation (not the model) lacks {what}.",
+            where=[model.places[part] for part in parts if part in model.places][:3],
+            advice='Or start from rest (start = "rest") or in the steady state (start = "steady").',
+        )
 
 
 def start_name(model: CompiledDae, entry: StartEntry) -> str:
     """Path of the variable of a start value."""
     return model.flat_variables[entry.node].path
-
-
-def _missing(model: CompiledDae, states: Collection[int], count: int) -> MissingStart:
-    names = [model.states[k] for k in states]
-    if count == 1:
-        shown = " or ".join(names[:4]) + (" …" if len(names) > 4 else "")
-        what = f"one equation: give {shown} a start value"
-    else:
-        shown = ", ".join(names[:8]) + (", …" if len(names) > 8 else "")
-        which = "" if count == len(names) else f"{count} of "
-        what = f"{count} equations: give {which}{shown} start values"
-    parts = dict.fromkeys(name.removeprefix("der(").rstrip(")").rpartition(".")[0] for name in names)
-    return MissingStart(
-        f"Initialisation (not the model) lacks {what}.",
-        where=[model.places[part] for part in parts if part in model.places][:3],
-        advice='Or start from rest (start = "rest") or in the steady state (start = "steady").',
-    )

@@ -11,7 +11,6 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from modelica_like.compile.buffers import buffered
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import InitializationError, SingularAtStart
 from modelica_like.initialize.singular import VANISHES, implicit_singular, is_regular, singular_block
@@ -41,7 +40,7 @@ class Point:
 def call(model: CompiledDae, function: Any, point: Point) -> Vector:
     """Evaluate a function of a model at a point; the result is flat, columns one after the other."""
     # By identity: asking a CasADi function for its name costs as much as evaluating a small one.
-    fast = buffered(model._cache, id(function), lambda: function)
+    fast = model.fast(id(function), lambda: function)
     return fast(point.t, point.x, point.z, model.p, model.u, point.d)[0]
 
 
@@ -54,7 +53,7 @@ def solve_implicit(model: CompiledDae, point: Point) -> None:
     """
     if not model.implicit:
         return
-    fast = buffered(model._cache, "newton", lambda: newton_at(model, look=True))
+    fast = model.fast("newton", lambda: newton_at(model, look=True))
     change = np.inf
     for _ in range(_MAX_NEWTON):
         new, condition = fast(point.t, point.x, point.z, model.p, model.u, point.d)
@@ -99,9 +98,8 @@ def newton_at(model: CompiledDae, *, look: bool) -> ca.Function:
 
 def is_linear(model: CompiledDae) -> bool:
     """Whether the implicit equations are linear in z: then one step of Newton's method solves them."""
-    if "linear" not in model._cache:
-        model._cache["linear"] = not model.alg_jacobian.jac_sparsity(0, model.alg_jacobian.index_in("z")).nnz()
-    return model._cache["linear"]
+    at = model.alg_jacobian.index_in("z")
+    return model.once("linear", lambda: not model.alg_jacobian.jac_sparsity(0, at).nnz())
 
 
 def _check_regular(model: CompiledDae, point: Point) -> None:
@@ -110,7 +108,7 @@ def _check_regular(model: CompiledDae, point: Point) -> None:
     Raises:
         SingularAtStart: it is.
     """
-    fast, size = buffered(model._cache, "residual at", lambda: implicit_at(model)), len(model.implicit)
+    fast, size = model.fast("residual at", lambda: implicit_at(model)), len(model.implicit)
     residual, entries = fast(point.t, point.x, point.z, model.p, model.u, point.d)
     jacobian = entries.reshape(size, size).T
     if not (np.isfinite(residual).all() and is_regular(jacobian)):
@@ -121,9 +119,9 @@ def check_singular(model: CompiledDae, point: Point) -> None:
     """Check that every block has a unique solution.
 
     Raises:
-        SingularAtStart: one has not.
+        SingularAtStart: one does not have one.
     """
-    fast = buffered(model._cache, "regular", lambda: _regular(model))
+    fast = model.fast("regular", lambda: _regular(model))
     if not fast(point.t, point.x, point.z, model.p, model.u, point.d)[0][0]:
         return
     determinants = call(model, model.determinants, point)
@@ -159,7 +157,7 @@ def variable_slopes(model: CompiledDae, point: Point, nodes: list[int]) -> Vecto
     Raises:
         SingularAtStart: a slope is not finite.
     """
-    fast = buffered(model._cache, ("slopes", tuple(nodes)), lambda: _slopes(model, nodes))
+    fast = model.fast(("slopes", tuple(nodes)), lambda: _slopes(model, nodes))
     results = fast(point.t, point.x, point.z, model.p, model.u, point.d)
     if not all(np.isfinite(part).all() for part in results):
         names = ", ".join(model.flat_variables[node].path for node in nodes)

@@ -70,9 +70,7 @@ class StartProblem:
         self.model = model
         self.given = call(model, model.start_values, point)
         self._solved: StartPlan | None = None
-        if "start entries" not in model._cache:
-            model._cache["start entries"] = _Sorted(model)
-        self._sorted: _Sorted = model._cache["start entries"]
+        self._sorted = model.once("start entries", lambda: _Sorted(model))
         self._sorted.guesses.put(point.x, self.given)
         self._sorted.implicit.put(point.z, self.given)
         for pair in self._sorted.again:
@@ -193,12 +191,9 @@ class _Evaluation:
 
 
 def _is_free_of_modes(model: CompiledDae, plan: StartPlan) -> bool:
-    key = "start free of modes", plan.kind
-    if key not in model._cache:
-        function = plan.system.function
-        values, modes = function.name_out().index("values"), function.name_in().index("d")
-        model._cache[key] = not function.jac_sparsity(values, modes).nnz()
-    return model._cache[key]
+    function = plan.system.function
+    values, modes = function.name_out().index("values"), function.name_in().index("d")
+    return model.once(("free of modes", plan.kind), lambda: not function.jac_sparsity(values, modes).nnz())
 
 
 def _dense_values(system: ca.Function) -> ca.Function:

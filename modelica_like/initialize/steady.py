@@ -68,13 +68,15 @@ def _arguments(model: CompiledDae, point: Point) -> tuple[Any, ...]:
 
 def _steady_function(model: CompiledDae) -> ca.Function:
     """Return a function of what a point has: rates of the moving states and residuals, and their Jacobian."""
-    if "steady" not in model._cache:
+
+    def make() -> ca.Function:
         arguments, moving = list(model.arguments.values()), moving_states(model)
         rows = [*moving, *range(len(model.states), len(model.states) + len(model.implicit))]
         equations = _equations(model)[rows]
         unknowns = ca.vertcat(*(model.arguments["x"][k] for k in moving), model.arguments["z"])
-        model._cache["steady"] = ca.Function("steady", arguments, [equations, ca.jacobian(equations, unknowns)])
-    return model._cache["steady"]
+        return ca.Function("steady", arguments, [equations, ca.jacobian(equations, unknowns)])
+
+    return model.once("steady", make)
 
 
 def _equations(model: CompiledDae) -> Any:
@@ -84,10 +86,9 @@ def _equations(model: CompiledDae) -> Any:
 
 def moving_states(model: CompiledDae) -> list[int]:
     """Positions of the states that something depends on; the others, absolute angles, never settle."""
-    if "moving" not in model._cache:
-        depends = ca.which_depends(_equations(model), model.arguments["x"], 1, False)
-        model._cache["moving"] = [k for k, does in enumerate(depends) if does]
-    return model._cache["moving"]
+    return model.once(
+        "moving", lambda: np.flatnonzero(ca.which_depends(_equations(model), model.arguments["x"], 1, False)).tolist()
+    )
 
 
 def modes_between(model: CompiledDae, before: Point, point: Point, modes: Vector) -> Vector:

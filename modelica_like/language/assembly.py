@@ -10,7 +10,7 @@ from typing import Any
 from modelica_like.errors import DuplicateName, ModelicaLikeError, Source, WrongConnection, raise_together_or_one
 from modelica_like.language.component import Component
 from modelica_like.language.declared import Connector, unknown
-from modelica_like.language.equation import Connection, Equations, FreeEnd, connect, free, series
+from modelica_like.language.equation import Equations, connect, free, series
 from modelica_like.language.expr import Expr, Symbol, symbol_of
 from modelica_like.language.fields import Parameter, Variable, param
 from modelica_like.language.places import NOWHERE, caller
@@ -132,22 +132,14 @@ class Assembly(Component):
     def _wiring(self) -> Iterator[tuple[str, Callable[[], list[Any]]]]:
         """Yield every entry of the netlist with what makes its statements."""
         for key, ends in self._wires.items():
-            yield f"connect.{key}", partial(self._connection, ends)
+            yield f"connect.{key}", lambda ends=ends: [connect(*map(self._resolve, ends))]
         for key, names in self._chains.items():
             yield f"series.{key}", partial(self._series, names)
         for end in self._free:
-            yield f"free.{end}", partial(self._free_end, end)
+            yield f"free.{end}", lambda end=end: [free(self._connector(end))]
         for name, end in self._own_connectors:
-            yield f"expose.{name}", partial(self._exposed, name, end)
-
-    def _free_end(self, path: str) -> list[FreeEnd]:
-        return [free(self._connector(path))]
-
-    def _exposed(self, name: str, path: str) -> list[Connection]:
-        return [connect(self._connectors[name], self._connector(path))]
-
-    def _connection(self, ends: Sequence[str]) -> list[Connection]:
-        return [connect(*(self._resolve(end) for end in ends))]
+            joined = self._connectors[name]
+            yield f"expose.{name}", lambda joined=joined, end=end: [connect(joined, self._connector(end))]
 
     def _series(self, names: Sequence[str]) -> list[Any]:
         components: list[Component] = []

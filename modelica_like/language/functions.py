@@ -46,7 +46,7 @@ def prescribed(motion: Expr) -> Expr:
         motion: a speed of the component, whose derivative stands in the same equation.
 
     Raises:
-        LanguageError: it is no variable.
+        LanguageError: it is not a variable.
     """
     if not isinstance(motion, Symbol) or motion is TIME or motion.order:
         raise LanguageError(f"prescribed({motion}): only a variable can be prescribed.")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, cast, dataclass_transform, get_type_hints
@@ -129,11 +129,16 @@ def shown(value: Any, quantity: Quantity) -> str:
     return ", ".join(f"{number:.6g}" for number in numbers)
 
 
+def titled(line: Line) -> str:
+    """Return the heading of a line that is a column: its name with the unit."""
+    return f"{line.name} [{line.unit}]" if line.unit else line.name
+
+
 def _grid(rows: tuple[Result, ...]) -> str:
     """Return results of one kind as rows; of many lines each is a row instead."""
     lines = [row.lines() for row in rows]
-    heading = [f"{line.name} [{line.unit}]" if line.unit else line.name for line in lines[0]]
-    table = [tuple(heading), *(tuple(line.value for line in each) for each in lines)]
+    heading = tuple(map(titled, lines[0]))
+    table = [heading, *(tuple(line.value for line in each) for each in lines)]
     return _aligned(table if len(heading) <= _WIDE else list(zip(*table, strict=True)))
 
 
@@ -177,8 +182,10 @@ def comparison(**results: Result) -> str:
     Args:
         results: results of the same check, by heading.
     """
-    columns = [result.lines() for result in results.values()]
-    rows = [("", *results, "", "")]
-    for lines in zip(*columns, strict=True):
-        rows.append((lines[0].name, *(each.value for each in lines), lines[0].unit, lines[0].description))
-    return _aligned(rows)
+    return _aligned([("", *results, "", ""), *beside(result.lines() for result in results.values())])
+
+
+def beside(columns: Iterable[Sequence[Line]]) -> list[tuple[str, ...]]:
+    """Return lines of results of one kind side by side: their name, the values, the unit and the description."""
+    rows = zip(*columns, strict=True)
+    return [(one[0].name, *(line.value for line in one), one[0].unit, one[0].description) for one in rows]

@@ -70,7 +70,7 @@ class Rows:
             The table, in SI units, and the parameters that say what counts as 1 in columns with quantities.
 
         Raises:
-            NetlistError: it has not the shape of the table, or a column does not rise.
+            NetlistError: it does not have the shape of the table, or a column does not rise.
             UnitError, ValueOutOfRange: a cell has another dimension or is not finite.
         """
         wanted = [one.described(fields) for one in self.columns]
@@ -189,7 +189,7 @@ def rows(*columns: Column, default: Any = REQUIRED, flat: bool = False, more: bo
     Args:
         columns: what stands in a row.
         default: rows; without it they must be given.
-        flat: the rows are no lists, but single values.
+        flat: the rows are single values instead of lists.
         more: there may be more columns like the last.
     """
     return Rows(columns, default, flat, more)

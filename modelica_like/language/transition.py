@@ -123,7 +123,7 @@ def _check_notice(transition: Transition, source: Source, component: str) -> Non
         if name not in parameters:
             raise LanguageError(
                 f"{component}: the notice of an event names {name}, "
-                f"which is no parameter{did_you_mean(name, parameters) or '.'}",
+                f"which is not a parameter{did_you_mean(name, parameters) or '.'}",
                 where=source,
             )
 

@@ -26,7 +26,8 @@ from modelica_like.fmi.tables import make_tables
 from modelica_like.native.library import MESSAGE_LENGTH, Run
 from modelica_like.simulation import Model, seconds, simulate
 from modelica_like.solve.options import Options
-from modelica_like.solve.plot import _QUANTITIES, chosen
+from modelica_like.solve.plot import chosen
+from modelica_like.solve.plot import quantity as quantity_of
 from modelica_like.units import ANY, ONE, Unit, coherent
 from modelica_like.writing import write_bytes
 
@@ -161,7 +162,7 @@ class _Units:
         """Return the position of a unit."""
         if unit not in self._numbers:
             self._numbers[unit] = len(self.rows)
-            quantity = _QUANTITIES.get(str(coherent(unit)), "value")
+            quantity = quantity_of(str(coherent(unit)))
             row = {"text": _spelled(unit), "factor": unit.factor, "offset": unit.offset, "quantity": quantity}
             self.rows.append(row)
         return self._numbers[unit]

@@ -61,7 +61,7 @@ def read_text(path: Path) -> str:
     """Return the text of a netlist file.
 
     Raises:
-        NetlistError: the file is missing, is no text, or is too large.
+        NetlistError: the file is missing, is not text, or is too large.
     """
     try:
         if not path.is_file():
@@ -98,7 +98,7 @@ def parse(text: str, file: str) -> Document:
         file: path of the file, for messages.
 
     Raises:
-        NetlistError: the text is not TOML, or has not the form of a netlist.
+        NetlistError: the text is not TOML, or does not have the form of a netlist.
         DuplicateName: a name is used twice.
         WiringErrors: several errors.
     """
@@ -268,7 +268,7 @@ def check_part(key: str, value: Any) -> Any:
     """Return the table of a part, or of several, if it has the form of one.
 
     Raises:
-        NetlistError: it has not.
+        NetlistError: it does not.
     """
     tables = value if isinstance(value, list) and value else [value]
     for table in tables:
@@ -276,9 +276,7 @@ def check_part(key: str, value: Any) -> Any:
             raise NetlistError(f'{key} must be a table: {{ is = "Inertia", J = "1 kg.m2" }}.')
         if not isinstance(table.get("is"), str):
             raise NetlistError(f"{key} has no type.", advice='Say what it is, such as is = "Inertia".')
-        count = table.get("count", 1)
-        if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= 100_000:
-            raise NetlistError(f"{key}: count = {count} must be a whole number from 1 to 100000.")
+        _whole(100_000)(f"{key}: count", table.get("count", 1))
     return value
 
 
@@ -319,14 +317,19 @@ def _rtol(key: str, value: Any) -> float:
     return float(value)
 
 
-def _points(key: str, value: Any) -> int:
-    if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= 1_000_000:
-        raise NetlistError(f"{key} = {value} must be a whole number from 1 to 1000000.")
-    return value
+def _whole(most: int) -> Check:
+    """Make the check of a number of things."""
+
+    def check(key: str, value: Any) -> int:
+        if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= most:
+            raise NetlistError(f"{key} = {value} must be a whole number from 1 to {most}.")
+        return value
+
+    return check
 
 
 _OPTIONS: Mapping[str, Check] = {
-    "until": duration, "start": _start_kind, "rtol": _rtol, "points": _points,
+    "until": duration, "start": _start_kind, "rtol": _rtol, "points": _whole(1_000_000),
 }  # fmt: skip
 _READERS: Mapping[str, Reader] = {
     "name": whole(as_text),

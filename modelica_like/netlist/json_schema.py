@@ -14,7 +14,7 @@ from modelica_like.netlist.registry import library_types
 from modelica_like.units import ANY
 
 _QUANTITY = {"type": ["number", "string"]}
-_JSON_TYPES: dict[type, str] = {bool: "boolean", int: "integer", float: "number", str: "string", tuple: "array"}
+_JSON_TYPES: dict[type, str] = {bool: "boolean", int: "integer", float: "number", str: "string"}
 _ENDS = {"type": "array", "items": {"type": "string"}, "minItems": 2}
 
 
@@ -133,11 +133,5 @@ def _cell_types(column: Column, fields: Mapping[str, Field]) -> str | list[str]:
 
 
 def _structural(default: object) -> dict[str, Any]:
-    names: dict[type, str] = {
-        bool: "boolean",
-        int: "integer",
-        float: "number",
-        str: "string",
-    }
-    kind = names.get(type(default))
+    kind = _JSON_TYPES.get(type(default))
     return {"type": kind, "default": default} if kind else {}

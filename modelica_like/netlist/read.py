@@ -33,7 +33,7 @@ def load(path: str | Path) -> Assembly:
         path: a TOML file.
 
     Raises:
-        NetlistError: the file cannot be read, or is no netlist.
+        NetlistError: the file cannot be read, or is not a netlist.
         CyclicAssembly: it contains itself.
         ModelicaLikeError: types, values or paths in it are wrong; several errors come as `WiringErrors`.
     """

@@ -135,7 +135,7 @@ def find_type(name: str, folder: Path | None = None) -> type[Component]:
 
     Raises:
         UnknownName: there is no such type.
-        NetlistError: the module cannot be imported, or the class is no component.
+        NetlistError: the module cannot be imported, or the class is not a component.
     """
     if ":" in name:
         return _class_of_module(name, folder or Path())
@@ -151,7 +151,7 @@ def find_type(name: str, folder: Path | None = None) -> type[Component]:
 def _class_of_module(name: str, folder: Path) -> type[Component]:
     module_name, _, class_name = name.partition(":")
     if not all(part.isidentifier() for part in module_name.split(".")):
-        raise NetlistError(f"'{name}' is no class of a module.", advice='Write "package.module:Class".')
+        raise NetlistError(f"'{name}' is not a class of a module.", advice='Write "package.module:Class".')
     module = _own_module(module_name, [str(one.resolve()) for one in (folder, Path())])
     kind = getattr(module, class_name, None)
     if kind is None:

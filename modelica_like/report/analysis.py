@@ -69,7 +69,7 @@ def modes_report(modes: Modes) -> RenderableType:
     made = table(
         "modes", ">", "eigenvalue in rad/s>", "frequency in Hz>", "damping>", "time constant in s>", "energy in",
         "lost in",
-        rows=[(str(k), *_numbers(mode), _shares(mode.stored), _shares(mode.lost)) for k, mode in enumerate(modes, 1)],
+        rows=[(str(k), *_numbers(mode), shares(mode.stored), shares(mode.lost)) for k, mode in enumerate(modes, 1)],
     )  # fmt: skip
     parts: list[RenderableType] = [head, "", made]
     if linear.held:
@@ -85,8 +85,9 @@ def _numbers(mode: Mode) -> tuple[str, str, str, str]:
     return f"{value.real:.5g}", "", "", f"{mode.time_constant:.3g}" if value else ""
 
 
-def _shares(shares: dict[str, float]) -> str:
-    shown = [(path, share) for path, share in shares.items() if abs(share) >= _LEAST_SHARE][:_SHARES_SHOWN]
+def shares(found: dict[str, float]) -> str:
+    """Return the largest shares of components as text."""
+    shown = [(path, share) for path, share in found.items() if abs(share) >= _LEAST_SHARE][:_SHARES_SHOWN]
     return ", ".join(f"{path} {100 * share:.0f} %" for path, share in shown)
 
 

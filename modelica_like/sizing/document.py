@@ -37,7 +37,7 @@ def read_document(path: Path) -> SizingDocument:
     """Read a sizing file and check its form.
 
     Raises:
-        NetlistError: the file is missing, is not TOML, or has not the form of a sizing file.
+        NetlistError: the file is missing, is not TOML, or does not have the form of a sizing file.
     """
     if not path.exists():
         raise NetlistError(f"The sizing file '{path}' does not exist.")

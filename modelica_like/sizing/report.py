@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import inspect
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, get_args, get_origin
 
 from rich.console import Group, RenderableType
@@ -12,6 +12,7 @@ from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
+from modelica_like.language.results import Line, beside, titled
 from modelica_like.report.types import table
 from modelica_like.sizing.checks import (
     Argument,
@@ -33,7 +34,7 @@ def sizing_report(sizing: Sizing) -> RenderableType:
     for check in sizing.checks:
         parts += ["", *_check_tables(check)]
     for heading, names in sizing.compare.items():
-        parts += ["", _comparison(heading, {name: sizing[name] for name in names})]
+        parts += ["", _side_by_side(heading, "line", {name: sizing[name].lines() for name in names})]
     return Group(*parts, "", _whole(sizing))
 
 
@@ -69,23 +70,14 @@ def _rows(title: str, rows: tuple[Any, ...]) -> Table:
     """Return results of one kind as rows; many lines stand below each other instead, one column per result."""
     lines = [row.lines() for row in rows]
     if len(lines[0]) > _WIDE and len(rows) <= _WIDE:
-        corner = f"{lines[0][0].name} [{lines[0][0].unit}]" if lines[0][0].unit else lines[0][0].name
-        return _side_by_side(title, corner, [(each[0].value, each[1:]) for each in lines])
-    names = [f"{line.name} [{line.unit}]" if line.unit else line.name for line in lines[0]]
-    columns = (f"{name}>" if k else name for k, name in enumerate(names))
-    return table(title, *columns, rows=([line.value for line in each] for each in lines))
+        return _side_by_side(title, titled(lines[0][0]), {each[0].value: each[1:] for each in lines})
+    first, *others = map(titled, lines[0])
+    return table(title, first, *(f"{name}>" for name in others), rows=([line.value for line in each] for each in lines))
 
 
-def _comparison(heading: str, results: dict[str, Any]) -> Table:
-    return _side_by_side(heading, "line", [(name, result.lines()) for name, result in results.items()])
-
-
-def _side_by_side(heading: str, corner: str, columns: list[tuple[str, tuple[Any, ...]]]) -> Table:
-    rows = (
-        (lines[0].name, *(line.value for line in lines), lines[0].unit, lines[0].description)
-        for lines in zip(*(each for _, each in columns), strict=True)
-    )
-    return table(heading, f"{corner}*", *(f"{name}>" for name, _ in columns), "unit", "what it is", rows=rows)
+def _side_by_side(heading: str, corner: str, columns: Mapping[str, Sequence[Line]]) -> Table:
+    titles = f"{corner}*", *(f"{name}>" for name in columns), "unit", "what it is"
+    return table(heading, *titles, rows=beside(columns.values()))
 
 
 def _whole(sizing: Sizing) -> str:

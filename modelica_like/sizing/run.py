@@ -29,9 +29,7 @@ class CheckedResult:
     """The result of one design check of a file.
 
     Attributes:
-        name: its name in the file.
         check: name of the design check.
-        result: what it returned.
         limits: smallest and largest value in SI, or None, by line.
         published: values of a document in SI by line, for comparison.
         note: remark of the file.
@@ -57,14 +55,7 @@ class CheckedResult:
 
 @dataclass(frozen=True)
 class Sizing:
-    """All design checks of a file.
-
-    Attributes:
-        name: what it is about.
-        description: one sentence.
-        checks: results in the order of the file.
-        compare: names of checks that stand side by side, by heading.
-    """
+    """All design checks of a file in their order, and names of those that stand side by side, by heading."""
 
     name: str
     description: str

@@ -65,36 +65,29 @@ class Between:
         Raises:
             StepFailed: where interpolation is not precise, IDAS gave up.
         """
-        if precisely:
-            self._fill(self._pieces, 0)
-        elif self._pieces:
-            for number, k in interpolate(self._integrator, self._pieces):
-                piece = self._pieces[number]
-                try:
-                    _, those, part = self._part(piece, k)
-                    self._fill([part], 1)
-                    piece.x[:, those], piece.z[:, those] = part.x, part.z
-                except StepFailed:
-                    piece.x[:, piece.looks.intervals(piece.times) == k] = np.nan
+        self._fill(self._pieces, 0, precisely)
         self._pieces = []
 
-    def _fill(self, pieces: list[Piece], depth: int) -> None:
+    def _fill(self, pieces: list[Piece], depth: int, precisely: bool) -> None:
         if not pieces:
             return
         parts: list[tuple[Piece, Any, Piece]] = []
-        for number, k in interpolate(self._integrator, pieces) if depth < _DEEPEST else ():
-            parts.append(self._part(pieces[number], k))
-        if depth == _DEEPEST:
-            interpolate(self._integrator, pieces)
-        self._fill([part for *_, part in parts], depth + 1)
-        for whole, those, part in parts:
-            whole.x[:, those], whole.z[:, those] = part.x, part.z
-
-    def _part(self, whole: Piece, k: int) -> tuple[Piece, Any, Piece]:
-        """Return a piece, which of its results lie in interval k, and these with closer looks."""
-        those = whole.looks.intervals(whole.times) == k
-        looks = whole.looks.within(k) or self._closer(whole.looks, k)
-        return whole, those, Piece(looks, whole.times[those], looks.count, whole.x[:, those], whole.z[:, those])
+        left = interpolate(self._integrator, pieces)
+        for number, k in left if depth < _DEEPEST else ():
+            whole = pieces[number]
+            those = whole.looks.intervals(whole.times) == k
+            try:
+                looks = whole.looks.within(k) or self._closer(whole.looks, k)
+            except StepFailed:
+                if precisely:
+                    raise
+                whole.x[:, those] = np.nan
+                continue
+            some = Piece(looks, whole.times[those], looks.count, whole.x[:, those], whole.z[:, those])
+            parts.append((whole, those, some))
+        self._fill([some for *_, some in parts], depth + 1, precisely)
+        for whole, those, some in parts:
+            whole.x[:, those], whole.z[:, those] = some.x, some.z
 
 
 def interpolate(integrator: Integrator, pieces: list[Piece]) -> list[tuple[int, int]]:
@@ -103,10 +96,12 @@ def interpolate(integrator: Integrator, pieces: list[Piece]) -> list[tuple[int, 
     counts = np.array([one.count for one in looks])
     owner = np.repeat(np.arange(len(pieces)), lengths)
     times, x = np.concatenate([one.times for one in pieces]), np.concatenate([one.x for one in looks], axis=1)
-    z, begins = (np.concatenate(part, axis=-1) for part in ([p.z for p in looks], [p.times for p in looks]))
-    k: Any = np.concatenate([one.looks.intervals(one.times) for one in pieces])
+    z = np.concatenate([one.z for one in looks], axis=1)
+    begins, widths = np.array([(one.times[0], one.width) for one in looks]).T
+    passed = (times - begins[owner]) / widths[owner]
+    k: Any = np.minimum(passed.astype(int), counts[owner] - 1)
     place: Any = (np.cumsum(counts + 1) - counts - 1)[owner] + k
-    share = (times - begins[place]) / np.array([one.width for one in looks])[owner]
+    share = passed - k
     new = np.diff(place, prepend=-1) > 0
     cell: Any = np.cumsum(new) - 1
     changes, left = _cells(integrator, pieces, x, owner[new], k[new])

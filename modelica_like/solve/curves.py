@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from fnmatch import fnmatchcase
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from modelica_like.compile.compiled import Vector
-from modelica_like.errors import UnknownName, ValueOutOfRange, did_you_mean
-from modelica_like.solve.plot import unit_of
+from modelica_like.errors import UnknownName, ValueOutOfRange
+from modelica_like.solve.plot import fitting, plot_curves, unit_of
 from modelica_like.solve.ranges import ranges
 from modelica_like.solve.recorder import Event
 from modelica_like.solve.trajectories import Trajectories
@@ -108,8 +107,6 @@ class Curves:
 
     def plot(self, *patterns: str) -> Figure:
         """Draw both over each other, and their difference below; by default the signals that deviate most."""
-        from modelica_like.solve.curves_plot import plot_curves
-
         return plot_curves(self, patterns)
 
 
@@ -150,13 +147,7 @@ def _signals(first: Trajectories, second: Trajectories, labels: tuple[str, str],
             f"{' and '.join(labels)} have no signal in common.",
             advice="Signals are compared by their names, such as clutch.tau.",
         )
-    chosen: dict[str, None] = {}
-    for pattern in patterns:
-        fitting = [name for name in common if name == pattern or fnmatchcase(name, pattern)]
-        if not fitting:
-            raise UnknownName(f"They have no common signal '{pattern}'{did_you_mean(pattern, common) or '.'}")
-        chosen.update(dict.fromkeys(fitting))
-    return list(chosen) or common
+    return fitting(common, patterns, "They have no common signal") or common
 
 
 def _instants(events: Sequence[Event], start: float, known: set[str]) -> dict[str, list[tuple[float, str]]]:

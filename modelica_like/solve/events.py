@@ -71,23 +71,27 @@ class EventLoop:
         Raises:
             Chattering, StepFailed, SingularAtStart: the run cannot go on; `record` is what came before.
         """
-        try:
-            self.instants.settle(self.now, self._wanting())
-            note_sharing(self.record, self.model, self.now)
-            self.record.begin(self.now)
-            while self.now.t < self.end:
-                self._advance(min(self.instants.next_moment(self.now), self.end))
-                if self.between.many:
-                    self._write()
-                if self.progress is not None:
-                    self.progress(self.now.t)
-            self.record.end(self.now.d)
-            self._write()
-        finally:
-            # What an error or an interrupt leaves; otherwise nothing is left.
-            self.record.end(self.now.d)
-            self._write(precisely=False)
+        with self.integrator.interrupts.watched():
+            try:
+                self._go()
+            finally:
+                # What an error or an interrupt leaves; otherwise nothing is left.
+                self.record.end(self.now.d)
+                self._write(precisely=False)
         return self.record
+
+    def _go(self) -> None:
+        self.instants.settle(self.now, self._wanting())
+        note_sharing(self.record, self.model, self.now)
+        self.record.begin(self.now)
+        while self.now.t < self.end:
+            self._advance(min(self.instants.next_moment(self.now), self.end))
+            if self.between.many:
+                self._write()
+            if self.progress is not None:
+                self.progress(self.now.t)
+        self.record.end(self.now.d)
+        self._write()
 
     def _write(self, *, precisely: bool = True) -> None:
         """Interpolate results, and put together the segments that have ended."""

@@ -21,7 +21,7 @@ _NOISE = 1e-30
 """A decaying signal ends by swinging around zero with such values; that is no event."""
 _LARGE = 1e300
 _MAX_TRIALS = 60
-_GUESSING = 12
+_GUESSING, _GUESSED = 12, 1e-6
 _NEAR = 0.1
 """A top between two results is looked at if it is this near zero, relative to the values at both ends."""
 
@@ -59,6 +59,12 @@ class Guards:
         follow = buffered(model._cache, "guards follow", lambda: _following(model, self._at.function))
         *found, point.z = follow(point.t, point.x, point.z, model.p, model.u, point.d)
         return found
+
+    def near(self, t: float, x: Vector, z: Vector, d: Vector) -> Vector:
+        """Return guards at three nearby points that share a guess for the implicit unknowns; shapes (3, nx), (3, n)."""
+        model = self.model
+        near = buffered(model._cache, "guards near", lambda: _near(model))
+        return near(t, x.ravel(), z, model.p, model.u, d)[0].reshape(len(x), -1)
 
     def wanting(self, point: Point) -> list[CompiledTransition]:
         """State events that want to fire now: positive, or about to be within the time resolution."""
@@ -99,13 +105,22 @@ def _clean(model: CompiledDae, events: list[CompiledTransition]) -> ca.Function:
     return ca.Function("guards_at", arguments, [ca.densify(one) for one in ca.cse([results[0], rates, results[1]])])
 
 
+def _near(model: CompiledDae) -> ca.Function:
+    arguments = list(model.arguments.values())
+    values = ca.Function("guards", arguments, [_numbers(model.guards(*arguments))], {"cse": True})
+    if model.implicit:
+        following = _following(model, values)
+        values = ca.Function("guards", arguments := following.mx_in(), following.call(arguments)[:1])
+    return values.map("guards_near", "serial", 3, [0, 2, 3, 4, 5], [])
+
+
 def _following(model: CompiledDae, at: ca.Function) -> ca.Function:
     newton = newton_at(model, look=False)
     arguments = newton.mx_in()
     t, x, z, *rest = arguments
     before = newton(t, x, z, *rest)[0]
     after = before if is_linear(model) else newton(t, x, before, *rest)[0]
-    return ca.Function("guards_follow", arguments, [*at(t, x, after, *rest), before, after])
+    return ca.Function("guards_follow", arguments, [*at.call([t, x, after, *rest]), before, after])
 
 
 def _numbers(guards: Any) -> Any:
@@ -274,5 +289,7 @@ def _cubic(g0: float, g1: float, r0: float, r1: float, inside: bool) -> float:
         value, slope = ((a * s + b) * s + c) * s + g0, (3 * a * s + 2 * b) * s + c
         low, high = (low, s) if value > 0 else (s, high)
         newton = s - value / slope if slope > 0 else -1.0
-        s = newton if low < newton < high else 0.5 * (low + high)
+        before, s = s, newton if low < newton < high else 0.5 * (low + high)
+        if abs(s - before) < _GUESSED:
+            break
     return s

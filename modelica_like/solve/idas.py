@@ -97,7 +97,7 @@ class Integrator:
         self.steps = 0
         self.evaluations = 0
         self.gave_up: StepFailed
-        self._interrupts = Interrupts()
+        self.interrupts = Interrupts()
         self._relaxed = 1.0
         self._gentle_from = np.inf
         self._whole = whole and len(model.states) >= _SPARSE_FROM
@@ -200,8 +200,10 @@ class Integrator:
             if not done:
                 raise self.gave_up
             x, z = x[:, :done], z[:, :done]
-        times = start.t + span * np.arange(1, x.shape[1] + 1) / outputs
-        return x, self.polished(times, x, z, start.d) if polish else z
+        if polish and self.model.implicit:
+            times = start.t + span * np.arange(1, x.shape[1] + 1) / outputs
+            z = self.polished(times, x, z, start.d)
+        return x, z
 
     def _call(self, start: Point, p: Vector, outputs: int, steps: int, gentle: bool) -> tuple[Vector, Vector, str]:
         """Return what IDAS computes, and what it says where it gives up: that is for the error, not for the screen.
@@ -215,7 +217,7 @@ class Integrator:
         screen, sys.stderr = sys.stderr, io.StringIO()
         why = ""
         try:
-            with self._interrupts:
+            with self.interrupts.watched(), self.interrupts.swallowed():
                 x, z = instance(start.x, start.z, p)
         except RuntimeError as error:
             why = f"{sys.stderr.getvalue()} {error}"

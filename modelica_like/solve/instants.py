@@ -133,19 +133,20 @@ class Instants:
 
     def _fire(self, now: Point, wanting: list[CompiledTransition]) -> None:
         """Carry out transitions together; of one mode only the one declared first."""
-        values = call(self.model, self.model.resets, now)
         chosen: dict[int, CompiledTransition] = {}
         for transition in sorted(wanting, key=self._number):
             if _is_source(now, transition):
                 chosen.setdefault(transition.mode, transition)
         targets: list[tuple[int, float]] = []
+        resets = any(transition.resets for transition in chosen.values())
+        values = call(self.model, self.model.resets, now) if resets else ()
         x, d = now.x.copy(), now.d.copy()
         for transition in chosen.values():
             self._note(now, transition.mode, transition.target, self._number(transition))
             if transition.fails:
                 owner = self.record.events[-1].mode.rpartition(".")[0] or self.model.name
                 told = NAME_IN_NOTICE.sub(r"\1", transition.notice)
-                raise LimitPassed(f"At {now.t:.9g} s {owner} {told}.", where=transition.source)
+                raise LimitPassed(f"At {now.t:.9g} s {owner} {told}.")
             d[transition.mode] = transition.target
             for reset in transition.resets:
                 if reset.kind == "state":

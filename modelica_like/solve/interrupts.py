@@ -4,43 +4,62 @@ from __future__ import annotations
 
 import signal
 import threading
-from types import FrameType, TracebackType
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
 from typing import Any
 
 
 class Interrupts:
-    """A context around foreign code that swallows interrupts: what a handler of SIGINT raises inside is raised behind.
+    """Lets what a handler of SIGINT raises inside foreign code be raised behind it.
 
     CasADi looks for signals while it integrates, but takes the exception for a failure of the equations. In other
     threads than the main one there are no signals.
-
-    Raises:
-        KeyboardInterrupt: or what else the program's own handler raises.
     """
 
     def __init__(self) -> None:
         self._previous: Any = None
+        self._foreign = False
         self._raised: BaseException | None = None
 
-    def __enter__(self) -> Interrupts:
-        if threading.current_thread() is threading.main_thread():
-            previous = signal.getsignal(signal.SIGINT)
-            if callable(previous):
-                self._previous = previous
-                signal.signal(signal.SIGINT, self._note)
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        if self._previous is not None:
-            signal.signal(signal.SIGINT, self._previous)
+    @contextmanager
+    def watched(self) -> Iterator[None]:
+        """Stand in for the program's handler; once for many calls, for that costs as much as a short call."""
+        if self._previous or threading.current_thread() is not threading.main_thread():
+            yield
+            return
+        previous = signal.getsignal(signal.SIGINT)
+        if not callable(previous):
+            yield
+            return
+        self._previous = previous
+        signal.signal(signal.SIGINT, self._note)
+        try:
+            yield
+        finally:
+            signal.signal(signal.SIGINT, previous)
             self._previous = None
-        if self._raised is not None:
-            raised, self._raised = self._raised, None
-            raise raised from None
+
+    @contextmanager
+    def swallowed(self) -> Iterator[None]:
+        """Run foreign code.
+
+        Raises:
+            KeyboardInterrupt: or what else the program's own handler raises.
+        """
+        self._foreign = True
+        try:
+            yield
+        finally:
+            self._foreign = False
+            if self._raised is not None:
+                raised, self._raised = self._raised, None
+                raise raised from None
 
     def _note(self, number: int, frame: FrameType | None) -> None:
         try:
             self._previous(number, frame)
         except BaseException as error:
-            self._raised = error
+            if self._foreign:
+                self._raised = error
             raise

@@ -147,7 +147,7 @@ class Looks:
 
     def intervals(self, times: Vector) -> Any:
         """Return the numbers of the intervals in which times lie."""
-        return np.clip(np.searchsorted(self.times, times) - 1, 0, self.count - 1)
+        return np.minimum(((times - self.times[0]) / self.width).astype(int), self.count - 1)
 
     def cells(self, k: int, last: int) -> Iterator[Cell]:
         """Give the interval from look k to the next, interpolated in several ways; nothing if there are too few looks.
@@ -167,19 +167,21 @@ class Looks:
                 data = np.concatenate([data, self.width * self.seen[2][:, nodes].T])
             yield Cell(scheme, float(self.times[k]), self.width, k, k - first, base, data)
 
-    def at(self, t: float, cell: Cell, x: Vector | None = None) -> tuple[Point, list[Vector]]:
+    def at(self, t: float, cell: Cell) -> tuple[Point, list[Vector]]:
         """Return the point at a time in an interval, and the guards there; implicit unknowns follow from the states."""
-        x = cell.states(t) if x is None else x
+        x = cell.states(t)
+        point = Point(t, x, self._guess(t, cell), self.d)
         if not len(self.z):
-            point = Point(t, x, self.z[:, 0], self.d)
             return point, self.guards.at(point)
-        begin, end = self.z[:, cell.k], self.z[:, cell.k + 1]
-        point = Point(t, x, begin + (t - cell.t) / cell.width * (end - begin), self.d)
         *guards, before = self.guards.follow(point)
         if not (np.abs(point.z - before) <= POLISHED * (1.0 + np.abs(point.z))).all():
             point.z = self.integrator.polished(np.array([t]), x[:, None], before[:, None], self.d)[:, 0]
             guards = self.guards.at(point)
         return point, guards
+
+    def _guess(self, t: float, cell: Cell) -> Vector:
+        begin, end = self.z[:, cell.k], self.z[:, cell.k + 1]
+        return begin + (t - cell.t) / cell.width * (end - begin) if len(begin) else begin
 
     def is_sharp(self, cell: Cell, ends: Ends, *, fresh: bool) -> bool:
         """Whether interpolated states are precise, and precise enough for guards with these values, in the middle.
@@ -192,10 +194,7 @@ class Looks:
         weights = self.integrator.weights(precise)
         if not (np.abs(precise - coarse) <= PRECISE * weights).all():
             return False
-        others = [(coarse, _SHARP)] if fresh else [(coarse, _SHARP), (precise + weights, 1.0)]
-        here = self.at(t, cell, precise)[1][0]
-        for x, allowed in others:
-            there = self.at(t, cell, x)[1][0]
-            if any(abs(here[g] - there[g]) > allowed * (abs(g0) + abs(g1)) for g, (g0, g1, *_) in ends.items()):
-                return False
-        return True
+        near = self.guards.near(t, np.array([precise, coarse, precise + weights]), self._guess(t, cell), self.d)
+        rough, moved = np.abs(near[1:] - near[0]).tolist()
+        sizes = [(g, abs(g0) + abs(g1)) for g, (g0, g1, *_) in ends.items()]
+        return all(rough[g] <= _SHARP * size and (fresh or moved[g] <= size) for g, size in sizes)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
@@ -75,20 +74,19 @@ class Pace:
     def snap(self, times: Vector) -> None:
         """Put times exactly on the regular grid, so that they do not collect rounding errors."""
         grid = self._at(np.rint((times - self.begin) / self.step))
-        on_grid = np.abs(times - grid) <= self._same(grid)
+        # Times that are the same, and surely no others on the grid.
+        same = np.minimum(_ON_GRID * self.step, SAME_TIME * np.maximum(1.0, np.abs(grid)))
+        on_grid = np.abs(times - grid) <= same
         times[on_grid] = grid[on_grid]
 
     def _at(self, numbers: Vector) -> Vector:
         return self.begin + (self.end - self.begin) * (numbers / self.points)
 
-    def _same(self, times: Any) -> Any:
-        """Distance of times that are the same, and surely of no others on the grid."""
-        return np.minimum(_ON_GRID * self.step, SAME_TIME * np.maximum(1.0, np.abs(times)))
-
     def results(self, first: float, last: float) -> Vector:
         """Return the times of results after `first` up to `last`, both with a little room."""
-        low = math.floor(float(first + self._same(first) - self.begin) / self.step) + 1
-        high = math.floor(float(last + self._same(last) - self.begin) / self.step)
+        same = min(_ON_GRID * self.step, SAME_TIME * max(1.0, abs(first), abs(last)))
+        low = math.floor((first + same - self.begin) / self.step) + 1
+        high = math.floor((last + same - self.begin) / self.step)
         return self._at(np.arange(low, high + 1, dtype=float))
 
     def before(self, t: float) -> float:

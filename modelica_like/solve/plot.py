@@ -11,9 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from modelica_like.errors import NetlistError, UnknownName, did_you_mean
-from modelica_like.solve.recorder import Event
-from modelica_like.solve.style import COLOURS, STYLE, headline, panels, with_unit
-from modelica_like.solve.trajectories import Trajectories
+from modelica_like.solve.style import COLOURS, picture, with_unit
 from modelica_like.writing import check_writable, write_bytes
 
 if TYPE_CHECKING:
@@ -21,7 +19,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from modelica_like.compile.compiled import CompiledDae
+    from modelica_like.solve.curves import Curves
     from modelica_like.solve.recorded import RecordedModel
+    from modelica_like.solve.recorder import Event
+    from modelica_like.solve.trajectories import Trajectories
 
 _QUANTITIES = {
     "rad/s": "speed", "N.m": "torque", "m/s": "velocity", "N": "force", "rad": "angle", "m": "position", "W": "power",
@@ -30,6 +31,7 @@ _QUANTITIES = {
 _USUAL = ("rad/s", "N.m", "m/s", "N")
 _MOST = 6
 _MOST_EVENTS = 40
+_MOST_CURVES = 4
 
 
 def plot(solution: Trajectories, patterns: Sequence[str] = (), *, title: str = "") -> Figure:
@@ -43,17 +45,42 @@ def plot(solution: Trajectories, patterns: Sequence[str] = (), *, title: str = "
     Raises:
         UnknownName: nothing fits a pattern.
     """
-    import matplotlib as mpl
-
     groups = _by_unit(solution, chosen(solution, patterns))
-    with mpl.rc_context(STYLE):
-        figure, rows = panels(max(len(groups), 1), 0.8 + 2.1 * max(len(groups), 1))
+    count = max(len(groups), 1)
+    with picture(title or solution.model.name, count, 0.8 + 2.1 * count) as (figure, rows):
         for axes, (unit, names) in zip(rows, groups.items(), strict=False):
             _draw(axes, solution, unit, names)
         _mark_events(rows, solution.events)
         rows[-1].set_xlabel("time in s")
         rows[-1].set_xlim(solution.time[0], solution.time[-1])
-        headline(figure, title or solution.model.name)
+    return figure
+
+
+def plot_curves(curves: Curves, patterns: Sequence[str] = ()) -> Figure:
+    """Draw signals of both, and below each the difference relative to its range.
+
+    Args:
+        curves: two trajectories.
+        patterns: of the signals; by default those that deviate most.
+
+    Raises:
+        UnknownName: nothing fits a pattern.
+    """
+    names = [row.signal for row in curves.deviations]
+    names = fitting(names, patterns, "Neither has a signal") if patterns else names[:_MOST_CURVES]
+    first, second = curves.first, curves.second
+    with picture("", 2 * len(names), 0.8 + 2.6 * len(names), height_ratios=[2.0, 1.0] * len(names)) as (figure, rows):
+        for name, upper, lower in zip(names, rows[::2], rows[1::2], strict=True):
+            upper.plot(first.time, first[name], color=COLOURS[0], label=curves.labels[0])
+            upper.plot(second.time, second[name], "--", color=COLOURS[1], label=curves.labels[1])
+            upper.set_ylabel(with_unit(name, curves[name].unit))
+            scale = curves[name].largest / curves[name].relative if curves[name].relative else 1.0
+            times, difference = curves.difference(name)
+            lower.plot(times, difference / scale, color="#444444", linewidth=1.0)
+            lower.set_ylabel("difference\n/ range")
+        rows[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)
+        rows[-1].set_xlabel("time in s")
+        figure.align_ylabels(rows)
     return figure
 
 
@@ -106,13 +133,21 @@ def matching(model: CompiledDae | RecordedModel, patterns: Sequence[str]) -> lis
     Raises:
         UnknownName: nothing fits a pattern.
     """
-    known = (*model.position, *model.discrete_position)
+    return fitting((*model.position, *model.discrete_position), patterns, f"{model.name} has no variable")
+
+
+def fitting(known: Sequence[str], patterns: Sequence[str], missing: str) -> list[str]:
+    """Return the names that fit patterns; `missing` is what to say before a pattern that none fits.
+
+    Raises:
+        UnknownName: nothing fits a pattern.
+    """
     names: dict[str, None] = {}
     for pattern in patterns:
-        fitting = [name for name in known if name == pattern or fnmatchcase(name, pattern)]
-        if not fitting:
-            raise UnknownName(f"{model.name} has no variable '{pattern}'{did_you_mean(pattern, known) or '.'}")
-        names.update(dict.fromkeys(fitting))
+        some = [name for name in known if name == pattern or fnmatchcase(name, pattern)]
+        if not some:
+            raise UnknownName(f"{missing} '{pattern}'{did_you_mean(pattern, known) or '.'}")
+        names.update(dict.fromkeys(some))
     return list(names)
 
 
@@ -138,6 +173,11 @@ def unit_of(solution: Trajectories, name: str) -> str:
     return str(model.flat_discretes[model.discrete_position[name]].unit)
 
 
+def quantity(unit: str) -> str:
+    """Return what is measured in a unit, for titles."""
+    return _QUANTITIES.get(unit, "value")
+
+
 def _by_unit(solution: Trajectories, names: Sequence[str]) -> dict[str, list[str]]:
     groups: dict[str, list[str]] = {}
     for name in names:
@@ -149,7 +189,7 @@ def _draw(axes: Axes, solution: Trajectories, unit: str, names: Sequence[str]) -
     for k, (name, values) in enumerate(solution.together(*names).items()):
         style = "-" if k < len(COLOURS) else "--"
         axes.plot(solution.time, values, style, label=name, color=COLOURS[k % len(COLOURS)])
-    axes.set_ylabel(with_unit(_QUANTITIES.get(unit, "value"), unit))
+    axes.set_ylabel(with_unit(quantity(unit), unit))
     axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
 
 

@@ -1,28 +1,28 @@
-"""Integrals of the powers along a run: by a rule over its own results and, where these are too coarse, by IDAS."""
+"""Integrals of the powers along a run: by a rule over its own results and, where these are too coarse, finer ones."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, partial
+from functools import cache
 
 import casadi as ca
 import numpy as np
 
-from modelica_like.compile.buffers import BufferedFunction, along, buffered
+from modelica_like.compile.buffers import along
 from modelica_like.compile.compiled import CompiledDae, Vector
+from modelica_like.errors import StepFailed
 from modelica_like.initialize import Point
-from modelica_like.solve.idas import Integrator, linear_solver, scaled_problem
+from modelica_like.solve.idas import Integrator
 from modelica_like.solve.options import Options
 from modelica_like.solve.quadrature import Places, rules
 from modelica_like.solve.recorder import Segment
 
 POWERS = 4
 """Powers of a component that are integrated: loss, source, inflow, rate of the stored energy."""
-_RATE = 4
-"""Column of the rate of the stored energy among the energy terms."""
-_PIECE = 20_000
-"""Results that are looked at together."""
+_PIECE, _LARGEST = 20_000, 10_000_000
+"""Results that are looked at together, and numbers in their energy terms at most."""
 _SHARE, _ALL = 0.1, 50.0
 """Errors of one interval and of all, in relative tolerances of the energy that moves, that are left as they are."""
 _ASTRAY = 3.0
@@ -32,8 +32,8 @@ _FINEST = 1e-12
 """What is integrated again is so much more precise than the run, but no more than this."""
 _NEAR = 8
 """Intervals that are integrated again as well rather than to start once more behind them."""
-_FAILURES = 20
-"""Failures of IDAS in a piece of a run from which the results have to do."""
+_MORE, _LEAST, _DEEPEST = 4, 4, 6
+"""Finer results per interval, intervals for which there are so many at least, and how often that is done."""
 _FEW = 4
 """Intervals of a smooth piece up to which slopes of the powers are taken."""
 _BESIDE = np.array([[1 / 2, 1 / 2], [2 / 3, 1 / 3], [1 / 2, 1 / 2]])
@@ -71,16 +71,16 @@ class Results:
         return Point(float(self.times[k]), self.x[:, k].copy(), self.z[:, k].copy(), self.d[:, k].copy())
 
 
-def results(model: CompiledDae, segments: tuple[Segment, ...]) -> Iterator[Results]:
+def results(model: CompiledDae, segments: Sequence[Segment]) -> Iterator[Results]:
     """Go through a run in pieces of bounded size; a long segment is cut into some that share a result."""
     held: list[Segment] = []
-    count = 0
+    count, most = 0, min(_PIECE, max(_LARGEST // (6 * max(len(model.components), 1)), 100))
     for segment in segments:
-        for first in range(0, max(len(segment.times) - 1, 1), _PIECE):
-            part = slice(first, first + _PIECE + 1)
+        for first in range(0, max(len(segment.times) - 1, 1), most):
+            part = slice(first, first + most + 1)
             held.append(Segment(segment.times[part], segment.x[:, part], segment.z[:, part], segment.d))
             count += len(held[-1].times)
-            if count > _PIECE:
+            if count > most:
                 yield _together(model, held)
                 held, count = [], 0
     if held:
@@ -121,18 +121,23 @@ class Powers:
         self.model, self.options = model, options
         self._share = min(_SHARE, _ALL / count)
         self.stored, self.moved = 0.0, _NOTHING
+        rtol = min(options.rtol, max(_FINER * options.rtol, _FINEST))
+        self._integrator = Integrator(model, replace(options, rtol=rtol, atol=options.atol * rtol / options.rtol))
 
-    def integrals(self, every: Results) -> Vector:
-        """Integrate all powers over some results; shape (4, components), in J."""
+    def integrals(self, every: Results, depth: int = 0) -> Vector:
+        """Integrate all powers over some results; shape (4, components), in J.
+
+        Where these are too coarse, there are finer ones between them, which may be too coarse again.
+        """
         kept = _apart(every)
         first, last = (np.searchsorted(kept, ends[kept]) for ends in (every.first, every.last))
         intervals, places, weights = rules(every.times[kept], first, last)
         first, last = first[intervals], last[intervals]
-        terms = every.terms[..., kept]
+        terms = np.take(every.terms, kept, axis=-1)
         powers = terms[1 : 1 + POWERS].reshape(-1, len(kept))
         self._move(terms[0], powers, np.diff(every.times[kept]))
         bent, bends = intervals[:0], np.zeros((2, len(powers), 0))
-        coarse = self._coarse(terms, intervals, places, weights, bent, bends)
+        coarse = self._coarse(terms, intervals, places, weights, bent, bends, depth)
         ends = np.stack([kept[intervals], kept[intervals + 1]])
         few = np.flatnonzero(coarse & (last - first < _FEW))
         if len(few) > 1 and self.model.states and not self.model.implicit:
@@ -140,13 +145,31 @@ class Powers:
             places[bent, :2] = intervals[bent, None] + np.arange(2)
             weights[bent] = 0.0
             weights[bent, :, :2] = _BESIDE * np.diff(every.times[ends[:, bent]], axis=0)[0][:, None, None]
-            coarse = self._coarse(terms, intervals, places, weights, bent, bends)
+            coarse = self._coarse(terms, intervals, places, weights, bent, bends, depth)
+        finer: list[Segment] = []
+        again = np.zeros(len(coarse), bool)
         # A stretch lies within one smooth piece.
-        again, total = self._again(every, ends, _stretches(coarse, first))
+        for stretch in _stretches(coarse, first) if depth < _DEEPEST else ():
+            segment = self._finer(every, ends[0, stretch[0]], ends[1, stretch[-1]], len(stretch))
+            if segment is not None:
+                finer.append(segment)
+                again[stretch] = True
         weights[again] = 0.0
-        total += powers @ np.bincount(places.ravel(), weights[:, 0].ravel(), len(kept))
-        total += bends[0] @ ~again[bent]
-        return total.reshape(POWERS, -1)
+        total = powers @ np.bincount(places.ravel(), weights[:, 0].ravel(), len(kept)) + bends[0] @ ~again[bent]
+        parts = (self.integrals(some, depth + 1) for some in results(self.model, finer))
+        return sum(parts, total.reshape(POWERS, -1))
+
+    def _finer(self, every: Results, begin: int, end: int, intervals: int) -> Segment | None:
+        """Integrate again from one result to another, with more results between; None if IDAS gives up."""
+        start = every.point(begin)
+        span, count = float(every.times[end]) - start.t, _MORE * 2 ** math.ceil(math.log2(max(intervals, _LEAST)))
+        try:
+            x, z = self._integrator.run(start, span, count)
+        except StepFailed:
+            return None
+        times = start.t + span * np.arange(count + 1) / count
+        states, implicit = (np.column_stack(pair) for pair in ((start.x, x), (start.z, z)))
+        return Segment(times, states, implicit, start.d)
 
     def _move(self, stored: Vector, powers: Vector, steps: Vector) -> None:
         """See what energies some results store and exchange."""
@@ -167,7 +190,7 @@ class Powers:
         return squares * np.stack([(slopes[:, 0] - slopes[:, 1]) / 12.0, slopes[:, 0] / 6.0])
 
     def _coarse(
-        self, terms: Vector, intervals: Places, places: Places, weights: Vector, bent: Places, bends: Vector
+        self, terms: Vector, intervals: Places, places: Places, weights: Vector, bent: Places, bends: Vector, depth: int
     ) -> Places:
         """Tell over which intervals the powers are integrated too coarsely.
 
@@ -175,42 +198,21 @@ class Powers:
         stored energies change is known, so that there the error itself is. It tells what an order gains, too, unless
         it is the error of the states. All are looked at in two sums with different weights, lest they cancel.
         """
-        if not self.model.states:
+        if not self.model.states and not depth:
             # Nothing tells what happens between the results.
             return np.ones(len(intervals), bool)
-        mixed = _mixing(terms.shape[1]) @ terms.reshape(-1, terms.shape[-1])
-        best, lower, lowest = np.matmul(weights, mixed[:4].T[places]).transpose(1, 2, 0).copy()
+        mixed, stored = _mixed(terms[1 : 1 + POWERS]), _mixing(terms[0].shape[0]) @ terms[0]
+        best, lower, lowest = np.matmul(weights, mixed.T[places]).transpose(1, 2, 0).copy()
         if len(bent):
-            more = _mixing(terms.shape[1])[:4, terms.shape[1] : -terms.shape[1]] @ bends
-            best[:, bent] += more[0]
-            lower[:, bent] += more[1]
+            for rule, more in zip((best, lower), bends, strict=True):
+                rule[:, bent] += _mixed(more.reshape(POWERS, terms.shape[1], -1))
         near, far = np.abs(best - lower), np.abs(lower - lowest)
-        known = np.maximum(*np.abs(mixed[4:, intervals + 1] - mixed[4:, intervals] - best[2:]))
+        known = np.maximum(*np.abs(stored[:, intervals + 1] - stored[:, intervals] - best[2:]))
         smooth = np.maximum(*near[2:])
         gain = np.maximum(_ratio(near[:2], far[:2]), _ratio(known, smooth))
         errors = np.maximum(np.maximum(*(near[:2] * gain)), np.minimum(known, smooth))
         allowed = self.options.rtol * self.moved
         return ~((errors <= self._share * allowed) & (known <= _ASTRAY * allowed))
-
-    def _again(self, every: Results, ends: Places, stretches: list[Places]) -> tuple[Places, Vector]:
-        """Integrate stretches of intervals again, divided where that fails; return which were, and their integrals."""
-        again = np.zeros(ends.shape[1], bool)
-        total = np.zeros(POWERS * len(self.model.components))
-        if not stretches:
-            return again, total
-        integrator = _Work(self.model, self.options, self.moved)
-        failures = 0
-        while stretches and failures < _FAILURES:
-            stretch = stretches.pop()
-            start = every.point(ends[0, stretch[0]])
-            found = integrator.over(start, float(every.times[ends[1, stretch[-1]]]) - start.t)
-            if found is not None:
-                total[_nonzero(self.model)] += found
-                again[stretch] = True
-                continue
-            failures += 1
-            stretches += np.array_split(stretch, 2) if len(stretch) > 1 else []
-        return again, total
 
 
 def _slopes(model: CompiledDae) -> ca.Function:
@@ -220,67 +222,6 @@ def _slopes(model: CompiledDae) -> ca.Function:
     ode = model.ode(*arguments.values())
     slopes = ca.jtimes(powers, arguments["x"], ode) + ca.jtimes(powers, arguments["t"], ca.SX(1))
     return ca.Function("slopes", list(arguments.values()), [ca.densify(slopes)], {"cse": True})
-
-
-class _Work(Integrator):
-    """Integrates powers together with the states, as further states.
-
-    IDAS' own quadratures do not serve: where states are straight lines they leave it at order one.
-
-    Args:
-        model: the compiled model.
-        options: of the run.
-        moved: energy, in J, of which the integrals are precise to the relative tolerance.
-    """
-
-    def __init__(self, model: CompiledDae, options: Options, moved: float) -> None:
-        # Without states nothing else asks for short steps.
-        finer = _FINER if model.states else _FINER**3
-        rtol = min(options.rtol, max(finer * options.rtol, _FINEST))
-        super().__init__(model, replace(options, rtol=rtol, atol=options.atol * rtol / options.rtol))
-        # IDAS has one absolute tolerance for all.
-        self._scale = self._settings(1, False, 1.0)["abstol"] / (rtol * moved)
-        self._tail = np.concatenate([[self._scale], self._tail])
-
-    def over(self, start: Point, span: float) -> Vector | None:
-        """Integrate the powers that are not zero anyway from a start over a time in s; None if IDAS gives up."""
-        p = np.concatenate([[start.t, span], self._tail, start.d])
-        start = replace(start, x=np.concatenate([start.x, np.zeros(len(_nonzero(self.model)))]))
-        for gentle in (False, True) if self.model.states else (False,):
-            self._call(start, p, 1, self.options.max_steps, gentle)
-            found = self._latest.latest()[0]
-            if np.isfinite(found).all():
-                return found[len(self.model.states) :] / self._scale
-        return None
-
-    def _first_step(self, start: Point, span: float) -> float:
-        return super()._first_step(replace(start, x=start.x[: len(self.model.states)]), span)
-
-    def _instance(self, outputs: int, steps: int, gentle: bool, first: float) -> BufferedFunction:
-        key = "work", self.rtol, self.options.atol, gentle, first
-        self._latest = buffered(self.model._cache, key, partial(self._make, outputs, steps, gentle, first), (0, 1))
-        self._latest.forget()
-        return self._latest
-
-    def _make(self, outputs: int, steps: int, gentle: bool, first: float) -> ca.Function:
-        problem = dict(scaled_problem(self.model, gentle=gentle))
-        inner, speed = problem.pop("inner"), problem.pop("span")
-        scale, p = ca.SX.sym("scale"), problem["p"]
-        powers = ca.densify(ca.vec(self.model.energy(*inner)[:, 1 : 1 + POWERS])[_nonzero(self.model)])
-        problem["x"] = ca.vertcat(problem["x"], ca.SX.sym("work", len(_nonzero(self.model))))
-        problem["ode"] = ca.cse(ca.vertcat(problem["ode"], powers * (speed * scale)))
-        problem["p"] = ca.vertcat(p[:2], scale, p[2:])
-        settings = self._settings(steps, gentle, first)
-        settings["linear_solver"] = linear_solver(problem["x"].numel() + problem["z"].numel())
-        return ca.integrator("work", "idas", problem, 0, [1.0], settings)
-
-
-def _nonzero(model: CompiledDae) -> list[int]:
-    """Powers that are not zero anyway."""
-    if "powers" not in model._cache:
-        every = ca.vec(model.energy(*model.arguments.values())[:, 1 : 1 + POWERS])
-        model._cache["powers"] = [k for k in range(every.numel()) if not every[k].is_zero()]
-    return model._cache["powers"]
 
 
 def _apart(every: Results) -> Places:
@@ -308,12 +249,13 @@ def _ratio(small: Vector, large: Vector) -> Vector:
     return np.divide(small, large, out=np.ones_like(small), where=large > small)
 
 
+def _mixed(powers: Vector) -> Vector:
+    """Return two sums each, with different weights, of powers and of rates of stored energies; (4, n)."""
+    flat, rates = powers.reshape(-1, powers.shape[-1]), powers[-1]
+    return np.concatenate([_mixing(len(flat)) @ flat, _mixing(len(rates)) @ rates])
+
+
 @cache
-def _mixing(components: int) -> Vector:
-    """Return weights of two sums each of powers, of rates of stored energies, and of these; (6, 6 components)."""
-    turns = 0.618 * np.arange(POWERS * components)
-    sums = np.array([1.0 + np.modf(turns)[0], 2.0 - 3.0 * np.modf(1.7 * turns)[0]])
-    table = np.zeros((3, 2, 2 + POWERS, components))
-    table[0, :, 1 : 1 + POWERS] = sums.reshape(2, POWERS, components)
-    table[1, :, _RATE] = table[2, :, 0] = sums[:, :components]
-    return table.reshape(6, -1)
+def _mixing(count: int) -> Vector:
+    turns = 0.618 * np.arange(count)
+    return np.array([1.0 + np.modf(turns)[0], 2.0 - 3.0 * np.modf(1.7 * turns)[0]])

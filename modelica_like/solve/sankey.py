@@ -6,12 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from modelica_like.solve.energy import EnergyBalance
-from modelica_like.solve.style import STYLE, headline
+from modelica_like.solve.style import picture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    from modelica_like.solve.energy import EnergyBalance
 
 _BROUGHT, _STORED, _HEAT, _TAKEN = "#0072b2", "#009e73", "#d55e00", "#56b4e9"
 _GAP = 0.035
@@ -46,22 +47,15 @@ def sankey(balance: EnergyBalance, title: str = "") -> Figure:
         balance: of a run.
         title: heading.
     """
-    import matplotlib as mpl
-    from matplotlib.figure import Figure
-
     brought, went = (_together(side) for side in streams(balance))
     total = max(sum(one.amount for one in brought), sum(one.amount for one in went), 1e-300)
-    with mpl.rc_context(STYLE):
-        rows = max(len(brought), len(went), 3)
-        figure = Figure(figsize=(8.0, 1.0 + 0.45 * rows), layout="constrained", dpi=150)
-        axes = figure.add_subplot()
+    rows = max(len(brought), len(went), 3)
+    with picture(f"{title or 'energy'}: {total:.4g} J", 1, 1.0 + 0.45 * rows) as (figure, (axes,)):
         axes.set_axis_off()
         _side(axes, brought, total, _LEFT)
         _side(axes, went, total, _RIGHT)
         _box(axes, _MIDDLE, 0.0, -1.0, "#444444")
         axes.set(xlim=(-0.45, 1.45), ylim=(-1.0 - _GAP * rows, 0.06 + _GAP * rows))
-        heading = title or "energy"
-        headline(figure, f"{heading}: {total:.4g} J")
     return figure
 
 

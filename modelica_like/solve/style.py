@@ -18,28 +18,23 @@ STYLE: Any = {
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
 
 
-def panels(count: int, height: float) -> tuple[Figure, list[Any]]:
-    """Return a figure with panels one above the other that share the horizontal axis; height in inches."""
+@contextmanager
+def picture(title: str, count: int, height: float, **grid: Any) -> Iterator[tuple[Figure, list[Any]]]:
+    """Give a figure in the house's style to be drawn within the context, and its panels, one above the other.
+
+    Args:
+        title: heading.
+        count: number of panels; they share the horizontal axis.
+        height: in inches.
+        grid: of matplotlib's `subplots`.
+    """
+    import matplotlib as mpl
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(8.0, height), layout="constrained", dpi=150)
-    return figure, list(figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0])
-
-
-@contextmanager
-def picture(title: str, count: int, height: float) -> Iterator[tuple[Figure, list[Any]]]:
-    """Give a figure in the house's style, and its panels as `panels` makes them, to be drawn within the context."""
-    import matplotlib as mpl
-
     with mpl.rc_context(STYLE):
-        figure, rows = panels(count, height)
-        headline(figure, title)
-        yield figure, rows
-
-
-def headline(figure: Figure, text: str) -> None:
-    """Write the heading of a picture."""
-    figure.suptitle(text, x=0.01, ha="left", fontsize=11, fontweight="bold")
+        figure = Figure(figsize=(8.0, height), layout="constrained", dpi=150)
+        figure.suptitle(title, x=0.01, ha="left", fontsize=11, fontweight="bold")
+        yield figure, list(figure.subplots(count, 1, sharex=True, squeeze=False, **grid)[:, 0])
 
 
 def with_unit(name: str, unit: str) -> str:

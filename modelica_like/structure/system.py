@@ -90,7 +90,7 @@ class System:
 def build_system(model: FlatModel, aliases: Aliases) -> System:
     """Replace every node by its class, and collect the equations that remain."""
     levels, chains, place = _chains(model, aliases)
-    node_level = _node_levels(model, aliases, place)
+    node_level = _node_levels(aliases, place)
     _name_levels(model, levels, node_level)
     node_level = _turn_chains(model, levels, node_level)
     _name_levels(model, levels, node_level)
@@ -127,18 +127,10 @@ def _chains(model: FlatModel, aliases: Aliases) -> tuple[list[Level], list[list[
     return levels, chains, place
 
 
-def _node_levels(
-    model: FlatModel, aliases: Aliases, place: dict[int, tuple[int, float]]
-) -> list[tuple[int, float] | None]:
-    result: list[tuple[int, float] | None] = []
-    for node in range(len(model.nodes)):
-        root = aliases.root[node]
-        if root in aliases.known:
-            result.append(None)
-        else:
-            level, factor = place[root]
-            result.append((level, aliases.factor[node] * factor))
-    return result
+def _node_levels(aliases: Aliases, place: dict[int, tuple[int, float]]) -> list[tuple[int, float] | None]:
+    """Level and factor of every node, None where its value is known."""
+    pairs = ((place.get(root), factor) for root, factor in zip(aliases.root, aliases.factor, strict=True))
+    return [found and (found[0], factor * found[1]) for found, factor in pairs]
 
 
 def _turn_chains(

@@ -45,7 +45,7 @@ def to_si(value: object, unit: Unit, name: str) -> float:
         name: the declared name, such as `Inertia.J`, for messages.
 
     Raises:
-        UnitError: the value has another dimension, or is no quantity.
+        UnitError: the value has another dimension, or is not a quantity.
         ValueOutOfRange: the value is not finite.
     """
     number, given = _quantity(value, unit, name)
@@ -111,7 +111,7 @@ def in_unit(value_si: float, unit_text: str) -> float:
     """Return an SI value in another unit for display: `in_unit(628.3, "rpm")` is about 6000.
 
     Raises:
-        UnitError: the text is no unit.
+        UnitError: the text is not a unit.
     """
     unit = parse_unit(unit_text)
     return (value_si - unit.offset) / unit.factor

@@ -11,7 +11,7 @@ from fractions import Fraction
 from functools import lru_cache
 
 from modelica_like.errors import UnitError
-from modelica_like.units.atoms import BASE, Exponent, find_atom, simplify
+from modelica_like.units.atoms import ATOMS, BASE, Exponent, find_atom, simplify
 
 _MAX_LENGTH = 200
 _MAX_EXPONENT = 20
@@ -117,17 +117,19 @@ def _resolve(unit: Unit) -> tuple[tuple[Exponent, ...], float, float]:
     return tuple(simplify(exponent) for exponent in exponents), factor, offset
 
 
+@lru_cache(maxsize=4096)
 def coherent(unit: Unit) -> Unit:
-    """Return the unit with its names replaced by SI ones of the same dimension: `kg.m` for `kg.cm`, `s` for `min`."""
-    if unit == ANY or all(find_atom(name).factor == 1.0 for name, _ in unit.atoms):
+    """Return the unit with its names replaced by SI ones of the same dimension: `N.m` for `kN.m`, `rad/s` for `rpm`."""
+    if unit == ANY:
         return unit
     return Unit(_collect((base, power) for name, old in unit.atoms for base, power in _base_powers(name, old)))
 
 
 def _base_powers(name: str, power: Exponent) -> list[tuple[str, Exponent]]:
     atom = find_atom(name)
-    if atom.factor == 1.0:
-        return [(name, power)]
+    plain = {"bar": "Pa", "degC": "K"}.get(name, name if atom.factor == 1.0 else name[1:])
+    if plain in ATOMS and ATOMS[plain].factor == 1.0 and ATOMS[plain].exponents == atom.exponents:
+        return [(plain, power)]
     return [(base, power * own) for base, own in zip(BASE, atom.exponents, strict=True)]
 
 
@@ -152,7 +154,7 @@ def parse_unit(text: str) -> Unit:
         text: the unit; `1` or an empty text is the unit of a number, `*` the wildcard `ANY`.
 
     Raises:
-        UnitError: the text is no unit, or a name in it is unknown.
+        UnitError: the text is not a unit, or a name in it is unknown.
     """
     stripped = text.strip()
     if stripped == "*":

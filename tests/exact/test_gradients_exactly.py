@@ -89,10 +89,7 @@ def test_a_gradient_is_exact(number):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number", [
-    pytest.param(k, marks=pytest.mark.xfail(reason="the adjoint is off by 2e-8", strict=True)) if k == 7 else k
-    for k in SMOOTH
-])  # fmt: skip
+@pytest.mark.parametrize("number", SMOOTH)
 def test_an_adjoint_gradient_is_exact(number):
     drive = random_drive(number)
     assert gradient(drive, "adjoint") == pytest.approx(exactly(drive)[0], abs=PRECISE)

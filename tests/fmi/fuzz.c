@@ -82,8 +82,7 @@ static void use(const Model *m) {
     for (int k = 0; k < m->n_variables; k++) {
         const Variable *v = &m->variables[k];
         double one = 1;
-        if (v->type == TYPE_ENUMERATION) get_mode(c, v->reference);
-        else get_float(c, v->reference, &value);
+        if (v->type != TYPE_ARRAY) get_value(c, v, &value);
         if (k % 7 == 0) directional(c, &v->reference, 1, &v->reference, 1, &one, &value);
         if (k % 7 == 1) adjoint(c, &v->reference, 1, &v->reference, 1, &one, &value);
         if (k % 7 == 2) output_rate(c, v->reference, 1 + k % 3, &value);

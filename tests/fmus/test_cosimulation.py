@@ -86,7 +86,7 @@ MISDEEDS: dict[str, tuple[float, type[ModelicaLikeError], str]] = {
     "leave": (3.0, FmuCrashed, f"{BAD} ended its process by itself, with exit code 0, after t = 0.49 s.\n{OWN}"),
     "hang": (
         2.0, FmuTimeout,
-        "bench has not come to its end within 3 s, and was stopped after t = 0.49 s.\n"
+        "bench did not finish within 3 s, and was stopped after t = 0.49 s.\n"
         f"{BAD} was at work.\nGive it more time with `timeout`, or a shorter run.",
     ),
     "fail": (
@@ -111,7 +111,7 @@ def test_what_is_no_number_stops_the_run(hostile: Path, reference_fmus: Built) -
     link = Link("noise", Port("bad", "x"), (Port("good", "motor.tau"),))
     with pytest.raises(FmuFailed) as told:
         cosim(System("bench", units, (link,)), until=1.0, step=1e-2)
-    assert str(told.value).startswith(f"{BAD}: x is no finite number at t = 0.5 s.\n")
+    assert str(told.value).startswith(f"{BAD}: x is not finite at t = 0.5 s.\n")
 
 
 def test_an_input_to_which_nothing_is_connected_is_told(reference_fmus: Built) -> None:

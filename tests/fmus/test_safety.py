@@ -30,7 +30,7 @@ MISDEEDS = {
     "hang": (
         HANG,
         FmuTimeout,
-        "hostile_fmi2.fmu has not come to its end within 3 s, and was stopped after t = 0.49 s.\n"
+        "hostile_fmi2.fmu did not finish within 3 s, and was stopped after t = 0.49 s.\n"
         "Give it more time with `timeout`, or a shorter run.",
     ),
     "fail": (FAIL, FmuFailed, "hostile_fmi2.fmu failed: fmi2DoStep failed with status 3 (error)."),

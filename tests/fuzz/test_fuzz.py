@@ -52,7 +52,7 @@ FOUND: dict[str, tuple[Callable[[], object], str]] = {
     ),
     "a run shorter than times": (
         lambda: simulate(loads(WHEEL), 5e-324),
-        "A run of 4.94066e-324 s is too short: no times can be told apart in it.",
+        "A run of 4.94066e-324 s is too short: its times cannot be distinguished.",
     ),
 }
 

@@ -9,7 +9,17 @@ from collections.abc import Callable
 import pytest
 
 import modelica_like.errors as errors
-from components import Clutch, ClutchActuator, ConstantSpeed, Fixed, Freewheel, Inertia, TimeFormula, Torque
+from components import (
+    BearingFriction,
+    Clutch,
+    ClutchActuator,
+    ConstantSpeed,
+    Fixed,
+    Freewheel,
+    Inertia,
+    TimeFormula,
+    Torque,
+)
 from components.sources import TorqueSource
 from modelica_like import build, simulate, simulation_function
 from modelica_like.errors import ModelicaLikeError
@@ -170,6 +180,12 @@ def overrun() -> Assembly:
     return Assembly("drive", parts=parts, series={"shaft": list(parts)})
 
 
+def coasting(bearing: Component) -> Assembly:
+    """A flywheel at 5 rad/s in a bearing."""
+    parts: dict[str, Component] = {"flywheel": Inertia(J=1.0, phi=0.0, w=5.0), "bearing": bearing}
+    return Assembly("drive", parts=parts, series={"shaft": list(parts)})
+
+
 CASES: dict[str, tuple[type[ModelicaLikeError], Callable[[], object], str]] = {}
 
 
@@ -204,7 +220,7 @@ case(
     "a mode holds what is no variable",
     lambda: flatten(Nothing()),
     """\
-Nothing.plates holds the motion 'w_slip', which is no variable of Nothing.
+Nothing.plates holds the motion 'w_slip', which is not a variable of Nothing.
 Name a variable, or a property that returns one.""",
 )
 case(
@@ -278,7 +294,7 @@ case(
     "a notice names what is no parameter",
     lambda: flatten(Alarm(bell="xmax")),
     """\
-Alarm: the notice of an event names xmax, which is no parameter; did you mean 'x_max'?
+Alarm: the notice of an event names xmax, which is not a parameter; did you mean 'x_max'?
   in test_component_messages.py:{alarm} \
 `yield self.alarm.go("quiet", "ringing", when=self.x > self.x_max, notice=notice)`""",
 )
@@ -320,6 +336,12 @@ state switched 20 times at t = 0.5 s (up ⇄ down).
   in test_component_messages.py:{relay down} `yield self.state.go("down", "up", when=self.x < 0)`
 Modes still switch after 20 rounds at one instant.
 Give the switching a hysteresis (a peak above 1 in friction), or smooth what drives it.""",
+)
+case(
+    errors.LimitPassed,
+    "a table is left that must not be",
+    lambda: simulate(coasting(BearingFriction(tau_pos=((0, 1), (2, 3)), extrapolate="error")), 2.0),
+    "At 0 s bearing leaves the rows of tau_pos.",
 )
 case(
     errors.StepFailed,

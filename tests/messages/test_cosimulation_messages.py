@@ -295,7 +295,7 @@ FAILURES: dict[str, tuple[dict[str, Any], str]] = {
     "no rollback": (
         {"kind": "no rollback", "unit": "a"},
         "a (a.fmu) cannot go back to a saved state, or does not take steps of any length, so the step cannot vary.\n"
-        "It has not both of canGetAndSetFMUState and canHandleVariableCommunicationStepSize.\n"
+        "It needs both canGetAndSetFMUState and canHandleVariableCommunicationStepSize.\n"
         "Run with a fixed step, without tolerance.",
     ),
     "loop": (
@@ -306,7 +306,7 @@ FAILURES: dict[str, tuple[dict[str, Any], str]] = {
     ),
     "no number": (
         {"kind": "not finite", "unit": "a", "name": "tau", "time": 0.25},
-        "a (a.fmu): tau is no finite number at t = 0.25 s.\n"
+        "a (a.fmu): tau is not finite at t = 0.25 s.\n"
         "If the values before it grow without bounds, take a shorter step.",
     ),
     "step": (

@@ -24,7 +24,7 @@ ENDS = {
     "hangs": (
         "while True: pass",
         pytest.raises(FmuTimeout),
-        "drive.fmu has not come to its end within 0.5 s, and was stopped before its first step had ended.\n"
+        "drive.fmu did not finish within 0.5 s, and was stopped before its first step had ended.\n"
         "Give it more time with `timeout`, or a shorter run.",
     ),
 }

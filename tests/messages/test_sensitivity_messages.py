@@ -145,7 +145,7 @@ A function with a fixed mode sequence has derivatives only as long as the sequen
 Bound the parameters, begin elsewhere, or allow it with any_sequence=True.""",
     ),
     "a step of the replay": (StepFailed, past_the_end, """\
-The replay of the run did not get on at t = 1 s: its steps do not converge.
+The replay of the run stalled at t = 1 s: its steps do not converge.
 Look for a function without a slope there, or for a mode that should have changed."""),
     "a model without states": (LanguageError, lambda: sensitivities(Timeless(), ["x"], ["T"], until="1 s"), """\
 Timeless has no states: nothing develops over time, so there is no run to differentiate.

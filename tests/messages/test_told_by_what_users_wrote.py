@@ -163,7 +163,7 @@ Remove one, or put a throttle between.""",
         lambda: simulate(loads(GEARED)),
         """\
 The Jacobian is singular at t = 0 s in block 1 (fast.flange_b.tau, gear.flange_b.tau, der(slow.w), der(fast.w)).
-  in inertias.py:26 `yield self.J * der(self.w) == a.tau + b.tau`
+  in inertias.py:{inertias.py:yield self.J * der(self.w) == a.tau + b.tau} `yield self.J * der(self.w) == a.tau + b.tau`
   in gears.py:{gears.py:yield self.ratio * a.tau + b.tau == 0} `yield self.ratio * a.tau + b.tau == 0`
   in gears.py:{gears.py:yield a.phi - self.phi_support == self.ratio * (b.phi - self.phi_support)} `yield a.phi - self.phi_support == self.ratio * (b.phi - self.phi_support)`
 gear.ratio is zero: that leaves these unknowns open.

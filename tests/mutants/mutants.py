@@ -29,7 +29,7 @@ ROOT = Path(__file__).parents[2]
 FOLDERS = ("components", *(f"modelica_like/{name}" for name in (
     "structure", "initialize", "solve", "flatten", "compile",
 )))  # fmt: skip
-PICTURES = ("plot.py", "curves_plot.py", "sankey.py", "style.py")
+PICTURES = ("plot.py", "sankey.py", "style.py")
 """They draw; what they draw is looked at."""
 NARROW = {
     "components/sizing": ["sizing"],
@@ -53,6 +53,8 @@ NARROW = {
 """Tests by the longest beginning of a path that fits; tests that name the module or its classes come before."""
 _BROKEN = 99
 _SLOW = ("test_rounding.py", "test_robustness.py", "test_endless_events.py", "test_number_kinds.py")
+PAGES = ("tests/report/test_component_pages.py::test_the_pages_are_current",)
+"""They tell defaults and limits."""
 SECONDS = 60
 LONGEST = 240
 """Time of the processor for one test, and for one change."""
@@ -86,7 +88,7 @@ def known(change: Change) -> bool:
 
 @cache
 def tests_of(file: str) -> tuple[str, ...]:
-    """Tests that should notice changes of a file, the closest ones first."""
+    """Tests that should notice changes in the functions of a file, the closest ones first."""
     text = (ROOT / file).read_text(encoding="utf-8")
     module = file.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
     names = [module] if not file.startswith("components") else re.findall(r"^(?:class|def) ([A-Za-z]\w+)", text, re.M)
@@ -131,7 +133,8 @@ class _Limit:
 
 def survives(place: Path, change: Change) -> str:
     """Run the tests of a change in a process of its own; an empty text if one fails, else what was run."""
-    tests = [one for one in tests_of(change.file) if (place / one).exists()]
+    declared = change.file.startswith("components/") and "." not in change.place and "sizing" not in change.file
+    tests = [*tests_of(change.file), *(PAGES if declared else ())]
     original = (place / change.file).read_text(encoding="utf-8")
     (place / change.file).write_text(change.applied(original), encoding="utf-8")
     try:

@@ -71,7 +71,8 @@ class Browser:
         self.complaints.clear()
         self.call("Page.navigate", url=page.as_uri())
         self.run("new Promise((go) => { const look = () => "
-                 "(document.getElementById('status')?.textContent || document.getElementById('said')?.textContent) "
+                 "(document.getElementById('status')?.textContent || document.getElementById('said')?.textContent "
+                 "|| document.documentElement?.dataset.ready) "
                  "? go(1) : setTimeout(look, 10); look(); })")  # fmt: skip
 
     def resize(self, width: int, height: int) -> None:

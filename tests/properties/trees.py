@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+import numpy as np
 from hypothesis import strategies as st
 
 from components import (
@@ -98,6 +99,26 @@ class Tree:
         group = self.groups()
         carriers = {group[one.ends[2]] for one in self.joints if one.kind == "planet"}
         return {number for number, first in enumerate(group) if number == first and first not in carriers}
+
+    def motions(self) -> np.ndarray:
+        """Speeds of all shafts by those of the free ones, in their order; shape (shafts, free ones)."""
+        free = sorted(self.free())
+        rows = dict(zip(free, np.eye(len(free)), strict=True))
+        while len(rows) < len(self.J):
+            for one in self.joints:
+                known = [end in rows for end in one.ends]
+                if one.kind == "gear" and any(known):
+                    a, b = one.ends
+                    rows.setdefault(b, rows[a] / one.number if known[0] else rows.get(b))
+                    rows.setdefault(a, rows[b] * one.number)
+                elif one.kind == "planet" and all(known[:2]):
+                    sun, ring, carrier = one.ends
+                    rows[carrier] = (rows[sun] + one.number * rows[ring]) / (1 + one.number)
+        return np.array([rows[k] for k in range(len(self.J))])
+
+    def start(self) -> np.ndarray:
+        """Speeds before the run, in rad/s; freewheels that lag take some of them away."""
+        return self.motions() @ [self.w[k] for k in sorted(self.free())]
 
 
 def decade(low: float, high: float) -> st.SearchStrategy[float]:

@@ -189,7 +189,7 @@ def test_where_nothing_can_be_integrated_again_the_results_count(monkeypatch: py
     run = simulate(oscillator(200.0, 0.1), 1.0, points=40)
 
     expected = run.energy()
-    monkeypatch.setattr(powers._Work, "over", lambda *_: None)
+    monkeypatch.setattr(powers.Powers, "_finer", lambda *_: None)
     balance = replace(run, _cache={}).energy()
     assert balance["spring"].lost == pytest.approx(expected["spring"].lost, rel=1e-4)
 

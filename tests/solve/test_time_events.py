@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from modelica_like import Solution, build, simulate
+from modelica_like import Assembly, Solution, build, simulate
 from modelica_like.language import (
     Component,
     Discrete,
@@ -51,6 +51,17 @@ def test_time_events_are_hit_exactly(period):
     assert run.final["beats"] == len(beats)
     switches = np.append(beats, end) if len(beats) % 2 else beats
     assert run.final["x"] == pytest.approx(np.sum(switches[1::2] - switches[::2]), abs=1e-12)
+
+
+def test_clocks_beside_each_other_are_each_in_time():
+    """Of several moments ahead the next one counts, and what both ask for at one time is done at it."""
+    periods = {"fast": 0.07, "slow": 0.1, "idle": 5.0}
+    parts = {name: Metronome(x=0.0, period=period, first=period) for name, period in periods.items()}
+    run = simulate(Assembly("clocks", parts=parts), 1.02, points=3)
+    for name, period in periods.items():
+        beats = [event.time for event in run.events if event.mode == f"{name}.hand"]
+        assert beats == pytest.approx(period * np.arange(1, int(1.02 / period) + 1), rel=1e-14)
+    assert np.all(np.diff(times(run)) >= 0)
 
 
 def test_a_time_event_at_or_before_the_start_fires_at_the_start():

@@ -252,6 +252,21 @@ def test_friction_work_of_the_shifts(run: Solution, report: ShiftReport) -> None
     assert balance.drift < 1e-6
 
 
+def test_the_page_has_the_table_of_its_snippet(report: ShiftReport) -> None:
+    page = (EXAMPLES.parent / "docs" / "examples" / "lepelletier.md").read_text(encoding="utf-8")
+    assert 'print(shift_report(simulate("examples/lepelletier.toml")))' in page
+    table = page[page.index("| shift | element |") :].split("\n\n")[0].splitlines()[2:]
+    gear, told = "", {}
+    for shift, element, *numbers in ([cell.strip() for cell in line.strip("|").split("|")] for line in table):
+        gear = "1" if shift == "start" else shift.partition("–")[2] or gear
+        told[gear, "_".join(element.split()[:2]).lower()] = [float(number) for number in numbers]
+    found = {(row.gear, row.element): [row.slipping, row.torque, row.work] for row in report.shifts}
+    assert told.keys() == found.keys()
+    for key, numbers in told.items():
+        for value, number, digit in zip(found[key], numbers, (1e-3, 0.1, 1.0), strict=True):
+            assert value == pytest.approx(number, abs=digit), key
+
+
 def test_torques_of_the_shifts(report: ShiftReport) -> None:
     """While an element slips its torque is what the schedule presses it with: at most its capacity."""
     assert {row.gear for row in report.shifts} == set("123456")

@@ -226,7 +226,7 @@ def test_values_in_si(value: object, unit: str, si: float) -> None:
         (True, "1", "Inertia.J expects 1; True is not a number."),
         (None, "m", "Inertia.J expects m; None is not a number."),
         ([1], "m", "Inertia.J expects m; [1] is not a number."),
-        (pint.Quantity(1, "s"), "m", "Inertia.J expects m; '1 second' is second."),
+        (pint.Quantity(1, "s"), "m", "Inertia.J expects m; '1 second' is s."),
     ],
 )
 def test_wrong_values_are_told(value: object, unit: str, message: str) -> None:
@@ -248,7 +248,9 @@ def test_a_conversion_that_overflows_is_refused() -> None:
 
 def test_coherent_names() -> None:
     assert str(coherent(parse_unit("kg.cm"))) == "kg.m"
-    assert str(coherent(parse_unit("kN.mm"))) == "kg.m2/s2"
+    assert str(coherent(parse_unit("kN.mm"))) == "N.m"
+    assert str(coherent(parse_unit("kN.m/deg"))) == "N.m/rad"
+    assert [str(coherent(parse_unit(name))) for name in ("rpm", "bar", "degC", "kJ")] == ["rad/s", "Pa", "K", "J"]
     assert str(coherent(parse_unit("N.m"))) == "N.m"
 
 

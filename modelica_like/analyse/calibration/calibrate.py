@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -165,6 +166,7 @@ class _Problem:
             if not low < high:
                 raise ValueOutOfRange(f"{name}: the lower bound {low:g} is not below the upper bound {high:g}.")
         self.span = self.high - self.low
+        self.labels: tuple[str, ...] = ()
         self._at: tuple[bytes, Matrix, Matrix] | None = None
 
     def starts(self, guess: Mapping[str, Any], count: int, seed: int) -> list[Matrix]:
@@ -190,10 +192,9 @@ class _Problem:
         key = q.tobytes()
         if self._at is None or self._at[0] != key:
             model = self.at(q)
-            parts = [one.residuals(model, self.names) for one in self.data]
-            residuals = np.concatenate([r for r, _ in parts])
-            slopes = np.concatenate([j for _, j in parts]) * self.span
-            self._at = key, residuals, slopes
+            residuals, slopes, labels = zip(*(one.residuals(model, self.names) for one in self.data), strict=True)
+            self.labels = tuple(chain(*labels))
+            self._at = key, np.concatenate(residuals), np.concatenate(slopes) * self.span
         return self._at[1], self._at[2]
 
     def at(self, q: Matrix) -> CompiledDae:
@@ -214,10 +215,9 @@ class _Problem:
             {name: float(w) for name, w in zip(self.names, row, strict=True) if abs(w) > 1e-3} for row in right[~known]
         )
         edges = tuple(name for name, q in zip(self.names, found.x, strict=True) if q <= 1e-9 or q >= 1 - 1e-9)
-        labels = tuple(label for one in self.data for label in one.labels())
         return Calibration(
-            self.at(found.x), self.names, values, self.units, residuals, labels, covariance, int(known.sum()), lost,
-            edges, costs,
+            self.at(found.x), self.names, values, self.units, residuals, self.labels, covariance,
+            int(known.sum()), lost, edges, costs,
         )  # fmt: skip
 
     def _covariance(self, right: Matrix, singular: Matrix, known: Any, residuals: Matrix, sizes: Matrix) -> Matrix:

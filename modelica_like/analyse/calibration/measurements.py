@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -18,27 +18,20 @@ from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import NetlistError, UnknownName, ValueOutOfRange, did_you_mean
 from modelica_like.units import Unit, parse_unit, to_si
 
+_SECOND = parse_unit("s")
 Matrix = np.ndarray[Any, np.dtype[np.float64]]
+
+
+Residuals = tuple[Matrix, Matrix, list[str]]
+"""Deviations over uncertainties, shape (numbers,), their derivatives by parameters in SI units, and what each is."""
 
 
 class Measurement(ABC):
     """What a model is compared with."""
 
     @abstractmethod
-    def residuals(self, model: CompiledDae, names: Sequence[str]) -> tuple[Matrix, Matrix]:
-        """Return deviations over uncertainties, and their derivatives by parameters in SI units.
-
-        Args:
-            model: the model with the values to judge.
-            names: parameters.
-
-        Returns:
-            Shapes (numbers,) and (numbers, parameters).
-        """
-
-    @abstractmethod
-    def labels(self) -> list[str]:
-        """Return what each number is."""
+    def residuals(self, model: CompiledDae, names: Sequence[str]) -> Residuals:
+        """Compare a model that has the values to judge, and differentiate by the parameters `names`."""
 
 
 @dataclass(frozen=True)
@@ -57,21 +50,16 @@ class Numbers(Measurement):
     until: float | str | None = None
     parameters: Mapping[str, Any] = field(default_factory=dict)
 
-    def residuals(self, model: CompiledDae, names: Sequence[str]) -> tuple[Matrix, Matrix]:
+    def residuals(self, model: CompiledDae, names: Sequence[str]) -> Residuals:
         """Run the model with its sensitivities."""
         outputs = [read_output(model, name) for name in self.values]
         wanted = np.array([to_si(v, o.unit, o.name) for v, o in zip(self.values.values(), outputs, strict=True)])
-        sizes = np.array(
-            [_uncertainty(self.uncertainty, o.name, o.unit, w) for o, w in zip(outputs, wanted, strict=True)]
-        )
+        pairs = zip(outputs, wanted, strict=True)
+        sizes = np.array([_uncertainty(self.uncertainty, one.name, one.unit, value) for one, value in pairs])
         run = quick_run(model, until=self.until, parameters=self.parameters)
         found = sensitivities(run, list(self.values), names)
         now = np.array([one.value for one in found.outputs])
-        return (now - wanted) / sizes, found.derivatives / sizes[:, None]
-
-    def labels(self) -> list[str]:
-        """Return the names of the outputs."""
-        return list(self.values)
+        return (now - wanted) / sizes, found.derivatives / sizes[:, None], list(self.values)
 
 
 @dataclass(frozen=True)
@@ -89,27 +77,21 @@ class OperatingPoints(Measurement):
     given: Sequence[str]
     uncertainty: Mapping[str, Any] = field(default_factory=dict)
 
-    def residuals(self, model: CompiledDae, names: Sequence[str]) -> tuple[Matrix, Matrix]:
+    def residuals(self, model: CompiledDae, names: Sequence[str]) -> Residuals:
         """Find the steady state of every row; each begins from the one before."""
         columns = _in_si(model, read_table(self.table))
         measured = [name for name in columns if name not in self.given]
-        sizes = np.array([_column_uncertainty(model, self.uncertainty, name, columns[name]) for name in measured])
+        sizes = np.array([_of_column(model, self.uncertainty, name, columns[name]) for name in measured])
         near: OperatingPoint | None = None
         deviations: list[Matrix] = []
         slopes: list[Matrix] = []
-        for row in range(len(next(iter(columns.values())))):
+        rows = range(len(next(iter(columns.values()))))
+        for row in rows:
             near = steady(model, parameters={name: columns[name][row] for name in self.given}, near=near)
-            wanted = np.array([columns[name][row] for name in measured])
-            deviations.append((np.array([near[name] for name in measured]) - wanted) / sizes)
+            deviations.append(np.array([near[name] - columns[name][row] for name in measured]) / sizes)
             slopes.append(steady_slopes(near.model, near.point, measured, names) / sizes[:, None])
-        return np.concatenate(deviations), np.concatenate(slopes)
-
-    def labels(self) -> list[str]:
-        """Return variable and row of every number."""
-        columns = read_table(self.table)
-        measured = [name for name, (_, _) in columns.items() if name not in self.given]
-        rows = len(next(iter(columns.values()))[0])
-        return [f"{name} in row {row + 1}" for row in range(rows) for name in measured]
+        labels = [f"{name} in row {row + 1}" for row in rows for name in measured]
+        return np.concatenate(deviations), np.concatenate(slopes), labels
 
 
 @dataclass(frozen=True)
@@ -126,26 +108,22 @@ class Trajectories(Measurement):
     uncertainty: Mapping[str, Any] = field(default_factory=dict)
     parameters: Mapping[str, Any] = field(default_factory=dict)
 
-    def residuals(self, model: CompiledDae, names: Sequence[str]) -> tuple[Matrix, Matrix]:
+    def residuals(self, model: CompiledDae, names: Sequence[str]) -> Residuals:
         """Run the model with the sensitivities of every number."""
-        columns = _in_si(model, read_table(self.table))
+        table = read_table(self.table)
+        columns = _in_si(model, table)
         if "time" not in columns:
             raise UnknownName("Measured trajectories need a column 'time'.")
         times = columns.pop("time")
-        sizes = [_column_uncertainty(model, self.uncertainty, name, columns[name]) for name in columns]
+        sizes = [_of_column(model, self.uncertainty, name, columns[name]) for name in columns]
+        run = quick_run(model, until=float(times.max()), parameters=self.parameters)
         wanted = [f"at({name}, {float(t)!r})" for name in columns for t in times]
-        end = float(times.max())
-        run = quick_run(model, until=end, parameters=self.parameters)
         found = sensitivities(run, wanted, names, method="forward")
         scale = np.repeat(sizes, len(times))
-        now = np.array([one.value for one in found.outputs])
-        return (now - np.concatenate(list(columns.values()))) / scale, found.derivatives / scale[:, None]
-
-    def labels(self) -> list[str]:
-        """Return variable and time of every number."""
-        columns = read_table(self.table)
-        times, unit = columns.pop("time")
-        return [f"{name} at {t:g} {unit or 's'}" for name in columns for t in times]
+        deviations = np.array([one.value for one in found.outputs]) - np.concatenate(list(columns.values()))
+        shown, unit = table["time"]
+        labels = [f"{name} at {t:g} {unit or 's'}" for name in columns for t in shown]
+        return deviations / scale, found.derivatives / scale[:, None], labels
 
 
 Columns = dict[str, tuple[Any, str]]
@@ -188,7 +166,7 @@ def _csv(path: Path) -> Mapping[str, Any]:
 def _in_si(model: CompiledDae, columns: Columns) -> dict[str, Matrix]:
     values: dict[str, Matrix] = {}
     for name, (numbers, unit) in columns.items():
-        own = parse_unit("s") if name == "time" else _unit(model, name)
+        own = _SECOND if name == "time" else _unit(model, name)
         values[name] = np.array([to_si(f"{n!r} {unit}" if unit else float(n), own, name) for n in map(float, numbers)])
     return values
 
@@ -200,8 +178,8 @@ def _unit(model: CompiledDae, name: str) -> Unit:
     return model.units[name]
 
 
-def _column_uncertainty(model: CompiledDae, stated: Mapping[str, Any], name: str, values: Iterable[float]) -> float:
-    return _uncertainty(stated, name, _unit(model, name), float(np.max(np.abs(np.asarray(values)))))
+def _of_column(model: CompiledDae, stated: Mapping[str, Any], name: str, values: Matrix) -> float:
+    return _uncertainty(stated, name, _unit(model, name), float(np.abs(values).max()))
 
 
 def _uncertainty(stated: Mapping[str, Any], name: str, unit: Unit, value: float) -> float:

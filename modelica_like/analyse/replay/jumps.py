@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from typing import Any
 
-import casadi as ca
 import numpy as np
 
-from modelica_like.analyse.replay.holds import impact, share_slopes
-from modelica_like.analyse.slopes import _NONE, Sizes, slopes
+from modelica_like.analyse.replay.holds import impact, projection, share_slopes
+from modelica_like.analyse.slopes import Sizes, slopes
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae, CompiledTransition
 from modelica_like.errors import NoGradient
@@ -262,11 +260,11 @@ class Work:
         return cls(model, point.copy(), np.eye(size.x, columns), np.eye(size.d, columns, size.x + size.fixed))
 
     def _total(
-        self, name: str, rows: Sequence[int] | None = None, expression: Any = None, constants: Vector = _NONE, *,
+        self, name: str, rows: Sequence[int] | None = None, function: Any = None, *constants: Vector,
         at: Point | None = None,
     ) -> tuple[Vector, Vector]:  # fmt: skip
         """Value of a function (see `slopes`) and its derivatives by (x, theta) before the event."""
-        part = slopes(self.model, at or self.point, name, rows, expression, constants)
+        part = slopes(self.model, at or self.point, name, rows, function, *constants)
         nx, fixed = len(self.x), len(self.model.fixed_position)
         total = part.x @ self.x + part.theta[:, fixed:] @ self.d
         total[:, nx : nx + fixed] += part.theta[:, :fixed]
@@ -338,7 +336,7 @@ class Work:
         solve_implicit(model, trial)
         struck = [k for k in entering if k not in strike.knocked]
         if struck:
-            self.x = self.x + impact(model, trial, struck, partial(self._total, at=trial))
+            self.x = self.x + self._total(f"impact {struck}", None, lambda: impact(model, struck), at=trial)[1]
         self.point = strike.point
 
     def _begin_again(self, entering: list[int]) -> list[int]:
@@ -366,19 +364,6 @@ class Work:
         present, slope = self._total("variables", nodes)
         back = np.linalg.pinv(slopes(model, self.point, "variables", nodes).x)
         missing = np.array([value for value, _ in values]) - present
-        change, turn = self._total(f"projection {nodes}", None, lambda r: _projection(model, nodes, r), missing)
+        change, turn = self._total(f"projection {nodes}", None, lambda: projection(model, nodes), missing)
         self.point = replace(self.point, x=self.point.x + change)
         self.x = self.x + turn + back @ (np.array([one for _, one in values]) - slope)
-
-
-def _projection(model: CompiledDae, nodes: list[int], missing: Any) -> Any:
-    """Smallest change of the states that changes variables by `missing`."""
-    given = model.arguments
-    x, z = given["x"], given["z"]
-    variables, alg = model.variables(*given.values())[nodes], model.alg(*given.values())
-    slope = ca.jacobian(variables, x)
-    if z.numel():
-        follow = ca.solve(ca.densify(ca.jacobian(alg, z)), ca.densify(ca.jacobian(alg, x)))
-        slope = slope - ca.mtimes(ca.jacobian(variables, z), follow)
-    slope = ca.densify(slope)
-    return ca.mtimes(slope.T, ca.solve(ca.mtimes(slope, slope.T), missing))

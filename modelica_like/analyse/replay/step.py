@@ -134,7 +134,7 @@ def _solved(functions: StepFunctions, point: Point, h: float, W: Vector, rtol: f
 def stuck(point: Point) -> StepFailed:
     """Return the error about steps that do not converge."""
     return StepFailed(
-        f"The replay of the run did not get on at t = {point.t:.9g} s: its steps do not converge.",
+        f"The replay of the run stalled at t = {point.t:.9g} s: its steps do not converge.",
         advice="Look for a function without a slope there, or for a mode that should have changed.",
     )
 

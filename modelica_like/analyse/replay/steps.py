@@ -229,7 +229,7 @@ class StepFunctions:
         """
         if not self._constant:
             by_w = self._residual(*self._names)[1]
-            return _solve(by_w.T if transposed else by_w, right, self._order)
+            return _solve(by_w, right, self._order, transposed=transposed)
         own = self.nx + self.nz
         basis, blocks = self.tableau.real_form
         back, there = (np.linalg.inv(basis).T, basis.T) if transposed else (basis, np.linalg.inv(basis))
@@ -240,7 +240,7 @@ class StepFunctions:
         for block, matrix in zip(blocks, shifted, strict=True):
             end = begin + own * len(block)
             order = [k * own + node for node in self._node_order for k in range(len(block))]
-            solved.append(_solve(matrix.T if transposed else matrix, mixed[begin:end, :], order))
+            solved.append(_solve(matrix, mixed[begin:end, :], order, transposed=transposed))
             begin = end
         return ca.mtimes(ca.kron(ca.DM(back), ca.DM.eye(own)), ca.vertcat(*solved))
 
@@ -280,9 +280,14 @@ class StepFunctions:
         return ca.Function("adjoint", [*self._names, L, Q], [ca.densify(begin), ca.densify(gradient)])
 
 
-def _solve(matrix: Any, right: Any, order: list[int]) -> Any:
-    """Solve a linear system: a small one as dense, a large one in an order that keeps it sparse."""
+def _solve(matrix: Any, right: Any, order: list[int], *, transposed: bool = False) -> Any:
+    """Solve a linear system or its transpose: a small one as dense, a large one in an order that keeps it sparse.
+
+    Both use the factors of the matrix itself: where nothing depends on an angle, its column has one entry, and the
+    multiplier of the angle stays exactly zero. Pivoting in the transpose would let rounding in.
+    """
     if matrix.size1() <= _DENSE:
-        return ca.solve(matrix, ca.densify(right), "lapacklu")
-    back = np.argsort(order).tolist()
-    return ca.solve(matrix[order, order], ca.densify(right)[order, :], "csparse")[back, :]
+        return ca.Linsol("solver", "lapacklu", matrix.sparsity()).solve(matrix, ca.densify(right), transposed)
+    back, ordered = np.argsort(order).tolist(), matrix[order, order]
+    linsol = ca.Linsol("solver", "csparse", ordered.sparsity())
+    return linsol.solve(ordered, ca.densify(right)[order, :], transposed)[back, :]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from itertools import zip_longest
 from typing import Any, TypeVar
 
 import casadi as ca
@@ -30,7 +31,33 @@ _FINER = 1e-2
 """Tolerance of a run in that of its replay, so that both give the same."""
 
 
-class SimulationFunction(ca.Callback):
+class _Callback(ca.Callback):
+    """A function of Python whose arguments and results have names and patterns."""
+
+    def declare(self, name: str, arguments: dict[str, Any], results: dict[str, Any], **options: Any) -> None:
+        self._arguments, self._results = list(arguments.items()), list(results.items())
+        self.construct(name, options)
+
+    def get_n_in(self) -> int:
+        return len(self._arguments)
+
+    def get_n_out(self) -> int:
+        return len(self._results)
+
+    def get_name_in(self, i: int) -> str:
+        return self._arguments[i][0]
+
+    def get_name_out(self, i: int) -> str:
+        return self._results[i][0]
+
+    def get_sparsity_in(self, i: int) -> Any:
+        return self._arguments[i][1]
+
+    def get_sparsity_out(self, i: int) -> Any:
+        return self._results[i][1]
+
+
+class SimulationFunction(_Callback):
     """y = f(p): simulates with all events; its Jacobian is that of the replay, exact through the events.
 
     Second derivatives are central differences of the exact Jacobian. The object must live as long as what is built
@@ -58,7 +85,7 @@ class SimulationFunction(ca.Callback):
         self._run = {**run, "parameters": freed.values}
         self._precision = precision
         self._nan_where_refused = nan_where_refused
-        self._last: tuple[bytes, Sensitivities] | None = None
+        self._last: tuple[Solution, Sensitivities] | None = None
         self._simulated: tuple[bytes, Solution] | None = None
         self._sequence: list[tuple[str, str, str]] | None = None
         self._plain = all(one.kind in _PLAIN for one in (read_output(self._model, name) for name in outputs))
@@ -70,12 +97,12 @@ class SimulationFunction(ca.Callback):
         self.start_values = np.array([one.value for one in first.parameters])
         self._sequence = None if any_sequence else mode_sequence(solution.events)
         self._jacobian = _Jacobian(self)
-        self.construct("simulation", {})
+        dense = ca.Sparsity.dense
+        self.declare("simulation", {"p": dense(len(self.inputs))}, {"y": dense(len(self.outputs))})
 
     def _differentiate(self, solution: Solution) -> Sensitivities:
-        return sensitivities(
-            solution, self.outputs, self.inputs, start=self._run.get("start"), precision=self._precision
-        )
+        start = self._run.get("start")
+        return sensitivities(solution, self.outputs, self.inputs, start=start, precision=self._precision)
 
     def at(self, p: Vector | Sequence[float]) -> Sensitivities:
         """Simulate at parameter values and return outputs with derivatives; kept until the next values.
@@ -84,10 +111,9 @@ class SimulationFunction(ca.Callback):
             NoGradient: the mode sequence is not the one of the start values, or a derivative does not exist.
             ModelicaLikeError: the simulation fails.
         """
-        values = np.asarray(p, float).ravel()
-        key = values.tobytes()
-        if self._last is None or self._last[0] != key:
-            self._last = key, self._differentiate(self._simulate(values))
+        solution = self._simulate(np.asarray(p, float).ravel())
+        if self._last is None or self._last[0] is not solution:
+            self._last = solution, self._differentiate(solution)
         return self._last[1]
 
     def values_at(self, p: Vector | Sequence[float]) -> list[float]:
@@ -98,10 +124,9 @@ class SimulationFunction(ca.Callback):
             UnknownName: a mode change does not happen.
             ModelicaLikeError: the simulation fails.
         """
-        values = np.asarray(p, float).ravel()
-        if not self._plain or (self._last is not None and self._last[0] == values.tobytes()):
-            return [one.value for one in self.at(values).outputs]
-        solution = self._simulate(values)
+        solution = self._simulate(np.asarray(p, float).ravel())
+        if not self._plain or (self._last is not None and self._last[0] is solution):
+            return [one.value for one in self.at(p).outputs]
         return [read(solution, read_output(solution.model, name)) for name in self.outputs]
 
     def _simulate(self, values: Vector) -> Solution:
@@ -111,40 +136,11 @@ class SimulationFunction(ca.Callback):
             given = {**self._run["parameters"], **dict(zip(self.inputs, map(float, values), strict=True))}
             self.runs += 1
             solution = quick_run(self._model, **{**self._run, **self._tight, "parameters": given})
-            self._check_sequence(solution)
+            sequence = mode_sequence(solution.events)
+            if self._sequence not in (None, sequence):
+                raise _changed(self._sequence or [], sequence, solution)
             self._simulated = key, solution
         return self._simulated[1]
-
-    def _check_sequence(self, solution: Solution) -> None:
-        if self._sequence is None:
-            return
-        sequence = mode_sequence(solution.events)
-        if sequence != self._sequence:
-            raise _changed(self._sequence, sequence, solution)
-
-    def get_n_in(self) -> int:
-        """Return the number of arguments."""
-        return 1
-
-    def get_n_out(self) -> int:
-        """Return the number of results."""
-        return 1
-
-    def get_name_in(self, i: int) -> str:
-        """Return the name of an argument."""
-        return "p"
-
-    def get_name_out(self, i: int) -> str:
-        """Return the name of a result."""
-        return "y"
-
-    def get_sparsity_in(self, i: int) -> Any:
-        """Return the shape of an argument."""
-        return ca.Sparsity.dense(len(self.inputs))
-
-    def get_sparsity_out(self, i: int) -> Any:
-        """Return the shape of a result."""
-        return ca.Sparsity.dense(len(self.outputs))
 
     def attempt(self, what: Callable[[Vector], Found], p: Any) -> Found | None:
         """Simulate for CasADi; what goes wrong is kept in `refusal`, and raised unless nan is wanted."""
@@ -171,32 +167,17 @@ class SimulationFunction(ca.Callback):
         return self._jacobian
 
 
-class _Jacobian(ca.Callback):
+class _Jacobian(_Callback):
     """dy/dp of a simulation."""
 
     def __init__(self, simulation: SimulationFunction) -> None:
         super().__init__()
         self._simulation = simulation
         self._size = len(simulation.outputs), len(simulation.inputs)
-        self.construct("jacobian", {"enable_fd": True, "fd_method": "central"})
-
-    def get_n_in(self) -> int:
-        return 2
-
-    def get_n_out(self) -> int:
-        return 1
-
-    def get_name_in(self, i: int) -> str:
-        return ("p", "out_y")[i]
-
-    def get_name_out(self, i: int) -> str:
-        return "jac_y_p"
-
-    def get_sparsity_in(self, i: int) -> Any:
-        return ca.Sparsity.dense(self._size[1]) if i == 0 else ca.Sparsity(self._size[0], 1)
-
-    def get_sparsity_out(self, i: int) -> Any:
-        return ca.Sparsity.dense(*self._size)
+        arguments = {"p": ca.Sparsity.dense(self._size[1]), "out_y": ca.Sparsity(self._size[0], 1)}
+        self.declare(
+            "jacobian", arguments, {"jac_y_p": ca.Sparsity.dense(*self._size)}, enable_fd=True, fd_method="central"
+        )
 
     def eval(self, arg: Any) -> list[Any]:
         made = self._simulation.attempt(self._simulation.at, arg[0])
@@ -245,24 +226,19 @@ def simulation_function(
 
 def mode_sequence(events: Sequence[Event]) -> list[tuple[str, str, str]]:
     """Return mode, name before and name after of all mode changes; those at one instant in alphabetical order."""
-    ordered: list[tuple[str, str, str]] = []
-    group: list[Event] = []
+    groups: list[list[Event]] = []
     for event in events:
-        if group and event.time - group[0].time > _TOGETHER * max(1.0, abs(event.time)):
-            ordered += _by_mode(group)
-            group = []
-        group.append(event)
-    return ordered + _by_mode(group)
+        if not groups or event.time - groups[-1][0].time > _TOGETHER * max(1.0, abs(event.time)):
+            groups.append([])
+        groups[-1].append(event)
+    ordered = (event for group in groups for event in sorted(group, key=lambda one: one.mode))
+    return [(event.mode, event.before, event.after) for event in ordered]
 
 
-def _by_mode(events: list[Event]) -> list[tuple[str, str, str]]:
-    return [(e.mode, e.before, e.after) for e in sorted(events, key=lambda event: event.mode)]
-
-
-def _changed(expected: list[tuple[str, str, str]], found: list[tuple[str, str, str]], solution: Solution) -> NoGradient:
-    differing = (k for k, (a, b) in enumerate(zip(expected, found, strict=False)) if a != b)
-    same = next(differing, min(len(expected), len(found)))
-    now, before = (_told(sequence[same : same + 1]) for sequence in (found, expected))
+def _changed(expected: Sequence[Any], found: Sequence[Any], solution: Solution) -> NoGradient:
+    pairs = zip_longest(expected, found)
+    same, (before, now) = next((k, pair) for k, pair in enumerate(pairs) if pair[0] != pair[1])
+    before, now = (f"'{one[0]}: {one[1]} → {one[2]}'" if one else "" for one in (before, now))
     what = f"{now} happens besides" if now else f"{before} is missing"
     if now and before:
         what = f"{now} happens instead of {before}"
@@ -272,7 +248,3 @@ def _changed(expected: list[tuple[str, str, str]], found: list[tuple[str, str, s
         why="A function with a fixed mode sequence has derivatives only as long as the sequence stays.",
         advice="Bound the parameters, begin elsewhere, or allow it with any_sequence=True.",
     )
-
-
-def _told(changes: list[tuple[str, str, str]]) -> str:
-    return "".join(f"'{mode}: {before} → {after}'" for mode, before, after in changes)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from itertools import pairwise
-from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -14,8 +13,9 @@ from modelica_like.analyse.replay.jumps import Jump
 from modelica_like.analyse.replay.step import Step, shortened
 from modelica_like.analyse.replay.sweeps import Reading
 from modelica_like.analyse.sensitivity.outputs import Output, expression_of
-from modelica_like.analyse.slopes import slopes
+from modelica_like.analyse.slopes import Slopes, slopes
 from modelica_like.compile.buffers import Vector
+from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import NoGradient, UnknownName, ValueOutOfRange
 from modelica_like.initialize import Point
 from modelica_like.solve.solution import Solution
@@ -58,8 +58,12 @@ def value_at(replay: Replay, path: str, node: Point, jump: Jump | None = None) -
     return Reading(float(part.value[0]), tuple(parts))
 
 
-def _slopes(replay: Replay, path: str, node: Point) -> Any:
-    return slopes(replay.model, node, f"value of {path}", None, expression_of(replay.model, path)[0])
+def _slopes(replay: Replay, path: str, node: Point) -> Slopes:
+    return slopes(replay.model, node, f"value of {path}", None, lambda: _function(replay.model, path))
+
+
+def _function(model: CompiledDae, path: str) -> ca.Function:
+    return ca.Function("value", [*model.arguments.values()], [ca.densify(ca.SX(expression_of(model, path)[0]()))])
 
 
 def _check_impacts(solution: Solution, outputs: Sequence[Output]) -> None:
@@ -132,8 +136,7 @@ def _peak(replay: Replay, output: Output) -> Reading:
 def _along(replay: Replay, path: str, points: list[Point]) -> Vector:
     """Values of a variable at points."""
     model = replay.model
-    make = lambda: ca.Function("value", [*model.arguments.values()], [expression_of(model, path)[0]()])  # noqa: E731
-    fast = model.fast(("only", path), make)
+    fast = model.fast(("only", path), lambda: _function(model, path))
     return np.array([fast(o.t, o.x, o.z, model.p, model.u, o.d)[0][0] for o in points])
 
 

@@ -8,7 +8,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include "core.h"
-#include "native.h"
 
 typedef enum {
     READ_END,

@@ -11,6 +11,13 @@
 
 #include "model.h"
 
+/* What programs see that load this library. */
+#ifdef _WIN32
+#define EXPORTED __declspec(dllexport)
+#else
+#define EXPORTED __attribute__((visibility("default")))
+#endif
+
 /* Compiled on a new Linux, the FMU is to run on an old one: these functions have got new versions since glibc 2.17.
    Versions can only be told to a linker that is given libm. */
 #if defined(OLD_GLIBC) && defined(__GLIBC__) && defined(__x86_64__)
@@ -252,15 +259,18 @@ size_t piece_size(const Model *m);
 void piece_at(const Model *m, const Piece *piece, double t, double *point);
 double first_step(Instance *c);
 
-/* integrate.c */
+/* locate.c */
 #define MOST_LOOKS 9 /* at guards, that there is room for */
+double cubic_guess(double g0, double r0, double g1, double r1);
+int search_events(Instance *c);
+
+/* integrate.c */
 typedef enum { REACHED, AT_EVENT, FAILED } Arrival;
 Arrival integrate_to(Instance *c, double target, int stop_at_events);
 void leave_piece(Instance *c);
 Result handle_event(Instance *c);
 Result check_whole(Instance *c, double size);
 Result check_step(Instance *c, double point, double size, double *target);
-double cubic_guess(double g0, double r0, double g1, double r1);
 Result move_to(Instance *c, double t);
 Result take_changes(Instance *c, int *event);
 int is_due(Instance *c);
@@ -271,10 +281,9 @@ Arrival step_fixed(Instance *c, double target);
 /* values.c */
 const Variable *find_variable(const Model *m, uint32_t reference);
 const Variable *known_variable(Instance *c, uint32_t reference, ValueType type);
-Result get_float(Instance *c, uint32_t reference, double *value);
-int get_mode(Instance *c, uint32_t reference);
-Result set_float(Instance *c, uint32_t reference, double value);
-Result set_mode(Instance *c, uint32_t reference, int64_t value);
+#define ANY_TYPE N_TYPES
+Result get_value(Instance *c, const Variable *v, double *value);
+Result set_value(Instance *c, const Variable *v, double value);
 Result set_input_rate(Instance *c, uint32_t reference, double rate);
 Result set_time(Instance *c, double time);
 Result set_states(Instance *c, const double *x);

@@ -21,12 +21,11 @@ static int is_start(const Instance *c, const Variable *v) {
 }
 
 static Result check_knowns(Instance *c, const uint32_t *knowns, size_t n) {
-    const Model *m = c->model;
     for (size_t k = 0; k < n; k++) {
         const Variable *v = known_variable(c, knowns[k], TYPE_FLOAT64);
         if (v == NULL) return RESULT_ERROR;
-        if (is_start(c, v) ? v->start < 0 || v->start >= m->n_starts : known_slot(m, v) < 0)
-            return fail(c, "Derivatives by %s are not available: it is neither %s.", text_of(m, v->name),
+        if (is_start(c, v) ? v->start < 0 || v->start >= c->model->n_starts : known_slot(c->model, v) < 0)
+            return fail(c, "Derivatives by %s are not available: it is neither %s.", text_of(c->model, v->name),
                 is_start(c, v) ? "a start value, input nor parameter" : "state, input nor parameter");
     }
     return RESULT_OK;
@@ -44,11 +43,10 @@ static Result check_unknowns(Instance *c, const uint32_t *unknowns, size_t n) {
 
 /* Factorises the Jacobian of the implicit equations at the present point, with the slots of m->tapes.rates filled. */
 Result factor_implicit(Instance *c, int *order) {
-    const Model *m = c->model;
     State *s = &c->state;
     if (settle(c) != RESULT_OK) return RESULT_ERROR;
-    evaluate_now(c, &m->tapes.alg_jacobian, c->work.dense_matrix);
-    if (!lu_factor(m->n_z, c->work.dense_matrix, order))
+    evaluate_now(c, &c->model->tapes.alg_jacobian, c->work.dense_matrix);
+    if (!lu_factor(c->model->n_z, c->work.dense_matrix, order))
         return fail(c, "The implicit equations are singular at t = %.9g s.", s->t);
     return RESULT_OK;
 }
@@ -67,10 +65,9 @@ static void tangent_of_implicit(Instance *c, const int *order) {
 }
 
 static void seed_knowns(Instance *c, const uint32_t *knowns, size_t n, const double *seed) {
-    const Model *m = c->model;
     for (size_t k = 0; k < n; k++) {
-        const Variable *v = find_variable(m, knowns[k]);
-        if (!is_start(c, v)) c->work.dots[known_slot(m, v)] += seed[k];
+        const Variable *v = find_variable(c->model, knowns[k]);
+        if (!is_start(c, v)) c->work.dots[known_slot(c->model, v)] += seed[k];
     }
 }
 
@@ -99,9 +96,8 @@ static Result start_system_tangent(Instance *c, const double *start_dots) {
 static Result start_tangent(Instance *c, const uint32_t *knowns, size_t n, const double *seed) {
     const Model *m = c->model;
     Work *w = &c->work;
-    State *s = &c->state;
     double *dots = w->dots, *starts = w->start_values;
-    s->solved = 0;
+    c->state.solved = 0;
     if (start_solve(c) != RESULT_OK) return RESULT_ERROR;
     if (m->settings->steady || anything_shared(c))
         return fail(

@@ -22,8 +22,7 @@ static int is_source(const Instance *c, const Transition *one) {
 }
 
 int guard_active(const Instance *c, int guard) {
-    const Model *m = c->model;
-    return is_source(c, &m->transitions[m->guard_transition[guard]]);
+    return is_source(c, &c->model->transitions[c->model->guard_transition[guard]]);
 }
 
 /* Room for a mark per transition; none wants to fire yet. */
@@ -32,13 +31,12 @@ unsigned char *nothing_wanting(Instance *c) { return memset(c->work.wanting, 0, 
 static double just_after(const State *s) { return s->t + SAME_TIME * fmax(1, fabs(s->t)); }
 
 double next_moment(Instance *c) {
-    const Model *m = c->model;
     State *s = &c->state;
     double *moments = c->work.guards, next = INFINITY;
-    if (m->n_moments == 0) return next;
-    evaluate_now(c, &m->tapes.moments, moments);
-    for (int k = 0; k < m->n_transitions; k++) {
-        const Transition *one = &m->transitions[k];
+    if (c->model->n_moments == 0) return next;
+    evaluate_now(c, &c->model->tapes.moments, moments);
+    for (int k = 0; k < c->model->n_transitions; k++) {
+        const Transition *one = &c->model->transitions[k];
         if (one->timed && is_source(c, one) && moments[one->index] > just_after(s))
             next = fmin(next, moments[one->index]);
     }
@@ -71,24 +69,22 @@ int find_wanting(Instance *c, unsigned char *wanting, int guards_too) {
 /* After a switch, drop state events whose guard is as good as zero at the end of the time resolution: an importer that
    stops there has them balanced on that edge, and would see them switch back and forth. They come a little later. */
 static void drop_balanced(Instance *c, unsigned char *wanting) {
-    const Model *m = c->model;
     double *soon = c->work.guards /* from find_wanting */, *now = c->work.guards_before;
-    if (m->n_guards == 0) return;
-    evaluate_now(c, &m->tapes.guards, now);
-    for (int k = 0; k < m->n_guards; k++)
+    if (c->model->n_guards == 0) return;
+    evaluate_now(c, &c->model->tapes.guards, now);
+    for (int k = 0; k < c->model->n_guards; k++)
         if (number_or_false(now[k]) < 0 && number_or_false(soon[k]) <= BALANCED * fabs(now[k]))
-            wanting[m->guard_transition[k]] = 0;
+            wanting[c->model->guard_transition[k]] = 0;
 }
 
 /* Move the states as little as possible, so that variables that follow from them take new values, or vanish. */
 void move_states(Instance *c, const int *nodes, const double *values, int count) {
-    const Model *m = c->model;
     double *slopes = c->work.square, *change = c->work.start_residual, *step = c->work.point;
     variables_now(c);
     for (int k = 0; k < count; k++) change[k] = (values ? values[k] : 0) - c->work.variables[nodes[k]];
-    for (int k = 0; k < count; k++) slope_of_node(c, nodes[k], k > 0, slopes + (size_t)k * m->n_x);
-    least_squares(count, m->n_x, slopes, change, step);
-    for (int k = 0; k < m->n_x; k++) c->x[k] += step[k];
+    for (int k = 0; k < count; k++) slope_of_node(c, nodes[k], k > 0, slopes + (size_t)k * c->model->n_x);
+    least_squares(count, c->model->n_x, slopes, change, step);
+    for (int k = 0; k < c->model->n_x; k++) c->x[k] += step[k];
 }
 
 /* Tells that a mode changes. */
@@ -153,15 +149,14 @@ static Result crowded(Instance *c) {
 
 /* Before one of several that hold a motion gives way, let the others take more. */
 static Result share_anew(Instance *c, unsigned char *wanting) {
-    const Model *m = c->model;
     double *soon = c->work.guards;
-    if (m->n_circuits == 0 || (c->bounded && !anything_shared(c))) return RESULT_OK;
+    if (c->model->n_circuits == 0 || (c->bounded && !anything_shared(c))) return RESULT_OK;
     share(c);
     c->variables_valid = 0;
     if (solve_now(c, 0) != RESULT_OK) return RESULT_ERROR;
-    evaluate_now(c, &m->tapes.guards_soon, soon);
-    for (int k = 0; k < m->n_guards; k++)
-        if (!(number_or_false(soon[k]) > 0)) wanting[m->guard_transition[k]] = 0;
+    evaluate_now(c, &c->model->tapes.guards_soon, soon);
+    for (int k = 0; k < c->model->n_guards; k++)
+        if (!(number_or_false(soon[k]) > 0)) wanting[c->model->guard_transition[k]] = 0;
     return RESULT_OK;
 }
 

@@ -54,14 +54,13 @@ static double next_zero(Instance *c, double before, double part, double behind) 
 
 /* The same for the whole piece, at whose end guards are evaluated; QUIET where none is positive there. */
 static double first_crossing(Instance *c, int behind_event) {
-    const Model *m = c->model;
     Piece *piece = c->piece;
-    int n = m->n_guards, any = 0;
+    int n = c->model->n_guards, any = 0;
     double *last = c->work.looks;
-    evaluate(c, &m->tapes.guards, piece->end, last_of(m, piece), last);
+    evaluate(c, &c->model->tapes.guards, piece->end, last_of(c->model, piece), last);
     for (int g = 0; g < n; g++) any |= guard_active(c, g) && number_or_false(last[g]) > 0;
     if (any && behind_event) return first_zero(c, c->work.guards, 0); /* as the last round has left them */
-    if (any && !c->state.looked) evaluate(c, &m->tapes.guards, piece->begin, piece->points, c->end_look);
+    if (any && !c->state.looked) evaluate(c, &c->model->tapes.guards, piece->begin, piece->points, c->end_look);
     if (any) return first_zero(c, c->end_look, 1);
     memcpy(c->end_look, last, 2 * (size_t)n * sizeof(double));
     c->state.looked = 1;
@@ -80,19 +79,18 @@ static Result fire_here(Instance *c, int *fired) {
 
 /* Goes from the present point to `limit`, or to an event before it while the budget allows for one. */
 static Result go_on(Instance *c, double limit, int *fired) {
-    const Model *m = c->model;
     State *s = &c->state;
     double *first = c->work.first, begin = s->t, error, part = QUIET;
     int behind_event = *fired;
     *fired = 0;
-    memcpy(first, c->x, m->n_unknowns * sizeof(double));
+    memcpy(first, c->x, c->model->n_unknowns * sizeof(double));
     if (!rosenbrock_step(c, begin, first, limit - begin, 0, c->piece, &error))
         return fail(c,
             "The step from t = %.12g s gives values that are not finite, or singular equations. Take smaller steps.",
             begin);
     c->piece->end = limit;
     if (c->budget < 2) s->looked = !(s->at_event = 1);
-    else if (m->n_guards > 0) part = first_crossing(c, behind_event);
+    else if (c->model->n_guards > 0) part = first_crossing(c, behind_event);
     for (double before = 0, behind = 10 * BEHIND; part < 1 && c->budget > 1; c->budget--, behind *= 10) {
         double here = part;
         if (move_to(c, begin + part * (limit - begin)) != RESULT_OK || fire_here(c, fired) != RESULT_OK)

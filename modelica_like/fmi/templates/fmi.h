@@ -58,6 +58,13 @@ static inline Status failed(Instance *c) {
     return FMI(Error);
 }
 
+static inline int get_mode(Instance *c, uint32_t reference, INTEGER *value) {
+    double number;
+    if (get_value(c, known_variable(c, reference, TYPE_ENUMERATION), &number) != RESULT_OK) return 0;
+    *value = (INTEGER)number;
+    return 1;
+}
+
 /* ---- life of an instance ---------------------------------------------------------------------------------------- */
 
 void FMI(FreeInstance)(void *instance) {

@@ -8,6 +8,7 @@
 #define Deserialize DeSerialize
 #define SerializedSize SerializedFMUstateSize
 #define GetNominals GetNominalsOfContinuousStates
+#define INTEGER fmi2Integer
 #include "fmi.h"
 
 static void log_fmi2(const Instance *c, int result, const char *category, const char *message) {
@@ -70,15 +71,11 @@ fmi2Status fmi2EnterInitializationMode(fmi2Component instance) {
         return nvr == 0 ? fmi2OK : refuse(c, "This model has no variables of type " kind "."); \
     }
 
-static int is_mode(int mode, fmi2Integer *value) {
-    if (mode >= 0) *value = mode;
-    return mode >= 0;
-}
-
-VALUES(GetReal, READABLE, fmi2Real, get_float(c, vr[k], &value[k]) == RESULT_OK)
-VALUES(SetReal, SETTABLE, const fmi2Real, set_float(c, vr[k], value[k]) == RESULT_OK)
-VALUES(GetInteger, READABLE, fmi2Integer, is_mode(get_mode(c, vr[k]), &value[k]))
-VALUES(SetInteger, SETTABLE, const fmi2Integer, set_mode(c, vr[k], value[k]) == RESULT_OK)
+VALUES(GetReal, READABLE, fmi2Real, get_value(c, known_variable(c, vr[k], TYPE_FLOAT64), &value[k]) == RESULT_OK)
+VALUES(SetReal, SETTABLE, const fmi2Real, set_value(c, known_variable(c, vr[k], TYPE_FLOAT64), value[k]) == RESULT_OK)
+VALUES(GetInteger, READABLE, fmi2Integer, get_mode(c, vr[k], &value[k]))
+VALUES(SetInteger, SETTABLE, const fmi2Integer,
+    set_value(c, known_variable(c, vr[k], TYPE_ENUMERATION), value[k]) == RESULT_OK)
 NO_VALUES(GetBoolean, READABLE, fmi2Boolean, "Boolean")
 NO_VALUES(SetBoolean, SETTABLE, const fmi2Boolean, "Boolean")
 NO_VALUES(GetString, READABLE, fmi2String, "String")

@@ -7,6 +7,7 @@
 #define SerializedSize SerializedFMUStateSize
 #define GetDerivatives GetContinuousStateDerivatives
 #define GetNominals GetNominalsOfContinuousStates
+#define INTEGER fmi3Int64
 #include "fmi.h"
 
 static void log_fmi3(const Instance *c, int result, const char *category, const char *message) {
@@ -118,15 +119,11 @@ static size_t elements(const Instance *c, fmi3ValueReference reference, fmi3Valu
         return fmi3OK;                                                                              \
     }
 
-static int is_mode(int mode, fmi3Int64 *value) {
-    if (mode >= 0) *value = mode;
-    return mode >= 0;
-}
-
-VALUES(GetFloat64, READABLE, fmi3Float64, get_float(c, r, values) == RESULT_OK)
-VALUES(SetFloat64, SETTABLE, const fmi3Float64, set_float(c, r, *values) == RESULT_OK)
-VALUES(GetInt64, READABLE, fmi3Int64, is_mode(get_mode(c, r), values))
-VALUES(SetInt64, SETTABLE, const fmi3Int64, set_mode(c, r, *values) == RESULT_OK)
+VALUES(GetFloat64, READABLE, fmi3Float64, get_value(c, known_variable(c, r, TYPE_FLOAT64), values) == RESULT_OK)
+VALUES(SetFloat64, SETTABLE, const fmi3Float64, set_value(c, known_variable(c, r, TYPE_FLOAT64), *values) == RESULT_OK)
+VALUES(GetInt64, READABLE, fmi3Int64, get_mode(c, r, values))
+VALUES(SetInt64, SETTABLE, const fmi3Int64,
+    set_value(c, known_variable(c, r, TYPE_ENUMERATION), (double)*values) == RESULT_OK)
 
 /* Functions for what no model has: other types, clocks, parts. They refuse every call that asks for something. */
 #define NOTHING(name, phases, what, unused, ...)                                          \

@@ -33,15 +33,14 @@ double largest_like(const Model *m, const double *values, int node) {
 
 /* Put held motions that are zero but for rounding at zero, where they are states. */
 void rest(Instance *c) {
-    const Model *m = c->model;
     const double *values;
-    if (m->n_holds == 0) return;
+    if (c->model->n_holds == 0) return;
     find_held(c, c->work.terms, c->work.held);
     values = variables_now(c);
-    for (int k = 0; k < m->n_holds; k++) {
-        const Held *one = &m->holds[k];
+    for (int k = 0; k < c->model->n_holds; k++) {
+        const Held *one = &c->model->holds[k];
         if (c->work.held[k] && one->state >= 0 &&
-            fabs(values[one->motion]) <= ROUNDING * largest_like(m, values, one->motion))
+            fabs(values[one->motion]) <= ROUNDING * largest_like(c->model, values, one->motion))
             c->x[one->state] = 0;
     }
 }

@@ -46,15 +46,14 @@ static Result respond(Instance *c, Strike *strike) {
 
 /* Lets go what cannot bear its impulse for an instant; tells whether anything is. */
 static int let_go_unbearable(const Instance *c, Strike *strike, const Terms *terms) {
-    const Model *m = c->model;
     double instant = 10 * TIME_RESOLUTION * fmax(1, fabs(c->state.t)), scale = 0;
     int any = 0;
-    for (int k = 0; k < m->n_holds; k++)
+    for (int k = 0; k < c->model->n_holds; k++)
         if (strike->held[k]) scale = fmax(scale, fabs(strike->impulse[k]));
-    for (int k = 0; k < m->n_holds; k++) {
+    for (int k = 0; k < c->model->n_holds; k++) {
         double sign = strike->impulse[k] > 0 ? 1 : -1, margin;
         double capacity = sign > 0 ? terms[k].forward : terms[k].backward;
-        if (!strike->held[k] || capacity >= UNLIMITED || m->holds[k].loose < 0) continue;
+        if (!strike->held[k] || capacity >= UNLIMITED || c->model->holds[k].loose < 0) continue;
         margin = fmax(capacity - sign * strike->reaction[k], 0) * instant;
         if (fabs(strike->impulse[k]) > margin + WEIGHS_NOTHING * scale) any = strike->loose[k] = 1;
     }
@@ -101,11 +100,10 @@ static void mark_moved(Instance *c, Strike *strike, const Terms *terms) {
 
 /* Tells what the impact has cost. */
 static void book(Instance *c, const Strike *strike, int first) {
-    const Model *m = c->model;
     const double *after = variables_now(c);
     int any = 0;
-    for (int k = 0; k < m->n_holds; k++) {
-        double energy = 0.5 * (strike->before[k] + after[m->holds[k].motion]) * strike->impulse[k];
+    for (int k = 0; k < c->model->n_holds; k++) {
+        double energy = 0.5 * (strike->before[k] + after[c->model->holds[k].motion]) * strike->impulse[k];
         if (!strike->held[k] || strike->approach[k] == 0 || energy == 0) continue;
         if (!any) c->struck(c, -1, 0, first);
         c->struck(c, k, energy, 0);
@@ -167,9 +165,8 @@ static void choose_again(Instance *c, const Strike *strike) {
 
 /* Close what finite forces have opened since the first impact at this instant: they come after it. */
 static Result hold_again(Instance *c, const unsigned char *entered) {
-    const Model *m = c->model;
-    for (int k = 0; k < m->n_holds; k++) {
-        const Held *one = &m->holds[k];
+    for (int k = 0; k < c->model->n_holds; k++) {
+        const Held *one = &c->model->holds[k];
         if (!entered[k] || c->d[one->mode] == one->number) continue;
         note_change(c, one->name, -1, one->mode, one->number);
         c->d[one->mode] = one->number;
@@ -181,15 +178,14 @@ static Result hold_again(Instance *c, const unsigned char *entered) {
 /* Speeds before an impact, and whether it is one. Friction stops nothing at once; where an importer lets it overrun
  * standstill, that is none. */
 static void begin_strike(Instance *c, Strike *strike, const Terms *terms) {
-    const Model *m = c->model;
     const double *values = variables_now(c);
     strike->hard = 0;
-    for (int k = 0; k < m->n_holds; k++) {
-        const Held *one = &m->holds[k];
+    for (int k = 0; k < c->model->n_holds; k++) {
+        const Held *one = &c->model->holds[k];
         double size = fabs(strike->before[k] = values[one->motion]);
         int limited = fmax(terms[k].forward, terms[k].backward) < UNLIMITED;
         if (strike->entering[k] && !limited &&
-            size > ROUNDING * fmax(largest_like(m, values, one->motion), one->nominal))
+            size > ROUNDING * fmax(largest_like(c->model, values, one->motion), one->nominal))
             strike->hard = 1;
     }
 }

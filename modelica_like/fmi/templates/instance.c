@@ -116,7 +116,7 @@ static void share_out_specials(Instance *c) {
 
 /* Tapes, equations and the integrator. */
 static uint64_t place_work(const Model *m, Work *w, double *memory) {
-    uint64_t n = m->n_unknowns, n_z = m->n_z, steady = m->n_steady + n_z;
+    uint64_t n = m->n_unknowns, n_z = m->n_z, steady = m->n_steady;
     uint64_t members = m->most_members, n_guards = m->n_guards, n_x = m->n_x;
     uint64_t resets = larger(larger(m->n_resets, m->n_reset_values), m->n_holds);
     uint64_t small = larger(larger(n_guards, m->n_moments), larger(larger(m->n_start_modes, m->n_d), m->n_derived));
@@ -264,19 +264,13 @@ typedef struct {
     uint64_t size, model, check;
 } Header;
 
-static uint64_t hash(const unsigned char *bytes, size_t size) { /* FNV-1a */
-    uint64_t value = 14695981039346656037u;
-    for (size_t k = 0; k < size; k++) value = (value ^ bytes[k]) * 1099511628211u;
-    return value;
-}
-
 /* A copy is the state, and then its numbers. */
 static size_t copy_size(const Instance *c) { return sizeof(State) + c->n_numbers * sizeof(double); }
 
 static Header header_of(const Instance *c, const void *copy) {
     Header h = {"MLSTATE", copy_size(c), 0, 0};
-    h.model = hash((const unsigned char *)c->model->token, strlen(c->model->token));
-    h.check = hash(copy, copy_size(c));
+    h.model = crc32_of((const unsigned char *)c->model->token, strlen(c->model->token));
+    h.check = crc32_of(copy, copy_size(c));
     return h;
 }
 

@@ -31,22 +31,22 @@ static const struct {
     size_t record, table, count;
 } tables[] = {TABLE(settings, n_settings), TABLE(text, n_text), TABLE(token, n_token), TABLE(constants, n_constants),
     TABLE(parameters, n_p), TABLE(parameter_min, n_p), TABLE(parameter_max, n_p), TABLE(inputs, n_u),
-    TABLE(guesses, n_x), TABLE(z_guesses, n_z), TABLE(nominals, n_x), TABLE(state_names, n_x),
-    TABLE(implicit_names, n_z), TABLE(singular_names, n_determinants), TABLE(variables, n_variables),
-    TABLE(rising, n_rising), TABLE(transitions, n_transitions), TABLE(guard_transition, n_guards),
-    TABLE(resets, n_resets), TABLE(reset_nodes, n_reset_nodes), TABLE(modes, n_modes), TABLE(mode_names, n_mode_names),
-    TABLE(holds, n_holds), TABLE(circuits, n_circuits), TABLE(members, n_members), TABLE(units, n_units),
-    TABLE(start_modes, n_start_modes), TABLE(start_direct, n_start_direct), TABLE(start_default, n_start_default),
-    TABLE(start_x_guess, n_start_x_guess), TABLE(start_z_guess, n_start_z_guess), TABLE(start_rows, n_start_unknowns),
-    TABLE(start_dependent, n_start_dependent), TABLE(start_zero, n_start_zero), TABLE(start_columns, n_start_unknowns),
-    TABLE(steady_states, n_steady), TABLE(jacobian_to_step, n_jacobian), TABLE(step_diagonal, n_x), QR(step), QR(start),
-    TAPE(rates), TAPE(jacobian), TAPE(alg), TAPE(alg_jacobian), TAPE(variables), TAPE(guards), TAPE(guards_soon),
-    TAPE(moments), TAPE(resets), TAPE(start_conditions), TAPE(start_values), TAPE(discrete_starts), TAPE(hold_terms),
-    TAPE(determinants), TAPE(start_system), TAPE(start_jacobian), TAPE(derived)};
+    TABLE(guesses, n_guesses), TABLE(nominals, n_x), TABLE(state_names, n_x), TABLE(implicit_names, n_z),
+    TABLE(singular_names, n_determinants), TABLE(variables, n_variables), TABLE(rising, n_rising),
+    TABLE(transitions, n_transitions), TABLE(guard_transition, n_guards), TABLE(resets, n_resets),
+    TABLE(reset_nodes, n_reset_nodes), TABLE(modes, n_modes), TABLE(mode_names, n_mode_names), TABLE(holds, n_holds),
+    TABLE(circuits, n_circuits), TABLE(members, n_members), TABLE(units, n_units), TABLE(start_modes, n_start_modes),
+    TABLE(start_direct, n_start_direct), TABLE(start_default, n_start_default), TABLE(start_guess, n_start_guess),
+    TABLE(start_rows, n_start_unknowns), TABLE(start_dependent, n_start_dependent), TABLE(start_zero, n_start_zero),
+    TABLE(start_columns, n_start_unknowns), TABLE(steady, n_steady), TABLE(jacobian_to_step, n_jacobian),
+    TABLE(step_diagonal, n_x), QR(step), QR(start), TAPE(rates), TAPE(jacobian), TAPE(alg), TAPE(alg_jacobian),
+    TAPE(variables), TAPE(guards), TAPE(guards_soon), TAPE(moments), TAPE(resets), TAPE(start_conditions),
+    TAPE(start_values), TAPE(discrete_starts), TAPE(hold_terms), TAPE(determinants), TAPE(start_system),
+    TAPE(start_jacobian), TAPE(derived)};
 enum { N_TABLES = sizeof tables / sizeof tables[0] };
 
 /* As zlib has it, by four bits at a time. */
-static uint32_t crc32_of(const unsigned char *bytes, size_t size) {
+uint32_t crc32_of(const unsigned char *bytes, size_t size) {
     static const uint32_t table[16] = {0x00000000, 0x1db71064, 0x3b6e20c8, 0x26d930ac, 0x76dc4190, 0x6b6b51f4,
         0x4db26158, 0x5005713c, 0xedb88320, 0xf00f9344, 0xd6d6a3e8, 0xcb61b38c, 0x9b64c2b0, 0x86d3d2d4, 0xa00ae278,
         0xbdbdf21c};
@@ -163,9 +163,10 @@ static int check_sizes(const Model *m, char *message) {
         {"determinants", m->tapes.determinants.n_outputs, m->n_determinants},
         {"start_jacobian", m->tapes.start_jacobian.n_outputs, m->start.n_nonzeros},
         {"step", m->step.size, m->n_unknowns}, {"start", m->start.size, m->n_start_unknowns},
-        {"units", m->n_units, m->n_holds > 0 ? m->n_nodes : 0}};
+        {"guesses", m->n_guesses, m->n_unknowns}, {"units", m->n_units, m->n_holds > 0 ? m->n_nodes : 0}};
     for (size_t k = 0; k < sizeof sizes / sizeof sizes[0]; k++)
         if (sizes[k].found != sizes[k].wanted) return damaged(message, sizes[k].name);
+    if (m->n_steady > m->n_unknowns) return damaged(message, "steady");
     return m->n_modes <= m->n_d || damaged(message, "modes");
 }
 

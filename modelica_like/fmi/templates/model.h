@@ -101,7 +101,7 @@ typedef struct Model { /* tables lie in the bytes of the file; texts are offsets
     const Settings *settings;
     const char *text, *token;
     int n_settings, n_text, n_token, n_x, n_z, n_p, n_u, n_constants, n_variables, n_rising;
-    const double *constants, *parameters, *parameter_min, *parameter_max, *inputs, *guesses, *z_guesses, *nominals;
+    const double *constants, *parameters, *parameter_min, *parameter_max, *inputs, *guesses, *nominals;
     const int *state_names, *implicit_names, *singular_names;
     const Variable *variables;
     const Rising *rising;
@@ -120,12 +120,13 @@ typedef struct Model { /* tables lie in the bytes of the file; texts are offsets
     const int *members;
     const int *units; /* by node: which have the same unit; empty where nothing is held */
 
-    int n_start_modes, n_start_direct, n_start_default, n_start_x_guess, n_start_z_guess, n_start_dependent;
+    int n_start_modes, n_start_direct, n_start_default, n_start_guess, n_start_dependent, n_guesses;
     int n_start_zero, n_start_unknowns, n_steady;
     const StartMode *start_modes;
-    const StartOf *start_direct, *start_default, *start_x_guess, *start_z_guess;
+    const StartOf *start_direct, *start_default, *start_guess;
     const StartRow *start_rows, *start_dependent;
-    const int *start_zero, *start_columns, *steady_states;
+    const int *start_zero, *start_columns;
+    const int *steady; /* unknowns that follow from zero rates, those of states first; empty for another start */
 
     int n_jacobian;
     const int *jacobian_to_step; /* nonzero of the Jacobian -> nonzero of the step matrix */
@@ -151,6 +152,7 @@ typedef void *(*Allocate)(size_t count, size_t size);
 typedef void (*Release)(void *memory);
 Model *model_read(const unsigned char *bytes, size_t size, Allocate allocate, Release release, char *message);
 void model_free(Model *m);
+uint32_t crc32_of(const unsigned char *bytes, size_t size);
 static inline const char *text_of(const Model *m, int place) { return m->text + place; }
 
 /* model_check.c */

@@ -75,15 +75,13 @@ static int check_starts(const Model *m, char *message) {
         COLUMN(start_direct, start, m->n_start_direct, 0, m->n_starts),
         COLUMN(start_default, position, m->n_start_default, 0, m->n_x),
         COLUMN(start_default, start, m->n_start_default, 0, m->n_starts),
-        COLUMN(start_x_guess, position, m->n_start_x_guess, 0, m->n_x),
-        COLUMN(start_x_guess, start, m->n_start_x_guess, 0, m->n_starts),
-        COLUMN(start_z_guess, position, m->n_start_z_guess, 0, m->n_z),
-        COLUMN(start_z_guess, start, m->n_start_z_guess, 0, m->n_starts),
+        COLUMN(start_guess, position, m->n_start_guess, 0, m->n_unknowns),
+        COLUMN(start_guess, start, m->n_start_guess, 0, m->n_starts),
         COLUMN(start_rows, start, m->n_start_unknowns, -1, m->n_starts),
         COLUMN(start_rows, row, m->n_start_unknowns, 0, m->n_start_values),
         COLUMN(start_dependent, start, m->n_start_dependent, 0, m->n_starts),
         COLUMN(start_dependent, node, m->n_start_dependent, 0, m->n_nodes), ARRAY(start_zero, m->n_start_zero, m->n_x),
-        ARRAY(start_columns, m->n_start_unknowns, m->n_unknowns + m->n_y), ARRAY(steady_states, m->n_steady, m->n_x),
+        ARRAY(start_columns, m->n_start_unknowns, m->n_unknowns + m->n_y), ARRAY(steady, m->n_steady, m->n_unknowns),
         ARRAY(jacobian_to_step, m->n_jacobian, m->step.n_nonzeros), ARRAY(step_diagonal, m->n_x, m->step.n_nonzeros)};
     return check_ranges(ranges, sizeof ranges / sizeof ranges[0], message);
 }

@@ -10,7 +10,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include "core.h"
-#include "native.h"
 
 enum { NATIVE_OK, NATIVE_FAILED, NATIVE_MORE, NATIVE_PAUSED };
 #define NEAR_EVENT 2e-7 /* of the distance of results: nearer to an event, its left side stands for the result */
@@ -99,18 +98,12 @@ EXPORTED int native_reset(Native *n, double start, double stop, double rtol, dou
 
 /* ---- values ----------------------------------------------------------------------------------------------------- */
 
-static int is_mode(const Instance *c, uint32_t reference) {
-    const Variable *v = find_variable(c->model, reference);
-    return v != NULL && v->type == TYPE_ENUMERATION;
-}
-
 /* Before the begin: parameters, inputs and start values; later: inputs, and parameters that are tunable. */
 EXPORTED int native_set(Native *n, int64_t count, const uint32_t *references, const double *values) {
-    Result result = RESULT_OK;
-    for (int64_t k = 0; k < count && result == RESULT_OK; k++)
-        result = is_mode(n->c, references[k]) ? set_mode(n->c, references[k], (int64_t)values[k])
-                                              : set_float(n->c, references[k], values[k]);
-    return code(result);
+    for (int64_t k = 0; k < count; k++)
+        if (set_value(n->c, known_variable(n->c, references[k], ANY_TYPE), values[k]) != RESULT_OK)
+            return NATIVE_FAILED;
+    return NATIVE_OK;
 }
 
 /* All parameters and inputs at once, in the order of the model's tables and unchecked. */
@@ -120,12 +113,9 @@ EXPORTED void native_set_all(Native *n, const double *parameters, const double *
 }
 
 static int read_values(Instance *c, int64_t count, const uint32_t *references, double *values) {
-    Result result = RESULT_OK;
-    for (int64_t k = 0; k < count && result == RESULT_OK; k++) {
-        if (!is_mode(c, references[k])) result = get_float(c, references[k], &values[k]);
-        else if ((values[k] = get_mode(c, references[k])) < 0) result = RESULT_ERROR;
-    }
-    return code(result);
+    for (int64_t k = 0; k < count; k++)
+        if (get_value(c, known_variable(c, references[k], ANY_TYPE), &values[k]) != RESULT_OK) return NATIVE_FAILED;
+    return NATIVE_OK;
 }
 
 /* Has an event to be handled before anything else? What a fixed step has left is taken by the next one. */
@@ -216,12 +206,11 @@ static void note_impact(Instance *c, int held, double energy, int first) {
 
 static int write_point(Native *n, NativeRun *r) {
     const Instance *c = n->c;
-    const Model *m = c->model;
     int64_t k = r->n_points++;
     r->last = c->state.t;
     if (r->times != NULL) r->times[k] = c->state.t;
     if (r->states != NULL) {
-        memcpy(r->states + k * m->n_unknowns, c->x, (size_t)m->n_unknowns * sizeof(double));
+        memcpy(r->states + k * c->model->n_unknowns, c->x, (size_t)c->model->n_unknowns * sizeof(double));
     }
     if (r->outputs == NULL) return NATIVE_OK;
     return read_values(n->c, r->n_outputs, r->references, r->outputs + k * r->n_outputs);

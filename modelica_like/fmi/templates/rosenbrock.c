@@ -73,25 +73,23 @@ static int factor(Instance *c, double h) {
 }
 
 static double error_norm(const Instance *c, const double *first, const double *last, const double *error) {
-    const Model *m = c->model;
     double sum = 0, rtol = c->state.tolerance, atol = c->state.absolute;
-    if (m->n_x == 0) return 0;
-    for (int k = 0; k < m->n_x; k++) {
-        double weight = rtol * fmax(fabs(first[k]), fabs(last[k])) + atol * m->nominals[k];
+    if (c->model->n_x == 0) return 0;
+    for (int k = 0; k < c->model->n_x; k++) {
+        double weight = rtol * fmax(fabs(first[k]), fabs(last[k])) + atol * c->model->nominals[k];
         sum += (error[k] / weight) * (error[k] / weight);
     }
-    return sqrt(sum / m->n_x);
+    return sqrt(sum / c->model->n_x);
 }
 
 /* Steps from `first` at t to t + h. With `keep_jacobian` that of the step before from the same point is used.
  * Returns 0 if the equations gave values that are not finite, or a singular matrix. */
 int rosenbrock_step(
     Instance *c, double t, const double *first, double h, int keep_jacobian, Piece *piece, double *error) {
-    const Model *m = c->model;
     Work *w = &c->work;
-    int n = m->n_unknowns;
+    int n = c->model->n_unknowns;
     size_t size = (size_t)n * sizeof(double);
-    double *last = last_of(m, piece), *slope = w->stages + (size_t)STAGES * (size_t)n, *y = w->point;
+    double *last = last_of(c->model, piece), *slope = w->stages + (size_t)STAGES * (size_t)n, *y = w->point;
     piece->begin = t;
     piece->end = t + h;
     memcpy(piece->points, first, size);
@@ -106,12 +104,12 @@ int rosenbrock_step(
         if (i == 0) memcpy(stage, w->first_rates, size);
         else evaluate_special(c, SPECIAL_RATES, t + C_TIME[i] * h, y, stage);
         for (int j = 0; j < i; j++)
-            for (int k = 0; k < m->n_x; k++) stage[k] += C[i][j] / h * w->stages[j * n + k];
+            for (int k = 0; k < c->model->n_x; k++) stage[k] += C[i][j] / h * w->stages[j * n + k];
         for (int k = 0; k < n; k++) {
             stage[k] += h * D_TIME[i] * slope[k];
             if (!isfinite(stage[k])) return 0;
         }
-        qr_solve(&m->step, w, stage);
+        qr_solve(&c->model->step, w, stage);
     }
     for (int k = 0; k < n; k++) {
         last[k] = y[k] + w->stages[(STAGES - 1) * n + k];
@@ -145,12 +143,11 @@ void piece_at(const Model *m, const Piece *piece, double t, double *point) {
 /* A first step at which states change by a hundredth (Hairer, Norsett & Wanner I, II.4); states that are nothing but
  * rounding tell nothing about it. */
 double first_step(Instance *c) {
-    const Model *m = c->model;
     double size, speed, *rates = c->work.rhs;
-    evaluate_now(c, &m->tapes.rates, rates);
+    evaluate_now(c, &c->model->tapes.rates, rates);
     size = error_norm(c, c->x, c->x, c->x);
     speed = error_norm(c, c->x, c->x, rates);
-    if (!isfinite(speed) || m->n_x == 0) return 1e-3;
+    if (!isfinite(speed) || c->model->n_x == 0) return 1e-3;
     if (size < 1e-5 || speed < 1e-5) return 1e-6;
     return fmax(0.01 * size / speed, TIME_RESOLUTION * fmax(1, fabs(c->state.t)));
 }

@@ -12,17 +12,14 @@ void start_defaults(Instance *c) {
     const Model *m = c->model;
     memcpy(c->p, m->parameters, m->n_p * sizeof(double));
     memcpy(c->u, m->inputs, m->n_u * sizeof(double));
-    memcpy(c->x, m->guesses, m->n_x * sizeof(double));
-    memcpy(c->z, m->z_guesses, m->n_z * sizeof(double));
+    memcpy(c->x, m->guesses, m->n_unknowns * sizeof(double));
 }
 
 /* Start values as the model says, or as they were given. */
-static const double *start_values(Instance *c) {
-    const Model *m = c->model;
-    evaluate_now(c, &m->tapes.start_values, c->work.start_values);
-    for (int k = 0; k < m->n_starts; k++)
+static void start_values(Instance *c) {
+    evaluate_now(c, &c->model->tapes.start_values, c->work.start_values);
+    for (int k = 0; k < c->model->n_starts; k++)
         if (c->start_given[k]) c->work.start_values[k] = c->start_value[k];
-    return c->work.start_values;
 }
 
 static Result apply_direct(Instance *c, const double *values) {
@@ -41,18 +38,9 @@ static Result apply_direct(Instance *c, const double *values) {
     return RESULT_OK;
 }
 
-static void apply_guesses(Instance *c, const double *values) {
-    const Model *m = c->model;
-    for (int k = 0; k < m->n_start_x_guess; k++)
-        c->x[m->start_x_guess[k].position] = values[m->start_x_guess[k].start] / m->start_x_guess[k].factor;
-    for (int k = 0; k < m->n_start_z_guess; k++) c->z[m->start_z_guess[k].position] = values[m->start_z_guess[k].start];
-}
-
-static double *start_unknown(Instance *c, int column) {
-    const Model *m = c->model;
-    if (column < m->n_x) return &c->x[column];
-    if (column < m->n_x + m->n_y) return &c->work.slots[m->slot_y + column - m->n_x];
-    return &c->z[column - m->n_x - m->n_y];
+/* Guesses, or defaults: they contradict nothing. */
+static void apply(Instance *c, const StartOf *starts, int count) {
+    for (int k = 0; k < count; k++) c->x[starts[k].position] = c->work.start_values[starts[k].start] / starts[k].factor;
 }
 
 /* Newton's method on the equations between free states, the variables that follow from them, and start values. */
@@ -78,7 +66,10 @@ static Result solve_start_system(Instance *c, const double *values) {
         }
         qr_solve(&m->start, &c->work, step);
         for (int k = 0; k < m->n_start_unknowns; k++) {
-            double *unknown = start_unknown(c, m->start_columns[k]);
+            int column = m->start_columns[k]; /* among states, variables, implicit unknowns */
+            double *y = &c->work.slots[m->slot_y], *unknown = column < m->n_x            ? &c->x[column]
+                                                              : column < m->n_x + m->n_y ? &y[column - m->n_x]
+                                                                                         : &c->x[column - m->n_y];
             *unknown -= step[k];
             change = fmax(change, fabs(step[k]) / (1 + fabs(*unknown)));
         }
@@ -111,8 +102,7 @@ static Result solve_states(Instance *c) {
 /* States with zero derivatives, the nearest to the guess; what nothing depends on and what is conserved stay. */
 static Result solve_steady(Instance *c) {
     const Model *m = c->model;
-    State *s = &c->state;
-    int n = m->n_steady + m->n_z;
+    int n = m->n_steady;
     double *rates = c->work.rhs, *a = c->work.square, *step = c->work.point, residual = INFINITY;
     for (int round = 0; round < MAX_NEWTON && n > 0; round++) {
         double change = 0;
@@ -121,37 +111,33 @@ static Result solve_steady(Instance *c) {
         memset(c->work.matrix, 0, (size_t)m->step.n_nonzeros * sizeof(double));
         for (int k = 0; k < m->n_jacobian; k++) c->work.matrix[m->jacobian_to_step[k]] = c->work.jacobian[k];
         memset(a, 0, (size_t)n * (size_t)n * sizeof(double));
-        for (int j = 0; j < n; j++) {
-            int column = j < m->n_steady ? m->steady_states[j] : m->n_x + j - m->n_steady;
-            for (int k = m->step.colind[column]; k < m->step.colind[column + 1]; k++)
+        for (int j = 0; j < n; j++)
+            for (int k = m->step.colind[m->steady[j]]; k < m->step.colind[m->steady[j] + 1]; k++)
                 for (int i = 0; i < n; i++)
-                    if ((i < m->n_steady ? m->steady_states[i] : m->n_x + i - m->n_steady) == m->step.row[k])
-                        a[i * n + j] = c->work.matrix[k];
-        }
+                    if (m->steady[i] == m->step.row[k]) a[i * n + j] = c->work.matrix[k];
         residual = 0;
         for (int i = 0; i < n; i++) {
-            c->work.vector[i] = rates[i < m->n_steady ? m->steady_states[i] : m->n_x + i - m->n_steady];
+            c->work.vector[i] = rates[m->steady[i]];
             residual = fmax(residual, isfinite(c->work.vector[i]) ? fabs(c->work.vector[i]) : INFINITY);
         }
         if (!isfinite(residual)) break;
-        keeping_least_squares(n, m->n_steady, a, a + (size_t)n * (size_t)n, c->work.vector, step);
+        keeping_least_squares(n, n - m->n_z, a, a + (size_t)n * (size_t)n, c->work.vector, step);
         for (int j = 0; j < n; j++) {
-            *(j < m->n_steady ? &c->x[m->steady_states[j]] : &c->z[j - m->n_steady]) -= step[j];
+            c->x[m->steady[j]] -= step[j];
             change = fmax(change, fabs(step[j]) / (1 + fabs(step[j])));
         }
         if (change < 1e-13) break;
     }
     if (n == 0 || residual <= 1e-6) return RESULT_OK;
-    return fail(c, "No steady state was found at t = %.9g s.", s->t);
+    return fail(c, "No steady state was found at t = %.9g s.", c->state.t);
 }
 
 /* Choose modes that are not decided by their start conditions: the first that holds wins. */
 void choose_modes(Instance *c, unsigned char *decided) {
-    const Model *m = c->model;
     double *holds = c->work.guards;
-    evaluate_now(c, &m->tapes.start_conditions, holds);
-    for (int k = 0; k < m->n_start_modes; k++) {
-        const StartMode *one = &m->start_modes[k];
+    evaluate_now(c, &c->model->tapes.start_conditions, holds);
+    for (int k = 0; k < c->model->n_start_modes; k++) {
+        const StartMode *one = &c->model->start_modes[k];
         if (holds[k] == 0 || decided[one->mode]) continue;
         decided[one->mode] = 1;
         c->d[one->mode] = one->target;
@@ -176,19 +162,10 @@ static int choose_start_modes(Instance *c, const double *begun) {
 }
 
 static void start_discretes(Instance *c) {
-    const Model *m = c->model;
     double *values = c->work.guards;
-    evaluate_now(c, &m->tapes.discrete_starts, values);
-    for (int k = 0; k < m->n_d; k++)
+    evaluate_now(c, &c->model->tapes.discrete_starts, values);
+    for (int k = 0; k < c->model->n_d; k++)
         if (!c->mode_given[k]) c->d[k] = values[k];
-}
-
-static void apply_defaults(Instance *c, const double *values) {
-    const Model *m = c->model;
-    for (int k = 0; k < m->n_start_default; k++) {
-        const StartOf *one = &m->start_default[k];
-        c->x[one->position] = values[one->start] / one->factor;
-    }
 }
 
 /* The steady state of the present modes, in which what they hold stands still; held motions become what they were. */
@@ -196,7 +173,7 @@ static Result find_steady(Instance *c, double *begun) {
     const Model *m = c->model;
     Work *w = &c->work;
     int count = 0;
-    apply_defaults(c, w->start_values);
+    apply(c, m->start_default, m->n_start_default);
     if (apply_direct(c, w->start_values) != RESULT_OK) return RESULT_ERROR;
     if (m->n_holds > 0) find_held(c, w->terms, w->held);
     variables_now(c);
@@ -227,19 +204,17 @@ static Result check_modes_hold(Instance *c) {
 /* States from parameters and start values; events at the start have not happened yet. */
 Result start_solve(Instance *c) {
     const Model *m = c->model;
-    State *s = &c->state;
     double *begun = c->work.begun;
     int round;
     if (check_tables(c) != RESULT_OK) return RESULT_ERROR;
-    memcpy(c->x, m->guesses, m->n_x * sizeof(double));
-    memcpy(c->z, m->z_guesses, m->n_z * sizeof(double));
+    memcpy(c->x, m->guesses, m->n_unknowns * sizeof(double));
     memset(c->d, 0, m->n_d * sizeof(double));
     start_discretes(c);
     share(c);
     start_values(c);
-    apply_guesses(c, c->work.start_values);
+    apply(c, m->start_guess, m->n_start_guess);
     if (m->settings->steady) {
-        apply_defaults(c, c->work.start_values);
+        apply(c, m->start_default, m->n_start_default);
         if (apply_direct(c, c->work.start_values) != RESULT_OK) return RESULT_ERROR;
         choose_start_modes(c, NULL);
         share(c);
@@ -255,8 +230,8 @@ Result start_solve(Instance *c) {
     rest(c);
     if (solve_now(c, 0) != RESULT_OK || check_singular(c) != RESULT_OK) return RESULT_ERROR;
     if (m->settings->steady && check_modes_hold(c) != RESULT_OK) return RESULT_ERROR;
-    s->z_valid = s->solved = 1;
-    s->piece_valid = s->event_pending = 0;
+    c->state.z_valid = c->state.solved = 1;
+    c->state.piece_valid = c->state.event_pending = 0;
     c->variables_valid = 0;
     return RESULT_OK;
 }

@@ -18,17 +18,17 @@ const Variable *find_variable(const Model *m, uint32_t reference) {
 
 const Variable *known_variable(Instance *c, uint32_t reference, ValueType type) {
     const Variable *v = find_variable(c->model, reference);
-    if (v != NULL && v->type == (int)type) return v;
+    if (v != NULL && (v->type == (int)type || type == ANY_TYPE)) return v;
     fail(c,
-        v == NULL ? "There is no variable with value reference %u."
-                  : "The variable with value reference %u is not of type %s.",
+        v == NULL               ? "There is no variable with value reference %u."
+        : v->type == TYPE_ARRAY ? "The variable with value reference %u is an array: it has no derivatives."
+                                : "The variable with value reference %u is not of type %s.",
         (unsigned)reference, type == TYPE_FLOAT64 ? "Real (Float64)" : "Enumeration (Integer, Int64)");
     return NULL;
 }
 
 /* Values that a tape gives, each computed once per point; NULL if there are none. */
 static const double *seen(Instance *c, const Variable *v) {
-    const Model *m = c->model;
     Work *w = &c->work;
     const double *values = v->kind == KIND_DERIVED      ? w->seen_derived
                            : v->kind == KIND_DERIVATIVE ? w->seen_rates
@@ -38,10 +38,10 @@ static const double *seen(Instance *c, const Variable *v) {
     if (c->variables_valid & 1 << v->kind) return values;
     if (v->kind != KIND_DERIVED && settle(c) != RESULT_OK) return NULL;
     switch (v->kind) {
-        case KIND_DERIVED: evaluate_now(c, &m->tapes.derived, w->seen_derived); break;
+        case KIND_DERIVED: evaluate_now(c, &c->model->tapes.derived, w->seen_derived); break;
         case KIND_DERIVATIVE:
             evaluate_special(c, SPECIAL_RATES, c->state.t, c->x, w->rhs);
-            memcpy(w->seen_rates, w->rhs, (size_t)m->n_x * sizeof(double));
+            memcpy(w->seen_rates, w->rhs, (size_t)c->model->n_x * sizeof(double));
             break;
         case KIND_GUARD: get_indicators(c, w->seen_indicators); break;
         default: evaluate_special(c, SPECIAL_VARIABLES, c->state.t, c->x, w->variables);
@@ -58,8 +58,8 @@ static Result make_ready(Instance *c, const Variable *v) {
     return start_solve(c);
 }
 
-Result get_float(Instance *c, uint32_t reference, double *value) {
-    const Variable *v = known_variable(c, reference, TYPE_FLOAT64);
+/* Of a variable that is known, or NULL: then its reference was wrong. */
+Result get_value(Instance *c, const Variable *v, double *value) {
     if (v == NULL || make_ready(c, v) != RESULT_OK) return RESULT_ERROR;
     switch (v->kind) {
         case KIND_TIME: *value = c->state.t; return RESULT_OK;
@@ -83,9 +83,8 @@ Result make_consistent(Instance *c) {
 }
 
 void get_derivatives(Instance *c, double *derivatives) {
-    const Model *m = c->model;
-    evaluate_now(c, &m->tapes.rates, c->work.rhs);
-    memcpy(derivatives, c->work.rhs, m->n_x * sizeof(double));
+    evaluate_now(c, &c->model->tapes.rates, c->work.rhs);
+    memcpy(derivatives, c->work.rhs, c->model->n_x * sizeof(double));
     rest_rates(c, derivatives);
 }
 
@@ -95,19 +94,12 @@ void get_derivatives(Instance *c, double *derivatives) {
  * an offset. It shifts no event, as it is gone above zero; its size is that of rounding, and products of it do not
  * underflow, by whose sign root finders judge. */
 void get_indicators(Instance *c, double *indicators) {
-    const Model *m = c->model;
     double *values = c->work.guards_before;
-    evaluate_now(c, &m->tapes.guards_soon, values);
-    for (int k = 0; k < m->n_guards; k++) {
+    evaluate_now(c, &c->model->tapes.guards_soon, values);
+    for (int k = 0; k < c->model->n_guards; k++) {
         double value = guard_active(c, k) ? number_or_false(values[k]) : -1;
         indicators[k] = value > 0 ? value : value - OFFSET;
     }
-}
-
-/* The number of the mode, -1 if there is none. */
-int get_mode(Instance *c, uint32_t reference) {
-    const Variable *v = known_variable(c, reference, TYPE_ENUMERATION);
-    return v == NULL || make_ready(c, v) != RESULT_OK ? -1 : (int)c->d[v->index];
 }
 
 static Result refuse_value(Instance *c, const Variable *v, const char *why) {
@@ -120,20 +112,26 @@ static void touch(Instance *c) {
     c->variables_valid = 0;
 }
 
+/* Their lines begin anew at the present time. */
+static void touch_inputs(Instance *c) {
+    for (int k = 0; k < c->model->n_u; k++) c->u[k] = input_at(c, k, c->state.t);
+    c->state.u_time = c->state.t;
+    touch(c);
+}
+
 static int before_start(const State *s) {
     return s->phase == PHASE_INSTANTIATED || s->phase == PHASE_INITIALIZATION || s->phase == PHASE_CONFIGURATION;
 }
 
 static Result set_parameter(Instance *c, const Variable *v, double value) {
-    const Model *m = c->model;
     State *s = &c->state;
-    double low = m->parameter_min[v->index], high = m->parameter_max[v->index];
+    double low = c->model->parameter_min[v->index], high = c->model->parameter_max[v->index];
     if (!v->tunable && !before_start(s))
         return refuse_value(c, v, "it is a fixed parameter. Set it before the end of the initialization.");
     if (v->tunable && s->phase == PHASE_CONTINUOUS)
         return refuse_value(c, v, "tunable parameters change in event mode only.");
     if (value < low || value > high)
-        return fail(c, "%s = %g is out of range: it must be at %s %g.", text_of(m, v->name), value,
+        return fail(c, "%s = %g is out of range: it must be at %s %g.", text_of(c->model, v->name), value,
             value < low ? "least" : "most", value < low ? low : high);
     if (c->p[v->index] != value) touch(c);
     if (c->p[v->index] != value && !before_start(s) && !c->work.tuned[v->index]) {
@@ -171,45 +169,32 @@ static Result set_start(Instance *c, const Variable *v, double value) {
     return RESULT_OK;
 }
 
-Result set_float(Instance *c, uint32_t reference, double value) {
-    const Variable *v = known_variable(c, reference, TYPE_FLOAT64);
-    State *s = &c->state;
+/* As get_value; modes by their numbers. */
+Result set_value(Instance *c, const Variable *v, double value) {
+    const Model *m = c->model;
     if (v == NULL) return RESULT_ERROR;
     if (!isfinite(value)) return refuse_value(c, v, "the value is not a finite number.");
+    if (v->type == TYPE_ENUMERATION && (value < 0 || value >= m->modes[v->index].n_names))
+        return fail(
+            c, "%s has no mode %.0f: they are 0 to %d.", text_of(m, v->name), value, m->modes[v->index].n_names - 1);
     if (v->kind == KIND_PARAMETER) return set_parameter(c, v, value);
-    if (v->kind != KIND_INPUT) return set_start(c, v, value);
-    if (input_at(c, v->index, s->t) == value) return RESULT_OK;
-    for (int k = 0; k < c->model->n_u; k++) c->u[k] = input_at(c, k, s->t);
-    s->u_time = s->t;
+    if (v->kind != KIND_INPUT) return set_start(c, v, v->type == TYPE_ENUMERATION ? floor(value) : value);
+    if (input_at(c, v->index, c->state.t) == value) return RESULT_OK;
+    touch_inputs(c);
     c->u[v->index] = value; /* its rate stays, in whatever order an importer gives the two */
-    touch(c);
     return RESULT_OK;
 }
 
 /* From now on the input moves with this rate. */
 Result set_input_rate(Instance *c, uint32_t reference, double rate) {
     const Variable *v = known_variable(c, reference, TYPE_FLOAT64);
-    State *s = &c->state;
     if (v == NULL) return RESULT_ERROR;
     if (v->kind != KIND_INPUT) return refuse_value(c, v, "it is no input, so it has no input derivative.");
     if (!isfinite(rate)) return refuse_value(c, v, "the derivative is not a finite number.");
     if (c->u_rate[v->index] == rate) return RESULT_OK;
-    for (int k = 0; k < c->model->n_u; k++) c->u[k] = input_at(c, k, s->t);
-    s->u_time = s->t;
+    touch_inputs(c);
     c->u_rate[v->index] = rate;
-    touch(c);
     return RESULT_OK;
-}
-
-Result set_mode(Instance *c, uint32_t reference, int64_t value) {
-    const Model *m = c->model;
-    const Variable *v = known_variable(c, reference, TYPE_ENUMERATION);
-    if (v == NULL) return RESULT_ERROR;
-    if (v->kind != KIND_DISCRETE) return refuse_value(c, v, "it is calculated.");
-    if (value < 0 || value >= m->modes[v->index].n_names)
-        return fail(c, "%s has no mode %lld: they are 0 to %d.", text_of(m, v->name), (long long)value,
-            m->modes[v->index].n_names - 1);
-    return set_start(c, v, (double)value);
 }
 
 Result set_time(Instance *c, double time) {

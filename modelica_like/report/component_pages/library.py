@@ -40,11 +40,9 @@ def component_pages(folder: Path, examples: Path | None = None, types: Sequence[
 
 
 def write_component_pages(folder: Path, examples: Path | None = None, types: Sequence[str] | None = None) -> list[Path]:
-    """Write pages about component types; other files in the folder are left alone.
+    """Write pages about component types, see `component_pages`; other files in the folder are left alone.
 
     Raises:
-        UnknownName: there is no such type.
-        NetlistError: a library or an example cannot be read.
         OSError: a file cannot be written.
     """
     pages = component_pages(folder, examples, types)

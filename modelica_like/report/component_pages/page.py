@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from textwrap import dedent
+from typing import NamedTuple
 
 from modelica_like.language import Component
 from modelica_like.report.component_pages import latex_names as names
@@ -24,14 +24,8 @@ from modelica_like.report.component_pages.source import Source
 from modelica_like.report.declared import Notation, declared
 
 
-@dataclass(frozen=True)
-class Example:
-    """A netlist in which a type occurs.
-
-    Attributes:
-        path: the file.
-        title: its description.
-    """
+class Example(NamedTuple):
+    """A netlist in which a type occurs, and its description."""
 
     path: Path
     title: str

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from textwrap import dedent
 from types import FunctionType
-from typing import Any
+from typing import Any, NamedTuple
 
 from modelica_like.language import Component
 from modelica_like.report.component_pages import latex_names as names
@@ -31,8 +31,7 @@ _ENERGY = ("stored_energy", "loss_power", "source_power")
 _LANGUAGE = "modelica_like.language"
 
 
-@dataclass(frozen=True)
-class Term:
+class Term(NamedTuple):
     """An equation or a definition: both sides as LaTeX, the sign between them, and where it holds."""
 
     left: str
@@ -41,19 +40,8 @@ class Term:
     where: str = ""
 
 
-@dataclass(frozen=True)
-class Event:
-    """A transition, or the choice of the mode at the start (`source` is then empty).
-
-    Attributes:
-        mode: which mode.
-        source: names of the modes it leaves.
-        target: name of the mode it enters.
-        when: condition or time as LaTeX.
-        resets: new values as LaTeX.
-        notice: what the report of a run says.
-        where: on which condition there is this event, as LaTeX.
-    """
+class Event(NamedTuple):
+    """A transition, or the choice of the mode at the start (`source` is then empty); what is mathematics as LaTeX."""
 
     mode: str
     source: str
@@ -68,8 +56,7 @@ Said = Term | Event | str
 """An equation, an event, or a paragraph in Markdown."""
 
 
-@dataclass(frozen=True)
-class _Function:
+class _Function(NamedTuple):
     """A function of a class (`owner`), or of a module."""
 
     name: str
@@ -199,16 +186,13 @@ class _Reader(Writer):
     def body(self, statements: Sequence[ast.stmt]) -> Iterator[Said]:
         """Yield what statements yield, one after the other; what cannot be written is shown as it stands."""
         for k, statement in enumerate(statements):
-            if isinstance(statement, ast.If) and isinstance((statement.body or [None])[-1], ast.Return):
-                rest = [*statement.orelse, *statements[k + 1 :]]
-                yield from self.body([ast.If(statement.test, statement.body[:-1], rest)])
-                return
-            for one in ast.walk(statement):
-                match one:
-                    case ast.Subscript(value=ast.Name(id=name), ctx=ast.Store()) | ast.AugAssign(ast.Name(id=name)):
+            match statement:
+                case ast.If(test=test, body=[*before, ast.Return()], orelse=other):
+                    yield from self.body([ast.If(test, before, [*other, *statements[k + 1 :]])])
+                    return
+                case _:
+                    for name in _changed(statement):
                         self.local.pop(name, None)
-                    case _:
-                        pass
             try:
                 yield from list(self._statement(statement))
             except Unwritable:
@@ -382,8 +366,18 @@ def _reader(source: Source, of: _Function, local: dict[str, Meaning] | None = No
     return _Reader(of.constants, {one: Path(one, own=False) for one in formal} if local is None else local, source, of)
 
 
+def _changed(statement: ast.stmt) -> Iterator[str]:
+    """Yield names whose values a statement changes."""
+    for one in ast.walk(statement):
+        match one:
+            case ast.Subscript(value=ast.Name(id=name), ctx=ast.Store()) | ast.AugAssign(target=ast.Name(id=name)):
+                yield name
+            case _:
+                pass
+
+
 def _where(condition: str, said: Said) -> Said:
     """Return what is said only on a condition."""
     if isinstance(said, str):
         return f"${condition}$:\n\n{said}"
-    return replace(said, where=rf"{condition} \text{{, }} {said.where}" if said.where else condition)
+    return said._replace(where=rf"{condition} \text{{, }} {said.where}" if said.where else condition)

@@ -1,0 +1,240 @@
+/* Looking for events in an accepted step: guards are looked at inside of it, closer where they do not behave as looks
+ * tell, and what rises above zero is located on the dense output, then by steps again up to the trial time. */
+#include <math.h>
+#include <string.h>
+#include "core.h"
+
+#define MIDDLE 0.45 /* of a step: where guards are looked at besides its end; not where a period might */
+#define DEPTH 6     /* divisions of a step in which guards do not behave */
+#define BEHAVES 0.05
+#define LOCATED 1e-13
+#define MAX_TRIALS 60
+#define NEAR 0.1
+
+typedef struct { /* guards and their rates at a time within a step; behind them room for one more number per guard */
+    double t, *values, *rates;
+} Look;
+
+static Look room_for_look(const Instance *c, int number) {
+    double *values = c->work.looks + 3 * (size_t)c->model->n_guards * (size_t)number;
+    return (Look){0, values, values + c->model->n_guards};
+}
+
+static int look_at(Instance *c, double t, double *point, Look *look) {
+    if (solve_implicit(c, t, point, 1) != RESULT_OK) return 0;
+    evaluate_special(c, SPECIAL_GUARDS, t, point, look->values);
+    look->t = t;
+    for (int g = 0; g < c->model->n_guards; g++) {
+        look->values[g] = number_or_false(look->values[g]);
+        if (!isfinite(look->rates[g])) look->rates[g] = 0;
+    }
+    return 1;
+}
+
+/* By the dense output of the whole step. */
+static int look_inside(Instance *c, double t, Look *look) {
+    double *point = c->work.vector + c->model->n_z;
+    piece_at(c->model, c->work.whole, t, point);
+    return look_at(c, t, point, look);
+}
+
+/* By a step again from the beginning of the whole one, which becomes the piece. */
+static int step_to(Instance *c, double t, Look *look) {
+    const Piece *whole = c->work.whole;
+    double ignored;
+    if (t <= whole->begin) {
+        memcpy(c->piece, whole, piece_size(c->model));
+        memcpy(last_of(c->model, c->piece), whole->points, (size_t)c->model->n_unknowns * sizeof(double));
+    } else if (!rosenbrock_step(c, whole->begin, whole->points, t - whole->begin, 1, c->piece, &ignored)) return 0;
+    c->piece->end = t;
+    return look_at(c, t, last_of(c->model, c->piece), look);
+}
+
+static inline double cubic(double s, double g0, double r0, double g1, double r1) {
+    double r = 1 - s;
+    return g0 * (1 + 2 * s) * r * r + r0 * s * r * r + g1 * s * s * (3 - 2 * s) + r1 * s * s * (s - 1);
+}
+
+/* Does the cubic through both ends come near zero from below in between? */
+static int is_hump(double g0, double r0, double g1, double r1) {
+    double top = -INFINITY;
+    if (!(g0 <= 0 && g1 <= 0 && r0 > NOISE && r1 < -NOISE)) return 0;
+    for (int k = 1; k < 20; k++) top = fmax(top, cubic(k / 20.0, g0, r0, g1, r1));
+    return top > -NEAR * (fabs(g0) + fabs(g1));
+}
+
+/* First zero of the cubic, or its top. */
+double cubic_guess(double g0, double r0, double g1, double r1) {
+    double best = -INFINITY, place = 0.5;
+    for (int k = 1; k <= 40; k++) {
+        double value = cubic(k / 40.0, g0, r0, g1, r1);
+        if (value > best) {
+            best = value;
+            place = k / 40.0;
+        }
+        if (value > 0) {
+            double low = (k - 1) / 40.0, high = k / 40.0;
+            for (int n = 0; n < 30; n++) {
+                double middle = 0.5 * (low + high);
+                if (cubic(middle, g0, r0, g1, r1) > 0) high = middle;
+                else low = middle;
+            }
+            return high;
+        }
+    }
+    return place;
+}
+
+/* Where the cubic through two looks says that a guard has a zero, or its top. */
+static double guess(const Look *before, const Look *after, int g) {
+    double h = after->t - before->t;
+    return before->t + h * cubic_guess(before->values[g], before->rates[g] * h, after->values[g], after->rates[g] * h);
+}
+
+/* Kinds of candidates per guard. */
+enum { QUIET, CROSSING, HUMP };
+
+static int find_candidates(Instance *c, const Look *before, const Look *after) {
+    unsigned char *kinds = c->work.kinds;
+    double h = after->t - before->t;
+    for (int g = 0; g < c->model->n_guards; g++) {
+        double g0 = before->values[g], g1 = after->values[g];
+        kinds[g] = QUIET;
+        if (!guard_active(c, g) || g0 > 0) continue;
+        if (g1 > 0) kinds[g] = CROSSING;
+        else if (is_hump(g0, before->rates[g] * h, g1, after->rates[g] * h)) kinds[g] = HUMP;
+    }
+    return any_of(kinds, c->model->n_guards);
+}
+
+/* Newton's step to the earliest zero of a candidate; tells whether one is positive already. */
+static int newton(const Instance *c, const Look *look, double *step) {
+    int positive = 0;
+    *step = INFINITY;
+    for (int g = 0; g < c->model->n_guards; g++) {
+        if (c->work.kinds[g] == QUIET) continue;
+        positive |= look->values[g] > 0;
+        if (look->rates[g] > 0) *step = fmin(*step, -look->values[g] / look->rates[g]);
+    }
+    return positive;
+}
+
+/* A time at which a guard that rises and falls again is positive; infinite if none is. */
+static double positive_top(Instance *c, const Look *before, const Look *after, Look *look) {
+    for (int g = 0; g < c->model->n_guards; g++) {
+        double low = before->t, high = after->t, t = c->work.kinds[g] == HUMP ? guess(before, after, g) : low;
+        for (int n = 0; n < MAX_TRIALS && c->work.kinds[g] == HUMP; n++) {
+            if (!look_inside(c, t, look)) return INFINITY;
+            if (look->values[g] > 0) return t;
+            *(look->rates[g] > 0 ? &low : &high) = t;
+            if (look->values[g] + fabs(look->rates[g]) * (high - low) < 0 || high - low < 1e-12) break;
+            t = 0.5 * (low + high);
+        }
+        if (c->work.kinds[g] == HUMP) c->work.kinds[g] = QUIET;
+    }
+    return INFINITY;
+}
+
+/* Finds the earliest zero of a candidate between two looks, first roughly; the piece then ends there, `look` tells the
+ * guards there. */
+static int locate(Instance *c, const Look *before, const Look *after, Look *look) {
+    double step, t = after->t, last = t, tolerance = LOCATED * fmax(1, fabs(before->t));
+    if (!newton(c, after, &step)) last = positive_top(c, before, after, look);
+    if (!isfinite(last)) return 0;
+    for (int g = 0; g < c->model->n_guards; g++)
+        if (c->work.kinds[g] != QUIET) t = fmin(t, guess(before, after, g));
+    t = fmin(t, last);
+    for (int rough = 1; rough >= 0; rough--) {
+        double low = before->t, high = last;
+        for (int n = 0; n < MAX_TRIALS; n++) {
+            if (!(rough ? look_inside(c, t, look) : step_to(c, t, look))) return 0;
+            *(newton(c, look, &step) ? &high : &low) = t;
+            if (fabs(step) <= tolerance && !rough) return 1;
+            if (fabs(step) <= tolerance || high - low <= tolerance) break;
+            t = t + step > low && t + step < high ? t + step : 0.5 * (low + high);
+        }
+        last = rough ? last : high;
+    }
+    return step_to(c, last, look);
+}
+
+/* Which of the located guards want to fire. */
+static int mark_wanting(Instance *c, const Look *look, double tolerance) {
+    const Model *m = c->model;
+    double *soon = look->rates + m->n_guards;
+    int any = 0;
+    evaluate(c, &m->tapes.guards_soon, c->piece->end, last_of(m, c->piece), soon);
+    for (int g = 0; g < m->n_guards; g++) {
+        int near = look->values[g] > 0 || (look->rates[g] > 0 && -look->values[g] <= 10 * tolerance * look->rates[g]);
+        if (c->work.kinds[g] != QUIET && near && number_or_false(soon[g]) > 0)
+            any = c->wanting[m->guard_transition[g]] = 1;
+    }
+    return any;
+}
+
+typedef enum { NOTHING, ENDED, TOO_LONG } Found;
+
+/* Go on by the time resolution; what crossed and is still positive there wants to fire, else the search begins anew. */
+static Found look_behind(Instance *c, double end, Look *look) {
+    if (!step_to(c, fmin(c->piece->end + TIME_RESOLUTION * fmax(1, fabs(c->piece->end)), end), look)) return TOO_LONG;
+    for (int g = 0; g < c->model->n_guards; g++)
+        if (c->work.kinds[g] == CROSSING && look->values[g] > 0)
+            c->state.event_pending = c->wanting[c->model->guard_transition[g]] = 1;
+    return ENDED;
+}
+
+/* Looks for an event between two looks; shortens the piece to it. */
+static Found check_between(Instance *c, const Look *before, const Look *after) {
+    const Model *m = c->model;
+    Look found = room_for_look(c, DEPTH + 2);
+    double step;
+    if (!find_candidates(c, before, after)) return NOTHING;
+    if (locate(c, before, after, &found)) {
+        c->state.event_pending = mark_wanting(c, &found, LOCATED * fmax(1, fabs(after->t)));
+        if (c->state.event_pending) return ENDED;
+        /* Positive for less than the time resolution: what the last event left is on its way down. */
+        if (memchr(c->work.kinds, CROSSING, (size_t)m->n_guards) != NULL) return look_behind(c, after->t, &found);
+    } else if (newton(c, after, &step)) return TOO_LONG;
+    memcpy(c->piece, c->work.whole, piece_size(m));
+    return NOTHING;
+}
+
+/* Are the guards between two looks what these tell of them? */
+static int behave(const Instance *c, const Look *before, const Look *middle, const Look *after) {
+    double h = after->t - before->t;
+    for (int g = 0; g < c->model->n_guards; g++) {
+        double g0 = before->values[g], g1 = after->values[g], value = middle->values[g];
+        double size = fmax(fabs(value), fmax(fabs(g0), fabs(g1)));
+        if (!guard_active(c, g)) continue;
+        if (fabs(value - cubic(MIDDLE, g0, before->rates[g] * h, g1, after->rates[g] * h)) > BEHAVES * size) return 0;
+    }
+    return 1;
+}
+
+static Found look_into(Instance *c, const Look *before, const Look *after, int depth) {
+    Look middle = room_for_look(c, depth + 1);
+    int deeper;
+    Found found;
+    if (!look_inside(c, before->t + MIDDLE * (after->t - before->t), &middle)) return TOO_LONG;
+    deeper = depth > 1 && !behave(c, before, &middle, after);
+    found = deeper ? look_into(c, before, &middle, depth - 1) : check_between(c, before, &middle);
+    if (found != NOTHING) return found;
+    return deeper ? look_into(c, &middle, after, depth - 1) : check_between(c, &middle, after);
+}
+
+/* Looks for events in an accepted step; shortens it to the first. Returns 0 if the step must be shorter. */
+int search_events(Instance *c) {
+    Look before = room_for_look(c, 0), after = room_for_look(c, 1);
+    const Piece *whole = memcpy(c->work.whole, c->piece, piece_size(c->model));
+    Found found;
+    if (!c->look_valid && !look_inside(c, whole->begin, &before)) return 0;
+    c->look_valid = 1;
+    before.t = whole->begin;
+    /* What the last event left positive did not want to fire: it is on its way down. */
+    for (int g = 0; g < c->model->n_guards; g++) before.values[g] = fmin(before.values[g], 0);
+    if (!look_inside(c, whole->end, &after)) return 0;
+    found = look_into(c, &before, &after, DEPTH);
+    if (found == NOTHING) memcpy(before.values, after.values, 2 * (size_t)c->model->n_guards * sizeof(double));
+    else if (found == ENDED) c->look_valid = 0;
+    return found != TOO_LONG;
+}

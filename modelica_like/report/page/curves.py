@@ -1,0 +1,69 @@
+"""What the script of a report draws: curves by quantity, modes as bands, events."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from modelica_like.solve.plot import chosen, unit_of
+from modelica_like.solve.plot import quantity as quantity_of
+from modelica_like.solve.solution import Solution
+
+_POINTS = 1200
+"""Results that are drawn; those at events are among them."""
+_MOST_BANDS = 400
+
+
+def curves(run: Solution, patterns: Sequence[str] = ()) -> dict[str, Any]:
+    """Return times, panels of curves by unit, modes as bands and events.
+
+    Args:
+        run: the run.
+        patterns: of what is drawn; by default speeds, torques and forces of the parts.
+
+    Raises:
+        UnknownName: nothing fits a pattern.
+    """
+    names = [name for name in chosen(run, patterns) if name in run.model.position]
+    rows = _thinned(run)
+    panels: dict[str, dict[str, Any]] = {}
+    for name, values in run.together(*names).items():
+        unit = unit_of(run, name)
+        panel = panels.setdefault(unit, {"title": quantity_of(unit), "unit": unit, "curves": []})
+        panel["curves"].append({"name": name, "values": [float(f"{value:.6g}") for value in values[rows]]})
+    return {
+        "times": [float(f"{t:.9g}") for t in run.time[rows]],
+        "panels": list(panels.values()),
+        "modes": _bands(run),
+        "events": sorted({float(f"{event.time:.9g}") for event in run.events}),
+    }
+
+
+def _thinned(run: Solution) -> NDArray[np.intp]:
+    """Positions of the results that are drawn: evenly spread ones, and both sides of every event."""
+    count = len(run.time)
+    spread = np.unique(np.linspace(0, count - 1, min(count, _POINTS)).round().astype(int))
+    times = np.unique([event.time for event in run.events][:_POINTS])
+    sides = np.concatenate([np.searchsorted(run.time, times, side) for side in ("left", "right")])
+    beside = np.clip(np.concatenate([sides, sides - 1]), 0, count - 1)
+    return np.unique(np.concatenate([spread, beside])).astype(np.intp)
+
+
+def _bands(run: Solution) -> list[dict[str, Any]]:
+    """Of each mode that changes, from when to when it has which name."""
+    found: dict[str, list[tuple[float, float, str]]] = {}
+    begin, end = float(run.time[0]), float(run.time[-1])
+    for event in run.events:
+        bands = found.setdefault(event.mode, [])
+        bands.append((bands[-1][1] if bands else begin, event.time, event.before))
+    last = {event.mode: event.after for event in run.events}
+    return [
+        {
+            "name": mode,
+            "bands": [band for band in [*bands, (bands[-1][1], end, last[mode])] if band[1] > band[0]][:_MOST_BANDS],
+        }
+        for mode, bands in found.items()
+    ]

@@ -1,0 +1,192 @@
+"""The page of a run."""
+
+from __future__ import annotations
+
+import json
+import platform
+import re
+from collections.abc import Callable, Iterable, Sequence
+from html import escape
+from importlib.metadata import version
+from pathlib import Path
+
+import casadi as ca
+
+from modelica_like.analyse.linear.linearize import linearize
+from modelica_like.draw import schematic
+from modelica_like.errors import ModelicaLikeError
+from modelica_like.language import Component
+from modelica_like.report.analysis import shares
+from modelica_like.report.page.curves import curves
+from modelica_like.report.run import notices, statistics_line
+from modelica_like.report.start import start_values
+from modelica_like.solve.energy import EnergyBalance
+from modelica_like.solve.recorder import Event
+from modelica_like.solve.solution import Solution
+from modelica_like.writing import write_text
+
+_MOST_EVENTS = 60
+_SMALL = 1e-6
+"""Part of the energy that moves below which a component is not listed."""
+
+
+def save_report(drive: Component, run: Solution, path: str | Path, *, show: Sequence[str] = ()) -> None:
+    """Write the report of a run as a page.
+
+    Args:
+        drive: what was run.
+        run: its run.
+        path: the file.
+        show: patterns of the curves, such as `*.w`; by default speeds, torques and forces of the parts.
+
+    Raises:
+        UnknownName: nothing fits a pattern.
+        OSError: the file cannot be written.
+    """
+    write_text(path, report(drive, run, show=show))
+
+
+def report(drive: Component, run: Solution, *, show: Sequence[str] = ()) -> str:
+    """Return the report of a run as HTML: one file that asks for nothing else.
+
+    Args:
+        drive: what was run.
+        run: its run.
+        show: patterns of the curves; by default speeds, torques and forces of the parts.
+
+    Raises:
+        UnknownName: nothing fits a pattern.
+    """
+    folder = Path(__file__).parent
+    sections = [
+        ("Schematic", f'<div class="wide">{_inline(schematic(drive))}</div>'),
+        ("What happens", _happens(run)),
+        ("Curves", '<div id="curves"></div><p class="hint">Move over a curve to read it, drag to zoom, double-click to '
+                   "see all.</p>"),
+        ("Energy", _attempt(lambda: _energy(run.energy()))),
+        ("Small motions at the end", _attempt(lambda: _small_motions(run))),
+        ("Parameters", _parameters(run)),
+        ("Start", _attempt(lambda: _start(drive, run))),
+        ("How it was computed", _computed(run)),
+        ("Netlist", _netlist(drive)),
+    ]  # fmt: skip
+    data = json.dumps(curves(run, show), ensure_ascii=False, separators=(",", ":")).replace("<", "\\u003c")
+    parts = {
+        "name": escape(run.model.name), "description": escape(getattr(drive, "description", "")), "data": data,
+        "sections": "\n".join(f"<section><h2>{title}</h2>{body}</section>" for title, body in sections if body),
+        "script": (folder / "page.js").read_text(encoding="utf-8").rstrip(),
+    }  # fmt: skip
+    page = (folder / "page.html").read_text(encoding="utf-8")
+    return re.sub(r"\{\{(\w+)\}\}", lambda found: parts[found[1]], page)
+
+
+def _attempt(make: Callable[[], str]) -> str:
+    """A section that cannot be made says why, and the others stand."""
+    try:
+        return make()
+    except ModelicaLikeError as error:
+        return f"<p>{escape(str(error))}</p>"
+
+
+def _inline(svg: str) -> str:
+    """A drawing takes its colours from the page."""
+    return re.sub(r'<rect class="paper" width="[^"]*" height="[^"]*" fill="[^"]*"/>', "", svg, count=1)
+
+
+def _table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Return a table; columns whose heads end with `>` are numbers."""
+    numbers = [head.endswith(">") for head in heads]
+    kinds = [' class="number"' if number else "" for number in numbers]
+    top = "".join(f"<th{kind}>{escape(head.rstrip('>'))}</th>" for head, kind in zip(heads, kinds, strict=True))
+    lines = ["".join(f"<td{kind}>{escape(cell)}</td>" for cell, kind in zip(row, kinds, strict=True)) for row in rows]
+    body = "".join(f"<tr>{line}</tr>" for line in lines)
+    return f"<table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table>" if lines else ""
+
+
+def _happens(run: Solution) -> str:
+    """Events in words, those of one instant together, and what the run has to say."""
+    instants: dict[float, dict[str, list[Event]]] = {}
+    for event in run.events:
+        instants.setdefault(event.time, {}).setdefault(event.mode, []).append(event)
+    lines = [
+        f"<li><b>{time:.6g} s</b> {'; '.join(escape(_told(run, events)) for events in modes.values())}.</li>"
+        for time, modes in list(instants.items())[:_MOST_EVENTS]
+    ]
+    lines += [f"<li>… {len(instants) - _MOST_EVENTS} more instants</li>"] if len(instants) > _MOST_EVENTS else []
+    said = "".join(f'<p class="notice">{escape(sentence)}</p>' for sentence in notices(run))
+    return said + (f"<ul>{''.join(lines)}</ul>" if lines else "<p>No mode changes.</p>")
+
+
+def _told(run: Solution, events: Sequence[Event]) -> str:
+    """Return what becomes of a mode at an instant: `clutch becomes stuck (slip reached zero)`."""
+    component = events[0].mode.rpartition(".")[0] or run.model.name
+    known = run.model.transitions
+    reasons = dict.fromkeys("an impact" if one.transition < 0 else known[one.transition].because for one in events)
+    told = ", ".join(filter(None, reasons))
+    return f"{component} becomes {events[-1].after.replace('_', ' ')}" + (f" ({told})" if told else "")
+
+
+def _energy(balance: EnergyBalance) -> str:
+    """Where the energy comes from and where it goes, in J and percent of what comes in."""
+    total = sum(max(row.source, 0.0) + max(-row.stored, 0.0) for row in balance) or 1.0
+    rows = [
+        (row.component or "the drive", what, value)
+        for row in balance
+        for what, value in (("brought in", row.source), ("stored", row.stored), ("lost", row.lost))
+        if abs(value) > _SMALL * balance.throughput
+    ]
+    order = {"brought in": 0, "stored": 1, "lost": 2}
+    rows.sort(key=lambda row: (order[row[1]], -abs(row[2])))
+    lines = "".join(
+        f'<tr><td>{escape(name)}</td><td>{what}</td><td class="number">{value:.5g}</td>'
+        f'<td class="number">{value / total:.1%}</td><td class="bar"><i class="{what.split()[0]}" '
+        f'style="width:{100 * min(abs(value / total), 1.0):.1f}%"></i></td></tr>'
+        for name, what, value in rows
+    )
+    heads = '<tr><th>part</th><th></th><th class="number">J</th><th class="number">share</th><th></th></tr>'
+    closes = f"The balance closes to {balance.closure:.1e} of {balance.throughput:.5g} J."
+    said = "".join(f'<p class="notice">{escape(sentence)}</p>' for sentence in balance.notices)
+    return f'<table class="energy"><thead>{heads}</thead><tbody>{lines}</tbody></table><p>{closes}</p>{said}'
+
+
+def _small_motions(run: Solution) -> str:
+    """Eigenfrequencies in the modes in which the run ends."""
+    modes = [mode for mode in linearize(run).modes() if mode.oscillates]
+    rows = [
+        (str(k), f"{mode.frequency:.4g}", f"{mode.damping:.3g}", shares(mode.stored), shares(mode.lost))
+        for k, mode in enumerate(modes, 1)
+    ]
+    return _table(("mode", "frequency in Hz>", "damping>", "energy in", "lost in"), rows)
+
+
+def _parameters(run: Solution) -> str:
+    values = zip(run.model.flat_parameters, run.model.p, strict=True)
+    return _details(_table(
+        ("parameter", "value>", "unit", "description"),
+        [(one.path, f"{value:.6g}", str(one.unit), one.description) for one, value in values],
+    ))  # fmt: skip
+
+
+def _start(drive: Component, run: Solution) -> str:
+    rows = start_values(drive, run.model, run.model.settings.get("start", "given"))
+    cells = [(row.path, f"{row.value:.6g}", row.unit, row.origin) for row in rows]
+    return _details(_table(("variable", "value>", "unit", "where from"), cells))
+
+
+def _details(table: str) -> str:
+    return f"<details><summary>show</summary>{table}</details>" if table else ""
+
+
+def _computed(run: Solution) -> str:
+    packages = f"modelica-like {version('modelica-like')}, CasADi {ca.__version__}, Python {platform.python_version()}"
+    options = f"rtol = {run.options.rtol:g}, atol = {run.options.atol:g}"
+    lines = run.model.summary, f"{statistics_line(run)}; {options}.", f"{packages}."
+    return "".join(f"<p>{escape(line)}</p>" for line in lines)
+
+
+def _netlist(drive: Component) -> str:
+    origin = getattr(drive, "origin", "")
+    if not origin or not Path(origin).is_file():
+        return ""
+    name, text = Path(origin).name, Path(origin).read_text("utf-8")
+    return f"<details><summary>{escape(name)}</summary><pre>{escape(text)}</pre></details>"

@@ -1,0 +1,177 @@
+"""The report of a run: what is written, and what a browser makes of it."""
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from modelica_like import load, simulate
+from modelica_like.cli import app
+from modelica_like.errors import UnknownName
+from modelica_like.report.page import report, save_report
+from modelica_like.report.page.curves import curves
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+LARGEST = 1_500_000
+"""Bytes of a page."""
+INK = "getComputedStyle(document.documentElement).getPropertyValue('--ink')"
+# How many dots of a panel have a colour.
+DRAWN = """[...document.querySelectorAll("canvas")].map((one) => {
+  const { data } = one.getContext("2d").getImageData(0, 0, one.width, one.height);
+  return data.filter((value, k) => k % 4 === 3 && value).length;
+})"""
+MOVE = """((name, x) => {
+  const canvas = document.querySelector("canvas"), box = canvas.getBoundingClientRect();
+  const place = { clientX: box.left + 64 + x * (box.width - 76), clientY: box.top + 40, pointerId: 1, bubbles: true };
+  canvas.setPointerCapture = () => {};
+  canvas.dispatchEvent(new PointerEvent(name, place));
+})"""
+
+
+@pytest.fixture(scope="session")
+def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    drive = load(EXAMPLES / "machine_tool_startup.toml")
+    path = tmp_path_factory.mktemp("report") / "startup.html"
+    save_report(drive, simulate(drive), path)
+    return path
+
+
+def rows(page: Path, title: str) -> list[list[str]]:
+    """Cells of the table of a section."""
+    text = re.search(rf"<h2>{title}</h2>(.*?)</section>", page.read_text("utf-8"), re.DOTALL)
+    assert text
+    found = re.findall(r"<tr>(.*?)</tr>", text[1])
+    return [[re.sub("<.*?>", "", cell) for cell in re.findall(r"<td.*?</td>", row)] for row in found][1:]
+
+
+def test_it_is_one_file_that_asks_for_nothing(page: Path) -> None:
+    text = page.read_text("utf-8")
+    assert len(text) < LARGEST
+    assert not re.search(r'(?:src|href)="(?!data:)', text)
+    assert "http://www.w3.org/2000/svg" in text
+
+
+def test_what_happens_is_told_in_words(page: Path) -> None:
+    text = page.read_text("utf-8")
+    assert "<b>0.265473 s</b> clutch becomes stuck (slip reached zero)." in text
+    assert "load becomes forward (friction limit exceeded, slip begins)." in text
+
+
+def test_shares_of_energy_add_up(page: Path) -> None:
+    # What comes in, and what stores give, is stored or lost.
+    signs = {"brought in": 1.0, "stored": -1.0, "lost": -1.0}
+    total = sum(signs[what] * float(share.rstrip("%")) for _, what, _, share, _ in rows(page, "Energy"))
+    assert total == pytest.approx(0.0, abs=0.7), "rounded to a tenth of a percent"
+    clutch = next(row for row in rows(page, "Energy") if row[:2] == ["clutch", "lost"])
+    assert float(clutch[2]) == pytest.approx(537.7, abs=0.1), "document 003"
+
+
+def test_eigenfrequencies_are_listed(page: Path) -> None:
+    assert len(rows(page, "Small motions at the end")) == 3
+
+
+def test_parameters_are_listed_with_units(page: Path) -> None:
+    assert ["k1", "6120", "N.m/rad", ""] in rows(page, "Parameters")
+
+
+def test_start_values_are_listed(page: Path) -> None:
+    found = {row[0]: row[1:] for row in rows(page, "Start")}
+    assert found["J2.w"][:2] == ["32.401", "rad/s"]
+    assert found["J2.w"][2].startswith("given in machine_tool_startup.toml:")
+
+
+def test_curves_keep_both_sides_of_events() -> None:
+    run = simulate(EXAMPLES / "machine_tool_startup.toml", points=10_000)
+    drawn = curves(run, ["clutch.tau"])
+    assert len(drawn["times"]) < 1300
+    for event in run.events:
+        assert drawn["times"].count(float(f"{event.time:.9g}")) >= 2
+    (panel,) = drawn["panels"]
+    values = np.interp(drawn["times"], run.time, run["clutch.tau"])
+    inside = np.diff(drawn["times"], prepend=-1.0) > 0
+    assert np.array(panel["curves"][0]["values"])[inside] == pytest.approx(values[inside], rel=1e-3, abs=1.0)
+
+
+def test_modes_are_bands_without_gaps() -> None:
+    run = simulate(EXAMPLES / "lepelletier.toml")
+    for mode in curves(run)["modes"]:
+        assert mode["bands"][0][0] == 0.0
+        assert mode["bands"][-1][1] == run.time[-1]
+        for (_, end, before), (begin, _, after) in zip(mode["bands"], mode["bands"][1:], strict=False):
+            assert end == begin
+            assert before != after
+
+
+def test_names_from_outside_are_text() -> None:
+    from components import ConstantTorque, Inertia
+    from modelica_like.language import Assembly
+
+    parts = {"motor": ConstantTorque(tau_constant=1), "J": Inertia(J=1)}
+    wires = {"a": ["motor.flange", "J.flange_a"]}
+    drive = Assembly("</script><b>", parts=parts, connect=wires, description="<i>")
+    text = report(drive, simulate(drive, 1.0, start="rest"))
+    assert "</script><b>" not in text
+    assert "&lt;/script&gt;&lt;b&gt;" in text
+    assert "<i>" not in text.partition("<section>")[0]
+
+
+def test_an_unknown_pattern_is_told() -> None:
+    drive = load(EXAMPLES / "machine_table_direct.toml")
+    with pytest.raises(UnknownName, match=r"no variable 'nix\.\*'"):
+        report(drive, simulate(drive), show=["nix.*"])
+
+
+def test_the_command_writes_it(tmp_path: Path) -> None:
+    file = tmp_path / "table.html"
+    result = CliRunner().invoke(app, ["report", str(EXAMPLES / "machine_table_direct.toml"), "-o", str(file)])
+    assert result.exit_code == 0, result.output
+    assert file.read_text("utf-8").startswith("<!DOCTYPE html>")
+
+
+# -- in a browser ------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.browser
+@pytest.mark.parametrize("width", [1200, 420])
+def test_all_panels_are_drawn_without_complaint(browser: Any, page: Path, width: int) -> None:
+    browser.open(page, width)
+    assert browser.complaints == []
+    drawn = browser.run(DRAWN)
+    assert len(drawn) == 3
+    assert min(drawn) > 1000
+    assert browser.run("document.documentElement.scrollWidth <= innerWidth"), "nothing is wider than the page"
+
+
+@pytest.mark.browser
+def test_values_are_read_under_the_pointer(browser: Any, page: Path) -> None:
+    browser.open(page)
+    browser.run(f"{MOVE}('pointermove', 0.5)")
+    read = browser.run("[...document.querySelectorAll('.panel output')].map((one) => one.textContent)")
+    assert float(read[0]) == pytest.approx(32.417, abs=1e-3), "the motor turns with 309.6 rpm"
+    assert read[-1].startswith("t = 0.5")
+    assert "clutch.mode stuck" in read[-1]
+
+
+@pytest.mark.browser
+def test_all_panels_zoom_together(browser: Any, page: Path) -> None:
+    browser.open(page)
+    for name, x in (("pointerdown", 0.2), ("pointermove", 0.4), ("pointerup", 0.4)):
+        browser.run(f"{MOVE}('{name}', {x})")
+    low, high = browser.run("[view.low, view.high]")
+    assert (low, high) == (pytest.approx(0.2, abs=0.01), pytest.approx(0.4, abs=0.01))
+    browser.run(f"{MOVE}('dblclick', 0.4)")
+    assert browser.run("[view.low, view.high]") == [0, 1]
+
+
+@pytest.mark.browser
+def test_it_has_dark_colours_and_prints(browser: Any, page: Path) -> None:
+    browser.open(page)
+    light = browser.run(INK)
+    browser.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": "dark"}])
+    assert browser.run(INK) != light
+    browser.call("Emulation.setEmulatedMedia", features=[])
+    assert len(json.dumps(browser.call("Page.printToPDF"))) > 20_000
