@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import gc
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -52,7 +49,7 @@ def export(
     debug: Debug = False,
 ) -> None:  # fmt: skip
     """Export a netlist as an FMU: compiled C that needs no Python, and check it; or as a page for a browser."""
-    with told(debug), _no_search_for_cycles():
+    with told(debug):
         assembly = load_netlist(netlist, assignments)
         from rich.console import Console
 
@@ -72,16 +69,6 @@ def export(
                 fixed_step=fixed_step, tables=tables or (), check=check, strict=strict, report=status.update,
             )  # fmt: skip
         say(str(done))
-
-
-@contextmanager
-def _no_search_for_cycles() -> Iterator[None]:
-    """The process ends soon, and the search takes a sixth of the time of a large model."""
-    gc.disable()
-    try:
-        yield
-    finally:
-        gc.enable()
 
 
 def runtimes(

@@ -28,7 +28,7 @@ from modelica_like.fmi.sources import LOG_CATEGORIES, licenses, runtime_sources,
 from modelica_like.fmi.tables import make_tables
 from modelica_like.fmi.terminals import Takes, icon_name, terminals_and_icons, with_open_ends
 from modelica_like.language.tunable import with_tunable_tables
-from modelica_like.simulation import Model, positive_step, seconds
+from modelica_like.simulation import Model, positive_step, seconds, without_garbage_search
 from modelica_like.solve.options import Options
 from modelica_like.solve.plot import save_plot
 from modelica_like.structure import reduce
@@ -70,6 +70,7 @@ class Export:
         return " ".join(filter(None, (f"{line}\n{self.check.sentence}".rstrip(), picture)))
 
 
+@without_garbage_search()
 def export_fmu(
     drive: Model, path: str | Path, version: Version | str = "2.0", kind: Collection[Kind | str] = ("me", "cs"),
     platforms: Sequence[str] | str = "native", *, outputs: Sequence[str] = (), ends: Sequence[str] = (),

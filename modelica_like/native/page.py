@@ -24,7 +24,7 @@ from modelica_like.fmi.package import target_file
 from modelica_like.fmi.runtime import runtime_library
 from modelica_like.fmi.tables import make_tables
 from modelica_like.native.library import MESSAGE_LENGTH, Run
-from modelica_like.simulation import Model, seconds, simulate
+from modelica_like.simulation import Model, seconds, simulate, without_garbage_search
 from modelica_like.solve.options import Options
 from modelica_like.solve.plot import chosen
 from modelica_like.solve.plot import quantity as quantity_of
@@ -60,6 +60,7 @@ class Page:
         return f"{self.path}: {counts}, {self.size / 1000:.0f} kB, {self.seconds:.1f} s"
 
 
+@without_garbage_search()
 def export_html(
     drive: Model, path: str | Path, until: float | str | None = None, *, show: Sequence[str] = (),
     report: Report = silent,
