@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+<<<<<<< HEAD
 import gc
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+=======
+>>>>>>> fmipy
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -50,7 +53,7 @@ def export(
     debug: Debug = False,
 ) -> None:  # fmt: skip
     """Export a netlist as an FMU: compiled C that needs no Python, and check it; or as a page for a browser."""
-    with told(debug), _no_search_for_cycles():
+    with told(debug):
         assembly = load_netlist(netlist, assignments)
         from rich.console import Console
 
@@ -69,6 +72,7 @@ def export(
         say(str(done))
 
 
+<<<<<<< HEAD
 def _page(assembly: Any, file: Path, show: Sequence[str], report: Callable[[str], None]) -> None:
     from modelica_like.native.page import export_html
 
@@ -85,6 +89,8 @@ def _no_search_for_cycles() -> Iterator[None]:
         gc.enable()
 
 
+=======
+>>>>>>> fmipy
 def runtimes(
     *, platforms: Annotated[
         str, Option(metavar="NAMES", help="Platforms to compile for: native, all, or names with commas.")
