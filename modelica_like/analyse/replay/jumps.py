@@ -311,8 +311,7 @@ class Work:
         share(model, self.point)
         solve_implicit(model, self.point)
         for circuit in model.circuits:
-            count = len(circuit.members)
-            own = slice(circuit.first, circuit.first + count * (1 + count))
+            own = circuit.entries
             self.d[own] = 0.0
             self.d[own] = share_slopes(model, self.point, circuit, columns, self._total)
 

@@ -151,7 +151,7 @@ def _by_existence(
         if moving and (named or len(reasons.keys() | moving) == len(chosen)):
             raise NoGradient(
                 error.what, where=error.where, why=error.why,
-                advice=f"Leave out {' and '.join(moving[:_NAMED])} or move the parameters away from this limit.",
+                advice=f"Leave out {' and '.join(moving[:_NAMED])}, or {error.advice[0].lower()}{error.advice[1:]}",
             )  # fmt: skip
         reasons |= dict.fromkeys(moving, error.what)
     return [k for k, one in enumerate(chosen) if one.name not in reasons], reasons
