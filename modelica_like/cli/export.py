@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import gc
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from modelica_like.cli.declare import Option
 from modelica_like.cli.shared import Assignments, Debug, Netlist, load_netlist, say, told
@@ -19,9 +17,7 @@ Modes = Literal["output", "local", "integer"]
 
 def export(
     netlist: Netlist, assignments: Assignments = None, *,
-    output: Annotated[
-        Path | None, Option("-o", "--output", metavar="FILE", help="The FMU; else named after the netlist.")
-    ] = None,
+    output: Annotated[Path | None, Option("-o", "--output", metavar="FILE", help="The FMU; else NETLIST.fmu.")] = None,
     html: Annotated[
         Path | None, Option(metavar="FILE", help="A page that simulates in a browser; with -o besides the FMU.")
     ] = None,
@@ -52,7 +48,7 @@ def export(
     debug: Debug = False,
 ) -> None:  # fmt: skip
     """Export a netlist as an FMU: compiled C that needs no Python, and check it; or as a page for a browser."""
-    with told(debug), _no_search_for_cycles():
+    with told(debug):
         assembly = load_netlist(netlist, assignments)
         from rich.console import Console
 
@@ -60,10 +56,7 @@ def export(
 
         with Console(stderr=True).status("loading") as status:
             if html is not None:
-                from modelica_like.native.page import export_html
-
-                page = export_html(assembly, html, show=outputs or (), report=status.update)
-                say(str(page))
+                _page(assembly, html, outputs or (), status.update)
             if html is not None and output is None:
                 return
             done = export_fmu(
@@ -74,14 +67,10 @@ def export(
         say(str(done))
 
 
-@contextmanager
-def _no_search_for_cycles() -> Iterator[None]:
-    """The process ends soon, and the search takes a sixth of the time of a large model."""
-    gc.disable()
-    try:
-        yield
-    finally:
-        gc.enable()
+def _page(assembly: Any, file: Path, show: Sequence[str], report: Callable[[str], None]) -> None:
+    from modelica_like.native.page import export_html
+
+    say(str(export_html(assembly, file, show=show, report=report)))
 
 
 def runtimes(

@@ -46,7 +46,7 @@ def simulate(
     ] = None,
     sankey: Annotated[Path | None, Option(metavar="FILE", help="Draw where the energy went.")] = None,
     energy: Annotated[bool, Option(help="Print the energy balance.")] = True,
-    solver: Annotated[Solver, Option(help="IDAS, or the compiled run-time of FMUs.")] = "idas",
+    solver: Annotated[Solver | None, Option(help="IDAS only, or only the compiled run-time of FMUs.")] = None,
     debug: Debug = False,
 ) -> None:  # fmt: skip
     """Simulate a netlist: events, energy balance, results as table and picture."""

@@ -21,7 +21,6 @@ from modelica_like.compile.soon import guards_soon
 from modelica_like.compile.start_system import start_system
 from modelica_like.errors import Source
 from modelica_like.flatten.model import FlatDiscrete, FlatModel, evaluate
-from modelica_like.flatten.template import TransitionForm
 from modelica_like.language.fields import Input
 from modelica_like.structure.holds import hold_terms
 from modelica_like.structure.reduce import ReducedDae
@@ -183,16 +182,9 @@ class _Builder:
                 for path, position in form.resets:
                     changes.append(self._reset(prefix + path, len(resets), targets))
                     resets.append(columns["resets"][number][position])
-                found.append(self._transition(prefix, form, len(store) - 1, tuple(changes)))
+                numbers = {"mode": self.place[prefix + form.mode], "index": len(store) - 1, "resets": tuple(changes)}
+                found.append(CompiledTransition(**{**vars(form), **numbers}))
         return ca.vertcat(*guards), ca.vertcat(*moments), tuple(found), ca.vertcat(*resets), targets
-
-    def _transition(
-        self, prefix: str, form: TransitionForm, index: int, resets: tuple[Reset, ...]
-    ) -> CompiledTransition:
-        return CompiledTransition(
-            self.place[prefix + form.mode], form.sources, form.target, form.timed, index, resets, form.source,
-            form.notice, form.because, form.fails,
-        )  # fmt: skip
 
     def _reset(self, path: str, value: int, targets: list[int]) -> Reset:
         if path in self.place:

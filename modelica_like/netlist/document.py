@@ -7,7 +7,7 @@ import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, get_args
 
 from modelica_like.errors import (
     DuplicateName,
@@ -24,7 +24,8 @@ from modelica_like.units import parse_unit, to_si
 
 _ENDLESS = re.compile(r"[0-9]{4301}")
 MAX_BYTES = 2_000_000
-START_KINDS = ("given", "rest", "steady")
+StartKind = Literal["given", "rest", "steady"]
+"""What stands for start values that are not given."""
 Check = Callable[[str, Any], Any]
 """Returns an entry with the key `section.name`, if it has the right form."""
 Reader = Callable[[str, Any, Lines, list[ModelicaLikeError]], Any]
@@ -309,8 +310,8 @@ def duration(key: str, value: Any) -> Any:
 
 
 def _start_kind(key: str, value: Any) -> str:
-    if value not in START_KINDS:
-        raise NetlistError(f"{key} = {value!r} must be one of {', '.join(START_KINDS)}.")
+    if value not in get_args(StartKind):
+        raise NetlistError(f"{key} = {value!r} must be one of {', '.join(get_args(StartKind))}.")
     return value
 
 

@@ -121,12 +121,13 @@ def test_specialised_tapes_change_nothing(monkeypatch, tmp_path):
         assert all(np.array_equal(a.x, b.x) for a, b in zip(special.segments, full.segments, strict=True))
 
 
-def test_gradients_of_a_native_run():
+@pytest.mark.parametrize("method", ["forward", "adjoint"])
+def test_gradients_of_a_native_run(method):
     drive = build(STARTUP)
     outputs = ["J2.w", "clutch.loss_energy", "max(shaft1.tau)"]
     first, second = (
         sensitivities(
-            simulate(drive, rtol=1e-9, atol=1e-11, solver=solver), outputs, ["k1", "J1.J", "force"]
+            simulate(drive, rtol=1e-9, atol=1e-11, solver=solver), outputs, ["k1", "J1.J", "force"], method=method
         ).derivatives
         for solver in ("idas", "native")
     )
@@ -203,6 +204,9 @@ def test_a_run_that_idas_gives_up_is_done_by_the_run_time(monkeypatch):
     (told,) = run.notices
     assert told.startswith("IDAS gave up at about t = ")
     assert told.endswith("The whole run was done by the compiled run-time instead (solver native).")
+
+    with pytest.raises(StepFailed):
+        simulate(gearbox, rtol=1e-13, atol=1e-15, solver="idas")
 
     def missing():
         raise ExportError("There is no run-time.")
