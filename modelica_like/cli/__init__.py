@@ -16,14 +16,11 @@ if TYPE_CHECKING:
 _GROUPS = {
     "models": ("check", "simulate"),
     "pictures": ("draw", "report"),
-    "analysis": ("modes",),
-    "sweeps": ("steady", "sweep"),
-    "sensitivity": ("sensitivity",),
+    "analysis": ("modes", "steady", "sweep", "sensitivity"),
     "export": ("export", "runtimes"),
     "cosimulation": ("split", "cosim"),
     "types": ("describe", "schema", "library", "docs"),
-    "validation": ("validate", "compare"),
-    "design": ("size", "demo"),
+    "validation": ("validate", "compare", "size", "demo"),
 }
 _HOME = {name: group for group, names in _GROUPS.items() for name in names}
 

@@ -1,4 +1,4 @@
-"""Commands on small motions: modes."""
+"""Commands on what a drive does: small motions, operating points, sweeps, exact derivatives."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Annotated
 
 from modelica_like.cli.declare import Option
+from modelica_like.cli.models import Solver, Start
 from modelica_like.cli.shared import Assignments, Debug, Netlist, load_netlist, out, told
 
 
@@ -24,8 +25,7 @@ def modes(
     """Linearise a netlist at a point: eigenvalues, damping, where the energy of each mode is."""
     with told(debug, pictures=[shapes, bode]):
         assembly = load_netlist(netlist, assignments)
-        from modelica_like.analyse.linear.linearize import linearize
-        from modelica_like.analyse.linear.points import when
+        from modelica_like.analyse.linear.linearize import linearize, when
         from modelica_like.report.analysis import modes_report
         from modelica_like.solve.plot import save_plot
 
@@ -41,3 +41,93 @@ def modes(
 
 def _is_speed(path: str, unit: str) -> bool:
     return unit == "rad/s" and path.endswith(".w")
+
+
+def steady(
+    netlist: Netlist, assignments: Assignments = None, *,
+    hold: Annotated[
+        list[str] | None, Option(metavar="NAME=VALUE", help="Hold a variable, e.g. 'motor.w=4000 rpm'.")
+    ] = None,
+    by: Annotated[list[str] | None, Option(metavar="PARAMETER", help="Find it, one for each held one.")] = None,
+    over: Annotated[
+        str | None, Option(metavar="NAME=VALUES", help="A curve, e.g. 'load=0:0.25:26' or 'load=0,0.1,0.2'.")
+    ] = None,
+    after: Annotated[str | None, Option(metavar="TIME", help="Begin from the end of a run, e.g. 2s.")] = None,
+    show: Annotated[list[str] | None, Option(metavar="NAME", help="Variables of the table and the plot.")] = None,
+    plot: Annotated[Path | None, Option(metavar="FILE", help="Draw the curve.")] = None,
+    debug: Debug = False,
+) -> None:  # fmt: skip
+    """Find operating points of a netlist: powers, losses and efficiency, or a characteristic curve."""
+    with told(debug, pictures=[plot]):
+        assembly = load_netlist(netlist, assignments)
+        from modelica_like.analyse.operating.curves import characteristic
+        from modelica_like.analyse.operating.steady import steady as find
+        from modelica_like.analyse.sweeps.ranges import read_assignment, read_range
+        from modelica_like.report.analysis import curves_report, point_report
+        from modelica_like.simulation import simulate
+        from modelica_like.solve.plot import save_plot
+
+        near = simulate(assembly, after) if after else None
+        if over is None:
+            held = dict(read_assignment(text) for text in hold or ())
+            out().print(point_report(find(assembly, held, by or (), near=near), show or ()))
+            return
+        curves = characteristic(assembly, dict([read_range(over)]), by=(by or [""])[0], near=near)
+        out().print(curves_report(curves, show or ()))
+        if plot:
+            save_plot(curves.plot(*(show or ("efficiency",))), plot)
+
+
+def sweep(
+    netlist: Netlist,
+    over: Annotated[list[str], Option(metavar="NAME=VALUES", help="E.g. 'gear.ratio=2:4:21' or 'mu=0.1,0.3'.")],
+    of: Annotated[list[str], Option(metavar="OUTPUT", help="What to read off each run, e.g. 'max(shaft.tau)'.")],
+    assignments: Assignments = None, *,
+    until: Annotated[str | None, Option(metavar="TIME", help="End time, e.g. 2s; else the netlist's.")] = None,
+    checkpoint: Annotated[Path | None, Option(metavar="FOLDER", help="Keeps what is done.")] = None,
+    processes: Annotated[int | None, Option(metavar="N", help="At once on this machine; else one per core.")] = None,
+    scheduler: Annotated[str | None, Option(metavar="ADDRESS", help="Dask, e.g. tcp://host:8786.")] = None,
+    solver: Annotated[Solver, Option(help="The compiled run-time of FMUs, or IDAS.")] = "native",
+    output: Annotated[Path | None, Option("--output", "-o", metavar="FILE", help=".csv, .parquet, .nc.")] = None,
+    debug: Debug = False,
+) -> None:  # fmt: skip
+    """Simulate a netlist over a grid of parameter values."""
+    with told(debug, tables=[output], files=[checkpoint / "zarr.json" if checkpoint else None]):
+        assembly = load_netlist(netlist, assignments)
+        from modelica_like.analyse.sweeps.ranges import read_range
+        from modelica_like.analyse.sweeps.sweep import sweep as run
+        from modelica_like.report.analysis import sweep_report
+        from modelica_like.report.files import STDOUT, write_dataset
+        from modelica_like.report.progress import Bar
+
+        with Bar(title="runs") as bar:
+            found = run(
+                assembly, dict(read_range(text) for text in over), of, until=until, checkpoint=checkpoint,
+                processes=processes, scheduler=scheduler, progress=bar, solver=solver,
+            )  # fmt: skip
+        out(stderr=output == STDOUT).print(sweep_report(found))
+        if output:
+            write_dataset(found, output)
+
+
+def sensitivity(
+    netlist: Netlist,
+    of: Annotated[list[str], Option(metavar="OUTPUT", help="What to differentiate, e.g. 'max(shaft.tau)'.")],
+    to: Annotated[list[str] | None, Option(metavar="PARAMETER", help="By what; else by all.")] = None,
+    assignments: Assignments = None, *,
+    until: Annotated[str | None, Option(metavar="TIME", help="End time, e.g. 2s; else the netlist's.")] = None,
+    start: Annotated[Start | None, Option(help="Start values: as given, from rest, or the steady state.")] = None,
+    tornado: Annotated[Path | None, Option(metavar="FILE", help="Draw a tornado plot of the first.")] = None,
+    debug: Debug = False,
+) -> None:  # fmt: skip
+    """Differentiate a run exactly, through its events: ranking tables, tornado plot."""
+    with told(debug, pictures=[tornado]):
+        assembly = load_netlist(netlist, assignments)
+        from modelica_like.analyse.sensitivity.derivatives import sensitivities
+        from modelica_like.report.analysis import sensitivity_report
+        from modelica_like.solve.plot import save_plot
+
+        result = sensitivities(assembly, of, to or (), until=until, start=start)
+        out().print(sensitivity_report(result))
+        if tornado:
+            save_plot(result.tornado(of[0]), tornado)

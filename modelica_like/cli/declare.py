@@ -10,32 +10,23 @@ class Argument:
     """A value by its position.
 
     Args:
-        metavar: how the help names it.
+        names: of an option, with their dashes; by default that of the parameter.
+        metavar: how the help names the value.
         help: what it is.
-        show_default: whether the help tells its default.
+        show_default: whether the help shows its default.
     """
 
-    def __init__(self, *, metavar: str | None = None, help: str | None = None, show_default: bool = True) -> None:
+    def __init__(
+        self, *names: str, metavar: str | None = None, help: str | None = None, show_default: bool = True
+    ) -> None:
+        self.names = names
         self.metavar = metavar
         self.help = help
         self.show_default = show_default
 
 
 class Option(Argument):
-    """A value by its name.
-
-    Args:
-        names: with their dashes; by default that of the parameter.
-        metavar: how the help names the value.
-        help: what it is.
-        show_default: whether the help tells its default.
-    """
-
-    def __init__(
-        self, *names: str, metavar: str | None = None, help: str | None = None, show_default: bool = True
-    ) -> None:
-        super().__init__(metavar=metavar, help=help, show_default=show_default)
-        self.names = names
+    """A value by its name."""
 
 
 class WrongUse(Exception):

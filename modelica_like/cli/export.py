@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+<<<<<<< HEAD
+import gc
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+=======
+>>>>>>> fmipy
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from modelica_like.cli.declare import Option
 from modelica_like.cli.shared import Assignments, Debug, Netlist, load_netlist, say, told
@@ -16,9 +22,7 @@ Modes = Literal["output", "local", "integer"]
 
 def export(
     netlist: Netlist, assignments: Assignments = None, *,
-    output: Annotated[
-        Path | None, Option("-o", "--output", metavar="FILE", help="The FMU; else named after the netlist.")
-    ] = None,
+    output: Annotated[Path | None, Option("-o", "--output", metavar="FILE", help="The FMU; else NETLIST.fmu.")] = None,
     html: Annotated[
         Path | None, Option(metavar="FILE", help="A page that simulates in a browser; with -o besides the FMU.")
     ] = None,
@@ -57,10 +61,7 @@ def export(
 
         with Console(stderr=True).status("loading") as status:
             if html is not None:
-                from modelica_like.native.page import export_html
-
-                page = export_html(assembly, html, show=outputs or (), report=status.update)
-                say(str(page))
+                _page(assembly, html, outputs or (), status.update)
             if html is not None and output is None:
                 return
             done = export_fmu(
@@ -71,6 +72,25 @@ def export(
         say(str(done))
 
 
+<<<<<<< HEAD
+def _page(assembly: Any, file: Path, show: Sequence[str], report: Callable[[str], None]) -> None:
+    from modelica_like.native.page import export_html
+
+    say(str(export_html(assembly, file, show=show, report=report)))
+
+
+@contextmanager
+def _no_search_for_cycles() -> Iterator[None]:
+    """The process ends soon, and the search takes a sixth of the time of a large model."""
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.enable()
+
+
+=======
+>>>>>>> fmipy
 def runtimes(
     *, platforms: Annotated[
         str, Option(metavar="NAMES", help="Platforms to compile for: native, all, or names with commas.")

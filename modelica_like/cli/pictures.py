@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Annotated
 
 from modelica_like.cli.declare import Option
-from modelica_like.cli.shared import Assignments, Debug, Netlist, load_netlist, out, told
+from modelica_like.cli.shared import Assignments, Debug, Netlist, load_netlist, say, told
 
 
 def draw(
@@ -22,7 +22,7 @@ def draw(
         path = output or Path(f"{netlist.stem}.svg")
         check_format(path)
         save_schematic(load_netlist(netlist, assignments), path, depth=depth)
-        out().print(f"{path}")
+        say(str(path))
 
 
 def report(
@@ -46,4 +46,4 @@ def report(
         with Bar(until or model.settings.get("until")) as bar:
             run = simulate(model, until, progress=bar)
         save_report(drive, run, path, show=show or ())
-        out().print(f"{path}")
+        say(str(path))

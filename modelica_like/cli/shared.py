@@ -7,7 +7,7 @@ import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NoReturn
+from typing import TYPE_CHECKING, Annotated, Any
 
 from modelica_like.cli.declare import Argument, Option, WrongUse
 from modelica_like.errors import InitializationError, ModelicaLikeError, SolveError, Source
@@ -50,27 +50,29 @@ def told(
     try:
         _check(filter(None, tables), filter(None, pictures), filter(None, files))
         yield
-    except KeyboardInterrupt as error:
-        if debug:
-            raise
-        _fail(" ".join(["Interrupted.", *(_notes(error) or ["Unfinished results are not written."])]), INTERRUPTED)
-    except ModelicaLikeError as error:
-        if debug:
-            raise
-        _fail("\n".join([str(error), *_notes(error)]), exit_code(error))
     except BrokenPipeError:
         # Who reads the results has seen enough.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         raise SystemExit(SOLVE_FAILED) from None
-    except OSError as error:
+    except (KeyboardInterrupt, ModelicaLikeError, OSError, *DEFECTS) as error:
         if debug:
             raise
-        _fail(f"{error.filename or 'A temporary file'}: {error.strerror or error}.", BAD_INPUT)
-    except DEFECTS as error:
-        if debug:
-            raise
-        what = f"{type(error).__name__}: {error}"
-        _fail(f"This should not happen: {what}\nRun again with --debug, and report what it shows.", SOLVE_FAILED)
+        message, code = _explained(error)
+        warn(message, "red")
+        raise SystemExit(code) from None
+
+
+def _explained(error: BaseException) -> tuple[str, int]:
+    """Return what an error says, and the exit code."""
+    notes: list[str] = getattr(error, "__notes__", [])
+    if isinstance(error, KeyboardInterrupt):
+        return " ".join(["Interrupted.", *(notes or ["Unfinished results are not written."])]), INTERRUPTED
+    if isinstance(error, ModelicaLikeError):
+        return "\n".join([str(error), *notes]), exit_code(error)
+    if isinstance(error, OSError):
+        return f"{error.filename or 'A temporary file'}: {error.strerror or error}.", BAD_INPUT
+    what = f"This should not happen: {type(error).__name__}: {error}"
+    return f"{what}\nRun again with --debug, and report what it shows.", SOLVE_FAILED
 
 
 def _check(tables: Iterable[Path], pictures: Iterable[Path], files: Iterable[Path]) -> None:
@@ -86,19 +88,10 @@ def _check(tables: Iterable[Path], pictures: Iterable[Path], files: Iterable[Pat
         check_picture(file)
 
 
-def _notes(error: BaseException) -> list[str]:
-    return getattr(error, "__notes__", [])
-
-
 def exit_code(error: ModelicaLikeError) -> int:
     """Return 1 where the model is right but cannot be solved, 2 where it is wrong."""
     unsolved = isinstance(error, SolveError) or type(error) is InitializationError
     return SOLVE_FAILED if unsolved else BAD_INPUT
-
-
-def _fail(message: str, code: int) -> NoReturn:
-    warn(message, "red")
-    raise SystemExit(code)
 
 
 def warn(message: str, colour: str = "yellow") -> None:
@@ -128,23 +121,29 @@ def say(text: str) -> None:
     out().print(escape(text), soft_wrap=True)
 
 
+def assigned(assignments: list[str] | None, option: str) -> dict[str, str]:
+    """Read what stands before and behind the signs of equality."""
+    pairs = [one.partition("=") for one in assignments or ()]
+    for before, equals, _ in pairs:
+        if not equals:
+            raise WrongUse(f"'{before}' is not {'PATH=VALUE' if option == '--set' else 'WHAT=UNIT'}.", option)
+    return {before.strip(): after.strip() for before, _, after in pairs}
+
+
 def load_netlist(netlist: Path, assignments: list[str] | None) -> Any:
     """Load a netlist and give it the values of `--set`."""
     from modelica_like.language import Assembly
     from modelica_like.netlist import load
 
     assembly = load(netlist)
-    for assignment in assignments or ():
-        path, equals, value = assignment.partition("=")
-        if not equals:
-            raise WrongUse(f"'{assignment}' is not PATH=VALUE.", "--set")
-        place = Source("--set", text=assignment)
+    for path, value in assigned(assignments, "--set").items():
+        place = Source("--set", text=f"{path}={value}")
         try:
-            assembly.set(path.strip(), _value(value.strip()))
+            assembly.set(path, _value(value))
         except ModelicaLikeError as error:
             error.where = (place,)
             raise
-        Assembly.place(assembly, f"set.{path.strip()}", place)
+        Assembly.place(assembly, f"set.{path}", place)
     return assembly
 
 

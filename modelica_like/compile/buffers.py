@@ -51,9 +51,15 @@ class BufferedFunction:
             array.fill(np.nan)
 
     def along(self, points: list[Vector], p: Vector, u: Vector) -> list[Vector]:
-        """Evaluate a mapped function at as many points (t, x, z, d) as there are; what lies behind is left over.
+        """Evaluate a mapped function at as many points as there are; what lies behind is left over.
 
-        p and u are the same at all points; the results are valid until the next call.
+        Args:
+            points: t, x, z and d of all points, each flat.
+            p: parameters, the same at all points.
+            u: inputs, likewise.
+
+        Returns:
+            Flat results, valid until the next call.
         """
         for k, part in zip((0, 1, 2, 5), points, strict=True):
             self._arguments[k][: len(part)] = part
@@ -70,7 +76,14 @@ class BufferedFunction:
 
 
 def buffered(cache: dict[Any, Any], key: Any, make: Any, results: tuple[int, ...] | None = None) -> BufferedFunction:
-    """Return this thread's buffered function for a key, made from `make()` on first use."""
+    """Return this thread's buffered function, made on first use.
+
+    Args:
+        cache: keeps it.
+        key: names it.
+        make: returns the CasADi function.
+        results: which results to compute; all by default.
+    """
     own = "buffer", get_ident(), key
     if own not in cache:
         cache[own] = BufferedFunction(make(), results)
@@ -105,7 +118,17 @@ class Along:
         return results
 
     def into(self, results: list[Vector], times: Vector, x: Vector, z: Vector, p: Vector, u: Vector, d: Vector) -> None:
-        """Evaluate as a call does, into given arrays."""
+        """Evaluate as a call does, into given arrays of shape (rows, n).
+
+        Args:
+            results: one array per result.
+            times: shape (n,).
+            x: shape (nx, n).
+            z: shape (nz, n).
+            p: shape (np,).
+            u: shape (nu,).
+            d: shape (nd, n).
+        """
         total, first = results[0].shape[1], 0
         for size in _BLOCKS:
             while total - first > (0.75 * size if size > _BLOCKS[-1] else 0):
@@ -120,7 +143,13 @@ class Along:
 
 
 def along(cache: dict[Any, Any], key: Any, make: Any) -> Along:
-    """Return this thread's function at many points for a key, made from `make()` on first use."""
+    """Return this thread's function at many points, made on first use.
+
+    Args:
+        cache: keeps it.
+        key: names it.
+        make: returns the CasADi function.
+    """
     own = "along", get_ident(), key
     if own not in cache:
         cache[own] = Along(make())

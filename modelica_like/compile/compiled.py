@@ -14,6 +14,7 @@ from modelica_like.compile.buffers import Vector as Vector
 from modelica_like.compile.start_system import StartSystem as StartSystem
 from modelica_like.errors import LanguageError, Source, UnknownName, ValueOutOfRange, did_you_mean
 from modelica_like.flatten.model import FlatDiscrete, FlatParameter, FlatVariable, Origin
+from modelica_like.flatten.template import TransitionForm
 from modelica_like.structure.holds import Circuit as Circuit
 from modelica_like.structure.holds import HeldMotion as HeldMotion
 from modelica_like.units import Unit, to_si
@@ -33,31 +34,8 @@ class Reset:
     target: int
 
 
-@dataclass(frozen=True)
-class CompiledTransition:
-    """A transition as numbers.
-
-    Attributes:
-        mode: position of the mode in d.
-        sources: numbers of the modes it leaves.
-        target: number of the mode it enters.
-        timed: whether `index` is a position in the moments rather than in the guards.
-        resets: what else changes.
-        notice: what the user is told when it happens.
-        because: why it happens, in words.
-        fails: whether the run ends there, with an error.
-    """
-
-    mode: int
-    sources: tuple[int, ...]
-    target: int
-    timed: bool
-    index: int
-    resets: tuple[Reset, ...]
-    source: Source
-    notice: str
-    because: str
-    fails: bool
+CompiledTransition = TransitionForm[int, Reset]
+"""A transition as numbers."""
 
 
 @dataclass(frozen=True)

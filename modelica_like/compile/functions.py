@@ -21,7 +21,6 @@ from modelica_like.compile.soon import guards_soon
 from modelica_like.compile.start_system import start_system
 from modelica_like.errors import Source
 from modelica_like.flatten.model import FlatDiscrete, FlatModel, evaluate
-from modelica_like.flatten.template import TransitionForm
 from modelica_like.language.fields import Input
 from modelica_like.structure.holds import hold_terms
 from modelica_like.structure.reduce import ReducedDae
@@ -70,10 +69,15 @@ def compile(reduced: ReducedDae) -> CompiledDae:
         implicit_blocks=reduced.implicit_blocks,
         motion_sources=_motion_sources(flat),
         summary=str(reduced),
-        settings=dict(getattr(flat.components.get(""), "_simulate", {})),
+        settings=_settings(flat.components.get("")),
         _make_energy=lambda: build.function("energy", energy_terms(reduced)),
         _make_start=lambda rest: start_system(reduced, rest),
     )
+
+
+def _settings(root: Any) -> dict[str, Any]:
+    display = getattr(root, "_display", {})
+    return {**getattr(root, "_simulate", {}), **({"display": display} if display else {})}
 
 
 def _discrete_starts(flat: FlatModel) -> Any:
@@ -178,16 +182,9 @@ class _Builder:
                 for path, position in form.resets:
                     changes.append(self._reset(prefix + path, len(resets), targets))
                     resets.append(columns["resets"][number][position])
-                found.append(self._transition(prefix, form, len(store) - 1, tuple(changes)))
+                numbers = {"mode": self.place[prefix + form.mode], "index": len(store) - 1, "resets": tuple(changes)}
+                found.append(CompiledTransition(**{**vars(form), **numbers}))
         return ca.vertcat(*guards), ca.vertcat(*moments), tuple(found), ca.vertcat(*resets), targets
-
-    def _transition(
-        self, prefix: str, form: TransitionForm, index: int, resets: tuple[Reset, ...]
-    ) -> CompiledTransition:
-        return CompiledTransition(
-            self.place[prefix + form.mode], form.sources, form.target, form.timed, index, resets, form.source,
-            form.notice, form.because, form.fails,
-        )  # fmt: skip
 
     def _reset(self, path: str, value: int, targets: list[int]) -> Reset:
         if path in self.place:

@@ -75,7 +75,16 @@ def _driven_input(component: Component, equations: list[Equation]) -> str:
 
 
 def check_units(component: Component, equations: list[Equation], events: list[Any]) -> dict[str, Unit]:
-    """Check every equation; return the units that `*` outputs take from their equations."""
+    """Check every equation; return the units that `*` outputs take from their equations.
+
+    Args:
+        component: of the class that is checked.
+        equations: its own.
+        events: its transitions and start modes.
+
+    Raises:
+        UnitMismatch, LanguageError: everything that does not fit, told together.
+    """
     inferred: dict[str, Unit] = {}
 
     def unit_of(leaf: Any) -> Unit:

@@ -39,7 +39,13 @@ class Parameters:
         self._dimensions = Dimensions(self._unit_of_leaf)
 
     def declare(self, component: Component, name: str, path: str) -> int | None:
-        """Give a parameter its place in q; None if it has no value."""
+        """Give a parameter its place in q; None if it has no value.
+
+        Args:
+            component: that declares it.
+            name: of the parameter or input.
+            path: its dotted name.
+        """
         key = id(component), name
         if key in self._position:
             return self._position[key]
@@ -88,6 +94,11 @@ class Parameters:
     def evaluate(self, value: Value, scope: Any, label: str) -> Any:
         """Return the number or the expression of a value.
 
+        Args:
+            value: what was given.
+            scope: the component whose names a formula speaks.
+            label: what messages call it.
+
         Raises:
             UnknownName: the formula uses a parameter that does not exist.
             UnitMismatch: the formula has another dimension than it should.
@@ -131,6 +142,11 @@ class Parameters:
 
     def position(self, component: Component, name: str, path: str = "") -> int:
         """Return the position of a parameter in q.
+
+        Args:
+            component: that declares it.
+            name: of the parameter or input.
+            path: its dotted name, if that is known already.
 
         Raises:
             MissingValue: it has no value.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
-from typing import Any, cast
+from typing import Any, Generic, TypeVar, cast
 
 import casadi as ca
 
@@ -46,32 +46,40 @@ class LinearForm:
     constant: float | str
 
 
+ModeT = TypeVar("ModeT")
+ResetT = TypeVar("ResetT")
+
+
 @dataclass(frozen=True)
-class TransitionForm:
+class TransitionForm(Generic[ModeT, ResetT]):
     """A transition without its expressions.
 
     Attributes:
-        mode: path of the mode from the component.
+        mode: in a template the path of the mode from the component, in a compiled model its position in d.
         sources: numbers of the modes it leaves.
         target: number of the mode it enters.
         timed: whether it is a time event.
         index: position in the guards, or in the moments.
-        resets: pairs of what is reset (slot path) and the position in the resets.
+        resets: what else changes; in a template pairs of what is reset (slot path) and the position in the resets.
         notice: what the user is told when it happens.
         because: why it happens, in words.
         fails: whether the run ends there, with an error.
     """
 
-    mode: str
+    mode: ModeT
     sources: tuple[int, ...]
     target: int
     timed: bool
     index: int
-    resets: tuple[tuple[str, int], ...]
+    resets: tuple[ResetT, ...]
     source: Source
     notice: str
     because: str
     fails: bool
+
+
+ClassTransition = TransitionForm[str, tuple[str, int]]
+"""A transition of a template."""
 
 
 @dataclass(frozen=True)
@@ -90,7 +98,7 @@ class Template:
     incidence: tuple[tuple[int, ...], ...]
     linear: tuple[LinearForm | None, ...]
     coefficients: ca.Function
-    transitions: tuple[TransitionForm, ...]
+    transitions: tuple[ClassTransition, ...]
     guards: ca.Function
     moments: ca.Function
     resets: ca.Function
@@ -267,9 +275,9 @@ class _Changes:
         """Return path and number of the modes at the start."""
         return tuple((self._mode(s), s.mode.mode.number(s.target), s.source) for s in self.starts)
 
-    def transition_forms(self) -> tuple[TransitionForm, ...]:
+    def transition_forms(self) -> tuple[ClassTransition, ...]:
         """Return the transitions without their expressions."""
-        forms: list[TransitionForm] = []
+        forms: list[ClassTransition] = []
         position = 0
         for index, t in enumerate(self.transitions):
             symbols = [symbols_in(target)[0] for target in t.reset]

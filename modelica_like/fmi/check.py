@@ -158,7 +158,7 @@ def _idas(model: CompiledDae, end: float, points: int, *tolerances: float) -> So
     """Run with the first of the tolerances that leads to the end."""
     first, *rest = tolerances
     try:
-        return simulate(model, end, points=points, rtol=first, atol=first / 100)
+        return simulate(model, end, points=points, rtol=first, atol=first / 100, solver="idas")
     except SolveError:
         if not rest:
             raise

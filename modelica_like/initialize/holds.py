@@ -118,7 +118,7 @@ def _share_circuits(model: CompiledDae, point: Point, active: set[int], weights:
         places = [place for place, k in enumerate(circuit.members) if k in active]
         if len(places) > 1:
             _share(model, point, circuit, places, weights, switches, shares)
-        point.d[circuit.first : circuit.first + count * (1 + count)] = np.concatenate([switches, shares.ravel()])
+        point.d[circuit.entries] = np.concatenate([switches, shares.ravel()])
         shared |= bool(switches.any())
     return shared
 
@@ -148,8 +148,7 @@ def _use(model: CompiledDae, point: Point, limits: Any) -> Vector:
     solve_implicit(model, trial)
     variables, use = call(model, model.variables, trial), np.zeros(len(model.holds))
     for circuit in model.circuits:
-        count = len(circuit.members)
-        shares = point.d[circuit.first + count : circuit.first + count * (1 + count)].reshape(count, count)
+        shares = circuit.shares(point.d)
         for place, k in enumerate(circuit.members):
             reaction = variables[model.holds[k].reaction]
             limit = limits[k, 0 if reaction > 0.0 else 1]
@@ -172,8 +171,8 @@ def _yield_to_contradiction(
 
     A switched equation says sum(share·reaction) = stiff·inertia·der(motion). Where all hold, the right side is zero.
     """
-    trial, count = point.copy(), len(circuit.members)
-    trial.d[circuit.first : circuit.first + count * (1 + count)] = np.concatenate([switches, shares.ravel()])
+    trial = point.copy()
+    trial.d[circuit.entries] = np.concatenate([switches, shares.ravel()])
     others = [k for place, k in enumerate(circuit.members) if shares[:, place].any() and not switches[place]]
     nodes = [model.holds[k].reaction for k in others]
     reactions: list[Vector] = []
@@ -214,8 +213,7 @@ def sharing(model: CompiledDae, point: Point) -> list[tuple[str, ...]]:
     """Components that share what they hold together at a point, circuit by circuit."""
     found: list[tuple[str, ...]] = []
     for circuit in model.circuits:
-        count = len(circuit.members)
-        shares = point.d[circuit.first + count : circuit.first + count * (1 + count)].reshape(count, count)
+        shares = circuit.shares(point.d)
         for row in shares[np.any(shares != 0.0, axis=1)]:
             parts = (model.holds[k].component for k, part in zip(circuit.members, row, strict=True) if part)
             found.append(tuple(dict.fromkeys(parts)))

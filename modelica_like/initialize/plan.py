@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -13,9 +13,9 @@ from modelica_like.compile.buffers import buffered
 from modelica_like.compile.compiled import CompiledDae, StartEntry, StartSystem, Vector
 from modelica_like.errors import MissingStart
 from modelica_like.initialize.point import Point
+from modelica_like.netlist.document import StartKind as StartKind
 from modelica_like.structure.matching import Elimination, Matching
 
-StartKind = Literal["given", "rest", "steady"]
 _DENSE = 100
 _WELL_CONDITIONED = 1e9
 

@@ -38,7 +38,16 @@ class Point:
 
 
 def call(model: CompiledDae, function: Any, point: Point) -> Vector:
-    """Evaluate a function of a model at a point; the result is flat, columns one after the other."""
+    """Evaluate a function at a point.
+
+    Args:
+        model: gives parameters and inputs.
+        function: of (t, x, z, p, u, d), with one result.
+        point: gives the rest.
+
+    Returns:
+        The result, flat: columns one after the other.
+    """
     # By identity: asking a CasADi function for its name costs as much as evaluating a small one.
     fast = model.fast(id(function), lambda: function)
     return fast(point.t, point.x, point.z, model.p, model.u, point.d)[0]

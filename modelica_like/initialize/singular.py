@@ -26,7 +26,13 @@ class Place(Protocol):
 
 
 def singular_block(model: CompiledDae, point: Place, number: int) -> SingularAtStart:
-    """Return the error for one of the blocks with a determinant, counted from 0."""
+    """Return the error for a block.
+
+    Args:
+        model: the compiled model.
+        point: where it is singular.
+        number: of the block among those with a determinant, from 0.
+    """
 
     def regular(p: Vector) -> bool:
         value = model.determinants(point.t, point.x, point.z, p, model.u, point.d).full()[number, 0]

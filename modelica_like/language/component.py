@@ -16,6 +16,7 @@ from modelica_like.language.mode import Mode
 from modelica_like.language.places import NOWHERE, caller
 from modelica_like.language.tables import REQUIRED, Rows, both_given, frozen_rows, rows
 from modelica_like.language.terminal import Terminal
+from modelica_like.upper import upper
 
 if TYPE_CHECKING:
     from modelica_like.language.equation import Equations
@@ -30,8 +31,8 @@ class Component(Declared):
     and replaceable parts something else than their default.
     """
 
-    inlet: ClassVar[str] = ""
-    outlet: ClassVar[str] = ""
+    inlet: ClassVar[str] = "flange_a flange"
+    outlet: ClassVar[str] = "flange_b flange"
     terminal: ClassVar[Terminal | None] = None
     icon: ClassVar[Icon | None] = None
     _partial: ClassVar[bool] = True
@@ -49,18 +50,15 @@ class Component(Declared):
         super().__init_subclass__(**options)
         cls._partial = partial
         own = {name: value for name, value in vars(cls).items() if not name.startswith("_")}
-        annotations = {
-            name: text
-            for name, text in _annotated(cls).items()
-            if not str(text).startswith(("ClassVar", "typing.ClassVar")) and not name.startswith("_")
-        }
+        hints = {name: str(text) for name, text in _annotated(cls).items() if not name.startswith("_")}
+        annotations = [name for name, text in hints.items() if not text.startswith(("ClassVar", "typing.ClassVar"))]
         # A class may extend several bases, as in Modelica: everything is collected along the whole line of ancestors.
         ancestors = [base for base in reversed(cls.__mro__[1:]) if issubclass(base, Component)]
         cls._class_connectors = _of_kind(cls, Connector)
         cls._class_modes = _of_kind(cls, Mode)
         parts = {name: value for name, value in own.items() if _is_part(value)}
         cls._class_parts = {name: part for base in ancestors for name, part in base._class_parts.items()} | parts
-        cls._replaceable = frozenset(parts.keys() & annotations).union(*(base._replaceable for base in ancestors))
+        cls._replaceable = frozenset(parts.keys() & {*annotations}).union(*(base._replaceable for base in ancestors))
         declared = (Field, Connector, Mode)
         plain = {
             n: own.get(n, REQUIRED) for n in annotations if not isinstance(own.get(n), declared) and n not in parts
@@ -178,10 +176,6 @@ class Component(Declared):
         store = self._values if isinstance(field, Parameter | Input) else self._starts
         store[field.name] = understood
 
-    def set_start_mode(self, name: str, target: str) -> None:
-        """Store the mode at the start."""
-        self._start_modes[name] = target
-
     @classmethod
     def check_structural(cls, name: str, value: Any) -> None:
         """Check that the value for a structural field has the type of its default.
@@ -275,10 +269,9 @@ class Component(Declared):
         """
         component = self
         for name in path.split(".") if path else ():
-            parts = component.parts
-            if name not in parts:
-                raise unknown("part", component.label, name, list(parts))
-            component = parts[name]
+            if name not in component.parts:
+                raise unknown("part", component.label, name, component.parts)
+            component = component.parts[name]
         return component
 
     def set(self, path: str, value: Any) -> None:
@@ -310,29 +303,32 @@ class Component(Declared):
         try:
             yield
         except ModelicaLikeError as error:
-            place = self.place_of(name)
-            if not error.where and place.file:
+            if not error.where and (place := self.place_of(name)).file:
                 error.where = (place,)
             raise
 
     def inlet_connector(self) -> Connector:
         """Return the connector that `series` joins to the part before."""
-        return self._end("inlet", ("flange_a", "flange"))
+        return self._end("inlet")
 
     def outlet_connector(self) -> Connector:
         """Return the connector that `series` joins to the part after."""
-        return self._end("outlet", ("flange_b", "flange"))
+        return self._end("outlet")
 
     def terminal_members(self) -> tuple[str, ...]:
         """Return the names of the signals that form the terminal of an adaptor."""
         return tuple(name for name, field in self.fields.items() if isinstance(field, Input | Output))
 
-    def _end(self, which: str, usual: tuple[str, ...]) -> Connector:
-        names = (getattr(type(self), which),) if getattr(type(self), which) else usual
-        for name in names:
-            if name in self._connectors:
-                return self._connectors[name]
-        raise unknown(which, f"{self.label} ({type(self).__name__})", " or ".join(names), list(self._connectors))
+    def _repr_svg_(self) -> str:
+        """Return the schematic, for notebooks."""
+        return upper("schematic")(self)
+
+    def _end(self, which: str) -> Connector:
+        names = getattr(type(self), which).split()
+        found = next((self._connectors[name] for name in names if name in self._connectors), None)
+        if found is None:
+            raise unknown(which, f"{self.label} ({type(self).__name__})", " or ".join(names), list(self._connectors))
+        return found
 
     def __setattr__(self, name: str, value: Any) -> None:
         if _is_part(value):

@@ -38,42 +38,24 @@ _PLACEHOLDER = "_quantity_{}_"
 _PRECEDENCE = {"+": 1, "-": 1, "*": 2, "/": 2, "neg": 3, "**": 4}
 
 
+def _operator(sign: str, *, turned: bool = False) -> Callable[[Any, Any], Formula]:
+    def apply(one: Any, other: Any) -> Formula:
+        return Formula(sign, tuple(as_formula(side) for side in ((other, one) if turned else (one, other))))
+
+    return apply
+
+
 class Arithmetic:
     """Operators that build formulas in a class body: `2 * J`, `z_ring / z_sun - 1`."""
 
-    def __add__(self, other: Any) -> Formula:
-        return _binary("+", self, other)
-
-    def __radd__(self, other: Any) -> Formula:
-        return _binary("+", other, self)
-
-    def __sub__(self, other: Any) -> Formula:
-        return _binary("-", self, other)
-
-    def __rsub__(self, other: Any) -> Formula:
-        return _binary("-", other, self)
-
-    def __mul__(self, other: Any) -> Formula:
-        return _binary("*", self, other)
-
-    def __rmul__(self, other: Any) -> Formula:
-        return _binary("*", other, self)
-
-    def __truediv__(self, other: Any) -> Formula:
-        return _binary("/", self, other)
-
-    def __rtruediv__(self, other: Any) -> Formula:
-        return _binary("/", other, self)
-
-    def __pow__(self, other: Any) -> Formula:
-        return _binary("**", self, other)
+    __add__, __radd__ = _operator("+"), _operator("+", turned=True)
+    __sub__, __rsub__ = _operator("-"), _operator("-", turned=True)
+    __mul__, __rmul__ = _operator("*"), _operator("*", turned=True)
+    __truediv__, __rtruediv__ = _operator("/"), _operator("/", turned=True)
+    __pow__ = _operator("**")
 
     def __neg__(self) -> Formula:
         return Formula("neg", (as_formula(self),))
-
-
-def _binary(operation: str, left: Any, right: Any) -> Formula:
-    return Formula(operation, (as_formula(left), as_formula(right)))
 
 
 @dataclass(frozen=True)

@@ -74,7 +74,7 @@ class Mode:
 
     def __set__(self, instance: Any, value: str) -> None:
         self.number(value)
-        instance.set_start_mode(self.name, value)
+        instance._start_modes[self.name] = value
 
     def number(self, name: str) -> int:
         """Return the number of a mode.

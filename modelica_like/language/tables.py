@@ -98,6 +98,11 @@ class Rows:
     def store(self, owner: Any, name: str, given: Any) -> tuple[Any, ...]:
         """Understand a table for a component, which keeps it as it was given, and the scales it then must not have.
 
+        Args:
+            owner: the component.
+            name: of the field.
+            given: tuple of rows, tuples.
+
         Raises:
             ModelicaLikeError: see `read`, or a scale has a value.
         """

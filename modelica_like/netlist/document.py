@@ -7,13 +7,14 @@ import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, get_args
 
 from modelica_like.errors import (
     DuplicateName,
     ModelicaLikeError,
     NetlistError,
     Source,
+    UnitError,
     UnknownName,
     did_you_mean,
     raise_together_or_one,
@@ -23,7 +24,8 @@ from modelica_like.units import parse_unit, to_si
 
 _ENDLESS = re.compile(r"[0-9]{4301}")
 MAX_BYTES = 2_000_000
-START_KINDS = ("given", "rest", "steady")
+StartKind = Literal["given", "rest", "steady"]
+"""What stands for start values that are not given."""
 Check = Callable[[str, Any], Any]
 """Returns an entry with the key `section.name`, if it has the right form."""
 Reader = Callable[[str, Any, Lines, list[ModelicaLikeError]], Any]
@@ -41,6 +43,7 @@ class Document:
         guess: guessed start values by path.
         expose: inner connectors by the name of the outer one.
         simulate: options of a run, as written.
+        display: units in which results are shown, by path, pattern or quantity.
     """
 
     lines: Lines
@@ -55,6 +58,7 @@ class Document:
     free: list[str] = field(default_factory=list)
     expose: dict[str, str] = field(default_factory=dict)
     simulate: dict[str, Any] = field(default_factory=dict)
+    display: dict[str, str] = field(default_factory=dict)
 
 
 def read_text(path: Path) -> str:
@@ -306,8 +310,8 @@ def duration(key: str, value: Any) -> Any:
 
 
 def _start_kind(key: str, value: Any) -> str:
-    if value not in START_KINDS:
-        raise NetlistError(f"{key} = {value!r} must be one of {', '.join(START_KINDS)}.")
+    if value not in get_args(StartKind):
+        raise NetlistError(f"{key} = {value!r} must be one of {', '.join(get_args(StartKind))}.")
     return value
 
 
@@ -328,6 +332,13 @@ def _whole(most: int) -> Check:
     return check
 
 
+def _unit_text(key: str, value: Any) -> str:
+    try:
+        return str(parse_unit(as_text(key, value)))
+    except UnitError as error:
+        raise UnitError(f"{key}: {error.what}", advice=error.advice) from None
+
+
 _OPTIONS: Mapping[str, Check] = {
     "until": duration, "start": _start_kind, "rtol": _rtol, "points": _whole(1_000_000),
 }  # fmt: skip
@@ -343,4 +354,5 @@ _READERS: Mapping[str, Reader] = {
     "free": whole(_names),
     "expose": each(as_text),
     "simulate": options(_OPTIONS),
+    "display": each(_unit_text, flat=True),
 }

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, get_args
 
 from modelica_like.language import Component, Input, Parameter, Variable
 from modelica_like.language.fields import Discrete, Field
 from modelica_like.language.tables import REQUIRED, Column, Rows
-from modelica_like.netlist.document import START_KINDS
+from modelica_like.netlist.document import StartKind
 from modelica_like.netlist.registry import library_types
 from modelica_like.units import ANY
 
@@ -52,6 +52,7 @@ def _sections() -> dict[str, Any]:
         "free": {"type": "array", "items": {"type": "string"}, "description": "connectors left free on purpose"},
         "expose": _map({"type": "string"}, "outer connectors: name and inner connector"),
         "simulate": _simulate(),
+        "display": _map({"type": "string"}, "units in which results are shown, by path, pattern or quantity"),
     }
 
 
@@ -61,7 +62,7 @@ def _simulate() -> dict[str, Any]:
         "additionalProperties": False,
         "properties": {
             "until": {**_QUANTITY, "description": "end time [s]"},
-            "start": {"enum": list(START_KINDS), "description": "how the start values are found"},
+            "start": {"enum": list(get_args(StartKind)), "description": "how the start values are found"},
             "rtol": {"type": "number", "minimum": 1e-14, "maximum": 0.1, "description": "relative tolerance"},
             "points": {"type": "integer", "minimum": 1, "description": "number of output intervals"},
         },

@@ -54,7 +54,13 @@ class Lines:
         return Source(self.file, number, _shortened(self.text[number - 1].strip()) if known else "")
 
     def add(self, path: Path, number: int, *, table: bool = False) -> None:
-        """Remember a key; a table may be mentioned more than once, as part of the names of its keys."""
+        """Remember a key.
+
+        Args:
+            path: its names.
+            number: of the line.
+            table: whether it may be mentioned again, as part of the names of its keys.
+        """
         if not path:  # no TOML: it has no key
             return
         if path in self.numbers and not table:

@@ -66,6 +66,17 @@ class Circuit:
     members: tuple[int, ...]
     first: int
 
+    @property
+    def entries(self) -> slice:
+        """Positions in d of switches and shares."""
+        count = len(self.members)
+        return slice(self.first, self.first + count * (1 + count))
+
+    def shares(self, d: Any) -> Any:
+        """Return the shares among the values of d; shape (members, members)."""
+        count = len(self.members)
+        return d[self.entries][count:].reshape(count, count)
+
 
 def add_approaches(system: System) -> tuple[HeldMotion, ...]:
     """Let every equation that holds a motion ask for an approach."""
@@ -171,7 +182,17 @@ def _groups(together: Any) -> list[list[int]]:
 
 
 def share_reactions(system: System, holds: tuple[HeldMotion, ...], circuits: list[Circuit], residual: Any) -> Any:
-    """Let equations of circuits be switched to the sharing of the reactions; returns the new residual."""
+    """Let equations of circuits be switched to the sharing of the reactions.
+
+    Args:
+        system: the equations; its model gets the switches and shares.
+        holds: the held motions.
+        circuits: those that depend on each other.
+        residual: column of all equations, differentiated ones included.
+
+    Returns:
+        The new residual, of the same size.
+    """
     slope, rows = gains(system), ca.vertsplit(residual)
     for circuit in circuits:
         count = len(circuit.members)

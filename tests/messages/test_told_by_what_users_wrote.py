@@ -265,6 +265,14 @@ def test_a_condition_without_words_is_told_as_it_is_written() -> None:
     assert [one.because for one in transitions] == ["x > limit", "", "its time has come"]
 
 
+def test_brackets_in_paths_are_no_markup(grip: str, tmp_path: Path) -> None:
+    picture = tmp_path / "[bold]grip[/x].svg".replace("/", "_")
+    result = CliRunner().invoke(app, ["draw", grip, "-o", str(picture)])
+    assert (result.exit_code, result.stdout) == (0, f"{picture}\n")
+    result = CliRunner().invoke(app, ["check", str(tmp_path / "[red]none.toml")])
+    assert "[red]none.toml' does not exist" in result.stderr
+
+
 def test_brackets_in_help_are_no_markup() -> None:
     text = " ".join(CliRunner().invoke(app, ["split", "--help"]).stdout.replace("│", " ").split())
     assert "an entry of [connect]; several are possible" in text

@@ -50,7 +50,7 @@ def test_a_netlist_loads_only_the_modules_of_its_parts():
         "print(*sorted(name for name in sys.modules if name.startswith('components.')))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.split() == ["components.inertias", "components.interfaces"]
+    assert done.stdout.split() == ["components.icons", "components.inertias", "components.interfaces"]
 
 
 @pytest.fixture
