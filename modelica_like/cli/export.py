@@ -2,12 +2,7 @@
 
 from __future__ import annotations
 
-<<<<<<< HEAD
-import gc
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-=======
->>>>>>> fmipy
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -72,25 +67,12 @@ def export(
         say(str(done))
 
 
-<<<<<<< HEAD
 def _page(assembly: Any, file: Path, show: Sequence[str], report: Callable[[str], None]) -> None:
     from modelica_like.native.page import export_html
 
     say(str(export_html(assembly, file, show=show, report=report)))
 
 
-@contextmanager
-def _no_search_for_cycles() -> Iterator[None]:
-    """The process ends soon, and the search takes a sixth of the time of a large model."""
-    gc.disable()
-    try:
-        yield
-    finally:
-        gc.enable()
-
-
-=======
->>>>>>> fmipy
 def runtimes(
     *, platforms: Annotated[
         str, Option(metavar="NAMES", help="Platforms to compile for: native, all, or names with commas.")
