@@ -50,7 +50,7 @@ _NAMES = {
     "shift_schedule": "ShiftSchedule",
     "signals": "CoilForce Constant Product Pulse Ramp Sine Step Table TimeFormula Trapezoid",
     "slides": "ElastoGap MassWithStopAndFriction Rod StribeckFriction SupportFriction TranslationalBrake",
-    "sources": "ConstantForce ConstantSpeed ConstantTorque Force Speed Torque TorqueStep TranslationalSpeed",
+    "sources": "ConstantForce ConstantSpeed ConstantTorque Force Speed Torque TorqueStep",
     "spindles": "BallScrew MachineTable",
     "springs": (
         "Damper ElastoBacklash ElastoBacklash2 Spring SpringDamper TranslationalDamper TranslationalSpring "
@@ -65,7 +65,8 @@ _NAMES = {
     ),
     "translational_sources": (
         "ConstantVelocity Force2 ForceStep InverseSpeedDependentForce LinearSpeedDependentForce "
-        "QuadraticSpeedDependentForce SignForce TranslationalAccelerate TranslationalPosition"
+        "QuadraticSpeedDependentForce SignForce TranslationalAccelerate TranslationalPosition "
+        "TranslationalSpeed"
     ),
     "transmissions": "Lepelletier Ravigneaux",
     "universal_joints": "UniversalJoint",

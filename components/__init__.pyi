@@ -119,7 +119,6 @@ from components.sources import Force as Force
 from components.sources import Speed as Speed
 from components.sources import Torque as Torque
 from components.sources import TorqueStep as TorqueStep
-from components.sources import TranslationalSpeed as TranslationalSpeed
 from components.spindles import BallScrew as BallScrew
 from components.spindles import MachineTable as MachineTable
 from components.springs import Damper as Damper
@@ -157,6 +156,7 @@ from components.translational_sources import QuadraticSpeedDependentForce as Qua
 from components.translational_sources import SignForce as SignForce
 from components.translational_sources import TranslationalAccelerate as TranslationalAccelerate
 from components.translational_sources import TranslationalPosition as TranslationalPosition
+from components.translational_sources import TranslationalSpeed as TranslationalSpeed
 from components.transmissions import Lepelletier as Lepelletier
 from components.transmissions import Ravigneaux as Ravigneaux
 from components.universal_joints import UniversalJoint as UniversalJoint

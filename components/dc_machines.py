@@ -5,7 +5,7 @@ from __future__ import annotations
 from components import icons
 from components.electrical import Pin
 from components.interfaces import Flange, Supported
-from components.thermal import Lossy
+from components.thermal import Conducting
 from modelica_like.language import (
     Equations,
     Expr,
@@ -25,7 +25,7 @@ _RPM = 0.10471975511965977
 _LINEAR_BELOW = 1e-3
 
 
-class DCMachine(Lossy, Supported, partial=True):
+class DCMachine(Conducting, Supported, partial=True):
     """Linear DC machine: induced voltage k·flux·w, torque k·flux·i, with the flux relative to its nominal value.
 
     Armature: v = R·ia + v_brush + v_core, v_core = La·der(i) + k·flux·w, where ia - i flows through the conductance of
@@ -51,9 +51,6 @@ class DCMachine(Lossy, Supported, partial=True):
     Ra: Parameter = param("Ohm", "armature resistance at T_ref", default=0.05, min=0)
     La: Parameter = param("H", "armature inductance", default=0.0015, min=0)
     Jr: Parameter = param("kg.m2", "moment of inertia of the rotor", default=0.15, min=0)
-    alpha: Parameter = param("1/K", "temperature coefficient of the windings", default=0.0)
-    T_ref: Parameter = param("K", "temperature to which the resistances belong", default=293.15)
-    T: Parameter = param("K", "temperature of the windings without a heat port", default=293.15)
     V_brush: Parameter = param("V", "voltage drop of all brushes", default=0.0, min=0)
     I_brush: Parameter = param("A", "current at which it is reached", default=1.0, min=1e-12)
     P_friction: Parameter = param("W", "friction loss at w_nominal", default=0.0, min=0)
@@ -105,8 +102,7 @@ class DCMachine(Lossy, Supported, partial=True):
 
     def resistance(self, cold: Expr | float) -> Expr:
         """Return the resistance of a warm winding."""
-        temperature = self.heat_port.T if self.heat_port.used else self.T
-        return cold * (1 + self.alpha * (temperature - self.T_ref))
+        return cold * self.warmth(self.temperature)
 
     def brush_voltage(self, current: Expr) -> Expr:
         """Return the voltage drop of the brushes."""
@@ -117,7 +113,7 @@ class DCMachine(Lossy, Supported, partial=True):
         """Induced voltage at the nominal operating point."""
         if self.given("k"):
             return self.k * self.w_nominal
-        warm = (self.Ra + self.series_resistance()) * (1 + self.alpha * (self.T_nominal - self.T_ref))
+        warm = (self.Ra + self.series_resistance()) * self.warmth(self.T_nominal)
         return self.V_nominal - warm * self.I_nominal - self.brush_voltage(self.I_nominal)
 
     @property

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from components import icons
 from components.interfaces import LinearOneFlange, OneFlange
-from components.thermal import Lossy
+from components.thermal import Conducting
 from modelica_like.language import Equations, Expr, Input, Parameter, Variable, der, param, signal_in, var
 
 
-class EddyCurrentDisc(Lossy, partial=True):
+class EddyCurrentDisc(Conducting, partial=True):
     """Conductor in which eddy currents brake: 2·peak·excitation²·x/(1 + x²), x = speed / speed of the peak (M. Kloss).
 
     The braking grows with the square of the excitation current. The conductor gets hot, its resistance rises, and with
@@ -18,16 +18,10 @@ class EddyCurrentDisc(Lossy, partial=True):
 
     icon = icons.EDDY
     excitation: Input = signal_in("1", "excitation current over its nominal value", default=1.0)
-    T_ref: Parameter = param("K", "reference temperature", default=293.15)
-    T: Parameter = param("K", "temperature of the conductor without a heat port", default=293.15)
-    alpha: Parameter = param("1/K", "temperature coefficient of the conductor's resistance at 20 °C", default=0.0)
-    T_20: Parameter = param("K", "temperature to which alpha belongs", default=293.15)
 
     def braking(self, relative_speed: Expr) -> Expr:
         """Return the braking over its peak, at a speed over that of the peak at T_ref."""
-        temperature = self.heat_port.T if self.heat_port.used else self.T
-        at_ref = self.alpha / (1 + self.alpha * (self.T_ref - self.T_20))
-        x = relative_speed / (1 + at_ref * (temperature - self.T_ref))
+        x = relative_speed / self.warmth(self.temperature)
         return 2 * self.excitation**2 * x / (1 + x**2)
 
 

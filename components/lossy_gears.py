@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from components import icons
-from components.friction import ShaftSticking
+from components.friction import HOLDS, ShaftSticking
 from components.interfaces import TwoFlanges
 from components.tabulated import Tabulated
 from modelica_like.language import (
     Equations,
     Events,
     Expr,
+    Mode,
     Output,
     Parameter,
     Variable,
     absolute,
+    all_of,
     column,
     der,
     maximum,
@@ -25,6 +27,7 @@ from modelica_like.language import (
     where,
 )
 
+_IDEAL = (1.0, 1.0, 0.0, 0.0)
 LossRows = tuple[tuple[float, float, float, float, float], ...]
 
 
@@ -43,6 +46,10 @@ class MeshWithFriction(ShaftSticking, TwoFlanges, partial=True):
 
     icon = icons.GEAR
     ratio: Parameter = param("1", "transmission ratio, speed of flange_a over speed of flange_b")
+    mode = Mode(
+        "free", "stuck", "start_forward", "start_backward", "forward", "backward",
+        description="friction mode", holds=HOLDS,
+    )  # fmt: skip
     phi_a: Variable = var("rad", "angle of flange_a relative to the housing")
     w_a: Variable = var("rad/s", "speed of flange_a relative to the housing", state="always")
     tau_loss: Variable = var("N.m", "lost torque at flange_a, against forward rotation")
@@ -91,6 +98,7 @@ class MeshWithFriction(ShaftSticking, TwoFlanges, partial=True):
         yield der(self.phi_a) == self.w_a
         yield b.tau + self.ratio * (a.tau - loss) == 0
         yield self.mode.choose(
+            free=loss,
             stuck=self.sticking(),
             start_forward=loss - self.forward_loss(0),
             start_backward=loss - self.backward_loss(0),
@@ -98,10 +106,16 @@ class MeshWithFriction(ShaftSticking, TwoFlanges, partial=True):
             backward=loss - self.backward_loss(maximum(-self.w_a, 0)),
         ) == 0  # fmt: skip
 
+    def rubs(self) -> bool:
+        """Tell whether there can be friction; without any the gear is free at all times, and has no events."""
+        return True
+
     def events(self) -> Events:
-        yield self.mode.initially("forward", when=self.w_a > 0)
-        yield self.mode.initially("backward", when=self.w_a < 0)
-        yield from super().events()
+        if self.rubs():
+            yield self.mode.initially("forward", when=self.w_a > 0)
+            yield self.mode.initially("backward", when=self.w_a < 0)
+            yield self.mode.initially("stuck", when=all_of(self.w_a <= 0, self.w_a >= 0))
+            yield from super().events()
 
 
 class LossyGear(Tabulated, MeshWithFriction):
@@ -122,6 +136,10 @@ class LossyGear(Tabulated, MeshWithFriction):
     def _column(self, speed: Expr | float, column: int) -> Expr:
         return self.look_up(speed / self.w_scale, self.loss_table, column)
 
+    def rubs(self) -> bool:
+        cells = [pair for row in self.loss_table for pair in zip(row[1:], _IDEAL, strict=True)]
+        return any(not isinstance(cell, float | int) or cell != ideal for cell, ideal in cells)
+
     def efficiencies(self, speed: Expr | float) -> tuple[Expr | float, Expr | float]:
         return self._column(speed, 1), self._column(speed, 2)
 
@@ -133,7 +151,8 @@ class LossyGear(Tabulated, MeshWithFriction):
 
     def events(self) -> Events:
         yield from super().events()
-        yield from self.leaving("loss_table", absolute(self.w_a) / self.w_scale, self.loss_table)
+        if self.rubs():
+            yield from self.leaving("loss_table", absolute(self.w_a) / self.w_scale, self.loss_table)
 
 
 class ConstantEfficiencyGear(MeshWithFriction):

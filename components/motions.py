@@ -12,6 +12,7 @@ from components.interfaces import (
     LinearFlange,
 )
 from components.shaft_sources import ShaftMotionSource
+from components.sources import AT_ONCE
 from components.translational_sources import MotionSource
 from modelica_like.language import (
     Component,
@@ -29,8 +30,6 @@ from modelica_like.language import (
     var,
 )
 
-_AT_ONCE = -1e30
-
 
 class Move(ShaftMotionSource):
     """Motion of a shaft given by signals of angle, speed and acceleration, which are derivatives of each other.
@@ -47,7 +46,7 @@ class Move(ShaftMotionSource):
     phi: Variable = var("rad", "angle of the shaft relative to the housing", state="always", default=0)
     w: Variable = var("rad/s", "speed of the shaft relative to the housing", state="always", default=0)
     stage = Mode("before", "moving", description="before or after the start")
-    begin: Discrete = discrete("s", "time of the start", start=_AT_ONCE)
+    begin: Discrete = discrete("s", "time of the start", start=AT_ONCE)
 
     def equations(self) -> Equations:
         yield from super().equations()
@@ -71,7 +70,7 @@ class TranslationalMove(MotionSource):
     s: Variable = var("m", "position of the slide relative to the housing", state="always", default=0)
     v: Variable = var("m/s", "velocity of the slide relative to the housing", state="always", default=0)
     stage = Mode("before", "moving", description="before or after the start")
-    begin: Discrete = discrete("s", "time of the start", start=_AT_ONCE)
+    begin: Discrete = discrete("s", "time of the start", start=AT_ONCE)
 
     def equations(self) -> Equations:
         yield from super().equations()
@@ -87,7 +86,8 @@ class TranslationalMove(MotionSource):
 class InitializeFlange(Component):
     """Start of a shaft from signals: at the start of a run it gets their angle and speed; later it is free.
 
-    An acceleration cannot be given: it follows from the torques.
+    The acceleration is that of the torques; it can be given as the start value of `a`, from which then, e.g., the twist
+    of a spring follows. In the Modelica Standard Library it is a signal, too.
     """
 
     icon = icons.START
@@ -100,12 +100,14 @@ class InitializeFlange(Component):
     w_start: Input = signal_in("rad/s", "speed at the start", default=0.0)
     phi: Variable = var("rad", "angle of the shaft", state="always", default=0)
     w: Variable = var("rad/s", "speed of the shaft", state="always", default=0)
+    a: Variable = var("rad/s2", "angular acceleration of the shaft")
     stage = Mode("before", "free", description="before or after the start")
-    begin: Discrete = discrete("s", "time of the start", start=_AT_ONCE)
+    begin: Discrete = discrete("s", "time of the start", start=AT_ONCE)
 
     def equations(self) -> Equations:
         yield self.flange.phi == self.phi
         yield der(self.phi) == self.w
+        yield der(self.w) == self.a
         yield self.flange.tau == 0
 
     def events(self) -> Events:
@@ -128,12 +130,14 @@ class TranslationalInitializeFlange(Component):
     v_start: Input = signal_in("m/s", "velocity at the start", default=0.0)
     s: Variable = var("m", "position of the slide", state="always", default=0)
     v: Variable = var("m/s", "velocity of the slide", state="always", default=0)
+    a: Variable = var("m/s2", "acceleration of the slide")
     stage = Mode("before", "free", description="before or after the start")
-    begin: Discrete = discrete("s", "time of the start", start=_AT_ONCE)
+    begin: Discrete = discrete("s", "time of the start", start=AT_ONCE)
 
     def equations(self) -> Equations:
         yield self.flange.s == self.s
         yield der(self.s) == self.v
+        yield der(self.v) == self.a
         yield self.flange.f == 0
 
     def events(self) -> Events:

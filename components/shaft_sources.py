@@ -6,6 +6,7 @@ A positive torque drives the connected part in positive direction.
 from __future__ import annotations
 
 from math import pi
+from typing import Literal
 
 from components import icons
 from components.interfaces import Flange, OneFlange
@@ -70,11 +71,16 @@ class InverseSpeedDependentTorque(SpeedDependentTorque):
 
 
 class SignTorque(TorqueSource):
-    """Constant torque with the sign of the speed, smoothed around standstill."""
+    """Constant torque with the sign of the speed, smoothed around standstill.
+
+    Modelica Standard Library, Rotational.SignTorque.
+    """
 
     icon = icons.LOAD
     tau_nominal: Parameter = param("N.m", "torque on the connected part in forward rotation; negative for a load")
-    w0: Parameter = param("rad/s", "speed at which 99 % of it are reached", default=0.1, min=1e-12)
+    w0: Parameter = param("rad/s", "speed from which on the sign is the full one", default=0.1, min=1e-12)
+    reg: Literal["exp", "sine", "linear", "cosine"] = "exp"
+    """Between -w0 and w0: tanh(50·w/w0) (`exp`), a quarter of a sine, a straight line, or one minus a cosine."""
     w: Variable = var("rad/s", "speed of the shaft relative to the housing")
 
     def equations(self) -> Equations:
@@ -82,7 +88,7 @@ class SignTorque(TorqueSource):
         yield der(self.phi) == self.w
 
     def torque(self) -> Expr:
-        return self.tau_nominal * sign_law(self.w / self.w0)
+        return self.tau_nominal * sign_law(self.w / self.w0, self.reg)
 
 
 class ShaftMotionSource(OneFlange, partial=True):

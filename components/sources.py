@@ -5,10 +5,12 @@ A positive torque or force drives the connected part in positive direction.
 
 from __future__ import annotations
 
+from math import pi
+
 from components import icons
-from components.interfaces import LinearFlange, LinearOneFlange, OneFlange
+from components.interfaces import LinearOneFlange, OneFlange
 from modelica_like.language import (
-    Component,
+    Discrete,
     Equations,
     Events,
     Expr,
@@ -17,10 +19,14 @@ from modelica_like.language import (
     Parameter,
     Variable,
     der,
+    discrete,
     param,
     signal_in,
     var,
 )
+
+AT_ONCE = -1e30
+"""A time before every start: an event at it happens at the start."""
 
 
 class TorqueSource(OneFlange, partial=True):
@@ -77,30 +83,51 @@ class TorqueStep(TorqueSource):
 class SpeedSource(OneFlange, partial=True):
     """Speed between the housing and a shaft, whatever torque it takes."""
 
-    icon = icons.SPEED
     phi: Variable = var("rad", "angle of the shaft relative to the housing", default=0)
-    w: Variable = var("rad/s", "speed")
+    w: Variable = var("rad/s", "speed of the shaft relative to the housing")
 
     def speed(self) -> Expr:
         """Return the prescribed speed."""
         raise NotImplementedError
 
+    def follows(self) -> Equations:
+        """Yield what makes the shaft turn with it."""
+        yield self.w == self.speed()
+
     def equations(self) -> Equations:
         yield from super().equations()
         yield der(self.phi) == self.w
-        yield self.w == self.speed()
+        yield from self.follows()
 
     def source_power(self) -> Expr:
         return -self.flange.tau * self.w
 
 
 class Speed(SpeedSource):
-    """Speed given by a signal."""
+    """Speed given by a signal: exactly, or through a filter of first order, which starts with the signal.
+
+    The filter makes the acceleration finite where the signal jumps. In the Modelica Standard Library, Rotational.Speed,
+    `exact` is false if nothing is said.
+    """
 
     w_ref: Input = signal_in("rad/s", "speed")
+    exact: bool = True
+    """Follow the signal exactly: it must then have a derivative."""
+    f_crit: Parameter = param("Hz", "cut-off frequency of the filter", default=50.0, min=1e-12)
+    w: Variable = var("rad/s", "speed of the shaft relative to the housing", default=0)
+    stage = Mode("before", "moving", description="before or after the start")
+    begin: Discrete = discrete("s", "time of the start", start=AT_ONCE)
 
     def speed(self) -> Expr:
         return self.w_ref
+
+    def follows(self) -> Equations:
+        filtered = 2 * pi * self.f_crit * (self.w_ref - self.w)
+        yield self.w == self.w_ref if self.exact else der(self.w) == filtered
+
+    def events(self) -> Events:
+        if not self.exact:
+            yield self.stage.go("before", "moving", at=self.begin, reset={self.begin: self.time, self.w: self.w_ref})
 
 
 class ConstantSpeed(SpeedSource):
@@ -145,19 +172,3 @@ class ConstantForce(ForceSource):
 
     def force(self) -> Expr:
         return self.f_constant
-
-
-class TranslationalSpeed(Component):
-    """Velocity of a slide given by a signal, whatever force it takes."""
-
-    icon = icons.VELOCITY
-    flange = LinearFlange("slide end")
-    v_ref: Input = signal_in("m/s", "velocity")
-    s: Variable = var("m", "position")
-
-    def equations(self) -> Equations:
-        yield self.flange.s == self.s
-        yield der(self.s) == self.v_ref
-
-    def source_power(self) -> Expr:
-        return -self.flange.f * self.v_ref

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from modelica_like.language import Expr, absolute, maximum, tanh, where
+from math import pi
+from typing import Literal
+
+from modelica_like.language import Expr, absolute, cos, maximum, minimum, sign, sin, tanh, where
 
 
 def linear_law(x: Expr, reverses: bool) -> Expr:
@@ -21,6 +24,19 @@ def inverse_law(x: Expr, x0: Expr, reverses: bool) -> Expr:
     return where(absolute(x) < x0, x / x0**2, 1 / x) if reverses else 1 / reach
 
 
-def sign_law(x: Expr) -> Expr:
-    """Return the sign of x, smoothed: 0.99 at x = 1."""
-    return tanh(2.6467 * x)
+Regularization = Literal["exp", "sine", "linear", "cosine"]
+"""How a sign passes through zero; those of the Modelica Standard Library, Blocks.Types.Regularization."""
+
+
+def sign_law(x: Expr, reg: Regularization) -> Expr:
+    """Return the sign of x, smoothed between -1 and 1; `exp` is narrower: 0.99 at x = 0.053."""
+    inside = maximum(minimum(x, 1), -1)
+    match reg:
+        case "exp":
+            return tanh(50 * x)
+        case "sine":
+            return sin(0.5 * pi * inside)
+        case "linear":
+            return inside
+        case "cosine":
+            return sign(x) * (1 - cos(0.5 * pi * inside))

@@ -56,6 +56,28 @@ class Lossy(Component, partial=True):
         return 0.0 if self.heat_port.used else self.dissipation()
 
 
+class Conducting(Lossy, partial=True):
+    """Element whose conductors get warmer, and their resistance with them: by alpha20 of its value at 20 °C per kelvin.
+
+    Copper: 3.92e-3/K.
+    """
+
+    alpha20: Parameter = param("1/K", "temperature coefficient of the conductors' resistance at 20 °C", default=0.0)
+    T_20: Parameter = param("K", "temperature to which alpha20 belongs", default=_ROOM)
+    T_ref: Parameter = param("K", "temperature to which the other values belong", default=_ROOM)
+    T: Parameter = param("K", "temperature of the conductors without a heat port", default=_ROOM)
+
+    @property
+    def temperature(self) -> Expr:
+        """Temperature of the conductors."""
+        return self.heat_port.T if self.heat_port.used else self.T
+
+    def warmth(self, temperature: Expr) -> Expr:
+        """Return the resistance at a temperature over that at T_ref."""
+        at_ref = self.alpha20 / (1 + self.alpha20 * (self.T_ref - self.T_20))
+        return 1 + at_ref * (temperature - self.T_ref)
+
+
 class ThermalMass(Component):
     """Body of one temperature that stores heat, e.g. the lining of a clutch: C·der(T) is the heat flow into it.
 

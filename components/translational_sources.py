@@ -6,13 +6,15 @@ A positive force drives the connected part in positive direction.
 from __future__ import annotations
 
 from math import pi
+from typing import Literal
 
 from components import icons
 from components.interfaces import LinearFlange, LinearOneFlange
-from components.sources import ForceSource
+from components.sources import AT_ONCE, ForceSource
 from components.speed_laws import inverse_law, linear_law, quadratic_law, sign_law
 from modelica_like.language import (
     Component,
+    Discrete,
     Equations,
     Events,
     Expr,
@@ -21,6 +23,7 @@ from modelica_like.language import (
     Parameter,
     Variable,
     der,
+    discrete,
     param,
     signal_in,
     var,
@@ -99,11 +102,13 @@ class InverseSpeedDependentForce(SpeedDependentForce):
 
 
 class SignForce(ForceSource):
-    """Constant force with the sign of the velocity, smoothed around standstill."""
+    """Constant force with the sign of the velocity, smoothed around standstill; see `SignTorque`."""
 
     icon = icons.LOAD
     f_nominal: Parameter = param("N", "force on the connected part in forward motion; negative for a load")
-    v0: Parameter = param("m/s", "velocity at which 99 % of it are reached", default=0.1, min=1e-12)
+    v0: Parameter = param("m/s", "velocity from which on the sign is the full one", default=0.1, min=1e-12)
+    reg: Literal["exp", "sine", "linear", "cosine"] = "exp"
+    """Between -v0 and v0: tanh(50·v/v0) (`exp`), a quarter of a sine, a straight line, or one minus a cosine."""
     v: Variable = var("m/s", "velocity of the slide relative to the housing")
 
     def equations(self) -> Equations:
@@ -111,7 +116,7 @@ class SignForce(ForceSource):
         yield der(self.s) == self.v
 
     def force(self) -> Expr:
-        return self.f_nominal * sign_law(self.v / self.v0)
+        return self.f_nominal * sign_law(self.v / self.v0, self.reg)
 
 
 class MotionSource(LinearOneFlange, partial=True):
@@ -146,6 +151,28 @@ class TranslationalPosition(MotionSource):
         else:
             w_crit = 2 * pi * self.f_crit
             yield der(self.v) == ((self.s_ref - self.s) * w_crit - 1.3617 * self.v) * w_crit / 0.6180
+
+
+class TranslationalSpeed(MotionSource):
+    """Velocity given by a signal: exactly, or through a filter of first order; see `Speed`."""
+
+    v_ref: Input = signal_in("m/s", "velocity")
+    exact: bool = True
+    """Follow the signal exactly: it must then have a derivative."""
+    f_crit: Parameter = param("Hz", "cut-off frequency of the filter", default=50.0, min=1e-12)
+    s: Variable = var("m", "position of the slide relative to the housing", default=0)
+    v: Variable = var("m/s", "velocity of the slide relative to the housing", default=0)
+    stage = Mode("before", "moving", description="before or after the start")
+    begin: Discrete = discrete("s", "time of the start", start=AT_ONCE)
+
+    def equations(self) -> Equations:
+        yield from super().equations()
+        filtered = 2 * pi * self.f_crit * (self.v_ref - self.v)
+        yield self.v == self.v_ref if self.exact else der(self.v) == filtered
+
+    def events(self) -> Events:
+        if not self.exact:
+            yield self.stage.go("before", "moving", at=self.begin, reset={self.begin: self.time, self.v: self.v_ref})
 
 
 class TranslationalAccelerate(MotionSource):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 from components import icons
 from components.interfaces import Flange, LinearFlange, LinearOneFlange
 from components.speed_laws import sign_law
@@ -32,14 +34,16 @@ class RollingResistance(Lossy, LinearOneFlange):
     weight: Parameter = param("N", "weight on the wheels", min=0)
     Cr: Input = signal_in("1", "rolling resistance coefficient", default=0.015)
     inclination: Input = signal_in("1", "rise of the road over its run", default=0.0)
-    v0: Parameter = param("m/s", "velocity at which 99 % of it are reached", default=0.1, min=1e-12)
+    v0: Parameter = param("m/s", "velocity from which on the sign is the full one", default=0.1, min=1e-12)
+    reg: Literal["exp", "sine", "linear", "cosine"] = "exp"
+    """Between -v0 and v0: tanh(50·v/v0) (`exp`), a quarter of a sine, a straight line, or one minus a cosine."""
     v: Variable = var("m/s", "velocity of the wheels")
     f: Variable = var("N", "force against forward motion")
 
     def equations(self) -> Equations:
         yield from super().equations()
         yield der(self.s) == self.v
-        yield self.f == self.Cr * self.weight / sqrt(1 + self.inclination**2) * sign_law(self.v / self.v0)
+        yield self.f == self.Cr * self.weight / sqrt(1 + self.inclination**2) * sign_law(self.v / self.v0, self.reg)
         yield self.flange.f == self.f
 
     def dissipation(self) -> Expr:
@@ -65,10 +69,12 @@ class Vehicle(Component):
     Cd: Parameter = param("1", "drag coefficient", default=0.5, min=0)
     rho: Parameter = param("kg/m3", "density of the air", default=1.2, min=0)
     g: Parameter = param("m/s2", "gravity", default=9.80665)
-    v0: Parameter = param("m/s", "velocity with 99 % of the rolling resistance", default=1e-3, min=1e-12)
+    v0: Parameter = param("m/s", "velocity from which on it rolls with the full resistance", default=1e-3, min=1e-12)
     Cr: Input = signal_in("1", "rolling resistance coefficient", default=0.015)
     inclination: Input = signal_in("1", "rise of the road over its run", default=0.0)
     v_wind: Input = signal_in("m/s", "velocity of the wind, positive from behind", default=0.0)
+    reg: Literal["exp", "sine", "linear", "cosine"] = "exp"
+    """Between -v0 and v0: tanh(50·v/v0) (`exp`), a quarter of a sine, a straight line, or one minus a cosine."""
     s: Variable = var("m", "position")
     v: Variable = var("m/s", "velocity")
     f_drag: Variable = var("N", "drag of the air against forward motion")
@@ -81,7 +87,7 @@ class Vehicle(Component):
         yield self.R * self.flange_r.phi == self.s
         yield der(self.s) == self.v
         yield self.f_drag == 0.5 * self.Cd * self.A * self.rho * wind * absolute(wind)
-        yield self.f_roll == self.Cr * self.m * self.g / slant * sign_law(self.v / self.v0)
+        yield self.f_roll == self.Cr * self.m * self.g / slant * sign_law(self.v / self.v0, self.reg)
         yield self.f_slope == self.m * self.g * self.inclination / slant
         drive = self.flange_r.tau / self.R + self.flange_t.f
         yield (self.m + self.J / self.R**2) * der(self.v) == drive - self.f_drag - self.f_roll - self.f_slope

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from modelica_like.compile.compiled import CompiledDae as CompiledDae
     from modelica_like.cosimulation.run import cosim as cosim
     from modelica_like.cosimulation.split import split as split
+    from modelica_like.draw import save_schematic as save_schematic
+    from modelica_like.draw import schematic as schematic
     from modelica_like.errors import ModelicaLikeError as ModelicaLikeError
     from modelica_like.fmi.export import export_fmu as export_fmu
     from modelica_like.fmi.run import run_fmu as run_fmu
@@ -33,6 +35,7 @@ if TYPE_CHECKING:
     from modelica_like.native.page import export_html as export_html
     from modelica_like.netlist import load as load
     from modelica_like.report.compare import compare as compare
+    from modelica_like.report.page import save_report as save_report
     from modelica_like.simulation import build as build
     from modelica_like.simulation import simulate as simulate
     from modelica_like.solve.options import Options as Options
@@ -62,6 +65,9 @@ _HOME = {
     "linearize": "modelica_like.analyse.linear.linearize",
     "load": "modelica_like.netlist",
     "run_fmu": "modelica_like.fmi.run",
+    "save_report": "modelica_like.report.page",
+    "save_schematic": "modelica_like.draw",
+    "schematic": "modelica_like.draw",
     "sensitivities": "modelica_like.analyse.sensitivity.derivatives",
     "simulate": "modelica_like.simulation",
     "simulation_function": "modelica_like.analyse.sensitivity.function",
@@ -81,6 +87,6 @@ def __getattr__(name: str) -> Any:
     raise AttributeError(f"module 'modelica_like' has no attribute '{name}'")
 
 
-_OFFERED = {"simulation_function": _HOME["simulation_function"], "Native": _HOME["Native"],
-            "NativeLoop": "modelica_like.native.run"}  # fmt: skip
+_OFFERED = {name: _HOME[name] for name in ("Native", "schematic", "simulation_function")}
+_OFFERED["NativeLoop"] = "modelica_like.native.run"
 provide(tuple(_OFFERED), lambda name: getattr(import_module(_OFFERED[name]), name))

@@ -17,6 +17,7 @@ from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import (
     ExportError,
     LanguageError,
+    MissingExtra,
     SolveError,
     StepFailed,
     UnitError,
@@ -95,7 +96,7 @@ def simulate(
     drive: Model, until: float | str | None = None, *, parameters: Mapping[str, Any] | None = None,
     start: StartKind | None = None, t0: float = 0.0, rtol: float | None = None, atol: float | None = None,
     points: int | None = None, options: Options | None = None, progress: Progress | None = None,
-    solver: Solver = "idas",
+    solver: Solver | None = None,
 ) -> Solution:  # fmt: skip
     """Simulate a drive.
 
@@ -110,8 +111,8 @@ def simulate(
         points: number of equal intervals of the results.
         options: all options together; the arguments before win.
         progress: called with the time reached.
-        solver: `idas`, the reference, or `native`: the compiled run-time of FMUs, several times as fast. Where IDAS
-            gives up, the run is done by the compiled run-time, if there is one and it succeeds; a notice tells so.
+        solver: `idas`, the reference, or `native`: the compiled run-time of FMUs, several times as fast. By default it
+            is IDAS, and the run-time where IDAS gives up, if there is one and it succeeds; a notice tells so.
 
     Raises:
         ModelicaLikeError: the model or a value is wrong, or the simulation cannot go on.
@@ -121,7 +122,7 @@ def simulate(
     if parameters:
         model = model.with_parameters(dict(parameters))
     end, chosen = plan(model, until, t0=t0, rtol=rtol, atol=atol, points=points, options=options)
-    make = _loop(solver)
+    make = _loop(solver or "idas")
     begin = time.perf_counter()
     first = initialize(model, t0, start or model.settings.get("start", "given"))
     loop = make(model, chosen, first, end, progress)
@@ -129,9 +130,9 @@ def simulate(
         loop.run()
     except (SolveError, KeyboardInterrupt) as error:
         vars(error)["run"] = _solution(loop, begin) if loop.record.segments else None
-        if solver == "idas" and isinstance(error, StepFailed):
+        if solver is None and isinstance(error, StepFailed):
             # Where there is no run-time, or it fails, too, what IDAS says stands.
-            with suppress(SolveError, ExportError, LanguageError):
+            with suppress(SolveError, ExportError, LanguageError, MissingExtra):
                 run = simulate(model, end, start=start, t0=t0, options=chosen, progress=progress, solver="native")
                 told = f"{error.what} The whole run was done by the compiled run-time instead (solver native)."
                 return replace(run, notices=(told, *run.notices))

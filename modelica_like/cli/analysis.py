@@ -25,8 +25,7 @@ def modes(
     """Linearise a netlist at a point: eigenvalues, damping, where the energy of each mode is."""
     with told(debug, pictures=[shapes, bode]):
         assembly = load_netlist(netlist, assignments)
-        from modelica_like.analyse.linear.linearize import linearize
-        from modelica_like.analyse.linear.points import when
+        from modelica_like.analyse.linear.linearize import linearize, when
         from modelica_like.report.analysis import modes_report
         from modelica_like.solve.plot import save_plot
 

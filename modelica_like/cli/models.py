@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 from modelica_like.cli.declare import Option
-from modelica_like.cli.shared import Assignments, Debug, Netlist, load_netlist, out, told
+from modelica_like.cli.shared import Assignments, Debug, Netlist, assigned, load_netlist, out, told
 
 Start = Literal["given", "rest", "steady"]
 """What stands for start values that are not given."""
@@ -41,9 +41,12 @@ def simulate(
     units: Annotated[bool, Option("--units", help="Units in a second header line of the table.")] = False,
     plot: Annotated[Path | None, Option(metavar="FILE", help="Draw the results: .png, .svg or .pdf.")] = None,
     show: Annotated[list[str] | None, Option(metavar="PATTERN", help="What to draw, e.g. '*.w'.")] = None,
+    display: Annotated[
+        list[str] | None, Option(metavar="WHAT=UNIT", help="Show in a unit, e.g. speed=rpm or '*.phi=deg'.")
+    ] = None,
     sankey: Annotated[Path | None, Option(metavar="FILE", help="Draw where the energy went.")] = None,
     energy: Annotated[bool, Option(help="Print the energy balance.")] = True,
-    solver: Annotated[Solver, Option(help="IDAS, or the compiled run-time of FMUs.")] = "idas",
+    solver: Annotated[Solver | None, Option(help="IDAS only, or only the compiled run-time of FMUs.")] = None,
     debug: Debug = False,
 ) -> None:  # fmt: skip
     """Simulate a netlist: events, energy balance, results as table and picture."""
@@ -55,16 +58,20 @@ def simulate(
         from modelica_like.report.run import run_report
         from modelica_like.simulation import build
         from modelica_like.simulation import simulate as run
+        from modelica_like.solve.display import Display
         from modelica_like.solve.plot import matching
         from modelica_like.solve.plot import plot as draw
 
         model = build(assembly)
         matching(model, show or ())
+        shown = assigned(display, "--display")
+        Display(model, shown)
         with Bar(until or model.settings.get("until")) as bar:
             made = Outcome(
                 lambda: run(model, until, start=start, points=points, progress=bar, solver=solver), debug=debug
             )
         energy = energy and made.stopped is None and made.attempt("The energy balance", made.solution.energy)
-        made.tell(lambda one: run_report(one, energy=energy, debug=debug), csv)
-        pictures = (plot, lambda one: draw(one, show or ())), (sankey, lambda one: one.energy().sankey(model.name))
-        made.write(csv, units=units, pictures=pictures)
+        made.tell(lambda one: run_report(one, energy=energy, debug=debug, display=shown), csv)
+        curves = (plot, lambda one: draw(one, show or (), display=shown))
+        pictures = curves, (sankey, lambda one: one.energy().sankey(model.name))
+        made.write(csv, units=units or bool(display), display=shown, pictures=pictures)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -52,7 +52,9 @@ class Outcome:
             return True
         return False
 
-    def write(self, table: Path | None, *, units: bool, pictures: Sequence[Picture]) -> None:
+    def write(
+        self, table: Path | None, *, units: bool, pictures: Sequence[Picture], display: Mapping[str, str] | None = None
+    ) -> None:
         """Write the files that were asked for.
 
         Raises:
@@ -62,7 +64,7 @@ class Outcome:
         if table:
             from modelica_like.report.files import write_solution
 
-            self.attempt("The table", lambda: write_solution(self.solution, table, units=units), table)
+            self.attempt("The table", lambda: write_solution(self.solution, table, units=units, display=display), table)
         for file, draw in pictures:
             if file:
                 self.attempt(f"The picture {file.name}", lambda file=file, draw=draw: self._draw(file, draw), file)

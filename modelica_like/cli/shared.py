@@ -121,23 +121,29 @@ def say(text: str) -> None:
     out().print(escape(text), soft_wrap=True)
 
 
+def assigned(assignments: list[str] | None, option: str) -> dict[str, str]:
+    """Read what stands before and behind the signs of equality."""
+    pairs = [one.partition("=") for one in assignments or ()]
+    for before, equals, _ in pairs:
+        if not equals:
+            raise WrongUse(f"'{before}' is not {'PATH=VALUE' if option == '--set' else 'WHAT=UNIT'}.", option)
+    return {before.strip(): after.strip() for before, _, after in pairs}
+
+
 def load_netlist(netlist: Path, assignments: list[str] | None) -> Any:
     """Load a netlist and give it the values of `--set`."""
     from modelica_like.language import Assembly
     from modelica_like.netlist import load
 
     assembly = load(netlist)
-    for assignment in assignments or ():
-        path, equals, value = assignment.partition("=")
-        if not equals:
-            raise WrongUse(f"'{assignment}' is not PATH=VALUE.", "--set")
-        place = Source("--set", text=assignment)
+    for path, value in assigned(assignments, "--set").items():
+        place = Source("--set", text=f"{path}={value}")
         try:
-            assembly.set(path.strip(), _value(value.strip()))
+            assembly.set(path, _value(value))
         except ModelicaLikeError as error:
             error.where = (place,)
             raise
-        Assembly.place(assembly, f"set.{path.strip()}", place)
+        Assembly.place(assembly, f"set.{path}", place)
     return assembly
 
 

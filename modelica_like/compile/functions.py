@@ -69,10 +69,15 @@ def compile(reduced: ReducedDae) -> CompiledDae:
         implicit_blocks=reduced.implicit_blocks,
         motion_sources=_motion_sources(flat),
         summary=str(reduced),
-        settings=dict(getattr(flat.components.get(""), "_simulate", {})),
+        settings=_settings(flat.components.get("")),
         _make_energy=lambda: build.function("energy", energy_terms(reduced)),
         _make_start=lambda rest: start_system(reduced, rest),
     )
+
+
+def _settings(root: Any) -> dict[str, Any]:
+    display = getattr(root, "_display", {})
+    return {**getattr(root, "_simulate", {}), **({"display": display} if display else {})}
 
 
 def _discrete_starts(flat: FlatModel) -> Any:

@@ -18,15 +18,7 @@ from modelica_like.fmi.inside import Job, Messages, Refused, about
 
 
 class Recorder:
-    """Writes rows of all variables, of the energies at the bonds and of the counts, so that no failure loses them.
-
-    Args:
-        slaves: whose variables.
-        outputs: names of each.
-        master: whose energies and counts.
-        interval: shortest time between two rows, in s.
-        file: where to write.
-    """
+    """Writes rows of all variables, of the energies at the bonds and of the counts, so that no failure loses them."""
 
     def __init__(
         self, slaves: list[Slave], outputs: list[list[str]], master: Master, interval: float, job: Job, file: Path

@@ -34,13 +34,7 @@ class Cut:
 
 @dataclass(frozen=True)
 class CutNetlist:
-    """A netlist in groups of parts.
-
-    Attributes:
-        groups: names of the parts of each group, in the order of the netlist.
-        wires: those inside the groups.
-        cuts: those between the groups.
-    """
+    """A netlist in groups of parts, by their names: `wires` lie inside the groups, `cuts` between them."""
 
     groups: tuple[tuple[str, ...], ...]
     wires: tuple[Wire, ...]

@@ -42,13 +42,7 @@ class UnitDefinition:
 
 @dataclass(frozen=True)
 class FmuVariable:
-    """A scalar variable of an FMU.
-
-    Attributes:
-        kind: `Real`, `Integer`, `Boolean`, `Float64`, `Enumeration`, …, as the standard calls it.
-        causality: `input`, `output`, `parameter`, `local`, …
-        unit: its name, or an empty text.
-    """
+    """A scalar variable of an FMU: type and causality as the standard calls them, name of the unit or an empty text."""
 
     name: str
     kind: str
@@ -64,14 +58,7 @@ class FmuVariable:
 
 @dataclass(frozen=True)
 class DescribedFmu:
-    """An FMU's description.
-
-    Attributes:
-        version: of FMI.
-        cosimulation: it has a Co-Simulation part.
-        variables: by name.
-        units: their definitions, by name.
-    """
+    """An FMU's description: FMI version, whether it has a Co-Simulation part, variables and units by name."""
 
     version: str
     cosimulation: bool

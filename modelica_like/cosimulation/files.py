@@ -25,17 +25,7 @@ _OWN_NAMES = "results keep the names that variables have in their FMUs"
 
 
 def load_system(path: Path, work: Path) -> System:
-    """Read a system: a TOML file, an SSP, or a netlist with FMUs as parts.
-
-    Args:
-        path: the file.
-        work: an empty folder for what has to be unpacked or exported.
-
-    Raises:
-        NetlistError, UnknownName: it is none of these, or something in it is wrong.
-        FmuRefused: an SSP is not sound.
-        ModelicaLikeError: the netlist's own parts cannot be exported.
-    """
+    """Read a system: a TOML file, an SSP, or a netlist with FMUs; what is unpacked or exported goes to `work`."""
     if path.suffix.lower() == ".ssp":
         from modelica_like.cosimulation.ssp import load_ssp
 
@@ -49,11 +39,7 @@ def load_system(path: Path, work: Path) -> System:
 
 
 def describes_system(path: Path) -> bool:
-    """Return whether a file describes FMUs that run together, and not a netlist that is simulated.
-
-    Raises:
-        NetlistError: it is not TOML, or does not exist.
-    """
+    """Return whether a file describes FMUs that run together, and not a netlist that is simulated."""
     if path.suffix.lower() == ".ssp":
         return True
     data, _ = _read_toml(path)

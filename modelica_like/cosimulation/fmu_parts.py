@@ -23,13 +23,10 @@ _ONLY_SIGNALS = "An FMU has signals only: join its inputs and outputs in [connec
 
 
 def system_of_netlist(path: Path, work: Path) -> System:
-    """Make a system of a netlist that has FMUs among its parts.
+    """Make a system of a netlist that has FMUs among its parts; several errors come together.
 
     The FMUs, whose files are named relative to the netlist, are units of their own; all other parts are exported into a
     folder as one FMU with the netlist's name.
-
-    Raises:
-        ModelicaLikeError: something in the netlist or in a file is wrong; several errors come together.
     """
     document = parse(read_text(path), str(path))
     fmus = {name: entry for name, entry in document.parts.items() if _is_fmu(entry)}

@@ -60,13 +60,7 @@ class Signal:
 
 @dataclass
 class Balance(Energies):
-    """Energy at a bond while it runs.
-
-    Attributes:
-        flow: number of the signal of the flow.
-        rate: number of the signal of the rate.
-        power: at the last communication point, in W.
-    """
+    """Energy at a bond of two signals, by their numbers, and its power in W at the last communication point."""
 
     flow: int
     rate: int
@@ -144,11 +138,7 @@ class Master:
         self.settle(time)
 
     def settle(self, time: float) -> None:
-        """Pass outputs on to inputs until they do not change any more: some follow inputs at once.
-
-        Raises:
-            Refused: they do not come to rest.
-        """
+        """Pass outputs on to inputs until they do not change any more: some follow inputs at once."""
         moved: list[Signal] = []
         for _ in range(_ROUNDS):
             for slave, taken in zip(self.slaves, self._taken, strict=True):
@@ -226,11 +216,7 @@ class Master:
             time = after
 
     def run_variable(self, start: float, stop: float, step: float, tolerance: float, observer: Observer) -> None:
-        """Step such that a step and two halves of it agree; the halves are kept.
-
-        Raises:
-            Refused: they do not agree, however short the step.
-        """
+        """Step such that a step and two halves of it agree; the halves are kept."""
         time, size = start, step
         order = 2 if self.linear and all(slave.slopes for slave in self.slaves) else 1
         resolution = _RESOLUTION * (stop - start)

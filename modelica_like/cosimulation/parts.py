@@ -1,20 +1,43 @@
-"""The netlists of the groups into which a drive is cut: their parts and wires, with adaptors at the open ends."""
+"""The groups into which a drive is cut: which side of a cut is told the motion and which the torque, their netlists."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Any, Literal
 
 from modelica_like.compile import compile
-from modelica_like.cosimulation.causality import End, signals_of
-from modelica_like.cosimulation.cut import CutNetlist, part_of
-from modelica_like.errors import NetlistError
+from modelica_like.compile.compiled import CompiledDae
+from modelica_like.cosimulation.cut import Cut, CutNetlist, as_name, part_of
+from modelica_like.errors import ModelicaLikeError, NetlistError, StructureError
 from modelica_like.flatten import flatten
+from modelica_like.fmi.dependencies import Following
 from modelica_like.fmi.terminals import adaptor_for, connector_at
 from modelica_like.language import Assembly, Component
+from modelica_like.language.fields import Input, Output
 from modelica_like.language.formula import Formula
 from modelica_like.netlist.convert import value_text
 from modelica_like.structure import reduce
+
+Takes = Literal["flow", "potential"]
+_MOST = 8
+
+
+@dataclass(frozen=True)
+class End:
+    """An open end of a group: the adaptor that is added for it, its path, and what comes from the other side."""
+
+    adaptor: str
+    path: str
+    takes: Takes
+
+
+def ends_of(cut: Cut, near_takes: Takes) -> tuple[End, End]:
+    """Return both ends of a cut; the names of their adaptors are those of the ends."""
+    other: Takes = "flow" if near_takes == "potential" else "potential"
+    near, far = cut.near, cut.far[0]
+    return End(as_name(near), near, near_takes), End(as_name(far), far, other)
 
 
 class Maker:
@@ -22,13 +45,30 @@ class Maker:
 
     def __init__(self, assembly: Assembly, found: CutNetlist) -> None:
         self.assembly, self.found = assembly, found
+        self._tried: dict[tuple[int, tuple[End, ...]], str] = {}
+
+    def open_ends(self, group: int, chosen: Mapping[Cut, Takes]) -> list[End]:
+        """Return the open shaft ends of a group."""
+        ends = [end for cut, near_takes in chosen.items() for end in ends_of(cut, near_takes)]
+        return [end for end in ends if self.found.group_of(end.path) == group]
+
+    def objection(self, group: int, chosen: Mapping[Cut, Takes]) -> str:
+        """Return why a group cannot have its ends so, or an empty text; every case is tried once."""
+        case = group, tuple(self.open_ends(group, chosen))
+        if case not in self._tried:
+            self._tried[case] = self._tell(*case)
+        return self._tried[case]
+
+    def _tell(self, group: int, ends: Sequence[End]) -> str:
+        try:
+            assembly = self.bare(group, ends)
+            model = compile(reduce(flatten(assembly, open_inputs=True)))
+        except StructureError as error:
+            return error.what.rstrip(".")
+        return next(filter(None, (_bad_end(model, assembly, end) for end in ends)), "")
 
     def bare(self, group: int, ends: Sequence[End]) -> Assembly:
-        """Return a group with adaptors at its open ends, with the start values that its parts were given.
-
-        Raises:
-            NetlistError: it needs a parameter of a part in another group.
-        """
+        """Return a group with adaptors at its open ends, with the start values that its parts were given."""
         names = self.found.groups[group]
         parts: dict[str, Any] = {name: self.assembly._parts[name] for name in names}
         wires = {wire.name: wire.ends for wire in self.found.wires if part_of(wire.ends[0]) in names}
@@ -61,13 +101,7 @@ class Maker:
         return {f"{end.adaptor}.{name}": 0.0 for end in takers for name in signals_of(self.adaptor(end)[0])[2]}
 
     def started(self, group: int, ends: Sequence[End], values: Mapping[str, float]) -> Assembly:
-        """Return a group that starts where the whole drive does.
-
-        Args:
-            group: its number.
-            ends: its open ends.
-            values: all variables of the whole drive at its start, in SI units.
-        """
+        """Return a group that starts where the whole drive does; `values` are those of the drive, in SI units."""
         made = self.bare(group, ends)
         model = compile(reduce(flatten(made, open_inputs=True)))
         given: set[int] = set()
@@ -112,3 +146,72 @@ def _names(part: Component | list[Component]) -> list[str]:
     values = [value for one in components for value in (*one._values.values(), *one._starts.values())]
     formulas: list[Formula] = [value.formula for value in values if value.formula is not None]
     return [name for formula in formulas for name in formula.names()]
+
+
+def signals_of(adaptor: Component) -> tuple[list[str], list[str], list[str]]:
+    """Return outputs, inputs, and those of the inputs that are second derivatives."""
+    rates = adaptor.terminal.rates if adaptor.terminal else ()
+    firsts = {rate for _, rate in rates}
+    second = [rate for name, rate in rates if name in firsts]
+    inputs = [name for name, field in adaptor.fields.items() if isinstance(field, Input)]
+    return [name for name, field in adaptor.fields.items() if isinstance(field, Output)], inputs, second
+
+
+# -- which side takes what ---------------------------------------------------------------------------------------------
+
+
+def orient(maker: Maker) -> dict[Cut, Takes]:
+    """Decide for each cut shaft what its near side takes, or raise a NetlistError that says why there is no choice.
+
+    The side with a spring or damper at the cut is told angle and speed, and gives a torque that depends on no
+    acceleration; the side with an inertia is told the torque, and its angle and speed are states.
+    """
+    cuts = [cut for cut in maker.found.cuts if not cut.signal]
+    if len(cuts) > _MOST:
+        raise NetlistError(f"{len(cuts)} cuts at once are too many; {_MOST} are possible.")
+    for chosen in _choices(cuts):
+        if not any(maker.objection(k, chosen) for k in range(len(maker.found.groups))):
+            return chosen
+    raise _impossible(maker, cuts)
+
+
+def _choices(cuts: Sequence[Cut]) -> Iterator[dict[Cut, Takes]]:
+    sides: list[Takes] = ["potential", "flow"]
+    for choice in product(sides, repeat=len(cuts)):
+        yield dict(zip(cuts, choice, strict=True))
+
+
+def _bad_end(model: CompiledDae, assembly: Assembly, end: End) -> str:
+    """Return what the answer of an end must not depend on, but does."""
+    outputs, inputs, second = signals_of(assembly.parts[end.adaptor])
+    wrong = second if end.takes == "potential" else inputs
+    depends = Following(model)
+    names = [model.flat_variables[k].path for k in model.inputs]
+    for name in outputs:
+        follows = {names[k] for k in depends.inputs_of(model.position[f"{end.adaptor}.{name}"])}
+        found = follows & {f"{end.adaptor}.{one}" for one in wrong}
+        if found and end.takes == "potential":
+            return f"{end.path} is rigid: its {outputs[0]} would depend on the acceleration"
+        if found:
+            return f"{end.path} stores nothing: its {outputs[0]} would follow {inputs[0]} at once"
+    return ""
+
+
+def _impossible(maker: Maker, cuts: Sequence[Cut]) -> ModelicaLikeError:
+    """Tell for the first cut that cannot be made in either way why."""
+    for cut in cuts:
+        sides = [maker.found.group_of(cut.near), maker.found.group_of(cut.far[0])]
+        others = [one for one in cuts if one is not cut]
+        reasons: dict[str, None] = {}
+        for chosen in _choices((cut, *others)):
+            objections = [maker.objection(side, chosen) for side in sides]
+            if not any(objections):
+                break
+            reasons.update(dict.fromkeys(filter(None, objections)))
+        else:
+            return NetlistError(
+                f"{cut.name}: neither side of the cut can take the motion while the other takes the load.",
+                where=cut.source, why=f"{'; '.join(reasons)}.",
+                advice="Cut where a spring or damper on one side meets an inertia on the other.",
+            )  # fmt: skip
+    return NetlistError("The cuts exclude each other.", advice="Cut at fewer shafts, or at others.")

@@ -12,11 +12,22 @@ from typing import Any
 
 import numpy as np
 
-from modelica_like.cosimulation.failures import tell_error, tell_loss
 from modelica_like.cosimulation.files import opened
 from modelica_like.cosimulation.solution import CosimSolution, Coupling
 from modelica_like.cosimulation.system import Inputs, Master, Settings, System, check_system
-from modelica_like.errors import FmuCrashed, FmuTimeout, SolveError, UnknownName, ValueOutOfRange, did_you_mean
+from modelica_like.errors import (
+    FmuCrashed,
+    FmuFailed,
+    FmuRefused,
+    FmuTimeout,
+    ModelicaLikeError,
+    SolveError,
+    StepFailed,
+    UnknownName,
+    ValueOutOfRange,
+    did_you_mean,
+)
+from modelica_like.fmi import failures
 from modelica_like.fmi.inside import PLACE
 from modelica_like.fmi.process import run_child, workplace
 from modelica_like.simulation import seconds
@@ -46,8 +57,7 @@ def cosim(
     Args:
         system: a system, its TOML file, an SSP, or a netlist with FMUs as parts.
         until: end time, a number in s or a quantity; by default what the system says.
-        step: communication step, a number in s or a quantity; by default what the system says, or a thousandth of
-            the run.
+        step: communication step, likewise; by default what the system says, or a thousandth of the run.
         master: `jacobi` or `gauss-seidel`.
         inputs: `linear` (FMUs are told the slopes of their inputs, where they can take them) or `hold`.
         tolerance: relative tolerance of the signals between FMUs; with it the step varies.
@@ -73,12 +83,7 @@ def cosim(
             )  # fmt: skip
     check_system(system)
     system = _with_parameters(system, parameters or {})
-    if until is None and system.settings.until is None:
-        raise ValueOutOfRange(
-            f"{system.name}: there is no end time.",
-            advice="Give `until`, or put it under [simulate] in the system's file.",
-        )
-    settings = _settings(system.settings, until, step, master, inputs, tolerance)
+    settings = _settings(system, until, step, master, inputs, tolerance)
     if timeout <= 0:
         raise ValueOutOfRange(f"{system.name}: the time limit must be positive, not {timeout:g} s.")
     if fmu_tolerance is None and settings.tolerance is not None:
@@ -124,9 +129,15 @@ def _with_parameters(system: System, given: Mapping[str, float]) -> System:
 
 
 def _settings(
-    base: Settings, until: float | str | None, step: float | str | None, master: str | None, inputs: str | None,
+    system: System, until: float | str | None, step: float | str | None, master: str | None, inputs: str | None,
     tolerance: float | None,
 ) -> Settings:  # fmt: skip
+    base = system.settings
+    if until is None and base.until is None:
+        raise ValueOutOfRange(
+            f"{system.name}: there is no end time.",
+            advice="Give `until`, or put it under [simulate] in the system's file.",
+        )
     end = seconds(until if until is not None else base.until)
     chosen = tolerance if tolerance is not None else base.tolerance
     part = _FIXED_PART if chosen is None else _FIRST_PART
@@ -177,3 +188,52 @@ def _watch(folder: Path, done: threading.Event, progress: Progress | None) -> No
 def _place(folder: Path) -> tuple[float, int]:
     """Return the time reached, and the number of the FMU that was called last."""
     return PLACE.unpack((folder / "progress").read_bytes())
+
+
+# -- what can go wrong -------------------------------------------------------------------------------------------------
+
+
+def tell_loss(system: System, calling: int, error: FmuCrashed | FmuTimeout) -> ModelicaLikeError:
+    """Return the error of a lost process, with the name of the FMU that was called last."""
+    unit = system.units[calling]
+    if isinstance(error, FmuTimeout):
+        return FmuTimeout(error.what, why=f"{unit.name} ({unit.file.name}) was at work.", advice=error.advice)
+    what = f"{unit.name} ({unit.file.name}){error.what.removeprefix(system.name)}"
+    return FmuCrashed(what, why=f"The FMUs of {system.name} ran in a process of their own.")
+
+
+def tell_error(system: System, folder: Path) -> None:
+    """Raise what the process has left to tell."""
+    units = {unit.name: f"{unit.name} ({unit.file.name})" for unit in system.units}
+    shorter = "If what the FMUs exchange grows without bounds, take a shorter step."
+    failures.tell_error(folder, units, _FAILURES, system=system.name, shorter=shorter)
+
+
+_FAILURES: failures.Failures = failures.FAILURES | {
+    "no output": (UnknownName, "{system} has no variable '{name}'{hint}", "", ""),
+    "too old": (FmuRefused, "{unit} is an FMU of FMI 1.0.", "", "Co-simulation takes FMI 2.0 and 3.0."),
+    "no co-simulation": (
+        FmuRefused, "{unit} has no Co-Simulation part.", "", "Export it as a Co-Simulation FMU.",
+    ),
+    "no rollback": (
+        FmuRefused,
+        "{unit} cannot go back to a saved state, or does not take steps of any length, so the step cannot vary.",
+        "It needs both canGetAndSetFMUState and canHandleVariableCommunicationStepSize.",
+        "Run with a fixed step, without tolerance.",
+    ),
+    "not settled": (
+        FmuFailed,
+        "{unit}: {name} does not come to rest at t = {time:.6g} s when inputs follow outputs.",
+        "{system} has an algebraic loop: the output follows inputs at once that follow this output at once.",
+        "Cut where a mass, a spring or a controller with a state is between the FMUs.",
+    ),
+    "not finite": (
+        FmuFailed, "{unit}: {name} is not finite at t = {time:.6g} s.", "",
+        "If the values before it grow without bounds, take a shorter step.",
+    ),
+    "step": (
+        StepFailed, "{system}: after t = {time:.6g} s no step is short enough for the tolerance of the coupling.", "",
+        "Give a larger tolerance, or a fixed step.",
+    ),
+    "ends": (FmuFailed, "{unit} wants to end the run after t = {time:g} s.", "", ""),
+}  # fmt: skip

@@ -15,13 +15,7 @@ _STORED = {name: name for name in (*REAL, *DISCRETE)} | {"Enumeration": "Integer
 
 
 class Slave:
-    """One FMU.
-
-    Args:
-        name: its name in the system.
-        folder: the unpacked FMU.
-        messages: keeps what it says.
-        notice: called before the FMU itself is.
+    """One FMU, which keeps what it says in `messages`; `notice` is called before it is.
 
     Attributes:
         variables: FMPy's descriptions of the scalar variables by name, without parameters.

@@ -20,11 +20,7 @@ _TOLD = 5
 
 @dataclass
 class Coupling(Energies):
-    """Energy at a bond over a run.
-
-    Attributes:
-        name: of the bond.
-    """
+    """Energy at a bond over a run."""
 
     name: str
 
@@ -83,12 +79,7 @@ class CosimSolution(RecordedSolution):
 
 
 def described_model(system: System) -> RecordedModel:
-    """Return the names of what a run will give, as far as the FMUs say them without being run.
-
-    Raises:
-        FmuRefused: a file is no FMU.
-        OSError: a file cannot be read.
-    """
+    """Return the names of what a run will give, as far as the FMUs say them without being run."""
     fmus = [described(unit.file).variables.values() for unit in system.units]
     columns = _columns(system, [[{"path": one.name} for one in fmu if one.varies] for fmu in fmus])
     return RecordedModel(system.name, (*columns, *_bond_columns(system)), (), {})

@@ -6,10 +6,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from modelica_like.cosimulation.causality import Takes, ends_of, open_ends, orient
 from modelica_like.cosimulation.cut import Cut, CutNetlist, cut_netlist
 from modelica_like.cosimulation.files import write_system
-from modelica_like.cosimulation.parts import Maker
+from modelica_like.cosimulation.parts import Maker, Takes, ends_of, orient
 from modelica_like.cosimulation.system import Bond, Link, Port, Settings, System, Unit
 from modelica_like.errors import DuplicateName, NetlistError
 from modelica_like.fmi.export import export_fmu
@@ -69,10 +68,8 @@ def split(
         report: called with what is being done.
 
     Raises:
-        UnknownName: there is no such shaft.
-        NetlistError: the drive cannot be cut there.
-        ExportError: a part cannot be exported.
-        ModelicaLikeError: something is wrong with the drive.
+        UnknownName, NetlistError: there is no such shaft, or the drive cannot be cut there.
+        ModelicaLikeError: something is wrong with the drive, or a part cannot be exported.
         OSError: nothing can be written into the folder.
     """
     tell, target = report or (lambda _: None), Path(folder)
@@ -84,19 +81,17 @@ def split(
     settings = _settings(assembly.__dict__["_simulate"].get("until"), step, master)
     maker = Maker(assembly, found)
     tell("looking for the causality")
-    chosen = orient(found, maker.bare)
+    chosen = orient(maker)
     values = _start_values(assembly)
     target.mkdir(parents=True, exist_ok=True)
-    units: list[Unit] = []
-    notes: list[str] = []
+    units, notes = list[Unit](), list[str]()
     for k, title in enumerate(titles):
         tell(f"exporting {title}")
-        ends, file = open_ends(found, k, chosen), target / f"{title}.fmu"
+        ends, file = maker.open_ends(k, chosen), target / f"{title}.fmu"
         note = _export(maker.started(k, ends, values), title, file, version, check=check)
         notes += [f"{title}: {note}"] if note else []
         units.append(Unit(title, file, maker.not_passed_on(ends)))
-    links, bonds = _couplings(maker, chosen, titles)
-    system = System(assembly._name, tuple(units), links, bonds, settings, own_names=True)
+    system = System(assembly._name, tuple(units), *_couplings(maker, chosen, titles), settings, own_names=True)
     write_system(system, target / _SYSTEM)
     taken: dict[str, Takes] = {end.path: end.takes for cut, takes in chosen.items() for end in ends_of(cut, takes)}
     return Split(system, target / _SYSTEM, taken, tuple(notes))

@@ -88,11 +88,8 @@ def _check_variables(system: System, fmus: dict[str, DescribedFmu]) -> None:
 def load_ssp(path: Path, work: Path) -> System:
     """Read an SSP: the system of its SystemStructure.ssd, flat.
 
-    Systems inside of the system are taken apart; the names of their FMUs are joined with `_`.
-
-    Args:
-        path: the file.
-        work: an empty folder into which it is unpacked; the FMUs of the system lie there.
+    Systems inside of the system are taken apart; the names of their FMUs are joined with `_`. The SSP is unpacked into
+    an empty folder, where the FMUs of the system lie.
 
     Raises:
         FmuRefused: the file is no SSP, or is unsafe to unpack.

@@ -38,9 +38,6 @@ def ssd(system: System, fmus: Mapping[str, DescribedFmu], sources: Mapping[str, 
         fmus: descriptions by the name of the unit.
         sources: paths inside the archive, by the name of the unit.
         version: of the SSP standard.
-
-    Raises:
-        NetlistError: two FMUs mean different units by one name.
     """
     spaces = {f"xmlns:{prefix}": home for prefix, home in NAMES.items()}
     top = Element("ssd:SystemStructureDescription", {**spaces, "version": version, "name": system.name})

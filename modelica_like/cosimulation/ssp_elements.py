@@ -43,13 +43,7 @@ class Bound(NamedTuple):
 
 @dataclass
 class Element:
-    """A component, or a system with elements inside.
-
-    Attributes:
-        path: names from the outermost system, which is left out, to this element.
-        xml: where it stands.
-        file: the FMU of a component; None for a system.
-    """
+    """A component with its FMU, or a system with elements inside; `path` has no name for the outermost system."""
 
     path: ElementPath
     xml: Any

@@ -51,11 +51,7 @@ def read_structure(name: str, folder: Path) -> System:
 
 
 class _Reader:
-    """Flattens a tree of elements.
-
-    Attributes:
-        drives: what drives a connector.
-    """
+    """Flattens a tree of elements; `drives` says what drives a connector."""
 
     def __init__(self, top: Any, root: Element, files: Files) -> None:
         self.top, self.root, self.files = top, root, files

@@ -33,13 +33,7 @@ class Port(NamedTuple):
 
 @dataclass(frozen=True)
 class Unit:
-    """An FMU in a system.
-
-    Attributes:
-        name: by which connections and results call it.
-        file: the FMU.
-        parameters: start values by name, in the FMU's units.
-    """
+    """An FMU in a system, by its name there; the parameters are start values in the FMU's units."""
 
     name: str
     file: Path
@@ -151,11 +145,7 @@ class System:
 
 
 def check_system(system: System) -> None:
-    """Check that names are known, and that no input is driven twice.
-
-    Raises:
-        NetlistError, UnknownName: what is wrong; several errors come together.
-    """
+    """Check that names are known, and that no input is driven twice; several errors come together."""
     errors: list[ModelicaLikeError] = []
     if not system.units:
         errors.append(NetlistError(f"{system.name} has no FMU.", advice="Declare them in [fmus]."))

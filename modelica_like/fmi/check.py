@@ -153,7 +153,7 @@ def error_of_fixed_steps(path: Path, model: CompiledDae, step: float) -> Check:
     except FmuFailed as error:
         return Check(f"In fixed steps of {step:g} s the FMU fails. {error}", differs=True)
     try:
-        truth = simulate(model, end, points=points, rtol=_TRUTH, atol=_TRUTH / 100)
+        truth = simulate(model, end, points=points, rtol=_TRUTH, atol=_TRUTH / 100, solver="idas")
     except SolveError as error:
         return Check(f"The error of fixed steps of {step:g} s is not known, as IDAS gave up: {error.what}")
     curves = compare_solutions(truth, run, names, ("IDAS", "FMU"), _LEAST_RANGE)
@@ -172,7 +172,7 @@ def _idas(model: CompiledDae, end: float, *tolerances: float) -> Solution:
     """Run with the first of the tolerances that leads to the end."""
     first, *rest = tolerances
     try:
-        return simulate(model, end, points=_POINTS, rtol=first, atol=first / 100)
+        return simulate(model, end, points=_POINTS, rtol=first, atol=first / 100, solver="idas")
     except SolveError:
         if not rest:
             raise

@@ -36,7 +36,9 @@ class Assembly(Component):
     ) -> None:  # fmt: skip
         self.__dict__.update(_own_fields={}, _own_connectors=(), _wires={}, _chains={}, _free=(), _places={})
         super().__init__()
-        self.__dict__.update(_name=name, _description=description, _simulate={}, _origin="", _made=caller())
+        self.__dict__.update(
+            _name=name, _description=description, _simulate={}, _display={}, _origin="", _made=caller()
+        )
         for key, value in (parameters or {}).items():
             self.add_parameter(key, value)
         for key, part in (parts or {}).items():
@@ -96,7 +98,7 @@ class Assembly(Component):
     def __getattr__(self, name: str) -> Expr:
         if name in self.__dict__.get("_own_fields", {}):
             return symbol_of(self, name)
-        if name in ("description", "simulate", "origin"):  # unless a part is called so
+        if name in ("description", "simulate", "display", "origin"):  # unless a part is called so
             return self.__dict__[f"_{name}"]
         raise AttributeError(f"{type(self).__name__} '{self.__dict__.get('_name', '')}' has no '{name}'")
 

@@ -14,6 +14,7 @@ from modelica_like.errors import (
     ModelicaLikeError,
     NetlistError,
     Source,
+    UnitError,
     UnknownName,
     did_you_mean,
     raise_together_or_one,
@@ -42,6 +43,7 @@ class Document:
         guess: guessed start values by path.
         expose: inner connectors by the name of the outer one.
         simulate: options of a run, as written.
+        display: units in which results are shown, by path, pattern or quantity.
     """
 
     lines: Lines
@@ -56,6 +58,7 @@ class Document:
     free: list[str] = field(default_factory=list)
     expose: dict[str, str] = field(default_factory=dict)
     simulate: dict[str, Any] = field(default_factory=dict)
+    display: dict[str, str] = field(default_factory=dict)
 
 
 def read_text(path: Path) -> str:
@@ -329,6 +332,13 @@ def _whole(most: int) -> Check:
     return check
 
 
+def _unit_text(key: str, value: Any) -> str:
+    try:
+        return str(parse_unit(as_text(key, value)))
+    except UnitError as error:
+        raise UnitError(f"{key}: {error.what}", advice=error.advice) from None
+
+
 _OPTIONS: Mapping[str, Check] = {
     "until": duration, "start": _start_kind, "rtol": _rtol, "points": _whole(1_000_000),
 }  # fmt: skip
@@ -344,4 +354,5 @@ _READERS: Mapping[str, Reader] = {
     "free": whole(_names),
     "expose": each(as_text),
     "simulate": options(_OPTIONS),
+    "display": each(_unit_text, flat=True),
 }

@@ -77,7 +77,7 @@ class _Loader:
             document.name, connect=document.connect, series=document.series, free=document.free,
             description=document.description,
         )  # fmt: skip
-        assembly.__dict__.update(_origin=str(chain[-1]), _simulate=document.simulate)
+        assembly.__dict__.update(_origin=str(chain[-1]), _simulate=document.simulate, _display=document.display)
         task = _Task(document, assembly, chain, self)
         task.run()
         if task.errors:

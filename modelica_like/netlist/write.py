@@ -59,6 +59,7 @@ class _Writer:
             "start": self.start,
             "guess": self.guess,
             "simulate": assembly.__dict__["_simulate"],
+            "display": assembly.__dict__["_display"],
         }
         document = tomlkit.document()
         document.add("name", tomlkit.item(assembly._name))

@@ -50,12 +50,7 @@ def filled(title: str, head: Sequence[str], rows: Iterable[Sequence[str]]) -> Li
 
 
 def declared(kind: type[Component], notation: Notation) -> list[Listing]:
-    """Return listings of connectors, fields, structural fields and modes; those without rows are left out.
-
-    Args:
-        kind: the type.
-        notation: how cells are written.
-    """
+    """Return listings of connectors, fields, structural fields and modes; those without rows are left out."""
     code, text = notation.code, notation.text
     made = [
         filled(

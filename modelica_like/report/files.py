@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, TextIO
 import numpy as np
 
 from modelica_like.errors import NetlistError, missing_extra
-from modelica_like.solve.plot import unit_of
+from modelica_like.solve.display import Display
 from modelica_like.solve.trajectories import Trajectories
 from modelica_like.writing import check_writable, replacing
 
@@ -46,7 +46,9 @@ def check_table(path: Path) -> None:
     check_writable(path)
 
 
-def write_solution(solution: Trajectories, path: Path, *, units: bool = False) -> None:
+def write_solution(
+    solution: Trajectories, path: Path, *, units: bool = False, display: Mapping[str, str] | None = None
+) -> None:
     """Write all trajectories as a table; its ending chooses the format.
 
     A repeated time is an event's left and right value.
@@ -55,13 +57,16 @@ def write_solution(solution: Trajectories, path: Path, *, units: bool = False) -
         solution: the run.
         path: `.csv` (first column `time`, then one column per variable, modes as numbers, with as many digits as
             reading them back needs), `.parquet` or `.nc` (netCDF); `-` is standard output.
-        units: write a second header line with the units into a .csv; a netCDF always tells them.
+        units: write a second header line with the units into a .csv; its values are then in the units of the
+            netlist's [display]. A netCDF always tells its units, and is always in SI units.
+        display: units by path, pattern or quantity, beside those of the netlist, such as {"speed": "rpm"}.
 
     Raises:
         NetlistError: no table has this ending.
+        UnknownName, UnitError: a variable cannot be shown in a unit.
         OSError: the file cannot be written.
     """
-    _write(path, lambda file: _rows(solution, file, units=units), solution.to_pandas, solution.to_xarray)
+    _write(path, lambda file: _rows(solution, file, display or {}, units=units), solution.to_pandas, solution.to_xarray)
 
 
 def write_dataset(found: xarray.Dataset, path: Path) -> None:
@@ -93,11 +98,15 @@ def _write(
                     rows(file)
 
 
-def _rows(solution: Trajectories, file: TextIO, *, units: bool) -> None:
-    columns = [solution.time, *solution.together(*solution.names).values()]
+def _rows(solution: Trajectories, file: TextIO, display: Mapping[str, str], *, units: bool) -> None:
+    values = solution.together(*solution.names)
+    shown = Display(solution.model, display)
+    if units:
+        values = {name: shown.values(name, column) for name, column in values.items()}
+    columns = [solution.time, *values.values()]
     writer = csv.writer(file)
     writer.writerow(["time", *solution.names])
     if units:
-        writer.writerow(["s", *(unit_of(solution, name) for name in solution.names)])
+        writer.writerow(["s", *map(shown.of, solution.names)])
     for row in np.column_stack(columns).tolist():
         writer.writerow(map(repr, row))

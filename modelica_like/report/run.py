@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING
 
 from rich.console import Group, RenderableType
@@ -11,8 +11,10 @@ from rich.table import Table
 
 from modelica_like.language.transition import NAME_IN_NOTICE
 from modelica_like.report.types import table
+from modelica_like.solve.display import Display
 from modelica_like.solve.recorder import Event
 from modelica_like.solve.trajectories import Trajectories
+from modelica_like.units import parse_unit
 
 if TYPE_CHECKING:
     from modelica_like.cosimulation.solution import CosimSolution
@@ -20,17 +22,20 @@ if TYPE_CHECKING:
 _SHOWN = 20
 
 
-def run_report(solution: Trajectories, *, energy: bool = True, debug: bool = False) -> RenderableType:
+def run_report(
+    solution: Trajectories, *, energy: bool = True, debug: bool = False, display: Mapping[str, str] | None = None
+) -> RenderableType:
     """Return events, energy balance and statistics of a run.
 
     Args:
         solution: the run.
         energy: False: leave out the energy balance.
         debug: name the line of every event's transition.
+        display: units by quantity, beside those of the netlist, such as {"energy": "kJ"}.
     """
     parts = _head(solution, notices(solution), debug=debug)
     if energy:
-        parts += ["", energy_table(solution), f"[dim]{closure_line(solution)}[/]"]
+        parts += ["", energy_table(solution, display), f"[dim]{closure_line(solution)}[/]"]
         parts += [f"[bold]{escape(notice)}[/]" for notice in solution.energy().notices]
     parts += ["", f"[dim]{statistics_line(solution)}[/]"]
     return Group(*parts)
@@ -69,24 +74,29 @@ def notices(solution: Trajectories) -> list[str]:
     return [*solution.notices, *told.values()]
 
 
-def energy_table(solution: Trajectories) -> Table:
-    """Return the energy balance in J; of many components only those that exchanged most."""
+def energy_table(solution: Trajectories, display: Mapping[str, str] | None = None) -> Table:
+    """Return the energy balance; of many components only those that exchanged most."""
     balance = solution.energy()
     # Where nothing collides there is no column for it.
     collides = any(row.impact for row in balance)
     columns = ["component", "in>", "from outside>", "stored>", "lost>", *["of it in impacts>"][: int(collides)]]
+    unit = Display(solution.model, display).of_quantity("J")
+    size = parse_unit(unit).factor
     rows = {
-        row.component: (row.inflow, row.source, row.stored, row.lost, *[row.impact][: int(collides)]) for row in balance
+        row.component: [
+            value / size for value in (row.inflow, row.source, row.stored, row.lost, *[row.impact][: int(collides)])
+        ]
+        for row in balance
     }
     active = [name for name, values in rows.items() if any(values)]
     largest = set(sorted(active, key=lambda name: max(map(abs, rows[name])), reverse=True)[:_SHOWN])
     shown = [(name or solution.model.name, *map(_energy, rows[name])) for name in active if name in largest]
     shown += [(f"… {len(active) - _SHOWN} more",)] if len(active) > _SHOWN else []
-    made = table("energy balance in J", *columns, rows=shown)
+    made = table(f"energy balance in {unit}", *columns, rows=shown)
     made.add_section()
     totals = [balance.source, balance.stored, balance.lost]
     totals += [sum(row.impact for row in balance)] if collides else []
-    made.add_row("total", "", *map(_energy, totals), style="bold")
+    made.add_row("total", "", *(_energy(value / size) for value in totals), style="bold")
     return made
 
 

@@ -23,14 +23,7 @@ _SHOWN = 4
 
 @dataclass(frozen=True)
 class StartValueRow:
-    """A start value.
-
-    Attributes:
-        path: of the variable.
-        value: in SI units.
-        unit: the coherent unit.
-        origin: where it comes from: `given in FILE:LINE`, `default`, `rest`, `follows from …`, `steady state`.
-    """
+    """A start value in SI units, and where it comes from: `given in FILE:LINE`, `default`, `rest`, `follows from …`."""
 
     path: str
     value: float
@@ -39,27 +32,14 @@ class StartValueRow:
 
 
 def start_report(drive: Component, model: CompiledDae) -> RenderableType:
-    """Return the start values of a model as a table.
-
-    Raises:
-        MissingStart, ContradictingStart, InitializationError: there is no start.
-    """
+    """Return the start values of a model as a table."""
     kind: StartKind = model.settings.get("start", "given")
     rows = ((row.path, f"{row.value:.9g}", row.unit, row.origin) for row in start_values(drive, model, kind))
     return table(f"start values ({kind})", "variable", "value>", "unit", "where from", rows=rows)
 
 
 def start_values(drive: Component, model: CompiledDae, kind: StartKind = "given") -> list[StartValueRow]:
-    """Return what is given, what is assumed and what follows for the states, in this order.
-
-    Args:
-        drive: the drive, to tell where values were given.
-        model: the drive, compiled.
-        kind: what stands for start values that are not given.
-
-    Raises:
-        MissingStart, ContradictingStart, InitializationError: there is no start.
-    """
+    """Return what is given, what is assumed and what follows for the states, in this order, for a kind of start."""
     point = initialize(model, start=kind)
     plan = start_plan(model, kind, point)
     variables = call(model, model.variables, point)

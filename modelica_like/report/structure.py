@@ -18,14 +18,7 @@ _SHOWN = 12
 
 
 def structure_report(component: Component) -> RenderableType:
-    """Flatten and reduce a model and tell what came out.
-
-    Args:
-        component: the model.
-
-    Raises:
-        ModelicaLikeError: the model is wrong.
-    """
+    """Flatten and reduce a model and tell what came out."""
     flat = flatten(component)
     reduced = reduce(flat)
     parts: list[RenderableType] = [_sizes(flat, reduced), "", _energy(flat)]

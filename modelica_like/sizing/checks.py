@@ -49,11 +49,7 @@ def _checks_of(entry: EntryPoint) -> Iterator[tuple[str, Check]]:
 
 
 def find_check(name: str) -> Check:
-    """Return the design check that a sizing file means by `is`.
-
-    Raises:
-        UnknownName: there is no such check.
-    """
+    """Return the design check that a sizing file means by `is`."""
     known = design_checks()
     if name not in known:
         hint = did_you_mean(name, known) or "."
@@ -63,14 +59,7 @@ def find_check(name: str) -> Check:
 
 @dataclasses.dataclass(frozen=True)
 class Argument:
-    """One argument of a design check.
-
-    Attributes:
-        name: how the file calls it.
-        kind: its annotation: a number with a unit, a text, a dataclass, or a sequence of one of these.
-        required: it has no default.
-        default: its default, if any.
-    """
+    """An argument of a design check; its annotation is a number with a unit, a text, a dataclass, or a sequence."""
 
     name: str
     kind: Any

@@ -28,13 +28,7 @@ _TEXTS: dict[Any, type] = {str: str, bool: bool, int: int}
 
 @dataclasses.dataclass(frozen=True)
 class Converter:
-    """Turns values into arguments.
-
-    Attributes:
-        lookup: gives the value of a name in a formula.
-        simulated: gives the load that a table with `from` asks for.
-        result: gives the result of another check of the file.
-    """
+    """Turns values into arguments; asks for names in formulas, loads of simulations, and results of other checks."""
 
     lookup: Lookup
     simulated: SimulatedLoad
@@ -50,11 +44,6 @@ class Converter:
             table: values by name.
             where: path of the table, for messages.
             place: gives the place of an argument in the file.
-
-        Raises:
-            UnknownName: there is no such argument.
-            MissingValue: an argument is missing.
-            ModelicaLikeError: a value does not fit.
         """
         known = arguments_of(target)
         for name in table:

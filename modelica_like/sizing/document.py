@@ -14,16 +14,7 @@ from modelica_like.netlist.locate import Lines, locate
 
 @dataclass
 class SizingDocument:
-    """One sizing file.
-
-    Attributes:
-        lines: where its keys stand.
-        name: what it is about.
-        description: one sentence.
-        parameters: numbers, quantities and formulas by name.
-        checks: tables with `is`, by name.
-        compare: names of checks whose results stand side by side, by heading.
-    """
+    """One sizing file: parameters, tables of checks, and names of checks that stand side by side, by heading."""
 
     lines: Lines
     name: str
@@ -34,11 +25,7 @@ class SizingDocument:
 
 
 def read_document(path: Path) -> SizingDocument:
-    """Read a sizing file and check its form.
-
-    Raises:
-        NetlistError: the file is missing, is not TOML, or does not have the form of a sizing file.
-    """
+    """Read a sizing file and check its form."""
     if not path.exists():
         raise NetlistError(f"The sizing file '{path}' does not exist.")
     text = read_text(path)

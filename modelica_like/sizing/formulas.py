@@ -28,17 +28,7 @@ Lookup = Callable[[str], Value]
 
 
 def read_value(text: str, lookup: Lookup) -> Value:
-    """Read a quantity or a formula.
-
-    Args:
-        text: `8.5 kg.cm2`, `2*torque` or `belt.shaft_load`.
-        lookup: gives the value of a name.
-
-    Raises:
-        NetlistError: it is neither.
-        UnitError: a sum mixes dimensions.
-        ValueOutOfRange: the value is not finite.
-    """
+    """Read a quantity or a formula: `8.5 kg.cm2`, `2*torque`, `belt.shaft_load`; `lookup` gives values of names."""
     quantity = read_quantity(text)
     if quantity is not None:
         number, unit = quantity

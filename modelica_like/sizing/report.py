@@ -90,11 +90,7 @@ def _whole(sizing: Sizing) -> str:
 
 
 def checks_report(name: str = "") -> RenderableType:
-    """Return the list of all design checks, or the page of one.
-
-    Raises:
-        UnknownName: there is no such check.
-    """
+    """Return the list of all design checks, or the page of one."""
     return check_page(name, find_check(name)) if name else checks_table(design_checks())
 
 

@@ -63,26 +63,14 @@ def load_of(run: Trajectories, key: Any, what: str = "peak") -> float:
 
 
 class Simulations:
-    """Runs of netlists; every run is made once.
-
-    Args:
-        folder: where the paths of the netlists begin.
-    """
+    """Runs of netlists, whose paths begin at a folder; every run is made once."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.runs: dict[str, Solution] = {}
 
     def load(self, table: Mapping[str, Any], where: str) -> Value:
-        """Return the load that a table asks for.
-
-        Args:
-            table: `from`, what to read with the variable (`peak = "clutch.tau"`), and maybe `until` and `set`.
-            where: the argument, for messages.
-
-        Raises:
-            ModelicaLikeError: the table, the netlist or the variable is wrong, or the simulation cannot go on.
-        """
+        """Return the load that a table asks for: `from`, what to read (`peak = "clutch.tau"`), `until` and `set`."""
         for key in table:
             if key not in _KEYS:
                 hint = did_you_mean(key, _KEYS) or "."

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from modelica_like.errors import NetlistError, UnknownName, did_you_mean
+from modelica_like.solve.display import QUANTITIES, Display
 from modelica_like.solve.style import COLOURS, picture, with_unit
 from modelica_like.writing import check_writable, write_bytes
 
@@ -24,32 +25,35 @@ if TYPE_CHECKING:
     from modelica_like.solve.recorder import Event
     from modelica_like.solve.trajectories import Trajectories
 
-_QUANTITIES = {
-    "rad/s": "speed", "N.m": "torque", "m/s": "velocity", "N": "force", "rad": "angle", "m": "position", "W": "power",
-    "J": "energy", "rad/s2": "acceleration", "A": "current", "V": "voltage", "K": "temperature",
-}  # fmt: skip
 _USUAL = ("rad/s", "N.m", "m/s", "N")
 _MOST = 6
 _MOST_EVENTS = 40
 _MOST_CURVES = 4
 
 
-def plot(solution: Trajectories, patterns: Sequence[str] = (), *, title: str = "") -> Figure:
+def plot(
+    solution: Trajectories, patterns: Sequence[str] = (), *, title: str = "", display: Mapping[str, str] | None = None
+) -> Figure:
     """Draw trajectories over time, one panel per unit, with events as dotted lines.
 
     Args:
         solution: the run.
         patterns: names or patterns (`*.w`) of what to draw; by default speeds, torques and forces of the parts.
         title: heading; by default the name of the model.
+        display: units by path, pattern or quantity, beside those of the netlist, such as {"speed": "rpm"}.
 
     Raises:
         UnknownName: nothing fits a pattern.
+        UnitError: a variable cannot be shown in a unit.
     """
-    groups = _by_unit(solution, chosen(solution, patterns))
+    shown = Display(solution.model, display)
+    groups: dict[str, list[str]] = {}
+    for name in chosen(solution, patterns):
+        groups.setdefault(shown.of(name), []).append(name)
     count = max(len(groups), 1)
     with picture(title or solution.model.name, count, 0.8 + 2.1 * count) as (figure, rows):
         for axes, (unit, names) in zip(rows, groups.items(), strict=False):
-            _draw(axes, solution, unit, names)
+            _draw(axes, solution, unit, names, shown)
         _mark_events(rows, solution.events)
         rows[-1].set_xlabel("time in s")
         rows[-1].set_xlim(solution.time[0], solution.time[-1])
@@ -175,21 +179,14 @@ def unit_of(solution: Trajectories, name: str) -> str:
 
 def quantity(unit: str) -> str:
     """Return what is measured in a unit, for titles."""
-    return _QUANTITIES.get(unit, "value")
+    return QUANTITIES.get(unit, "value")
 
 
-def _by_unit(solution: Trajectories, names: Sequence[str]) -> dict[str, list[str]]:
-    groups: dict[str, list[str]] = {}
-    for name in names:
-        groups.setdefault(unit_of(solution, name), []).append(name)
-    return groups
-
-
-def _draw(axes: Axes, solution: Trajectories, unit: str, names: Sequence[str]) -> None:
+def _draw(axes: Axes, solution: Trajectories, unit: str, names: Sequence[str], shown: Display) -> None:
     for k, (name, values) in enumerate(solution.together(*names).items()):
         style = "-" if k < len(COLOURS) else "--"
-        axes.plot(solution.time, values, style, label=name, color=COLOURS[k % len(COLOURS)])
-    axes.set_ylabel(with_unit(quantity(unit), unit))
+        axes.plot(solution.time, shown.values(name, values), style, label=name, color=COLOURS[k % len(COLOURS)])
+    axes.set_ylabel(with_unit(shown.quantity(names[0]), unit))
     axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
 
 

@@ -34,6 +34,8 @@ _NEAR = 8
 """Intervals that are integrated again as well rather than to start once more behind them."""
 _MORE, _LEAST, _DEEPEST = 4, 4, 6
 """Finer results per interval, intervals for which there are so many at least, and how often that is done."""
+_FAILURES = 20
+"""Failures of IDAS in a piece of a run from which the results have to do."""
 _FEW = 4
 """Intervals of a smooth piece up to which slopes of the powers are taken."""
 _BESIDE = np.array([[1 / 2, 1 / 2], [2 / 3, 1 / 3], [1 / 2, 1 / 2]])
@@ -146,18 +148,28 @@ class Powers:
             weights[bent] = 0.0
             weights[bent, :, :2] = _BESIDE * np.diff(every.times[ends[:, bent]], axis=0)[0][:, None, None]
             coarse = self._coarse(terms, intervals, places, weights, bent, bends, depth)
-        finer: list[Segment] = []
-        again = np.zeros(len(coarse), bool)
-        # A stretch lies within one smooth piece.
-        for stretch in _stretches(coarse, first) if depth < _DEEPEST else ():
-            segment = self._finer(every, ends[0, stretch[0]], ends[1, stretch[-1]], len(stretch))
-            if segment is not None:
-                finer.append(segment)
-                again[stretch] = True
+        again, finer = self._again(every, ends, _stretches(coarse, first) if depth < _DEEPEST else [])
         weights[again] = 0.0
         total = powers @ np.bincount(places.ravel(), weights[:, 0].ravel(), len(kept)) + bends[0] @ ~again[bent]
         parts = (self.integrals(some, depth + 1) for some in results(self.model, finer))
         return sum(parts, total.reshape(POWERS, -1))
+
+    def _again(self, every: Results, ends: Places, stretches: list[Places]) -> tuple[Places, list[Segment]]:
+        """Return which intervals have finer results, and these; a stretch lies within one smooth piece.
+
+        Where IDAS gives up, stretches are divided; in the end there are none for some.
+        """
+        again, finer, failures = np.zeros(ends.shape[1], bool), list[Segment](), 0
+        while stretches and failures < _FAILURES:
+            stretch = stretches.pop()
+            segment = self._finer(every, ends[0, stretch[0]], ends[1, stretch[-1]], len(stretch))
+            if segment is not None:
+                finer.append(segment)
+                again[stretch] = True
+                continue
+            failures += 1
+            stretches += np.array_split(stretch, 2) if len(stretch) > 1 else []
+        return again, finer
 
     def _finer(self, every: Results, begin: int, end: int, intervals: int) -> Segment | None:
         """Integrate again from one result to another, with more results between; None if IDAS gives up."""

@@ -161,19 +161,21 @@ class Trajectories(ABC):
         if not first <= t <= last:
             raise ValueOutOfRange(f"t = {t:g} s is not within the run, {first:g} s to {last:g} s.")
 
-    def plot(self, *patterns: str, title: str = "") -> Figure:
+    def plot(self, *patterns: str, title: str = "", display: Mapping[str, str] | None = None) -> Figure:
         """Draw trajectories over time, one panel per unit, with events as dotted lines.
 
         Args:
             patterns: names or patterns (`*.w`) of what to draw; by default speeds, torques and forces of the parts.
             title: heading; by default the name of the model.
+            display: units by path, pattern or quantity, beside those of the netlist, such as {"speed": "rpm"}.
 
         Raises:
             UnknownName: nothing fits a pattern.
+            UnitError: a variable cannot be shown in a unit.
         """
         from modelica_like.solve.plot import plot
 
-        return plot(self, patterns, title=title)
+        return plot(self, patterns, title=title, display=display)
 
     def to_pandas(self) -> pandas.DataFrame:
         """Return a table with time as index and one column per variable.

@@ -167,7 +167,7 @@ def test_a_freewheel_that_drives_turns_as_one():
     class Driven(Component):
         motor, rotor, freewheel = ConstantTorque(tau_constant=5.0), Inertia(J=0.1, phi=0), Freewheel()
         wheel = Inertia(J=0.2, w=guess(1.0))
-        bearing = BearingFriction(tau_pos=((0, 1), (1, 2)))
+        bearing = BearingFriction(tau_pos=((0, 1), (1, 2)), extrapolate="linear")
 
         def equations(self) -> Equations:
             yield from series(self.motor, self.rotor, self.freewheel, self.wheel, self.bearing)

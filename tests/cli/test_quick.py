@@ -29,6 +29,8 @@ CALLS = [
     "export a.toml --takes potential --output=b.fmu",
     "split a.toml --at shaft --at gear.flange_a -o folder --name one --name two --ssp 2.0",
     "cosim a.ssp --set f.k=1 --step 0.1ms --tolerance 1e-5 --master gauss-seidel --inputs hold --timeout 60",
+    "draw a.toml --output a.svg --depth 2 --set J.J=2",
+    "report a.toml -o a.html --until 2s --show *.w --show b.x",
     "describe Clutch",
     "schema",
     "library",

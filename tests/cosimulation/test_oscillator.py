@@ -96,6 +96,10 @@ def test_the_residual_is_the_energy_that_the_wheel_has_got_too_much(oscillator: 
     assert coupling.received == pytest.approx(J2 / 2 * run["J2.w"][-1] ** 2, rel=1e-3)
     assert abs(coupling.residual) > 0.05 * coupling.throughput
     assert run["shaft.residual_energy"][-1] == pytest.approx(coupling.residual)
+    passed = float(np.trapezoid(run["shaft.power"], run.time))
+    assert passed == pytest.approx((coupling.delivered + coupling.received) / 2, abs=2 * abs(coupling.residual))
+    assert coupling.throughput >= (coupling.delivered + coupling.received) / 2 * (1 - 1e-12)
+    assert abs(coupling.residual) <= coupling.mismatch < coupling.throughput
 
 
 def test_held_inputs_pump_energy_into_an_undamped_oscillation(oscillator: Split) -> None:

@@ -201,6 +201,11 @@ def test_svg_is_well_formed_and_names_every_part() -> None:
     assert {f"{name}: {type(part).__name__}" for name, part in made.parts.items() if name != "ground"} <= titles
 
 
+def test_a_drive_is_its_schematic_in_a_notebook() -> None:
+    made = drive("two_mass.toml")
+    assert made._repr_svg_() == schematic(made)
+
+
 def test_what_cannot_be_written_is_told_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(NetlistError, match=r"a schematic can be pdf, png, svg"):
         save_schematic(drive("fan.toml"), tmp_path / "fan.bmp")

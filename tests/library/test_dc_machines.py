@@ -16,6 +16,7 @@ from components import (
     ConstantVoltage,
     CurrentSensor,
     CurrentSink,
+    Fixed,
     Ground,
     Inductor,
     Inertia,
@@ -94,6 +95,21 @@ def test_resistance_rises_with_its_temperature() -> None:
     rise = run["copper.T"] - 293.15
     np.testing.assert_allclose(rise + 0.002 * rise**2, 400.0 / 400.0 * run.time, rtol=1e-7, atol=1e-7)
     assert run.energy().closure <= 1e-8
+
+
+def test_a_winding_of_copper_at_any_temperature() -> None:
+    """Copper by its coefficient at 20 °C: 0.5 Ohm at 80 °C are 0.5·(1 + 80·3.92e-3)/(1 + 60·3.92e-3) Ohm at 100 °C."""
+    motor = PermanentMagnetDCMachine(Ra=0.5, alpha20=3.92e-3, T_ref="80 degC", T="100 degC", k=1.0, quasi_static=True)
+    parts: dict[str, Component] = {
+        "source": ConstantVoltage(V=20.0),
+        "motor": motor,
+        "wall": Fixed(),
+        "ground": Ground(),
+    }
+    connect = {"p": ["source.p", "motor.ap"], "n": ["source.n", "motor.an", "ground.p"]}
+    connect["shaft"] = ["motor.flange", "wall.flange"]
+    run = simulate(Assembly("stalled", parts=parts, connect=connect), 0.1)
+    assert run.final["motor.ia"] == pytest.approx(20.0 / (0.5 * (1 + 80 * 3.92e-3) / (1 + 60 * 3.92e-3)), rel=1e-12)
 
 
 def test_switch_and_current_sources() -> None:

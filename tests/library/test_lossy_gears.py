@@ -15,8 +15,10 @@ from components import (
     Inertia,
     LossyGear,
     Mass,
+    Sine,
     SpringDamper,
     ThermalMass,
+    Torque,
     TorqueStep,
 )
 from modelica_like import Assembly, Component, simulate
@@ -149,3 +151,26 @@ def test_rolling_wheel(radius: float) -> None:
     run = simulate(drive, "1 s")
     assert run.final["car.v"] == pytest.approx((6.0 / radius - 2.0) / (20.0 + 0.9 / radius**2), rel=1e-9)
     assert run.energy().closure <= 1e-8
+
+
+def test_a_gear_without_losses_is_free() -> None:
+    """The table [0, 1, 1, 0, 0] of the Modelica Standard Library: no mode changes, and no event at any standstill."""
+    gear = LossyGear(ratio=2.0, loss_table=((0, 1, 1, 0, 0),))
+    parts = {
+        "sine": Sine(amplitude="3 N.m", f=1.0), "motor": Torque(), "J1": Inertia(J=1.0, phi=0.0, w=0.0), "gear": gear,
+        "J2": Inertia(J=4.0),
+    }  # fmt: skip
+    shaft = ["motor", "J1", "gear", "J2"]
+    drive = Assembly("d", parts=parts, series={"s": shaft}, connect={"c": ["sine.y", "motor.tau"]})
+    run = simulate(drive, 3.0, rtol=1e-10, atol=1e-12)
+    assert run.events == ()
+    # 2 kg.m2 at flange_a: w = 3/2·(1 - cos(2π t))/(2π)
+    np.testing.assert_allclose(run["J1.w"], 1.5 * (1 - np.cos(2 * np.pi * run.time)) / (2 * np.pi), atol=1e-8)
+    assert run.energy()["gear"].lost == 0.0
+
+
+def test_one_row_with_a_loss_is_not_free() -> None:
+    gear = LossyGear(ratio=1.0, loss_table=((0, 1, 1, 0, 0), (10, 0.9, 0.9, 0, 0)))
+    parts = {"motor": ConstantSpeed(w_fixed=10.0), "gear": gear, "load": ConstantTorque(tau_constant=-9.0)}
+    run = simulate(Assembly("d", parts=parts, series={"s": list(parts)}), 1.0)
+    assert run.final["gear.flange_a.tau"] == pytest.approx(10.0, rel=1e-12)

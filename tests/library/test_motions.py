@@ -17,6 +17,7 @@ from components import (
     Position,
     RelativeStates,
     Spring,
+    SpringDamper,
     Table,
     TranslationalFixed,
     TranslationalInitializeFlange,
@@ -87,6 +88,16 @@ def test_start_from_signals(use_phi: bool, use_w: bool) -> None:
     wanted = 0.3 * use_phi * cos(4) + 0.5 * use_w * sin(4)
     assert run.final["J.phi"] == pytest.approx(wanted, rel=1e-6)
     assert run.energy().closure <= 1e-8
+
+
+def test_start_with_an_acceleration() -> None:
+    """5 rad/s² of 2 kg.m2 at 1 rad/s against 3 N.m.s/rad: the spring of 100 N.m/rad is twisted by 0.13 rad."""
+    parts = {
+        "begin": InitializeFlange(use_phi=False, w_start=1.0, w=1.0, a=5.0), "J": Inertia(J=2.0),
+        "shaft": SpringDamper(c=100.0, d=3.0), "wall": Fixed(),
+    }  # fmt: skip
+    run = simulate(Assembly("d", parts=parts, series={"s": list(parts)}), 0.1)
+    assert (run["begin.a"][0], run["J.w"][0], run["J.phi"][0]) == pytest.approx((5.0, 1.0, -0.13), rel=1e-12)
 
 
 def test_slides_start_and_move_from_signals() -> None:

@@ -23,7 +23,9 @@ from components import (
     RelativeAccelerationSensor,
     SignTorque,
     Sine,
+    Speed,
     SpringDamper,
+    Step,
     Torque,
     Torque2,
     TorqueToAngleAdaptor,
@@ -61,9 +63,23 @@ def test_inverse_torque_stays_finite_at_standstill() -> None:
 def test_sign_torque_and_torque_between_shafts() -> None:
     signed = simulate(shaft(drive=ConstantSpeed(w_fixed=-5.0), load=SignTorque(tau_nominal=-7.0)), "1 s", points=2)
     assert -signed.final["load.flange.tau"] == pytest.approx(7.0, rel=1e-6)
+    slow = simulate(
+        shaft(drive=ConstantSpeed(w_fixed=1e-3), load=SignTorque(tau_nominal=-7.0, w0=0.1)), "1 s", points=2
+    )
+    # 2/(1 + exp(-x)) - 1 with x = w/(0.01·w0), as the Modelica Standard Library writes it.
+    assert -slow.final["load.flange.tau"] == pytest.approx(-7.0 * (2 / (1 + np.exp(-1.0)) - 1), rel=1e-9)
     left, motor, right = Inertia(J=2.0, phi=0.0, w=0.0), Torque2(tau=6.0), Inertia(J=3.0, phi=0.0, w=0.0)
     run = simulate(shaft(left=left, motor=motor, right=right), "1 s")
     assert (run.final["left.w"], run.final["right.w"]) == pytest.approx((-3.0, 2.0), rel=1e-9)
+    assert run.energy().closure <= 1e-8
+
+
+def test_a_filtered_speed_rises_exponentially() -> None:
+    parts = {"signal": Step(height="30 rad/s", start_time=0.01), "drive": Speed(exact=False), "mass": Inertia(J=0.2)}
+    wires = {"c": ["signal.y", "drive.w_ref"]}
+    run = simulate(Assembly("d", parts=parts, series={"s": ["drive", "mass"]}, connect=wires), 0.05, rtol=1e-9)
+    rises = 1 - np.exp(-100 * np.pi * np.maximum(run.time - 0.01, 0))
+    np.testing.assert_allclose(run["mass.w"], 30 * rises, atol=1e-7)
     assert run.energy().closure <= 1e-8
 
 

@@ -33,6 +33,7 @@ from components import (
     TranslationalBrake,
     TranslationalFixed,
     TranslationalPosition,
+    TranslationalSpeed,
     TranslationalSpring,
     TranslationalSpringDamper,
     VelocitySensor,
@@ -216,8 +217,29 @@ def test_drag_has_the_closed_form_of_quadratic_braking() -> None:
 
 
 def test_sign_force_is_smooth_and_saturates() -> None:
-    run = simulate(slide(drive=ConstantVelocity(v_fixed=0.1), load=SignForce(f_nominal=-7.0, v0=0.1)), "1 s", points=5)
-    assert -run.final["load.flange.f"] == pytest.approx(-0.99 * 7.0, rel=1e-3)
+    for reg, at_half in (("exp", np.tanh(25.0)), ("sine", np.sqrt(0.5)), ("linear", 0.5), ("cosine", 1 - np.sqrt(0.5))):
+        for v, part in ((0.05, at_half), (-0.05, -at_half), (0.2, 1.0)):
+            load = SignForce(f_nominal=-7.0, v0=0.1, reg=reg)
+            run = simulate(slide(drive=ConstantVelocity(v_fixed=v), load=load), "1 s", points=5)
+            assert -run.final["load.flange.f"] == pytest.approx(-7.0 * part, rel=1e-8)
+
+
+@pytest.mark.parametrize("support", [False, True])
+def test_a_filtered_velocity_rises_exponentially(support: bool) -> None:
+    """A jump of 3 m/s at 10 ms through a filter of 20 Hz, relative to a bed that moves, too: it takes 2 kg along."""
+    parts: dict[str, Component] = {
+        "signal": Step(height="3 m/s", offset="1 m/s", start_time=0.01), "mass": Mass(m=2.0),
+        "drive": TranslationalSpeed(exact=False, f_crit=20.0),
+    }  # fmt: skip
+    wires = {"signal": ["signal.y", "drive.v_ref"]}
+    if support:
+        parts["bed"] = ConstantVelocity(v_fixed=5.0)
+        wires["bed"] = ["drive.support", "bed.flange"]
+    run = simulate(Assembly("d", parts=parts, series={"s": ["drive", "mass"]}, connect=wires), 0.1, rtol=1e-9)
+    late = np.maximum(run.time - 0.01, 0)
+    np.testing.assert_allclose(run["drive.v"], 1 + 3 * (1 - np.exp(-40 * np.pi * late)), atol=1e-7)
+    np.testing.assert_allclose(run["mass.v"], run["drive.v"] + 5.0 * support, atol=1e-9)
+    assert run.energy().closure <= 1e-8
 
 
 @pytest.mark.parametrize("exact", [True, False])

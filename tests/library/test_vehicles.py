@@ -56,11 +56,9 @@ def test_rolling_resistance(v: float) -> None:
     wheels = RollingResistance(weight=500.0, Cr=0.02, inclination=0.3, v0=0.1)
     parts: dict[str, Component] = {"drive": ConstantVelocity(v_fixed=v), "wheels": wheels}
     run = simulate(Assembly("d", parts=parts, series={"s": list(parts)}), 1.0)
-    wanted = 0.02 * 500 / sqrt(1 + 0.3**2) * np.tanh(2.6467 * v / 0.1)
+    wanted = 0.02 * 500 / sqrt(1 + 0.3**2) * np.tanh(50 * v / 0.1)
     assert run.final["wheels.f"] == pytest.approx(wanted, rel=1e-9)
     assert run["wheels.loss_power"][-1] == pytest.approx(wanted * v, rel=1e-9)
-    # 99 % at v0
-    assert np.tanh(2.6467) == pytest.approx(0.99, abs=1e-4)
 
 
 @pytest.mark.parametrize("part", [IdealGearR2T(ratio=10.0), IdealRollingWheel(radius=0.1)], ids=["gear", "wheel"])
@@ -100,7 +98,7 @@ def test_warm_brake_has_its_peak_at_a_higher_velocity() -> None:
     """At 100 K above T_ref the resistance is 1.4 times as high."""
     parts: dict[str, Component] = {
         "drive": ConstantForce(f_constant=30.0), "m": Mass(m=2.0, s=0.0, v=3.0 * 1.4),
-        "brake": EddyCurrentForce(f_nominal=30.0, v_nominal=3.0, alpha=4e-3),
+        "brake": EddyCurrentForce(f_nominal=30.0, v_nominal=3.0, alpha20=4e-3),
         "rail": ThermalMass(C=1e9, T=393.15), "air": FixedTemperature(), "cooling": ThermalConductor(G=1.0),
     }  # fmt: skip
     connect = {"h": ["brake.heat_port", "rail.port", "cooling.port_a"], "c": ["cooling.port_b", "air.port"]}

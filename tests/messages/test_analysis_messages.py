@@ -14,8 +14,7 @@ from modelica_like import build
 from modelica_like.analyse.calibration.calibrate import Numbers, OperatingPoints, Trajectories, calibrate
 from modelica_like.analyse.calibration.measurements import read_table
 from modelica_like.analyse.linear.campbell import campbell
-from modelica_like.analyse.linear.linearize import linearize
-from modelica_like.analyse.linear.points import when
+from modelica_like.analyse.linear.linearize import linearize, when
 from modelica_like.analyse.operating.curves import characteristic
 from modelica_like.analyse.operating.steady import steady
 from modelica_like.analyse.sweeps.importance import importance
@@ -123,7 +122,7 @@ mass.J: a sweep needs at least one value, not []."""),
     "no bounds": (ValueOutOfRange, lambda: swept(over={"mass.J": [2.0, 1.0]}, sampling=LatinHypercube(4)), """\
 mass.J: a sweep needs a lower and an upper bound, not [2.0, 1.0]."""),
     "a parameter of a sweep": (UnknownName, lambda: swept(over={"mass.j": [2.0]}), """\
-Accelerated has no parameter 'mass.j'; did you mean 'mass.J'?"""),
+Accelerated has no input or parameter 'mass.j'; did you mean 'mass.J'?"""),
     "a formula in a compiled model": (LanguageError, lambda: sweep(build(GEARED), {"gear.ratio": [0.2]}, ["table.s"]), """\
 gear.ratio follows from other parameters.
 Vary those, or sweep the netlist itself."""),
@@ -135,7 +134,7 @@ mass.w has no value in 6 of 12 runs: mass.J = -0.09687008894979954 is out of ran
 Narrow the ranges until all runs succeed."""),
     "a method": (UnknownName, lambda: importance(model(), {"mass.J": (1.0, 2.0)}, ["mass.w"], method="fast"), """\
 There is no method 'fast'. There are sobol and morris."""),
-    "SALib": (MissingExtra, lambda: missing("SALib.sample", lambda: importance(model(), {"mass.J": (1.0, 2.0)}, ["mass.w"])), """\
+    "SALib": (MissingExtra, lambda: missing("SALib.sample.sobol", lambda: importance(model(), {"mass.J": (1.0, 2.0)}, ["mass.w"])), """\
 SALib is not installed.
 Install it with: pip install "modelica-like[analyse]\""""),
     "no data": (ValueOutOfRange, lambda: fitted([]), """\

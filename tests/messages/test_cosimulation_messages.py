@@ -7,9 +7,8 @@ from typing import Any
 import pytest
 
 from modelica_like.cosimulation.cut import cut_netlist
-from modelica_like.cosimulation.failures import tell_error
 from modelica_like.cosimulation.files import load_system
-from modelica_like.cosimulation.run import cosim
+from modelica_like.cosimulation.run import cosim, tell_error
 from modelica_like.cosimulation.split import split
 from modelica_like.cosimulation.system import Link, Port, Settings, System, Unit, check_system
 from modelica_like.errors import ModelicaLikeError

@@ -134,7 +134,7 @@ No gradient at t = 0.5 s: 'first: below → above' and 'second: below → above'
   in test_sensitivity_messages.py:{one} `yield self.first.go("below", "above", when=self.x > self.one)`
   in test_sensitivity_messages.py:{two} `yield self.second.go("below", "above", when=self.x > self.two)`
 A small change of a parameter decides which comes first, so the derivatives of both sides differ.
-Move the parameters apart.""",
+Leave out one, or move the parameters apart.""",
     ),
     "another mode sequence": (
         NoGradient,

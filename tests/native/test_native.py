@@ -204,6 +204,9 @@ def test_a_run_that_idas_gives_up_is_done_by_the_run_time(monkeypatch):
     assert told.startswith("IDAS gave up at about t = ")
     assert told.endswith("The whole run was done by the compiled run-time instead (solver native).")
 
+    with pytest.raises(StepFailed):
+        simulate(gearbox, rtol=1e-13, atol=1e-15, solver="idas")
+
     def missing():
         raise ExportError("There is no run-time.")
 

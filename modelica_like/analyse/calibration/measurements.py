@@ -13,7 +13,7 @@ import numpy as np
 from modelica_like.analyse.operating.steady import OperatingPoint, steady, steady_slopes
 from modelica_like.analyse.sensitivity.derivatives import sensitivities
 from modelica_like.analyse.sensitivity.outputs import read_output
-from modelica_like.analyse.sensitivity.runs import quick_run
+from modelica_like.analyse.sensitivity.readings import quick_run
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import NetlistError, UnknownName, ValueOutOfRange, did_you_mean
 from modelica_like.units import Unit, parse_unit, to_si

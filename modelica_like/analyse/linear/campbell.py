@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from modelica_like.analyse.linear.linearize import linearize
-from modelica_like.analyse.linear.points import At
+from modelica_like.analyse.linear.linearize import At, linearize
 from modelica_like.errors import ValueOutOfRange
 from modelica_like.initialize import call
 from modelica_like.simulation import Model, build

@@ -9,7 +9,7 @@ M. A. Aizerman, F. R. Gantmakher, 1958), so the chain has the first derivatives 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import casadi as ca
@@ -18,8 +18,8 @@ import numpy as np
 from modelica_like.analyse.replay.jumps import Jump, Work, event_time, make_jump
 from modelica_like.analyse.replay.kinks import Kinks
 from modelica_like.analyse.replay.start import start_slopes
-from modelica_like.analyse.replay.step import CLOSE, Step, Tolerances, shortened, stuck, try_step
-from modelica_like.analyse.replay.steps import StepFunctions
+from modelica_like.analyse.replay.step import CLOSE, Step, shortened, stuck, try_step
+from modelica_like.analyse.replay.steps import StepFunctions, Tolerances
 from modelica_like.analyse.slopes import Sizes
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae
@@ -42,22 +42,33 @@ class Replay:
     """The chain: start, then moves from node to node.
 
     Attributes:
-        model: the compiled model.
+        functions: of its steps.
         nodes: the points between the moves; the first is the start after its events.
         moves: steps and jumps; move k leads from node k to node k + 1.
         start_x: derivatives of the first node's states by (p, u), shape (nx, np + nu).
         start_d: derivatives of its discrete values, shape (nd, np + nu).
-        quadratures: integrals over the run of the integrands it was made with.
     """
 
-    model: CompiledDae
     functions: StepFunctions
-    nodes: list[Point]
-    moves: list[Move]
-    start_x: Vector
-    start_d: Vector
-    quadratures: Vector
-    tolerances: Tolerances
+    nodes: list[Point] = field(default_factory=list)
+    moves: list[Move] = field(default_factory=list)
+    start_x: Vector = field(default_factory=lambda: np.zeros((0, 0)))
+    start_d: Vector = field(default_factory=lambda: np.zeros((0, 0)))
+
+    @property
+    def model(self) -> CompiledDae:
+        """The compiled model."""
+        return self.functions.model
+
+    @property
+    def quadratures(self) -> Vector:
+        """Integrals over the run of the integrands it was made with."""
+        return sum((move.quadratures for move in self.moves), np.zeros(self.functions.nq))
+
+    def append(self, move: Move) -> None:
+        """Add a move with the node that it leads to."""
+        self.moves.append(move)
+        self.nodes.append(move.after)
 
     @property
     def jumps(self) -> Iterator[tuple[int, Jump]]:
@@ -73,7 +84,7 @@ class Replay:
         k = max(k for k, node in enumerate(self.nodes) if node.t <= t)
         if self.nodes[k].t == t:
             return self.nodes[k]
-        made, _ = try_step(self.functions, self.nodes[k], t - self.nodes[k].t, None, self.tolerances)
+        made, _ = try_step(self.functions, self.nodes[k], t - self.nodes[k].t, None)
         if made is None:
             raise stuck(self.nodes[k])
         return self.split(k, made)
@@ -85,7 +96,7 @@ class Replay:
             StepFailed: the second one did not converge.
         """
         end = self.nodes[k + 1]
-        second, _ = try_step(self.functions, first.after, end.t - first.after.t, None, self.tolerances)
+        second, _ = try_step(self.functions, first.after, end.t - first.after.t, None)
         if second is None:
             raise stuck(first.after)
         self.moves[k : k + 1] = [first, replace(second, after=end)]
@@ -119,26 +130,22 @@ def replay(
             advice="Compare runs with other parameter values instead.",
         )
     integrands = ca.SX(0, 1) if quadratures is None else quadratures
-    maker = _Maker(solution, StepFunctions(model, integrands, name), tolerances or Tolerances(), np.sort(stops))
+    chain = Replay(StepFunctions(model, integrands, name, tolerances or Tolerances()))
+    maker = _Maker(solution, chain, stops)
     maker.start(start or model.settings.get("start", "given"))
     for number, segment in enumerate(solution.segments):
         if number:
             maker.jump(number)
         maker.smooth(segment)
-    return maker.result()
+    return chain
 
 
 class _Maker:
-    def __init__(self, solution: Solution, functions: StepFunctions, tolerances: Tolerances, stops: Vector) -> None:
-        self.solution = solution
-        self.model = solution.model
-        self.functions = functions
-        self.tolerances = tolerances
+    def __init__(self, solution: Solution, chain: Replay, stops: Sequence[float] | Vector) -> None:
+        self.solution, self.model, self.chain = solution, solution.model, chain
         self.kinks = Kinks(solution.model, solution.segments)
         # A step could begin and end on the same side of a kink that the run has passed twice in between.
         self.stops = np.union1d(stops, self.kinks.seen())
-        self.nodes: list[Point] = []
-        self.moves: list[Move] = []
         self.h = np.inf
         self.span = float(solution.segments[-1].times[-1] - solution.segments[0].times[0])
         self.events: list[list[Event]] = [[] for _ in solution.segments]
@@ -154,24 +161,25 @@ class _Maker:
         whole = np.concatenate([begin_x, np.eye(size.fixed), begin_d])
         work = Work.at(self.model, point)
         work.share()
-        self.start_x, self.start_d = begin_x, work.d @ whole
+        start_x, start_d = begin_x, work.d @ whole
         if self.events[0]:
-            jump = make_jump(self.model, point, tuple(self.events[0]), point, self.functions.integrands, first=True)
-            whole = np.concatenate([begin_x, np.eye(size.fixed), self.start_d])
-            self.start_x, self.start_d = jump.x @ whole, jump.d @ whole
-            point = jump.after
-        self.nodes.append(point)
+            integrands = self.chain.functions.integrands
+            jump = make_jump(self.model, point, tuple(self.events[0]), point, integrands, first=True)
+            whole = np.concatenate([start_x, np.eye(size.fixed), start_d])
+            start_x, start_d, point = jump.x @ whole, jump.d @ whole, jump.after
+        self.chain.start_x, self.chain.start_d = start_x, start_d
+        self.chain.nodes.append(point)
 
     def jump(self, number: int) -> None:
         """Event before a segment."""
         events = tuple(self.events[number])
         begin = self.solution.segments[number - 1].start
         for _ in range(_RELOCATIONS):
-            when = event_time(self.model, self.nodes[-1], events, begin)
+            when = event_time(self.model, self.chain.nodes[-1], events, begin)
             if when.trigger is None or not self._relocate(when.trigger.shift):
                 break
-        made = make_jump(self.model, self.nodes[-1], events, begin, self.functions.integrands, first=False)
-        self._append(made, made.after)
+        made = make_jump(self.model, self.chain.nodes[-1], events, begin, self.chain.functions.integrands, first=False)
+        self.chain.append(made)
         self.h = _FIRST * min(self.h, self.span)
 
     def _relocate(self, late: float) -> bool:
@@ -179,19 +187,19 @@ class _Maker:
 
         What is left of the shift spoils derivatives by its product with the rates of the fastest motion.
         """
-        last, small = self.moves[-1] if self.moves else None, CLOSE * max(1.0, abs(self.nodes[-1].t))
+        last, small = self.chain.moves[-1] if self.chain.moves else None, CLOSE * max(1.0, abs(self.chain.nodes[-1].t))
         if late == 0.0 or 0.0 < late <= 2.0 * small or not isinstance(last, Step):
             return False
         h = last.h + late - small
         made = None
         if h > 0.0:
-            made, _ = try_step(self.functions, last.before, h, last, self.tolerances)
+            made, _ = try_step(self.chain.functions, last.before, h, last)
             if made is None:
                 return False
-        self.nodes.pop()
-        self.moves.pop()
+        self.chain.nodes.pop()
+        self.chain.moves.pop()
         if made is not None:
-            self._append(made, made.after)
+            self.chain.append(made)
         return True
 
     def smooth(self, segment: Segment) -> None:
@@ -204,19 +212,19 @@ class _Maker:
     def _advance(self, end: float) -> None:
         """Steps up to a time, as long as their error allows."""
         before = None
-        while (here := self.nodes[-1]).t < end:
+        while (here := self.chain.nodes[-1]).t < end:
             left = end - here.t
             h = left if self.h >= 0.999 * left else min(self.h, 0.5 * left) if self.h > 0.5 * left else self.h
             if h < _SMALLEST * max(1.0, abs(here.t)) and h < left:
                 raise stuck(here)
-            made, error = try_step(self.functions, here, h, before, self.tolerances)
+            made, error = try_step(self.chain.functions, here, h, before)
             factor = max(_SHRINK, min(_GROW, _SAFETY * (error + 1e-16) ** self._exponent))
             if made is not None and error <= 1.0:
                 if h == left:
                     made.after.t = end
                 self.h = max(self.h, h * factor) if h == left else h * factor
                 before = self._up_to_kink(made)
-                self._append(before, before.after)
+                self.chain.append(before)
             else:
                 self.h = h * min(factor, 0.7)
                 before = None if made is None else before
@@ -230,7 +238,7 @@ class _Maker:
                 break
             number, high = passed
             value = lambda point, k=number: float(self.kinks.at(point)[k])  # noqa: E731
-            shorter = shortened(step, value, (0.0, float(begin[number])), high, self.tolerances)
+            shorter = shortened(step, value, (0.0, float(begin[number])), high)
             if shorter is None:
                 break
             step = shorter
@@ -247,17 +255,4 @@ class _Maker:
 
     @property
     def _exponent(self) -> float:
-        return -1.0 / (len(self.functions.tableau.nodes) + 1)
-
-    def _append(self, move: Move, node: Point) -> None:
-        self.moves.append(move)
-        self.nodes.append(node)
-
-    def result(self) -> Replay:
-        """The chain."""
-        total = np.zeros(self.functions.nq)
-        for move in self.moves:
-            total += move.quadratures if isinstance(move, Step) else move.late
-        return Replay(
-            self.model, self.functions, self.nodes, self.moves, self.start_x, self.start_d, total, self.tolerances
-        )
+        return -1.0 / (len(self.chain.functions.tableau.nodes) + 1)

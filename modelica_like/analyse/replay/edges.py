@@ -55,7 +55,7 @@ def edges(chain: Replay, readings: Sequence[Reading]) -> list[Edge]:
     found = [
         Edge(Reading(0.0, ((jump.before, one.by),)), one.size, one.reason)
         for _, jump in chain.jumps
-        for one in (jump.apart if jump.matters or id(jump.before) in timed else ())
+        for one in (jump.when.apart if jump.matters or id(jump.before) in timed else ())
     ]
     return found + _ties(chain)
 

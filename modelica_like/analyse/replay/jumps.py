@@ -51,6 +51,18 @@ class Apart:
 
 
 @dataclass(frozen=True)
+class When:
+    """What decides when an event happens, why nothing does, and what else would do so for a different reason.
+
+    There is no trigger at the start of the run, and where nothing depends on the time of the event.
+    """
+
+    trigger: Trigger | None = None
+    reason: NoGradient | None = None
+    apart: tuple[Apart, ...] = ()
+
+
+@dataclass(frozen=True)
 class Jump:
     """An instant at which modes change, carried back and forth to the recorded time.
 
@@ -58,28 +70,29 @@ class Jump:
         before: point before.
         after: point after, at the same time.
         events: the mode changes.
-        trigger: when it happens; None at the start of the run, and where nothing depends on the time of the event.
+        when: what decides when it happens.
         x: derivatives of the states after by (x, theta) before, shape (nx, nx + ntheta).
         d: derivatives of the discrete values after, shape (nd, nx + ntheta).
-        reason: why there is no trigger.
         gain: what the integrands lose at the event: quadratures grow by it times the shift of the event, shape (nq,).
-        apart: other reasons for which it happens at this instant.
         matters: whether it matters when it happens.
     """
 
     before: Point
     after: Point
     events: tuple[Event, ...]
-    trigger: Trigger | None
+    when: When
     x: Vector
     d: Vector
-    reason: NoGradient | None = None
-    gain: Vector = field(default_factory=lambda: np.zeros(0))
-    apart: tuple[Apart, ...] = ()
-    matters: bool = False
+    gain: Vector
+    matters: bool
 
     @property
-    def late(self) -> Vector:
+    def trigger(self) -> Trigger | None:
+        """When it happens."""
+        return self.when.trigger
+
+    @property
+    def quadratures(self) -> Vector:
         """What the quadratures gain because the event is not exactly at its recorded time."""
         return self.gain * (0.0 if self.trigger is None else self.trigger.shift)
 
@@ -90,8 +103,8 @@ class Jump:
             NoGradient: its time has no derivative.
         """
         if self.trigger is None:
-            assert self.reason is not None
-            raise self.reason
+            assert self.when.reason is not None
+            raise self.when.reason
         return self.trigger
 
     @property
@@ -130,7 +143,7 @@ def make_jump(
     """
     work = Work.at(model, before)
     rate_before = slopes(model, before, "ode").value
-    when = When(None) if first else event_time(model, before, events, begin)
+    when = When() if first else event_time(model, before, events, begin)
     trigger = when.trigger
     if trigger is not None:
         work.x += np.outer(rate_before, trigger.by)
@@ -141,37 +154,25 @@ def make_jump(
         work.fire([event for event in events if event.round == number])
     rate_after = slopes(model, work.point, "ode").value
     gain = integrands(before) - integrands(work.point)
-    matters = bool(np.any(np.abs(gain) > _SMOOTH)) or _matters(model, before, rate_before, work.point, rate_after)
+    # Only where states, rates or integrands jump does it matter when the event happens.
+    states, rates = np.abs(before.x - work.point.x), np.abs(rate_before - rate_after)
+    matters = np.any(np.abs(gain) > _SMOOTH)
+    matters |= np.any(rates > _SMOOTH * (model.nominals + np.abs(rate_before) + np.abs(rate_after)))
+    matters |= np.any(states > _SMOOTH * (model.nominals + np.abs(before.x)))
     if when.reason is not None and matters:
         raise when.reason
     if trigger is not None:
         work.x -= np.outer(rate_after, trigger.by)
         work.point.x = work.point.x - rate_after * trigger.shift
         solve_implicit(model, work.point)
-    return Jump(before, work.point, events, trigger, work.x, work.d, when.reason, gain, when.apart, matters)
-
-
-def _matters(model: CompiledDae, before: Point, f_before: Vector, after: Point, f_after: Vector) -> bool:
-    """Tell whether states or rates jump: only then does it matter when the event happens."""
-    rates = np.abs(f_before - f_after) > _SMOOTH * (model.nominals + np.abs(f_before) + np.abs(f_after))
-    states = np.abs(before.x - after.x) > _SMOOTH * (model.nominals + np.abs(before.x))
-    return bool(np.any(rates | states))
-
-
-@dataclass(frozen=True)
-class When:
-    """What decides when an event happens, why nothing does, and what else would do so for a different reason."""
-
-    trigger: Trigger | None
-    reason: NoGradient | None = None
-    apart: tuple[Apart, ...] = ()
+    return Jump(before, work.point, events, when, work.x, work.d, gain, bool(matters))
 
 
 def event_time(model: CompiledDae, before: Point, events: tuple[Event, ...], begin: Point) -> When:
     """Find out what decides when the event happens: what fires in the first round."""
     if not events:
         # Elements that hold the same motion share it anew, and nothing else happens.
-        return When(None)
+        return When()
     found: list[tuple[Event, Trigger]] = []
     for event in events:
         if event.round or event.transition < 0:

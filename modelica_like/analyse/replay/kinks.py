@@ -11,7 +11,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from modelica_like.compile.buffers import Vector, buffered
+from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.initialize import Point
 from modelica_like.solve.recorder import Segment
@@ -32,9 +32,8 @@ class Kinks:
 
     def __init__(self, model: CompiledDae, segments: Sequence[Segment] = ()) -> None:
         self.model = model
-        if "kinks" not in model._cache:
-            model._cache["kinks"] = _switches(model)
-        self.count = int(model._cache["kinks"].size1_out(0))
+        self._function: ca.Function = model.once("kinks", lambda: _switches(model))
+        self.count = int(self._function.size1_out(0))
         self._along = [(one.times, self._over(one)) for one in segments if self.count]
         largest = [np.abs(values).max(axis=1) for _, values in self._along]
         self._zero = np.maximum(_AT_IT * np.max(largest, axis=0), _NOISE) if largest else np.full(self.count, _NOISE)
@@ -44,7 +43,7 @@ class Kinks:
         model = self.model
         if not self.count:
             return np.zeros(0)
-        fast = buffered(model._cache, "kinks along", lambda: model._cache["kinks"])
+        fast = model.fast("kinks along", lambda: self._function)
         return fast(point.t, point.x, point.z, model.p, model.u, point.d)[0]
 
     def passed(self, before: Vector, after: Vector) -> Any:
@@ -61,7 +60,7 @@ class Kinks:
         """Values at the results of a segment, shape (count, n)."""
         model, times = self.model, segment.times
         fixed = (np.repeat(one[:, None], len(times), axis=1) for one in (model.p, model.u, segment.d))
-        return np.asarray(model._cache["kinks"](times[None, :], segment.x, segment.z, *fixed).full())
+        return np.asarray(self._function(times[None, :], segment.x, segment.z, *fixed).full())
 
 
 def _switches(model: CompiledDae) -> ca.Function:

@@ -7,43 +7,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from modelica_like.analyse.replay.steps import StepFunctions
+from modelica_like.analyse.replay.steps import ABSOLUTE, StepFunctions
 from modelica_like.compile.buffers import Vector
-from modelica_like.errors import StepFailed, ValueOutOfRange
+from modelica_like.errors import StepFailed
 from modelica_like.initialize import Point
 
 _ITERATIONS = 12
 _CONVERGED = 1e-2
-_ABSOLUTE = 1e-2
-_ORDERS = 0.75
-_FINEST, _COARSEST = 1e-13, 1e-3
 _TRIALS = 40
 CLOSE = 2e-13
 """How far before an event or a kink a step ends, relative to the time."""
-
-
-@dataclass(frozen=True)
-class Tolerances:
-    """How precisely to integrate again: relative to the states, or to a hundredth of their nominal values.
-
-    What a step can estimate is the error of order s that its s stages leave; its end is of order 2 s - 1. The estimate
-    may therefore be larger than the error that is wanted: by the power `_ORDERS`, where the orders alone would allow
-    (s + 1)/(2 s), because for stiff motions the end loses order.
-    """
-
-    rtol: float = 1e-8
-
-    def __post_init__(self) -> None:
-        if not _FINEST <= self.rtol <= _COARSEST:
-            raise ValueOutOfRange(
-                f"The precision of a replay, {self.rtol:g}, is out of range: "
-                f"it must be between {_FINEST:g} and {_COARSEST:g}."
-            )
-
-    def norm(self, error: Vector, before: Point, after: Point, nominals: Vector) -> float:
-        """Estimated error of a step over what is allowed."""
-        scale = np.maximum(np.abs(before.x), np.abs(after.x)) + _ABSOLUTE * nominals
-        return float(np.linalg.norm(error / scale)) / (len(error) ** 0.5 * self.rtol**_ORDERS)
 
 
 @dataclass(frozen=True)
@@ -83,9 +56,7 @@ class Step:
         return here.t, self.h, here.x, self.stages, model.p, model.u, here.d
 
 
-def try_step(
-    functions: StepFunctions, point: Point, h: float, last: Step | None, tolerances: Tolerances
-) -> tuple[Step | None, float]:
+def try_step(functions: StepFunctions, point: Point, h: float, last: Step | None) -> tuple[Step | None, float]:
     """Make a step; return it and its error relative to the tolerances, or None if it did not converge.
 
     Args:
@@ -93,7 +64,6 @@ def try_step(
         point: its beginning.
         h: its length in s.
         last: the step before, or one from the same beginning, which tells where to look for it.
-        tolerances: what the error is relative to.
     """
     model, nx, nz = functions.model, functions.nx, functions.nz
     theta = model.p, model.u, point.d
@@ -104,20 +74,20 @@ def try_step(
         if last is not None:
             begin = 0.0 if last.before is point else 1.0
             W = functions.tableau.continued(last.stages, begin, h / last.h)
-        W = _solved(functions, point, h, W, tolerances.rtol)
+        W = _solved(functions, point, h, W)
         if W is None:
             return None, np.inf
         error, quadratures = functions.finish(point.t, h, point.x, W, *theta, point.z)
     after = Point(point.t + h, W[-nx - nz : W.size - nz].copy(), W[W.size - nz :].copy(), point.d)
-    norm = tolerances.norm(error, point, after, model.nominals)
+    norm = functions.tolerances.norm(error, point, after, model.nominals)
     return (Step(functions, point, after, h, W, quadratures), norm) if norm < np.inf else (None, np.inf)
 
 
-def _solved(functions: StepFunctions, point: Point, h: float, W: Vector, rtol: float) -> Vector | None:
+def _solved(functions: StepFunctions, point: Point, h: float, W: Vector) -> Vector | None:
     """The stages by Newton's method, or None if it does not converge."""
     model = functions.model
-    scale = np.concatenate([np.abs(point.x) + _ABSOLUTE * model.nominals, 1.0 + np.abs(point.z)])
-    weights = np.concatenate([rtol * scale] * len(functions.tableau.nodes))
+    scale = np.concatenate([np.abs(point.x) + ABSOLUTE * model.nominals, 1.0 + np.abs(point.z)])
+    weights = np.concatenate([functions.tolerances.rtol * scale] * len(functions.tableau.nodes))
     size = np.inf
     for _ in range(_ITERATIONS):
         correction = functions.newton(point.t, h, point.x, W, model.p, model.u, point.d)[0]
@@ -140,9 +110,8 @@ def stuck(point: Point) -> StepFailed:
 
 
 def shortened(
-    step: Step, value: Callable[[Point], float], low: tuple[float, float], high: tuple[float, float],
-    tolerances: Tolerances, zero: float = 0.0,
-) -> Step | None:  # fmt: skip
+    step: Step, value: Callable[[Point], float], low: tuple[float, float], high: tuple[float, float], zero: float = 0.0
+) -> Step | None:
     """Shorten a step so that it ends just before a function of its end changes its sign: regula falsi (Illinois).
 
     Args:
@@ -150,7 +119,6 @@ def shortened(
         value: the function.
         low: a length and the function there, before the change.
         high: the same behind it.
-        tolerances: of the step.
         zero: what is zero for the function, on either side, relative to its values at `low` and `high`.
 
     Returns:
@@ -164,7 +132,7 @@ def shortened(
         if b - a <= small:
             break
         h = min(max(b - f_b * (b - a) / (f_b - f_a), a + 0.5 * small), b - 0.5 * small)
-        made, _ = try_step(step.functions, step.before, h, step, tolerances)
+        made, _ = try_step(step.functions, step.before, h, step)
         if made is None:
             break
         f = value(made.after)

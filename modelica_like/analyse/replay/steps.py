@@ -6,6 +6,7 @@ Source: E. Hairer, G. Wanner: Solving Ordinary Differential Equations II, sectio
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -15,11 +16,39 @@ import numpy as np
 from modelica_like.analyse.replay.tableau import radau
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae
+from modelica_like.errors import ValueOutOfRange
 from modelica_like.initialize import Point
 
 STAGES = 7
+ABSOLUTE = 1e-2
+_ORDERS = 0.75
+_FINEST, _COARSEST = 1e-13, 1e-3
 _DENSE = 60
 """Largest linear system of a step that is solved as a dense one; beyond it LAPACK would start threads."""
+
+
+@dataclass(frozen=True)
+class Tolerances:
+    """How precisely to integrate again: relative to the states, or to a hundredth of their nominal values.
+
+    What a step can estimate is the error of order s that its s stages leave; its end is of order 2 s - 1. The estimate
+    may therefore be larger than the error that is wanted: by the power `_ORDERS`, where the orders alone would allow
+    (s + 1)/(2 s), because for stiff motions the end loses order.
+    """
+
+    rtol: float = 1e-8
+
+    def __post_init__(self) -> None:
+        if not _FINEST <= self.rtol <= _COARSEST:
+            raise ValueOutOfRange(
+                f"The precision of a replay, {self.rtol:g}, is out of range: "
+                f"it must be between {_FINEST:g} and {_COARSEST:g}."
+            )
+
+    def norm(self, error: Vector, before: Point, after: Point, nominals: Vector) -> float:
+        """Estimated error of a step over what is allowed."""
+        scale = np.maximum(np.abs(before.x), np.abs(after.x)) + ABSOLUTE * nominals
+        return float(np.linalg.norm(error / scale)) / (len(error) ** 0.5 * self.rtol**_ORDERS)
 
 
 class StepFunctions:
@@ -30,17 +59,19 @@ class StepFunctions:
     Args:
         model: the compiled model.
         quadratures: integrands, an SX column in the model's `arguments`; its name makes it known to the cache.
+        tolerances: how precise the steps are to be.
     """
 
-    def __init__(self, model: CompiledDae, quadratures: Any, name: str, stages: int = STAGES) -> None:
+    def __init__(self, model: CompiledDae, quadratures: Any, name: str, tolerances: Tolerances) -> None:
+        self.tolerances = tolerances
         self.model = model
         self.name = name
         self.quadratures = quadratures
-        self.tableau = radau(stages)
+        self.tableau = radau(STAGES)
         self.nx, self.nz = len(model.states), len(model.implicit)
         self.nt = len(model.p) + len(model.u) + model.discrete_size
         self.nq = int(quadratures.numel())
-        self.size = stages * (self.nx + self.nz)
+        self.size = STAGES * (self.nx + self.nz)
 
     def _cached(self, key: Any, make: Any) -> Any:
         return self.model.fast(("replay", self.name, self.tableau.nodes.size, key), make)

@@ -9,7 +9,7 @@ import numpy as np
 
 from modelica_like.analyse.replay.chain import Replay, replay
 from modelica_like.analyse.replay.edges import Edge, edges
-from modelica_like.analyse.replay.step import Tolerances
+from modelica_like.analyse.replay.steps import Tolerances
 from modelica_like.analyse.replay.sweeps import adjoint, forward
 from modelica_like.analyse.sensitivity.formulas import Freed, bound_by_formula, equal_to, free_formulas
 from modelica_like.analyse.sensitivity.outputs import Output, listed, quadratures, read_output
@@ -152,7 +152,7 @@ def _by_existence(
         if moving and (named or len(reasons.keys() | moving) == len(chosen)):
             raise NoGradient(
                 error.what, where=error.where, why=error.why,
-                advice=f"Leave out {' and '.join(moving[:_NAMED])} or move the parameters away from this limit.",
+                advice=f"Leave out {' and '.join(moving[:_NAMED])}, or {error.advice[0].lower()}{error.advice[1:]}",
             )  # fmt: skip
         reasons |= dict.fromkeys(moving, error.what)
     return [k for k, one in enumerate(chosen) if one.name not in reasons], reasons

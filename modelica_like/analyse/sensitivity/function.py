@@ -12,8 +12,7 @@ import numpy as np
 from modelica_like.analyse.sensitivity.derivatives import Sensitivities, sensitivities
 from modelica_like.analyse.sensitivity.formulas import free_formulas
 from modelica_like.analyse.sensitivity.outputs import listed, read_output
-from modelica_like.analyse.sensitivity.readings import read
-from modelica_like.analyse.sensitivity.runs import quick_run
+from modelica_like.analyse.sensitivity.readings import quick_run, read
 from modelica_like.compile.buffers import Vector
 from modelica_like.errors import LanguageError, ModelicaLikeError, NoGradient
 from modelica_like.initialize import StartKind

@@ -1,4 +1,4 @@
-"""Numbers read off a run: final values, peaks, energies, times of mode changes."""
+"""Runs that only numbers are read off: final values, peaks, energies, times of mode changes."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ import numpy as np
 
 from modelica_like.analyse.sensitivity.outputs import Output
 from modelica_like.compile.compiled import CompiledDae
-from modelica_like.errors import UnknownName
+from modelica_like.errors import ExportError, InitializationError, LanguageError, MissingExtra, SolveError, UnknownName
+from modelica_like.simulation import simulate
 from modelica_like.solve.solution import Solution
 from modelica_like.solve.trajectories import ENERGY_TERMS
 
@@ -62,3 +63,19 @@ def read_all(solution: Solution, outputs: Sequence[Output]) -> list[float]:
         except UnknownName:
             values.append(float("nan"))
     return values
+
+
+def quick_run(model: CompiledDae, **run: Any) -> Solution:
+    """Simulate by the compiled run-time, and by IDAS where that is not there or cannot do it.
+
+    Args:
+        model: the compiled model.
+        run: further arguments of `simulate`.
+
+    Raises:
+        ModelicaLikeError: IDAS cannot do it either; the error is that of IDAS.
+    """
+    try:
+        return simulate(model, **run, solver="native")
+    except (ExportError, InitializationError, LanguageError, MissingExtra, SolveError):
+        return simulate(model, **run)

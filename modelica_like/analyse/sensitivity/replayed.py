@@ -121,7 +121,7 @@ def _peak(replay: Replay, output: Output) -> Reading:
     best, top, found = int(np.argmax(at_nodes)), float(np.max(at_nodes)), None
     for k, (move, between) in enumerate(zip(replay.moves, inside, strict=True)):
         if isinstance(move, Step) and max(at_nodes[k], at_nodes[k + 1], *between) >= level:
-            for step in _tops(replay, move, rate):
+            for step in _tops(move, rate):
                 value = float(values([step.after])[0])
                 if value > top + _FLAT * abs(top):
                     best, top, found = k, value, step
@@ -140,12 +140,12 @@ def _along(replay: Replay, path: str, points: list[Point]) -> Vector:
     return np.array([fast(o.t, o.x, o.z, model.p, model.u, o.d)[0][0] for o in points])
 
 
-def _tops(replay: Replay, step: Step, rate: Callable[[Point], float]) -> list[Step]:
+def _tops(step: Step, rate: Callable[[Point], float]) -> list[Step]:
     """Shorten a step to where a rate passes zero from above."""
     points = [step.before, *step.inside(), step.after]
     rates = [(point.t - step.before.t, rate(point)) for point in points]
     found = [
-        shortened(step, rate, low, high, replay.tolerances, _STILL)
+        shortened(step, rate, low, high, _STILL)
         for low, high in pairwise(rates)
         if low[1] > 0.0 >= high[1] or low[1] >= 0.0 > high[1]
     ]

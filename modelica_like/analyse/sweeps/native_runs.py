@@ -46,9 +46,7 @@ class NativeRuns:
         parts = [_readings(known, one) for one in outputs]
         self._firsts = np.cumsum([0, *(len(part) for part in parts[:-1])])
         self._batch = Batch(known, [one for part in parts for one in part], options, span, settings.get("start"))
-        inputs = {model.flat_variables[k].path: n for n, k in enumerate(model.inputs)}
-        self._of_p = [(k, model.parameter_position[name]) for k, name in enumerate(names) if name not in inputs]
-        self._of_u = [(k, inputs[name]) for k, name in enumerate(names) if name in inputs]
+        self._places = [model.fixed_position[name] for name in names]
 
     def run(self, points: Any, stop: ctypes.c_int | None = None) -> tuple[Vector, dict[int, str], list[int]]:
         """Do runs one after the other.
@@ -60,10 +58,9 @@ class NativeRuns:
         Returns:
             Outputs, shape (runs, outputs), sentences about values that cannot be, by run, and the runs that failed.
         """
-        p, u = (np.tile(values, (len(points), 1)) for values in (self._model.p, self._model.u))
-        for values, places in ((p, self._of_p), (u, self._of_u)):
-            for column, place in places:
-                values[:, place] = points[:, column]
+        fixed = np.tile(np.concatenate([self._model.p, self._model.u]), (len(points), 1))
+        fixed[:, self._places] = points
+        p, u = np.split(fixed, [len(self._model.p)], axis=1)
         refused = self._refused(points, p)
         kept = np.array([k for k in range(len(points)) if k not in refused], int)
         numbers, failed = self._batch.run(p[kept], u[kept], stop)
@@ -76,9 +73,10 @@ class NativeRuns:
         """Which values cannot be, and why; only doubtful ones are looked at one by one."""
         model = self._model
         fine = np.all(np.isfinite(points), axis=1)
-        for column, place in self._of_p:
-            one = model.flat_parameters[place]
-            fine &= _within(points[:, column], one.min, one.max) & one.tunable
+        for column, place in enumerate(self._places):
+            if place < len(model.flat_parameters):
+                one = model.flat_parameters[place]
+                fine &= _within(points[:, column], one.min, one.max) & one.tunable
         if any(one.min is not None or one.max is not None for one in model.flat_derived):
             for one, values in zip(model.flat_derived, model.derived(p.T).full(), strict=True):
                 fine &= np.isfinite(values) & _within(values, one.min, one.max)
@@ -98,19 +96,20 @@ def _within(values: Vector, low: float | None, high: float | None) -> Any:
 def _with_energies(model: CompiledDae, paths: Sequence[str]) -> CompiledDae:
     """Return the model with energies and powers of components among its variables, if any are asked for."""
     more = tuple(dict.fromkeys(path for path in paths if path not in model.position))
-    if more and ("energies", more) not in model._cache:
-        made = [expression_of(model, path) for path in more]
-        column = ca.vertcat(model.variables(*model.arguments.values()), *(expression() for expression, _ in made))
-        names = model.variables.name_in()
-        variables = ca.Function("variables", [*model.arguments.values()], [ca.densify(column)], names, ["variables"])
-        like = model.flat_variables[0]
-        further = [
-            replace(like, path=path, unit=unit, kind="local") for path, (_, unit) in zip(more, made, strict=True)
-        ]
-        twin = model.twin(variables=variables, flat_variables=(*model.flat_variables, *further), _cache={})
-        twin.__dict__.pop("position", None)
-        model._cache["energies", more] = twin
-    return model._cache["energies", more] if more else model
+    return model.once(("energies", more), lambda: _with(model, more)) if more else model
+
+
+def _with(model: CompiledDae, more: tuple[str, ...]) -> CompiledDae:
+    made = [expression_of(model, path) for path in more]
+    column = ca.vertcat(model.variables(*model.arguments.values()), *(expression() for expression, _ in made))
+    names = model.variables.name_in()
+    variables = ca.Function("variables", [*model.arguments.values()], [ca.densify(column)], names, ["variables"])
+    like = model.flat_variables[0]
+    further = [replace(like, path=path, unit=unit, kind="local") for path, (_, unit) in zip(more, made, strict=True)]
+    twin = model.twin(variables=variables, flat_variables=(*model.flat_variables, *further), _cache={})
+    for name in ("position", "units"):
+        twin.__dict__.pop(name, None)
+    return twin
 
 
 def _readings(model: CompiledDae, output: Output) -> list[Reading]:

@@ -85,41 +85,38 @@ def sweep(
         KeyboardInterrupt: it was interrupted; its note says how much is in the checkpoint.
         WorkersLost: workers died again and again.
     """
-    model = build(drive, free=over)
-    if parameters:
-        model = model.with_parameters(dict(parameters))
+    model = build(drive, free=over).with_parameters(dict(parameters or {}))
     plan = make_plan(model, over, sampling)
-    if not outputs or (processes is not None and processes < 1) or (chunk is not None and chunk < 1):
+    if not outputs or any(number is not None and number < 1 for number in (processes, chunk)):
         raise ValueOutOfRange(
             "A sweep needs at least one output, and positive numbers of processes and runs in a chunk."
         )
-    read = [read_output(model, name) for name in outputs]
+    units = {name: str(read_output(model, name).unit) for name in outputs}
     count = chunk or min(max(len(plan) // _PARTS, _CHUNK[0]), _CHUNK[1])
     chunks: list[Chunk] = [(first, plan.points[first : first + count]) for first in range(0, len(plan), count)]
     job = Job.of(model, plan.names, outputs, {"until": until, "points": _POINTS, **settings, "solver": solver})
     job, why = _solvable(job) if scheduler is None else (job, "")
     done = _collect(job, plan, chunks, checkpoint, progress, _workers(job, processes, scheduler, len(plan)))
-    if job.settings["solver"] == "native":
-        _check_extremes(job, plan, done)
-    found = _dataset(model, plan, {one.name: str(one.unit) for one in read}, done.values, done.failures)
-    return found.assign_attrs(
-        solver=job.settings["solver"], checked=done.checked, notice="\n".join(filter(None, [why, *_notices(done)]))
-    )
+    _check_extremes(job, plan, done)
+    notice = "\n".join(filter(None, [why, *_notices(done)]))
+    found = _dataset(model, plan, units, done.values, done.failures)
+    return found.assign_attrs(solver=job.settings["solver"], checked=done.checked, notice=notice)
 
 
 def _solvable(job: Job) -> tuple[Job, str]:
     """Return a job that IDAS does if the run-time cannot do it, and why."""
-    if job.settings["solver"] != "native":
-        return job, ""
     try:
-        Reference(job).native()
+        if job.settings["solver"] == "native":
+            Reference(job).native()
     except ModelicaLikeError as error:
         return replace(job, settings={**job.settings, "solver": "idas"}), f"IDAS did all runs: {error.what}"
     return job, ""
 
 
 def _check_extremes(job: Job, plan: Plan, done: Done) -> None:
-    """Compare the runs with the smallest and the largest outputs."""
+    """Compare the native runs with the smallest and the largest outputs."""
+    if job.settings["solver"] != "native":
+        return
     wanted: set[int] = set()
     for column in done.values.T:
         known = np.flatnonzero(np.isfinite(column))
@@ -148,11 +145,7 @@ def _workers(job: Job, processes: int | None, scheduler: str | None, runs: int) 
     if job.settings["solver"] == "native":
         return lambda chunks: in_threads(job, chunks, processes or cores())
     count = processes if processes is not None else cores() if runs >= _WORTH_PROCESSES else 1
-    return (
-        (lambda chunks: in_processes(job, chunks, count))
-        if count > 1
-        else (lambda chunks: in_this_process(job, chunks))
-    )
+    return lambda chunks: in_processes(job, chunks, count) if count > 1 else in_this_process(job, chunks)
 
 
 def _collect(

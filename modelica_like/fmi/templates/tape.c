@@ -58,34 +58,51 @@ void tape_run(const Tape *tape, double *slots, double *outputs) {
 }
 
 void tape_tangent(const Tape *tape, const double *slots, double *dots, double *output_dots) {
+#define OPERATION(name, value, by_a, by_b)                                                         \
+    case OPERATION_##name:                                                                         \
+        for (; k < end; k++) {                                                                     \
+            int left = tape->operands[k].left, right = tape->operands[k].right;                    \
+            double a = slots[left], b = slots[right], f = slots[tape->first_result + k];           \
+            (void)a, (void)b, (void)f;                                                             \
+            dots[tape->first_result + k] = product(by_a, dots[left]) + product(by_b, dots[right]); \
+        }                                                                                          \
+        break;
     int k = 0;
     for (int r = 0; r < tape->n_runs; r++) {
-        int operation = tape->runs[r].operation, end = k + tape->runs[r].count;
-        for (; k < end; k++) {
-            const Operands *one = &tape->operands[k];
-            double by_a, by_b;
-            slopes(operation, slots[one->left], slots[one->right], slots[tape->first_result + k], &by_a, &by_b);
-            dots[tape->first_result + k] = product(by_a, dots[one->left]) + product(by_b, dots[one->right]);
+        int end = k + tape->runs[r].count;
+        switch (tape->runs[r].operation) {
+#include "operations.h"
+            default: break;
         }
     }
+#undef OPERATION
     for (int n = 0; n < tape->n_outputs; n++) output_dots[n] = dots[tape->outputs[n]];
 }
 
 /* Adds to the bars of the arguments. */
 void tape_adjoint(const Tape *tape, const double *slots, double *bars, const double *output_bars) {
+#define OPERATION(name, value, by_a, by_b)                                               \
+    case OPERATION_##name:                                                               \
+        while (--k >= first) {                                                           \
+            int left = tape->operands[k].left, right = tape->operands[k].right;          \
+            double a = slots[left], b = slots[right], f = slots[tape->first_result + k]; \
+            double bar = bars[tape->first_result + k];                                   \
+            (void)a, (void)b, (void)f;                                                   \
+            if (bar == 0) continue;                                                      \
+            bars[left] += product(by_a, bar);                                            \
+            bars[right] += product(by_b, bar);                                           \
+        }                                                                                \
+        break;
     int k = tape->n_operations;
     memset(bars + tape->first_result, 0, (size_t)tape->n_operations * sizeof(double));
     for (int n = 0; n < tape->n_outputs; n++) bars[tape->outputs[n]] += output_bars[n];
     for (int r = tape->n_runs - 1; r >= 0; r--) {
-        int operation = tape->runs[r].operation, first = k - tape->runs[r].count;
-        while (--k >= first) {
-            const Operands *one = &tape->operands[k];
-            double by_a, by_b, bar = bars[tape->first_result + k];
-            if (bar == 0) continue;
-            slopes(operation, slots[one->left], slots[one->right], slots[tape->first_result + k], &by_a, &by_b);
-            bars[one->left] += product(by_a, bar);
-            bars[one->right] += product(by_b, bar);
+        int first = k - tape->runs[r].count;
+        switch (tape->runs[r].operation) {
+#include "operations.h"
+            default: break;
         }
         k = first;
     }
+#undef OPERATION
 }

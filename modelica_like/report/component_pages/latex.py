@@ -82,12 +82,7 @@ def otherwise(condition: str, then: Written, other: Written) -> Written:
 
 @dataclass(frozen=True)
 class Writer:
-    """Writes expressions of one function of a class.
-
-    Attributes:
-        constants: names of its module with their values.
-        local: what its own names stand for.
-    """
+    """Writes expressions of a function: `local` says what its names mean, `constants` what those of its module are."""
 
     constants: Mapping[str, Any]
     local: dict[str, Meaning]
@@ -113,11 +108,7 @@ class Writer:
         return nullcontext()
 
     def write(self, node: ast.expr) -> Written:
-        """Return the LaTeX of an expression, and how tightly it binds.
-
-        Raises:
-            Unwritable: there is no notation for it.
-        """
+        """Return the LaTeX of an expression, and how tightly it binds; Unwritable if there is no notation for it."""
         method = getattr(self, f"_{type(node).__name__.lower()}", None)
         if method is None:
             raise Unwritable

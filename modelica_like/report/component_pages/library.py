@@ -55,9 +55,6 @@ def examples_by_type(folder: Path) -> dict[str, list[Example]]:
     """Return the netlists of a folder in which each type occurs, the shortest first.
 
     Files without parts, such as design checks, are no netlists.
-
-    Raises:
-        NetlistError: there is no such folder, or a file is no TOML.
     """
     if not folder.is_dir():
         raise NetlistError(f"There is no folder '{folder}' with examples.", advice="Name a folder of netlists.")

@@ -1,0 +1,143 @@
+"""Units of results: SI everywhere, or those that the netlist or the user asks for, everywhere the same."""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from components import Constant, Ramp
+from modelica_like import Assembly, Solution, load, simulate
+from modelica_like.errors import ModelicaLikeError, UnitError, UnknownName
+from modelica_like.netlist.write import save
+from modelica_like.report.files import write_solution
+from modelica_like.report.run import run_report
+
+NETLIST = """
+name = "spindle"
+
+[parts]
+wanted = { is = "Constant", k = "1500 rpm" }
+motor = { is = "Speed" }
+oil = { is = "Damper", d = "2 N.m.s/rad" }
+wall = { is = "Fixed" }
+feed = { is = "Ramp", height = "10 mm", duration = "1 s" }
+
+[series]
+shaft = ["motor", "oil", "wall"]
+
+[connect]
+speed = ["wanted.y", "motor.w_ref"]
+
+[simulate]
+until = "2 s"
+
+[display]
+speed = "rpm"
+"feed.y" = "mm"
+"*.phi" = "deg"
+energy = "kJ"
+torque = "kN.m"
+"wall.flange.tau" = "N.m"
+"""
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> Solution:
+    netlist = tmp_path / "spindle.toml"
+    netlist.write_text(NETLIST)
+    return simulate(load(netlist))
+
+
+def test_signals_are_in_the_si_unit_of_their_value() -> None:
+    parts = {
+        "n": Constant(k="1500 rpm"), "x": Ramp(height="10 mm", duration=1.0), "T": Constant(k="20 degC"),
+        "p": Constant(k="2 bar"), "f": Constant(k="3 kN"),
+    }  # fmt: skip
+    found = simulate(Assembly("signals", parts=parts), 1.0)
+    units = {one.path: str(one.unit) for one in found.model.flat_variables}
+    wanted = {
+        "n.y": (50 * np.pi, "rad/s"),
+        "x.y": (0.01, "m"),
+        "T.y": (293.15, "K"),
+        "p.y": (2e5, "Pa"),
+        "f.y": (3e3, "N"),
+    }
+    for path, (value, unit) in wanted.items():
+        assert found.final[path] == pytest.approx(value, rel=1e-12)
+        assert units[path] == unit
+    assert {str(one.unit) for one in found.model.flat_parameters} >= {"rad/s", "m", "K", "Pa", "N"}
+
+
+def test_a_picture_is_in_the_units_of_the_netlist(run: Solution) -> None:
+    figure = run.plot("motor.w", "feed.y", "oil.phi_rel", "motor.phi", "motor.flange.tau", "wall.flange.tau")
+    curves = {
+        line.get_label(): (line.get_ydata()[-1], axes.get_ylabel()) for axes in figure.axes for line in axes.lines
+    }
+    assert curves["motor.w"] == (pytest.approx(1500), "speed in rpm")
+    assert curves["feed.y"] == (pytest.approx(10), "position in mm")
+    assert curves["motor.phi"] == (pytest.approx(18000, rel=1e-6), "angle in deg")
+    assert curves["oil.phi_rel"] == (pytest.approx(-100 * np.pi, rel=1e-6), "angle in rad")
+    assert curves["motor.flange.tau"] == (pytest.approx(-0.1 * np.pi, rel=1e-6), "torque in kN·m")
+    assert curves["wall.flange.tau"] == (pytest.approx(100 * np.pi, rel=1e-6), "torque in N·m")
+
+
+def test_an_argument_wins_over_the_netlist(run: Solution) -> None:
+    (axes,) = run.plot("motor.w", display={"speed": "rad/s"}).axes
+    assert axes.get_ylabel() == "speed in rad/s"
+    assert axes.lines[0].get_ydata()[-1] == pytest.approx(50 * np.pi)
+
+
+def test_a_table_with_units_is_in_them_and_one_without_is_in_si(run: Solution, tmp_path: Path) -> None:
+    for units, speed, stroke in ((True, 1500.0, 10.0), (False, 50 * np.pi, 0.01)):
+        write_solution(run, tmp_path / "run.csv", units=units)
+        rows = list(csv.reader((tmp_path / "run.csv").read_text().splitlines()))
+        column = dict(zip(rows[0], zip(*rows[1:], strict=True), strict=True))
+        assert float(column["motor.w"][-1]) == pytest.approx(speed)
+        assert float(column["feed.y"][-1]) == pytest.approx(stroke)
+        assert not units or (column["motor.w"][0], column["feed.y"][0], column["time"][0]) == ("rpm", "mm", "s")
+
+
+def test_a_report_tells_its_energies_in_them(run: Solution) -> None:
+    console = Console(record=True, width=120)
+    console.print(run_report(run))
+    text = console.export_text()
+    lost = 2 * (50 * np.pi) ** 2 * 2 / 1000
+    assert "energy balance in kJ" in text
+    assert f"{lost:.4f}" in text
+
+
+def test_they_stay_in_the_netlist(run: Solution, tmp_path: Path) -> None:
+    copy = tmp_path / "copy.toml"
+    save(load(tmp_path / "spindle.toml"), copy)
+    assert simulate(load(copy)).model.settings["display"] == run.model.settings["display"]
+
+
+@pytest.mark.parametrize(
+    ("display", "kind", "told"),
+    [
+        ({"motor.w": "mm"}, UnitError, "motor.w is in rad/s: it cannot be shown in mm."),
+        ({"speed": "N"}, UnitError, "speed is in rad/s: it cannot be shown in N."),
+        (
+            {"sped": "rpm"},
+            UnknownName,
+            "spindle has no variable or quantity 'sped' to show in rpm; did you mean 'speed'?",
+        ),
+        ({"speed": "rmp"}, UnitError, "Unknown unit 'rmp'; did you mean 'rpm'?"),
+    ],
+)
+def test_what_cannot_be_shown_is_told(
+    run: Solution, display: dict[str, str], kind: type[ModelicaLikeError], told: str
+) -> None:
+    with pytest.raises(kind) as caught:
+        run.plot(display=display)
+    assert caught.value.what == told
+
+
+def test_a_wrong_unit_in_the_netlist_is_told_with_its_line(tmp_path: Path) -> None:
+    netlist = tmp_path / "spindle.toml"
+    netlist.write_text(NETLIST.replace('"mm"', '"mmm"'))
+    with pytest.raises(UnitError, match="Unknown unit 'mmm'") as caught:
+        load(netlist)
+    assert caught.value.where[0].line == NETLIST.splitlines().index('"feed.y" = "mm"') + 1
