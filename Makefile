@@ -1,5 +1,6 @@
 # make demo   the machine-table and machine-tool start-ups, computed against published values
-# make test   everything that continuous integration runs
+# make test   the formats, the types, the layers, and all tests that are not slow: ten minutes on two cores
+# make slow   the slow tests; continuous integration runs them, too
 # make docs   the pages of all component types
 # make release   the wheel for all platforms and the sdist, in dist/, tried in a new environment
 # make try   the wheel in dist/, in a new environment
@@ -16,7 +17,7 @@ PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constr
 COMPILED := ls modelica_like/fmi/runtimes/* >/dev/null 2>&1 || echo "No C compiler was found: the run-time of FMUs is \
 compiled at first use. Install cc, gcc or clang, or zig by $(BIN)/pip install 'modelica-like[cross]'."
 
-.PHONY: demo test lint types layers pytest benchmark docs release try fmus format clean
+.PHONY: demo test lint types layers pytest slow benchmark docs release try fmus format clean
 
 demo: .venv/installed
 	$(BIN)/modelica-like demo
@@ -35,7 +36,10 @@ layers: .venv/installed-dev
 	$(BIN)/lint-imports
 
 pytest: .venv/installed-dev
-	$(BIN)/python -m pytest -q -n auto
+	$(BIN)/python -m pytest -q -n auto -m "not slow"
+
+slow: .venv/installed-dev
+	$(BIN)/python -m pytest -q -n auto -m slow
 
 benchmark: .venv/installed-dev
 	$(BIN)/python benchmarks/import_time.py

@@ -19,15 +19,15 @@ from chain import Chain
 from modelica_like import export_fmu
 
 NETLIST = Path(__file__).parent.parent / "examples" / "msl" / "rotational" / "CoupledClutches.toml"
-LARGEST_SECONDS = {"CoupledClutches": 5.0, "chain of 1000": 60.0}
+LARGEST_SECONDS = {"CoupledClutches": 0.15, "chain of 1000": 3.0}
 LARGEST_BYTES = 300_000
 
 
 def measure(drive: Any, folder: Path) -> tuple[float, int]:
-    """Wall time in s and size in bytes of one export, without the run against IDAS."""
-    begin = time.perf_counter()
+    """CPU time in s and size in bytes of one export, without the run against IDAS."""
+    begin = time.process_time()
     done = export_fmu(drive, folder / "drive.fmu", "3.0", check=False)
-    return time.perf_counter() - begin, done.size
+    return time.process_time() - begin, done.size
 
 
 def exponents(sizes: list[int], amounts: list[float]) -> list[str]:
@@ -42,7 +42,7 @@ def main(sizes: list[int]) -> None:
         folder = Path(work)
         base, size = min(measure(NETLIST, folder) for _ in range(3))
         sys.stdout.write(
-            f"CoupledClutches {base:6.2f} s (limit {LARGEST_SECONDS['CoupledClutches']:.0f} s) "
+            f"CoupledClutches {base:6.2f} s (limit {LARGEST_SECONDS['CoupledClutches']:.2f} s) "
             f"{size / 1000:8.0f} kB (limit {LARGEST_BYTES / 1000:.0f} kB)\n"
         )
         results = []

@@ -6,8 +6,8 @@ import copy
 import gc
 import math
 import time
-from collections.abc import Iterable, Mapping
-from contextlib import suppress
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal, get_args
@@ -81,15 +81,21 @@ def build(drive: Model, free: Iterable[str] = (), *, tables: Iterable[str] = ())
     return _compiled(drive)
 
 
-def _compiled(drive: Component) -> CompiledDae:
-    """Compile a component tree without the garbage collector: much is made here, and little of it is in cycles."""
+@contextmanager
+def without_garbage_search() -> Iterator[None]:
+    """Put off Python's search for cycles: much is made inside, and little of it is in cycles."""
     collects = gc.isenabled()
     gc.disable()
     try:
-        return compile(reduce(flatten(drive)))
+        yield
     finally:
         if collects:
             gc.enable()
+
+
+@without_garbage_search()
+def _compiled(drive: Component) -> CompiledDae:
+    return compile(reduce(flatten(drive)))
 
 
 def simulate(

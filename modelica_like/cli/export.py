@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import gc
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -50,7 +48,7 @@ def export(
     debug: Debug = False,
 ) -> None:  # fmt: skip
     """Export a netlist as an FMU: compiled C that needs no Python, and check it; or as a page for a browser."""
-    with told(debug), _no_search_for_cycles():
+    with told(debug):
         assembly = load_netlist(netlist, assignments)
         from rich.console import Console
 
@@ -73,16 +71,6 @@ def _page(assembly: Any, file: Path, show: Sequence[str], report: Callable[[str]
     from modelica_like.native.page import export_html
 
     say(str(export_html(assembly, file, show=show, report=report)))
-
-
-@contextmanager
-def _no_search_for_cycles() -> Iterator[None]:
-    """The process ends soon, and the search takes a sixth of the time of a large model."""
-    gc.disable()
-    try:
-        yield
-    finally:
-        gc.enable()
 
 
 def runtimes(

@@ -30,6 +30,7 @@ _ROUNDING = 1e-10
 _TRUTH = 1e-9
 _TOLD = 5
 _LISTED = 12
+_FIXED = (("In fixed steps", "the FMU fails."), ("The error of fixed steps", "is not known"))
 _PART_NAME = r"(?:[_a-zA-Z]\w*|'[^'\\]+')(?:\[\d+(?:,\d+)*\])?"
 _IDENTIFIER = rf"{_PART_NAME}(?:\.{_PART_NAME})*"
 _NAME = re.compile(rf"{_IDENTIFIER}|der\({_IDENTIFIER}(?:,\d+)?\)", re.ASCII)
@@ -100,31 +101,47 @@ class Check:
     picture: Path | None = None
 
 
-def compare_with_idas(path: Path, model: CompiledDae, kind: Literal["me", "cs"]) -> Check:
-    """Run the first tenth of an FMU's time, and compare its states with IDAS.
+def compare_with_idas(path: Path, model: CompiledDae, kind: Literal["me", "cs"], fixed_step: float = 0.0) -> Check:
+    """Run the first tenth of an FMU's time, or with fixed steps the whole, and compare its states with IDAS.
 
     Their difference is judged by what tolerances do, as fast oscillations drift in phase: where it is more than 1e-4 of
-    a state's range, it may be ten times that between IDAS at the FMU's tolerance and IDAS at a fine one.
+    a state's range, it may be ten times that between IDAS at the FMU's tolerance and IDAS at a fine one. The error of
+    fixed steps is told by variable.
+
+    Args:
+        path: the FMU.
+        model: the model in it.
+        kind: which part of it runs.
+        fixed_step: size of its fixed steps in s.
     """
-    end = _PART * seconds(model.settings.get("until", "1 s"))
-    rtol = float(model.settings.get("rtol", Options.rtol))
+    until, rtol = seconds(model.settings.get("until", "1 s")), float(model.settings.get("rtol", Options.rtol))
+    step = communication_step(until, fixed_step, _RESULTS) if fixed_step else _PART * until / _POINTS
+    points = int(until / step * (1 + _ROUNDING)) if fixed_step else _POINTS
+    end = points * step
     nominals = {n: abs(size) for n, size in zip(model.states, model.nominals, strict=True) if n in model.position}
-    if not nominals:
+    if not nominals or not points:
         return Check()
+    fails, unknown = f"The FMU fails in the first {end:g} s of its run.", "The FMU runs, but nothing was compared"
+    if fixed_step:
+        fails, unknown = (f"{text} of {fixed_step:g} s {rest}" for text, rest in _FIXED)
     modes = (one.path for one in model.flat_discretes if one.names)  # by whose changes curves are matched
     try:
-        run = run_fmu(path, stop=end, kind=kind, step=end / _POINTS, outputs=[*nominals, *modes])
+        run = run_fmu(path, stop=end, kind=kind, step=step, outputs=[*nominals, *modes])
+        truth = _idas(model, end, points, _TRUTH, rtol)
     except FmuFailed as error:
-        return Check(f"The FMU fails in the first {end:g} s of its run. {error}", differs=True)
-    try:
-        truth = _idas(model, end, _TRUTH, rtol)
+        return Check(f"{fails} {error}", differs=True)
     except SolveError as error:
-        return Check(f"The FMU runs, but nothing was compared, as IDAS gave up: {error.what}")
+        return Check(f"{unknown}, as IDAS gave up: {error.what}")
     curves = compare_solutions(truth, run, list(nominals), ("IDAS", "FMU"), _LEAST_RANGE)
+    if fixed_step:
+        shares = ", ".join(f"{d.signal} {d.relative:.2g}" for d in curves.deviations[:_LISTED])
+        rest = f"; {len(nominals) - _LISTED} others less" if len(nominals) > _LISTED else ""
+        told = f"Error of fixed steps of {fixed_step:g} s until t = {end:g} s, against IDAS, over the range: {shares}"
+        return Check(f"{told}{rest}.", curves)
     off = [d for d in curves.deviations if d.relative > _AGREEMENT and d.largest > _ROUNDING * nominals[d.signal]]
     if not off:
         return Check(curves=curves)
-    usual = compare_solutions(truth, _idas(model, end, rtol), list(nominals), ("", ""), _LEAST_RANGE)
+    usual = compare_solutions(truth, _idas(model, end, points, rtol), list(nominals), ("", ""), _LEAST_RANGE)
     beyond = [d for d in off if d.relative > _ALLOWANCE * usual[d.signal].relative]
     reason = "by more than its tolerance explains" if beyond else f"as the tolerance {rtol:g} lets it"
     shares = ", ".join(f"{d.signal} by {d.relative:.2g}" for d in (beyond or off)[:_TOLD])
@@ -132,48 +149,17 @@ def compare_with_idas(path: Path, model: CompiledDae, kind: Literal["me", "cs"])
     return Check(told, curves, bool(beyond))
 
 
-def error_of_fixed_steps(path: Path, model: CompiledDae, step: float) -> Check:
-    """Run an FMU of fixed steps over its whole time, and tell how far its states are from IDAS, by variable.
-
-    Args:
-        path: the FMU.
-        model: the model in it.
-        step: size of its fixed steps in s.
-    """
-    end = seconds(model.settings.get("until", "1 s"))
-    communication = communication_step(end, step, _RESULTS)
-    points = int(end / communication * (1 + _ROUNDING))
-    names = [name for name in model.states if name in model.position]
-    if not names or not points:
-        return Check()
-    end = points * communication
-    modes = (one.path for one in model.flat_discretes if one.names)
-    try:
-        run = run_fmu(path, stop=end, kind="cs", step=communication, outputs=[*names, *modes])
-    except FmuFailed as error:
-        return Check(f"In fixed steps of {step:g} s the FMU fails. {error}", differs=True)
-    try:
-        truth = simulate(model, end, points=points, rtol=_TRUTH, atol=_TRUTH / 100, solver="idas")
-    except SolveError as error:
-        return Check(f"The error of fixed steps of {step:g} s is not known, as IDAS gave up: {error.what}")
-    curves = compare_solutions(truth, run, names, ("IDAS", "FMU"), _LEAST_RANGE)
-    shares = ", ".join(f"{d.signal} {d.relative:.2g}" for d in curves.deviations[:_LISTED])
-    rest = f"; {len(names) - _LISTED} others less" if len(names) > _LISTED else ""
-    told = f"Error of fixed steps of {step:g} s until t = {end:g} s, against IDAS, over the range: {shares}{rest}."
-    return Check(told, curves)
-
-
 def communication_step(end: float, step: float, points: int) -> float:
     """Return a whole number of fixed steps, about `points` of which make a run."""
     return step * max(1, round(end / points / step))
 
 
-def _idas(model: CompiledDae, end: float, *tolerances: float) -> Solution:
+def _idas(model: CompiledDae, end: float, points: int, *tolerances: float) -> Solution:
     """Run with the first of the tolerances that leads to the end."""
     first, *rest = tolerances
     try:
-        return simulate(model, end, points=_POINTS, rtol=first, atol=first / 100, solver="idas")
+        return simulate(model, end, points=points, rtol=first, atol=first / 100, solver="idas")
     except SolveError:
         if not rest:
             raise
-        return _idas(model, end, *rest)
+        return _idas(model, end, points, *rest)

@@ -17,7 +17,7 @@ from modelica_like.errors import ExportError, UnknownName
 from modelica_like.flatten import flatten
 from modelica_like.flatten.model import FlatModel
 from modelica_like.fmi.build import PLATFORMS, build, chosen_platforms, native_platform
-from modelica_like.fmi.check import Check, communication_step, compare_with_idas, error_of_fixed_steps, problems
+from modelica_like.fmi.check import Check, communication_step, compare_with_idas, problems
 from modelica_like.fmi.description import About, Kind, Version, build_description, identifier, model_description
 from modelica_like.fmi.documentation import Listing, index_page
 from modelica_like.fmi.interface import Interface, ModesAs, interface
@@ -28,7 +28,7 @@ from modelica_like.fmi.sources import LOG_CATEGORIES, licenses, runtime_sources,
 from modelica_like.fmi.tables import make_tables
 from modelica_like.fmi.terminals import Takes, icon_name, terminals_and_icons, with_open_ends
 from modelica_like.language.tunable import with_tunable_tables
-from modelica_like.simulation import Model, positive_step, seconds
+from modelica_like.simulation import Model, positive_step, seconds, without_garbage_search
 from modelica_like.solve.options import Options
 from modelica_like.solve.plot import save_plot
 from modelica_like.structure import reduce
@@ -70,6 +70,7 @@ class Export:
         return " ".join(filter(None, (f"{line}\n{self.check.sentence}".rstrip(), picture)))
 
 
+@without_garbage_search()
 def export_fmu(
     drive: Model, path: str | Path, version: Version | str = "2.0", kind: Collection[Kind | str] = ("me", "cs"),
     platforms: Sequence[str] | str = "native", *, outputs: Sequence[str] = (), ends: Sequence[str] = (),
@@ -274,7 +275,7 @@ def _checked(draft: Path, model: CompiledDae, kinds: tuple[Kind, ...], fixed_ste
         )
     if not run:
         return Check()
-    return error_of_fixed_steps(draft, model, fixed_step) if fixed_step else compare_with_idas(draft, model, kinds[-1])
+    return compare_with_idas(draft, model, kinds[-1], fixed_step)
 
 
 def _draw(check: Check, target: Path) -> Check:

@@ -18,7 +18,6 @@ import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.fmi.interface import FmuVariable
-from modelica_like.fmi.sparse import QrPattern
 from modelica_like.fmi.start_tables import StartTables
 from modelica_like.fmi.tables import Tables
 from modelica_like.fmi.tape import OPERATIONS, Tape
@@ -184,7 +183,7 @@ def _contents(
     }
     contents |= _events(model, text) | _holds(model, text) | _starts(start, len(model.states), len(model.implicit))
     for name, pattern in (("step", tables.step), ("start", tables.start_pattern)):
-        contents |= _pattern(name, pattern)
+        contents |= {f"{name}.{field}": pattern[field] for field in _QR}
     for tape in tables.tapes.values():
         contents |= _tape(tape)
     return contents
@@ -274,10 +273,6 @@ def _variable(one: FmuVariable, text: _Text) -> tuple[int, ...]:
     if count:
         of_type, start = _ARRAY, one.elements[0]
     return (one.reference, of_type, _KINDS.index(kind), index, start, tunable, text(one.name), count or 1)
-
-
-def _pattern(name: str, one: QrPattern) -> dict[str, Any]:
-    return {f"{name}.{field}": getattr(one, field) for field in _QR}
 
 
 def _tape(tape: Tape) -> dict[str, Any]:

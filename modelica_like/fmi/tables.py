@@ -8,9 +8,16 @@ from typing import Any
 import casadi as ca
 
 from modelica_like.compile.compiled import CompiledDae
-from modelica_like.fmi.sparse import QrPattern, qr_pattern
 from modelica_like.fmi.start_tables import StartTables, start_tables
 from modelica_like.fmi.tape import ARGUMENTS, Slots, Tape, write_tapes
+
+Pattern = dict[str, tuple[int, ...]]
+"""A square matrix by columns, with orderings and patterns of a QR factorisation, by their names in model.h.
+
+`colind`, `row`: its columns; `v_colind`, `v_row`: columns of the Householder vectors, in permuted rows; `r_colind`,
+`r_row`: columns of R, the diagonal last; `row_place`: permuted position of every row; `column_order`: the matrix's
+column at each permuted position.
+"""
 
 
 @dataclass(frozen=True)
@@ -26,10 +33,10 @@ class Tables:
     start: StartTables
     slots: Slots
     tapes: dict[str, Tape]
-    step: QrPattern
+    step: Pattern
     to_step: tuple[int, ...]
     diagonal: tuple[int, ...]
-    start_pattern: QrPattern
+    start_pattern: Pattern
 
     @property
     def implicit_linear(self) -> bool:
@@ -66,6 +73,15 @@ def make_tables(model: CompiledDae, start: StartTables | None = None) -> Tables:
         model, start, slots, {tape.name: tape for tape in tapes}, qr_pattern(step), _places(jacobian, step),
         tuple(_places(diagonal, step)), qr_pattern(start_pattern),
     )  # fmt: skip
+
+
+def qr_pattern(pattern: Any) -> Pattern:
+    """Analyse a square, structurally regular `casadi.Sparsity` (approximate minimum degree, then elimination tree)."""
+    v, r, rows, columns = pattern.qr_sparse(True) if pattern.size1() else (pattern, pattern, (), ())
+    found: Pattern = {"row_place": tuple(rows), "column_order": tuple(columns)}
+    for prefix, one in (("", pattern), ("v_", v), ("r_", r)):
+        found |= {f"{prefix}colind": tuple(one.colind()), f"{prefix}row": tuple(one.row())}
+    return found
 
 
 def _places(inner: Any, outer: Any) -> tuple[int, ...]:

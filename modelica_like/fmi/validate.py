@@ -7,6 +7,7 @@ import math
 import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -86,28 +87,22 @@ class Validation:
 
 @dataclass(frozen=True)
 class _Subject:
-    """The FMU under examination.
-
-    Attributes:
-        path: the archive.
-        folder: where it is unpacked.
-        description: FMPy's model description.
-        timeout: for each run, in s.
-    """
+    """The FMU under examination: the archive, FMPy's model description, and the time limit of each run in s."""
 
     path: Path
-    folder: Path
     description: Any
     timeout: float
 
-    @property
-    def version(self) -> str:
-        return str(self.description.fmiVersion)
-
-    @property
+    @cached_property
     def stop(self) -> float:
+        """End of the runs, in s."""
         stop = getattr(self.description.defaultExperiment, "stopTime", None)
         return float(stop) if stop is not None else 1.0
+
+    @property
+    def step(self) -> float:
+        """Communication step in s."""
+        return self.stop / _STEPS
 
     @property
     def euler_stop(self) -> float:
@@ -115,27 +110,22 @@ class _Subject:
         most = min(_EULER_FRACTION * self.stop, _EULER_STEPS * _EULER_STEP)
         return math.floor(most / self.step * (1 + _ROUNDING)) * self.step or most
 
-    def run(self, kind: Kind, stop: float, step: float, solver: Solver = "CVode") -> RecordedSolution:
-        """Run with FMPy."""
-        step = stop / _EULER_STEPS if solver == "Euler" else step
-        return run_fmu(
-            self.path, stop=stop, kind=kind, solver=solver, step=step, timeout=self.timeout,
-            outputs=self.observed(),
-        )  # fmt: skip
-
-    @property
-    def step(self) -> float:
-        return self.stop / _STEPS
-
-    def at(self, time: float, known: RecordedSolution) -> Values:
-        """Return the values at a time from a run, or from one to that time where it is before the first result."""
-        return known.at(min(time, known.final.time)) if time >= self.step else self.run("me", time, time).final
-
+    @cached_property
     def observed(self) -> list[str]:
         """Continuous outputs, or else some local variables."""
         reals = [v for v in self.description.modelVariables if v.type in ("Real", "Float64") and not v.shape]
         outputs = [v.name for v in reals if v.causality == "output"]
         return outputs or [v.name for v in reals if v.causality == "local"][:_OBSERVED]
+
+    def run(self, kind: Kind, stop: float, step: float, solver: Solver = "CVode") -> RecordedSolution:
+        """Run with FMPy."""
+        return run_fmu(
+            self.path, stop=stop, kind=kind, solver=solver, step=step, timeout=self.timeout, outputs=self.observed
+        )
+
+    def at(self, time: float, known: RecordedSolution) -> Values:
+        """Return the values at a time from a run, or from one to that time where it is before the first result."""
+        return known.at(min(time, known.final.time)) if time >= self.step else self.run("me", time, time).final
 
 
 def validate_fmu(path: str | Path, *, timeout: float = TIMEOUT) -> Validation:
@@ -166,11 +156,11 @@ def _checks(path: Path, folder: Path, timeout: float) -> Iterator[Check]:
     version = _version(folder)
     schemas = [_schema_check(name, folder / file, version, schema) for name, (file, schema) in _SCHEMAS.items()]
     yield from schemas
-    problems = _fmpy_problems(folder)
+    problems = [str(problem).replace("\n", " ") for problem in fmpy.validation.validate_fmu(str(folder))]
     yield Check("fmpy validate_fmu", FAILED if problems else PASSED, " ".join(problems) or "It finds nothing.")
     if schemas[0].verdict == FAILED:
         return
-    subject = _Subject(path, folder, fmpy.read_model_description(str(folder), validate=False), timeout)
+    subject = _Subject(path, fmpy.read_model_description(str(folder), validate=False), timeout)
     runs: dict[str, RecordedSolution] = {}
     yield _run_check("FMPy ME CVode", subject, "me", "CVode", runs)
     yield _run_check(_EULER, subject, "me", "Euler", runs)
@@ -209,19 +199,15 @@ def _schema_check(name: str, file: Path, version: str, schema: str) -> Check:
     return Check(name, FAILED, found)
 
 
-def _fmpy_problems(folder: Path) -> list[str]:
-    return [str(problem).replace("\n", " ") for problem in fmpy.validation.validate_fmu(str(folder))]
-
-
 def _run_check(name: str, subject: _Subject, kind: Kind, solver: Solver, runs: dict[str, RecordedSolution]) -> Check:
     """Run with FMPy; what is run must agree with what was run before."""
     part = subject.description.modelExchange if kind == "me" else subject.description.coSimulation
     if part is None:
         return Check(name, ABSENT, f"It has no {'Model Exchange' if kind == 'me' else 'Co-Simulation'}.")
     before = next(iter(runs.values()), None)
-    stop = subject.euler_stop if solver == "Euler" else subject.stop
+    stop, steps = (subject.euler_stop, _EULER_STEPS) if solver == "Euler" else (subject.stop, _STEPS)
     try:
-        run = subject.run(kind, stop, stop / _STEPS, solver)
+        run = subject.run(kind, stop, stop / steps, solver)
         expected = before and subject.at(stop, before)
     except ModelicaLikeError as error:
         return Check(name, FAILED, str(error).replace("\n", " "))
@@ -239,11 +225,11 @@ def _importer_check(name: str, importer: str, subject: _Subject, known: Recorded
         return Check(name, ABSENT, "It has no Co-Simulation.")
     if not importers.installed(importer):
         return Check(name, ABSENT, 'It is not installed: pip install "modelica-like[importers]".')
-    names = subject.observed()
+    names = subject.observed
     try:
         values = _run_importer(importer, subject, names)
     except FmuFailed as error:
-        if importer == "libcosim" and subject.version.startswith("3"):
+        if importer == "libcosim" and subject.description.fmiVersion.startswith("3"):
             return Check(name, ABSENT, f"{error.what} It does so with every FMU of FMI 3.0: the importer is at fault.")
         return Check(name, FAILED, error.what)
     if known is None:

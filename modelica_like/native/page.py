@@ -9,7 +9,7 @@ import json
 import re
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -24,7 +24,7 @@ from modelica_like.fmi.package import target_file
 from modelica_like.fmi.runtime import runtime_library
 from modelica_like.fmi.tables import make_tables
 from modelica_like.native.library import MESSAGE_LENGTH, Run
-from modelica_like.simulation import Model, seconds, simulate
+from modelica_like.simulation import Model, seconds, simulate, without_garbage_search
 from modelica_like.solve.options import Options
 from modelica_like.solve.plot import chosen
 from modelica_like.solve.plot import quantity as quantity_of
@@ -60,23 +60,7 @@ class Page:
         return f"{self.path}: {counts}, {self.size / 1000:.0f} kB, {self.seconds:.1f} s"
 
 
-@dataclass(frozen=True)
-class _Slider:
-    """A value that the page changes, in the shown unit, from which SI values follow by factor and offset."""
-
-    name: str
-    group: str
-    reference: int | None
-    description: str
-    unit: str
-    factor: float
-    offset: float
-    value: float
-    low: float
-    high: float
-    log: bool
-
-
+@without_garbage_search()
 def export_html(
     drive: Model, path: str | Path, until: float | str | None = None, *, show: Sequence[str] = (),
     report: Report = silent,
@@ -131,13 +115,16 @@ def _page(name: str, description: str, content: dict[str, Any]) -> str:
 def _content(model: CompiledDae, names: Sequence[str], until: float, options: Options) -> dict[str, Any]:
     """Return what the script reads, but for the run-time."""
     variables = interface(model)
-    end = _Slider("end time", "", None, "", "s", 1.0, 0.0, until, until / _SPREAD, until * _SPREAD, True)
+    end = {
+        "name": "end time", "group": "", "reference": None, "description": "", "unit": "s", "factor": 1.0,
+        "offset": 0.0, "value": until, "low": until / _SPREAD, "high": until * _SPREAD, "log": True,
+    }  # fmt: skip
     units = _Units()
     return {
         "model": _text(model_file(make_tables(model, variables.start), variables.variables, "{page}", options.rtol)),
         "layout": _layout(), "message_length": MESSAGE_LENGTH, "tool": tool(), "until": until,
         "rtol": options.rtol, "atol": options.atol, "points": options.points, "most_events": options.max_events,
-        "sliders": [asdict(end), *(asdict(one) for one in _sliders(model, variables.by_name))],
+        "sliders": [end, *_sliders(model, variables.by_name)],
         "variables": list(_variables(model, variables.by_name, set(names), units)),
         "modes": [
             {
@@ -201,19 +188,21 @@ def _variables(
             }  # fmt: skip
 
 
-def _sliders(model: CompiledDae, known: dict[str, FmuVariable]) -> Iterator[_Slider]:
+def _sliders(model: CompiledDae, known: dict[str, FmuVariable]) -> Iterator[dict[str, Any]]:
+    """Values that the page changes, in the shown unit, from which SI values follow by factor and offset."""
     inputs = (model.flat_variables[k] for k in model.inputs)
     for one in (*model.flat_parameters, *inputs):
         if isinstance(one, FlatParameter) and not one.tunable:
             continue
         about, unit = known[one.path], one.unit
-        value, low, high = (
-            None if si is None else (si - unit.offset) / unit.factor for si in (about.start, one.min, one.max)
-        )
-        yield _Slider(
-            one.path, one.path.rpartition(".")[0], about.reference, one.description, _spelled(unit), unit.factor,
-            unit.offset, value or 0.0, *_span(value or 0.0, low, high),
-        )  # fmt: skip
+        shown = (None if si is None else (si - unit.offset) / unit.factor for si in (about.start, one.min, one.max))
+        value, least, most = shown
+        low, high, log = _span(value or 0.0, least, most)
+        yield {
+            "name": one.path, "group": one.path.rpartition(".")[0], "reference": about.reference,
+            "description": one.description, "unit": _spelled(unit), "factor": unit.factor, "offset": unit.offset,
+            "value": value or 0.0, "low": low, "high": high, "log": log,
+        }  # fmt: skip
 
 
 def _span(value: float, low: float | None, high: float | None) -> tuple[float, float, bool]:

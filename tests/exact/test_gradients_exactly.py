@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
-from functools import partial
+from functools import cache, partial
 from typing import Any, Literal
 
 import numpy as np
@@ -56,6 +56,7 @@ def _with(drive: Drive, field: str, k: int, one: Any, times: Fraction) -> Drive:
     return replace(drive, **{field: (*every[:k], one, *every[k + 1 :])})
 
 
+@cache
 def exactly(drive: Drive) -> np.ndarray:
     """Give the changes of the final speeds per relative change of a parameter upwards and downwards, over the largest.
 

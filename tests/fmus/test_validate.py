@@ -59,7 +59,7 @@ def test_libcosim_crashes_on_fmi_3_of_whatever_origin(reference_fmus: Built) -> 
         "stick_slip_fmi3.fmu in libcosim crashed with SIGSEGV before its first step had ended. "
         "It does so with every FMU of FMI 3.0: the importer is at fault."
     )
-    subject = validate._Subject(reference_fmus["machine_table", "3.0"], Path(), _description("3.0", reference_fmus), 60)
+    subject = validate._Subject(reference_fmus["machine_table", "3.0"], _description("3.0", reference_fmus), 60)
     with pytest.raises(FmuCrashed, match="SIGSEGV"):
         validate._run_importer("libcosim", subject, ["table.v"])
 

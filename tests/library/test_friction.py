@@ -13,6 +13,7 @@ from components import (
     Clutch,
     ConstantSpeed,
     ConstantTorque,
+    IdealGear,
     Inertia,
     Pulse,
     Ramp,
@@ -323,3 +324,36 @@ def test_friction_only_ever_dissipates_and_stays_below_its_limit(
     balance = run.energy()
     assert balance["brake"].lost >= -1e-9
     assert balance.closure < 1e-8
+
+
+@pytest.mark.parametrize("load", [3.6, -3.6])
+def test_brakes_side_by_side_share_a_load_by_their_capacities(load: float) -> None:
+    """The least norm weighted by the inverse capacities: 1 and 3 of 4 parts, in either direction."""
+    parts = {
+        "push": ConstantTorque(tau_constant=load), "rotor": Inertia(J=1.0, phi=0.0, w=0.0),
+        "small": Brake(capacity=1.0), "large": Brake(capacity=3.0),
+    }  # fmt: skip
+    ends = ("push.flange", "rotor.flange_a", "small.flange_a", "large.flange_a")
+    run = simulate(Assembly("shared", parts=parts, connect={"shaft": ends}), 1.0, points=4)
+    assert not run.events
+    np.testing.assert_allclose(run["small.tau"], 0.25 * load, rtol=1e-12)
+    np.testing.assert_allclose(run["large.tau"], 0.75 * load, rtol=1e-12)
+
+
+@pytest.mark.parametrize("load", [2.8, -2.8])
+def test_brakes_hold_what_they_can_hold_together(load: float) -> None:
+    """The near one and the far one twice bear 2.8 of 3 N.m; by the least norm the far one would bear 1.12."""
+    parts = {
+        "push": ConstantTorque(tau_constant=load), "rotor": Inertia(J=1.0, phi=0.0, w=0.0), "near": Brake(capacity=1.0),
+        "gear": IdealGear(ratio=0.5), "far": Brake(capacity=1.0),
+    }  # fmt: skip
+    wires = {
+        "shaft": ("push.flange", "rotor.flange_a", "near.flange_a", "gear.flange_a"),
+        "fast": ("gear.flange_b", "far.flange_a"),
+    }
+    run = simulate(Assembly("shared", parts=parts, connect=wires), 1.0, points=4)
+    assert not run.events
+    near, far = run["near.tau"], run["far.tau"]
+    np.testing.assert_allclose(near + 2 * far, load, rtol=1e-12)
+    assert max(np.abs(near).max(), np.abs(far).max()) <= 1.0 + 1e-9
+    assert np.array_equal(run["rotor.w"], np.zeros(len(run.time)))

@@ -121,12 +121,13 @@ def test_specialised_tapes_change_nothing(monkeypatch, tmp_path):
         assert all(np.array_equal(a.x, b.x) for a, b in zip(special.segments, full.segments, strict=True))
 
 
-def test_gradients_of_a_native_run():
+@pytest.mark.parametrize("method", ["forward", "adjoint"])
+def test_gradients_of_a_native_run(method):
     drive = build(STARTUP)
     outputs = ["J2.w", "clutch.loss_energy", "max(shaft1.tau)"]
     first, second = (
         sensitivities(
-            simulate(drive, rtol=1e-9, atol=1e-11, solver=solver), outputs, ["k1", "J1.J", "force"]
+            simulate(drive, rtol=1e-9, atol=1e-11, solver=solver), outputs, ["k1", "J1.J", "force"], method=method
         ).derivatives
         for solver in ("idas", "native")
     )

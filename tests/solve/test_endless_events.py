@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from modelica_like import Solution, simulate
-from modelica_like.errors import Chattering, StepFailed
+from modelica_like.errors import Chattering
 from modelica_like.language import (
     Component,
     Discrete,
@@ -155,21 +155,6 @@ def test_a_relay_with_hysteresis_is_no_chattering():
 
 
 # -- no way on -------------------------------------------------------------------------------------------------------
-
-
-def test_a_blow_up_in_finite_time_is_told():
-    class Blow(Component):
-        x: Variable = var("1", "grows")
-        T: Parameter = param("s", "time", default=1.0)
-
-        def equations(self) -> Equations:
-            yield self.T * der(self.x) == self.x**2  # x = 1 / (1 - t)
-
-    with pytest.raises(StepFailed) as caught:
-        simulate(Blow(x=1.0), 2.0)
-    moment = float(caught.value.what.split("t = ")[1].split(" s")[0])
-    assert moment == pytest.approx(1.0, abs=1e-3)
-    assert caught.value.why == "x changes fastest relative to its tolerance."
 
 
 def test_a_panel_that_runs_past_an_event_into_nonsense_is_shortened():

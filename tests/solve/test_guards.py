@@ -6,7 +6,7 @@ import pytest
 from modelica_like import simulate
 from modelica_like.initialize import Point
 from modelica_like.language import Component, Equations, Events, Mode, Parameter, Variable, der, param, var
-from modelica_like.solve.guards import Candidate, locate
+from modelica_like.solve.guards import Candidate, _cubic, _peak, candidates, locate
 
 
 class Steps(Component):
@@ -78,3 +78,52 @@ def test_the_earliest_of_two_tops_counts() -> None:
     assert found is not None
     assert found.point.t == pytest.approx(1 / 3, abs=2e-13)
     assert guard.asked < 5
+
+
+def ends(value: np.poly1d) -> tuple[float, float, float, float]:
+    return value(0.0), value(1.0), value.deriv()(0.0), value.deriv()(1.0)
+
+
+@pytest.mark.parametrize("root", [0.03, 0.3, 0.85])
+@pytest.mark.parametrize("other", [(1.0, 1.0, 1.0), (-1.0, 0.5, 2.0), (0.0, -3.0, 7.0)])
+def test_the_first_guess_is_the_zero_of_the_cubic(root: float, other: tuple[float, float, float]) -> None:
+    value = np.poly1d([1.0, -root]) * np.poly1d(other)
+    assert _cubic(*ends(value), inside=False) == pytest.approx(root, abs=1e-9)
+
+
+@pytest.mark.parametrize("top", [0.1, 0.35, 0.9])
+def test_the_first_guess_of_a_hump_is_the_top_of_the_cubic(top: float) -> None:
+    """Its slope is (s - top)·(s - 2)."""
+    value = (np.poly1d([1.0, -top]) * np.poly1d([1.0, -2.0])).integ() - 5.0
+    assert _cubic(*ends(value), inside=True) == pytest.approx(top, abs=1e-9)
+    highest = value(top)
+    raised = value - highest
+    assert _peak(*ends(raised)) == pytest.approx(0.0, abs=2e-3)
+    assert _peak(*ends(raised)) <= 1e-14
+
+
+def test_a_bound_says_where_no_hump_can_reach_zero() -> None:
+    """A cubic lies below the largest of its Bézier points: the ends, and a third of the slopes on from them."""
+    assert _peak(-5.0, -4.0, 3.0, -6.0) == -2.0
+
+
+class Ahead:
+    """Guards at some times, their rates, and what is found in them."""
+
+    def __init__(self, *values: np.poly1d) -> None:
+        self.times = np.linspace(0.0, 1.0, 6)
+        self.values = np.array([one(self.times) for one in values])
+        self.rates = np.array([one.deriv()(self.times) for one in values])
+
+    def found(self, active: list[int]) -> list[tuple[int, int, bool]]:
+        groups = candidates(self.values, self.rates, np.array(active), 0.2)
+        return [(one.guard, one.interval, one.inside) for group in groups for one in group]
+
+
+def test_where_guards_may_become_positive() -> None:
+    """One rises through zero at 0.5, one has a double root near 0.3, one touches nothing, one is positive all along."""
+    rises, hump = np.poly1d([1.0, -0.5]), np.poly1d([-1.0, 0.6, 1e-4 - 0.09])
+    ahead = Ahead(rises, hump, hump - 1.0, rises + 1.0, -rises)
+    assert ahead.found([0, 1, 2, 3, 4]) == [(1, 1, True), (0, 2, False)]
+    assert ahead.found([1, 2]) == [(1, 1, True)]
+    assert ahead.found([2, 3]) == []

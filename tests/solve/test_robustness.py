@@ -221,6 +221,9 @@ def test_a_model_without_events_keeps_what_was_computed_too() -> None:
 
     with pytest.raises(StepFailed) as caught:
         simulate(Blow(x=1.0), 2.0)
+    moment = float(caught.value.what.split("t = ")[1].split(" s")[0])
+    assert moment == pytest.approx(1.0, abs=1e-3)
+    assert caught.value.why == "x changes fastest relative to its tolerance."
     run = caught.value.run
     assert run.time[-1] == pytest.approx(1.0, abs=0.05)
     np.testing.assert_allclose(1 / run["x"], 1 - run.time, rtol=0, atol=1e-5)

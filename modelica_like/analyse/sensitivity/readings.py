@@ -78,4 +78,4 @@ def quick_run(model: CompiledDae, **run: Any) -> Solution:
     try:
         return simulate(model, **run, solver="native")
     except (ExportError, InitializationError, LanguageError, MissingExtra, SolveError):
-        return simulate(model, **run)
+        return simulate(model, **run, solver="idas")
