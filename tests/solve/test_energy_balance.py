@@ -173,10 +173,11 @@ def test_a_model_without_states(points: int) -> None:
     assert balance.closure < 1e-12
 
 
-def test_a_long_run_is_looked_at_in_pieces(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(("bound", "most"), [("_PIECE", 40), ("_LARGEST", 1)])
+def test_a_long_run_is_looked_at_in_pieces(monkeypatch: pytest.MonkeyPatch, bound: str, most: int) -> None:
     run = simulate(load(EXAMPLES / "msl/rotational/CoupledClutches.toml"))
     whole = run.energy()
-    monkeypatch.setattr(powers, "_PIECE", 40)
+    monkeypatch.setattr(powers, bound, most)
     parts = replace(run, _cache={}).energy()
     for row in whole:
         other = parts[row.component]
