@@ -13,9 +13,9 @@ from modelica_like.cosimulation.split import Split, split
 from modelica_like.cosimulation.ssp_document import Version, ssd
 from modelica_like.cosimulation.ssp_reader import read_structure
 from modelica_like.cosimulation.system import System, check_system
-from modelica_like.errors import UnknownName, did_you_mean
+from modelica_like.errors import NetlistError, UnknownName, did_you_mean
 from modelica_like.fmi.package import known_version, target_file, write_archive
-from modelica_like.fmi.unpack import SSP, unpack
+from modelica_like.fmi.unpack import SSP, printable, unpack
 from modelica_like.language import Component
 
 
@@ -49,7 +49,13 @@ def write_ssp(system: System, path: str | Path, version: Version | str = "1.0") 
         homes.setdefault(unit.file.resolve(), f"resources/{unit.name}.fmu")
     sources = {unit.name: homes[unit.file.resolve()] for unit in system.units}
     files = {home: file.read_bytes() for file, home in homes.items()}
-    write_archive(target, files | {SSP.description: ssd(system, fmus, sources, chosen)})
+    try:
+        structure = ssd(system, fmus, sources, chosen)
+    except ValueError:  # so lxml says it
+        raise NetlistError(
+            f"A name in system '{printable(system.name)}' has characters that XML does not know."
+        ) from None
+    write_archive(target, files | {SSP.description: structure})
     return target
 
 

@@ -156,7 +156,7 @@ def _verdict(value: Number, bound: Number, quantity: Quantity, *, above: bool) -
     worst = int(np.argmax(np.where(np.isfinite(excess), excess, np.inf)))
     if excess[worst] <= _ROUNDING * abs(bounds[worst]):
         return "ok"
-    share = f" ({100 * excess[worst] / abs(bounds[worst]):.3g} %)" if bounds[worst] else ""
+    share = f" ({100 * float(excess[worst]) / abs(float(bounds[worst])):.3g} %)" if bounds[worst] else ""
     unit = f" {quantity.shown}".rstrip()
     limit, difference = shown(bounds[worst], quantity), f"{excess[worst] / quantity.factor:.4g}"
     return f"{'above' if above else 'below'} the limit {limit}{unit} by {difference}{unit}{share}"

@@ -17,7 +17,7 @@ from modelica_like.sizing.convert import Converter
 from modelica_like.sizing.document import SizingDocument, placed, read_document
 from modelica_like.sizing.formulas import Value, read_value
 from modelica_like.sizing.simulated import Simulations
-from modelica_like.units import ONE
+from modelica_like.units import ONE, to_si
 
 _OWN = ("is", "note", "limits", "published")
 _STEP = re.compile(r"([A-Za-z_]\w*)(?:\[(\d+)\])?")
@@ -148,7 +148,7 @@ class _Run:
             return read_value(given, self.lookup)
         if isinstance(given, bool) or not isinstance(given, int | float):
             raise NetlistError(f'{where} must be a number or a text with a unit, such as "10 N.m".')
-        return Value(float(given), ONE)
+        return Value(to_si(given, ONE, where), ONE)
 
     def _enter(self, name: str) -> None:
         if name in self.open:

@@ -14,6 +14,8 @@ from modelica_like import simulate
 from modelica_like.analyse.sweeps.ranges import read_range
 from modelica_like.cosimulation.described import described
 from modelica_like.cosimulation.files import load_system
+from modelica_like.cosimulation.ssp import write_ssp
+from modelica_like.cosimulation.system import System, Unit
 from modelica_like.errors import FmuRefused, ModelicaLikeError
 from modelica_like.netlist import loads
 from modelica_like.netlist.write import dumps
@@ -78,6 +80,13 @@ input_speed = "1000 rpm"
 input_torque = "100 N.m"
 teeth = { small_sun = 21, large_sun = 39, short_planet = 13, long_planet = 10, ring = 3 }
 """
+
+
+def test_a_limit_next_to_nothing_is_missed_without_a_warning(tmp_path: Path) -> None:
+    (tmp_path / "small.toml").write_text(LIFE + "limits = { life = { max = 5e-324 } }\n")
+    assert size(tmp_path / "small.toml").exceeded == 1
+
+
 SIZINGS = {
     "a published list": (LIFE + 'published = { life = ["1 h"] }\n', "checks.k.published.life compares one number"),
     "a limit that is a list": (LIFE + "limits = { life = { min = [[0, 1]] } }\n", "checks.k.limits.life compares"),
@@ -85,6 +94,10 @@ SIZINGS = {
     "a ring inside of its planets": (RING, "checks.k cannot be worked out: A ring of 3 teeth cannot hold planets of"),
     "teeth without the ring": (RING.replace(", ring = 3", ""), "checks.k.teeth needs ring."),
     "a list without numbers": (LIFE.replace('"150 N"', "[]"), "checks.k.radial_load must be a list of numbers"),
+    "a number without end": (
+        LIFE.replace('"150 N"', '"a*1 N"') + "[parameters]\na = " + "9" * 401 + "\n",
+        "parameters.a is larger than any",
+    ),
     "an array in published": (LIFE + "published = [1, 2]\n", "checks.k.published must be a table by line"),
 }
 
@@ -142,6 +155,17 @@ def test_an_ssp_in_an_encoding_that_is_another_one(tmp_path: Path) -> None:
     (tmp_path / "work").mkdir()
     with pytest.raises(ModelicaLikeError, match=r"^SystemStructure\.ssd in bad\.ssp is no XML: "):
         load_system(tmp_path / "bad.ssp", tmp_path / "work")
+
+
+def test_an_ssp_has_no_names_that_xml_does_not_know(tmp_path: Path) -> None:
+    with zipfile.ZipFile(tmp_path / "a.fmu", "w") as archive:
+        archive.writestr(
+            "modelDescription.xml",
+            '<fmiModelDescription fmiVersion="2.0" modelName="a" guid="1"><CoSimulation modelIdentifier="a"/>'
+            "<ModelVariables/><ModelStructure/></fmiModelDescription>",
+        )
+    with pytest.raises(ModelicaLikeError, match=r"^A name in system 'two.' has characters that XML does not know\.$"):
+        write_ssp(System("two\0", (Unit("a", tmp_path / "a.fmu"),), ()), tmp_path / "two.ssp")
 
 
 def test_a_null_character_in_the_name_of_an_fmu(tmp_path: Path) -> None:

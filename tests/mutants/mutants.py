@@ -41,7 +41,7 @@ NARROW = {
     "modelica_like/solve": [
         "solve/test_looks.py", "solve/test_guards.py", "solve/test_time_events.py", "solve/test_events.py",
         "solve/test_reading.py", "solve/test_solution.py", "solve/test_energy_balance.py", "solve/test_accuracy.py",
-        "library/test_one_instant.py",
+        "library/test_one_instant.py", "report/test_compare.py",
     ],
     "modelica_like/flatten": [
         "flatten", "solve/test_guards.py", "language/test_equations.py", "language/test_modes.py", "structure",
