@@ -48,6 +48,7 @@ _NAMES = {
         "SignTorque Torque2"
     ),
     "shift_schedule": "ShiftSchedule",
+    "signal_tables": "Table1D Table2D",
     "signals": "CoilForce Constant Product Pulse Ramp Sine Step Table TimeFormula Trapezoid",
     "slides": "ElastoGap MassWithStopAndFriction Rod StribeckFriction SupportFriction TranslationalBrake",
     "sources": "ConstantForce ConstantSpeed ConstantTorque Force Speed Torque TorqueStep",

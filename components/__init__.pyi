@@ -96,6 +96,8 @@ from components.shaft_sources import QuadraticSpeedDependentTorque as QuadraticS
 from components.shaft_sources import SignTorque as SignTorque
 from components.shaft_sources import Torque2 as Torque2
 from components.shift_schedule import ShiftSchedule as ShiftSchedule
+from components.signal_tables import Table1D as Table1D
+from components.signal_tables import Table2D as Table2D
 from components.signals import CoilForce as CoilForce
 from components.signals import Constant as Constant
 from components.signals import Product as Product

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from components import icons
 from components.interfaces import CompliantWithRelativeStates
 from modelica_like.language import (
     Equations,
@@ -29,6 +30,7 @@ class RigidBacklash(CompliantWithRelativeStates):
     then one pushes the other until it is pulled back. An `ElastoBacklash` has elastic flanks instead.
     """
 
+    icon = icons.PLAY
     b: Parameter = param("rad", "total backlash", min=1e-10)
     phi_rel0: Parameter = param("rad", "relative angle in the middle of the backlash", default=0.0)
     e: Parameter = param("1", "restitution: speed after an impact over that before", default=0.0, min=0, max=1)
@@ -77,6 +79,7 @@ class DogClutch(CompliantWithRelativeStates):
     What is left of the slip ends in an impact. Without play and at any angle; the play is a `RigidBacklash` in series.
     """
 
+    icon = icons.DOGS
     # No torque depends on the angle by which an open clutch has turned.
     phi_rel: Variable = var("rad", "relative angle, flange_b.phi - flange_a.phi", state="prefer", default=0)
     w_rel: Variable = var("rad/s", "slip speed", state="always")

@@ -40,6 +40,13 @@ SPRING_DAMPER = Icon(
     key=("c",),
 )  # fmt: skip
 BACKLASH = Icon(50, 36, lines=f"M-25 0 h10 {_COIL} M15 0 M15 -8 v16 M20 -8 v16 M20 0 h5", key=("b", "c"))
+PLAY = Icon(
+    50,
+    36,
+    lines="M-25 0 h15 M10 0 h15",
+    heavy="M-10 -12 v24 M-10 -12 h14 M-10 12 h14 M10 -4 h-14 M10 4 h-14",
+    key=("b",),
+)
 CLUTCH = Icon(30, 48, lines="M-15 0 h9 M6 0 h9", heavy="M-6 -23 v46 M6 -23 v46", ports={"f_normalized": "N"},
               key=("capacity", "fn_max"))  # fmt: skip
 MULTI_PLATE = Icon(36, 48, lines="M-18 0 h8 M10 0 h8 M-10 -23 h8 M-10 23 h8 M10 -17 h-8 M10 17 h-8",
@@ -50,6 +57,9 @@ BRAKE = Icon(44, 56, lines="M-22 0 h44 M-9 -19 v-6 h18 v6 M0 -25 v-3 M-9 19 v6 h
 BEARING = Icon(44, 36, lines=f"M-22 0 h44 {_hatch(-11, -12, 22, -1)} {_hatch(-11, 12, 22)}",
                heavy="M-11 -8 h22 M-11 8 h22")  # fmt: skip
 FREEWHEEL = Icon(44, 40, paper=_circle(0, 0, 19), solid="M-6 -8 L8 0 L-6 8 Z", lines="M-22 0 h16 M8 0 h14 M8 -8 v16")
+DOGS = replace(
+    CLUTCH, heavy="M-6 -20 v40 M6 -20 v40 M-6 -12 h6 M-6 12 h6 M6 0 h-6", ports={"engage": "N"}, key=("w_max",)
+)
 ONE_WAY_CLUTCH = replace(CLUTCH, solid="M-4 -6 L5 0 L-4 6 Z")
 LIMITER_CLUTCH = Icon(44, 48, lines="M-22 0 h12 M2 0 h3 l2 -6 l4 12 l4 -12 l2 6 h3",
                       heavy="M-10 -23 v46 M2 -23 v46")  # fmt: skip

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from components import icons
 from components.interfaces import Flange, LinearFlange
-from modelica_like.language import Component, Equations, Expr, Parameter, Variable, der, param, var
+from modelica_like.language import Component, Equations, Expr, Parameter, Variable, der, param, sin, var
 
 
 class Inertia(Component):
@@ -34,7 +34,7 @@ class Inertia(Component):
 class Mass(Component):
     """Rigid sliding mass.
 
-    The acceleration force m·der(v) is the sum of both cut forces.
+    The acceleration force m·der(v) is the sum of both cut forces. On a slope, or hanging, its weight acts, too.
     """
 
     icon = icons.MASS
@@ -42,8 +42,18 @@ class Mass(Component):
     flange_b = LinearFlange("right end", free=True)
     m: Parameter = param("kg", "mass", min=0)
     L: Parameter = param("m", "distance from left to right end; without a value both ends are at s", default=None)
+    angle: Parameter = param(
+        "rad", "rise of the way, 90° is upwards: m·g·sin(angle) acts against it; without a value there is no weight",
+        default=None,
+    )  # fmt: skip
+    g: Parameter = param("m/s2", "gravity", default=9.80665)
     s: Variable = var("m", "position")
     v: Variable = var("m/s", "velocity")
+
+    @property
+    def weight(self) -> Expr:
+        """Part of the weight against positive motion."""
+        return self.m * self.g * sin(self.angle)
 
     def equations(self) -> Equations:
         a, b = self.flange_a, self.flange_b
@@ -51,7 +61,8 @@ class Mass(Component):
         yield a.s == self.s - half
         yield b.s == self.s + half
         yield der(self.s) == self.v
-        yield self.m * der(self.v) == a.f + b.f
+        yield self.m * der(self.v) == a.f + b.f - (self.weight if self.given("angle") else 0.0)
 
     def stored_energy(self) -> Expr:
-        return 0.5 * self.m * self.v**2
+        kinetic = 0.5 * self.m * self.v**2
+        return kinetic + self.weight * self.s if self.given("angle") else kinetic

@@ -107,7 +107,8 @@ class ShaftMotionSource(OneFlange, partial=True):
 class Position(ShaftMotionSource):
     """Angle given by a signal: exactly, or through a Bessel filter of second order.
 
-    The filter makes speed and acceleration of any signal finite (Modelica Standard Library, Rotational.Position).
+    The filter makes speed and acceleration of any signal finite. In the Modelica Standard Library, Rotational.Position,
+    `exact` is false if nothing is said.
     """
 
     icon = icons.ANGLE

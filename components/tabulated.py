@@ -7,6 +7,8 @@ from typing import Literal
 
 from modelica_like.language import Component, Events, Expr, Mode, all_of, any_of, interpolate
 
+_ROUNDING = 1e-10
+
 
 class Tabulated(Component, partial=True):
     """Element with tables that were measured in a range.
@@ -40,7 +42,9 @@ class Tabulated(Component, partial=True):
             told = ": its last value holds" if self.extrapolate == "hold" else ""
             first, last = table[0][0], table[-1][0]
             above = isinstance(first, float | int) and first <= least
-            outside = x > last if above else any_of(x > last, x < first)
+            # Who reaches the end of a table has not left it.
+            slack = _ROUNDING * (last - first)
+            outside = x > last + slack if above else any_of(x > last + slack, x < first - slack)
             yield self.range.go(
                 "kept", "left", when=all_of(outside, *conditions), fails=self.extrapolate == "error",
                 notice=f"leaves the rows of {name}{told}",

@@ -133,10 +133,7 @@ class MotionSource(LinearOneFlange, partial=True):
 
 
 class TranslationalPosition(MotionSource):
-    """Position given by a signal: exactly, or through a Bessel filter of second order.
-
-    The filter makes velocity and acceleration of any signal finite (Modelica Standard Library, Translational.Position).
-    """
+    """Position given by a signal: exactly, or through a Bessel filter of second order; see `Position`."""
 
     icon = icons.POSITION
     s_ref: Input = signal_in("m", "position")

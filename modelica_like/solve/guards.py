@@ -147,26 +147,25 @@ def candidates(values: Vector, rates: Vector, active: Any, step: float) -> Itera
         step: longest distance of two times in s.
     """
     values, rates = values[active], rates[active]
-    below, slow = values <= 0, _NOISE / step
+    below, up = values <= 0, rates > _NOISE / step
     rises = below[:, :-1] > below[:, 1:]
-    humps = rates > slow
-    humps = humps[:, :-1] > humps[:, 1:]
+    humps = up[:, :-1] > up[:, 1:]
     humps &= below[:, :-1]
     humps &= below[:, 1:]
     for k in np.flatnonzero((rises | humps).any(axis=0)):
         group = [Candidate(int(active[g]), int(k), False) for g in rises[:, k].nonzero()[0]]
         for g in humps[:, k].nonzero()[0]:
-            (g0, g1), (r0, r1) = values[g, k : k + 2], rates[g, k : k + 2] * step
-            if r1 < -_NOISE and _peak(g0, g1, r0, r1) > -_NEAR * (abs(g0) + abs(g1)):
+            ends = values[g, k : k + 2], rates[g, k : k + 2] * step
+            if _nearly(*ends[0].tolist(), *ends[1].tolist()):
                 group.append(Candidate(int(active[g]), int(k), True))
         if group:
             yield group
 
 
-def _peak(g0: float, g1: float, r0: float, r1: float) -> float:
-    """Largest value of the cubic through both ends with the given slopes (sampled), or a bound that is negative."""
-    bound = max(g0 + r0 / 3, g1 - r1 / 3)
-    return float(np.max(_CUBIC @ np.array([g0, r0, g1, r1]))) if bound > -_NEAR * (abs(g0) + abs(g1)) else bound
+def _nearly(g0: float, g1: float, r0: float, r1: float) -> bool:
+    """Whether the cubic through both ends with the given slopes comes near zero, by a bound, and then by samples."""
+    low = -_NEAR * (abs(g0) + abs(g1))
+    return r1 < -_NOISE and max(g0 + r0 / 3, g1 - r1 / 3) > low and float(np.max(_CUBIC @ [g0, r0, g1, r1])) > low
 
 
 def _hermite(s: Vector) -> Vector:

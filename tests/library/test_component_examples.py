@@ -55,6 +55,14 @@ def dogs(run: Solution) -> None:
 
 
 @numbers
+def torque_map(run: Solution) -> None:
+    assert run.final["throttle.y"] == close(0.6)
+    lag = 0.5 * 200 / (0.6 * 100)
+    assert run.at(1.0)["flywheel.w"] == close(200 * (1 - exp(-1.0 / lag)))
+    assert run.final["flywheel.w"] == close(200 * (1 - exp(-5.0 / lag)))
+
+
+@numbers
 def screw_lift(run: Solution) -> None:
     ideal = 2000 * 0.01 / (2 * pi)
     assert -run.at(0.3)["motor.flange.tau"] == close(ideal / 0.9)

@@ -35,6 +35,7 @@ from components import (
     Torque,
 )
 from modelica_like import Assembly, Component, simulate
+from modelica_like.report.run import notices
 
 TIGHT = {"rtol": 1e-10, "atol": 1e-12}
 
@@ -86,6 +87,33 @@ def test_belt_slips_by_eytelwein(direction: float) -> None:
     assert grips == pytest.approx(100.0 * 0.5 / (force * r_b / 0.2), rel=1e-2)
     assert np.all(run["belt.loss_power"] >= -1e-9)
     assert run.energy().closure <= 1e-8
+
+
+@pytest.mark.parametrize(("torque", "slack"), [(4.0, False), (12.0, True), (-12.0, True)])
+def test_a_strand_cannot_push(torque: float, slack: bool) -> None:
+    """Pulley of 50 mm on strands of 20 kN/m with 100 N each: from 10 N.m on one is slack, the other carries alone."""
+    belt = TimingBelt(r_a=0.05, r_b=0.1, c=2e4, d=50.0, F_0=100.0)
+    push, wheel = ConstantTorque(tau_constant=torque), Inertia(J=1e-3, phi=0.0, w=0.0)
+    run = simulate(shaft(push=push, wheel=wheel, belt=belt, wall=Fixed()), 2.0, rtol=1e-9)
+    force = abs(torque) / 0.05
+    strands = sorted([run.final["belt.F_1"], run.final["belt.F_2"]])
+    assert strands == pytest.approx([0.0, force] if slack else [100 - force / 2, 100 + force / 2], abs=1e-6)
+    assert abs(run.final["belt.x"]) == pytest.approx((force - 100) / 2e4 if slack else force / 4e4, rel=1e-6)
+    stored = 0.5 * (strands[1] ** 2 + strands[0] ** 2 - 2 * 100**2) / 2e4
+    assert run.energy()["belt"].stored == pytest.approx(stored, rel=1e-6)
+    assert run.energy().imbalance == 0
+    assert run.energy()["belt"].gain == 0
+    told = [one for one in notices(run) if "slack strand" in one]
+    assert len(told) == slack
+
+
+def test_a_belt_without_pre_tension_pulls_with_one_strand() -> None:
+    """Frequency sqrt(c·r²/J): half the stiffness, in both directions."""
+    belt = TimingBelt(r_a=0.1, r_b=0.05, c=2e4, d=1e-9)
+    run = simulate(shaft(wall=Fixed(), belt=belt, wheel=Inertia(J=0.02, phi=0.0, w=1.0)), "0.5 s", **TIGHT)
+    w = sqrt(2e4 * 0.05**2 / 0.02)
+    np.testing.assert_allclose(run["wheel.phi"], np.sin(w * run.time) / w, atol=1e-7)
+    assert np.min([run["belt.F_1"], run["belt.F_2"]]) >= 0
 
 
 # -- screws ------------------------------------------------------------------------------------------------------------

@@ -170,3 +170,23 @@ def test_backlash_starts_on_the_flank_where_it_is() -> None:
         )
         names = run.model.flat_discretes[run.model.discrete_position["gap.contact"]].names
         assert names[int(run["gap.contact"][0])] == contact
+
+
+def test_a_hanging_mass_swings_about_its_weight() -> None:
+    """2 kg on 50 N/m: it starts at the free length and swings by m·g/c about m·g/c below, with sqrt(c/m)."""
+    parts = {
+        "ceiling": TranslationalFixed(), "spring": TranslationalSpring(c=50.0),
+        "mass": Mass(m=2.0, angle="-90 deg", g=9.81, s=0.0, v=0.0),
+    }  # fmt: skip
+    run = simulate(Assembly("hanging", parts=parts, series={"s": [*parts]}), 3.0, rtol=1e-10, atol=1e-12)
+    deep = 2.0 * 9.81 / 50.0
+    np.testing.assert_allclose(run["mass.s"], deep * (1 - np.cos(5.0 * run.time)), atol=1e-8)
+    assert run.energy().imbalance == 0
+    assert run.energy().stored == pytest.approx(0.0, abs=1e-7)
+
+
+@pytest.mark.parametrize("angle", [0.0, 5.0, -30.0])
+def test_a_mass_rolls_down_its_slope(angle: float) -> None:
+    run = simulate(Mass(m=3.0, angle=f"{angle} deg", s=0.0, v=0.0), 2.0, **TIGHT)
+    assert run.final["v"] == pytest.approx(-2 * 9.80665 * np.sin(np.deg2rad(angle)), rel=1e-9)
+    assert run.energy().stored == pytest.approx(0.0, abs=1e-6)
