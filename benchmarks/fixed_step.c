@@ -10,7 +10,7 @@
 #include <string.h>
 #include <time.h>
 #include "core.h"
-#include "fmi2.h"
+#include "fmi2Functions.h"
 
 static void tell(void *environment, const char *name, fmi2Status status, const char *category, const char *text, ...) {
     (void)environment, (void)name, (void)status, (void)category;

@@ -15,8 +15,8 @@ from pathlib import Path
 from modelica_like.compile import compile
 from modelica_like.flatten import flatten
 from modelica_like.fmi.build import compiler_command, flags, native_platform
-from modelica_like.fmi.codegen import generate
 from modelica_like.fmi.interface import interface
+from modelica_like.fmi.model_file import generate
 from modelica_like.netlist import load
 from modelica_like.simulation import seconds
 from modelica_like.structure import reduce

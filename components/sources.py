@@ -83,6 +83,7 @@ class TorqueStep(TorqueSource):
 class SpeedSource(OneFlange, partial=True):
     """Speed between the housing and a shaft, whatever torque it takes."""
 
+    icon = icons.SPEED
     phi: Variable = var("rad", "angle of the shaft relative to the housing", default=0)
     w: Variable = var("rad/s", "speed of the shaft relative to the housing")
 

@@ -153,6 +153,7 @@ class TranslationalPosition(MotionSource):
 class TranslationalSpeed(MotionSource):
     """Velocity given by a signal: exactly, or through a filter of first order; see `Speed`."""
 
+    icon = icons.VELOCITY
     v_ref: Input = signal_in("m/s", "velocity")
     exact: bool = True
     """Follow the signal exactly: it must then have a derivative."""

@@ -78,14 +78,14 @@ class _Partials:
         outputs = [ca.densify(value), *(ca.jacobian(value, one) for one in (x, z, t, ca.vertcat(*theta)))]
         self._fast = BufferedFunction(ca.Function("slopes", symbols, outputs))
         patterns = [self._fast.function.sparsity_out(k) for k in range(len(outputs))]
-        self._patterns = [(one.shape, one.find()) for one in patterns]
+        self._patterns = [(one.shape, np.array(one.find(), int)) for one in patterns]
 
     def __call__(self, model: CompiledDae, point: Point, *constants: Vector) -> list[Vector]:
         found = self._fast(point.t, point.x, point.z, model.p, model.u, point.d, *constants)
         return [_filled(entries, *pattern) for entries, pattern in zip(found, self._patterns, strict=True)]
 
 
-def _filled(entries: Vector, shape: tuple[int, int], places: list[int]) -> Vector:
+def _filled(entries: Vector, shape: tuple[int, int], places: Any) -> Vector:
     """Fill a matrix column by column."""
     if len(places) < shape[0] * shape[1]:
         given, entries = entries, np.zeros(shape[0] * shape[1])

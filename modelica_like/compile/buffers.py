@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from threading import get_ident
 from typing import Any, cast
 
 import casadi as ca
@@ -75,21 +74,6 @@ class BufferedFunction:
         return dict(self._buffer.stats())
 
 
-def buffered(cache: dict[Any, Any], key: Any, make: Any, results: tuple[int, ...] | None = None) -> BufferedFunction:
-    """Return this thread's buffered function, made on first use.
-
-    Args:
-        cache: keeps it.
-        key: names it.
-        make: returns the CasADi function.
-        results: which results to compute; all by default.
-    """
-    own = "buffer", get_ident(), key
-    if own not in cache:
-        cache[own] = BufferedFunction(make(), results)
-    return cache[own]
-
-
 _BLOCKS = 4096, 512, 64
 """Points that are evaluated in one call: many, about as many as a run has results, and the rest."""
 _GROUP, _SMALL = 8, 2000
@@ -140,17 +124,3 @@ class Along:
                 for whole, part in zip(results, block, strict=True):
                     whole[:, first:last] = part.reshape(size, -1).T[:, : last - first]
                 first = last
-
-
-def along(cache: dict[Any, Any], key: Any, make: Any) -> Along:
-    """Return this thread's function at many points, made on first use.
-
-    Args:
-        cache: keeps it.
-        key: names it.
-        make: returns the CasADi function.
-    """
-    own = "along", get_ident(), key
-    if own not in cache:
-        cache[own] = Along(make())
-    return cache[own]

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from threading import get_ident
 from typing import Any, TypeVar
 
 import casadi as ca
 
-from modelica_like.compile.buffers import BufferedFunction, buffered
+from modelica_like.compile.buffers import Along, BufferedFunction
 from modelica_like.compile.buffers import Vector as Vector
 from modelica_like.compile.start_system import StartSystem as StartSystem
 from modelica_like.errors import LanguageError, Source, UnknownName, ValueOutOfRange, did_you_mean
@@ -263,9 +264,18 @@ class CompiledDae:
             self._cache[key] = make()
         return self._cache[key]
 
-    def fast(self, key: Any, make: Callable[[], ca.Function]) -> BufferedFunction:
-        """Return this thread's buffered function for a key, made on first use, and kept with the model."""
-        return buffered(self._cache, key, make)
+    def fast(
+        self, key: Any, make: Callable[[], ca.Function], results: tuple[int, ...] | None = None
+    ) -> BufferedFunction:
+        """Return this thread's buffered function (with some of its results) for a key, made on first use, and kept."""
+        own = "buffer", get_ident(), key
+        if own not in self._cache:
+            self._cache[own] = BufferedFunction(make(), results)
+        return self._cache[own]
+
+    def along(self, key: Any, make: Callable[[], ca.Function]) -> Along:
+        """Return this thread's function at many points for a key, made on first use, and kept."""
+        return self.once(("along", get_ident(), key), lambda: Along(make()))
 
     def function(self, inputs: Sequence[str], outputs: Sequence[str], **run: Any) -> ca.Function:
         """Return the whole simulation as a differentiable CasADi function of parameters.

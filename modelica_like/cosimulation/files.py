@@ -77,7 +77,8 @@ def _system(data: Mapping[str, Any], lines: Lines, path: Path) -> System:
 
 def _unit(key: str, entry: Any) -> Unit:
     table, name = {"file": entry} if isinstance(entry, str) else entry, _name(key)
-    if not isinstance(table, dict) or not isinstance(table.get("file"), str) or set(table) - {"file", "parameters"}:
+    known = isinstance(table, dict) and isinstance(table.get("file"), str) and "\0" not in table["file"]
+    if not known or set(table) - {"file", "parameters"}:
         raise NetlistError(f'{key} must be a table: {{ file = "{name}.fmu" }}, with `parameters` if there are any.')
     if not name.isidentifier():
         raise NetlistError(f"{key}: the name of an FMU is a word: letters, digits and _.")

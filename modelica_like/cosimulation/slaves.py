@@ -9,7 +9,7 @@ from typing import Any
 import fmpy
 from fmpy.simulation import instantiate_fmu
 
-from modelica_like.fmi.inside import DISCRETE, REAL, Messages, Refused
+from modelica_like.fmi.inside import DISCRETE, REAL, Messages, Refused, savings
 
 _STORED = {name: name for name in (*REAL, *DISCRETE)} | {"Enumeration": "Integer"}
 
@@ -40,10 +40,7 @@ class Slave:
         self._fmu: Any = instantiate_fmu(
             str(folder), self.description, "CoSimulation", logger=messages, event_mode_used=False
         )
-        state = "FMUstate" if second else "FMUState"
-        self.save, self.load, self.free = (
-            self._noticed(getattr(self._fmu, f"{verb}{state}")) for verb in ("get", "set", "free")
-        )
+        self.save, self.load, self.free = map(self._noticed, savings(self._fmu, self.description.fmiVersion))
 
     def _noticed(self, function: Callable[..., Any]) -> Callable[..., Any]:
         def call(*arguments: Any) -> Any:

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 from modelica_like.draw.diagram import Node
-
-if TYPE_CHECKING:
-    from modelica_like.draw.sheet import Placed
 
 NAME, VALUE = 12.5, 11.0
 """Sizes of letters in 1/96 inch."""
@@ -56,25 +52,6 @@ def labels(node: Node) -> list[tuple[str, float]]:
                 written.append((_shortened(f"{key} = {_told(value.given)}"), VALUE))
                 break
     return written
-
-
-def texts(part: Placed) -> Iterator[Text]:
-    """Yield what is written around the middle of a part: names of ports, its own name, and a value."""
-    node, (half_x, half_y) = part.node, part.half
-    if part.sheet or node.border:
-        return
-    for port in node.ports.values():
-        if port.mark or port.side not in ("W", "E") or not (node.icon is None or node.icon.named):
-            continue
-        # Inside a box, beside a symbol above its line.
-        east, outside = port.side == "E", node.icon is not None
-        shift = (half_x + (4.0 if outside else -5.0)) * (1 if east else -1)
-        at = shift, port.along + (-4.0 if outside else 4.0)
-        yield Text(port.name, at, VALUE, "end" if east != outside else "start")
-    low = -half_y - 3.0 if part.above else part.room[3]
-    for text, size in reversed(labels(node)):
-        yield Text(text, (0.0, low - 3.0), size)
-        low -= size + 4.0
 
 
 def _told(given: object) -> str:

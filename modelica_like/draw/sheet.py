@@ -9,7 +9,7 @@ from itertools import pairwise, permutations
 import casadi as ca
 
 from modelica_like.draw.diagram import Diagram, Net, Node, Port
-from modelica_like.draw.labels import VALUE, labels, text_width
+from modelica_like.draw.labels import VALUE, Text, labels, text_width
 from modelica_like.draw.layers import Channel, End, Layers, Slot, layered, solve_lp
 from modelica_like.language.icon import SIGNAL, Stroke
 
@@ -98,6 +98,25 @@ class Sheet:
 def inner_origin(part: Placed) -> Point:
     """Where the inside of an open assembly begins."""
     return part.at[0] - part.half[0], part.at[1] - part.half[1] + TITLE
+
+
+def texts(part: Placed) -> Iterator[Text]:
+    """Yield what is written around the middle of a part: names of ports, its own name, and a value."""
+    node, (half_x, half_y) = part.node, part.half
+    if part.sheet or node.border:
+        return
+    for port in node.ports.values():
+        if port.mark or port.side not in ("W", "E") or not (node.icon is None or node.icon.named):
+            continue
+        # Inside a box, beside a symbol above its line.
+        east, outside = port.side == "E", node.icon is not None
+        shift = (half_x + (4.0 if outside else -5.0)) * (1 if east else -1)
+        at = shift, port.along + (-4.0 if outside else 4.0)
+        yield Text(port.name, at, VALUE, "end" if east != outside else "start")
+    low = -half_y - 3.0 if part.above else part.room[3]
+    for text, size in reversed(labels(node)):
+        yield Text(text, (0.0, low - 3.0), size)
+        low -= size + 4.0
 
 
 def sheet(diagram: Diagram) -> Sheet:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from xml.sax.saxutils import escape
 
-from modelica_like.draw.labels import NAME, VALUE, Text, texts
-from modelica_like.draw.sheet import TITLE, Line, Placed, Point, Sheet
+from modelica_like.draw.labels import NAME, VALUE, Text
+from modelica_like.draw.sheet import TITLE, Line, Placed, Point, Sheet, texts
 from modelica_like.language.icon import Icon, Stroke
 
 _INK, _PAPER, _STEEL, _GREY, _FRAME = "#1f2937", "#ffffff", "#cbd5e1", "#6b7280", "#f5f7fa"

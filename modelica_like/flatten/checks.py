@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any, cast
 
 import casadi as ca
@@ -87,19 +88,7 @@ def check_units(component: Component, equations: list[Equation], events: list[An
     """
     inferred: dict[str, Unit] = {}
 
-    def unit_of(leaf: Any) -> Unit:
-        symbol = symbols_in(leaf)[0]
-        if symbol is TIME:
-            return _SECOND
-        declared = symbol.owner.fields.get(symbol.name)
-        if not isinstance(declared, Field):
-            return ONE
-        unit = unit_of_field(symbol.owner, symbol.name)
-        if unit == ANY and symbol.owner is component:
-            unit = inferred.get(symbol.name, ANY)
-        return unit if unit == ANY or symbol.order == 0 else unit / _SECOND**symbol.order
-
-    dimensions = Dimensions(unit_of)
+    dimensions = Dimensions(partial(_unit_of_leaf, component, inferred))
     kind = type(component).__name__
     errors: list[ModelicaLikeError] = []
 
@@ -128,6 +117,18 @@ def check_units(component: Component, equations: list[Equation], events: list[An
     if errors:
         raise raise_together_or_one(errors)
     return inferred
+
+
+def _unit_of_leaf(component: Component, inferred: dict[str, Unit], leaf: Any) -> Unit:
+    symbol = symbols_in(leaf)[0]
+    if symbol is TIME:
+        return _SECOND
+    if not isinstance(symbol.owner.fields.get(symbol.name), Field):
+        return ONE
+    unit = unit_of_field(symbol.owner, symbol.name)
+    if unit == ANY and symbol.owner is component:
+        unit = inferred.get(symbol.name, ANY)
+    return unit if unit == ANY or symbol.order == 0 else unit / _SECOND**symbol.order
 
 
 def _infer(component: Component, equation: Equation, dimensions: Dimensions, inferred: dict[str, Unit]) -> None:

@@ -9,7 +9,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
@@ -94,21 +94,21 @@ def chosen_platforms(platforms: Sequence[str] | str, there: Iterable[str] = PLAT
         UnknownName: there is no such platform.
         ExportError: FMUs have no binaries for this machine.
     """
-    asked = (platforms,) if isinstance(platforms, str) else tuple(platforms)
     found: list[str] = []
-    for one in asked:
-        known = ["native", "all", *there]
-        if one not in known:
-            raise UnknownName(
-                f"There is no platform '{one}'{did_you_mean(one, known) or '.'}",
-                advice=f"There are {', '.join(known)}.",
-            )
+    for one in (platforms,) if isinstance(platforms, str) else platforms:
+        _check_known(one, ["native", "all", *there])
         found += there if one == "all" else [native_platform() if one == "native" else one]
     return tuple(dict.fromkeys(found))
 
 
+def _check_known(platform: str, known: Collection[str]) -> None:
+    if platform not in known:
+        hint = did_you_mean(platform, known) or "."
+        raise UnknownName(f"There is no platform '{platform}'{hint}", advice=f"There are {', '.join(known)}.")
+
+
 def build(sources: Mapping[str, str], platform: str, output_dir: Path, identifier: str = "model") -> Path:
-    """Compile sources to a shared library that exports the FMI functions only.
+    """Compile sources to a shared library, which is returned and exports the FMI functions only.
 
     This machine's platform is compiled by `$CC`, cc, gcc or clang, or by zig where none of these is found; all others
     by zig.
@@ -119,19 +119,12 @@ def build(sources: Mapping[str, str], platform: str, output_dir: Path, identifie
         output_dir: folder of the library.
         identifier: name of the library without suffix.
 
-    Returns:
-        Path of the library.
-
     Raises:
         UnknownName: there is no such platform.
         MissingExtra: zig is needed and not installed.
         ExportError: there is no compiler, or the compiler failed.
     """
-    if platform not in RUNTIMES:
-        raise UnknownName(
-            f"There is no platform '{platform}'{did_you_mean(platform, RUNTIMES) or '.'}",
-            advice=f"There are {', '.join(RUNTIMES)}.",
-        )
+    _check_known(platform, RUNTIMES)
     chosen = RUNTIMES[platform]
     library = Path(output_dir) / f"{identifier}{chosen.suffix}"
     command = compiler_command(platform)

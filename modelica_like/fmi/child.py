@@ -13,7 +13,7 @@ import fmpy
 import numpy as np
 from fmpy.simulation import Recorder
 
-from modelica_like.fmi.inside import DISCRETE, REAL, Job, Messages, Refused, about
+from modelica_like.fmi.inside import DISCRETE, REAL, Job, Messages, Refused, about, savings
 
 Side = Literal["left", "right"]
 KINDS = {"me": "ModelExchange", "cs": "CoSimulation"}
@@ -26,13 +26,9 @@ class EventLocator:
     """Finds the mode changes inside communication steps, by stepping again from a saved state."""
 
     def __init__(self, recorder: Recorder, fmi: str) -> None:
-        fmu: Any = recorder.fmu
-        self._fmu, self._recorder = fmu, recorder
-        self._save, self._load, self._free = (
-            (fmu.getFMUstate, fmu.setFMUstate, fmu.freeFMUstate)
-            if fmi == "2.0"
-            else (fmu.getFMUState, fmu.setFMUState, fmu.freeFMUState)
-        )
+        self._fmu: Any = recorder.fmu
+        self._recorder = recorder
+        self._save, self._load, self._free = savings(self._fmu, fmi)
         self._columns = [k for k, column in enumerate(recorder.cols) if column[1] not in (np.float64, np.float32)]
         self._state: Any = None
         self._from = 0.0

@@ -118,20 +118,11 @@ def export_fmu(
     model, description, equations = compiled_open(drive, ends, takes, tables)
     variables = interface(model, outputs, as_what)
     tell("writing the model")
-    files = _contents(model, variables, _about(model, chosen, kinds, description, fixed), equations, embed)
-    with tempfile.TemporaryDirectory(prefix="modelica_like_") as folder:
-        for name in names:
-            home = PLATFORMS[name].fmi2 if chosen == "2.0" else name
-            place = f"binaries/{home}/{identifier(model.name)}{PLATFORMS[name].suffix}"
-            files[place] = _library(files, name, Path(folder), embed, tell).read_bytes()
-        draft = Path(folder) / "draft.fmu"
-        write_archive(draft, files)
-        tell("checking")
-        checked = _checked(draft, model, kinds, fixed, check and native_platform() in names)
-        if strict and checked.differs:
-            raise ExportError(checked.sentence, advice="Without `strict` it is written all the same, with a picture.")
-        write_bytes(target, draft.read_bytes())
-    checked = _draw(checked, target)
+    about = _about(model, chosen, kinds, description, fixed)
+    files = _contents(model, variables, about, equations, embed)
+    files |= _binaries(files, identifier(model.name), chosen, names, embed, tell)
+    tell("checking")
+    checked = _written(files, target, model, about, check and native_platform() in names, strict)
     return Export(target, chosen, kinds, names, target.stat().st_size, time.perf_counter() - begin, checked)
 
 
@@ -218,16 +209,6 @@ def tool() -> str:
         return "modelica-like"
 
 
-def _library(files: dict[str, bytes], platform: str, folder: Path, embed: bool, tell: Report) -> Path:
-    """Return the run-time for a platform, or one with the model compiled in."""
-    if not embed:
-        return runtime_library(platform, tell)
-    tell(f"compiling for {platform}")
-    home = "sources/"
-    sources = {name.removeprefix(home): text.decode() for name, text in files.items() if name.startswith(home)}
-    return build({name: text for name, text in sources.items() if name.endswith((".c", ".h"))}, platform, folder)
-
-
 # -- the files ---------------------------------------------------------------------------------------------------------
 
 
@@ -266,20 +247,41 @@ def _token(texts: dict[str, str], data: bytes) -> str:
     return f"{{{digest[:8]}-{digest[8:12]}-{digest[12:16]}-{digest[16:20]}-{digest[20:32]}}}"
 
 
-def _checked(draft: Path, model: CompiledDae, kinds: tuple[Kind, ...], fixed_step: float, run: bool) -> Check:
-    """Check the parts of an FMU, and run it against IDAS."""
-    found = problems(draft)
-    if found:
-        raise ExportError(
-            f"The FMU does not pass its checks: {'; '.join(found[:3])}.", why="This is a fault of the export."
-        )
-    if not run:
-        return Check()
-    return compare_with_idas(draft, model, kinds[-1], fixed_step)
+def _binaries(
+    files: dict[str, bytes], name: str, version: Version, platforms: tuple[str, ...], embed: bool, tell: Report
+) -> dict[str, bytes]:
+    """Return the run-time for each platform, or one with the model compiled in, by its place."""
+    home = "sources/"
+    sources = {place.removeprefix(home): text.decode() for place, text in files.items() if place.startswith(home)}
+    own = {file: text for file, text in sources.items() if file.endswith((".c", ".h"))}
+    found: dict[str, bytes] = {}
+    with tempfile.TemporaryDirectory(prefix="modelica_like_") as folder:
+        for one in platforms:
+            if embed:
+                tell(f"compiling for {one}")
+            library = build(own, one, Path(folder)) if embed else runtime_library(one, tell)
+            place = PLATFORMS[one].fmi2 if version == "2.0" else one
+            found[f"binaries/{place}/{name}{library.suffix}"] = library.read_bytes()
+    return found
 
 
-def _draw(check: Check, target: Path) -> Check:
-    """Draw curves that differ next to the FMU."""
+def _written(
+    files: dict[str, bytes], target: Path, model: CompiledDae, about: About, run: bool, strict: bool
+) -> Check:  # fmt: skip
+    """Write an FMU whose parts have no fault, after a run against IDAS; draw curves that differ next to it."""
+    with tempfile.TemporaryDirectory(prefix="modelica_like_") as folder:
+        draft = Path(folder) / "draft.fmu"
+        write_archive(draft, files)
+        found = problems(draft)
+        if found:
+            raise ExportError(
+                f"The FMU does not pass its checks: {'; '.join(found[:3])}.", why="This is a fault of the export."
+            )
+        kind = "cs" if "cs" in about.kinds else "me"
+        check = compare_with_idas(draft, model, kind, about.fixed_step) if run else Check()
+        if strict and check.differs:
+            raise ExportError(check.sentence, advice="Without `strict` it is written all the same, with a picture.")
+        write_bytes(target, draft.read_bytes())
     if not check.differs or check.curves is None:
         return check
     picture = target.with_name(f"{target.stem}_check.png")

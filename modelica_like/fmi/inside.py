@@ -80,6 +80,13 @@ class Job:
         (self.folder / "error.json").write_text(json.dumps(detail))
 
 
+def savings(fmu: Any, version: str) -> tuple[Any, Any, Any]:
+    """Return the functions of an FMU that save a state, go back to it, and give it back."""
+    name = "FMUstate" if version == "2.0" else "FMUState"
+    save, load, free = (getattr(fmu, f"{verb}{name}") for verb in ("get", "set", "free"))
+    return save, load, free
+
+
 def about(variable: Any) -> dict[str, Any]:
     """Return what is to be known about a variable, by the names of `RecordedVariable`."""
     declared = variable.declaredType

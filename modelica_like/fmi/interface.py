@@ -122,17 +122,13 @@ def interface(model: CompiledDae, outputs: Sequence[str] = (), modes: ModesAs = 
     build.discretes(modes)
     build.guards()
     states = range(len(model.states))
+    chosen = tuple(one.reference for one in build.found if one.causality == "output")
     return Interface(
-        model.name,
-        tuple(build.found),
-        tuple(build.states[k] for k in states),
-        tuple(build.derivatives[k] for k in states),
-        tuple(one.reference for one in build.found if one.causality == "output"),
-        tuple(build.indicators[k] for k in sorted(build.indicators)),
-        build.starts.tables,
-        build.reach,
+        model.name, tuple(build.found), tuple(build.states[k] for k in states),
+        tuple(build.derivatives[k] for k in states), chosen,
+        tuple(build.indicators[k] for k in sorted(build.indicators)), build.starts.tables, build.reach,
         tuple(build.arrays()),
-    )
+    )  # fmt: skip
 
 
 class _Builder:

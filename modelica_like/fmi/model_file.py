@@ -17,14 +17,16 @@ from typing import Any
 import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae
-from modelica_like.fmi.interface import FmuVariable
+from modelica_like.fmi.interface import FmuVariable, Interface
+from modelica_like.fmi.sources import Version, runtime_sources
 from modelica_like.fmi.start_tables import StartTables
-from modelica_like.fmi.tables import Tables
+from modelica_like.fmi.tables import Tables, make_tables
 from modelica_like.fmi.tape import OPERATIONS, Tape
 
 ABSOLUTE_TO_RELATIVE = 1e-2
 """Absolute tolerance, in nominal values, over the relative one."""
 
+DEFAULT_TOLERANCE = 1e-7
 MODEL = "resources/model.bin"
 """Where the file stands in an FMU."""
 FORMAT = 2
@@ -140,6 +142,14 @@ def as_c(data: bytes) -> str:
         + ",\n    ".join(lines)
         + "};\nconst size_t model_data_size = sizeof model_data;\n"
     )
+
+
+def generate(
+    model: CompiledDae, face: Interface, version: Version = "2.0", *, token: str, fixed_step: float = 0.0
+) -> dict[str, str]:
+    """Return all C sources of an FMU by file name, with the model compiled in; arguments are those of `model_file`."""
+    data = model_file(make_tables(model, face.start), face.variables, token, DEFAULT_TOLERANCE, fixed_step)
+    return runtime_sources((version,)) | {"model_data.c": as_c(data)}
 
 
 class _Text:

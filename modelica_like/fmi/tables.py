@@ -104,18 +104,10 @@ def _functions(model: CompiledDae, start: StartTables) -> tuple[dict[str, Any], 
         for name, expression in written.items()
     }
     plain = (
-        "alg",
-        "variables",
-        "guards_soon",
-        "moments",
-        "resets",
-        "start_conditions",
-        "start_values",
-        "discrete_starts",
-        "determinants",
-        "hold_terms",
-    )
-    functions |= {name: getattr(model, name) for name in (*plain, "derived")}
+        "alg", "variables", "guards_soon", "moments", "resets", "start_conditions", "start_values", "discrete_starts",
+        "determinants", "hold_terms", "derived",
+    )  # fmt: skip
+    functions |= {name: getattr(model, name) for name in plain}
     y = ca.SX.sym("y", start.system.size1_out(0))
     order = [y if name == "y" else arguments[name] for name in start.system.name_in()]
     _, start_jacobian, start_values = start.system(*order)

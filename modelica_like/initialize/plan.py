@@ -9,7 +9,6 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from modelica_like.compile.buffers import buffered
 from modelica_like.compile.compiled import CompiledDae, StartEntry, StartSystem, Vector
 from modelica_like.errors import MissingStart
 from modelica_like.initialize.point import Point
@@ -102,16 +101,16 @@ def start_plan(model: CompiledDae, kind: StartKind, point: Point) -> StartPlan:
 def _is_regular(model: CompiledDae, plan: StartPlan, point: Point) -> bool:
     """Tell whether the plan's matrix is far from singular; one that was found to be is not looked at again."""
     function = plan.system.function
-    fast = buffered(model._cache, ("start matrix", plan.kind), lambda: function, (1,))
+    fast = model.fast(("start matrix", plan.kind), lambda: function, (1,))
     y = np.zeros(function.size1_out(0))
     entries = fast(point.t, point.x, y, point.z, model.p, model.u, point.d)[0]
     entries = plan.entries(entries)
-    key = "regular start", plan.kind
-    if np.array_equal(model._cache.get(key, ()), entries):
+    known: dict[str, Any] = model.once(("regular start", plan.kind), dict)
+    if np.array_equal(known.get("entries", ()), entries):
         return True
     regular = _regular(plan.matrix(entries), entries)
     if regular:
-        model._cache[key] = entries
+        known["entries"] = entries
     return regular
 
 

@@ -8,7 +8,6 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from modelica_like.compile.buffers import buffered
 from modelica_like.compile.compiled import CompiledDae, StartEntry, Vector
 from modelica_like.errors import ContradictingStart, InitializationError
 from modelica_like.initialize.plan import StartKind, StartPlan, direct_starts, start_name, start_plan
@@ -181,7 +180,7 @@ class _Evaluation:
 
     def __init__(self, model: CompiledDae, plan: StartPlan) -> None:
         function, key = plan.system.function, f"start system {plan.kind}"
-        self._fast = buffered(model._cache, key, lambda: _dense_values(function), (1, 2))
+        self._fast = model.fast(key, lambda: _dense_values(function), (1, 2))
         self._plan, self._rows = plan, np.array(plan.wanted, int)
 
     def __call__(self, *arguments: Any) -> tuple[Any, Vector]:

@@ -74,9 +74,8 @@ class Component(Declared):
 
     def __init__(self, **values: Any) -> None:
         if self._partial:
-            raise LanguageError(
-                f"{type(self).__name__} is partial: it is only a base of other components.", where=caller()
-            )
+            what = f"{type(self).__name__} is partial: it is only a base of other components."
+            raise LanguageError(what, where=caller())
         self._values: dict[str, Value] = {}
         self._starts: dict[str, Value] = {}
         self._start_modes: dict[str, str] = {}
@@ -165,8 +164,7 @@ class Component(Declared):
         try:
             understood = field.read(value)
         except ModelicaLikeError as error:
-            if not error.where:
-                error.where = (caller(),)
+            error.where = error.where or (caller(),)
             raise
         if field.name in self._measured:
             raise both_given(self._measured[field.name], field.name)
@@ -240,10 +238,8 @@ class Component(Declared):
         if named is None:
             named = {}
             for name, part in self._parts.items():
-                if isinstance(part, list):
-                    named.update({f"{name}[{k}]": element for k, element in enumerate(part, 1)})
-                else:
-                    named[name] = part
+                listed = isinstance(part, list)
+                named |= {f"{name}[{k}]": one for k, one in enumerate(part, 1)} if listed else {name: part}
             self.__dict__["_named"] = named
         return MappingProxyType(named)
 
@@ -253,8 +249,7 @@ class Component(Declared):
         while pending:
             component = pending.pop()
             yield component
-            if component._parts:
-                pending.extend(reversed([*component.parts.values()]))
+            pending += reversed([*component.parts.values()] if component._parts else [])
 
     def find(self, path: str) -> Component:
         """Return the part at a dotted path.

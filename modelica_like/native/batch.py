@@ -81,14 +81,8 @@ class Batch:
         numbers = [np.ascontiguousarray(one, float) for one in (parameters, inputs)]
         places = (one.ctypes.data for one in (self._readings, *numbers, values, failed))
         counts = options.points, options.max_events, runs, len(self._readings)
-        arguments = BatchArguments(
-            *self._span,
-            options.rtol,
-            options.atol,
-            *counts,
-            *places,
-            ctypes.pointer(ctypes.c_int(0) if stop is None else stop),
-        )
+        stops = ctypes.pointer(ctypes.c_int(0) if stop is None else stop)
+        arguments = BatchArguments(*self._span, options.rtol, options.atol, *counts, *places, stops)
         if self._native.library.batch(self._native.address, ctypes.byref(arguments)) < 0:
             raise MemoryError(f"There is no memory for runs of {self._native.name}.")
         return values, failed.astype(bool)

@@ -77,9 +77,7 @@ class NativeModel:
     def of(model: CompiledDae, start: StartKind | None = None, fixed_step: float = 0.0) -> NativeModel:
         """Return the one that was made before of the same model, whatever its parameters were."""
         key = "native", start or model.settings.get("start", "given"), fixed_step
-        if key not in model._cache:
-            model._cache[key] = NativeModel(model, *key[1:])
-        return model._cache[key]
+        return model.once(key, lambda: NativeModel(model, *key[1:]))
 
     def references(self, names: Iterable[str]) -> np.ndarray[Any, np.dtype[np.uint32]]:
         """Return the value references of variables.

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, Vector
+from modelica_like.initialize import Impact
 from modelica_like.solve.options import Options
 from modelica_like.solve.powers import POWERS, Powers, Results, results
 from modelica_like.solve.recorder import Event, Segment
@@ -23,25 +24,6 @@ _NOTHING = 1e-12
 _SAME_TIME = 1e-12
 _ADDED_UP = 10.0
 """Drift, in relative tolerances of the run, from which it is told."""
-
-
-class Loss(Protocol):
-    """Energy in J that a component loses at once, at a time in s: an impact."""
-
-    @property
-    def component(self) -> str:
-        """Path of the component."""
-        ...
-
-    @property
-    def energy(self) -> float:
-        """Lost energy in J."""
-        ...
-
-    @property
-    def time(self) -> float:
-        """When, in s."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -204,7 +186,7 @@ def energy_balance(
     segments: tuple[Segment, ...],
     options: Options | None = None,
     events: Sequence[Event] = (),
-    impacts: Sequence[Loss] = (),
+    impacts: Sequence[Impact] = (),
 ) -> EnergyBalance:
     """Integrate the energy terms of every component along a run.
 
@@ -280,7 +262,7 @@ class _Audit:
         return imbalance / np.maximum(self._largest, 1e-300), when, gain, then
 
 
-def _unexplained(times: Vector, jumps: Vector, reset: Sequence[float], impacts: Sequence[Loss]) -> float:
+def _unexplained(times: Vector, jumps: Vector, reset: Sequence[float], impacts: Sequence[Impact]) -> float:
     """Return the largest change of all stored energies together at an instant that nothing explains, in J."""
     instants, place = np.unique(times, return_inverse=True)
     if not len(instants):

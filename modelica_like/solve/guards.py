@@ -10,7 +10,6 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from modelica_like.compile.buffers import buffered
 from modelica_like.compile.compiled import CompiledDae, CompiledTransition, Vector
 from modelica_like.flatten.conditions import JUST_TRUE
 from modelica_like.initialize import Point, is_linear, newton_at
@@ -34,7 +33,7 @@ class Guards:
         self.state_events = [t for t in model.transitions if not t.timed]
         self.count = len(self.state_events)
         self.positions = {id(one): k for k, one in enumerate(self.state_events)}
-        self._at = buffered(model._cache, "guards at", lambda: _clean(model, self.state_events))
+        self._at = model.fast("guards at", lambda: _clean(model, self.state_events))
         self._active: dict[bytes, Any] = {}
 
     def active(self, d: Vector) -> Any:
@@ -56,14 +55,14 @@ class Guards:
             Guards, their rates, guards soon, and the implicit unknowns before the last step.
         """
         model = self.model
-        follow = buffered(model._cache, "guards follow", lambda: _following(model, self._at.function))
+        follow = model.fast("guards follow", lambda: _following(model, self._at.function))
         *found, point.z = follow(point.t, point.x, point.z, model.p, model.u, point.d)
         return found
 
     def near(self, t: float, x: Vector, z: Vector, d: Vector) -> Vector:
         """Return guards at three nearby points that share a guess for the implicit unknowns; shapes (3, nx), (3, n)."""
         model = self.model
-        near = buffered(model._cache, "guards near", lambda: _near(model))
+        near = model.fast("guards near", lambda: _near(model))
         return near(t, x.ravel(), z, model.p, model.u, d)[0].reshape(len(x), -1)
 
     def wanting(self, point: Point) -> list[CompiledTransition]:
@@ -78,7 +77,7 @@ class Guards:
         Shapes (guards, times), (guards, times), (nx, times).
         """
         count, model = len(times), self.model
-        seen = buffered(model._cache, ("seen", count), lambda: along(_seen(model), count))
+        seen = model.fast(("seen", count), lambda: along(model.once("seen", lambda: _seen(model)), count))
         results = seen(times, x.ravel("F"), z.ravel("F"), model.p, model.u, d)
         values, rates, slopes = (v.reshape(count, -1).T for v in results)
         return values, rates, slopes
@@ -86,13 +85,11 @@ class Guards:
 
 def _seen(model: CompiledDae) -> ca.Function:
     """Guards, their rates and the states' in one function: they share most of what they compute."""
-    if "seen" not in model._cache:
-        arguments = list(model.arguments.values())
-        rates = model.guard_rates(*arguments)
-        rates = ca.densify(ca.if_else(ca.fabs(rates) <= _LARGE, rates, 0))
-        results = [_numbers(model.guards(*arguments)), rates, model.ode(*arguments)]
-        model._cache["seen"] = ca.Function("seen", arguments, ca.cse(results))
-    return model._cache["seen"]
+    arguments = list(model.arguments.values())
+    rates = model.guard_rates(*arguments)
+    rates = ca.densify(ca.if_else(ca.fabs(rates) <= _LARGE, rates, 0))
+    results = [_numbers(model.guards(*arguments)), rates, model.ode(*arguments)]
+    return ca.Function("seen", arguments, ca.cse(results))
 
 
 def _clean(model: CompiledDae, events: list[CompiledTransition]) -> ca.Function:
@@ -150,26 +147,25 @@ def candidates(values: Vector, rates: Vector, active: Any, step: float) -> Itera
         step: longest distance of two times in s.
     """
     values, rates = values[active], rates[active]
-    below, slow = values <= 0, _NOISE / step
+    below, up = values <= 0, rates > _NOISE / step
     rises = below[:, :-1] > below[:, 1:]
-    humps = rates > slow
-    humps = humps[:, :-1] > humps[:, 1:]
+    humps = up[:, :-1] > up[:, 1:]
     humps &= below[:, :-1]
     humps &= below[:, 1:]
     for k in np.flatnonzero((rises | humps).any(axis=0)):
         group = [Candidate(int(active[g]), int(k), False) for g in rises[:, k].nonzero()[0]]
         for g in humps[:, k].nonzero()[0]:
-            (g0, g1), (r0, r1) = values[g, k : k + 2], rates[g, k : k + 2] * step
-            if r1 < -_NOISE and _peak(g0, g1, r0, r1) > -_NEAR * (abs(g0) + abs(g1)):
+            ends = values[g, k : k + 2], rates[g, k : k + 2] * step
+            if _nearly(*ends[0].tolist(), *ends[1].tolist()):
                 group.append(Candidate(int(active[g]), int(k), True))
         if group:
             yield group
 
 
-def _peak(g0: float, g1: float, r0: float, r1: float) -> float:
-    """Largest value of the cubic through both ends with the given slopes (sampled), or a bound that is negative."""
-    bound = max(g0 + r0 / 3, g1 - r1 / 3)
-    return float(np.max(_CUBIC @ np.array([g0, r0, g1, r1]))) if bound > -_NEAR * (abs(g0) + abs(g1)) else bound
+def _nearly(g0: float, g1: float, r0: float, r1: float) -> bool:
+    """Whether the cubic through both ends with the given slopes comes near zero, by a bound, and then by samples."""
+    low = -_NEAR * (abs(g0) + abs(g1))
+    return r1 < -_NOISE and max(g0 + r0 / 3, g1 - r1 / 3) > low and float(np.max(_CUBIC @ [g0, r0, g1, r1])) > low
 
 
 def _hermite(s: Vector) -> Vector:

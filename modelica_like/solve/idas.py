@@ -10,8 +10,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from modelica_like.compile.buffers import BufferedFunction, buffered
-from modelica_like.compile.buffers import along as every_along
+from modelica_like.compile.buffers import BufferedFunction
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import StepFailed
 from modelica_like.initialize import Point, call, is_linear, newton_at
@@ -56,19 +55,17 @@ def scaled_problem(model: CompiledDae, *, gentle: bool = False, scaled: bool = T
             of zero at s = 0 are exact, and first steps are short whatever the span is.
         scaled: without, t = t0 + s: rates need no factor, which is an eighth of the work of some models.
     """
-    key = "scaled", gentle, scaled
-    if key not in model._cache:
-        arguments = model.arguments
-        s, t0, span = ca.SX.sym("s"), ca.SX.sym("t0"), ca.SX.sym("span")
-        x, z, p, u, d = (arguments[name] for name in ("x", "z", "p", "u", "d"))
-        passed, speed = (s * s * span, 2 * s * span) if gentle else (s * span, span) if scaled else (s, 1.0)
-        inner = [t0 + passed, x, z, p, u, d]
-        ode, alg = ca.cse([speed * model.ode(*inner), model.alg(*inner)])
-        model._cache[key] = {
-            "t": s, "x": x, "z": z, "p": ca.vertcat(t0, span, p, u, d), "ode": ode, "alg": alg, "inner": inner,
-            "span": speed,
-        }  # fmt: skip
-    return model._cache[key]
+    return model.once(("scaled", gentle, scaled), lambda: _scaled_problem(model, gentle, scaled))
+
+
+def _scaled_problem(model: CompiledDae, gentle: bool, scaled: bool) -> dict[str, Any]:
+    s, t0, span = ca.SX.sym("s"), ca.SX.sym("t0"), ca.SX.sym("span")
+    x, z, p, u, d = (model.arguments[name] for name in ("x", "z", "p", "u", "d"))
+    passed, speed = (s * s * span, 2 * s * span) if gentle else (s * span, span) if scaled else (s, 1.0)
+    inner = [t0 + passed, x, z, p, u, d]
+    ode, alg = ca.cse([speed * model.ode(*inner), model.alg(*inner)])
+    parameters = ca.vertcat(t0, span, p, u, d)
+    return {"t": s, "x": x, "z": z, "p": parameters, "ode": ode, "alg": alg, "inner": inner, "span": speed}
 
 
 def linear_solver(unknowns: int) -> str:
@@ -122,7 +119,7 @@ class Integrator:
 
     def _instance(self, outputs: int, steps: int, gentle: bool, first: float) -> BufferedFunction:
         key = "idas", outputs, self.rtol, self.options.atol, steps, gentle, first, None if gentle else self._seconds
-        return buffered(self.model._cache, key, lambda: self._make(outputs, steps, gentle, first), results=(0, 1))
+        return self.model.fast(key, lambda: self._make(outputs, steps, gentle, first), results=(0, 1))
 
     def _first_step(self, start: Point, span: float) -> float:
         """Return a first step in scaled time that may move states by their tolerances, as IDAS can find it from there.
@@ -255,9 +252,9 @@ class Integrator:
     def _newton(self, times: Vector, x: Vector, z: Vector, d: Vector) -> Vector:
         model, count = self.model, len(times)
         if d.ndim > 1:
-            everywhere = every_along(model._cache, "newton", lambda: newton_at(model, look=False))
+            everywhere = model.along("newton", lambda: newton_at(model, look=False))
             return everywhere(times, x, z, model.p, model.u, d)[0]
-        fast = buffered(model._cache, ("newton", count), lambda: along(newton_at(model, look=False), count))
+        fast = model.fast(("newton", count), lambda: along(newton_at(model, look=False), count))
         return fast(times, x.ravel("F"), z.ravel("F"), model.p, model.u, d)[0].reshape(count, -1).T
 
     def _count(self, statistics: dict[str, Any]) -> None:

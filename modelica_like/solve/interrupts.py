@@ -25,20 +25,17 @@ class Interrupts:
     @contextmanager
     def watched(self) -> Iterator[None]:
         """Stand in for the program's handler; once for many calls, for that costs as much as a short call."""
-        if self._previous or threading.current_thread() is not threading.main_thread():
-            yield
-            return
-        previous = signal.getsignal(signal.SIGINT)
-        if not callable(previous):
-            yield
-            return
-        self._previous = previous
-        signal.signal(signal.SIGINT, self._note)
+        alone = self._previous is None and threading.current_thread() is threading.main_thread()
+        previous = signal.getsignal(signal.SIGINT) if alone else None
+        if callable(previous):
+            self._previous = previous
+            signal.signal(signal.SIGINT, self._note)
         try:
             yield
         finally:
-            signal.signal(signal.SIGINT, previous)
-            self._previous = None
+            if callable(previous):
+                signal.signal(signal.SIGINT, previous)
+                self._previous = None
 
     @contextmanager
     def swallowed(self) -> Iterator[None]:

@@ -10,7 +10,6 @@ from functools import cache
 import casadi as ca
 import numpy as np
 
-from modelica_like.compile.buffers import along
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import StepFailed
 from modelica_like.initialize import Point
@@ -95,7 +94,7 @@ def _together(model: CompiledDae, segments: list[Segment]) -> Results:
     times = np.concatenate([segment.times for segment in segments])
     x, z = (np.concatenate([getattr(segment, name) for segment in segments], axis=1) for name in "xz")
     d = np.repeat(np.array([segment.d for segment in segments]).T, sizes, axis=1)
-    function = along(model._cache, "energy terms", lambda: _terms(model))
+    function = model.along("energy terms", lambda: _terms(model))
     terms = function(times, x, z, model.p, model.u, d)[0].reshape(-1, len(model.components), len(times))
     return Results(times, x, z, d, np.repeat(ends - sizes, sizes), np.repeat(ends - 1, sizes), terms)
 
@@ -195,7 +194,7 @@ class Powers:
     def _bends(self, every: Results, ends: Places) -> Vector:
         """Return what slopes of powers add to the integrals of the first two rules; shape (2, 4 components, m)."""
         model = self.model
-        function = along(model._cache, "slopes of powers", lambda: _slopes(model))
+        function = model.along("slopes of powers", lambda: _slopes(model))
         x, z, d = (part[:, ends.ravel()] for part in (every.x, every.z, every.d))
         slopes = function(every.times[ends.ravel()], x, z, model.p, model.u, d)[0].reshape(-1, *ends.shape)
         squares = np.diff(every.times[ends], axis=0) ** 2

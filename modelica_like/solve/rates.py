@@ -36,11 +36,9 @@ def rate_along(model: CompiledDae, name: str, times: Any, x: Vector, z: Vector, 
     if name not in model.position:
         near = did_you_mean(name, list(model.position)) or "."
         raise UnknownName(f"{model.name} has no continuous variable '{name}'{near}")
-    key = "rate", name
-    if key not in model._cache:
-        model._cache[key] = _rate(model, model.position[name])
+    rate = model.once(("rate", name), lambda: _rate(model, model.position[name]))
     count = len(times)
-    parts = model._cache[key](np.reshape(times, (1, -1)), x, z, model.p, model.u, d)
+    parts = rate(np.reshape(times, (1, -1)), x, z, model.p, model.u, d)
     direct, by_z, drift, jacobian = (np.asarray(part.full()) for part in parts)
     if not model.implicit:
         return direct.ravel()

@@ -9,7 +9,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from modelica_like.compile.buffers import Along, along
+from modelica_like.compile.buffers import Along
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.solve.recorder import Segment
 
@@ -60,7 +60,7 @@ def variables(model: CompiledDae, segments: Sequence[Segment], rows: Sequence[in
         rows: which variables; all if None.
     """
     if rows is None:
-        function = along(model._cache, "variables", lambda: model.variables)
+        function = model.along("variables", lambda: model.variables)
         parts = [function(t, x, z, model.p, model.u, d)[0] for t, x, z, d in blocks(segments)]
         return np.concatenate(parts, axis=1)
     return _Expressions.of(model, "variables", model.variables, tuple(rows)).read(model, segments)
@@ -88,12 +88,8 @@ class _Expressions:
     @staticmethod
     def of(model: CompiledDae, name: str, function: ca.Function, rows: tuple[int, ...]) -> _Expressions:
         key = "read", get_ident(), name, rows
-        if key not in model._cache:
-            whole = "read", name
-            if whole not in model._cache:
-                model._cache[whole] = ca.vec(function(*model.arguments.values()))
-            model._cache[key] = _Expressions(model, model._cache[whole][list(rows)])
-        return model._cache[key]
+        whole = model.once(("read", name), lambda: ca.vec(function(*model.arguments.values())))
+        return model.once(key, lambda: _Expressions(model, whole[list(rows)]))
 
     def read(self, model: CompiledDae, segments: Sequence[Segment]) -> Vector:
         t, x, z, p, u, d = self._needed

@@ -116,12 +116,15 @@ class RecordedSolution(Trajectories):
         if t > self._time[k]:
             share = (t - self._time[k]) / (self._time[k + 1] - self._time[k])
             column = column + share * (self._values_table[:, k + 1] - column)
-        return Values(self, t, column, self._discretes[:, k])
+        return self._one(t, column, k)
 
     @property
     def final(self) -> Values:
         """All variables at the end."""
-        return Values(self, float(self._time[-1]), self._values_table[:, -1], self._discretes[:, -1])
+        return self._one(self._time[-1], self._values_table[:, -1], -1)
+
+    def _one(self, t: float, column: Vector, k: int) -> Values:
+        return Values(RecordedSolution(self.model, np.array([t]), column[:, None], self._discretes[:, k, None], 0.0))
 
     def energy(self) -> EnergyBalance:
         """Return the energy balance, as far as the columns tell it.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -115,8 +115,7 @@ class Solution(Trajectories):
         Raises:
             ValueOutOfRange: the time is not within the run.
         """
-        point = self.point(t)
-        return self._values(point.t, point.x, point.z, point.d)
+        return self._values(self.point(t))
 
     def point(self, t: float) -> Point:
         """Return states, implicit unknowns and modes at a time, integrated there from the result before.
@@ -136,12 +135,11 @@ class Solution(Trajectories):
     @property
     def final(self) -> Values:
         """All variables at the end."""
-        segment = self.segments[-1]
-        return self._values(float(segment.times[-1]), segment.x[:, -1], segment.z[:, -1], segment.d)
+        return self._values(self.segments[-1].point(-1))
 
-    def _values(self, t: float, x: Vector, z: Vector, d: Vector) -> Values:
-        column = np.array(self.model.variables(t, x, z, self.model.p, self.model.u, d)).ravel()
-        return Values(self, t, column, d, Point(t, np.ravel(x), np.ravel(z), d))
+    def _values(self, now: Point) -> Values:
+        one = Segment(np.array([now.t]), now.x[:, None], now.z[:, None], now.d)
+        return Values(replace(self, segments=(one,), _cache={}))
 
     def energy(self, begin: float | None = None, end: float | None = None) -> EnergyBalance:
         """Return the energy balance of every component over the run, or over a part of it.

@@ -7,14 +7,11 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from modelica_like.compile.compiled import Vector
 from modelica_like.errors import NetlistError, ValueOutOfRange, missing_extra
 from modelica_like.initialize import Point
 from modelica_like.language.expr import Symbol
 from modelica_like.language.mode import BoundMode
-from modelica_like.solve.rates import differentiated, rate_along
 from modelica_like.solve.recorder import Event
 
 if TYPE_CHECKING:
@@ -47,40 +44,20 @@ class Statistics:
 
 
 class Values(Mapping[str, float]):
-    """All variables at one instant, by path."""
+    """All variables at one instant, by path: the only result of trajectories."""
 
-    def __init__(
-        self, solution: Trajectories, time: float, column: Vector, discrete: Vector, point: Point | None = None
-    ) -> None:
-        self.time = time
-        self._point = point
-        self._solution = solution
-        self._column = column
-        self._discrete = discrete
+    def __init__(self, one: Trajectories) -> None:
+        self.time = float(one.time[0])
+        self._one = one
 
     def __getitem__(self, key: str | Any) -> float:
-        path = self._solution.path(key)
-        model = self._solution.model
-        if path in model.position:
-            return float(self._column[model.position[path]])
-        if path in model.discrete_position:
-            return float(self._discrete[model.discrete_position[path]])
-        if self._point is not None and (name := differentiated(path)):
-            now = self._point
-            return float(rate_along(model, name, np.array([now.t]), *(v[:, None] for v in (now.x, now.z, now.d)))[0])
-        owner, _, term = path.rpartition(".")
-        if self._point is not None and term in ENERGY_TERMS and owner in model.components:
-            terms = model.energy(self._point.t, self._point.x, self._point.z, model.p, model.u, self._point.d)
-            return float(terms[model.components.index(owner), ENERGY_TERMS.index(term)])
-        return float(self._solution[path][0])
+        return float(self._one[key][0])
 
     def __iter__(self) -> Iterator[str]:
-        model = self._solution.model
-        yield from model.position
-        yield from model.discrete_position
+        yield from self._one.names
 
     def __len__(self) -> int:
-        return len(self._solution.model.flat_variables) + len(self._solution.model.flat_discretes)
+        return len(self._one.names)
 
     def __repr__(self) -> str:
         return f"<{len(self)} values at t = {self.time:g} s>"

@@ -8,8 +8,7 @@ from xml.etree import ElementTree
 import pytest
 
 from modelica_like.draw import layout, save_schematic, schematic
-from modelica_like.draw.labels import texts
-from modelica_like.draw.sheet import Line, Placed, Sheet
+from modelica_like.draw.sheet import Line, Placed, Sheet, texts
 from modelica_like.errors import MissingExtra, NetlistError
 from modelica_like.language import Component
 from modelica_like.netlist import load, loads

@@ -10,8 +10,8 @@ import modelica_like.fmi.build as module
 from modelica_like import build as build_model
 from modelica_like.errors import ExportError, MissingExtra, ModelicaLikeError, UnknownName
 from modelica_like.fmi.build import PLATFORMS, build, compiler_command, native_platform
-from modelica_like.fmi.codegen import generate
 from modelica_like.fmi.interface import interface
+from modelica_like.fmi.model_file import generate
 from modelica_like.fmi.sources import source_files
 
 TINY = {"model.c": "double twice(double x) { return 2 * x; }\n"}

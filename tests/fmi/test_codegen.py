@@ -13,9 +13,8 @@ import pytest
 
 from modelica_like import build
 from modelica_like.fmi.build import compiler_command, native_platform
-from modelica_like.fmi.codegen import generate
 from modelica_like.fmi.interface import interface
-from modelica_like.fmi.model_file import SECTIONS
+from modelica_like.fmi.model_file import SECTIONS, generate
 from modelica_like.fmi.sources import RUNTIME
 from modelica_like.fmi.tables import make_tables
 from modelica_like.fmi.tape import ARGUMENTS

@@ -8,8 +8,8 @@ import pytest
 
 from modelica_like import build as build_model
 from modelica_like.fmi.build import build
-from modelica_like.fmi.codegen import generate
 from modelica_like.fmi.interface import interface
+from modelica_like.fmi.model_file import generate
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 X86_64, ARM64 = 0x8664, 0x0100000C

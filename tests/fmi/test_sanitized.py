@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from modelica_like import build
-from modelica_like.fmi.codegen import generate
 from modelica_like.fmi.interface import interface
+from modelica_like.fmi.model_file import generate
 from modelica_like.fmi.sources import source_files
 
 HERE = Path(__file__).parent

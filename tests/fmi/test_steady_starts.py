@@ -18,7 +18,7 @@ def rubbing():
     parts = {
         "push": ConstantTorque(tau_constant=5.0),
         "rotor": Inertia(J=1.0),
-        "bearing": BearingFriction(tau_pos=((0, 1), (1, 2)), w=guess(1.0)),
+        "bearing": BearingFriction(tau_pos=((0, 1), (1, 2)), extrapolate="linear", w=guess(1.0)),
     }
     joints = {"a": ["push.flange", "rotor.flange_a"], "b": ["rotor.flange_b", "bearing.flange_a"]}
     drive = Assembly("rubbing", parts=parts, connect=joints)
@@ -41,7 +41,7 @@ def clutched():
         "rotor": Inertia(J=1.0, w=guess(1.0)),
         "clutch": Clutch(capacity=20.0),
         "wheel": Inertia(J=3.0, w=guess(1.0)),
-        "bearing": BearingFriction(tau_pos=((0, 1), (1, 2))),
+        "bearing": BearingFriction(tau_pos=((0, 1), (1, 2)), extrapolate="linear"),
     }
     drive = Assembly("clutched", parts=parts, series={"shaft": [*parts]})
     drive.simulate.update(start="steady", until=1.0)

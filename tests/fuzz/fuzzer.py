@@ -38,6 +38,7 @@ from modelica_like.units import parse_unit, read_quantity, to_si
 EXAMPLES = Path(__file__).parents[2] / "examples"
 SECONDS = 5
 """Time of the processor for one input."""
+PROGRESS = 5000
 LARGEST = 4000
 """Characters of the netlists that are mutated."""
 
@@ -212,6 +213,9 @@ def main() -> None:
     seen: dict[str, int] = {}
     for number in range(first, first + count):
         crash = attempt(number)
+        if (number + 1 - first) % PROGRESS == 0:
+            sys.stdout.write(f"{number + 1 - first} inputs\n")
+            sys.stdout.flush()
         if crash is None:
             continue
         frame = traceback.extract_tb(crash.error.__traceback__)[-1]

@@ -136,6 +136,12 @@ def test_values_of_fmus_are_finite_numbers(given: str, told: str, tmp_path: Path
     assert caught.value.what.startswith(f"fmus.a.J {told}")
 
 
+def test_a_null_character_in_the_name_of_an_fmu(tmp_path: Path) -> None:
+    (tmp_path / "two.toml").write_text('[fmus]\na = "a\\u0000.fmu"\n')
+    with pytest.raises(ModelicaLikeError, match=r"^fmus\.a must be a table: "):
+        load_system(tmp_path / "two.toml", tmp_path)
+
+
 DEEP = {"1,500 folders": "a/" * 1500 + "b", "a name of 300 letters": "a" * 300, "700 letters": "a/" * 350}
 
 

@@ -12,7 +12,6 @@ import contextlib
 import os
 import random
 import re
-import resource
 import shutil
 import signal
 import sys
@@ -87,7 +86,7 @@ def known(change: Change) -> bool:
 
 
 @cache
-def tests_of(file: str) -> tuple[str, ...]:
+def narrow_tests(file: str) -> tuple[str, ...]:
     """Tests that should notice changes in the functions of a file, the closest ones first."""
     text = (ROOT / file).read_text(encoding="utf-8")
     module = file.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
@@ -134,7 +133,7 @@ class _Limit:
 def survives(place: Path, change: Change) -> str:
     """Run the tests of a change in a process of its own; an empty text if one fails, else what was run."""
     declared = change.file.startswith("components/") and "." not in change.place and "sizing" not in change.file
-    tests = [*tests_of(change.file), *(PAGES if declared else ())]
+    tests = [*narrow_tests(change.file), *(PAGES if declared else ())]
     original = (place / change.file).read_text(encoding="utf-8")
     (place / change.file).write_text(change.applied(original), encoding="utf-8")
     try:
@@ -154,6 +153,8 @@ def survives(place: Path, change: Change) -> str:
 
 
 def _tested(place: Path, tests: list[str]) -> int:
+    import resource  # not on Windows
+
     resource.setrlimit(resource.RLIMIT_CPU, (LONGEST, LONGEST))
     os.chdir(place)
     os.environ["PYTHONPATH"] = str(place)

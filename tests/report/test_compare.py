@@ -67,6 +67,14 @@ def test_events_are_paired_and_the_time_between_them_is_left_out() -> None:
     assert comparison.largest_event_difference == pytest.approx(0.1)
 
 
+def test_a_mode_that_only_one_has_is_no_difference() -> None:
+    first = recorded("first", [0, 1, 1, 2], [0, 0, 1, 1], [0, 0, 1, 1])
+    model = RecordedModel("second", (RecordedVariable("x", "m"),), (), {})
+    second = RecordedSolution(model, np.array([0.0, 2.0]), np.array([[0.0, 0.0]]), np.zeros((0, 2)), 0.0)
+    assert compare(first, second).events == ()
+    assert compare(second, first).events == ()
+
+
 def test_an_event_that_only_one_has() -> None:
     first = recorded("first", [0, 1, 1, 2], [0, 0, 1, 1], [0, 0, 1, 1])
     second = recorded("second", [0, 2], [0, 0], [0, 0])

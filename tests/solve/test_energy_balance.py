@@ -1,6 +1,6 @@
 """Energies are integrated along the run's own results: how precisely, and from how few."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -11,8 +11,9 @@ import pytest
 from components import ConstantTorque, Damper, Fixed, Inertia, RigidBacklash, SpringDamper
 from modelica_like import Assembly, Component, build, load, simulate
 from modelica_like.errors import ValueOutOfRange
-from modelica_like.language import Equations, Parameter, Variable, param, sin, var
+from modelica_like.language import Equations, Events, Expr, Mode, Parameter, Variable, der, param, sin, var
 from modelica_like.solve import powers
+from modelica_like.solve.energy import _unexplained
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -172,10 +173,11 @@ def test_a_model_without_states(points: int) -> None:
     assert balance.closure < 1e-12
 
 
-def test_a_long_run_is_looked_at_in_pieces(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(("bound", "most"), [("_PIECE", 40), ("_LARGEST", 1)])
+def test_a_long_run_is_looked_at_in_pieces(monkeypatch: pytest.MonkeyPatch, bound: str, most: int) -> None:
     run = simulate(load(EXAMPLES / "msl/rotational/CoupledClutches.toml"))
     whole = run.energy()
-    monkeypatch.setattr(powers, "_PIECE", 40)
+    monkeypatch.setattr(powers, bound, most)
     parts = replace(run, _cache={}).energy()
     for row in whole:
         other = parts[row.component]
@@ -198,3 +200,49 @@ def test_states_that_are_no_numbers_have_a_balance_of_none() -> None:
     run = simulate(Inertia(J=1.0), 1.0, start="rest", points=5)
     segment = replace(run.segments[0], x=run.segments[0].x * float("nan"))
     assert np.isnan(replace(run, segments=(segment,), _cache={}).energy().stored)
+
+
+class Flywheel(Component):
+    """Its only transition, the first of the model, lets it jump to half of its speed."""
+
+    w: Variable = var("rad/s", "speed")
+    J: Parameter = param("kg.m2", "inertia", default=2.0)
+    at: Parameter = param("s", "time of the jump", default=0.5)
+    mode = Mode("fast", "slow")
+
+    def equations(self) -> Equations:
+        yield self.J * der(self.w) == 0
+
+    def events(self) -> Events:
+        yield self.mode.go("fast", "slow", at=self.at, reset={self.w: self.w / 2})
+
+    def stored_energy(self) -> Expr:
+        return 0.5 * self.J * self.w**2
+
+
+def test_a_reset_explains_what_changes_with_it() -> None:
+    balance = simulate(Flywheel(w=4.0), 1.0, points=4).energy()
+    assert balance.at_events == 0.0
+    assert balance.notices == ()
+    assert [row.at_events for row in balance] == [-12.0]
+
+
+@dataclass
+class Known:
+    """An impact."""
+
+    time: float
+    energy: float
+    component: str = ""
+
+
+def test_energy_at_events_that_nothing_explains() -> None:
+    """Jumps of 1 J and 2 J at 1 s and of -5 J at 2 s: what explains one counts at its own time only."""
+    times, jumps = np.array([1.0, 1.0, 2.0]), np.array([1.0, 2.0, -5.0])
+    near = 2.0 + 1e-12
+    assert _unexplained(times, jumps, [], []) == 5.0
+    assert _unexplained(times, jumps, [2.0], []) == 3.0
+    assert _unexplained(times, jumps, [near], [Known(1.0, -3.0)]) == 0.0
+    assert _unexplained(times, jumps, [], [Known(near, 5.0)]) == 3.0
+    assert _unexplained(times, jumps, [2.1, 0.9], [Known(1.5, 7.0), Known(9.0, 7.0)]) == 5.0
+    assert _unexplained(times[:0], jumps[:0], [1.0], [Known(1.0, 1.0)]) == 0.0

@@ -74,6 +74,14 @@ def test_start_values_of_a_torque(start):
     assert found["rotor.phi"] == pytest.approx(0.54, rel=1e-14)
 
 
+@pytest.mark.parametrize("size", [1.0, 1e5, 1e9, 1e13])
+@pytest.mark.parametrize("number", [1 / 3, 0.7, 2 / 7, 1.1])
+def test_the_rounding_of_large_start_values_is_no_error(start, size, number):
+    """What is left of 1e13 N.m by rounding is 1e-3 N.m; compared with its size it is nothing."""
+    found = start(Elastic(), spring__c=100 / 3, spring__d=0.7, spring__tau=number * size, rotor__w=size / 7)
+    assert found["spring.phi_rel"] == pytest.approx((number - 0.7 / 7) * size * 0.03, rel=1e-13)
+
+
 @pytest.mark.parametrize(
     "values",
     [

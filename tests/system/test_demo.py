@@ -10,7 +10,7 @@ import pytest
 from rich.console import Console
 from typer.testing import CliRunner
 
-from modelica_like.cli import app, design
+from modelica_like.cli import app, validation
 
 ROOT = Path(__file__).parents[2]
 
@@ -63,7 +63,7 @@ def test_pages_tell_everything_and_pictures_are_written(tmp_path: Path) -> None:
 
 
 def test_without_the_examples_it_says_so(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(design, "DEMO", tmp_path / "nothing")
+    monkeypatch.setattr(validation, "DEMO", tmp_path / "nothing")
     result = CliRunner().invoke(app, ["demo", "--pictures", str(tmp_path)])
     assert result.exit_code == 2
     assert result.stderr == "The demo needs the folder of examples.\nRun it from a copy of the source.\n"
@@ -73,6 +73,6 @@ def test_the_command_runs_it(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) ->
     (tmp_path / "demo.py").write_text(
         "def run_demo(console, pictures):\n    console.print(f'pages and {pictures.name}')\n"
     )
-    monkeypatch.setattr(design, "DEMO", tmp_path / "demo.py")
+    monkeypatch.setattr(validation, "DEMO", tmp_path / "demo.py")
     result = CliRunner().invoke(app, ["demo", "--pictures", str(tmp_path / "pictures")])
     assert (result.exit_code, result.stdout) == (0, "pages and pictures\n")

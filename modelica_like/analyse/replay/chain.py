@@ -1,4 +1,4 @@
-"""A run once more, as a chain of smooth steps and jumps whose derivatives are exact.
+"""A run once more, as a chain of smooth steps and jumps whose derivatives are exact, forward and adjoint.
 
 The mode sequence of a solution is given. Each smooth segment is integrated again by collocation over its known
 interval, without looking for events; each event is a jump at its known time. Where the guard or the moment puts the
@@ -34,7 +34,23 @@ _RELOCATIONS = 6
 _FIRST = 1e-3
 """First step behind an event, relative to the last one before: a law can begin there with an infinite slope."""
 
+_NONE = np.zeros(0)
 Move = Step | Jump
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A number read off a replay, and how it depends on what is there.
+
+    Attributes:
+        value: the number.
+        parts: nodes, and its derivatives by (x, theta) there, shape (nx + ntheta,).
+        quadratures: derivative by the quadratures over the run, shape (nq,); empty: none.
+    """
+
+    value: float
+    parts: tuple[tuple[Point, Vector], ...] = ()
+    quadratures: Vector = field(default_factory=lambda: _NONE)
 
 
 @dataclass(eq=False)
@@ -102,6 +118,60 @@ class Replay:
         self.moves[k : k + 1] = [first, replace(second, after=end)]
         self.nodes.insert(k + 1, first.after)
         return first.after
+
+    def forward(self, readings: Sequence[Reading], directions: Vector) -> Vector:
+        """Derivatives of readings along directions of (p, u).
+
+        Args:
+            replay: the chain.
+            readings: what to differentiate.
+            directions: shape (np + nu, m).
+
+        Returns:
+            Shape (readings, m).
+        """
+        result = np.zeros((len(readings), directions.shape[1]))
+        total = np.zeros((self.functions.nq, directions.shape[1]))
+        whole = np.vstack([self.start_x @ directions, directions, self.start_d @ directions])
+        at_node = _by_node(readings)
+        for k, node in enumerate(self.nodes):
+            for number, row in at_node.get(id(node), ()):
+                result[number] += row @ whole
+            if k < len(self.moves):
+                whole, gained = self.moves[k].forward(whole)
+                total += gained
+        for number, reading in enumerate(readings):
+            if reading.quadratures.size:
+                result[number] += reading.quadratures @ total
+        return result
+
+    def adjoint(self, readings: Sequence[Reading]) -> Vector:
+        """Derivatives of readings by all parameters and inputs.
+
+        Returns:
+            Shape (readings, np + nu).
+        """
+        size = Sizes.of(self.model)
+        whole = np.zeros((size.x + size.theta, len(readings)))
+        none = np.zeros(self.functions.nq)
+        Q = np.array([one.quadratures if one.quadratures.size else none for one in readings]).T
+        at_node = _by_node(readings)
+        for k in range(len(self.nodes) - 1, -1, -1):
+            if k < len(self.moves):
+                whole = self.moves[k].adjoint(whole, Q)
+            for number, row in at_node.get(id(self.nodes[k]), ()):
+                whole[:, number] += row
+        x, fixed, d = np.split(whole, [size.x, size.x + size.fixed])
+        return x.T @ self.start_x + fixed.T + d.T @ self.start_d
+
+
+def _by_node(readings: Sequence[Reading]) -> dict[int, list[tuple[int, Vector]]]:
+    """Numbers of the readings at each node, by its identity, and their derivatives there."""
+    found: dict[int, list[tuple[int, Vector]]] = {}
+    for number, reading in enumerate(readings):
+        for node, row in reading.parts:
+            found.setdefault(id(node), []).append((number, row))
+    return found
 
 
 def replay(

@@ -8,9 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from modelica_like.analyse.replay.chain import Replay
+from modelica_like.analyse.replay.chain import Reading, Replay
 from modelica_like.analyse.replay.jumps import Jump
-from modelica_like.analyse.replay.sweeps import Reading
 from modelica_like.analyse.slopes import slopes
 from modelica_like.compile.buffers import Vector
 from modelica_like.errors import NoGradient

@@ -42,7 +42,8 @@ class Tableau:
         """Return T and blocks B with matrix = T B T⁻¹: 1 x 1 of real eigenvalues, 2 x 2 of complex pairs."""
         columns: list[Vector] = []
         blocks: list[Vector] = []
-        for value, vector in zip(*_eigenpairs(self.matrix), strict=True):
+        values, vectors = np.linalg.eig(self.matrix)
+        for value, vector in zip(values, vectors.T, strict=True):
             a, b = value.real, value.imag
             if abs(b) < _REAL:
                 columns.append(vector.real)
@@ -75,12 +76,6 @@ def radau(stages: int) -> Tableau:
     powers = np.arange(1, stages + 1)
     vandermonde = nodes[:, None] ** (powers - 1)
     matrix = np.asarray(np.linalg.solve(vandermonde.T, (nodes[:, None] ** powers / powers).T).T, np.float64)
-    gamma = next(float(one.real) for one in _eigenpairs(matrix)[0] if abs(one.imag) < _REAL)
+    gamma = next(float(one.real) for one in np.linalg.eigvals(matrix) if abs(one.imag) < _REAL)
     estimate = np.linalg.solve(vandermonde.T, np.append(-gamma, np.zeros(stages - 1)))
     return Tableau(nodes, matrix, gamma, estimate)
-
-
-def _eigenpairs(matrix: Vector) -> tuple[np.ndarray, np.ndarray]:
-    """Eigenvalues, and eigenvectors as rows."""
-    values, vectors = np.linalg.eig(matrix)
-    return values, vectors.T

@@ -10,7 +10,6 @@ import numpy as np
 from modelica_like.analyse.replay.chain import Replay, replay
 from modelica_like.analyse.replay.edges import Edge, edges
 from modelica_like.analyse.replay.steps import Tolerances
-from modelica_like.analyse.replay.sweeps import adjoint, forward
 from modelica_like.analyse.sensitivity.formulas import Freed, bound_by_formula, equal_to, free_formulas
 from modelica_like.analyse.sensitivity.outputs import Output, listed, quadratures, read_output
 from modelica_like.analyse.sensitivity.replayed import read_off, value_at
@@ -118,9 +117,9 @@ def _differentiate(
     # A column costs about the same in both directions.
     way = method if method != "auto" else "adjoint" if len(total) < len(chosen) else "forward"
     if way == "adjoint":
-        derivatives = adjoint(chain, total)[:, positions]
+        derivatives = chain.adjoint(total)[:, positions]
     else:
-        derivatives = forward(chain, total, np.eye(len(chain.model.fixed_position))[:, positions])
+        derivatives = chain.forward(total, np.eye(len(chain.model.fixed_position))[:, positions])
     # By parameters that nobody named the others are answered all the same.
     kept, left_out = _by_existence(on_edge, derivatives[len(total) - len(on_edge) :], [one for _, one in chosen], named)
     derivatives, chosen = derivatives[: len(total) - len(on_edge), kept], [chosen[k] for k in kept]

@@ -8,10 +8,9 @@ from itertools import pairwise
 import casadi as ca
 import numpy as np
 
-from modelica_like.analyse.replay.chain import Replay
+from modelica_like.analyse.replay.chain import Reading, Replay
 from modelica_like.analyse.replay.jumps import Jump
 from modelica_like.analyse.replay.step import Step, shortened
-from modelica_like.analyse.replay.sweeps import Reading
 from modelica_like.analyse.sensitivity.outputs import Output, expression_of
 from modelica_like.analyse.slopes import Slopes, slopes
 from modelica_like.compile.buffers import Vector

@@ -63,17 +63,8 @@ class LatinHypercube:
         return _qmc().LatinHypercube(dimensions, rng=self.seed).random(self.count)
 
 
-@dataclass(frozen=True)
-class Sobol:
-    """A scrambled Sobol sequence (I. M. Sobol, 1967): low discrepancy.
-
-    Attributes:
-        count: number of runs, a power of two keeps its balance.
-        seed: of the scrambling.
-    """
-
-    count: int
-    seed: int = 0
+class Sobol(LatinHypercube):
+    """A scrambled Sobol sequence (I. M. Sobol, 1967): low discrepancy; a power of two runs keeps its balance."""
 
     def unit_cube(self, dimensions: int) -> Any:
         """Return samples in [0, 1], shape (count, dimensions)."""
@@ -96,7 +87,7 @@ class Samples:
         return np.asarray(self.cube, float).reshape(-1, dimensions)
 
 
-Sampling = LatinHypercube | Sobol | Samples
+Sampling = LatinHypercube | Samples
 
 
 def make_plan(model: CompiledDae, over: Mapping[str, Iterable[Any]], sampling: Sampling | None) -> Plan:

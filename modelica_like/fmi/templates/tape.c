@@ -81,28 +81,16 @@ void tape_tangent(const Tape *tape, const double *slots, double *dots, double *o
 
 /* Adds to the bars of the arguments. */
 void tape_adjoint(const Tape *tape, const double *slots, double *bars, const double *output_bars) {
-#define OPERATION(name, value, by_a, by_b)                                               \
-    case OPERATION_##name:                                                               \
-        while (--k >= first) {                                                           \
-            int left = tape->operands[k].left, right = tape->operands[k].right;          \
-            double a = slots[left], b = slots[right], f = slots[tape->first_result + k]; \
-            double bar = bars[tape->first_result + k];                                   \
-            (void)a, (void)b, (void)f;                                                   \
-            if (bar == 0) continue;                                                      \
-            bars[left] += product(by_a, bar);                                            \
-            bars[right] += product(by_b, bar);                                           \
-        }                                                                                \
-        break;
     int k = tape->n_operations;
     memset(bars + tape->first_result, 0, (size_t)tape->n_operations * sizeof(double));
     for (int n = 0; n < tape->n_outputs; n++) bars[tape->outputs[n]] += output_bars[n];
-    for (int r = tape->n_runs - 1; r >= 0; r--) {
-        int first = k - tape->runs[r].count;
-        switch (tape->runs[r].operation) {
-#include "operations.h"
-            default: break;
+    for (int r = tape->n_runs - 1; r >= 0; r--)
+        for (int first = k - tape->runs[r].count; k > first;) {
+            const Operands *one = &tape->operands[--k];
+            double by_a, by_b, f = slots[tape->first_result + k], bar = bars[tape->first_result + k];
+            if (bar == 0) continue;
+            slopes(tape->runs[r].operation, slots[one->left], slots[one->right], f, &by_a, &by_b);
+            bars[one->left] += product(by_a, bar);
+            bars[one->right] += product(by_b, bar);
         }
-        k = first;
-    }
-#undef OPERATION
 }

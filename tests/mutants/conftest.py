@@ -1,0 +1,6 @@
+"""The command is a module beside its test."""
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))
