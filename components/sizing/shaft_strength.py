@@ -183,7 +183,7 @@ def stepped_shaft(
     """
     statics = shaft_statics(loads, bearings, hinges)
     last = max(cut.at for cut in statics.diagram)
-    require(f"Something acts at {last:g} m, beyond the last section.", last <= sections[-1].end)
+    require(f"Something acts at {np.max(last):g} m, beyond the last section.", last <= sections[-1].end)
     everything = [*loads, *(Load(reaction.at, reaction.y, reaction.z) for reaction in statics.reactions)]
     stresses: list[ShaftStress] = []
     for sides in zip(statics.diagram[::2], statics.diagram[1::2], strict=True):

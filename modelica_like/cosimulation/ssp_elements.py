@@ -80,7 +80,7 @@ class Files:
         refuse_document_type(self.name, file)
         parser = etree.XMLParser(resolve_entities=False, no_network=True, remove_comments=True, remove_pis=True)
         try:
-            return etree.parse(file, parser).getroot()
+            return etree.fromstring(file.read_bytes(), parser, base_url=str(file))
         except etree.XMLSyntaxError as error:
             raise NetlistError(
                 f"{file.name} in {self.name} is no XML: {error.msg}.", where=Source(file.name, error.lineno or 0)

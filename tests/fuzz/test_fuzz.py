@@ -136,6 +136,14 @@ def test_values_of_fmus_are_finite_numbers(given: str, told: str, tmp_path: Path
     assert caught.value.what.startswith(f"fmus.a.J {told}")
 
 
+def test_an_ssp_in_an_encoding_that_is_another_one(tmp_path: Path) -> None:
+    with zipfile.ZipFile(tmp_path / "bad.ssp", "w") as archive:
+        archive.writestr("SystemStructure.ssd", b'<?xml version="1.0" encoding="utf-8"?><a b="\xff"/>')
+    (tmp_path / "work").mkdir()
+    with pytest.raises(ModelicaLikeError, match=r"^SystemStructure\.ssd in bad\.ssp is no XML: "):
+        load_system(tmp_path / "bad.ssp", tmp_path / "work")
+
+
 def test_a_null_character_in_the_name_of_an_fmu(tmp_path: Path) -> None:
     (tmp_path / "two.toml").write_text('[fmus]\na = "a\\u0000.fmu"\n')
     with pytest.raises(ModelicaLikeError, match=r"^fmus\.a must be a table: "):

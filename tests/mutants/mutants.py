@@ -43,7 +43,10 @@ NARROW = {
         "solve/test_reading.py", "solve/test_solution.py", "solve/test_energy_balance.py", "solve/test_accuracy.py",
         "library/test_one_instant.py",
     ],
-    "modelica_like/flatten": ["flatten", "language/test_equations.py", "language/test_modes.py", "structure"],
+    "modelica_like/flatten": [
+        "flatten", "solve/test_guards.py", "language/test_equations.py", "language/test_modes.py", "structure",
+        "solve/test_events.py",
+    ],
     "modelica_like/compile": [
         "solve/test_initialize.py", "structure/test_build.py", "language/test_modes.py", "solve/test_events.py",
         "library/test_one_instant.py",
