@@ -195,9 +195,9 @@ def _sliders(model: CompiledDae, known: dict[str, FmuVariable], display: Display
     for one in (*model.flat_parameters, *inputs):
         if isinstance(one, FlatParameter) and not one.tunable:
             continue
-        about, unit = known[one.path], parse_unit(display.of_quantity(str(one.unit)))
-        if unit == one.unit and isinstance(one, FlatParameter):
-            unit = one.written or unit
+        about, asked = known[one.path], display.of_quantity(str(one.unit))
+        unit = one.written if isinstance(one, FlatParameter) and one.written and asked == str(one.unit) else None
+        unit = unit or parse_unit(asked)
         shown = (None if si is None else (si - unit.offset) / unit.factor for si in (about.start, one.min, one.max))
         value, least, most = shown
         low, high, log = _span(value or 0.0, least, most)
