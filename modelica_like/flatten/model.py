@@ -31,7 +31,10 @@ class FlatVariable:
 
 @dataclass(frozen=True, slots=True)
 class FlatParameter:
-    """A parameter with its value in SI units; it must exceed the one that stands `above` places before it, if any."""
+    """A parameter with its value in SI units; it must exceed the one that stands `above` places before it, if any.
+
+    `written` is the unit in which its value was given, where no unit is declared.
+    """
 
     path: str
     unit: Unit
@@ -41,6 +44,7 @@ class FlatParameter:
     max: float | None
     tunable: bool
     above: int = 0
+    written: Unit | None = None
 
     def checked(self, number: float, given: object) -> float:
         """Return the number if it is finite and within min and max.

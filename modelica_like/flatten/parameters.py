@@ -70,9 +70,11 @@ class Parameters:
         symbol = ca.SX.sym(path)
         self._by_leaf[leaf_id(symbol)] = len(self.flat)
         unit = coherent(unit_of_field(component, name))
+        read = read_quantity(value.given) if field.unit_text == "*" and isinstance(value.given, str) else None
         tunable, above = (field.tunable, field.above) if isinstance(field, Parameter) else (True, 0)
         number = value.number if value.number is not None else 0.0
-        self.flat.append(FlatParameter(path, unit, field.description, number, field.min, field.max, tunable, above))
+        bounds, written = (field.min, field.max), read[1] if read else None
+        self.flat.append(FlatParameter(path, unit, field.description, number, *bounds, tunable, above, written))
         self._symbols.append(symbol)
         return symbol
 

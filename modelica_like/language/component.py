@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar, cast, dataclass_transform
 
-from modelica_like.errors import DuplicateName, LanguageError, ModelicaLikeError, NetlistError, Source, did_you_mean
+from modelica_like.errors import DuplicateName, LanguageError, ModelicaLikeError, NetlistError, Source
 from modelica_like.language.declared import Connector, Declared, unknown
 from modelica_like.language.expr import TIME, Expr
 from modelica_like.language.fields import Discrete, Field, Input, Output, Parameter, Value, param, require_identifier
@@ -86,8 +86,6 @@ class Component(Declared):
         for name, part in self._class_parts.items():
             setattr(self, name, values.pop(name) if name in values and name in self._replaceable else part)
         for name, default in self._structural.items():
-            if name in values and name not in self._tables:
-                self.check_structural(name, values[name])
             self._set_structural(name, values.pop(name, default))
         for name, value in values.items():
             self.give(name, value)
@@ -146,7 +144,6 @@ class Component(Declared):
         elif name in self._class_modes:
             self._class_modes[name].__set__(self, value)
         elif name in self._structural:
-            self.check_structural(name, value)
             self._set_structural(name, value)
             self.build()
         elif name in self._parts and name in self._replaceable and _is_part(value):
@@ -185,24 +182,22 @@ class Component(Declared):
         if name in cls._tables:
             cls._tables[name].read(f"{cls.__name__}.{name}", cls._class_fields, frozen_rows(value))
             return
-        if type(value) is int and abs(value) > _MOST:
-            # It may be a number of parts, which would be made.
+        if type(value) is int and abs(value) > _MOST:  # it may be a number of parts, which would be made
             raise NetlistError(f"{cls.__name__}.{name} is larger than {_MOST}; no drive has as many parts.")
         hint = next(str(_annotated(base)[name]) for base in cls.__mro__ if name in _annotated(base))
         if hint.startswith("Literal[") and value not in (choices := hint[9:-2].split("', '")):
-            hints = did_you_mean(str(value), choices) or "."
-            raise NetlistError(f"{cls.__name__}.{name} = {value!r} must be {' or '.join(choices)}{hints}")
-        wanted = cast("type[object]", type(cls._structural[name]))
-        if cls._structural[name] is REQUIRED:
-            wanted = next((kind for kind in _PLAIN if hint == kind.__name__), object)
-        if wanted not in _PLAIN or (isinstance(value, wanted) and isinstance(value, bool) == (wanted is bool)):
-            return
-        if not (wanted is float and isinstance(value, int) and not isinstance(value, bool)):
+            raise NetlistError(f"{cls.__name__}.{name} = {value!r} must be {' or '.join(choices)}.")
+        default: Any = cls._structural[name]
+        wanted: Any = next((k for k in _PLAIN if hint == k.__name__), object) if default is REQUIRED else type(default)
+        fits = isinstance(value, wanted) and isinstance(value, bool) == (wanted is bool)
+        if wanted in _PLAIN and not fits and not (wanted is float and type(value) is int):
             raise NetlistError(f"{cls.__name__}.{name} = {value!r} must be {_PLAIN[wanted]}.")
 
     def _set_structural(self, name: str, value: Any) -> None:
         if value is REQUIRED:
             raise LanguageError(f"{type(self).__name__} needs a value for {name}.", where=caller())
+        if name not in self._tables:
+            self.check_structural(name, value)
         frozen = frozen_rows(value)
         self.__dict__[name] = self._tables[name].store(self, name, frozen) if name in self._tables else frozen
 

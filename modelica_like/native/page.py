@@ -25,10 +25,11 @@ from modelica_like.fmi.runtime import runtime_library
 from modelica_like.fmi.tables import make_tables
 from modelica_like.native.library import MESSAGE_LENGTH, Run
 from modelica_like.simulation import Model, seconds, simulate, without_garbage_search
+from modelica_like.solve.display import Display
 from modelica_like.solve.options import Options
 from modelica_like.solve.plot import chosen
 from modelica_like.solve.plot import quantity as quantity_of
-from modelica_like.units import ANY, ONE, Unit, coherent
+from modelica_like.units import ANY, ONE, Unit, coherent, parse_unit
 from modelica_like.writing import write_bytes
 
 _SPREAD = 5.0
@@ -119,13 +120,13 @@ def _content(model: CompiledDae, names: Sequence[str], until: float, options: Op
         "name": "end time", "group": "", "reference": None, "description": "", "unit": "s", "factor": 1.0,
         "offset": 0.0, "value": until, "low": until / _SPREAD, "high": until * _SPREAD, "log": True,
     }  # fmt: skip
-    units = _Units()
+    units, display = _Units(), Display(model)
     return {
         "model": _text(model_file(make_tables(model, variables.start), variables.variables, "{page}", options.rtol)),
         "layout": _layout(), "message_length": MESSAGE_LENGTH, "tool": tool(), "until": until,
         "rtol": options.rtol, "atol": options.atol, "points": options.points, "most_events": options.max_events,
-        "sliders": [end, *_sliders(model, variables.by_name)],
-        "variables": list(_variables(model, variables.by_name, set(names), units)),
+        "sliders": [end, *_sliders(model, variables.by_name, display)],
+        "variables": list(_variables(model, variables.by_name, set(names), units, display)),
         "modes": [
             {
                 "name": one.path, "reference": variables.by_name[one.path].reference, "names": one.names or None,
@@ -178,23 +179,25 @@ def _spelled(unit: Unit) -> str:
 
 
 def _variables(
-    model: CompiledDae, known: dict[str, FmuVariable], names: set[str], units: _Units
+    model: CompiledDae, known: dict[str, FmuVariable], names: set[str], units: _Units, display: Display
 ) -> Iterator[dict[str, Any]]:
     for one in model.flat_variables:
         if one.path in known and (one.path in names or one.kind in ("local", "output")):
             yield {
                 "name": one.path, "reference": known[one.path].reference, "description": one.description,
-                "unit": units.number(one.unit), "shown": one.path in names,
+                "unit": units.number(parse_unit(display.of(one.path))), "shown": one.path in names,
             }  # fmt: skip
 
 
-def _sliders(model: CompiledDae, known: dict[str, FmuVariable]) -> Iterator[dict[str, Any]]:
+def _sliders(model: CompiledDae, known: dict[str, FmuVariable], display: Display) -> Iterator[dict[str, Any]]:
     """Values that the page changes, in the shown unit, from which SI values follow by factor and offset."""
     inputs = (model.flat_variables[k] for k in model.inputs)
     for one in (*model.flat_parameters, *inputs):
         if isinstance(one, FlatParameter) and not one.tunable:
             continue
-        about, unit = known[one.path], one.unit
+        about, asked = known[one.path], display.of_quantity(str(one.unit))
+        unit = one.written if isinstance(one, FlatParameter) and one.written and asked == str(one.unit) else None
+        unit = unit or parse_unit(asked)
         shown = (None if si is None else (si - unit.offset) / unit.factor for si in (about.start, one.min, one.max))
         value, least, most = shown
         low, high, log = _span(value or 0.0, least, most)

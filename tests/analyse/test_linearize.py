@@ -242,3 +242,10 @@ def test_campbell_diagram_finds_critical_speeds():
     np.testing.assert_allclose(diagram.speeds, speeds)
     np.testing.assert_allclose(diagram.frequencies, np.full((1, 3), 15 / (2 * np.pi)), rtol=1e-12)
     assert [one.speed for one in diagram.crossings()] == pytest.approx([15.0, 7.5], rel=1e-12)
+    (axes,) = diagram.plot().axes
+    mode, first, second, *points = axes.lines
+    np.testing.assert_allclose(mode.get_ydata(), diagram.frequencies[0])
+    np.testing.assert_allclose(second.get_ydata(), 2 * first.get_ydata())
+    assert [(one.get_xdata()[0], one.get_ydata()[0]) for one in points] == [
+        pytest.approx((speed * 30 / np.pi, 15 / (2 * np.pi))) for speed in (15.0, 7.5)
+    ]

@@ -46,6 +46,11 @@ def test_characteristic_curves_of_the_motor(motor):
     np.testing.assert_allclose(curves["efficiency"], efficiency, rtol=1e-9, atol=1e-12)
     np.testing.assert_allclose(curves["loss"], (1 - efficiency) * SUPPLY * current(torques), rtol=1e-9)
     assert curves.unit("motor.w") == "rad/s"
+    above, below = curves.plot("motor.w", "efficiency").axes
+    assert (above.get_ylabel(), below.get_ylabel()) == ("motor.w in rad/s", "efficiency")
+    np.testing.assert_array_equal(below.lines[0].get_ydata(), curves["efficiency"])
+    with pytest.raises(UnknownName, match=r"There is no 'motor\.speed' in these curves"):
+        curves.unit("motor.speed")
 
 
 def test_the_load_that_holds_a_speed(motor):

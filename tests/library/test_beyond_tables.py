@@ -113,7 +113,7 @@ WRONG = {
     "LossyGear.loss_table, row 1, eta_mf2: 1.2 is above 1": lambda: LossyGear(ratio=1, loss_table=((0, 1, 1.2, 0, 0),)),
     "row 2, sliding friction coefficient: -0.1 is below 0": lambda: Clutch(fn_max=1, mu_pos=((0, 0.1), (1, -0.1))),
     "friction force: '-1 N' is below 0": lambda: SupportFriction(f_pos=((0, "-1 N"),)),
-    "extrapolate = 'holt' must be hold or linear or error; did you mean 'hold'": lambda: Brake(extrapolate="holt"),
+    "extrapolate = 'holt' must be hold or linear or error.": lambda: Brake(extrapolate="holt"),
 }
 
 

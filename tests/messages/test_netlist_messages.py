@@ -16,7 +16,8 @@ MESSAGES = {
     ),
     "unknown parameter": (
         '[parts]\nm = { is = "Mass", n = 3 }\n',
-        "Mass has no parameter or variable 'n'. It has m, L, s, v.\n  in bad.toml:2 `m = { is = \"Mass\", n = 3 }`",
+        "Mass has no parameter or variable 'n'. It has m, L, angle, g, s, v.\n"
+        '  in bad.toml:2 `m = { is = "Mass", n = 3 }`',
     ),
     "wrong unit": (
         '[parts]\nrotor = { is = "Inertia", J = "8.5 kg.cm" }\n',

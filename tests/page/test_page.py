@@ -115,6 +115,18 @@ def test_ranges_of_sliders(value: float, low: float | None, high: float | None, 
     assert _span(value, low, high) == pytest.approx(expected)
 
 
+def test_the_netlist_chooses_units(tmp_path: Path) -> None:
+    text = (EXAMPLES / "machine_table_direct.toml").read_text(encoding="utf-8")
+    drive = tmp_path / "rpm.toml"
+    drive.write_text(f'{text}\n[display]\nspeed = "rpm"\n', encoding="utf-8")
+    export_html(drive, tmp_path / "rpm.html")
+    page = content(tmp_path / "rpm.html")
+    speed = next(one for one in page["sliders"] if one["name"] == "motor_speed")
+    assert (speed["value"], speed["unit"]) == (pytest.approx(6000.0), "rpm")
+    curve = next(one for one in page["variables"] if one["name"] == "motor.w")
+    assert page["units"][curve["unit"]]["text"] == "rpm"
+
+
 @pytest.mark.parametrize(
     ("unit", "text"), [("N.m.s/rad", "N·m·s/rad"), ("kg.m2/s2", "kg·m²/s²"), ("deg", "°"), ("1", ""), ("*", "")]
 )
@@ -154,8 +166,8 @@ def test_mistakes_are_told(tmp_path: Path) -> None:
 def test_curves_are_those_of_idas(browser: Any, pages: dict[str, Path], name: str) -> None:
     browser.open(pages[name])
     put(browser, "motor_speed", 900.0 if "table" in name else 25.0)
-    assert (said(browser), browser.complaints) == ("", [])
     si = 900.0 * 2 * np.pi / 60 if "table" in name else 25.0
+    assert (said(browser), browser.complaints) == ("", [])
     run = simulate(EXAMPLES / f"{name}.toml", parameters={"motor_speed": si}, rtol=1e-9)
     drawn = curves(browser)
     once = np.flatnonzero(np.diff(drawn["time"], append=np.inf, prepend=-np.inf)[1:] > 0)

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from modelica_like.analyse.sensitivity.outputs import read_output
 from modelica_like.analyse.sweeps.checkpoint import Checkpoint
 from modelica_like.analyse.sweeps.plan import Plan, Sampling, make_plan
 from modelica_like.analyse.sweeps.workers import (
@@ -87,20 +86,22 @@ def sweep(
     """
     model = build(drive, free=over).with_parameters(dict(parameters or {}))
     plan = make_plan(model, over, sampling)
-    if not outputs or any(number is not None and number < 1 for number in (processes, chunk)):
-        raise ValueOutOfRange(
-            "A sweep needs at least one output, and positive numbers of processes and runs in a chunk."
-        )
-    units = {name: str(read_output(model, name).unit) for name in outputs}
-    count = chunk or min(max(len(plan) // _PARTS, _CHUNK[0]), _CHUNK[1])
-    chunks: list[Chunk] = [(first, plan.points[first : first + count]) for first in range(0, len(plan), count)]
+    chunks = _chunks(plan, outputs, processes, chunk)
     job = Job.of(model, plan.names, outputs, {"until": until, "points": _POINTS, **settings, "solver": solver})
     job, why = _solvable(job) if scheduler is None else (job, "")
     done = _collect(job, plan, chunks, checkpoint, progress, _workers(job, processes, scheduler, len(plan)))
     _check_extremes(job, plan, done)
-    notice = "\n".join(filter(None, [why, *_notices(done)]))
-    found = _dataset(model, plan, units, done.values, done.failures)
-    return found.assign_attrs(solver=job.settings["solver"], checked=done.checked, notice=notice)
+    return _dataset(model, plan, job, done, why)
+
+
+def _chunks(plan: Plan, outputs: Sequence[str], processes: int | None, chunk: int | None) -> list[Chunk]:
+    """Divide the runs among workers."""
+    if not outputs or any(number is not None and number < 1 for number in (processes, chunk)):
+        raise ValueOutOfRange(
+            "A sweep needs at least one output, and positive numbers of processes and runs in a chunk."
+        )
+    count = chunk or min(max(len(plan) // _PARTS, _CHUNK[0]), _CHUNK[1])
+    return [(first, plan.points[first : first + count]) for first in range(0, len(plan), count)]
 
 
 def _solvable(job: Job) -> tuple[Job, str]:
@@ -175,14 +176,13 @@ def _collect(
     return kept.results() if kept is not None else found
 
 
-def _dataset(
-    model: CompiledDae, plan: Plan, units: Mapping[str, str], values: Any, failures: Mapping[int, str]
-) -> xarray.Dataset:
+def _dataset(model: CompiledDae, plan: Plan, job: Job, done: Done, why: str) -> xarray.Dataset:
+    failures, units = done.failures, dict(zip(job.outputs, job.units, strict=True))
     # Not as long as the longest sentence for each of many runs.
     told = np.full(len(plan), "", object)
     told[list(failures)] = list(failures.values())
     data: dict[str, Any] = {
-        name: (plan.dims, values[:, k].reshape(plan.shape), {"units": unit})
+        name: (plan.dims, done.values[:, k].reshape(plan.shape), {"units": unit})
         for k, (name, unit) in enumerate(units.items())
     }
     data["failure"] = (plan.dims, told.reshape(plan.shape), {"long_name": "why a run failed"})
@@ -191,4 +191,6 @@ def _dataset(
         name: (name if plan.axes is not None else "sample", column, {"units": unit})
         for name, unit, column in zip(plan.names, plan.units, columns, strict=True)
     }
-    return extra_module("xarray", "data").Dataset(data, coords=coords, attrs={"model": model.name})
+    notice = "\n".join(filter(None, [why, *_notices(done)]))
+    attrs = {"model": model.name, "solver": job.settings["solver"], "checked": done.checked, "notice": notice}
+    return extra_module("xarray", "data").Dataset(data, coords=coords, attrs=attrs)

@@ -46,6 +46,7 @@ class Job:
         identity: tells models and their values apart.
         names: what is varied.
         outputs: what is read off.
+        units: their coherent SI units.
         settings: arguments of `simulate`.
     """
 
@@ -53,13 +54,19 @@ class Job:
     identity: str = field(repr=False)
     names: tuple[str, ...]
     outputs: tuple[str, ...]
+    units: tuple[str, ...]
     settings: dict[str, Any]
 
     @classmethod
     def of(cls, model: CompiledDae, names: Sequence[str], outputs: Sequence[str], settings: dict[str, Any]) -> Job:
-        """Pack a model."""
+        """Pack a model.
+
+        Raises:
+            UnknownName: an output is not known.
+        """
         identity = repr([model.summary, [one.path for one in model.flat_variables], model.p.tolist(), model.u.tolist()])
-        return cls(pickle.dumps(model), identity, tuple(names), tuple(outputs), settings)
+        units = tuple(str(read_output(model, name).unit) for name in outputs)
+        return cls(pickle.dumps(model), identity, tuple(names), tuple(outputs), units, settings)
 
 
 Chunk = tuple[int, Any]
