@@ -42,6 +42,9 @@ def write_ssp(system: System, path: str | Path, version: Version | str = "1.0") 
     """
     target, chosen = target_file(path, ".ssp", "An SSP"), known_version(version, Version, "SSP")
     check_system(system)
+    for name in (system.name, *(one.name for one in (*system.links, *system.bonds))):
+        if not name.isprintable():
+            raise NetlistError(f"The name '{printable(name)}' has characters that XML does not know.")
     fmus = {unit.name: described(unit.file) for unit in system.units}
     _check_variables(system, fmus)
     homes: dict[Path, str] = {}
@@ -49,13 +52,7 @@ def write_ssp(system: System, path: str | Path, version: Version | str = "1.0") 
         homes.setdefault(unit.file.resolve(), f"resources/{unit.name}.fmu")
     sources = {unit.name: homes[unit.file.resolve()] for unit in system.units}
     files = {home: file.read_bytes() for file, home in homes.items()}
-    try:
-        structure = ssd(system, fmus, sources, chosen)
-    except ValueError:  # so lxml says it
-        raise NetlistError(
-            f"A name in system '{printable(system.name)}' has characters that XML does not know."
-        ) from None
-    write_archive(target, files | {SSP.description: structure})
+    write_archive(target, files | {SSP.description: ssd(system, fmus, sources, chosen)})
     return target
 
 

@@ -164,7 +164,7 @@ def test_an_ssp_has_no_names_that_xml_does_not_know(tmp_path: Path) -> None:
             '<fmiModelDescription fmiVersion="2.0" modelName="a" guid="1"><CoSimulation modelIdentifier="a"/>'
             "<ModelVariables/><ModelStructure/></fmiModelDescription>",
         )
-    with pytest.raises(ModelicaLikeError, match=r"^A name in system 'two.' has characters that XML does not know\.$"):
+    with pytest.raises(ModelicaLikeError, match=r"^The name 'two.' has characters that XML does not know\.$"):
         write_ssp(System("two\0", (Unit("a", tmp_path / "a.fmu"),), ()), tmp_path / "two.ssp")
 
 
