@@ -32,7 +32,7 @@ from modelica_like.simulation import Model, positive_step, seconds, without_garb
 from modelica_like.solve.options import Options
 from modelica_like.solve.plot import save_plot
 from modelica_like.structure import reduce
-from modelica_like.writing import write_bytes
+from modelica_like.writing import replacing
 
 _PICTURES = Path(__file__).parent / "pictures"
 _TOKEN = "{00000000-0000-0000-0000-000000000000}"
@@ -269,8 +269,7 @@ def _written(
     files: dict[str, bytes], target: Path, model: CompiledDae, about: About, run: bool, strict: bool
 ) -> Check:  # fmt: skip
     """Write an FMU whose parts have no fault, after a run against IDAS; draw curves that differ next to it."""
-    with tempfile.TemporaryDirectory(prefix="modelica_like_") as folder:
-        draft = Path(folder) / "draft.fmu"
+    with replacing(target) as draft:
         write_archive(draft, files)
         found = problems(draft)
         if found:
@@ -281,7 +280,6 @@ def _written(
         check = compare_with_idas(draft, model, kind, about.fixed_step) if run else Check()
         if strict and check.differs:
             raise ExportError(check.sentence, advice="Without `strict` it is written all the same, with a picture.")
-        write_bytes(target, draft.read_bytes())
     if not check.differs or check.curves is None:
         return check
     picture = target.with_name(f"{target.stem}_check.png")
