@@ -44,7 +44,7 @@ def test_what_follows_follows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     (tmp_path / "spindle_drive.toml").write_text(block("toml"), encoding="utf-8")
     monkeypatch.chdir(tmp_path)
     lines = re.findall(r"^modelica-like (.*spindle_drive.*)$", README, re.MULTILINE)
-    assert len(lines) == 6
+    assert len(lines) == 8
     for line in lines:
         result = CliRunner().invoke(app, shlex.split(line, comments=True))
         assert result.exit_code == 0, f"{line}: {result.stderr}"
