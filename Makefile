@@ -41,6 +41,8 @@ pytest: .venv/installed-dev
 slow: .venv/installed-dev
 	$(BIN)/python -m pytest -q -n auto -m slow
 
+# Times are those of the CPU: threads of BLAS that wait would count.
+benchmark: export OPENBLAS_NUM_THREADS = 1
 benchmark: .venv/installed-dev
 	$(BIN)/python benchmarks/import_time.py
 	$(BIN)/python benchmarks/bad_input.py
