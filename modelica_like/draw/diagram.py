@@ -62,6 +62,7 @@ class Node:
         inside: what an open assembly consists of.
         ports: what something is joined to, by name.
         border: for an outer connector the side of the box at which it lies.
+        turned: west and east are exchanged.
     """
 
     name: str
@@ -70,6 +71,7 @@ class Node:
     inside: Diagram | None = None
     ports: dict[str, Port] = field(default_factory=dict)
     border: Side | None = None
+    turned: bool = False
 
     def turn(self) -> None:
         """Exchange west and east; signals stay, as they are read from left to right."""
@@ -81,8 +83,6 @@ class Node:
             if port.side in ("N", "S"):
                 port.along = -port.along
         self.turned = not self.turned
-
-    turned: bool = False
 
 
 @dataclass(eq=False)
@@ -113,7 +113,7 @@ def diagram(component: Component, depth: int) -> Diagram:
         depth: how many levels of assemblies are open.
     """
     nodes = {
-        name: Node(name, part, _icon(part), diagram(part, depth - 1) if _opens(part, depth) else None)
+        name: Node(name, part, part.icon, diagram(part, depth - 1) if _opens(part, depth) else None)
         for name, part in component.parts.items()
     }
     outer = dict[str, Node]()
@@ -135,11 +135,7 @@ def diagram(component: Component, depth: int) -> Diagram:
 
 
 def _opens(part: Component, depth: int) -> bool:
-    return depth > 0 and _icon(part) is None and bool(part.parts) and any(_joined(part))
-
-
-def _icon(part: Component) -> Icon | None:
-    return part.icon
+    return depth > 0 and part.icon is None and bool(part.parts) and any(_joined(part))
 
 
 def _joined(component: Component) -> Iterator[list[Connector | Symbol]]:
