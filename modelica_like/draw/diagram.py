@@ -18,6 +18,7 @@ _USUAL: dict[str, Side] = {
     "flange_b": "E", "n": "E", "port_b": "E", "flange_t": "E", "support": "S", "heat_port": "S",
 }  # fmt: skip
 _BESIDE = 9.0
+"""Between ports at one place of a symbol, in 1/96 inch."""
 _OPPOSITE: dict[Side, Side] = {"W": "E", "E": "W", "N": "N", "S": "S"}
 
 
@@ -185,11 +186,10 @@ def _place(icon: Icon | None, name: str, drives: int) -> tuple[Side, float]:
 
 def _mark(net: Net) -> None:
     """Draw grounds where they are used."""
-    marks = [port for port in net.ports if port.node.icon and port.node.icon.at_ports]
+    marks = [port.node.icon for port in net.ports if port.node.icon and port.node.icon.at_ports]
     if marks:
-        net.ports = [port for port in net.ports if port not in marks]
         for port in net.ports:
-            port.mark = marks[0].node.icon
+            port.mark = marks[0]
         net.ports.clear()
 
 

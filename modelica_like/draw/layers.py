@@ -12,8 +12,7 @@ from modelica_like.draw.diagram import Diagram, Net, Node, Port
 from modelica_like.language.icon import SIGNAL
 
 _ROUNDS = 12
-_FEEDBACK = 0.1
-"""What the length of a connection counts that runs from east to west."""
+"""How often all columns are ordered anew, from west to east and back in turn."""
 
 
 @dataclass(eq=False)
@@ -50,7 +49,7 @@ class Channel:
         nets: the nets in it, with their ends in the layer before and in the layer after.
     """
 
-    nets: dict[Net, tuple[list[End], list[End]]] = field(default_factory=lambda: defaultdict(lambda: ([], [])))
+    nets: dict[Net, tuple[list[End], list[End]]] = field(default_factory=dict["Net", "tuple[list[End], list[End]]"])
 
 
 @dataclass(eq=False)

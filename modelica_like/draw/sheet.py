@@ -11,7 +11,7 @@ import casadi as ca
 from modelica_like.draw.diagram import Diagram, Net, Node, Port
 from modelica_like.draw.labels import VALUE, Text, labels, text_width
 from modelica_like.draw.layers import Channel, End, Layers, Slot, layered, solve_lp
-from modelica_like.language.icon import SIGNAL, Stroke
+from modelica_like.language.icon import Stroke
 
 Point = tuple[float, float]
 Box = tuple[float, float, float, float]
@@ -126,6 +126,7 @@ def sheet(diagram: Diagram) -> Sheet:
     heights = _heights(layers, placed)
     _straighten(layers, heights, placed)
     lines = {net: Line(net.stroke, ports=net.ports) for net in diagram.nets}
+    line_of = {port: lines[net] for net in diagram.nets for port in net.ports}
     x = 0.0
     for k, column in enumerate([*layers.columns, []]):
         tracks, width = _tracks(layers.channels[k], heights, placed)
@@ -138,7 +139,7 @@ def sheet(diagram: Diagram) -> Sheet:
             if slot.node:
                 one = placed[slot.node]
                 one.at = x + west, heights[slot]
-                _lead(one, (x, x + west + east), lines)
+                _lead(one, (x, x + west + east), line_of)
             elif slot.net:
                 lines[slot.net].paths.append([(x, heights[slot]), (x + west + east, heights[slot])])
         x += west + east
@@ -347,21 +348,21 @@ def _route(
                 line.dots.append((x, y))
 
 
-def _lead(part: Placed, room: tuple[float, float], lines: dict[Net, Line]) -> None:
+def _lead(part: Placed, room: tuple[float, float], lines: dict[Port, Line]) -> None:
     """Draw the lines from the symbol to the edge of its column."""
     (x, y), (half_x, half_y) = part.at, part.half
-    for net, line in lines.items():
-        for port in net.ports:
-            if port.node is not part.node:
-                continue
-            edge = room[0] if port.way == "W" else room[1]
-            exit_y = y + part.exits[port]
-            if port.side in ("W", "E"):
-                symbol = x + (half_x if port.side == "E" else -half_x)
-                path = [(edge, exit_y), (symbol, exit_y)]
-            else:
-                px = x + port.along
-                path = [(edge, exit_y), (px, exit_y), (px, y + (half_y if port.side == "S" else -half_y))]
-            line.paths.append(path)
-            if port.signal < 0 and line.stroke is SIGNAL and not part.sheet and not part.node.border:
-                line.arrows.append((path[-1], {"W": "E", "E": "W", "N": "S", "S": "N"}[port.side]))
+    for port in part.node.ports.values():
+        line = lines.get(port)
+        if line is None:  # a ground is drawn there
+            continue
+        edge = room[0] if port.way == "W" else room[1]
+        exit_y = y + part.exits[port]
+        if port.side in ("W", "E"):
+            symbol = x + (half_x if port.side == "E" else -half_x)
+            path = [(edge, exit_y), (symbol, exit_y)]
+        else:
+            px = x + port.along
+            path = [(edge, exit_y), (px, exit_y), (px, y + (half_y if port.side == "S" else -half_y))]
+        line.paths.append(path)
+        if port.signal < 0 and not part.sheet and not part.node.border:
+            line.arrows.append((path[-1], {"W": "E", "E": "W", "N": "S", "S": "N"}[port.side]))

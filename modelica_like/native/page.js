@@ -1,4 +1,3 @@
-"use strict";
 /* A drive as a page. PAGE (see page.py) has the compiled run-time, the model, what can be set and what can be shown. */
 const PAGE = JSON.parse(document.getElementById("page").textContent);
 const MODES = PAGE.modes.filter((one) => one.names); // the others are discrete values
@@ -103,21 +102,10 @@ class Drive {
 
 /* ---- controls: values are in the shown unit, positions from 0 to 1 ---- */
 
-function element(tag, properties, ...children) {
-  const made = Object.assign(document.createElement(tag), properties);
-  made.append(...children);
-  return made;
-}
-
 function grouped(list, key) {
   const groups = new Map();
   for (const one of list) groups.set(key(one), [...(groups.get(key(one)) ?? []), one]);
   return groups;
-}
-
-function short(value, digits = 5) {
-  const size = Math.abs(value), plain = size === 0 || (size < 1e6 && size >= 1e-4);
-  return plain ? String(Number(value.toPrecision(digits))) : value.toExponential(digits - 2).replace(/\.?0+e/, "e");
 }
 
 const valueAt = (one, p) => one.log ? one.low * (one.high / one.low) ** p : one.low + p * (one.high - one.low);
@@ -156,13 +144,6 @@ function controls() {
 /* ---- pictures ---- */
 
 const LEFT = 58, RIGHT = 14, TOP = 6, BOTTOM = 20, HEIGHT = 165, ROW = 36, COLOURS = 7;
-
-function ticks(low, high, count) {
-  const raw = (high - low) / count, power = 10 ** Math.floor(Math.log10(raw));
-  const step = power * [1, 2, 5, 10].find((k) => k * power >= raw * (1 - 1e-9));
-  const first = Math.ceil(low / step - 1e-9), length = Math.floor(high / step + 1e-9) - first + 1;
-  return Array.from({ length }, (_, k) => Number(((first + k) * step).toPrecision(12)));
-}
 
 /* What a run has for a variable, in its shown unit. */
 function values(result, variable) {

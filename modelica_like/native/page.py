@@ -34,6 +34,8 @@ from modelica_like.writing import write_bytes
 
 _SPREAD = 5.0
 """Sliders without bounds go from the value over this to the value times this."""
+HELPERS = Path(__file__).parent / "helpers.js"
+"""What scripts of pages share."""
 _POINTER_SIZE = 4
 _HIGH = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 
@@ -107,6 +109,7 @@ def _page(name: str, description: str, content: dict[str, Any]) -> str:
     data = json.dumps(content, ensure_ascii=False, separators=(",", ":")).replace("<", "\\u003c")
     parts = {
         "name": escape(name), "description": escape(description), "page": data,
+        "helpers": HELPERS.read_text(encoding="utf-8").rstrip(),
         "script": (folder / "page.js").read_text(encoding="utf-8").rstrip(),
     }  # fmt: skip
     page = (folder / "page.html").read_text(encoding="utf-8")

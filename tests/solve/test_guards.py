@@ -71,7 +71,7 @@ def test_a_top_below_zero_is_given_up_soon() -> None:
     assert guard.asked < 20
 
 
-def test_the_earliest_of_two_tops_counts() -> None:
+def test_a_straight_guard_is_met_at_its_zero() -> None:
     """A guard that rises through zero in a straight line is met at its zero, to 1e-13 of the time."""
     guard = Known(np.poly1d([3.0, -1.0]))
     found = locate(guard, 1.0, guard.ends(1.0), [Candidate(0, 0, inside=False)], 0.0)

@@ -1,4 +1,3 @@
-"use strict";
 /* The curves of a report: panels with one time axis, modes as bands below. DATA is what curves.py returns. */
 const DATA = JSON.parse(document.getElementById("data").textContent);
 const LEFT = 64, RIGHT = 12, TOP = 8, BOTTOM = 22, HEIGHT = 190, ROW = 22, COLOURS = 8, MOST_MARKS = 80;
@@ -6,24 +5,6 @@ const whole = [DATA.times[0], DATA.times.at(-1)];
 const view = { low: whole[0], high: whole[1], at: null, from: null };
 const root = document.getElementById("curves");
 const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`);
-
-function ticks(low, high, count) {
-  const raw = (high - low) / count || 1, power = 10 ** Math.floor(Math.log10(raw));
-  const step = power * [1, 2, 5, 10].find((k) => k * power >= raw * (1 - 1e-9)), first = Math.ceil(low / step - 1e-9);
-  const length = Math.max(0, Math.floor(high / step + 1e-9) - first + 1);
-  return Array.from({ length }, (_, k) => Number(((first + k) * step).toPrecision(12)));
-}
-
-const short = (value) => {
-  const size = Math.abs(value);
-  return size === 0 || (size < 1e6 && size >= 1e-4) ? String(Number(value.toPrecision(5))) : value.toExponential(3);
-};
-
-function element(tag, properties, ...children) {
-  const made = Object.assign(document.createElement(tag), properties);
-  made.append(...children);
-  return made;
-}
 
 /* Returns the position of the last result that is not after t. */
 function before(t) {

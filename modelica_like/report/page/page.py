@@ -7,7 +7,6 @@ import platform
 import re
 from collections.abc import Callable, Iterable, Sequence
 from html import escape
-from importlib.metadata import version
 from pathlib import Path
 
 import casadi as ca
@@ -15,7 +14,9 @@ import casadi as ca
 from modelica_like.analyse.linear.linearize import linearize
 from modelica_like.draw import schematic
 from modelica_like.errors import ModelicaLikeError
+from modelica_like.fmi.export import tool
 from modelica_like.language import Component
+from modelica_like.native.page import HELPERS
 from modelica_like.report.analysis import shares
 from modelica_like.report.page.curves import curves
 from modelica_like.report.run import notices, statistics_line
@@ -74,6 +75,7 @@ def report(drive: Component, run: Solution, *, show: Sequence[str] = ()) -> str:
     parts = {
         "name": escape(run.model.name), "description": escape(getattr(drive, "description", "")), "data": data,
         "sections": "\n".join(f"<section><h2>{title}</h2>{body}</section>" for title, body in sections if body),
+        "helpers": HELPERS.read_text(encoding="utf-8").rstrip(),
         "script": (folder / "page.js").read_text(encoding="utf-8").rstrip(),
     }  # fmt: skip
     page = (folder / "page.html").read_text(encoding="utf-8")
@@ -178,7 +180,7 @@ def _details(table: str) -> str:
 
 
 def _computed(run: Solution) -> str:
-    packages = f"modelica-like {version('modelica-like')}, CasADi {ca.__version__}, Python {platform.python_version()}"
+    packages = f"{tool()}, CasADi {ca.__version__}, Python {platform.python_version()}"
     options = f"rtol = {run.options.rtol:g}, atol = {run.options.atol:g}"
     lines = run.model.summary, f"{statistics_line(run)}; {options}.", f"{packages}."
     return "".join(f"<p>{escape(line)}</p>" for line in lines)
