@@ -144,7 +144,7 @@ class Modes extends Panel {
         c.globalAlpha = 1;
         c.fillStyle = colour("ink");
         c.textAlign = "left";
-        const text = bands.length > 1 && row >= 0 ? `${name}: ${mode}` : name;
+        const text = `${name}: ${mode}`;
         if (c.measureText(text).width < wide - 8) c.fillText(text, west + 5, top + ROW - 8);
         else if (c.measureText(mode).width < wide - 8) c.fillText(mode, west + 5, top + ROW - 8);
       }

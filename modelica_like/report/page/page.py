@@ -141,7 +141,7 @@ def _energy(balance: EnergyBalance) -> str:
     rows.sort(key=lambda row: (order[row[1]], -abs(row[2])))
     lines = "".join(
         f'<tr><td>{escape(name)}</td><td>{what}</td><td class="number">{value:.5g}</td>'
-        f'<td class="number">{value / total:.1%}</td><td class="bar"><i class="{what.split()[0]}" '
+        f'<td class="number">{round(value / total, 3) + 0.0:.1%}</td><td class="bar"><i class="{what.split()[0]}" '
         f'style="width:{100 * min(abs(value / total), 1.0):.1f}%"></i></td></tr>'
         for name, what, value in rows
     )
