@@ -6,6 +6,7 @@ from typing import Any
 # Modules and their public names, each loaded when first used: a netlist needs few of them. For type checkers and
 # editors the same stands in `__init__.pyi`.
 _NAMES = {
+    "actuators": "ElectromagneticActuator HydraulicActuator PneumaticActuator",
     "adaptors": (
         "AngleToTorqueAdaptor CurrentToVoltageAdaptor ForceToPositionAdaptor HeatFlowToTemperatureAdaptor "
         "PositionToForceAdaptor TemperatureToHeatFlowAdaptor TorqueToAngleAdaptor VoltageToCurrentAdaptor"
@@ -59,6 +60,7 @@ _NAMES = {
     ),
     "stepped_signals": "BooleanPulse BooleanStep BooleanTable StepTable",
     "thermal": "FixedTemperature HeatPort HeatSource TemperatureSensor ThermalConductor ThermalMass",
+    "thermal_clutches": "ThermalClutch",
     "torque_converters": "TorqueConverter",
     "translational_sensors": (
         "LinearAccelerationSensor LinearMultiSensor LinearPowerSensor RelativeLinearAccelerationSensor "
@@ -66,8 +68,7 @@ _NAMES = {
     ),
     "translational_sources": (
         "ConstantVelocity Force2 ForceStep InverseSpeedDependentForce LinearSpeedDependentForce "
-        "QuadraticSpeedDependentForce SignForce TranslationalAccelerate TranslationalPosition "
-        "TranslationalSpeed"
+        "QuadraticSpeedDependentForce SignForce TranslationalAccelerate TranslationalPosition TranslationalSpeed"
     ),
     "transmissions": "Lepelletier Ravigneaux",
     "universal_joints": "UniversalJoint",

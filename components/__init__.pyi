@@ -1,3 +1,6 @@
+from components.actuators import ElectromagneticActuator as ElectromagneticActuator
+from components.actuators import HydraulicActuator as HydraulicActuator
+from components.actuators import PneumaticActuator as PneumaticActuator
 from components.adaptors import AngleToTorqueAdaptor as AngleToTorqueAdaptor
 from components.adaptors import CurrentToVoltageAdaptor as CurrentToVoltageAdaptor
 from components.adaptors import ForceToPositionAdaptor as ForceToPositionAdaptor
@@ -141,6 +144,7 @@ from components.thermal import HeatSource as HeatSource
 from components.thermal import TemperatureSensor as TemperatureSensor
 from components.thermal import ThermalConductor as ThermalConductor
 from components.thermal import ThermalMass as ThermalMass
+from components.thermal_clutches import ThermalClutch as ThermalClutch
 from components.torque_converters import TorqueConverter as TorqueConverter
 from components.translational_sensors import LinearAccelerationSensor as LinearAccelerationSensor
 from components.translational_sensors import LinearMultiSensor as LinearMultiSensor

@@ -49,6 +49,7 @@ PLAY = Icon(
 )
 CLUTCH = Icon(30, 48, lines="M-15 0 h9 M6 0 h9", heavy="M-6 -23 v46 M6 -23 v46", ports={"f_normalized": "N"},
               key=("capacity", "fn_max"))  # fmt: skip
+THERMAL_CLUTCH = replace(CLUTCH, lines="M-15 0 h9 M6 0 h9 M-2 10 v6 M2 10 v6 M-2 20 v6 M2 20 v6")
 MULTI_PLATE = Icon(36, 48, lines="M-18 0 h8 M10 0 h8 M-10 -23 h8 M-10 23 h8 M10 -17 h-8 M10 17 h-8",
                    heavy="M-10 -23 v46 M10 -17 v34 M-3 -23 v8 M-3 23 v-8 M3 -17 v9 M3 17 v-9",
                    ports={"f_normalized": "N"}, key=("capacity", "fn_max"))  # fmt: skip
@@ -106,6 +107,13 @@ SLIDE_BRAKE = replace(SLIDEWAY, solid=_rect(10, 5, 0, -12), ports={"f_normalized
 VEHICLE = Icon(64, 36, paper="M-31 6 v-8 l8 -3 l8 -10 h22 l9 10 l14 3 v8 Z",
                solid=f"{_circle(-17, 8, 7)} {_circle(17, 8, 7)}", key=("m",),
                ports=dict.fromkeys(("Cr", "inclination", "v_wind"), "N"))  # fmt: skip
+
+# -- actuators -------------------------------------------------------------------------------------------------------
+
+MAGNET = Icon(48, 44, paper=_rect(14, 20, -8), solid=_rect(4, 20, 16), lines="M-22 -12 l28 24 M-22 12 l28 -24 M8 0 h4",
+              ports={"p": ("W", -12), "n": ("W", 12), "y": "E"}, key=("R",))  # fmt: skip
+PISTON = Icon(52, 34, paper=_rect(26, 14), solid=_rect(4, 14), lines="M4 0 h3 l2 -7 l4 14 l4 -14 l4 14 l2 -7 h3",
+              ports={"p_in": "W", "y": "E"}, key=("A",))  # fmt: skip
 
 # -- sources and loads -----------------------------------------------------------------------------------------------
 
