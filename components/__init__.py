@@ -6,6 +6,7 @@ from typing import Any
 # Modules and their public names, each loaded when first used: a netlist needs few of them. For type checkers and
 # editors the same stands in `__init__.pyi`.
 _NAMES = {
+    "absorbers": "CentrifugalPendulum TunedAbsorber",
     "actuators": "ElectromagneticActuator HydraulicActuator PneumaticActuator",
     "adaptors": (
         "AngleToTorqueAdaptor CurrentToVoltageAdaptor ForceToPositionAdaptor HeatFlowToTemperatureAdaptor "
@@ -16,6 +17,7 @@ _NAMES = {
     "choppers": "HBridge",
     "contacts": "DogClutch RigidBacklash",
     "control": "PI PID ClutchActuator Feedback FirstOrder Gain Integrator Limiter P Sum",
+    "couplings": "ArcSpring DualMassFlywheel ElasticCoupling HystereticCoupling OldhamCoupling RuptureCoupling",
     "dc_machines": "PermanentMagnetDCMachine SeparatelyExcitedDCMachine SeriesDCMachine ShuntDCMachine",
     "eddy_current_brakes": "EddyCurrentForce EddyCurrentTorque",
     "electrical": (
@@ -53,12 +55,14 @@ _NAMES = {
     "signals": "CoilForce Constant Product Pulse Ramp Sine Step Table TimeFormula Trapezoid",
     "slides": "ElastoGap MassWithStopAndFriction Rod StribeckFriction SupportFriction TranslationalBrake",
     "sources": "ConstantForce ConstantSpeed ConstantTorque Force Speed Torque TorqueStep",
+    "speed_clutches": "CentrifugalClutch ViscousClutch",
     "spindles": "BallScrew MachineTable",
     "springs": (
         "Damper ElastoBacklash ElastoBacklash2 Spring SpringDamper TranslationalDamper TranslationalSpring "
         "TranslationalSpringDamper"
     ),
     "stepped_signals": "BooleanPulse BooleanStep BooleanTable StepTable",
+    "synchronisers": "Synchroniser",
     "thermal": "FixedTemperature HeatPort HeatSource TemperatureSensor ThermalConductor ThermalMass",
     "thermal_clutches": "ThermalClutch",
     "torque_converters": "TorqueConverter",
