@@ -29,6 +29,7 @@ _NAMES = {
     "friction": "BearingFriction Brake Clutch DryFriction MultiPlateClutch",
     "gearboxes": "Gearbox",
     "gears": "IdealGear",
+    "hoists": "HoldingBrake Rope WinchDrum",
     "inertias": "Inertia Mass",
     "interfaces": "Compliant CompliantWithRelativeStates Flange LinearFlange",
     "loads": "SpeedDependentLoad",
@@ -62,6 +63,7 @@ _NAMES = {
         "TranslationalSpringDamper"
     ),
     "stepped_signals": "BooleanPulse BooleanStep BooleanTable StepTable",
+    "switching": "Contactor Diode",
     "synchronisers": "Synchroniser",
     "thermal": "FixedTemperature HeatPort HeatSource TemperatureSensor ThermalConductor ThermalMass",
     "thermal_clutches": "ThermalClutch",
@@ -79,6 +81,7 @@ _NAMES = {
     "vehicles": "RollingResistance Vehicle",
     "waves": "CombiTable Cosine Exponentials ExpSine LogFrequencySweep SawTooth Sinc VariableSine",
     "wheels": "IdealGearR2T IdealRollingWheel",
+    "worms": "WormGear",
 }
 _HOME = {name: module for module, names in _NAMES.items() for name in names.split()}
 

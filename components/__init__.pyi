@@ -63,6 +63,9 @@ from components.friction import DryFriction as DryFriction
 from components.friction import MultiPlateClutch as MultiPlateClutch
 from components.gearboxes import Gearbox as Gearbox
 from components.gears import IdealGear as IdealGear
+from components.hoists import HoldingBrake as HoldingBrake
+from components.hoists import Rope as Rope
+from components.hoists import WinchDrum as WinchDrum
 from components.inertias import Inertia as Inertia
 from components.inertias import Mass as Mass
 from components.interfaces import Compliant as Compliant
@@ -148,6 +151,8 @@ from components.stepped_signals import BooleanPulse as BooleanPulse
 from components.stepped_signals import BooleanStep as BooleanStep
 from components.stepped_signals import BooleanTable as BooleanTable
 from components.stepped_signals import StepTable as StepTable
+from components.switching import Contactor as Contactor
+from components.switching import Diode as Diode
 from components.synchronisers import Synchroniser as Synchroniser
 from components.thermal import FixedTemperature as FixedTemperature
 from components.thermal import HeatPort as HeatPort
@@ -189,3 +194,4 @@ from components.waves import Sinc as Sinc
 from components.waves import VariableSine as VariableSine
 from components.wheels import IdealGearR2T as IdealGearR2T
 from components.wheels import IdealRollingWheel as IdealRollingWheel
+from components.worms import WormGear as WormGear

@@ -112,6 +112,12 @@ RACK = Icon(48, 44, paper=_circle(0, -4, 15), solid=_circle(0, -4, 2.5),
             ports={"flange_t": "E", "support_r": "S", "support_t": ("S", 10)})  # fmt: skip
 WHEEL = replace(RACK, lines=_hatch(-22, 12, 44), heavy="M-22 12 h44", solid=_circle(0, -4, 4))
 
+DRUM = replace(
+    RACK, paper=_circle(-4, -4, 15), lines="M11 -4 v24 M11 20 h13", solid=_circle(-4, -4, 2.5), key=("radius",)
+)
+HOLDING_BRAKE = replace(BRAKE, lines=f"{BRAKE.lines} M-5 -19 l10 -6 M-5 25 l10 -6", key=("capacity",),
+                        ports={"p": ("N", -8), "n": ("N", 8)})  # fmt: skip
+
 # -- slides ----------------------------------------------------------------------------------------------------------
 
 MASS = Icon(44, 34, solid=_rect(22, 17), key=("m",))
@@ -123,6 +129,8 @@ SLIDE_BRAKE = replace(SLIDEWAY, solid=_rect(10, 5, 0, -12), ports={"f_normalized
 VEHICLE = Icon(64, 36, paper="M-31 6 v-8 l8 -3 l8 -10 h22 l9 10 l14 3 v8 Z",
                solid=f"{_circle(-17, 8, 7)} {_circle(17, 8, 7)}", key=("m",),
                ports=dict.fromkeys(("Cr", "inclination", "v_wind"), "N"))  # fmt: skip
+
+ROPE = Icon(50, 14, lines="M-25 0 h4 q4 -6 8 0 q4 6 8 0 q4 -6 8 0 q4 6 8 0 q4 -6 8 0 h6", key=("c",))
 
 # -- actuators -------------------------------------------------------------------------------------------------------
 
@@ -177,6 +185,12 @@ CURRENT = Icon(44, 44, paper=_circle(0, 0, 18), lines="M22 -16 h-22 v-2 M22 16 h
                ports={"p": ("E", -16), "n": ("E", 16), "i_ref": "N"}, key=("I",))  # fmt: skip
 SWITCH = Icon(48, 24, lines="M-24 0 h12 L10 -11 M12 0 h12", solid=f"{_circle(-12, 0, 2.5)} {_circle(12, 0, 2.5)}",
               ports={"closed": "N"})  # fmt: skip
+DIODE = Icon(40, 22, lines="M-20 0 h12 M8 0 h12", solid="M-8 -9 L8 0 L-8 9 Z", heavy="M8 -10 v20")
+CONTACTOR = Icon(
+    52, 44, paper=_rect(14, 8, 0, -11), lines="M-26 12 h14 L8 2 M12 12 h14 M-2 6 v-8",
+    solid=f"{_circle(-12, 12, 2.5)} {_circle(12, 12, 2.5)}",
+    ports={"p": ("W", 12), "n": ("E", 12), "cp": ("W", -11), "cn": ("E", -11)},
+)  # fmt: skip
 BRIDGE = Icon(56, 52, paper=_rect(28, 26), lines="M-10 -14 v28 M10 -14 v28 M-10 0 h20 M-14 -14 h8 M6 -14 h8 M-14 14 h8 "
               "M6 14 h8", ports={
     "p": ("W", -15), "n": ("W", 15), "p_out": ("E", -15), "n_out": ("E", 15), "u": "N",

@@ -2,13 +2,14 @@
 
 from collections.abc import Callable
 from functools import lru_cache
-from math import acos, atan, cos, exp, log, pi, radians, sin, sqrt
+from math import acos, atan, cos, cosh, exp, log, pi, radians, sin, sqrt, tan
 from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.integrate import quad
 from scipy.linalg import expm
+from scipy.optimize import brentq
 from scipy.special import ellipk
 
 from modelica_like import simulate
@@ -122,6 +123,45 @@ def synchroniser(run: Solution) -> None:
     assert (grinding.component, grinding.time) == ("sharp", close(0.12))
     slip = 80 - 0.5 * slope * 0.02**2 / inertia
     assert grinding.energy == close(0.5 * inertia * slip**2)
+
+
+@numbers
+def hoists(run: Solution) -> None:
+    g, reach = 9.80665, 5 / 2
+    growth = sqrt(2 * g / (2 * 30 + 5 + 0.1 / 0.2**2))
+    assert run.final["hook.s"] == close(3 + reach - (3 + reach) * cosh(growth))
+    taut = sqrt(2 * 0.3 / g)
+    assert moment(run, "rope.rope", "taut") == close(taut)
+    swing = sqrt(20e3 / 50)
+    lowest = taut + (pi - atan(sqrt(2 * g * 0.3) * swing / g)) / swing
+    assert run.at(lowest)["rope.tension"] == close(50 * g * (1 + sqrt(1 + 2 * 0.3 * 20e3 / (50 * g))))
+    # A load that would pull the self-locking worm backwards brakes it: the friction of the flanks takes more than that.
+    rise, rho = tan(radians(3)), 0.06 / cos(radians(20))
+    back = (rise - rho) / (rise * (1 + rise * rho)) * 100 / 60
+    stopped = moment(run, "holds.mode", "stuck")
+    assert (back < 0, stopped) == (True, close(20 * 0.01 / -back))
+    assert [run.final["held_rotor.w"], run.final["rest_rotor.w"]] == close([0, 0])
+    rise, rho = tan(radians(20)), 0.05 / cos(radians(20))
+    back = tan(radians(20) - atan(rho)) / rise * 100 / 10
+    assert run.final["running_rotor.w"] == close(-back / 0.01)
+    assert [event.before for event in run.events if event.after == "told"] == ["locking", "starting"]
+    assert [run.final[f"{name}.self_locking"] for name in ("holds", "at_rest", "runs")] == [1, 1, 0]
+
+
+@numbers
+def switching(run: Solution) -> None:
+    # While the diode conducts: C·v' = (10·sin(w·t) - v)/1 - v/100; it blocks where the voltages are equal.
+    w, a = 100 * pi, (1 + 1 / 100) / 1e-3
+
+    def charged(t: float) -> float:
+        return 1e4 / (a**2 + w**2) * (a * sin(w * t) - w * cos(w * t) + w * exp(-a * t))
+
+    blocks = brentq(lambda t: 10 * sin(w * t) - charged(t), 0.005, 0.0099, xtol=1e-14)
+    assert next(e.time for e in run.events if (e.mode, e.before) == ("rectifier.state", "conducting")) == close(blocks)
+    assert run.at(0.015)["capacitor.v"] == close(charged(blocks) * exp(-(0.015 - blocks) / 0.1))
+    assert moment(run, "contactor.contacts", "closed") == close(0.01 + 0.6 / 48 * log(0.5 / 0.2))
+    full = 0.5 * (1 - exp(-0.05 * 48 / 0.6))
+    assert moment(run, "contactor.contacts", "open") == close(0.06 + 0.6 / 48 * log(full / 0.1))
 
 
 def test_every_netlist_has_numbers_and_a_line_on_the_page() -> None:
