@@ -65,7 +65,7 @@ def test_brake_by_hand() -> None:
 
 
 def test_stop_by_hand() -> None:
-    """The brake and at most what lifting takes, against the inertia at the motor; the elastic rope lets the load go on."""
+    """The brake and at most what lifting takes, against the inertia at the motor: the rope lets the load go on."""
     closed, still = moment("brake.brake.mode", "forward", 4.0), moment("brake.brake.mode", "stuck", 4.0)
     inertia = 0.008 + (0.15 + 0.35 * 20 * 0.08**2) / 40**2
     rate = run().at(closed)["motor.w"] / (still - closed)
