@@ -142,7 +142,8 @@ class BoundMode:
             reset: new values of variables and discrete values, in SI units.
             notice: what the report of a run says, such as "exceeds {w_max} rad/s": the name of the component comes
                 first, and values of its parameters stand for their names.
-            because: why it happens, in a few words, such as "slip reached zero"; else the condition as it is written.
+            because: why it happens, in a few words, such as "slip reached zero" or "is beyond {limit}" (the report
+                adds the value of the parameter); without it the report puts the condition into words.
             fails: the run ends there, with the notice as an error.
 
         Raises:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -16,8 +15,8 @@ from modelica_like.language.places import NOWHERE
 if TYPE_CHECKING:
     from modelica_like.language.mode import BoundMode
 
-NAME_IN_NOTICE = re.compile(r"\{(\w+)\}")
-"""A parameter in the notice of a transition."""
+NAME_IN_NOTICE = re.compile(r"\{([\w.]+)\}")
+"""A parameter in the notice or the reason of a transition."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,17 +45,6 @@ class Transition:
     notice: str = ""
     because: str = ""
     fails: bool = False
-
-    def reason(self) -> str:
-        """Return in words why it happens: as declared, or the condition as it is written."""
-        if self.because or self.at is not None:
-            return self.because or "its time has come"
-        try:
-            call: Any = ast.parse(self.source.text.removeprefix("yield ").strip(), mode="eval").body
-            written = next(one.value for one in call.keywords if one.arg == "when")
-        except (SyntaxError, AttributeError, StopIteration):  # not written as one call
-            return ""
-        return ast.unparse(written).replace("self.", "")
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,13 +104,13 @@ def _check_transition(transition: Transition, source: Source, component: str) ->
 
 
 def _check_notice(transition: Transition, source: Source, component: str) -> None:
-    """Check that the names in a notice are parameters."""
+    """Check that the names in a notice and in a reason are parameters."""
     fields = transition.mode.symbol.owner.fields
     parameters = [name for name, field in fields.items() if isinstance(field, Parameter)]
-    for name in NAME_IN_NOTICE.findall(transition.notice):
+    for name in NAME_IN_NOTICE.findall(transition.notice + transition.because):
         if name not in parameters:
             raise LanguageError(
-                f"{component}: the notice of an event names {name}, "
+                f"{component}: the notice or reason of an event names {name}, "
                 f"which is not a parameter{did_you_mean(name, parameters) or '.'}",
                 where=source,
             )
