@@ -10,8 +10,7 @@ import casadi as ca
 
 from modelica_like.language.expr import Symbol, symbols_in
 from modelica_like.language.fields import Parameter
-from modelica_like.language.mode import Mode
-from modelica_like.language.transition import Transition
+from modelica_like.language.mode import Mode, Transition
 
 _LONGEST, _TERM = 100, 40
 """Characters of a reason, and of one side of a relation, that a reader takes in at a glance."""

@@ -18,8 +18,9 @@ from modelica_like.language.declared import Declared
 from modelica_like.language.equation import Connection, Equation, FreeEnd, as_statement
 from modelica_like.language.expr import TIME, Symbol, flagged_motion, is_expression, symbol_of, symbols_in
 from modelica_like.language.fields import Parameter, Variable
+from modelica_like.language.mode import StartMode, Transition
 from modelica_like.language.places import located
-from modelica_like.language.transition import EventStatement, StartMode, Transition, as_event
+from modelica_like.language.transition import EventStatement, as_event
 from modelica_like.language.tunable import symbols_in_tables
 from modelica_like.units import ANY, Unit
 
