@@ -62,8 +62,8 @@ def simulate(
         from modelica_like.simulation import build
         from modelica_like.simulation import simulate as run
         from modelica_like.solve.display import Display
-        from modelica_like.solve.plot import matching
         from modelica_like.solve.plot import plot as draw
+        from modelica_like.solve.trajectories import matching
 
         model = build(assembly)
         matching(model, show or ())

@@ -39,7 +39,7 @@ def report(
         from modelica_like.report.page import save_report
         from modelica_like.report.progress import Bar
         from modelica_like.simulation import build, simulate
-        from modelica_like.solve.plot import matching
+        from modelica_like.solve.trajectories import matching
 
         model = build(drive)
         matching(model, show or ())
