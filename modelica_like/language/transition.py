@@ -50,7 +50,7 @@ class Transition:
     def reason(self) -> str:
         """Return in words why it happens: as declared, or the condition as it is written."""
         if self.because or self.at is not None:
-            return self.because or "its time has come"
+            return self.because or "its time is reached"
         try:
             call: Any = ast.parse(self.source.text.removeprefix("yield ").strip(), mode="eval").body
             written = next(one.value for one in call.keywords if one.arg == "when")
@@ -102,7 +102,7 @@ def _check_transition(transition: Transition, source: Source, component: str) ->
     moving = [s for s in asked if s is TIME or isinstance(_field(s), Variable)]
     if moving:
         raise LanguageError(
-            f"{component}: the time of an event depends on {moving[0].name}, so it is not known ahead.",
+            f"{component}: the time of an event depends on {moving[0].name}, so it is not known in advance.",
             where=source, advice="Write it as a state event, `when=…`.",
         )  # fmt: skip
     for target in transition.reset:

@@ -99,7 +99,7 @@ class Calibration:
             lines.append(f"  {name:{width}}  {value:.6g} {spread} {unit}{note}".rstrip())
         for combination in self.undetermined:
             parts = ", ".join(f"{name} {100 * weight:+.0f} %" for name, weight in combination.items())
-            lines.append(f"  The data do not tell this change: {parts}.")
+            lines.append(f"  The data do not determine this combination:  {parts}.")
         worst = int(np.argmax(np.abs(self.residuals)))
         lines.append(f"  largest residual {self.residuals[worst]:+.3g} of its uncertainty: {self.labels[worst]}")
         return "\n".join(lines)
@@ -143,7 +143,7 @@ def calibrate(
     if not found:
         raise CalibrationFailed(
             f"{model.name} could not be calibrated: {failures[-1].what}", where=failures[-1].where,
-            advice="Give a guess with which the model can be computed, or narrower bounds.",
+            advice="Give a guess for which the model can be solved, or narrower bounds.",
         )  # fmt: skip
     best = min(found, key=lambda one: one.cost)
     return problem.result(best, tuple(2 * one.cost for one in found))

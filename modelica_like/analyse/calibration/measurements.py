@@ -159,7 +159,7 @@ def _csv(path: Path) -> Mapping[str, Any]:
     except ValueError as error:
         raise NetlistError(f"{path.name} is not a table of numbers: {error}.") from None
     if rows.ndim != 2 or rows.shape[1] != len(titles):
-        raise NetlistError(f"{path.name}: rows have not as many columns as the title line.")
+        raise NetlistError(f"{path.name}: the rows and the title line differ in their number of columns.")
     return dict(zip(titles, rows.T, strict=True))
 
 

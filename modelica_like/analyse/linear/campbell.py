@@ -123,7 +123,7 @@ def campbell(
         ModelicaLikeError: a point cannot be found.
     """
     if len(over) != 1:
-        raise ValueOutOfRange(f"A Campbell diagram goes over one parameter, not {len(over)}.")
+        raise ValueOutOfRange(f"A Campbell diagram varies one parameter, not {len(over)}.")
     (path, values) = next(iter(over.items()))
     model = build(drive, free=[path])
     linear = [linearize(model.with_parameters({path: value}), at, outputs=[speed]) for value in values]

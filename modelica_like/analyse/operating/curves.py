@@ -93,7 +93,7 @@ def characteristic(
         InitializationError: there is no steady state for a value; the message names it.
     """
     if len(over) != 1:
-        raise ValueOutOfRange(f"A characteristic curve goes over one quantity, not {len(over)}.")
+        raise ValueOutOfRange(f"A characteristic curve varies one quantity, not {len(over)}.")
     (path, values) = next(iter(over.items()))
     model = build(drive, free=[path, by])
     points: list[OperatingPoint] = []
@@ -106,5 +106,5 @@ def characteristic(
             error.what = f"At {path} = {value}: {error.what}"
             raise
     if not points:
-        raise ValueOutOfRange(f"There is no value of {path} to go over.")
+        raise ValueOutOfRange(f"{path}: no values are given.")
     return Curves(path, tuple(points))

@@ -148,8 +148,8 @@ class _Target:
         if len(hold) != len(free):
             held, found = ", ".join(hold) or "nothing", ", ".join(free) or "nothing"
             raise ValueOutOfRange(
-                f"{model.name}: {held} cannot be held by {found}: each held variable takes one parameter.",
-                advice='Say for example steady(drive, {"motor.w": "3000 rpm"}, by="load.tau_constant").',
+                f"{model.name}: {held} cannot be held by {found}: each held variable needs one parameter.",
+                advice='Write for example steady(drive, {"motor.w": "3000 rpm"}, by="load.tau_constant").',
             )
         self.paths, self.free = list(hold), list(free)
         self.rows = nodes_of(model, self.paths)

@@ -196,7 +196,7 @@ def replay(
     model = solution.model
     if not model.states:
         raise LanguageError(
-            f"{model.name} has no states: nothing develops over time, so there is no run to differentiate.",
+            f"{model.name} has no states, so there is no run to differentiate.",
             advice="Compare runs with other parameter values instead.",
         )
     integrands = ca.SX(0, 1) if quadratures is None else quadratures

@@ -94,9 +94,9 @@ def _tie(chain: Replay, guards: Guards, guard: int, first: int, last: int) -> Ed
     terms = np.abs(part.by[0]) @ np.abs(np.concatenate([x, model.p, model.u, point.d]))
     error = NoGradient(
         f"No gradient from t = {chain.nodes[first].t:.9g} s on: {mode.path} stays {mode.names[int(point.d[one.mode])]} "
-        f"just at the limit at which it becomes {mode.names[one.target]}.",
+        f"exactly at the limit where it becomes {mode.names[one.target]}.",
         where=one.source,
-        why="A small change of a parameter decides whether it does, so the derivatives of both sides differ.",
+        why="A small change of a parameter decides whether it changes, so the derivatives on both sides differ.",
         advice="Move the parameters away from this limit.",
     )
     return Edge(Reading(float(part.value[0]), ((point, part.by[0]),)), _ROUNDING * float(terms), error)

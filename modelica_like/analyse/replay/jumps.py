@@ -226,7 +226,7 @@ def _grazing(event: Event) -> NoGradient:
         f"No gradient at t = {event.time:.9g} s: {event.mode} changes from {event.before} to {event.after} "
         "where its condition only grazes zero.",
         where=event.source,
-        why="A small change of a parameter moves the event by much, or lets it vanish.",
+        why="A small change of a parameter moves the event far, or removes it.",
         advice="Move the parameters away from this limit.",
     )
 
@@ -236,8 +236,8 @@ def _coincidence(one: Event, other: Event) -> NoGradient:
         f"No gradient at t = {one.time:.9g} s: '{one.mode}: {one.before} → {one.after}' and "
         f"'{other.mode}: {other.before} → {other.after}' happen at the same instant but for different reasons.",
         where=[one.source, other.source],
-        why="A small change of a parameter decides which comes first, so the derivatives of both sides differ.",
-        advice="Move the parameters apart.",
+        why="A small change of a parameter decides which comes first, so the derivatives on both sides differ.",
+        advice="Choose parameter values that separate the two events.",
     )
 
 

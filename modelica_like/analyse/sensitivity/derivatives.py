@@ -60,7 +60,7 @@ def sensitivities(
     if method not in get_args(Method):
         raise UnknownName(
             f"There is no method '{method}'{did_you_mean(method, get_args(Method)) or '.'}",
-            advice="Derivatives are found by forward or adjoint, or by what is cheaper: auto.",
+            advice="The methods are forward, adjoint and auto (the cheaper of both).",
         )
     if isinstance(drive, Solution):
         freed, solution = Freed(drive.model, {}), drive
@@ -94,7 +94,7 @@ def _chosen(model: CompiledDae, names: Sequence[str]) -> list[tuple[int, Quantit
             raise UnknownName(f"{model.name} has no parameter '{name}'{near or '.'}")
         if name in fixed:
             raise LanguageError(
-                f"{name} cannot change after compilation, so nothing can be differentiated by it.",
+                f"{name} cannot change after compilation, so there are no derivatives with respect to it.",
                 advice="Compare runs of models that were built with other values.",
             )
         k = known[name]

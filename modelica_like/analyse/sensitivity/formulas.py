@@ -78,12 +78,12 @@ def equal_to(model: CompiledDae, name: str) -> str | None:
 
 
 def bound_by_formula(model: CompiledDae, name: str) -> LanguageError:
-    """Return what is told of a parameter that cannot move on its own."""
+    """Return the error about a parameter that cannot be decoupled from its formula."""
     names = ", ".join(model.flat_parameters[k].path for k in _formula(model, name)[1])
     return LanguageError(
         f"{name} follows from other parameters ({names})." if names else f"{name} is given by a formula of numbers.",
-        advice=f"{'Ask for these, or h' if names else 'H'}and over the drive as it was before it was compiled or run: "
-        f"{name} then moves on its own.",
+        advice=f"{'Ask for these, or p' if names else 'P'}ass the drive before it is compiled or run: "
+        f"{name} is then decoupled from its formula.",
     )
 
 

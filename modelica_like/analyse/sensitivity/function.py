@@ -238,12 +238,12 @@ def _changed(expected: Sequence[Any], found: Sequence[Any], solution: Solution) 
     pairs = zip_longest(expected, found)
     same, (before, now) = next((k, pair) for k, pair in enumerate(pairs) if pair[0] != pair[1])
     before, now = (f"'{one[0]}: {one[1]} → {one[2]}'" if one else "" for one in (before, now))
-    what = f"{now} happens besides" if now else f"{before} is missing"
+    what = f"{now} happens additionally" if now else f"{before} is missing"
     if now and before:
         what = f"{now} happens instead of {before}"
     return NoGradient(
         f"{solution.model.name} has another mode sequence at these parameter values: "
         f"as mode change {same + 1}, {what}.",
         why="A function with a fixed mode sequence has derivatives only as long as the sequence stays.",
-        advice="Bound the parameters, begin elsewhere, or allow it with any_sequence=True.",
+        advice="Bound the parameters, start elsewhere, or allow it with any_sequence=True.",
     )

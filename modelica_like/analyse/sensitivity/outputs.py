@@ -147,7 +147,7 @@ def expression_of(model: CompiledDae, path: str) -> tuple[Callable[[], Any], Uni
         known += [f"{owner}.{word}" for word in (*columns, "lock_time", "unlock_time")]
     raise UnknownName(
         f"{model.name} has no variable '{path}'{did_you_mean(path, known) or '.'}",
-        advice="Besides variables there are max(…), min(…), integral(…), at(…, time), series(…), "
+        advice="Other outputs are max(…), min(…), integral(…), at(…, time), series(…), "
         "time(mode: before -> after), and of components loss_energy, source_energy, lock_time, unlock_time.",
     )
 

@@ -75,7 +75,7 @@ def _check_impacts(solution: Solution, outputs: Sequence[Output]) -> None:
             raise NoGradient(
                 f"No gradient of {output.name}: {found[0].component} loses {found[0].energy:.6g} J in an impact at "
                 f"t = {found[0].time:.9g} s.",
-                why="Only the loss of power over time is differentiated, not what an impact takes at once.",
+                why="Only losses over time are differentiated, not the energy of an impact.",
                 advice=f"Ask for integral({output.path.removesuffix('energy')}power), which leaves impacts out, or for "
                 "speeds after the impact.",
             )

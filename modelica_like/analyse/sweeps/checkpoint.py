@@ -41,8 +41,8 @@ class Checkpoint:
             self._group = zarr.open_group(self.path, mode="r+")
             if self._group.attrs.get("sweep") != key:
                 raise CheckpointMismatch(
-                    f"{self.path.name} holds another sweep: the model, its values, the points or the outputs differ.",
-                    advice="Give another file, or remove this one to begin anew.",
+                    f"{self.path.name} is from another sweep: the model, its values, the points or the outputs differ.",
+                    advice="Name another file, or delete this one to start again.",
                 )
         elif self.path.exists() and (not self.path.is_dir() or any(self.path.iterdir())):
             raise CheckpointMismatch(f"{self.path.name} exists and is not the checkpoint of a sweep.")

@@ -104,7 +104,7 @@ def make_plan(model: CompiledDae, over: Mapping[str, Iterable[Any]], sampling: S
         UnitError: a value has the wrong unit.
     """
     if not over:
-        raise ValueOutOfRange("A sweep goes over at least one parameter.")
+        raise ValueOutOfRange("A sweep needs at least one parameter.")
     units = {name: _unit(model, name) for name in over}
     values = {name: np.array([to_si(v, units[name], name) for v in given]) for name, given in over.items()}
     names, texts = tuple(values), tuple(str(unit) for unit in units.values())

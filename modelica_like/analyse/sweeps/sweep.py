@@ -130,12 +130,11 @@ def _notices(done: Done) -> list[str]:
     """Return what has to be said about native runs."""
     told: list[str] = []
     if done.by_idas:
-        told.append(f"IDAS did {done.by_idas} of {len(done.values)} runs, which the native run-time could not do.")
+        told.append(f"IDAS did {done.by_idas} of {len(done.values)} runs, where the native run-time failed.")
     if done.differences:
         listed = [f"  run {k}: {done.differences[k]}" for k in sorted(done.differences)[:_TOLD]]
         told.append(
-            f"{len(done.differences)} of {done.checked} runs that IDAS did once more are others with it:\n"
-            + "\n".join(listed)
+            f"In {len(done.differences)} of {done.checked} repeated runs IDAS has other results:\n" + "\n".join(listed)
         )
     return told
 
@@ -170,7 +169,7 @@ def _collect(
                 if progress is not None:
                     progress(count, total)
     except KeyboardInterrupt as error:
-        where = f"in {kept.path}: the same sweep goes on there" if kept is not None else "lost without a checkpoint"
+        where = f"in {kept.path}: the same sweep resumes there" if kept is not None else "lost without a checkpoint"
         error.add_note(f"{count} of {total} runs are {where}.")
         raise
     return kept.results() if kept is not None else found

@@ -242,8 +242,8 @@ def in_processes(job: Job, chunks: Sequence[Chunk], count: int) -> Generator[Don
         return
     raise _lost(
         left, f"worker processes of this machine died {_RESTARTS} times",
-        'If they died at their start: a script that sweeps keeps its own work behind if __name__ == "__main__":, '
-        "or says processes=1.",
+        'If they died at startup: put the work of a script under if __name__ == "__main__":, '
+        "or set processes=1.",
     )  # fmt: skip
 
 
@@ -271,7 +271,7 @@ def on_cluster(job: Job, chunks: Sequence[Chunk], scheduler: str) -> Generator[D
         client = dask.Client(scheduler, set_as_default=False, timeout=_PATIENCE)
     except (OSError, ValueError):
         raise WorkersLost(
-            f"There is no Dask scheduler at {scheduler}.", advice="Its address looks like tcp://host:8786."
+            f"There is no Dask scheduler at {scheduler}.", advice="An address looks like tcp://host:8786."
         ) from None
     with client:
         shared = client.scatter(job, broadcast=True, hash=False)
@@ -292,7 +292,7 @@ def _lost(left: dict[int, Any], why: str, hint: str = "") -> WorkersLost:
     count = sum(len(points) for points in left.values())
     return WorkersLost(
         f"{count} runs of the sweep were not done: {why}.",
-        advice=f"What was done is in the checkpoint, if there is one: start the sweep again with it. {hint}".rstrip(),
+        advice=f"Finished runs are in the checkpoint, if there is one: start the sweep again with it. {hint}".rstrip(),
     )
 
 
