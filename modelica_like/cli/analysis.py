@@ -22,7 +22,7 @@ def modes(
     outputs: Annotated[list[str] | None, Option("--output", metavar="NAME", help="Variable.")] = None,
     debug: Debug = False,
 ) -> None:  # fmt: skip
-    """Linearise a netlist at a point: eigenvalues, damping, where the energy of each mode is."""
+    """Linearize a netlist at a point: eigenvalues, damping, energy shares of each mode."""
     with told(debug, pictures=[shapes, bode]):
         assembly = load_netlist(netlist, assignments)
         from modelica_like.analyse.linear.linearize import linearize, when

@@ -38,7 +38,7 @@ def demo(
     pictures: Annotated[Path, Option(metavar="FOLDER", help="Where to write the pictures.")] = Path("build/demo"),
     *, debug: Debug = False,
 ) -> None:  # fmt: skip
-    """Run the start-ups of the examples against their published values."""
+    """Run the start-ups of the examples and compare them with the published values."""
     with told(debug):
         from runpy import run_path
 

@@ -71,7 +71,7 @@ class Batch:
         Args:
             parameters: in the order of `model.p`, unchecked, shape (runs, parameters).
             inputs: in the order of `model.u`, shape (runs, inputs).
-            stop: not zero as soon as nobody waits for them any more.
+            stop: becomes nonzero when the results are no longer needed.
 
         Returns:
             Numbers, shape (runs, readings), and which runs failed, shape (runs,). What does not happen is nan.

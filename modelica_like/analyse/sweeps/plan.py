@@ -1,4 +1,4 @@
-"""Which parameter values a sweep tries: full grids, Latin hypercubes, Sobol sequences."""
+"""Parameter values of a sweep: full grids, Latin hypercubes, Sobol sequences."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class LatinHypercube:
 
     Attributes:
         count: number of runs.
-        seed: of the random numbers, so that a sweep can be repeated.
+        seed: of the random numbers, to repeat a sweep.
     """
 
     count: int
