@@ -1,6 +1,6 @@
 """Acausal component models of drive-trains.
 
-Written once, simulated, differentiated and exported from one description.
+One description of a drive is simulated, differentiated and exported.
 """
 
 from __future__ import annotations

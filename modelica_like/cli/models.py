@@ -16,7 +16,7 @@ Solver = Literal["idas", "native"]
 
 def check(
     netlist: Netlist, assignments: Assignments = None, *,
-    start: Annotated[bool, Option("--start", help="Print the start values and where each comes from.")] = False,
+    start: Annotated[bool, Option("--start", help="Print the start values and their origin.")] = False,
     debug: Debug = False,
 ) -> None:  # fmt: skip
     """Check a netlist: equations, unknowns, states, index, blocks, energy terms."""
@@ -36,17 +36,17 @@ def check(
 
 def simulate(
     netlist: Netlist, assignments: Assignments = None, *,
-    until: Annotated[str | None, Option(metavar="TIME", help="End time, e.g. 2s; else the netlist's.")] = None,
+    until: Annotated[str | None, Option(metavar="TIME", help="End time, e.g. 2s; default: the netlist's.")] = None,
     start: Annotated[Start | None, Option(help="Start values: as given, from rest, or the steady state.")] = None,
     csv: Annotated[Path | None, Option(metavar="FILE", help="Write a table: .csv, .parquet, .nc.")] = None,
     points: Annotated[int | None, Option(metavar="N", help="Number of equal intervals of the results.")] = None,
     units: Annotated[bool, Option("--units", help="Units in a second header line of the table.")] = False,
     plot: Annotated[Path | None, Option(metavar="FILE", help="Draw the results: .png, .svg or .pdf.")] = None,
-    show: Annotated[list[str] | None, Option(metavar="PATTERN", help="What to draw, e.g. '*.w'.")] = None,
+    show: Annotated[list[str] | None, Option(metavar="PATTERN", help="Variables to draw, e.g. '*.w'.")] = None,
     display: Annotated[
-        list[str] | None, Option(metavar="WHAT=UNIT", help="Show in a unit, e.g. speed=rpm or '*.phi=deg'.")
+        list[str] | None, Option(metavar="WHAT=UNIT", help="Unit of results, e.g. speed=rpm or '*.phi=deg'.")
     ] = None,
-    sankey: Annotated[Path | None, Option(metavar="FILE", help="Draw where the energy went.")] = None,
+    sankey: Annotated[Path | None, Option(metavar="FILE", help="Draw an energy flow diagram.")] = None,
     energy: Annotated[bool, Option(help="Print the energy balance.")] = True,
     solver: Annotated[Solver | None, Option(help="IDAS only, or only the compiled run-time of FMUs.")] = None,
     debug: Debug = False,

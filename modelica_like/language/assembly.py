@@ -50,7 +50,7 @@ class Assembly(Component):
     def add_parameter(self, name: str, value: Any) -> None:
         """Declare a parameter of the assembly; its unit is that of its value."""
         if name in self.fields or name in self._parts:
-            raise DuplicateName(f"{self.label}: '{name}' is already the name of something else.")
+            raise DuplicateName(f"{self.label}: '{name}' is already in use.")
         field: Parameter = param("*")
         field.owner, field.name = self.label, name
         field.default = value
@@ -155,7 +155,7 @@ class Assembly(Component):
         owner, _, name = path.rpartition(".")
         if owner and name in self.find(owner).connectors:
             raise WrongConnection(
-                f"{path} is a connector, and a series joins parts.",
+                f"{path} is a connector, but a series joins parts.",
                 advice=f"Write {owner} in the series, or join {path} in a connection of its own.",
             )
         return self.find(path)

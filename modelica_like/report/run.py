@@ -153,9 +153,7 @@ def couplings_table(solution: CosimSolution) -> Table:
          f"{one.residual / one.throughput:.1e}" if one.throughput else "", f"{one.mismatch:.3g}")
         for one in solution.couplings
     ]  # fmt: skip
-    return table(
-        "energy at the couplings in J", "coupling", "through>", "made by it>", "share>", "mismatch>", rows=rows
-    )
+    return table("energy at the couplings in J", "coupling", "through>", "created>", "share>", "mismatch>", rows=rows)
 
 
 def steps_line(solution: CosimSolution) -> str:
@@ -163,5 +161,5 @@ def steps_line(solution: CosimSolution) -> str:
     sizes = f"{solution.shortest:.3g} s"
     if solution.longest > solution.shortest * (1 + 1e-6):
         sizes += f" to {solution.longest:.3g} s"
-    back = f", {solution.rejected} taken back" if solution.rejected else ""
+    back = f", {solution.rejected} rejected" if solution.rejected else ""
     return f"{solution.steps} communication steps of {sizes}{back}, {solution.statistics.seconds:.2f} s"

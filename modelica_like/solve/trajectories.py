@@ -35,7 +35,7 @@ class Statistics:
         evaluations: evaluations of the equations.
         integrations: calls of the integrator (panels and event locations).
         events: mode changes.
-        seconds: wall time of initialisation and integration.
+        seconds: wall time of initialization and integration.
     """
 
     steps: int

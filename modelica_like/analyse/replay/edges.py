@@ -1,4 +1,4 @@
-"""Edges: parameter values at which a run has other derivatives on one side than on the other."""
+"""Edges: parameter values at which the derivatives of a run differ on both sides."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from modelica_like.errors import NoGradient
 from modelica_like.solve.guards import Guards
 
 _STILL = 1e-7
-"""Values of a guard, relative to its largest one, that may be zero; and to what a parameter changes, that are."""
+"""A guard is possibly zero below this share of its largest value, and zero below this share of a parameter's effect."""
 _ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
 class Edge:
-    """Where a run may be on an edge: it is, if the reading changes with a parameter.
+    """A possible edge of a run: it is one if the reading changes with a parameter.
 
     Attributes:
         reading: what is zero on the edge.
-        least: change per relative change of a parameter up to which it is rounding.
-        error: what to say.
+        least: change per relative change of a parameter that counts as rounding.
+        error: the error for the user.
     """
 
     reading: Reading
@@ -35,7 +35,7 @@ class Edge:
     error: NoGradient
 
     def moved_by(self, changes: Vector) -> NDArray[np.bool_]:
-        """Return which parameters lead away from the edge, so that there is no derivative by them.
+        """Return which parameters lead away from the edge; derivatives by these do not exist.
 
         Args:
             changes: changes of the reading per relative change of each parameter, shape (parameters,).
@@ -48,7 +48,7 @@ def edges(chain: Replay, readings: Sequence[Reading]) -> list[Edge]:
 
     Args:
         chain: the run.
-        readings: what is asked for; it may depend on the times of jumps.
+        readings: the requested ones, which may depend on the times of jumps.
     """
     timed = {id(node) for one in readings for node, _ in one.parts}
     found = [
@@ -60,12 +60,12 @@ def edges(chain: Replay, readings: Sequence[Reading]) -> list[Edge]:
 
 
 def _ties(chain: Replay) -> list[Edge]:
-    """Guards that are zero all along a segment, without firing: torque that is just what friction can bear."""
+    """Guards that are zero all along a segment without firing: a torque that equals the friction limit."""
     model = chain.model
     guards, found = Guards(model), list[Edge]()
     if not guards.count:
         return found
-    # Those that may not fire are -1.
+    # Guards that cannot fire are -1.
     values, rates = np.array([guards.at(node)[:2] for node in chain.nodes]).transpose(1, 0, 2)
     near = _STILL * np.maximum(1.0, np.abs(values).max(axis=0))
     still_at = (np.abs(values) <= near) & (np.abs(rates) * (chain.nodes[-1].t - chain.nodes[0].t) <= near)
@@ -74,13 +74,13 @@ def _ties(chain: Replay) -> list[Edge]:
         lasts = chain.nodes[last].t > chain.nodes[first].t
         still = np.all(still_at[first : last + 1], axis=0)
         if isinstance(move := chain.moves[last] if last < len(chain.moves) else None, Jump):
-            # What fires at the end of the segment was on its way.
+            # A guard that fires at the end of the segment was approaching zero.
             fired = [model.transitions[one.transition] for one in move.events if one.transition >= 0 and not one.round]
             still[[guards.positions[id(one)] for one in fired if not one.timed]] = False
         if lasts:
             found += [_tie(chain, guards, int(k), first, last) for k in np.flatnonzero(still)]
         first = last + 1
-    # What fires just at the end of the run does so only on one side.
+    # A guard that fires exactly at the end of the run fires on one side only.
     last = len(chain.nodes) - 1
     fires = (np.abs(values[last]) <= near) & ~still_at[last] & (rates[last] > 0.0)
     return found + [_tie(chain, guards, int(k), last, last) for k in np.flatnonzero(fires)]
@@ -94,9 +94,9 @@ def _tie(chain: Replay, guards: Guards, guard: int, first: int, last: int) -> Ed
     terms = np.abs(part.by[0]) @ np.abs(np.concatenate([x, model.p, model.u, point.d]))
     error = NoGradient(
         f"No gradient from t = {chain.nodes[first].t:.9g} s on: {mode.path} stays {mode.names[int(point.d[one.mode])]} "
-        f"just at the limit at which it becomes {mode.names[one.target]}.",
+        f"exactly at the limit where it becomes {mode.names[one.target]}.",
         where=one.source,
-        why="A small change of a parameter decides whether it does, so the derivatives of both sides differ.",
+        why="A small change of a parameter decides whether it changes, so the derivatives on both sides differ.",
         advice="Move the parameters away from this limit.",
     )
     return Edge(Reading(float(part.value[0]), ((point, part.by[0]),)), _ROUNDING * float(terms), error)
