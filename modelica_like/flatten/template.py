@@ -207,7 +207,8 @@ def _build(component: Component) -> Template:
     events = [as_event(item, source, kind) for item, source in located(component.events(), f"{kind}.events()")]
     equations = [s for s in statements if isinstance(s, Equation)]
     wiring = tuple(s for s in statements if isinstance(s, Connection | FreeEnd))
-    check_balance(component, equations)
+    ends = (end for one in wiring if isinstance(one, Connection) for end in one.ends if isinstance(end, Symbol))
+    check_balance(component, equations, {end.name for end in ends if end.owner is component})
     inferred = check_units(component, equations, events)
     residuals = [e.left - e.right for e in equations]
     changes = _Changes(component, events)
