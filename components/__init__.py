@@ -28,21 +28,24 @@ _NAMES = {
     "gears": "IdealGear",
     "inertias": "Inertia Mass",
     "interfaces": "Compliant CompliantWithRelativeStates Flange LinearFlange",
+    "linear_blocks": "Derivative SecondOrder TransferFunction",
     "loads": "SpeedDependentLoad",
     "lossy_gears": "ConstantEfficiencyGear LossyGear",
     "motions": (
         "InitializeFlange Move RelativeStates TranslationalInitializeFlange TranslationalMove "
         "TranslationalRelativeStates"
     ),
+    "nonlinear_blocks": "DeadZone Hysteresis PulseCounter Quantizer SlewRateLimiter VariableLimiter",
     "one_way": "Freewheel OneWayClutch TorqueLimiter",
     "planetary": "Differential IdealPlanetary LossyPlanetarySet PlanetarySet",
     "point_to_point": "KinematicPTP2",
+    "sampled": "FrequencyMeter NormalNoise UniformNoise ZeroOrderHold",
     "screw_drives": "BallScrewDrive",
     "sensors": (
         "AngleSensor ForceSensor MultiSensor PositionSensor PowerSensor RelativeAngleSensor RelativeSpeedSensor "
         "SpeedLimit SpeedSensor TorqueSensor"
     ),
-    "shaft_sensors": "AccelerationSensor RelativeAccelerationSensor",
+    "shaft_sensors": "AccelerationSensor PulseSensor RelativeAccelerationSensor",
     "shaft_sources": (
         "Accelerate InverseSpeedDependentTorque LinearSpeedDependentTorque Position QuadraticSpeedDependentTorque "
         "SignTorque Torque2"

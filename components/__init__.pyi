@@ -58,6 +58,9 @@ from components.interfaces import Compliant as Compliant
 from components.interfaces import CompliantWithRelativeStates as CompliantWithRelativeStates
 from components.interfaces import Flange as Flange
 from components.interfaces import LinearFlange as LinearFlange
+from components.linear_blocks import Derivative as Derivative
+from components.linear_blocks import SecondOrder as SecondOrder
+from components.linear_blocks import TransferFunction as TransferFunction
 from components.loads import SpeedDependentLoad as SpeedDependentLoad
 from components.lossy_gears import ConstantEfficiencyGear as ConstantEfficiencyGear
 from components.lossy_gears import LossyGear as LossyGear
@@ -67,6 +70,12 @@ from components.motions import RelativeStates as RelativeStates
 from components.motions import TranslationalInitializeFlange as TranslationalInitializeFlange
 from components.motions import TranslationalMove as TranslationalMove
 from components.motions import TranslationalRelativeStates as TranslationalRelativeStates
+from components.nonlinear_blocks import DeadZone as DeadZone
+from components.nonlinear_blocks import Hysteresis as Hysteresis
+from components.nonlinear_blocks import PulseCounter as PulseCounter
+from components.nonlinear_blocks import Quantizer as Quantizer
+from components.nonlinear_blocks import SlewRateLimiter as SlewRateLimiter
+from components.nonlinear_blocks import VariableLimiter as VariableLimiter
 from components.one_way import Freewheel as Freewheel
 from components.one_way import OneWayClutch as OneWayClutch
 from components.one_way import TorqueLimiter as TorqueLimiter
@@ -75,6 +84,10 @@ from components.planetary import IdealPlanetary as IdealPlanetary
 from components.planetary import LossyPlanetarySet as LossyPlanetarySet
 from components.planetary import PlanetarySet as PlanetarySet
 from components.point_to_point import KinematicPTP2 as KinematicPTP2
+from components.sampled import FrequencyMeter as FrequencyMeter
+from components.sampled import NormalNoise as NormalNoise
+from components.sampled import UniformNoise as UniformNoise
+from components.sampled import ZeroOrderHold as ZeroOrderHold
 from components.screw_drives import BallScrewDrive as BallScrewDrive
 from components.sensors import AngleSensor as AngleSensor
 from components.sensors import ForceSensor as ForceSensor
@@ -87,6 +100,7 @@ from components.sensors import SpeedLimit as SpeedLimit
 from components.sensors import SpeedSensor as SpeedSensor
 from components.sensors import TorqueSensor as TorqueSensor
 from components.shaft_sensors import AccelerationSensor as AccelerationSensor
+from components.shaft_sensors import PulseSensor as PulseSensor
 from components.shaft_sensors import RelativeAccelerationSensor as RelativeAccelerationSensor
 from components.shaft_sources import Accelerate as Accelerate
 from components.shaft_sources import InverseSpeedDependentTorque as InverseSpeedDependentTorque

@@ -197,6 +197,11 @@ DIFFERENCE = Icon(30, 30, paper=_circle(0, 0, 15), lines="M-7 0 h14", ports={"u1
 PRODUCT = Icon(30, 30, paper=_circle(0, 0, 15), lines="M-6 -6 l12 12 M-6 6 l12 -12", ports={"u1": "W", "u2": "S"})
 LIMITER = block("M-14 9 h7 l14 -18 h7")
 INTEGRATOR = block("", text="∫")
+DERIVATIVE = block("", text="d/dt")
+TRANSFER = block("", text="b/a", key=("k",))
+DEAD_ZONE = block("M-14 10 l8 -10 h12 l8 -10", key=("u_max",))
+HYSTERESIS = block("M-14 8 h20 v-16 M14 -8 h-20 v16")
+NOISE = block("M-14 2 l3 -8 l3 12 l3 -7 l3 9 l3 -14 l3 10 l3 -4 l3 6 l4 -9")
 _CONTROL = {"u_s": ("W", 0.0), "u_m": ("S", 0.0), "u_ff": ("N", 0.0)}
 CONTROL_P = replace(block("", text="P", key=("k",)), ports=_CONTROL)
 CONTROL_PI = replace(block("", text="PI", key=("k",)), ports=_CONTROL)

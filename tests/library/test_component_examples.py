@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from functools import lru_cache
-from math import atan, cos, exp, log, pi, sin, sqrt, tan, tanh
+from math import asin, atan, cos, exp, log, pi, sin, sqrt, tan, tanh
 from pathlib import Path
 
 import numpy as np
@@ -353,6 +353,50 @@ def waves(run: Solution) -> None:
     ]
     assert [2 * run.final[f"rotor[{k}].w"] for k in range(1, 8)] == close(torques)
     assert [2 * run.final[f"wheel[{k}].w"] for k in range(1, 6)] == close([0.5, 4 * 0.1, 0.25 + 1.25, 2, 1 + 2])
+
+
+@numbers
+def limited_control(run: Solution) -> None:
+    assert run.at(0.2)["ramp.y"] == close(50 * 0.2)
+    assert run.at(0.39)["rotor.w"] - run.at(0.3)["rotor.w"] == close(0.09 * (4 - 2) / 0.1)
+    assert run.at(0.42)["rotor.w"] - run.at(0.4)["rotor.w"] == close(0.02 * (10 - 2) / 0.1)
+    assert [run.final["rotor.w"], run.final["allowed.y"]] == close([20, 2])
+
+
+@numbers
+def filters(run: Solution) -> None:
+    def delayed(t: float) -> float:
+        return 3 * (1 - exp(-t / 0.3) * (1 + t / 0.3))
+
+    def oscillating(t: float) -> float:
+        w = 10 * sqrt(1 - 0.2**2)
+        return 3 * (1 - exp(-2 * t) * (cos(w * t) + 2 / w * sin(w * t)))
+
+    begin = asin(0.5) / (pi / 2)
+    beyond = quad(lambda t: 2 * sin(pi / 2 * t) - 1, begin, 2 - begin)[0]
+    assert [2 * run.final[f"rotor[{k}].w"] for k in (1, 2, 3, 4)] == close(
+        [quad(delayed, 0, 4)[0], quad(oscillating, 0, 4)[0], 0.5 * 8, 0]
+    )
+    assert 2 * run.at(2)["rotor[4].w"] == close(beyond)
+    assert run.at(1)["rate.y"] == close(0.5 * 4 * (1 - exp(-10)))
+
+
+@numbers
+def sampled_control(run: Solution) -> None:
+    assert [run.at(0.1 * n + 1e-6)["rotor.w"] for n in (1, 2, 5)] == pytest.approx(
+        [40 * (1 - 0.5**n) for n in (1, 2, 5)], abs=3e-4
+    )
+    assert [run.final[name] for name in ("rotor.w", "fast.y")] == close([40, 1])
+    assert run.final["encoder.y"] == 0.25 * round(run.final["rotor.phi"] / 0.25)
+    # 20 rad in half a second are 12.7 pulses of a quarter of a turn.
+    assert round(run.final["meter.y"] / pi, 9) in (12, 13)
+    numbers, state = [], 42
+    for _ in range(12):
+        state = 48271 * state % (2**31 - 1)
+        numbers.append(state / (2**31 - 1))
+    assert run.final["wheel[1].w"] == close(2 * 0.5 * sum(numbers[:6]))
+    pairs = zip(numbers[1::2], [*numbers[2::2], 48271 * state % (2**31 - 1) / (2**31 - 1)], strict=True)
+    assert run.final["wheel[2].w"] == close(0.5 * sum(2 * sqrt(-2 * log(u)) * cos(2 * pi * v) for u, v in pairs))
 
 
 def test_every_netlist_has_numbers_and_a_line_on_the_page() -> None:
