@@ -10,6 +10,7 @@ _NAMES = {
         "AngleToTorqueAdaptor CurrentToVoltageAdaptor ForceToPositionAdaptor HeatFlowToTemperatureAdaptor "
         "PositionToForceAdaptor TemperatureToHeatFlowAdaptor TorqueToAngleAdaptor VoltageToCurrentAdaptor"
     ),
+    "batteries": "Battery",
     "belts": "TimingBelt",
     "bristle_friction": "LuGreFriction",
     "choppers": "HBridge",
@@ -18,8 +19,8 @@ _NAMES = {
     "dc_machines": "PermanentMagnetDCMachine SeparatelyExcitedDCMachine SeriesDCMachine ShuntDCMachine",
     "eddy_current_brakes": "EddyCurrentForce EddyCurrentTorque",
     "electrical": (
-        "Capacitor ConstantCurrent ConstantVoltage CurrentSensor CurrentSink Ground Inductor Pin Resistor "
-        "SignalVoltage Switch VariableResistor VoltageSensor"
+        "Capacitor ConstantCurrent ConstantVoltage CurrentSensor CurrentSink ElectricalPowerSensor Ground Inductor "
+        "Pin Resistor SignalCurrent SignalVoltage Switch VariableResistor VoltageSensor"
     ),
     "fixed": "Disc Fixed TranslationalFixed",
     "flexible_shafts": "FlexibleShaft StribeckBearing",
@@ -45,6 +46,7 @@ _NAMES = {
         "AngleSensor ForceSensor MultiSensor PositionSensor PowerSensor RelativeAngleSensor RelativeSpeedSensor "
         "SpeedLimit SpeedSensor TorqueSensor"
     ),
+    "servos": "PositionServo ServoMotor",
     "shaft_sensors": "AccelerationSensor PulseSensor RelativeAccelerationSensor",
     "shaft_sources": (
         "Accelerate InverseSpeedDependentTorque LinearSpeedDependentTorque Position QuadraticSpeedDependentTorque "
@@ -61,7 +63,10 @@ _NAMES = {
         "TranslationalSpringDamper"
     ),
     "stepped_signals": "BooleanPulse BooleanStep BooleanTable StepTable",
-    "thermal": "FixedTemperature HeatPort HeatSource TemperatureSensor ThermalConductor ThermalMass",
+    "thermal": (
+        "FixedTemperature HeatPort HeatSource PrescribedHeatFlow PrescribedTemperature TemperatureSensor "
+        "ThermalConductor ThermalMass"
+    ),
     "torque_converters": "TorqueConverter",
     "translational_sensors": (
         "LinearAccelerationSensor LinearMultiSensor LinearPowerSensor RelativeLinearAccelerationSensor "

@@ -6,6 +6,7 @@ from components.adaptors import PositionToForceAdaptor as PositionToForceAdaptor
 from components.adaptors import TemperatureToHeatFlowAdaptor as TemperatureToHeatFlowAdaptor
 from components.adaptors import TorqueToAngleAdaptor as TorqueToAngleAdaptor
 from components.adaptors import VoltageToCurrentAdaptor as VoltageToCurrentAdaptor
+from components.batteries import Battery as Battery
 from components.belts import TimingBelt as TimingBelt
 from components.bristle_friction import LuGreFriction as LuGreFriction
 from components.choppers import HBridge as HBridge
@@ -32,10 +33,12 @@ from components.electrical import ConstantCurrent as ConstantCurrent
 from components.electrical import ConstantVoltage as ConstantVoltage
 from components.electrical import CurrentSensor as CurrentSensor
 from components.electrical import CurrentSink as CurrentSink
+from components.electrical import ElectricalPowerSensor as ElectricalPowerSensor
 from components.electrical import Ground as Ground
 from components.electrical import Inductor as Inductor
 from components.electrical import Pin as Pin
 from components.electrical import Resistor as Resistor
+from components.electrical import SignalCurrent as SignalCurrent
 from components.electrical import SignalVoltage as SignalVoltage
 from components.electrical import Switch as Switch
 from components.electrical import VariableResistor as VariableResistor
@@ -99,6 +102,8 @@ from components.sensors import RelativeSpeedSensor as RelativeSpeedSensor
 from components.sensors import SpeedLimit as SpeedLimit
 from components.sensors import SpeedSensor as SpeedSensor
 from components.sensors import TorqueSensor as TorqueSensor
+from components.servos import PositionServo as PositionServo
+from components.servos import ServoMotor as ServoMotor
 from components.shaft_sensors import AccelerationSensor as AccelerationSensor
 from components.shaft_sensors import PulseSensor as PulseSensor
 from components.shaft_sensors import RelativeAccelerationSensor as RelativeAccelerationSensor
@@ -152,6 +157,8 @@ from components.stepped_signals import StepTable as StepTable
 from components.thermal import FixedTemperature as FixedTemperature
 from components.thermal import HeatPort as HeatPort
 from components.thermal import HeatSource as HeatSource
+from components.thermal import PrescribedHeatFlow as PrescribedHeatFlow
+from components.thermal import PrescribedTemperature as PrescribedTemperature
 from components.thermal import TemperatureSensor as TemperatureSensor
 from components.thermal import ThermalConductor as ThermalConductor
 from components.thermal import ThermalMass as ThermalMass

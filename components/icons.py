@@ -166,7 +166,10 @@ AMMETER = Icon(40, 36, paper=_circle(0, 0, 17), lines="M-20 0 h3 M17 0 h3", text
 # -- heat ------------------------------------------------------------------------------------------------------------
 
 THERMAL_MASS = Icon(36, 36, solid=_rect(18, 18), text="C", key=("C",))
-TEMPERATURE = Icon(36, 36, paper=_circle(0, 0, 17), text="T", key=("T",))
+WATTMETER = Icon(40, 36, paper=_circle(0, 0, 17), lines="M-20 0 h3 M17 0 h3", text="W",
+                 ports={"pc": "W", "nc": "E", "pv": "N", "nv": ("S", -8), "power": ("S", 8)})  # fmt: skip
+SERVO = replace(MOTOR, text="SM", lines="M24 0 h2", ports={"flange": "E"}, key=("I_max",))
+TEMPERATURE = Icon(36, 36, paper=_circle(0, 0, 17), text="T", key=("T",), ports={"T": "N"})
 HEAT_SOURCE = replace(TEMPERATURE, text="Q", key=("Q_flow",))
 CONDUCTOR = Icon(
     48, 24, paper=_rect(16, 12), lines="M-24 0 h8 M16 0 h8 M-9 -5 l5 10 M-2 -5 l5 10 M5 -5 l5 10", key=("G",)

@@ -399,6 +399,23 @@ def sampled_control(run: Solution) -> None:
     assert run.final["wheel[2].w"] == close(0.5 * sum(2 * sqrt(-2 * log(u)) * cos(2 * pi * v) for u, v in pairs))
 
 
+@numbers
+def battery(run: Solution) -> None:
+    assert [run.final["battery.soc"], run.final["battery.v_cell"]] == close([0.75, 3.85])
+    assert run.final["meter.power"] == close(10 * (3.85 - 2 * (0.02 + 0.01)) * 4)
+    # After 45 time constants of the RC element, nearly all loss is (R_i + R_1)·i² in 20 cells.
+    warm = 298.15 + (5 + 20 * 0.03 * 4) / 2
+    assert run.final["cells.T"] == pytest.approx(warm + (298.15 - warm) * exp(-900 / 400), abs=0.05)
+
+
+@numbers
+def servo(run: Solution) -> None:
+    assert run.at(0.01)["table.w"] - run.at(0.006)["table.w"] == pytest.approx(0.004 * 0.5 * 30 / 3e-3, rel=0.01)
+    assert [run.final["table.phi"], run.final["spindle.motor.w"]] == close([3, 100])
+    assert run.final["spindle.motor.ia"] == close(6 / 0.5)
+    assert run.final["spindle.inverter.v"] == close(0.8 * 12 + 0.5 * 100)
+
+
 def test_every_netlist_has_numbers_and_a_line_on_the_page() -> None:
     names = {path.stem for path in FOLDER.glob("*.toml")}
     assert names == NUMBERS.keys()
