@@ -19,8 +19,8 @@ from modelica_like.language import (
 )
 
 
-class ServoMotor(Component):
-    """Motor whose drive controls its current and its speed.
+class Servo(Component, partial=True):
+    """Motor whose drive controls its current and its speed, in a cascade.
 
     The current controller compensates the time constant of the winding and the induced voltage, so that the current
     follows with the time constant T_current until the voltage V_max is reached. The speed controller is set by the
@@ -32,7 +32,6 @@ class ServoMotor(Component):
     icon = icons.SERVO
     flange = Flange("shaft end")
     outlet = "flange"
-    w_ref: Input = signal_in("rad/s", "set value of the speed")
     k: Parameter = param("N.m/A", "torque over current", min=1e-12)
     R: Parameter = param("Ohm", "resistance of the winding", min=1e-12)
     L: Parameter = param("H", "inductance of the winding", min=1e-12)
@@ -52,7 +51,6 @@ class ServoMotor(Component):
     tacho = SpeedSensor()
 
     def equations(self) -> Equations:
-        yield connect(self.w_ref, self.speed.u_s)
         yield connect(self.tacho.w, self.speed.u_m, self.induced.u)
         yield connect(self.speed.y, self.current.u_s)
         yield connect(self.ammeter.i, self.current.u_m)
@@ -64,23 +62,30 @@ class ServoMotor(Component):
         yield connect(self.motor.flange, self.tacho.flange, self.flange)
 
 
-class PositionServo(Component):
-    """Servo motor whose drive controls its angle: a proportional controller gives the speed, up to w_max."""
+class ServoMotor(Servo):
+    """Motor with a drive that controls its speed."""
 
-    icon = icons.SERVO
-    flange = Flange("shaft end")
-    outlet = "flange"
+    w_ref: Input = signal_in("rad/s", "set value of the speed")
+
+    def equations(self) -> Equations:
+        yield from super().equations()
+        yield connect(self.w_ref, self.speed.u_s)
+
+
+class PositionServo(Servo):
+    """Motor with a drive that controls its angle: a proportional controller gives the speed, up to w_max."""
+
     phi_ref: Input = signal_in("rad", "set value of the angle")
     w_ff: Input = signal_in("rad/s", "speed of the set value, as feed-forward", default=0.0)
     Kv: Parameter = param("1/s", "gain, speed over error of the angle", min=0)
     w_max: Parameter = param("rad/s", "largest speed", min=0)
-    servo: ServoMotor = ServoMotor()
     position = P(k="Kv", y_max="w_max")
     encoder = AngleSensor()
 
     def equations(self) -> Equations:
+        yield from super().equations()
         yield connect(self.phi_ref, self.position.u_s)
         yield connect(self.w_ff, self.position.u_ff)
         yield connect(self.encoder.phi, self.position.u_m)
-        yield connect(self.position.y, self.servo.w_ref)
-        yield connect(self.servo.flange, self.encoder.flange, self.flange)
+        yield connect(self.position.y, self.speed.u_s)
+        yield connect(self.encoder.flange, self.flange)

@@ -119,12 +119,12 @@ def test_a_servo_against_an_independent_solver() -> None:
             (i_ref - i) * R / L,
         ]  # fmt: skip
 
-    drive = PositionServo(Kv=Kv, w_max=w_max, servo=ServoMotor(**MOTOR))
+    drive = PositionServo(Kv=Kv, w_max=w_max, **MOTOR)
     run = servo(drive, "phi_ref", Step(height="3 rad"), Inertia(J=2e-3, phi=0.0, w=0.0), 0.3)
     oracle = solve_ivp(rates, (0, 0.3), [0.0] * 5, rtol=1e-10, atol=1e-12, dense_output=True, max_step=1e-4)
     for t in (0.005, 0.02, 0.08, 0.15, 0.3):
         wanted = list(oracle.sol(t)[:3])
-        got = [run.at(t)[n] for n in ("load.phi", "load.w", "m.servo.motor.ia")]
+        got = [run.at(t)[n] for n in ("load.phi", "load.w", "m.motor.ia")]
         assert got == pytest.approx(wanted, rel=1e-6, abs=1e-6)
-    assert 29.99 < max(run["m.servo.motor.ia"]) < 30.0
+    assert 29.99 < max(run["m.motor.ia"]) < 30.0
     assert run.energy().closure < 1e-8
