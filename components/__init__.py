@@ -17,11 +17,13 @@ _NAMES = {
     "contacts": "DogClutch RigidBacklash",
     "control": "PI PID ClutchActuator Feedback FirstOrder Gain Integrator Limiter P Sum",
     "dc_machines": "PermanentMagnetDCMachine SeparatelyExcitedDCMachine SeriesDCMachine ShuntDCMachine",
+    "drivers": "Driver",
     "eddy_current_brakes": "EddyCurrentForce EddyCurrentTorque",
     "electrical": (
         "Capacitor ConstantCurrent ConstantVoltage CurrentSensor CurrentSink ElectricalPowerSensor Ground Inductor "
         "Pin Resistor SignalCurrent SignalVoltage Switch VariableResistor VoltageSensor"
     ),
+    "engines": "CombustionEngine",
     "fixed": "Disc Fixed TranslationalFixed",
     "flexible_shafts": "FlexibleShaft StribeckBearing",
     "friction": "BearingFriction Brake Clutch DryFriction MultiPlateClutch",
@@ -78,8 +80,9 @@ _NAMES = {
         "TranslationalSpeed"
     ),
     "transmissions": "Lepelletier Ravigneaux",
+    "tyres": "AxleLoads Tyre",
     "universal_joints": "UniversalJoint",
-    "vehicles": "RollingResistance Vehicle",
+    "vehicles": "RoadLoad RollingResistance Vehicle",
     "waves": "CombiTable Cosine Exponentials ExpSine LogFrequencySweep SawTooth Sinc VariableSine",
     "wheels": "IdealGearR2T IdealRollingWheel",
 }

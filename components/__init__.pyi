@@ -26,6 +26,7 @@ from components.dc_machines import PermanentMagnetDCMachine as PermanentMagnetDC
 from components.dc_machines import SeparatelyExcitedDCMachine as SeparatelyExcitedDCMachine
 from components.dc_machines import SeriesDCMachine as SeriesDCMachine
 from components.dc_machines import ShuntDCMachine as ShuntDCMachine
+from components.drivers import Driver as Driver
 from components.eddy_current_brakes import EddyCurrentForce as EddyCurrentForce
 from components.eddy_current_brakes import EddyCurrentTorque as EddyCurrentTorque
 from components.electrical import Capacitor as Capacitor
@@ -43,6 +44,7 @@ from components.electrical import SignalVoltage as SignalVoltage
 from components.electrical import Switch as Switch
 from components.electrical import VariableResistor as VariableResistor
 from components.electrical import VoltageSensor as VoltageSensor
+from components.engines import CombustionEngine as CombustionEngine
 from components.fixed import Disc as Disc
 from components.fixed import Fixed as Fixed
 from components.fixed import TranslationalFixed as TranslationalFixed
@@ -182,7 +184,10 @@ from components.translational_sources import TranslationalPosition as Translatio
 from components.translational_sources import TranslationalSpeed as TranslationalSpeed
 from components.transmissions import Lepelletier as Lepelletier
 from components.transmissions import Ravigneaux as Ravigneaux
+from components.tyres import AxleLoads as AxleLoads
+from components.tyres import Tyre as Tyre
 from components.universal_joints import UniversalJoint as UniversalJoint
+from components.vehicles import RoadLoad as RoadLoad
 from components.vehicles import RollingResistance as RollingResistance
 from components.vehicles import Vehicle as Vehicle
 from components.waves import CombiTable as CombiTable

@@ -94,6 +94,7 @@ RACK = Icon(48, 44, paper=_circle(0, -4, 15), solid=_circle(0, -4, 2.5),
             lines="M-24 13" + " l4 -4 l4 4" * 6, key=("r", "radius", "ratio"),
             ports={"flange_t": "E", "support_r": "S", "support_t": ("S", 10)})  # fmt: skip
 WHEEL = replace(RACK, lines=_hatch(-22, 12, 44), heavy="M-22 12 h44", solid=_circle(0, -4, 4))
+TYRE = replace(WHEEL, ports={"flange_t": "E", "F_z": "N"}, key=("mu",))
 
 # -- slides ----------------------------------------------------------------------------------------------------------
 
@@ -106,6 +107,9 @@ SLIDE_BRAKE = replace(SLIDEWAY, solid=_rect(10, 5, 0, -12), ports={"f_normalized
 VEHICLE = Icon(64, 36, paper="M-31 6 v-8 l8 -3 l8 -10 h22 l9 10 l14 3 v8 Z",
                solid=f"{_circle(-17, 8, 7)} {_circle(17, 8, 7)}", key=("m",),
                ports=dict.fromkeys(("Cr", "inclination", "v_wind"), "N"))  # fmt: skip
+AXLES = Icon(64, 30, paper="M-31 2 v-8 l8 -3 l8 -6 h22 l9 6 l14 3 v8 Z",
+             lines="M-17 15 v-10 l-3 4 m3 -4 l3 4 M17 15 v-10 l-3 4 m3 -4 l3 4",
+             ports={"flange": "W", "inclination": "N", "F_rear": ("E", -7), "F_front": ("E", 7)})  # fmt: skip
 
 # -- sources and loads -----------------------------------------------------------------------------------------------
 
@@ -131,6 +135,9 @@ BOUNDARY = Icon(36, 30, paper="M-18 -15 h24 l12 15 l-12 15 h-24 Z")
 
 # -- sensors ---------------------------------------------------------------------------------------------------------
 
+ENGINE = Icon(52, 52, paper=_rect(24, 24), solid=_circle(6, 6, 4), heavy="M-12 -16 h24", key=("J",),
+              lines="M24 0 h2 M-12 -24 v12 h24 v-12 M-10 -12 v-8 M10 -12 v-8 M0 -12 L6 6",
+              ports={"flange": "E", "pedal": "W"})  # fmt: skip
 _NEEDLE = "M-10 4 a11 11 0 0 1 20 0 M0 6 L6 -6"
 SENSOR = Icon(36, 36, paper=_circle(0, 0, 17), lines=_NEEDLE)
 BETWEEN_SENSOR = Icon(40, 36, paper=_circle(0, 0, 17), lines=f"M-20 0 h3 M17 0 h3 {_NEEDLE}", ports=dict.fromkeys(
@@ -211,3 +218,4 @@ CONTROL_PI = replace(block("", text="PI", key=("k",)), ports=_CONTROL)
 CONTROL_PID = replace(block("", text="PID", key=("k",)), ports=_CONTROL)
 PATH = block("M-14 10 q8 0 12 -10 q4 -10 16 -10")
 SCHEDULE = block("M-14 11 h7 v-7 h7 v-7 h7 v-8 h7")
+DRIVER = block("M-12 8 a12 12 0 1 1 24 0 M-9 -2 h18 M0 -2 v10")

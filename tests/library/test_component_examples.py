@@ -416,6 +416,37 @@ def servo(run: Solution) -> None:
     assert run.final["spindle.inverter.v"] == close(0.8 * 12 + 0.5 * 100)
 
 
+@numbers
+def engine(run: Solution) -> None:
+    # One turn of the idling engine has no net torque; its firing orders make the speed swing around the idle speed.
+    idle = [run.at(t)["engine.w"] for t in np.linspace(4.9, 4.9 + 2 * pi / 80, 200)]
+    assert np.mean(idle) == pytest.approx(80, rel=1e-3)
+    assert run.at(4.999)["engine.throttle"] == pytest.approx(12 / 120, rel=0.02)
+    cut = [event.time for event in run.events if event.after == "cut"]
+    # 100 % of 120 N·m against 12 N·m; it falls by 20 rad/s with 60 rad/s² and rises again with 540 rad/s².
+    assert np.mean(np.diff(cut)) == pytest.approx(20 / 60 + 20 / 540, rel=0.01)
+    assert np.max(run["engine.w"]) <= 300 * (1 + 1e-9)
+
+
+@numbers
+def traction(run: Solution) -> None:
+    a = 0.9 * 9.80665 * 1.2 / (2.6 - 0.9 * 0.6)
+    assert run.at(1.9)["car.v"] - run.at(1)["car.v"] == close(0.9 * a)
+    assert run.at(1.9)["axles.F_rear"] == close(1200 * a / 0.9)
+    assert run.at(1.9)["wheels.w"] - run.at(1)["wheels.w"] == close(0.9 * (2500 - 0.3 * 1200 * a) / 2)
+    assert run.final["tyre.slip"] == pytest.approx(0, abs=1e-6)
+    momentum = 2 * 2500 / 0.3
+    assert 1200 * run.final["car.v"] + 2 / 0.3 * run.final["wheels.w"] == close(momentum)
+
+
+@numbers
+def driving_cycle(run: Solution) -> None:
+    assert run.at(33)["car.v"] == pytest.approx(15, rel=1e-4)
+    assert run.at(33)["engine.y"] == pytest.approx(120 + 2 * 15 + 0.4 * 15**2, rel=1e-3)
+    assert np.max(np.abs(run["driver.v_ref"] - run["car.v"])) < 0.4
+    assert np.max(run["driver.brake"]) == pytest.approx(1200 * 15 / 8 / 8000, rel=0.1)
+
+
 def test_every_netlist_has_numbers_and_a_line_on_the_page() -> None:
     names = {path.stem for path in FOLDER.glob("*.toml")}
     assert names == NUMBERS.keys()
