@@ -21,6 +21,7 @@ from components.sizing.clutches import friction_work as friction_work
 from components.sizing.clutches import machine_table_clutch as machine_table_clutch
 from components.sizing.clutches import referred_inertia as referred_inertia
 from components.sizing.clutches import referred_mass as referred_mass
+from components.sizing.clutches import slip_angle as slip_angle
 from components.sizing.dc_motor_fit import LineConsistency as LineConsistency
 from components.sizing.dc_motor_fit import MotorFit as MotorFit
 from components.sizing.dc_motor_fit import fit_current_line as fit_current_line
@@ -179,6 +180,7 @@ __all__ = [
     "shaft_statics",
     "shaft_stress",
     "shunt_motor",
+    "slip_angle",
     "speed_limit",
     "square_second_moment",
     "stepped_shaft",
