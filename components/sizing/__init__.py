@@ -5,6 +5,7 @@ A function that returns a `Result` can be named by a sizing file (`modelica-like
 
 from components.sizing.belts import BeltForces as BeltForces
 from components.sizing.belts import BeltGeometry as BeltGeometry
+from components.sizing.belts import TimingBeltLoad as TimingBeltLoad
 from components.sizing.belts import belt_forces as belt_forces
 from components.sizing.belts import belt_geometry as belt_geometry
 from components.sizing.belts import belt_velocity as belt_velocity
@@ -13,6 +14,7 @@ from components.sizing.belts import effective_pull as effective_pull
 from components.sizing.belts import exact_centre_distance as exact_centre_distance
 from components.sizing.belts import pitch_diameter as pitch_diameter
 from components.sizing.belts import strand_resultant as strand_resultant
+from components.sizing.belts import timing_belt_load as timing_belt_load
 from components.sizing.belts import wrap_angle as wrap_angle
 from components.sizing.clutches import ClutchSelection as ClutchSelection
 from components.sizing.clutches import MachineTableClutch as MachineTableClutch
@@ -30,11 +32,13 @@ from components.sizing.dc_motor_fit import fit_speed_line as fit_speed_line
 from components.sizing.dc_motor_fit import line_consistency as line_consistency
 from components.sizing.dc_motors import DcMotor as DcMotor
 from components.sizing.dc_motors import DriveForClutch as DriveForClutch
+from components.sizing.dc_motors import GeneratorPoint as GeneratorPoint
 from components.sizing.dc_motors import MotorLines as MotorLines
 from components.sizing.dc_motors import MotorPoint as MotorPoint
 from components.sizing.dc_motors import MotorSummary as MotorSummary
 from components.sizing.dc_motors import dc_motor_point as dc_motor_point
 from components.sizing.dc_motors import drive_for_clutch as drive_for_clutch
+from components.sizing.dc_motors import generator_point as generator_point
 from components.sizing.dc_motors import generator_voltage as generator_voltage
 from components.sizing.dc_motors import measured_lines as measured_lines
 from components.sizing.dc_motors import motor_lines as motor_lines
@@ -46,6 +50,13 @@ from components.sizing.dc_motors import rope_brake_mass as rope_brake_mass
 from components.sizing.dc_motors import series_motor_speed as series_motor_speed
 from components.sizing.dc_motors import shunt_motor as shunt_motor
 from components.sizing.dc_motors import torque_at_speed as torque_at_speed
+from components.sizing.dc_windings import CommutationRipple as CommutationRipple
+from components.sizing.dc_windings import MachineConstant as MachineConstant
+from components.sizing.dc_windings import commutated as commutated
+from components.sizing.dc_windings import commutation_ripple as commutation_ripple
+from components.sizing.dc_windings import conductor_force as conductor_force
+from components.sizing.dc_windings import conductor_voltage as conductor_voltage
+from components.sizing.dc_windings import machine_constant as machine_constant
 from components.sizing.deflection import Deflection as Deflection
 from components.sizing.deflection import deflection as deflection
 from components.sizing.deflection import midspan_sag as midspan_sag
@@ -69,6 +80,9 @@ from components.sizing.ravigneaux import ravigneaux_gear as ravigneaux_gear
 from components.sizing.ravigneaux import ravigneaux_meshes as ravigneaux_meshes
 from components.sizing.rolling_bearings import BearingLife as BearingLife
 from components.sizing.rolling_bearings import bearing_life as bearing_life
+from components.sizing.shaft_fatigue import ShaftFatigue as ShaftFatigue
+from components.sizing.shaft_fatigue import ShaftMaterial as ShaftMaterial
+from components.sizing.shaft_fatigue import shaft_fatigue as shaft_fatigue
 from components.sizing.shaft_statics import BearingReaction as BearingReaction
 from components.sizing.shaft_statics import Load as Load
 from components.sizing.shaft_statics import SectionForces as SectionForces
@@ -106,14 +120,17 @@ __all__ = [
     "BeltGeometry",
     "BeltSpeedLimit",
     "ClutchSelection",
+    "CommutationRipple",
     "DcMotor",
     "Deflection",
     "DriveForClutch",
     "Flywheel",
+    "GeneratorPoint",
     "Lepelletier",
     "LepelletierGear",
     "LineConsistency",
     "Load",
+    "MachineConstant",
     "MachineTableClutch",
     "MotorFit",
     "MotorLines",
@@ -127,10 +144,13 @@ __all__ = [
     "Section",
     "SectionForces",
     "ShaftDiameter",
+    "ShaftFatigue",
+    "ShaftMaterial",
     "ShaftStatics",
     "ShaftStress",
     "SpeedLimit",
     "SteppedShaft",
+    "TimingBeltLoad",
     "bearing_life",
     "bearing_reactions",
     "belt_forces",
@@ -140,7 +160,11 @@ __all__ = [
     "bending_stress",
     "centre_distance",
     "clutch_selection",
+    "commutated",
+    "commutation_ripple",
     "comparison",
+    "conductor_force",
+    "conductor_voltage",
     "cylinder_inertia",
     "cylinder_mass",
     "dc_motor_point",
@@ -154,10 +178,12 @@ __all__ = [
     "flywheel",
     "flywheel_for_time",
     "friction_work",
+    "generator_point",
     "generator_voltage",
     "lepelletier",
     "lepelletier_gear",
     "line_consistency",
+    "machine_constant",
     "machine_table_clutch",
     "measured_lines",
     "midspan_sag",
@@ -177,6 +203,7 @@ __all__ = [
     "section_forces",
     "series_motor_speed",
     "shaft_diameter",
+    "shaft_fatigue",
     "shaft_statics",
     "shaft_stress",
     "shunt_motor",
@@ -187,6 +214,7 @@ __all__ = [
     "strand_resultant",
     "stress_concentration",
     "switching_time",
+    "timing_belt_load",
     "torque_at_speed",
     "torsional_stress",
     "von_mises",

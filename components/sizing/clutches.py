@@ -80,7 +80,8 @@ def machine_table_clutch(
     """Size the clutch between a running motor and a machine table at rest, or already moving (document 000).
 
     J_T = m·(u/w)², J_red = J_K + J_in + (J_out + J_S)/i² + J_T, M_B = J_red·(w - w_L0)/t, M_K = M_B + M_L/i,
-    phi = (w - w_L0)·t/2, W = M_K·phi. The hub lies wholly on the driven side of the friction surfaces; the screw has no loss.
+    phi = (w - w_L0)·t/2, W = M_K·phi. The hub lies wholly on the driven side of the friction surfaces; the screw has no
+    loss.
 
     Args:
         motor_speed: speed of motor and clutch in rad/s.

@@ -29,6 +29,7 @@ def _choose(condition: Any, then: Any, otherwise: Any) -> Any:
 
 sqrt = _function(np.sqrt, ca.sqrt, "Square root.")
 exp = _function(np.exp, ca.exp, "Exponential function.")
+log10 = _function(np.log10, ca.log10, "Decimal logarithm.")
 sin = _function(np.sin, ca.sin, "Sine of an angle in rad.")
 cos = _function(np.cos, ca.cos, "Cosine of an angle in rad.")
 acos = _function(np.arccos, ca.acos, "Angle in rad with a given cosine.")

@@ -35,3 +35,15 @@ def test_sizing_files(number: int, tmp_path: Path) -> None:
 def test_every_example_is_on_the_page() -> None:
     for path in (ROOT / "examples" / "sizing").glob("*.toml"):
         assert f"`{path.name}`" in PAGE
+
+
+def test_page_has_the_numbers_of_the_files() -> None:
+    """Every row of docs/examples/test_bench.md that names a check has its line as `size` prints it."""
+    page = (ROOT / "docs" / "examples" / "test_bench.md").read_text(encoding="utf-8")
+    files = [size(ROOT / "examples" / "sizing" / f"{name}.toml") for name in ("test_bench", "test_bench_motor")]
+    checks = {check.name: check for file in files for check in file.checks}
+    rows = re.findall(r"^\| `(\w+)\.(\w+)` \| ([^|]+) \|([^|]*)\|", page, re.MULTILINE)
+    assert len(rows) > 10
+    for check, name, value, unit in rows:
+        line = next(line for line in checks[check].result.lines() if line.name == name)
+        assert (line.value, line.unit) == (value, unit.strip()), f"{check}.{name}"

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from components import sizing
-from components.sizing import DcMotor, Load, MotorLines, RavigneauxTeeth, Section
+from components.sizing import DcMotor, Load, MotorLines, RavigneauxTeeth, Section, ShaftMaterial
 
 LINES = MotorLines(24.0, 496.0, 364.0, 1.06, 20.0)
 TEETH = RavigneauxTeeth(21, 39, 13, 10, 60)
@@ -29,6 +29,14 @@ CASES: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "clutch_selection": (given(power=40.0, speed=139.6, rated_torque=0.6, service_factor=2.0), {}),
     "belt_geometry": (given(small_teeth=10.0, large_teeth=30.0, pitch=5.08e-3, belt_length=0.33), {}),
     "belt_forces": (given(pull=25.0, angle=2.85, friction=0.5, velocity=3.4, section=19e-6, density=1200.0), {}),
+    "timing_belt_load": (given(pull=25.0, velocity=3.4, teeth_in_mesh=4.0, width=9.5e-3, tooth_height=1.27e-3,
+                              power_limit=300.0, pressure_limit=1.5e6), {}),
+    "machine_constant": (given(conductors=100.0, pole_pairs=2.0, flux=1.5e-3, parallel_pairs=1.0), {}),
+    "commutation_ripple": (given(loops=2.0, pole_pairs=1.0), {}),
+    "generator_point": (given(generator=DcMotor(0.05, 0.8, 0.04, 1e-4), speed=480.0, current=2.0), {}),
+    "shaft_fatigue": (given(bending=1.05, torque=0.6, diameter=6e-3, material=ShaftMaterial(430e6, 275e6, 215e6, 125e6),
+                            large_diameter=8e-3, fillet=2e-3, bending_factor=1.25, torsion_factor=1.3, alternating=0.5,
+                            required_safety=2.5), {}),
     "belt_speed_limit": (given(speed=418.9, diameter=0.016, limit=523.0, velocity_limit=80.0), {}),
     "speed_limit": (given(speed=418.9, limit=157.0, ratio=3.0), {}),
     "shaft_statics": (given(loads=LOADS), given(bearings=[0.025, 0.037])),
