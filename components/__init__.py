@@ -13,6 +13,7 @@ _NAMES = {
     "belts": "TimingBelt",
     "bristle_friction": "LuGreFriction",
     "choppers": "HBridge",
+    "commutated_machines": "CommutatedDCMachine",
     "contacts": "DogClutch RigidBacklash",
     "control": "PI PID ClutchActuator Feedback FirstOrder Gain Integrator Limiter P Sum",
     "dc_machines": "PermanentMagnetDCMachine SeparatelyExcitedDCMachine SeriesDCMachine ShuntDCMachine",
@@ -37,6 +38,7 @@ _NAMES = {
     "one_way": "Freewheel OneWayClutch TorqueLimiter",
     "planetary": "Differential IdealPlanetary LossyPlanetarySet PlanetarySet",
     "point_to_point": "KinematicPTP2",
+    "pulse_sensors": "PulseSensor",
     "screw_drives": "BallScrewDrive",
     "sensors": (
         "AngleSensor ForceSensor MultiSensor PositionSensor PowerSensor RelativeAngleSensor RelativeSpeedSensor "

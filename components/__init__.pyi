@@ -9,6 +9,7 @@ from components.adaptors import VoltageToCurrentAdaptor as VoltageToCurrentAdapt
 from components.belts import TimingBelt as TimingBelt
 from components.bristle_friction import LuGreFriction as LuGreFriction
 from components.choppers import HBridge as HBridge
+from components.commutated_machines import CommutatedDCMachine as CommutatedDCMachine
 from components.contacts import DogClutch as DogClutch
 from components.contacts import RigidBacklash as RigidBacklash
 from components.control import PI as PI
@@ -75,6 +76,7 @@ from components.planetary import IdealPlanetary as IdealPlanetary
 from components.planetary import LossyPlanetarySet as LossyPlanetarySet
 from components.planetary import PlanetarySet as PlanetarySet
 from components.point_to_point import KinematicPTP2 as KinematicPTP2
+from components.pulse_sensors import PulseSensor as PulseSensor
 from components.screw_drives import BallScrewDrive as BallScrewDrive
 from components.sensors import AngleSensor as AngleSensor
 from components.sensors import ForceSensor as ForceSensor
