@@ -68,6 +68,19 @@ from components.sizing.flywheels import cylinder_mass as cylinder_mass
 from components.sizing.flywheels import flywheel as flywheel
 from components.sizing.flywheels import flywheel_for_time as flywheel_for_time
 from components.sizing.flywheels import switching_time as switching_time
+from components.sizing.gear_geometry import GearPair as GearPair
+from components.sizing.gear_geometry import tooth_form as tooth_form
+from components.sizing.gear_life import HARDENED_FLANK as HARDENED_FLANK
+from components.sizing.gear_life import HARDENED_ROOT as HARDENED_ROOT
+from components.sizing.gear_life import GearLife as GearLife
+from components.sizing.gear_life import LifeCurve as LifeCurve
+from components.sizing.gear_life import LoadStage as LoadStage
+from components.sizing.gear_life import StageDamage as StageDamage
+from components.sizing.gear_life import gear_life as gear_life
+from components.sizing.gear_life import life_factor as life_factor
+from components.sizing.gear_strength import GearMaterial as GearMaterial
+from components.sizing.gear_strength import GearStrength as GearStrength
+from components.sizing.gear_strength import gear_strength as gear_strength
 from components.sizing.lepelletier import Lepelletier as Lepelletier
 from components.sizing.lepelletier import LepelletierGear as LepelletierGear
 from components.sizing.lepelletier import lepelletier as lepelletier
@@ -112,6 +125,8 @@ from modelica_like.language.results import Result as Result
 from modelica_like.language.results import comparison as comparison
 
 __all__ = [
+    "HARDENED_FLANK",
+    "HARDENED_ROOT",
     "SHOULDER_IN_BENDING",
     "SHOULDER_IN_TORSION",
     "BearingLife",
@@ -125,11 +140,17 @@ __all__ = [
     "Deflection",
     "DriveForClutch",
     "Flywheel",
+    "GearLife",
+    "GearMaterial",
+    "GearPair",
+    "GearStrength",
     "GeneratorPoint",
     "Lepelletier",
     "LepelletierGear",
+    "LifeCurve",
     "LineConsistency",
     "Load",
+    "LoadStage",
     "MachineConstant",
     "MachineTableClutch",
     "MotorFit",
@@ -149,6 +170,7 @@ __all__ = [
     "ShaftStatics",
     "ShaftStress",
     "SpeedLimit",
+    "StageDamage",
     "SteppedShaft",
     "TimingBeltLoad",
     "bearing_life",
@@ -178,10 +200,13 @@ __all__ = [
     "flywheel",
     "flywheel_for_time",
     "friction_work",
+    "gear_life",
+    "gear_strength",
     "generator_point",
     "generator_voltage",
     "lepelletier",
     "lepelletier_gear",
+    "life_factor",
     "line_consistency",
     "machine_constant",
     "machine_table_clutch",
@@ -215,6 +240,7 @@ __all__ = [
     "stress_concentration",
     "switching_time",
     "timing_belt_load",
+    "tooth_form",
     "torque_at_speed",
     "torsional_stress",
     "von_mises",

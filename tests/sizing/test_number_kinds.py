@@ -9,10 +9,22 @@ import numpy as np
 import pytest
 
 from components import sizing
-from components.sizing import DcMotor, Load, MotorLines, RavigneauxTeeth, Section, ShaftMaterial
+from components.sizing import (
+    DcMotor,
+    GearMaterial,
+    GearPair,
+    Load,
+    LoadStage,
+    MotorLines,
+    RavigneauxTeeth,
+    Section,
+    ShaftMaterial,
+)
 
 LINES = MotorLines(24.0, 496.0, 364.0, 1.06, 20.0)
 TEETH = RavigneauxTeeth(21, 39, 13, 10, 60)
+PAIR = GearPair(17, 43, 3e-3, 0.03, 0.3, 0.1, 0.2)
+STRENGTH = sizing.gear_strength(PAIR, 150.0, GearMaterial(1500e6, 461e6))
 LOADS = [Load(0.0, -40.5, -25.0, 0.6), Load(0.06, 1.0, 2.0, -0.6, 0.1, 0.2)]
 
 
@@ -45,6 +57,10 @@ CASES: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "shaft_diameter": (given(bending=1.3, strength=275e6, safety=2.5, diameter=6e-3), {}),
     "stepped_shaft": (given(loads=LOADS, yield_strength=275e6, required_safety=2.5), given(
         bearings=[0.025, 0.037], sections=[Section(0.022, 6e-3, 2e-3), Section(0.06, 8e-3)])),
+    "gear_strength": (given(pair=PAIR, torque=150.0, material=GearMaterial(1500e6, 461e6), application=1.25,
+                            dynamic=1.1, face_load=1.2, transverse_load=1.1, flank_life=0.9, root_life=0.9,
+                            flank_influence=0.95, root_influence=0.95, pinion_reversal=0.7), {}),
+    "gear_life": (given(strength=STRENGTH, wheel_cycles=0.4, spectrum=[LoadStage(4.0, 1e4), LoadStage(2.0, 1e6)]), {}),
     "bearing_life": (given(radial_load=150.0, speed=139.6, dynamic_rating=2600.0, static_rating=1060.0,
                           speed_limit=3351.0, exponent=3.0, axial_load=10.0, radial_factor=0.56, axial_factor=1.6), {}),
     "flywheel_for_time": (given(time=0.2, torque=0.6, speed=139.6, density=2700.0, radius=0.045, width_limit=0.1), {}),
