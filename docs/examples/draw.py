@@ -168,6 +168,41 @@ def startups() -> Figure:
     return panels("machine_tool_startup", "time in s", rows)
 
 
+def disengaging() -> Figure:
+    """The coil is switched off after 3 s."""
+    drive = load(EXAMPLES / "machine_tool_startup.toml")
+    drive.set("coil.stop_time", "3 s")
+    drive.set("coil.T_off", "20 ms")
+    run = simulate(drive, "9 s", points=9000)
+    rows = {
+        "speed in rad/s": {"ω2, motor side": "J2.w", "ω3, load side": "J3.w"},
+        "torque in N·m": {"clutch": "clutch.tau", "shaft 2": "shaft2.tau"},
+    }
+    late = run.time >= 2.9
+    signs = {"speed in rad/s": 1, "torque in N·m": -1}
+    return panels(
+        "machine_tool_startup, switched off at 3 s",
+        "time in s",
+        {
+            label: [Curve(name, run.time[late], signs[label] * run[path][late]) for name, path in names.items()]
+            for label, names in rows.items()
+        },
+    )
+
+
+def backlash() -> Figure:
+    """The torque of the second shaft, with several plays."""
+    rows: dict[str, list[Curve]] = {"torque of shaft 2 in N·m": [], "speed ω4 in rad/s": []}
+    for play in (0.0, 0.5, 2.0):
+        netlist = "machine_tool_backlash" if play else "machine_tool_startup"
+        values = {"backlash": play * pi / 180} if play else {}
+        run = simulate(EXAMPLES / f"{netlist}.toml", "0.7 s", parameters=values, points=2000)
+        part = run.time > 0.25
+        for row, path, sign in zip(rows.values(), ("shaft2.tau", "J4.w"), (-1, 1), strict=True):
+            row.append(Curve(f"{play:g}° play", run.time[part], sign * run[path][part]))
+    return panels("machine_tool_backlash", "time in s", rows)
+
+
 def readings() -> Figure:
     """The load side's speed and the clutch's torque, for each reading of the document's formulas."""
     rows: dict[str, list[Curve]] = {"speed ω3 in rad/s": [], "clutch torque in N·m": []}
@@ -274,6 +309,8 @@ FIGURES: dict[str, Callable[[], Figure]] = {
     "test_bench_sections": sections,
     "dc_machines": machine_curves,
     "machine_tool_damping": startups,
+    "machine_tool_release": disengaging,
+    "machine_tool_backlash": backlash,
     "machine_tool_readings": readings,
 }
 
