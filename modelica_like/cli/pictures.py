@@ -1,4 +1,4 @@
-"""Commands that show netlists and runs: draw, report."""
+"""Commands that show netlists and runs: draw, report, explore."""
 
 from __future__ import annotations
 
@@ -47,3 +47,21 @@ def report(
             run = simulate(model, until, progress=bar)
         save_report(drive, run, path, show=show or ())
         say(str(path))
+
+
+def explore(
+    netlist: Netlist, assignments: Assignments = None, *,
+    until: Annotated[str | None, Option(metavar="TIME", help="End time, e.g. 2s; else the netlist's.")] = None,
+    show: Annotated[list[str] | None, Option(metavar="PATTERN", help="What to draw, e.g. '*.w'.")] = None,
+    output: Annotated[Path, Option("--output", "-o", metavar="FOLDER", help="Where the page saves files.")] = Path(),
+    browser: Annotated[bool, Option(help="Open the browser.")] = True,
+    debug: Debug = False,
+) -> None:  # fmt: skip
+    """Open a page with sliders and curves that runs the drive on this machine."""
+    with told(debug):
+        drive = load_netlist(netlist, assignments)
+        from modelica_like.explore import Explorer
+
+        with Explorer(drive, until, show=show or (), folder=output) as explorer:
+            say(f"{explorer.address}\nCtrl-C ends it.")
+            explorer.show(browser=browser)

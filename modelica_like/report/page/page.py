@@ -60,7 +60,7 @@ def report(drive: Component, run: Solution, *, show: Sequence[str] = ()) -> str:
     """
     folder = Path(__file__).parent
     sections = [
-        ("Schematic", f'<div class="wide">{_inline(schematic(drive))}</div>'),
+        ("Schematic", f'<div class="wide">{schematic(drive, background=False)}</div>'),
         ("What happens", _happens(run)),
         ("Curves", '<div id="curves"></div><p class="hint">Move over a curve to read it, drag to zoom, double-click to '
                    "see all.</p>"),
@@ -88,11 +88,6 @@ def _attempt(make: Callable[[], str]) -> str:
         return make()
     except ModelicaLikeError as error:
         return f"<p>{escape(str(error))}</p>"
-
-
-def _inline(svg: str) -> str:
-    """A drawing takes its colours from the page."""
-    return re.sub(r'<rect class="paper" width="[^"]*" height="[^"]*" fill="[^"]*"/>', "", svg, count=1)
 
 
 def _table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
