@@ -15,6 +15,7 @@ from components.batteries import Battery as Battery
 from components.belts import TimingBelt as TimingBelt
 from components.bristle_friction import LuGreFriction as LuGreFriction
 from components.choppers import HBridge as HBridge
+from components.commutated_machines import CommutatedDCMachine as CommutatedDCMachine
 from components.contacts import DogClutch as DogClutch
 from components.contacts import RigidBacklash as RigidBacklash
 from components.control import PI as PI
@@ -100,6 +101,7 @@ from components.planetary import IdealPlanetary as IdealPlanetary
 from components.planetary import LossyPlanetarySet as LossyPlanetarySet
 from components.planetary import PlanetarySet as PlanetarySet
 from components.point_to_point import KinematicPTP2 as KinematicPTP2
+from components.pulse_sensors import PulseSpeedSensor as PulseSpeedSensor
 from components.sampled import FrequencyMeter as FrequencyMeter
 from components.sampled import NormalNoise as NormalNoise
 from components.sampled import UniformNoise as UniformNoise
