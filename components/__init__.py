@@ -12,18 +12,22 @@ _NAMES = {
         "AngleToTorqueAdaptor CurrentToVoltageAdaptor ForceToPositionAdaptor HeatFlowToTemperatureAdaptor "
         "PositionToForceAdaptor TemperatureToHeatFlowAdaptor TorqueToAngleAdaptor VoltageToCurrentAdaptor"
     ),
+    "batteries": "Battery",
     "belts": "TimingBelt",
     "bristle_friction": "LuGreFriction",
     "choppers": "HBridge",
+    "commutated_machines": "CommutatedDCMachine",
     "contacts": "DogClutch RigidBacklash",
     "control": "PI PID ClutchActuator Feedback FirstOrder Gain Integrator Limiter P Sum",
     "couplings": "ArcSpring DualMassFlywheel ElasticCoupling HystereticCoupling OldhamCoupling RuptureCoupling",
     "dc_machines": "PermanentMagnetDCMachine SeparatelyExcitedDCMachine SeriesDCMachine ShuntDCMachine",
+    "drivers": "Driver",
     "eddy_current_brakes": "EddyCurrentForce EddyCurrentTorque",
     "electrical": (
-        "Capacitor ConstantCurrent ConstantVoltage CurrentSensor CurrentSink Ground Inductor Pin Resistor "
-        "SignalVoltage Switch VariableResistor VoltageSensor"
+        "Capacitor ConstantCurrent ConstantVoltage CurrentSensor CurrentSink ElectricalPowerSensor Ground Inductor "
+        "Pin Resistor SignalCurrent SignalVoltage Switch VariableResistor VoltageSensor"
     ),
+    "engines": "CombustionEngine",
     "fixed": "Disc Fixed TranslationalFixed",
     "flexible_shafts": "FlexibleShaft StribeckBearing",
     "friction": "BearingFriction Brake Clutch DryFriction MultiPlateClutch",
@@ -32,21 +36,26 @@ _NAMES = {
     "hoists": "HoldingBrake Rope WinchDrum",
     "inertias": "Inertia Mass",
     "interfaces": "Compliant CompliantWithRelativeStates Flange LinearFlange",
+    "linear_blocks": "Derivative SecondOrder TransferFunction",
     "loads": "SpeedDependentLoad",
     "lossy_gears": "ConstantEfficiencyGear LossyGear",
     "motions": (
         "InitializeFlange Move RelativeStates TranslationalInitializeFlange TranslationalMove "
         "TranslationalRelativeStates"
     ),
+    "nonlinear_blocks": "DeadZone Hysteresis PulseCounter Quantizer SlewRateLimiter VariableLimiter",
     "one_way": "Freewheel OneWayClutch TorqueLimiter",
     "planetary": "Differential IdealPlanetary LossyPlanetarySet PlanetarySet",
     "point_to_point": "KinematicPTP2",
+    "pulse_sensors": "PulseSpeedSensor",
+    "sampled": "FrequencyMeter NormalNoise UniformNoise ZeroOrderHold",
     "screw_drives": "BallScrewDrive",
     "sensors": (
         "AngleSensor ForceSensor MultiSensor PositionSensor PowerSensor RelativeAngleSensor RelativeSpeedSensor "
         "SpeedLimit SpeedSensor TorqueSensor"
     ),
-    "shaft_sensors": "AccelerationSensor RelativeAccelerationSensor",
+    "servos": "PositionServo ServoMotor",
+    "shaft_sensors": "AccelerationSensor PulseSensor RelativeAccelerationSensor",
     "shaft_sources": (
         "Accelerate InverseSpeedDependentTorque LinearSpeedDependentTorque Position QuadraticSpeedDependentTorque "
         "SignTorque Torque2"
@@ -65,7 +74,10 @@ _NAMES = {
     "stepped_signals": "BooleanPulse BooleanStep BooleanTable StepTable",
     "switching": "Contactor Diode",
     "synchronisers": "Synchroniser",
-    "thermal": "FixedTemperature HeatPort HeatSource TemperatureSensor ThermalConductor ThermalMass",
+    "thermal": (
+        "FixedTemperature HeatPort HeatSource PrescribedHeatFlow PrescribedTemperature TemperatureSensor "
+        "ThermalConductor ThermalMass"
+    ),
     "thermal_clutches": "ThermalClutch",
     "torque_converters": "TorqueConverter",
     "translational_sensors": (
@@ -77,8 +89,9 @@ _NAMES = {
         "QuadraticSpeedDependentForce SignForce TranslationalAccelerate TranslationalPosition TranslationalSpeed"
     ),
     "transmissions": "Lepelletier Ravigneaux",
+    "tyres": "AxleLoads Tyre",
     "universal_joints": "UniversalJoint",
-    "vehicles": "RollingResistance Vehicle",
+    "vehicles": "RoadLoad RollingResistance Vehicle",
     "waves": "CombiTable Cosine Exponentials ExpSine LogFrequencySweep SawTooth Sinc VariableSine",
     "wheels": "IdealGearR2T IdealRollingWheel",
     "worms": "WormGear",

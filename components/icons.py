@@ -111,6 +111,7 @@ RACK = Icon(48, 44, paper=_circle(0, -4, 15), solid=_circle(0, -4, 2.5),
             lines="M-24 13" + " l4 -4 l4 4" * 6, key=("r", "radius", "ratio"),
             ports={"flange_t": "E", "support_r": "S", "support_t": ("S", 10)})  # fmt: skip
 WHEEL = replace(RACK, lines=_hatch(-22, 12, 44), heavy="M-22 12 h44", solid=_circle(0, -4, 4))
+TYRE = replace(WHEEL, ports={"flange_t": "E", "F_z": "N"}, key=("mu",))
 
 DRUM = replace(
     RACK, paper=_circle(-4, -4, 15), lines="M11 -4 v24 M11 20 h13", solid=_circle(-4, -4, 2.5), key=("radius",)
@@ -129,6 +130,9 @@ SLIDE_BRAKE = replace(SLIDEWAY, solid=_rect(10, 5, 0, -12), ports={"f_normalized
 VEHICLE = Icon(64, 36, paper="M-31 6 v-8 l8 -3 l8 -10 h22 l9 10 l14 3 v8 Z",
                solid=f"{_circle(-17, 8, 7)} {_circle(17, 8, 7)}", key=("m",),
                ports=dict.fromkeys(("Cr", "inclination", "v_wind"), "N"))  # fmt: skip
+AXLES = Icon(64, 30, paper="M-31 2 v-8 l8 -3 l8 -6 h22 l9 6 l14 3 v8 Z",
+             lines="M-17 15 v-10 l-3 4 m3 -4 l3 4 M17 15 v-10 l-3 4 m3 -4 l3 4",
+             ports={"flange": "W", "inclination": "N", "F_rear": ("E", -7), "F_front": ("E", 7)})  # fmt: skip
 
 ROPE = Icon(50, 14, lines="M-25 0 h4 q4 -6 8 0 q4 6 8 0 q4 -6 8 0 q4 6 8 0 q4 -6 8 0 h6", key=("c",))
 
@@ -163,6 +167,9 @@ BOUNDARY = Icon(36, 30, paper="M-18 -15 h24 l12 15 l-12 15 h-24 Z")
 
 # -- sensors ---------------------------------------------------------------------------------------------------------
 
+ENGINE = Icon(52, 52, paper=_rect(24, 24), solid=_circle(6, 6, 4), heavy="M-12 -16 h24", key=("J",),
+              lines="M24 0 h2 M-12 -24 v12 h24 v-12 M-10 -12 v-8 M10 -12 v-8 M0 -12 L6 6",
+              ports={"flange": "E", "pedal": "W"})  # fmt: skip
 _NEEDLE = "M-10 4 a11 11 0 0 1 20 0 M0 6 L6 -6"
 SENSOR = Icon(36, 36, paper=_circle(0, 0, 17), lines=_NEEDLE)
 BETWEEN_SENSOR = Icon(40, 36, paper=_circle(0, 0, 17), lines=f"M-20 0 h3 M17 0 h3 {_NEEDLE}", ports=dict.fromkeys(
@@ -204,7 +211,10 @@ AMMETER = Icon(40, 36, paper=_circle(0, 0, 17), lines="M-20 0 h3 M17 0 h3", text
 # -- heat ------------------------------------------------------------------------------------------------------------
 
 THERMAL_MASS = Icon(36, 36, solid=_rect(18, 18), text="C", key=("C",))
-TEMPERATURE = Icon(36, 36, paper=_circle(0, 0, 17), text="T", key=("T",))
+WATTMETER = Icon(40, 36, paper=_circle(0, 0, 17), lines="M-20 0 h3 M17 0 h3", text="W",
+                 ports={"pc": "W", "nc": "E", "pv": "N", "nv": ("S", -8), "power": ("S", 8)})  # fmt: skip
+SERVO = replace(MOTOR, text="SM", lines="M24 0 h2", ports={"flange": "E"}, key=("I_max",))
+TEMPERATURE = Icon(36, 36, paper=_circle(0, 0, 17), text="T", key=("T",), ports={"T": "N"})
 HEAT_SOURCE = replace(TEMPERATURE, text="Q", key=("Q_flow",))
 CONDUCTOR = Icon(
     48, 24, paper=_rect(16, 12), lines="M-24 0 h8 M16 0 h8 M-9 -5 l5 10 M-2 -5 l5 10 M5 -5 l5 10", key=("G",)
@@ -235,9 +245,15 @@ DIFFERENCE = Icon(30, 30, paper=_circle(0, 0, 15), lines="M-7 0 h14", ports={"u1
 PRODUCT = Icon(30, 30, paper=_circle(0, 0, 15), lines="M-6 -6 l12 12 M-6 6 l12 -12", ports={"u1": "W", "u2": "S"})
 LIMITER = block("M-14 9 h7 l14 -18 h7")
 INTEGRATOR = block("", text="∫")
+DERIVATIVE = block("", text="d/dt")
+TRANSFER = block("", text="b/a", key=("k",))
+DEAD_ZONE = block("M-14 10 l8 -10 h12 l8 -10", key=("u_max",))
+HYSTERESIS = block("M-14 8 h20 v-16 M14 -8 h-20 v16")
+NOISE = block("M-14 2 l3 -8 l3 12 l3 -7 l3 9 l3 -14 l3 10 l3 -4 l3 6 l4 -9")
 _CONTROL = {"u_s": ("W", 0.0), "u_m": ("S", 0.0), "u_ff": ("N", 0.0)}
 CONTROL_P = replace(block("", text="P", key=("k",)), ports=_CONTROL)
 CONTROL_PI = replace(block("", text="PI", key=("k",)), ports=_CONTROL)
 CONTROL_PID = replace(block("", text="PID", key=("k",)), ports=_CONTROL)
 PATH = block("M-14 10 q8 0 12 -10 q4 -10 16 -10")
 SCHEDULE = block("M-14 11 h7 v-7 h7 v-7 h7 v-8 h7")
+DRIVER = block("M-12 8 a12 12 0 1 1 24 0 M-9 -2 h18 M0 -2 v10")

@@ -9,12 +9,14 @@ from modelica_like.language import (
     Domain,
     Equations,
     Expr,
+    Input,
     Output,
     Parameter,
     Variable,
     der,
     flow,
     param,
+    signal_in,
     signal_out,
     var,
 )
@@ -128,6 +130,34 @@ class HeatSource(Component):
 
     def source_power(self) -> Expr:
         return self.Q_flow
+
+
+class PrescribedHeatFlow(Component):
+    """Heat flow into the connected body, given by a signal."""
+
+    icon = icons.HEAT_SOURCE
+    port = HeatPort("surface")
+    Q_flow: Input = signal_in("W", "heat flow into the connected body")
+
+    def equations(self) -> Equations:
+        yield self.port.Q_flow == -self.Q_flow
+
+    def source_power(self) -> Expr:
+        return self.Q_flow
+
+
+class PrescribedTemperature(Component):
+    """Surroundings whose temperature is a signal, whatever heat they take."""
+
+    icon = icons.TEMPERATURE
+    port = HeatPort("surface")
+    T: Input = signal_in("K", "temperature")
+
+    def equations(self) -> Equations:
+        yield self.port.T == self.T
+
+    def source_power(self) -> Expr:
+        return -self.port.Q_flow
 
 
 class ThermalConductor(Component):
