@@ -21,6 +21,7 @@ _NAMES = {
     "control": "PI PID ClutchActuator Feedback FirstOrder Gain Integrator Limiter P Sum",
     "couplings": "ArcSpring DualMassFlywheel ElasticCoupling HystereticCoupling OldhamCoupling RuptureCoupling",
     "dc_machines": "PermanentMagnetDCMachine SeparatelyExcitedDCMachine SeriesDCMachine ShuntDCMachine",
+    "drag_losses": "ChurningGear DeepGrooveBearing",
     "drivers": "Driver",
     "eddy_current_brakes": "EddyCurrentForce EddyCurrentTorque",
     "electrical": (
@@ -31,6 +32,7 @@ _NAMES = {
     "fixed": "Disc Fixed TranslationalFixed",
     "flexible_shafts": "FlexibleShaft StribeckBearing",
     "friction": "BearingFriction Brake Clutch DryFriction MultiPlateClutch",
+    "gear_meshes": "GearMesh",
     "gearboxes": "Gearbox",
     "gears": "IdealGear",
     "hoists": "HoldingBrake Rope WinchDrum",

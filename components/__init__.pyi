@@ -38,6 +38,8 @@ from components.dc_machines import PermanentMagnetDCMachine as PermanentMagnetDC
 from components.dc_machines import SeparatelyExcitedDCMachine as SeparatelyExcitedDCMachine
 from components.dc_machines import SeriesDCMachine as SeriesDCMachine
 from components.dc_machines import ShuntDCMachine as ShuntDCMachine
+from components.drag_losses import ChurningGear as ChurningGear
+from components.drag_losses import DeepGrooveBearing as DeepGrooveBearing
 from components.drivers import Driver as Driver
 from components.eddy_current_brakes import EddyCurrentForce as EddyCurrentForce
 from components.eddy_current_brakes import EddyCurrentTorque as EddyCurrentTorque
@@ -67,6 +69,7 @@ from components.friction import Brake as Brake
 from components.friction import Clutch as Clutch
 from components.friction import DryFriction as DryFriction
 from components.friction import MultiPlateClutch as MultiPlateClutch
+from components.gear_meshes import GearMesh as GearMesh
 from components.gearboxes import Gearbox as Gearbox
 from components.gears import IdealGear as IdealGear
 from components.hoists import HoldingBrake as HoldingBrake

@@ -83,6 +83,8 @@ PENDULUM = Icon(44, 52, paper=_circle(0, 6, 18), lines="M-22 6 h22 M0 6 v-16 l6 
 _PAIR, _HUBS = f"{_circle(-11, 0, 9)} {_circle(9, 0, 11)}", f"{_circle(-11, 0, 2.5)} {_circle(9, 0, 2.5)}"
 GEAR = Icon(48, 38, paper=_PAIR, solid=_HUBS, lines="M-24 0 h4 M20 0 h4", key=("ratio",))
 WORM = replace(GEAR, lines="M-24 0 h4 M20 0 h4 M-17 -5 l4 10 M-12 -7 l4 12 M-7 -6 l3 8")
+GEAR_MESH = replace(GEAR, lines="M-24 0 h4 M20 0 h4 M-6 -16 l2 4 l2 -8 l2 8 l2 -4", key=("c",))
+CHURNING = replace(BEARING, paper=_circle(0, 0, 14), lines=f"M-22 0 h44 {_hatch(-16, 8, 32)}", heavy="", key=("R",))
 GEARBOX = Icon(56, 46, paper=f"{_rect(28, 23)} {_PAIR}", solid=_HUBS, key=("ratio",))
 BELT = Icon(60, 34, paper=f"{_circle(-18, 0, 9)} {_circle(13, 0, 14)}",
             solid=f"{_circle(-18, 0, 2)} {_circle(13, 0, 2)}",

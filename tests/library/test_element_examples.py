@@ -164,6 +164,31 @@ def switching(run: Solution) -> None:
     assert moment(run, "contactor.contacts", "open") == close(0.06 + 0.6 / 48 * log(full / 0.1))
 
 
+@numbers
+def gears_and_losses(run: Solution) -> None:
+    # A free pair: x = 10 µm·cos(w·t) for as long as the flanks touch; without backlash that is always.
+    w = sqrt(200e6 * (0.03**2 / 0.001 + 0.06**2 / 0.008))
+    period = 2 * pi / w
+    assert run.at(7.25 * period)["mesh.x"] == pytest.approx(0, abs=1e-5 * 1e-5)
+    assert run.at(8 * period)["mesh.f"] == pytest.approx(200e6 * 1e-5, rel=1e-5)
+    # Across half the backlash, half a swing on the teeth, and back across the whole.
+    gap, swing = 0.15e-3 / (0.03 * 5), pi / (0.03 * sqrt(200e6 / 0.001))
+    contacts = [event.time for event in run.events if event.mode == "loose.contact"]
+    assert contacts[:3] == close([gap, gap + swing, 3 * gap + swing])
+    # SKF: R_1·d_m^1.96·F_r^0.54·(nu·n)^0.6 with both factors, and 0.05 to 0.15 of S_1·d_m^-0.26·F_r^(5/3).
+    heating = 1 / (1 + 1.84e-9 * (3000 * 60) ** 1.28 * 20**0.64)
+    starved = exp(-3e-8 * 20 * 3000 * 120 * sqrt(3.1 / 80))
+    rolling = heating * starved * 3.9e-7 * 60**1.96 * 2000**0.54 * 60000**0.6
+    mixed = exp(-2.6e-8 * 60000**1.4 * 60)
+    sliding = (0.15 * mixed + 0.05 * (1 - mixed)) * 3.23e-3 * 60**-0.26 * 2000 ** (5 / 3)
+    assert run.final["bearing.tau"] == close(1e-3 * (rolling + sliding))
+    # Torque k·w^0.59: w^0.41 falls in a straight line.
+    theta = pi / 3
+    surface = 0.08**2 * (2 * theta - sin(2 * theta)) + 2 * 0.08 * 0.03 * theta
+    k = 0.5 * 870 * 0.08**3 * surface * 1.5 * (0.08 / 9.80665) ** -0.6 * (0.08 * 0.03 / 50e-6) ** -0.21
+    assert run.final["rotor.w"] ** 0.41 == close(200**0.41 - 0.41 * k / 0.05 * 0.02)
+
+
 def test_every_netlist_has_numbers_and_a_line_on_the_page() -> None:
     names = {path.stem for path in FOLDER.glob("*.toml")}
     assert names == NUMBERS.keys()
