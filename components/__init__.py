@@ -39,8 +39,10 @@ _NAMES = {
     "inertias": "Inertia Mass",
     "interfaces": "Compliant CompliantWithRelativeStates Flange LinearFlange",
     "linear_blocks": "Derivative SecondOrder TransferFunction",
+    "linkages": "Cam FourBar SliderCrank",
     "loads": "SpeedDependentLoad",
     "lossy_gears": "ConstantEfficiencyGear LossyGear",
+    "machine_loads": "CentrifugalPump Conveyor CuttingLoad DisplacementLoad FormingForce",
     "motions": (
         "InitializeFlange Move RelativeStates TranslationalInitializeFlange TranslationalMove "
         "TranslationalRelativeStates"
@@ -93,6 +95,7 @@ _NAMES = {
     "transmissions": "Lepelletier Ravigneaux",
     "tyres": "AxleLoads Tyre",
     "universal_joints": "UniversalJoint",
+    "variable_drives": "ChainDrive VariableGear",
     "vehicles": "RoadLoad RollingResistance Vehicle",
     "waves": "CombiTable Cosine Exponentials ExpSine LogFrequencySweep SawTooth Sinc VariableSine",
     "wheels": "IdealGearR2T IdealRollingWheel",

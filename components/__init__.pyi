@@ -84,9 +84,17 @@ from components.interfaces import LinearFlange as LinearFlange
 from components.linear_blocks import Derivative as Derivative
 from components.linear_blocks import SecondOrder as SecondOrder
 from components.linear_blocks import TransferFunction as TransferFunction
+from components.linkages import Cam as Cam
+from components.linkages import FourBar as FourBar
+from components.linkages import SliderCrank as SliderCrank
 from components.loads import SpeedDependentLoad as SpeedDependentLoad
 from components.lossy_gears import ConstantEfficiencyGear as ConstantEfficiencyGear
 from components.lossy_gears import LossyGear as LossyGear
+from components.machine_loads import CentrifugalPump as CentrifugalPump
+from components.machine_loads import Conveyor as Conveyor
+from components.machine_loads import CuttingLoad as CuttingLoad
+from components.machine_loads import DisplacementLoad as DisplacementLoad
+from components.machine_loads import FormingForce as FormingForce
 from components.motions import InitializeFlange as InitializeFlange
 from components.motions import Move as Move
 from components.motions import RelativeStates as RelativeStates
@@ -212,6 +220,8 @@ from components.transmissions import Ravigneaux as Ravigneaux
 from components.tyres import AxleLoads as AxleLoads
 from components.tyres import Tyre as Tyre
 from components.universal_joints import UniversalJoint as UniversalJoint
+from components.variable_drives import ChainDrive as ChainDrive
+from components.variable_drives import VariableGear as VariableGear
 from components.vehicles import RoadLoad as RoadLoad
 from components.vehicles import RollingResistance as RollingResistance
 from components.vehicles import Vehicle as Vehicle

@@ -189,6 +189,69 @@ def gears_and_losses(run: Solution) -> None:
     assert run.final["rotor.w"] ** 0.41 == close(200**0.41 - 0.41 * k / 0.05 * 0.02)
 
 
+@numbers
+def linkages(run: Solution) -> None:
+    t, r, rod = 0.37, 0.05, 0.18
+    phi, u = 10 * t, rod**2 - (r * sin(10 * t)) ** 2
+    bent = r * cos(phi) + r**2 * cos(2 * phi) / sqrt(u) + (r**2 * sin(phi) * cos(phi)) ** 2 / u**1.5
+    slope = -r * sin(phi) - r**2 * sin(phi) * cos(phi) / sqrt(u)
+    at = run.at(t)
+    assert [at["slide.s"], at["slide.v"]] == close([r * cos(phi) + sqrt(u), 10 * slope])
+    assert at["crank.flange_r.tau"] == close(-slope * 2 * bent * 100)
+    # The follower is accelerated most at a quarter of the rise, 2·pi·h/beta²·w², and fastest in the middle, 2·h/beta·w.
+    beta, h, w = radians(120), 0.012, 20.0
+    quarter, middle = run.at(beta / 4 / w), run.at(beta / 2 / w)
+    assert quarter["follower.s"] == close(h * (0.25 - 1 / (2 * pi)))
+    assert -quarter["cam.flange_t.f"] == close(0.5 * 2 * pi * h / beta**2 * w**2)
+    assert middle["follower.v"] == close(2 * h / beta * w)
+    resting, fallen = run.at(radians(140) / w + 2 * pi / w), run.at(radians(300) / w)
+    assert [resting["follower.s"], fallen["follower.s"]] == close([h, 0])
+    # The rocker at both stretched positions of crank and coupler, and the coupler's length in between.
+    a, b, c, d = 0.03, 0.09, 0.07, 0.1
+    for stretched in (b + a, b - a):
+        crank = acos((d**2 + stretched**2 - c**2) / (2 * d * stretched)) + (pi if stretched < b else 0)
+        rocker = pi - acos((d**2 + c**2 - stretched**2) / (2 * d * c))
+        assert run.at(crank / 3)["rocker.phi"] == close(rocker)
+        assert run.at(crank / 3)["rocker.w"] == pytest.approx(0, abs=1e-6)
+    angle, swing = 3 * 1.3, run.at(1.3)["rocker.phi"]
+    coupler = np.hypot(d + c * cos(swing) - a * cos(angle), c * sin(swing) - a * sin(angle))
+    assert coupler == close(b)
+
+
+@numbers
+def variable_drives(run: Solution) -> None:
+    ratio = 1 + exp(-0.4 / 0.2)
+    at, slower = run.at(0.5), -(1 - ratio) / 0.2
+    assert [at["variator.ratio"], at["wheel.w"]] == close([ratio, 100 / ratio])
+    torque = 20 + 0.5 * 100 / ratio**2 * slower
+    assert -at["engine.flange.tau"] == close(torque / ratio / 0.9)
+    # The chain's way on either polygon: pitch per tooth, and r·sin of what is left of it.
+    ways = []
+    for z, angle in ((11, 2 * 0.33), (22, 0.33)):
+        teeth = round(angle * z / (2 * pi))
+        ways.append(0.0127 * (teeth + sin(angle - 2 * pi / z * teeth) / (2 * sin(pi / z))))
+    assert run.at(0.33)["chain.f"] == close(100e3 * (ways[0] - ways[1]))
+
+
+@numbers
+def machine_loads(run: Solution) -> None:
+    thickness = 0.3 * sin(radians(75))
+    force = 1700 * 3 / sin(radians(75)) * thickness**0.75
+    assert run.at(0.2)["cut.tau"] == close(force * 0.04)
+    assert moment(run, "cut.mode", "stuck") == close(0.4 * 100 / (force * 0.04))
+    gas = 1e5 * 1.3 / 0.3 * (8 ** (0.3 / 1.3) - 1)
+    assert run.final["compressor.tau"] == close(0.5e-3 * gas / (2 * pi * 0.9))
+    assert run.final["oil_pump.tau"] == close(20e-6 * 100e5 / (2 * pi * 0.95))
+    flow = sqrt((60 * (2 / 3) ** 2 - 10) / 3e5)
+    head = 10 + 2e5 * flow**2
+    assert run.final["pump.Q"] == pytest.approx(flow, rel=3e-6)  # the smooth beginning of the flow
+    assert run.final["pump.tau"] == pytest.approx(9806.65 * head * flow / 0.75 / 100 + 5 * (2 / 3) ** 2, rel=1e-5)
+    assert run.final["slide.v"] == close(sqrt(2.5**2 - 2 * 80e3 * 4e-3 / 200))
+    pressing = 15 + (24 + 50) * cos(radians(10))
+    torque = 3500 - 0.4 * 60 * 9.80665 * (1.6 * 0.025 * pressing + 50 * sin(radians(10)))
+    assert run.final["conveyor.w"] == close(torque / (60 * (24 + 15 + 50) * 0.16) * 0.5)
+
+
 def test_every_netlist_has_numbers_and_a_line_on_the_page() -> None:
     names = {path.stem for path in FOLDER.glob("*.toml")}
     assert names == NUMBERS.keys()
