@@ -58,7 +58,7 @@ def magnetic_clutch(run: Solution) -> None:
 
 @numbers
 def wet_clutch(run: Solution) -> None:
-    filling = quad(lambda drop: 2e-13 * sqrt(1e5 * (drop + 1e3)) / (4e-3 / 60 * drop), 6e5, 8e5)[0]
+    filling = quad(lambda drop: 2e-13 * sqrt(1e5 * (drop + 1e3)) / (4e-3 / 60 * drop), 8e5 - 601 / 30e-4, 8e5)[0]
     assert moment(run, "piston.stop", "moving") == close(0.1 + filling)
     assert moment(run, "air_piston.stop", "moving") == close(0.1 + 1e-4 * 1e5 / (1e5 * 1e-8 * 7e5))
     assert [run.final["piston.y"], run.final["air_piston.y"]] == pytest.approx([1, 1], rel=1e-5)
