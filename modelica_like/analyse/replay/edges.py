@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from modelica_like.analyse.replay.chain import Reading, Replay
 from modelica_like.analyse.replay.jumps import Jump
-from modelica_like.analyse.slopes import slopes
 from modelica_like.compile.buffers import Vector
 from modelica_like.errors import NoGradient
+from modelica_like.initialize.slopes import slopes
 from modelica_like.solve.guards import Guards
 
 _STILL = 1e-7
