@@ -1,4 +1,4 @@
-"""Commands that show netlists and runs: draw, report."""
+"""Commands that show netlists and runs: draw, report, explore."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from modelica_like.cli.shared import Assignments, Debug, Netlist, load_netlist, 
 def draw(
     netlist: Netlist, assignments: Assignments = None, *,
     output: Annotated[Path | None, Option("--output", "-o", metavar="FILE", help="A .svg, .png or .pdf file.")] = None,
-    depth: Annotated[int, Option(metavar="N", help="How many levels of assemblies are open.")] = 1,
+    depth: Annotated[int, Option(metavar="N", help="Levels of assemblies to open.")] = 1,
     debug: Debug = False,
 ) -> None:  # fmt: skip
     """Draw the schematic of a netlist: power from left to right."""
@@ -28,8 +28,8 @@ def draw(
 def report(
     netlist: Netlist, assignments: Assignments = None, *,
     output: Annotated[Path | None, Option("--output", "-o", metavar="FILE", help="The page, .html.")] = None,
-    until: Annotated[str | None, Option(metavar="TIME", help="End time, e.g. 2s; else the netlist's.")] = None,
-    show: Annotated[list[str] | None, Option(metavar="PATTERN", help="What to draw, e.g. '*.w'.")] = None,
+    until: Annotated[str | None, Option(metavar="TIME", help="End time, e.g. 2s; default: the netlist's.")] = None,
+    show: Annotated[list[str] | None, Option(metavar="PATTERN", help="Variables to draw, e.g. '*.w'.")] = None,
     debug: Debug = False,
 ) -> None:  # fmt: skip
     """Simulate a netlist and write a page about it: schematic, events, curves, energies, numbers."""
@@ -47,3 +47,21 @@ def report(
             run = simulate(model, until, progress=bar)
         save_report(drive, run, path, show=show or ())
         say(str(path))
+
+
+def explore(
+    netlist: Netlist, assignments: Assignments = None, *,
+    until: Annotated[str | None, Option(metavar="TIME", help="End time, e.g. 2s; else the netlist's.")] = None,
+    show: Annotated[list[str] | None, Option(metavar="PATTERN", help="What to draw, e.g. '*.w'.")] = None,
+    output: Annotated[Path, Option("--output", "-o", metavar="FOLDER", help="Where the page saves files.")] = Path(),
+    browser: Annotated[bool, Option(help="Open the browser.")] = True,
+    debug: Debug = False,
+) -> None:  # fmt: skip
+    """Open a page with sliders and curves that runs the drive on this machine."""
+    with told(debug):
+        drive = load_netlist(netlist, assignments)
+        from modelica_like.explore import Explorer
+
+        with Explorer(drive, until, show=show or (), folder=output) as explorer:
+            say(f"{explorer.address}\nCtrl-C ends it.")
+            explorer.show(browser=browser)

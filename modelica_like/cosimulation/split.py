@@ -45,7 +45,10 @@ class Split:
     notes: tuple[str, ...] = ()
 
     def __str__(self) -> str:
-        words = {"flow": "takes the load, and tells how it moves", "potential": "is moved, and tells its load"}
+        words = {
+            "flow": "receives the load and returns the motion",
+            "potential": "receives the motion and returns the load",
+        }
         lines = [f"{self.path}: {', '.join(unit.file.name for unit in self.system.units)}"]
         return "\n".join([*lines, *(f"  {path} {words[takes]}" for path, takes in self.ends.items()), *self.notes])
 
@@ -85,7 +88,7 @@ def split(
     titles = _titles(found, names)
     settings = _settings(assembly.__dict__["_simulate"].get("until"), step, master)
     maker = Maker(assembly, found)
-    tell("looking for the causality")
+    tell("choosing the causality")
     chosen = orient(maker)
     values = _start_values(assembly)
     target.mkdir(parents=True, exist_ok=True)
@@ -153,9 +156,9 @@ def _titles(found: CutNetlist, names: Sequence[str]) -> list[str]:
         )
     for name in names:
         if not name.isidentifier():
-            raise NetlistError(f"'{name}' is no name of an FMU: letters, digits and _.")
+            raise NetlistError(f"'{name}' is not a name for an FMU: use letters, digits and _.")
     if len(set(names)) < len(names):
-        raise DuplicateName(f"Two FMUs cannot have one name: {', '.join(names)}.")
+        raise DuplicateName(f"Two FMUs cannot have the same name: {', '.join(names)}.")
     return list(names)
 
 

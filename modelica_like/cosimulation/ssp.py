@@ -38,7 +38,7 @@ def write_ssp(system: System, path: str | Path, version: Version | str = "1.0") 
     check_system(system)
     for name in (system.name, *(one.name for one in (*system.links, *system.bonds))):
         if not name.isprintable():
-            raise NetlistError(f"The name '{printable(name)}' has characters that XML does not know.")
+            raise NetlistError(f"The name '{printable(name)}' has characters that XML does not allow.")
     fmus = {unit.name: described(unit.file) for unit in system.units}
     _check_variables(system, fmus)
     homes: dict[Path, str] = {}

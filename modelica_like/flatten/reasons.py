@@ -29,7 +29,7 @@ def reason(transition: Transition, path: Callable[[Symbol], str]) -> str:
         A few words; names of parameters in braces stand for name and value.
     """
     if transition.because or transition.when is None:
-        return transition.because or "its time has come"
+        return transition.because or "its time is reached"
     told = _condition(transition.when, path)
     if len(told) <= _LONGEST and "…" not in told:
         return told

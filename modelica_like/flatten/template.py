@@ -13,6 +13,7 @@ from modelica_like.flatten.checks import check_balance, check_units, unit_of_fie
 from modelica_like.flatten.conditions import guard_of
 from modelica_like.flatten.holds import HoldForm, hold_forms
 from modelica_like.flatten.reasons import reason
+from modelica_like.flatten.wiring import taken
 from modelica_like.language.component import Component
 from modelica_like.language.declared import Declared
 from modelica_like.language.equation import Connection, Equation, FreeEnd, as_statement
@@ -209,7 +210,8 @@ def _build(component: Component) -> Template:
     events = [as_event(item, source, kind) for item, source in located(component.events(), f"{kind}.events()")]
     equations = [s for s in statements if isinstance(s, Equation)]
     wiring = tuple(s for s in statements if isinstance(s, Connection | FreeEnd))
-    check_balance(component, equations)
+    joined = {name for one in wiring if isinstance(one, Connection) for name in taken(component, one)}
+    check_balance(component, equations, joined)
     inferred = check_units(component, equations, events)
     residuals = [e.left - e.right for e in equations]
     changes = _Changes(component, events)

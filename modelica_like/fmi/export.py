@@ -152,8 +152,8 @@ def _fixed_step(asked: float | str | None, kinds: tuple[Kind, ...]) -> float:
     step = positive_step(asked)
     if step and "cs" not in kinds:
         raise ExportError(
-            "A fixed step belongs to Co-Simulation, and only Model Exchange is exported.",
-            why="In Model Exchange the importer chooses the steps.", advice="Export cs, too.",
+            "A fixed step is for Co-Simulation, but only Model Exchange is exported.",
+            why="In Model Exchange the importer chooses the steps.", advice="Also export cs.",
         )  # fmt: skip
     return step
 
@@ -271,12 +271,12 @@ def _written(
         found = problems(draft)
         if found:
             raise ExportError(
-                f"The FMU does not pass its checks: {'; '.join(found[:3])}.", why="This is a fault of the export."
+                f"The FMU does not pass its checks: {'; '.join(found[:3])}.", why="This is an error of the exporter."
             )
         kind = "cs" if "cs" in about.kinds else "me"
         check = compare_with_idas(draft, model, kind, about.fixed_step) if run else Check()
         if strict and check.differs:
-            raise ExportError(check.sentence, advice="Without `strict` it is written all the same, with a picture.")
+            raise ExportError(check.sentence, advice="Without `strict` it is still written, with a picture.")
     if not check.differs or check.curves is None:
         return check
     picture = target.with_name(f"{target.stem}_check.png")

@@ -43,7 +43,7 @@ class Sizes:
 
     @property
     def fixed(self) -> int:
-        """Parameters and inputs: what does not change during a run."""
+        """Parameters and inputs: all that is constant during a run."""
         return self.p + self.u
 
 
@@ -197,7 +197,7 @@ def columns_of(model: CompiledDae, names: Iterable[str]) -> list[int]:
     """Return the positions in (p, u) of parameters and inputs.
 
     Raises:
-        UnknownName: a name is none of the model's.
+        UnknownName: the model has no such parameter or input.
     """
     return _found(model, names, model.fixed_position, "input or parameter")
 

@@ -16,8 +16,8 @@ from modelica_like.initialize.slopes import slopes
 _MAX_NEWTON = 50
 _STEADY = 1e-6
 _NEAR = (
-    "Give guesses near the motion that is steady, such as guess(100) for a speed; "
-    "an operating point can begin from the end of a run, too."
+    "Give guesses near the steady motion, such as guess(100) for a speed; "
+    "an operating point can also start from the end of a run."
 )
 
 
@@ -134,7 +134,7 @@ def steady_change(model: CompiledDae, point: Point, theta: Vector, guess: Vector
         model: the compiled model.
         point: the steady state.
         theta: changes of (p, u, d), shape (ntheta, columns).
-        guess: changes of the states which what equilibrium leaves open keeps to, shape (nx, columns); none by default.
+        guess: changes of the states that equilibrium does not determine, shape (nx, columns); none by default.
     """
     moving, rates = moving_states(model), slopes(model, point, "ode")
     change = np.zeros((len(rates.x), theta.shape[1])) if guess is None else guess.copy()

@@ -113,13 +113,13 @@ def as_equation(item: Any, source: Source, component: str) -> Equation:
             return Equation(*(reversed(sides) if _is_turned(*sides, source.text) else sides), source=source)
         if item.is_constant():
             raise LanguageError(
-                f"{component} has an equation whose two sides are the same, or only numbers.",
+                f"{component} has an equation whose two sides are the same, or have only numbers.",
                 where=source, advice="An equation relates unknowns: left == right.",
             )  # fmt: skip
     if isinstance(item, bool):
         raise LanguageError(
             f"{component} has an equation that Python evaluated to {item}.",
-            where=source, advice="Keep a symbol on the left: `self.tau == 0`, not `0 == self.tau`.",
+            where=source, advice="Write a symbol on the left: `self.tau == 0`, not `0 == self.tau`.",
         )  # fmt: skip
     raise LanguageError(
         f"{component}.equations() yields {type(item).__name__} instead of an equation.",

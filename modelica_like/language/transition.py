@@ -49,7 +49,7 @@ def _check_transition(transition: Transition, source: Source, component: str) ->
     moving = [s for s in asked if s is TIME or isinstance(_field(s), Variable)]
     if moving:
         raise LanguageError(
-            f"{component}: the time of an event depends on {moving[0].name}, so it is not known ahead.",
+            f"{component}: the time of an event depends on {moving[0].name}, so it is not known in advance.",
             where=source, advice="Write it as a state event, `when=…`.",
         )  # fmt: skip
     for target in transition.reset:

@@ -62,7 +62,7 @@ def events_table(solution: Trajectories, *, debug: bool = False) -> Table:
 
 
 def reasons(solution: Trajectories) -> list[str]:
-    """Return in words why each of the events happened, parameters with their values."""
+    """Return in words why each of the events happened, parameters with their values; nothing where nobody knows."""
     known: dict[tuple[str, int], str] = {}
 
     def valued(path: str) -> str:
@@ -72,7 +72,8 @@ def reasons(solution: Trajectories) -> list[str]:
     for event in solution.events:
         key, (component, dot, _) = (event.mode, event.transition), event.mode.rpartition(".")
         if key not in known:
-            because = "an impact" if event.transition < 0 else solution.model.transitions[event.transition].because
+            by_itself = "an impact" if event.source.file else ""  # FMUs do not tell why
+            because = by_itself if event.transition < 0 else solution.model.transitions[event.transition].because
             known[key] = NAME_IN_NOTICE.sub(lambda name, owner=component + dot: valued(owner + name[1]), because)
     return [known[event.mode, event.transition] for event in solution.events]
 
@@ -153,9 +154,7 @@ def couplings_table(solution: CosimSolution) -> Table:
          f"{one.residual / one.throughput:.1e}" if one.throughput else "", f"{one.mismatch:.3g}")
         for one in solution.couplings
     ]  # fmt: skip
-    return table(
-        "energy at the couplings in J", "coupling", "through>", "made by it>", "share>", "mismatch>", rows=rows
-    )
+    return table("energy at the couplings in J", "coupling", "through>", "created>", "share>", "mismatch>", rows=rows)
 
 
 def steps_line(solution: CosimSolution) -> str:
@@ -163,5 +162,5 @@ def steps_line(solution: CosimSolution) -> str:
     sizes = f"{solution.shortest:.3g} s"
     if solution.longest > solution.shortest * (1 + 1e-6):
         sizes += f" to {solution.longest:.3g} s"
-    back = f", {solution.rejected} taken back" if solution.rejected else ""
+    back = f", {solution.rejected} rejected" if solution.rejected else ""
     return f"{solution.steps} communication steps of {sizes}{back}, {solution.statistics.seconds:.2f} s"

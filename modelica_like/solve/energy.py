@@ -147,7 +147,7 @@ class EnergyBalance:
             if row.gain:
                 told.append(f"{name} has a negative loss, {-row.gain:.6g} W at {row.gain_time:.9g} s.")
         if self.at_events > _ROUNDING * self.throughput:
-            told.append(f"At an event {self.at_events:.6g} J appear or vanish that no impact and no reset explains.")
+            told.append(f"At an event {self.at_events:.6g} J appear or vanish without an impact or a reset.")
         if self.tolerance and self.drift > _ADDED_UP * self.tolerance:
             worst = max(self.rows, key=lambda row: abs(row.drift))
             told.append(

@@ -137,7 +137,7 @@ CASES: dict[str, tuple[type[ModelicaLikeError], Callable[[], object], str]] = {
 The network of u, r has no Ground.
   in circuit.toml:3 `u = { is = "ConstantVoltage", V = "10 V" }`
   in circuit.toml:4 `r = { is = "Resistor", R = "1 Ohm" }`
-Every voltage in it counts from another one; none is zero.
+Every voltage in it is relative to another one; none is zero.
 Connect a part that is = "Ground" to it.""",
     ),
     "two voltages between the same pins": (
@@ -173,7 +173,7 @@ The Jacobian is singular at t = 0 s in block 1 (fast.flange_b.tau, gear.flange_b
   in inertias.py:{inertias.py:yield self.J * der(self.w) == a.tau + b.tau} `yield self.J * der(self.w) == a.tau + b.tau`
   in gears.py:{gears.py:yield self.ratio * a.tau + b.tau == 0} `yield self.ratio * a.tau + b.tau == 0`
   in gears.py:{gears.py:yield a.phi - self.phi_support == self.ratio * (b.phi - self.phi_support)} `yield a.phi - self.phi_support == self.ratio * (b.phi - self.phi_support)`
-gear.ratio is zero: that leaves these unknowns open.
+gear.ratio is zero, so these unknowns are undetermined.
 Give it another value.""",  # noqa: E501
     ),
     "an equation drives an input": (
@@ -275,7 +275,7 @@ def test_a_condition_without_words_is_put_into_words() -> None:
     assert [one.because for one in transitions] == [
         "rising x rose above {limit}",
         "rising x rose above 2*limit",
-        "its time has come",
+        "its time is reached",
         "rising x rose above {late} and mode is low",
         "its condition on x holds",
         "is back below {limit}",
