@@ -12,7 +12,8 @@ from modelica_like.compile.compiled import Circuit, CompiledDae, Vector
 from modelica_like.compile.functions import ROUNDING
 from modelica_like.compile.soon import TIME_RESOLUTION
 from modelica_like.flatten.holds import TERMS
-from modelica_like.initialize.point import Point, call, solve_implicit, variable_slopes
+from modelica_like.initialize.point import Point, call, solve_implicit
+from modelica_like.initialize.slopes import variable_slopes
 from modelica_like.language.hold import UNLIMITED
 
 _DEPENDENT = 1e-9

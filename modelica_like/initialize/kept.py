@@ -9,7 +9,8 @@ import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.initialize.holds import holding
-from modelica_like.initialize.point import Point, call, variable_slopes
+from modelica_like.initialize.point import Point, call
+from modelica_like.initialize.slopes import variable_slopes
 
 Matrix = np.ndarray[Any, np.dtype[np.float64]]
 RANK = 1e-12

@@ -71,6 +71,15 @@ class System:
         """The column of all symbols."""
         return self.column(list(range(len(self.symbols))))
 
+    def generic(self, expressions: Any) -> ca.DM:
+        """Return numbers at a point that is not special; parameters have their values, modes their starts."""
+        model = self.model
+        function = ca.Function("generic", [self.everything, model.p, model.d, model.time], [expressions])
+        point = [0.3 + 0.61803398875 * (k % 7 + 1) for k in range(len(self.symbols))]
+        starts = [one.start if isinstance(one.start, int | float) else 0.0 for one in model.discretes]
+        starts += [0.0] * (model.d.numel() - len(starts))
+        return function(point, [one.value for one in model.parameters], starts, 0.0)
+
     def add_level(self, chain: int) -> int:
         """Extend a chain by one derivative."""
         below = self.levels[self.chains[chain][-1]]
