@@ -122,7 +122,7 @@ def simulate(
 
     Raises:
         ModelicaLikeError: the model or a value is wrong, or the simulation cannot go on.
-        KeyboardInterrupt: it was interrupted. `run` of this and of a `SolveError` is the solution up to there.
+        KeyboardInterrupt: the run was interrupted. `run` of this and of a `SolveError` is the solution up to then.
     """
     model = build(drive)
     if parameters:

@@ -1,4 +1,4 @@
-"""Schematics: drives draw themselves.
+"""Schematics of drives.
 
 A layered drawing, with power from west to east: columns by a linear programme, orders by crossings, heights by another
 linear programme, and lines along both. Symbols are declared by the components.
@@ -31,7 +31,7 @@ def layout(component: Component, *, depth: int = 1) -> Sheet:
 
     Args:
         component: the drive.
-        depth: how many levels of assemblies are open.
+        depth: number of levels of open assemblies.
     """
     return sheet(diagram(component, depth))
 
@@ -41,16 +41,16 @@ def schematic(component: Component, *, depth: int = 1) -> str:
 
     Args:
         component: the drive.
-        depth: how many levels of assemblies are open.
+        depth: number of levels of open assemblies.
     """
     return svg(layout(component, depth=depth), component.label)
 
 
 def check_format(path: Path) -> None:
-    """Tell why a schematic cannot be written there.
+    """Raise an error if a schematic cannot be written there.
 
     Raises:
-        NetlistError: the ending is none of `FORMATS`.
+        NetlistError: the ending is not in `FORMATS`.
         MissingExtra: the format needs a package that is not installed.
         OSError: it cannot be written there.
     """
@@ -69,10 +69,10 @@ def save_schematic(component: Component, path: str | Path, *, depth: int = 1) ->
     Args:
         component: the drive.
         path: the file.
-        depth: how many levels of assemblies are open.
+        depth: number of levels of open assemblies.
 
     Raises:
-        NetlistError: the ending is none of these.
+        NetlistError: the file name has another ending.
         MissingExtra: PNG and PDF need the extra `pictures`.
         OSError: the file cannot be written.
     """

@@ -1,4 +1,4 @@
-"""A schematic as SVG: plain attributes for every renderer, and dark colours where a browser asks for them."""
+"""A schematic as SVG: plain attributes for every renderer, and dark colours for browsers in dark mode."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ def svg(drawn: Sheet, title: str, *, background: bool = True) -> str:
 
     Args:
         drawn: what to draw.
-        title: for readers who do not see it.
-        background: fill the paper.
+        title: for screen readers.
+        background: whether to fill the paper.
     """
     width, height = drawn.width + 2 * _MARGIN, drawn.height + 2 * _MARGIN
     strokes = {item.stroke.name: item.stroke for _, item in drawn.everything() if isinstance(item, Line)}

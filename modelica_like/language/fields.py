@@ -119,7 +119,7 @@ def in_range(number: float, given: object, label: str, unit: str, bounds: tuple[
     Args:
         number: in SI units.
         given: how it was written, for messages.
-        label: what messages call it.
+        label: name for messages.
         unit: of the bounds, likewise.
         bounds: smallest and largest value, in SI units; None where there is none.
 

@@ -12,7 +12,7 @@ class Terminal:
 
     Attributes:
         kind: kind of the terminal; ends of one kind fit together.
-        takes: what comes from outside: the `flow` (torque, force, current, heat flow) or the `potential` (angle,
+        takes: quantity from outside: the `flow` (torque, force, current, heat flow) or the `potential` (angle,
             position, voltage, temperature).
         rates: pairs of an input and the input that is its time derivative.
         power: the flow and the signal whose product is the power through it, such as torque and speed.

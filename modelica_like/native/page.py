@@ -79,7 +79,7 @@ def export_html(
         path: the page to write, with the ending .html.
         until: end time, a number in s or a quantity; by default what the netlist says.
         show: patterns of what is drawn at first, such as `*.w`; by default speeds, torques and forces of the parts.
-        report: called with what is being done.
+        report: called with the present activity.
 
     Raises:
         ExportError: it cannot be exported, or the run-time cannot be compiled.

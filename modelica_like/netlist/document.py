@@ -25,7 +25,7 @@ from modelica_like.units import parse_unit, to_si
 _ENDLESS = re.compile(r"[0-9]{4301}")
 MAX_BYTES = 2_000_000
 StartKind = Literal["given", "rest", "steady"]
-"""What stands for start values that are not given."""
+"""Replacement of missing start values."""
 Check = Callable[[str, Any], Any]
 """Returns an entry with the key `section.name`, if it has the right form."""
 Reader = Callable[[str, Any, Lines, list[ModelicaLikeError]], Any]

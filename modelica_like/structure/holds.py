@@ -187,7 +187,7 @@ def share_reactions(system: System, holds: tuple[HeldMotion, ...], circuits: lis
     Args:
         system: the equations; its model gets the switches and shares.
         holds: the held motions.
-        circuits: those that depend on each other.
+        circuits: held motions that depend on each other.
         residual: column of all equations, differentiated ones included.
 
     Returns:

@@ -41,7 +41,7 @@ class ReducedDae:
         index: structural index of the equations before the reduction.
         differentiated: origins of the differentiated equations.
         holds: motions that modes hold.
-        circuits: those that depend on each other.
+        circuits: held motions that depend on each other.
     """
 
     flat: FlatModel
