@@ -108,7 +108,7 @@ def simulate(
 
     Args:
         drive: a component, a netlist file, or a compiled model.
-        until: end time, a number in s or a quantity; by default what the netlist says.
+        until: end time, a number in s or a quantity; by default that of the netlist.
         parameters: other values of parameters and inputs by path; nothing is compiled again.
         start: `given`, `rest` (what has no start value stands still) or `steady`.
         t0: start time in s.

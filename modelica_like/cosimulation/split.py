@@ -59,7 +59,7 @@ def split(
     number from the start of the drive.
 
     Args:
-        drive: a netlist file, or a component that has only parts and wires.
+        drive: a netlist file, or a component that has only parts and connections.
         at: names of parts (the cut is behind them), of their ends (`shaft.flange_a`), or of entries of `[connect]`;
             signals can also be cut.
         folder: for the files; it is created if it does not exist.

@@ -63,7 +63,7 @@ def split_to_ssp(
     """Cut a drive at shafts, and write the parts as an SSP.
 
     Args:
-        drive: a netlist file, or a component that has only parts and wires.
+        drive: a netlist file, or a component that has only parts and connections.
         at: where to cut; see `split`.
         path: the file to write, `….ssp`.
         ssp_version: of the SSP standard.

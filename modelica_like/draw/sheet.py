@@ -32,8 +32,8 @@ class Placed:
     """A node with the space around the middle of its symbol.
 
     Attributes:
-        node: the
-        node. half: half the size of the symbol.
+        node: the node.
+        half: half the size of the symbol.
         room: west, north, east and south of the middle.
         exits: height at which the line of a port leaves.
         sheet: the inside of an open assembly.

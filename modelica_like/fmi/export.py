@@ -50,7 +50,7 @@ class Export:
         kinds: `me`, `cs` or both.
         platforms: names of the platforms it has binaries for.
         size: of the file in bytes.
-        seconds: how long it took.
+        seconds: wall time.
         check: how it compares with IDAS.
     """
 

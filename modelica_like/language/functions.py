@@ -38,12 +38,12 @@ def der(expression: Expr) -> Expr:
 
 
 def prescribed(motion: Expr) -> Expr:
-    """Return 1 where the model prescribes a motion, whatever torque or force it takes, and 0 where these move it.
+    """Return 1 if the model prescribes a motion, whatever torque or force it takes, and 0 if these determine it.
 
-    That follows from the structure of the whole model; it never changes during a run.
+    This follows from the structure of the whole model and never changes during a run.
 
     Args:
-        motion: a speed of the component, whose derivative stands in the same equation.
+        motion: a speed of the component, whose derivative is in the same equation.
 
     Raises:
         LanguageError: it is not a variable.
@@ -102,29 +102,41 @@ def where(condition: Expr | bool, then: Scalar, otherwise: Scalar) -> Expr:
 
     Args:
         condition: a relation, or several joined with `all_of` and the like.
-        then: value where it holds.
-        otherwise: value where it does not.
+        then: value if it is true.
+        otherwise: value if it is false.
     """
     return ca.if_else(condition, _sx(then), _sx(otherwise))
 
 
 def all_of(*conditions: Expr) -> Expr:
-    """All conditions hold."""
+    """Return a condition that is true where all conditions are.
+
+    Args:
+        conditions: relations, or combinations of them.
+    """
     return functools.reduce(ca.logic_and, conditions)
 
 
 def any_of(*conditions: Expr) -> Expr:
-    """At least one condition holds."""
+    """Return a condition that is true where at least one condition is.
+
+    Args:
+        conditions: relations, or combinations of them.
+    """
     return functools.reduce(ca.logic_or, conditions)
 
 
 def negate(condition: Expr) -> Expr:
-    """The condition does not hold."""
+    """Return the opposite of a condition.
+
+    Args:
+        condition: a relation, or a combination of several.
+    """
     return ca.logic_not(condition)
 
 
 BEYOND = ("hold", "linear", "error")
-"""What may be beyond the ends of a table."""
+"""Extrapolation of a table."""
 
 
 def interpolate(
@@ -133,16 +145,16 @@ def interpolate(
     """Interpolate in a table.
 
     Args:
-        x: where to look up.
+        x: abscissa of the value.
         xs: abscissae, strictly increasing, at least one.
         ys: values at the abscissae.
         smooth: False: piecewise linear. True: continuous slope (cubic Hermite with Fritsch-Carlson slopes, no
             overshoot).
-        extrapolate: beyond the ends `hold`: the last value; `linear`: the last slope goes on; `error`: the last value,
-            too: that a run must end there, an event of the component says.
+        extrapolate: beyond the ends `hold`: the last value; `linear`: the last slope; `error`: also the last value,
+            while an event of the component ends the run.
 
     Raises:
-        LanguageError: lengths differ, `xs` does not increase, or `extrapolate` is none of the three.
+        LanguageError: lengths differ, `xs` does not increase, or `extrapolate` is unknown.
     """
     known = not any(is_expression(x) for x in xs)
     if extrapolate not in BEYOND:

@@ -1,4 +1,4 @@
-"""What `events()` yields: transitions of modes, and choices of the mode at the start."""
+"""Items that `events()` yields: transitions of modes, and choices of the mode at the start."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ class Transition:
 
     Attributes:
         mode: the mode that changes.
-        sources: names of the modes it may leave.
-        target: name of the mode it enters.
+        sources: names of the modes to leave.
+        target: name of the mode to enter.
         when: condition of a state event, or None.
         at: time of a time event in s, or None.
         reset: new values of states and discrete values.
-        notice: what the user is told when it happens, without the name of the component.
-        because: why it happens, in a few words.
-        fails: the run ends there, with an error.
+        notice: message for the user, without the name of the component.
+        because: reason in a few words.
+        fails: whether the run ends there, with an error.
     """
 
     mode: BoundMode
@@ -48,7 +48,7 @@ class Transition:
     fails: bool = False
 
     def reason(self) -> str:
-        """Return in words why it happens: as declared, or the condition as it is written."""
+        """Return the reason in words: as declared, or the condition as written."""
         if self.because or self.at is not None:
             return self.because or "its time is reached"
         try:
@@ -71,15 +71,15 @@ class StartMode:
 
 EventStatement = Transition | StartMode
 Events = Iterator[EventStatement]
-"""What `events()` returns."""
+"""Return type of `events()`."""
 
 
 def as_event(item: Any, source: Source, component: str) -> EventStatement:
-    """Read what `events()` yielded.
+    """Read an item yielded by `events()`.
 
     Args:
-        item: what it yielded.
-        source: where.
+        item: the item.
+        source: its place.
         component: name of the class, for messages.
 
     Raises:
@@ -97,7 +97,7 @@ def as_event(item: Any, source: Source, component: str) -> EventStatement:
 
 
 def _check_transition(transition: Transition, source: Source, component: str) -> None:
-    """Check that the time of a time event is known ahead, and that only variables and discrete values are reset."""
+    """Check that a time event is known in advance, and that only variables and discrete values are reset."""
     asked = () if transition.at is None else symbols_in(transition.at)
     moving = [s for s in asked if s is TIME or isinstance(_field(s), Variable)]
     if moving:

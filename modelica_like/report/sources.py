@@ -55,7 +55,7 @@ def trajectories(
 def read_csv(path: Path) -> RecordedSolution:
     """Read a table whose first column is `time` in s; a second header line with units may follow the names.
 
-    A repeated time is an event's left and right value.
+    A repeated time gives the values before and after an event.
 
     Raises:
         NetlistError: the file is not such a table.

@@ -115,8 +115,8 @@ def compare_solutions(
 ) -> Curves:
     """Compare two solutions by the names of their signals.
 
-    Around events only the smooth pieces are compared: between the times at which the two change a mode, each is right
-    in its own way, and the difference of the times is told instead.
+    Around events only the smooth pieces are compared: between the two times of a mode change nothing is compared, and
+    the difference of the times is reported instead.
 
     Args:
         first: one of them.
@@ -126,7 +126,7 @@ def compare_solutions(
         least: the least range of a signal, over the largest value of its unit; see `ranges`.
 
     Raises:
-        UnknownName: nothing fits a pattern, or they have no signal in common.
+        UnknownName: nothing matches a pattern, or they have no signal in common.
         ValueOutOfRange: they have no time in common.
     """
     if min(first.time[-1], second.time[-1]) <= max(first.time[0], second.time[0]):

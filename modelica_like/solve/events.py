@@ -69,7 +69,7 @@ class EventLoop:
         """Simulate.
 
         Raises:
-            Chattering, StepFailed, SingularAtStart: the run cannot go on; `record` is what came before.
+            Chattering, StepFailed, SingularAtStart: the run cannot continue; `record` has the run up to then.
         """
         with self.integrator.interrupts.watched():
             try:

@@ -40,10 +40,10 @@ def plot(
         solution: the run.
         patterns: names or patterns (`*.w`) of what to draw; by default speeds, torques and forces of the parts.
         title: heading; by default the name of the model.
-        display: units by path, pattern or quantity, beside those of the netlist, such as {"speed": "rpm"}.
+        display: units by path, pattern or quantity, in addition to those of the netlist, such as {"speed": "rpm"}.
 
     Raises:
-        UnknownName: nothing fits a pattern.
+        UnknownName: nothing matches a pattern.
         UnitError: a variable cannot be shown in a unit.
     """
     shown = Display(solution.model, display)
@@ -68,7 +68,7 @@ def plot_curves(curves: Curves, patterns: Sequence[str] = ()) -> Figure:
         patterns: of the signals; by default those that deviate most.
 
     Raises:
-        UnknownName: nothing fits a pattern.
+        UnknownName: nothing matches a pattern.
     """
     names = [row.signal for row in curves.deviations]
     names = fitting(names, patterns, "Neither has a signal") if patterns else names[:_MOST_CURVES]
@@ -126,7 +126,7 @@ def chosen(solution: Trajectories, patterns: Sequence[str]) -> list[str]:
     """Return the names that fit the patterns, or a sensible choice if there are none.
 
     Raises:
-        UnknownName: nothing fits a pattern.
+        UnknownName: nothing matches a pattern.
     """
     return matching(solution.model, patterns) if patterns else _usual(solution)
 
@@ -135,7 +135,7 @@ def matching(model: CompiledDae | RecordedModel, patterns: Sequence[str]) -> lis
     """Return the variables and modes of a model that fit patterns, before it is run.
 
     Raises:
-        UnknownName: nothing fits a pattern.
+        UnknownName: nothing matches a pattern.
     """
     return fitting((*model.position, *model.discrete_position), patterns, f"{model.name} has no variable")
 
@@ -144,7 +144,7 @@ def fitting(known: Sequence[str], patterns: Sequence[str], missing: str) -> list
     """Return the names that fit patterns; `missing` is what to say before a pattern that none fits.
 
     Raises:
-        UnknownName: nothing fits a pattern.
+        UnknownName: nothing matches a pattern.
     """
     names: dict[str, None] = {}
     for pattern in patterns:

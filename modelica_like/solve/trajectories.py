@@ -144,10 +144,10 @@ class Trajectories(ABC):
         Args:
             patterns: names or patterns (`*.w`) of what to draw; by default speeds, torques and forces of the parts.
             title: heading; by default the name of the model.
-            display: units by path, pattern or quantity, beside those of the netlist, such as {"speed": "rpm"}.
+            display: units by path, pattern or quantity, in addition to those of the netlist, such as {"speed": "rpm"}.
 
         Raises:
-            UnknownName: nothing fits a pattern.
+            UnknownName: nothing matches a pattern.
             UnitError: a variable cannot be shown in a unit.
         """
         from modelica_like.solve.plot import plot

@@ -28,35 +28,35 @@ from modelica_like.writing import write_text
 
 _MOST_EVENTS = 60
 _SMALL = 1e-6
-"""Part of the energy that moves below which a component is not listed."""
+"""Share of the throughput below which a component is not listed."""
 
 
 def save_report(drive: Component, run: Solution, path: str | Path, *, show: Sequence[str] = ()) -> None:
     """Write the report of a run as a page.
 
     Args:
-        drive: what was run.
+        drive: the drive.
         run: its run.
         path: the file.
         show: patterns of the curves, such as `*.w`; by default speeds, torques and forces of the parts.
 
     Raises:
-        UnknownName: nothing fits a pattern.
+        UnknownName: nothing matches a pattern.
         OSError: the file cannot be written.
     """
     write_text(path, report(drive, run, show=show))
 
 
 def report(drive: Component, run: Solution, *, show: Sequence[str] = ()) -> str:
-    """Return the report of a run as HTML: one file that asks for nothing else.
+    """Return the report of a run as HTML: one file that loads nothing else.
 
     Args:
-        drive: what was run.
+        drive: the drive.
         run: its run.
         show: patterns of the curves; by default speeds, torques and forces of the parts.
 
     Raises:
-        UnknownName: nothing fits a pattern.
+        UnknownName: nothing matches a pattern.
     """
     folder = Path(__file__).parent
     sections = [
@@ -83,7 +83,7 @@ def report(drive: Component, run: Solution, *, show: Sequence[str] = ()) -> str:
 
 
 def _attempt(make: Callable[[], str]) -> str:
-    """A section that cannot be made says why, and the others stand."""
+    """If a section cannot be made, it shows why; the others are not affected."""
     try:
         return make()
     except ModelicaLikeError as error:
@@ -106,7 +106,7 @@ def _table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 
 def _happens(run: Solution) -> str:
-    """Events in words, those of one instant together, and what the run has to say."""
+    """Events in words, grouped by time, and the notices of the run."""
     instants: dict[float, dict[str, list[Event]]] = {}
     for event in run.events:
         instants.setdefault(event.time, {}).setdefault(event.mode, []).append(event)
@@ -120,7 +120,7 @@ def _happens(run: Solution) -> str:
 
 
 def _told(run: Solution, events: Sequence[Event]) -> str:
-    """Return what becomes of a mode at an instant: `clutch becomes stuck (slip reached zero)`."""
+    """Return the change of a mode at an instant: `clutch becomes stuck (slip reached zero)`."""
     component = events[0].mode.rpartition(".")[0] or run.model.name
     known = run.model.transitions
     reasons = dict.fromkeys("an impact" if one.transition < 0 else known[one.transition].because for one in events)
