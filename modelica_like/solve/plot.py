@@ -38,7 +38,7 @@ def plot(
 
     Args:
         solution: the run.
-        patterns: names or patterns (`*.w`) of what to draw; by default speeds, torques and forces of the parts.
+        patterns: names or patterns (`*.w`) of the curves; by default speeds, torques and forces of the parts.
         title: heading; by default the name of the model.
         display: units by path, pattern or quantity, in addition to those of the netlist, such as {"speed": "rpm"}.
 
@@ -89,10 +89,10 @@ def plot_curves(curves: Curves, patterns: Sequence[str] = ()) -> Figure:
 
 
 def check_picture(path: Path) -> None:
-    """Tell before a run why a picture cannot be written.
+    """Raise an error before a run if a picture cannot be written.
 
     Raises:
-        NetlistError: matplotlib does not know the format.
+        NetlistError: matplotlib does not support the format.
         OSError: it cannot be written there.
     """
     from matplotlib.backend_bases import FigureCanvasBase
@@ -112,18 +112,18 @@ def save_plot(figure: Figure, path: Path, **options: Any) -> None:
         options: of matplotlib's `savefig`.
 
     Raises:
-        NetlistError: matplotlib does not know the format.
+        NetlistError: matplotlib does not support the format.
         OSError: the file cannot be written.
     """
     check_picture(path)
-    # In memory first: not every format tells that a disk is full.
+    # In memory first: not every format reports a full disk.
     content = io.BytesIO()
     figure.savefig(content, format=path.suffix[1:].lower(), **options)
     write_bytes(path, content.getvalue())
 
 
 def chosen(solution: Trajectories, patterns: Sequence[str]) -> list[str]:
-    """Return the names that fit the patterns, or a sensible choice if there are none.
+    """Return the names that match the patterns, or a default choice without patterns.
 
     Raises:
         UnknownName: nothing matches a pattern.
@@ -132,7 +132,7 @@ def chosen(solution: Trajectories, patterns: Sequence[str]) -> list[str]:
 
 
 def matching(model: CompiledDae | RecordedModel, patterns: Sequence[str]) -> list[str]:
-    """Return the variables and modes of a model that fit patterns, before it is run.
+    """Return the variables and modes of a model that match patterns, before a run.
 
     Raises:
         UnknownName: nothing matches a pattern.
@@ -141,7 +141,7 @@ def matching(model: CompiledDae | RecordedModel, patterns: Sequence[str]) -> lis
 
 
 def fitting(known: Sequence[str], patterns: Sequence[str], missing: str) -> list[str]:
-    """Return the names that fit patterns; `missing` is what to say before a pattern that none fits.
+    """Return the names that match patterns; `missing` begins the message about a pattern without a match.
 
     Raises:
         UnknownName: nothing matches a pattern.
@@ -156,7 +156,7 @@ def fitting(known: Sequence[str], patterns: Sequence[str], missing: str) -> list
 
 
 def _usual(solution: Trajectories) -> list[str]:
-    """Choose speeds, torques and forces of parts; curves that coincide are drawn once, and those at rest not at all."""
+    """Choose speeds, torques and forces of parts, without curves at rest; coinciding curves are drawn once."""
     names: list[str] = []
     for unit in _USUAL:
         curves: dict[bytes, str] = {}
@@ -178,7 +178,7 @@ def unit_of(solution: Trajectories, name: str) -> str:
 
 
 def quantity(unit: str) -> str:
-    """Return what is measured in a unit, for titles."""
+    """Return the quantity of a unit, for titles."""
     return QUANTITIES.get(unit, "value")
 
 
@@ -205,7 +205,7 @@ def _mark_events(panels: Sequence[Axes], events: Sequence[Event]) -> None:
 
 
 def _spaced(events: Sequence[Event], gap: float) -> list[Event]:
-    """Return the last event of each instant, as far as there is room for a label between them."""
+    """Return the last event of each instant, if there is space for a label."""
     shown: list[Event] = []
     for event in {event.time: event for event in events}.values():
         if not shown or event.time - shown[-1].time > gap:

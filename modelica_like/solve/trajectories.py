@@ -142,7 +142,7 @@ class Trajectories(ABC):
         """Draw trajectories over time, one panel per unit, with events as dotted lines.
 
         Args:
-            patterns: names or patterns (`*.w`) of what to draw; by default speeds, torques and forces of the parts.
+            patterns: names or patterns (`*.w`) of the curves; by default speeds, torques and forces of the parts.
             title: heading; by default the name of the model.
             display: units by path, pattern or quantity, in addition to those of the netlist, such as {"speed": "rpm"}.
 

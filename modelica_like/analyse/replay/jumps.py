@@ -324,7 +324,7 @@ class Work:
             return
         strike = Strike(model, point.copy(), entering)
         if strike.hard:
-            # All impacts at this instant are one, from the speeds before the first.
+            # All impacts at this instant are solved together, from the speeds before the first.
             entering = self._begin_again(entering)
             point = self.point
             strike = Strike(model, point.copy(), entering)
@@ -357,7 +357,7 @@ class Work:
         return float(value[0]), slope[0]
 
     def _project(self, targets: list[int], values: list[tuple[float, Vector]]) -> None:
-        """Move the states as little as possible until variables have their new values; see solve.events."""
+        """Change the states as little as possible until variables have their new values; see solve.events."""
         model = self.model
         nodes = [model.reset_nodes[k] for k in targets]
         solve_implicit(model, self.point)

@@ -129,7 +129,7 @@ def _told(run: Solution, events: Sequence[Event]) -> str:
 
 
 def _energy(balance: EnergyBalance) -> str:
-    """Where the energy comes from and where it goes, in J and percent of what comes in."""
+    """Energy of each part, in J and percent of the supply."""
     total = sum(max(row.source, 0.0) + max(-row.stored, 0.0) for row in balance) or 1.0
     rows = [
         (row.component or "the drive", what, value)
@@ -152,7 +152,7 @@ def _energy(balance: EnergyBalance) -> str:
 
 
 def _small_motions(run: Solution) -> str:
-    """Eigenfrequencies in the modes in which the run ends."""
+    """Natural frequencies in the modes in which the run ends."""
     modes = [mode for mode in linearize(run).modes() if mode.oscillates]
     rows = [
         (str(k), f"{mode.frequency:.4g}", f"{mode.damping:.3g}", shares(mode.stored), shares(mode.lost))
