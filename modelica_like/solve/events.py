@@ -190,8 +190,7 @@ class EventLoop:
         return looks.width * (int(np.argmax(risen)) + 1 if risen.any() else looks.count)
 
     def _go_on(self, end: float) -> bool:
-        """Count failures on the way to one place, which may be caused by an event behind it; True if another try makes
-        sense.
+        """Count failures on the way to one place; True if another try makes sense (an event may be behind it).
 
         Shorter panels start closer to it. The last resort is a relaxed tolerance.
         """

@@ -41,7 +41,7 @@ _POLISHING = 8
 POLISHED = 1e-8
 _RELAXATION = 10.0
 _PANEL_STEPS = 300
-"""Largest number of steps between two results of a panel; with more, it has probably run past an event, and ends there."""
+"""Largest number of steps between two results of a panel; with more, it has probably passed an event, and ends."""
 
 
 def scaled_problem(model: CompiledDae, *, gentle: bool = False, scaled: bool = True) -> dict[str, Any]:

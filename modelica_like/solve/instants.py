@@ -122,7 +122,7 @@ class Instants:
             raise self._chattering(f"There were more than {self.options.max_events} events")
 
     def _share_anew(self, now: Point, wanting: list[CompiledTransition]) -> list[CompiledTransition]:
-        """Before one of several elements that hold a motion breaks away, let the others take more; return the remaining transitions."""
+        """Let others take more before one of several holding elements breaks away; return the remaining transitions."""
         if not any(now.d[one.first : one.first + len(one.members)].any() for one in self.model.circuits):
             return wanting
         share(self.model, now)

@@ -1,4 +1,4 @@
-"""Trajectories over time, wherever they come from: what can be read from them needs no equations."""
+"""Trajectories over time from any source: everything that can be read without equations."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ ENERGY_TERMS = ("stored_energy", "loss_power", "source_power")
 
 @dataclass(frozen=True)
 class Statistics:
-    """What a run took.
+    """Statistics of a run.
 
     Attributes:
         steps: integrator steps.
@@ -44,7 +44,7 @@ class Statistics:
 
 
 class Values(Mapping[str, float]):
-    """All variables at one instant, by path: the only result of trajectories."""
+    """All variables at one time, by path."""
 
     def __init__(self, one: Trajectories) -> None:
         self.time = float(one.time[0])
@@ -69,8 +69,8 @@ class Trajectories(ABC):
     Attributes:
         model: names, units and parameters.
         events: mode changes.
-        statistics: what the run took.
-        notices: what should be known about the run, as sentences.
+        statistics: of the run.
+        notices: messages about the run.
     """
 
     model: Any
@@ -106,7 +106,7 @@ class Trajectories(ABC):
         """Return states, implicit unknowns and modes at a time.
 
         Raises:
-            NetlistError: they are not known, as in recorded data.
+            NetlistError: they are unknown, as in recorded data.
         """
         raise needs_equations(self)
 
@@ -186,7 +186,7 @@ class Trajectories(ABC):
 
 
 def needs_equations(run: Trajectories) -> NetlistError:
-    """Return the error about trajectories that are given where equations are needed."""
+    """Return the error about trajectories in place of a drive with equations."""
     return NetlistError(
         f"{run.model.name}: this needs the drive with its equations, not trajectories.",
         advice="Give the netlist, the component or the compiled model.",
