@@ -30,7 +30,7 @@ _SETTLED_AFTER = 9
 
 
 def at_limits(limit: BoundMode, free: Expr, low: Expr, high: Expr) -> Events:
-    """Yield the events of a signal, free of limits, that meets and leaves its limits."""
+    """Yield the events at which an unlimited signal reaches and leaves its limits."""
     yield limit.initially("high", when=free > high)
     yield limit.initially("low", when=free < low)
     yield limit.go("free", "high", when=free > high)
@@ -98,7 +98,7 @@ class Limiter(Component):
 
 
 class P(Component):
-    """Proportional controller y = k·(u_s - u_m), limited to ±y_max where that is given; it needs no anti-windup."""
+    """Proportional controller y = k·(u_s - u_m), limited to ±y_max if given; it needs no anti-windup."""
 
     icon = icons.CONTROL_P
     u_s: Input = signal_in("*", "set value")
@@ -148,9 +148,9 @@ class Integrator(Component):
 class PI(Component):
     """Proportional-integral controller y = k·(e + 1/Ti·∫e dt) + u_ff, e = u_s - u_m.
 
-    With y_max given, the output is limited to ±y_max. What exceeds the limit is fed back to the integral with the time
-    constant Ni·Ti, so that it does not wind up (anti-windup by back-calculation, as in the Modelica Standard Library,
-    Blocks.Continuous.LimPID).
+    With y_max given, the output is limited to ±y_max. The part beyond the limit is fed back to the integral with the
+    time constant Ni·Ti, so that it does not wind up (anti-windup by back-calculation, as in the Modelica Standard
+    Library, Blocks.Continuous.LimPID).
     """
 
     icon = icons.CONTROL_PI
@@ -211,9 +211,9 @@ class ClutchActuator(Component):
     """Electromagnetic actuator of a clutch or brake: delay, rise and release of the torque (VDI 2241).
 
     After switching on nothing happens for the response delay t11. Then the torque rises linearly to its full value in
-    the time t12; after switching off it falls linearly to zero in the time t2. As an exponential, like the current of a
-    coil, it has 90 % of its full value after t12, and 10 % after t2, as data sheets state these times: its distance
-    from the final value is divided by ten in each of them. Its output goes to `f_normalized`.
+    the time t12; after switching off it falls linearly to zero in the time t2. With `exponential`, like the current of
+    a coil, it reaches 90 % of its full value after t12, and falls to 10 % after t2, as in data sheets: in each of these
+    times its distance from the final value is divided by ten. Its output goes to `f_normalized`.
     """
 
     icon = icons.RISE
@@ -229,18 +229,18 @@ class ClutchActuator(Component):
     coil = Mode("off", "waiting", "rising", "on", "falling", description="state of the coil")
 
     def remaining(self, distance: Expr, time: Expr) -> Expr:
-        """Return how far the torque still is from its final value."""
+        """Return the distance of the torque from its final value."""
         decades = (self.time - self.since) / time
         return distance * exp(-_LN_10 * decades) if self.exponential else distance - decades
 
     def arrival(self, distance: Expr, time: Expr) -> Expr:
-        """Return when it has its final value."""
+        """Return the time at which it has its final value."""
         return self.since + time * (_SETTLED_AFTER if self.exponential else distance)
 
     def equations(self) -> Equations:
         rising = 1 - self.remaining(1 - self.level, self.t12)
         falling = self.remaining(self.level, self.t2)
-        # At rest exactly 0 and 1: a clutch that is closed by 1e-30 of its force would be another mode.
+        # Exactly 0 and 1 at rest: a clutch closed with 1e-30 of its force would be in another mode.
         yield self.y == self.coil.choose(off=0, waiting=0, rising=rising, on=1, falling=falling)
 
     def events(self) -> Events:

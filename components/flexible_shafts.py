@@ -25,7 +25,7 @@ from modelica_like.language import (
 class FlexibleShaft(Component):
     """Shaft of n equal pieces: each a torsion spring with damping between two halves of its inertia.
 
-    The natural frequencies of the continuous shaft are met the better the more pieces: the k-th of a free shaft,
+    More pieces approximate the natural frequencies of the continuous shaft better: the k-th of a free shaft,
     k·pi·sqrt(c/J), to (k·pi/n)²/24.
     """
 

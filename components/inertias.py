@@ -34,7 +34,7 @@ class Inertia(Component):
 class Mass(Component):
     """Rigid sliding mass.
 
-    The acceleration force m·der(v) is the sum of both cut forces. On a slope, or hanging, its weight acts, too.
+    The acceleration force m·der(v) is the sum of both cut forces. On a slope, or hanging, its weight also acts.
     """
 
     icon = icons.MASS

@@ -38,7 +38,7 @@ class SpeedDependentTorque(TorqueSource, partial=True):
     tau_nominal: Parameter = param("N.m", "torque on the connected part at w_nominal; negative for a load")
     w_nominal: Parameter = param("rad/s", "nominal speed", min=1e-12)
     reverses: bool = True
-    """The torque changes its direction with the speed, as friction does."""
+    """The torque changes its direction with the speed, like friction."""
     w: Variable = var("rad/s", "speed of the shaft relative to the housing")
 
     def equations(self) -> Equations:
@@ -108,7 +108,7 @@ class Position(ShaftMotionSource):
     """Angle given by a signal: exactly, or through a Bessel filter of second order.
 
     The filter makes speed and acceleration of any signal finite. In the Modelica Standard Library, Rotational.Position,
-    `exact` is false if nothing is said.
+    `exact` is false by default.
     """
 
     icon = icons.ANGLE

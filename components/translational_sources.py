@@ -69,7 +69,7 @@ class SpeedDependentForce(ForceSource, partial=True):
     f_nominal: Parameter = param("N", "force on the connected part at v_nominal; negative for a load")
     v_nominal: Parameter = param("m/s", "nominal velocity", min=1e-12)
     reverses: bool = True
-    """The force changes its direction with the velocity, as friction does."""
+    """The force changes its direction with the velocity, like friction."""
     v: Variable = var("m/s", "velocity of the slide relative to the housing")
 
     def equations(self) -> Equations:

@@ -1,4 +1,4 @@
-"""Vehicles in one dimension, and what resists them."""
+"""Vehicles in one dimension, and their resistances."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ def pitch_diameter(teeth: Teeth, pitch: Length) -> Length:
 
 
 def centre_distance(belt_length: Length, small: Length, large: Length) -> Length:
-    """Return the centre distance in m of an open belt by the rule of the books.
+    """Return the centre distance in m of an open belt by the approximate rule.
 
     e = a + sqrt(a² - (d2 - d1)²/8) with a = L/4 - pi/8·(d1 + d2) (Roloff/Matek; document 002, equation 18).
 
@@ -123,8 +123,8 @@ def belt_forces(
     """Work out strand forces and shaft load (Eytelwein, Roloff/Matek; document 002, equations 23 to 28).
 
     F1 = F_t·m/(m - 1) and F2 = F_t/(m - 1) with m = exp(mu·beta). For a timing belt, which cannot slip, Eytelwein's
-    ratio is a habit of sizing. The shaft load already is the sum of both strands; document 002 adds the effective pull
-    to it at a right angle, which counts it twice (`doubled_load`).
+    ratio is a convention of sizing. The shaft load is already the sum of both strands; document 002 adds the effective
+    pull to it at a right angle, which counts it twice (`doubled_load`).
 
     Args:
         pull: effective pull in N.

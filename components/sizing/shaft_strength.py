@@ -82,7 +82,7 @@ def shaft_diameter(bending: Torque, strength: Stress, safety: Ratio, diameter: L
 
     Args:
         bending: resultant bending moment in N.m.
-        strength: fatigue strength in Pa; document 002 takes the yield strength.
+        strength: fatigue strength in Pa; document 002 uses the yield strength.
         safety: required safety.
         diameter: smallest diameter of the shaft in m.
     """
@@ -137,7 +137,7 @@ def shaft_stress(
 
 @dataclass(frozen=True)
 class Section:
-    """A cylindrical piece of a shaft.
+    """A cylindrical section of a shaft.
 
     Attributes:
         end: position of its end in m; it begins where the one before ends.
@@ -151,7 +151,7 @@ class Section:
 
 
 class SteppedShaft(Result):
-    """Safety of a stepped shaft at every place that matters."""
+    """Safety of a stepped shaft at every relevant place."""
 
     reactions: tuple[Result, ...] = line("bearings")
     stresses: tuple[ShaftStress, ...] = line("stresses at bearings, loads and shoulders")
@@ -171,7 +171,7 @@ def stepped_shaft(
     Positions and diameters are plain numbers; forces and torques may be arrays or expressions.
 
     Args:
-        loads: what acts on the shaft.
+        loads: on the shaft.
         bearings: positions in m.
         sections: pieces of the shaft from its left end on.
         yield_strength: in Pa.
@@ -203,7 +203,7 @@ def stepped_shaft(
 
 
 def _worst(stresses: list[ShaftStress]) -> list[ShaftStress]:
-    """Of both sides of one cut only the worse one is told, where it can be decided."""
+    """Of both sides of one cut only the worse one is kept, if it can be decided."""
     if is_symbolic(*(stress.safety for stress in stresses)) or any(np.ndim(stress.safety) for stress in stresses):
         return stresses
     return [min(stresses, key=lambda stress: stress.safety)]
