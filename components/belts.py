@@ -50,7 +50,7 @@ class TimingBelt(Lossy, TwoFlanges):
     F_1: Output = signal_out("N", "force in the strand that is stretched by x")
     F_2: Output = signal_out("N", "force in the other strand")
     grip = Mode("sticking", "forward", "backward", description="slip of the belt")
-    strands = Mode("tight", "slack", description="whether a strand with pre-tension has ever been slack")
+    strands = Mode("tight", "slack", description="whether a pre-tensioned strand has been slack")
 
     @property
     def slip_force(self) -> Expr:

@@ -24,7 +24,7 @@ class LuGreFriction(Lossy, ShaftInHousing):
     sigma_1: Parameter = param("N.m.s/rad", "damping of the bristles at standstill", default=0.0, min=0)
     sigma_2: Parameter = param("N.m.s/rad", "viscous friction", default=0.0, min=0)
     tau_Coulomb: Parameter = param("N.m", "dry friction at high speed, without the viscous part", min=1e-12)
-    tau_Stribeck: Parameter = param("N.m", "what friction at rest has in excess", default=0.0, min=0)
+    tau_Stribeck: Parameter = param("N.m", "excess of friction at rest", default=0.0, min=0)
     w_Stribeck: Parameter = param("rad/s", "speed at which the excess has fallen to 1/e", default=1.0, min=1e-12)
     w_damping: Parameter = param(
         "rad/s", "speed at which sigma_1 has fallen to 1/e; without a value it is constant", default=None, min=1e-12

@@ -34,8 +34,8 @@ class RigidBacklash(CompliantWithRelativeStates):
     b: Parameter = param("rad", "total backlash", min=1e-10)
     phi_rel0: Parameter = param("rad", "relative angle in the middle of the backlash", default=0.0)
     e: Parameter = param("1", "restitution: speed after an impact over that before", default=0.0, min=0, max=1)
-    w_rest: Parameter = param("rad/s", "speed from which on flanks stay together", default=1e-3, min=0)
-    faint: Parameter = param("N.m", "torque up to which what parts them may be rounding", default=1e-9, min=0)
+    w_rest: Parameter = param("rad/s", "impact speed below which flanks stay together", default=1e-3, min=0)
+    faint: Parameter = param("N.m", "separating torque that counts as rounding", default=1e-9, min=0)
     phi_rel: Variable = var("rad", "relative angle, flange_b.phi - flange_a.phi", state="always", default=0)
     w_rel: Variable = var("rad/s", "relative speed", state="always")
     contact = Mode(
@@ -84,8 +84,8 @@ class DogClutch(CompliantWithRelativeStates):
     # No torque depends on the angle of an open clutch.
     phi_rel: Variable = var("rad", "relative angle, flange_b.phi - flange_a.phi", state="prefer", default=0)
     w_rel: Variable = var("rad/s", "slip speed", state="always")
-    engage: Input = signal_in("1", "the teeth go in above 0.5, and out below", default=1.0)
-    w_max: Parameter = param("rad/s", "slip from which on the teeth go in", default=1e30, min=0)
+    engage: Input = signal_in("1", "the teeth engage above 0.5 and disengage below", default=1.0)
+    w_max: Parameter = param("rad/s", "largest slip at which the teeth engage", default=1e30, min=0)
     dogs = Mode("out", "in", description="teeth out or in", holds={"in": Hold("w_rel", reaction="tau")})
 
     def equations(self) -> Equations:

@@ -131,8 +131,8 @@ class Sticking(Lossy, partial=True):
 class ShaftSticking(Sticking, partial=True):
     """Turning surfaces that slide or stick."""
 
-    creep: Parameter = param("1/(kg.m2)", "acceleration while it sticks over its torque", default=None, min=0)
-    creep_time: Parameter = param("s", "time after which it creeps no faster", default=1e-3, min=0)
+    creep: Parameter = param("1/(kg.m2)", "acceleration per torque while stuck", default=None, min=0)
+    creep_time: Parameter = param("s", "time after which the creep speed stays constant", default=1e-3, min=0)
     rest: Parameter = param("rad/s", "speed that a prescribed motion must exceed to break away", default=1e-12, min=0)
 
 

@@ -33,9 +33,9 @@ class Freewheel(CompliantWithRelativeStates):
     # No torque depends on the angle of overrun.
     phi_rel: Variable = var("rad", "relative angle, flange_b.phi - flange_a.phi", state="prefer", default=0)
     w_rel: Variable = var("rad/s", "overrunning speed", state="always")
-    slow: Parameter = param("rad/s", "speed up to which falling behind may be rounding", default=1e-9, min=0)
-    soon: Parameter = param("s", "time in which it must reach that speed to count as falling", default=1.0, min=0)
-    faint: Parameter = param("N.m", "torque up to which what releases it may be rounding", default=1e-9, min=0)
+    slow: Parameter = param("rad/s", "speed of falling behind that counts as rounding", default=1e-9, min=0)
+    soon: Parameter = param("s", "time limit for reaching that speed", default=1.0, min=0)
+    faint: Parameter = param("N.m", "releasing torque that counts as rounding", default=1e-9, min=0)
     mode = Mode(
         "overrunning", "locked", description="state of the freewheel",
         holds={"locked": Hold("w_rel", reaction="tau", capacity="limits")},

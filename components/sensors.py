@@ -51,7 +51,7 @@ class SpeedLimit(SpeedSensor):
     w_max: Parameter = param("rad/s", "largest permitted speed", min=0)
     reason: str = ""
     """Text added in the report, e.g. `a series machine runs away without load`."""
-    limit = Mode("kept", "exceeded", description="speed within its limit, or once above")
+    limit = Mode("kept", "exceeded", description="speed within its limit, or exceeded")
 
     def events(self) -> Events:
         notice = "exceeds {w_max} rad/s" + (f": {self.reason}" if self.reason else "")

@@ -19,7 +19,7 @@ class Torque2(Component):
     """Torque between two shafts, given by a signal: it drives flange_b in positive, flange_a in negative direction."""
 
     icon = icons.BETWEEN_TORQUE
-    flange_a = Flange("shaft end that is pushed back")
+    flange_a = Flange("shaft end with the reaction")
     flange_b = Flange("shaft end that is driven")
     tau: Input = signal_in("N.m", "torque on flange_b")
 
@@ -78,7 +78,7 @@ class SignTorque(TorqueSource):
 
     icon = icons.LOAD
     tau_nominal: Parameter = param("N.m", "torque on the connected part in forward rotation; negative for a load")
-    w0: Parameter = param("rad/s", "speed from which on the sign is the full one", default=0.1, min=1e-12)
+    w0: Parameter = param("rad/s", "speed above which the sign is ±1", default=0.1, min=1e-12)
     reg: Literal["exp", "sine", "linear", "cosine"] = "exp"
     """Between -w0 and w0: tanh(50·w/w0) (`exp`), a quarter of a sine, a straight line, or one minus a cosine."""
     w: Variable = var("rad/s", "speed of the shaft relative to the housing")

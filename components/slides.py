@@ -63,7 +63,7 @@ class ElastoGap(Lossy, LinearCompliantWithRelativeStates):
     n: Parameter = param("1", "exponent of the spring force; without a value the spring is linear", default=None, min=1)
     s_ref: Parameter = param("m", "penetration at which the force is c·s_ref", default=1.0, min=1e-12)
     contact = Mode("gap", "touching", description="whether the bodies touch")
-    surfaces = Mode("pressed", "meeting", "leaving", description="spring and damper, damper limited, left behind")
+    surfaces = Mode("pressed", "meeting", "leaving", description="spring and damper, limited damper, separating")
 
     @property
     def penetration(self) -> Expr:
@@ -113,8 +113,8 @@ class ElastoGap(Lossy, LinearCompliantWithRelativeStates):
 class SlideSticking(Sticking, partial=True):
     """Surfaces of a slide that slide or stick."""
 
-    creep: Parameter = param("1/kg", "acceleration while it sticks over its force", default=None, min=0)
-    creep_time: Parameter = param("s", "time after which it creeps no faster", default=1e-3, min=0)
+    creep: Parameter = param("1/kg", "acceleration per force while stuck", default=None, min=0)
+    creep_time: Parameter = param("s", "time after which the creep speed stays constant", default=1e-3, min=0)
     rest: Parameter = param("m/s", "velocity that a prescribed motion must exceed to break away", default=1e-12, min=0)
 
 
@@ -159,7 +159,7 @@ class StribeckFriction(SlideFriction):
 
     F_prop: Parameter = param("N.s/m", "viscous friction", default=0.0, min=0)
     F_Coulomb: Parameter = param("N", "dry friction at high velocity, without the viscous part", min=0)
-    F_Stribeck: Parameter = param("N", "what friction at rest has in excess", default=0.0, min=0)
+    F_Stribeck: Parameter = param("N", "excess of friction at rest", default=0.0, min=0)
     fexp: Parameter = param("s/m", "inverse of the velocity at which the excess has fallen to 1/e", default=1.0, min=0)
 
     def sliding_friction(self, speed: Expr | float) -> Expr:
@@ -206,11 +206,11 @@ class MassWithStopAndFriction(SlideSticking, DryFriction):
     smax: Parameter = param("m", "position of the right stop, where flange_b meets it", default=25.0)
     F_prop: Parameter = param("N.s/m", "viscous friction", default=0.0, min=0)
     F_Coulomb: Parameter = param("N", "dry friction at high velocity, without the viscous part", default=0.0, min=0)
-    F_Stribeck: Parameter = param("N", "what friction at rest has in excess", default=0.0, min=0)
+    F_Stribeck: Parameter = param("N", "excess of friction at rest", default=0.0, min=0)
     fexp: Parameter = param("s/m", "inverse of the velocity at which the excess has fallen to 1/e", default=1.0, min=0)
     peak: Parameter = param("1", "static friction over sliding friction at standstill", default=1.001, min=1)
     e: Parameter = param("1", "restitution of the stops: speed after over before an impact", default=0.0, min=0, max=1)
-    v_rest: Parameter = param("m/s", "velocity from which on it comes to rest at a stop", default=1e-3, min=0)
+    v_rest: Parameter = param("m/s", "impact velocity below which it rests at a stop", default=1e-3, min=0)
     s: Variable = var("m", "position of the centre of mass", state="always")
     v: Variable = var("m/s", "velocity", state="always")
     f: Variable = var("N", "force of the housing against forward motion")

@@ -124,7 +124,7 @@ class ElastoBacklash(Backlash):
     Modelica Standard Library, Rotational.ElastoBacklash.
     """
 
-    flanks = Mode("pressed", "meeting", "leaving", description="spring and damper, damper limited, left behind")
+    flanks = Mode("pressed", "meeting", "leaving", description="spring and damper, limited damper, separating")
 
     def pressure(self) -> Expr:
         return self.flanks.choose(pressed=self.spring + self.damper, meeting=2 * self.spring, leaving=0)
@@ -144,7 +144,7 @@ class ElastoBacklash2(Backlash):
     Modelica Standard Library, Rotational.ElastoBacklash2.
     """
 
-    flanks = Mode("pressed", "leaving", description="spring and damper, left behind")
+    flanks = Mode("pressed", "leaving", description="spring and damper, separating")
 
     def pressure(self) -> Expr:
         return self.flanks.choose(pressed=self.spring + self.damper, leaving=0)

@@ -21,7 +21,7 @@ class Tabulated(Component, partial=True):
     """Interpolate in tables with a continuous slope."""
     extrapolate: Literal["hold", "linear", "error"] = "hold"
     """Beyond a table's rows: `hold` its last value, continue its last slope (`linear`), or end the run (`error`)."""
-    range = Mode("kept", "left", description="whether it was always inside the rows of its tables")
+    range = Mode("kept", "left", description="whether it was always within the rows of its tables")
 
     def look_up(self, x: Expr | float, table: Sequence[Sequence[float]], column: int = 1) -> Expr:
         """Return a value of a table at x, in the scale of its first column."""

@@ -74,7 +74,7 @@ class Exponentials(Component):
     """Signal that rises exponentially towards a value for a time, and then falls exponentially."""
 
     icon = icons.RISE
-    height: Parameter = param("*", "value that the rise tends to", default=1.0)
+    height: Parameter = param("*", "final value of the rise", default=1.0)
     rise_time: Parameter = param("s", "duration of the rise", min=1e-12)
     T_rise: Parameter = param("s", "time constant of the rise", min=1e-12)
     T_fall: Parameter = param("s", "time constant of the fall", min=1e-12)

@@ -19,10 +19,10 @@ class LineConsistency(Result):
     torque_constant: MotorConstant = line("torque constant from the line of the current")
     friction: Torque = line("friction torque from the line of the current")
     back_emf_constant: MotorConstant = line("back-EMF constant from the line of the speed and the no-load current")
-    resistance: Resistance = line("resistance that goes with both")
+    resistance: Resistance = line("resistance from both lines")
     largest_constant: MotorConstant = line("back-EMF constant if the armature had no resistance")
     constants: Ratio = line("torque constant over back-EMF constant", at_most="conserving")
-    conserving: Ratio = line("what conserves energy; above it the machine would create energy")
+    conserving: Ratio = line("value that conserves energy; above it the machine would create energy")
 
 
 def line_consistency(lines: MotorLines) -> LineConsistency:

@@ -33,9 +33,9 @@ class Flywheel(Result):
     inertia: SmallInertia = line("moment of inertia")
     radius: Length = line("radius")
     width: Length = line("width", at_most="width_limit")
-    width_limit: Length = line("room for it")
+    width_limit: Length = line("available width")
     mass: Mass = line("mass")
-    switching_time: Time = line("time in which the torque brings it to speed")
+    switching_time: Time = line("time to reach the speed")
 
 
 def flywheel_for_time(

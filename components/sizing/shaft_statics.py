@@ -46,7 +46,7 @@ class SectionForces(Result):
     """Section forces on one side of a cut."""
 
     at: Length = line("position")
-    side: str = line("left or right of what acts there")
+    side: str = line("left or right of the load")
     shear_y: Force = line("shear force in y")
     shear_z: Force = line("shear force in z")
     bending_y: SmallTorque = line("bending moment in the x-y plane")
@@ -62,7 +62,7 @@ class ShaftStatics(Result):
     diagram: tuple[SectionForces, ...] = line("section forces")
     largest_radial: Force = line("largest radial load of a bearing")
     largest_bending: SmallTorque = line("largest resultant bending moment")
-    place: Length = line("where it is")
+    place: Length = line("its position")
     largest_torque: SmallTorque = line("largest torsional moment")
     unbalanced_torque: SmallTorque = line("sum of all torques, zero in steady state")
 

@@ -73,7 +73,7 @@ class ShaftDiameter(Result):
 
     bending: SmallTorque = line("resultant bending moment")
     allowable_stress: Stress = line("strength over required safety")
-    smallest_diameter: Length = line("smallest diameter that stands the bending moment", at_most="diameter")
+    smallest_diameter: Length = line("smallest diameter for the bending moment", at_most="diameter")
     diameter: Length = line("diameter of the shaft")
 
 
@@ -158,7 +158,7 @@ class SteppedShaft(Result):
     largest_bending: SmallTorque = line("largest resultant bending moment")
     largest_stress: Stress = line("largest equivalent stress (von Mises)")
     safety: Ratio = line("smallest safety against yielding", at_least="required_safety")
-    place: Length = line("where it is")
+    place: Length = line("its position")
     required_safety: Ratio = line("required safety")
 
 
