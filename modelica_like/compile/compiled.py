@@ -268,7 +268,13 @@ class CompiledDae:
     def fast(
         self, key: Any, make: Callable[[], ca.Function], results: tuple[int, ...] | None = None
     ) -> BufferedFunction:
-        """Return this thread's buffered function (with some of its results) for a key, from the cache."""
+        """Return this thread's buffered function for a key, from the cache.
+
+        Args:
+            key: in the cache.
+            make: makes the function on first use.
+            results: which results to compute; all by default.
+        """
         own = "buffer", get_ident(), key
         if own not in self._cache:
             self._cache[own] = BufferedFunction(make(), results)

@@ -20,6 +20,15 @@ class Assembly(Component):
     """Parts and their connections, named at run time.
 
     Connections are stored as text (`"clutch.flange_a"`), as in a netlist, and resolved when the model is used.
+
+    Args:
+        name: of the model.
+        parts: components, or lists of them, by name.
+        connect: paths of the ends of each connection, by its name.
+        series: names of the parts of each chain, by its name.
+        free: paths of connectors that stay unconnected on purpose.
+        parameters: values by name.
+        description: one phrase.
     """
 
     _own_connectors: tuple[tuple[str, str], ...]

@@ -27,8 +27,8 @@ if TYPE_CHECKING:
 class Component(Declared):
     """A machine element: declared fields, connectors and parts, with equations between them.
 
-    Keywords of the constructor set values of parameters and inputs, start values of variables, structural fields and
-    replaceable parts.
+    Args:
+        values: of parameters and inputs, start values of variables, structural fields and replaceable parts, by name.
     """
 
     inlet: ClassVar[str] = "flange_a flange"

@@ -52,6 +52,10 @@ Equations = Iterator["Expr | Connection | FreeEnd"]
 def connect(first: Connector | Expr, *others: Connector | Expr) -> Connection:
     """Join connectors of one kind, or one output with inputs.
 
+    Args:
+        first: a connector or signal.
+        others: at least one more.
+
     Raises:
         LanguageError: fewer than two ends, or an end that is neither a connector nor a signal.
     """
@@ -68,13 +72,20 @@ def connect(first: Connector | Expr, *others: Connector | Expr) -> Connection:
 
 
 def series(*parts: Component) -> Equations:
-    """Connect the outlet of each part with the inlet of the next."""
+    """Connect the outlet of each part with the inlet of the next.
+
+    Args:
+        parts: at least two components, in order.
+    """
     for left, right in pairwise(parts):
         yield connect(left.outlet_connector(), right.inlet_connector())
 
 
 def free(connector: Any) -> FreeEnd:
     """Declare that a connector stays unconnected on purpose.
+
+    Args:
+        connector: of this component or of a part.
 
     Raises:
         LanguageError: it is not a connector.

@@ -26,7 +26,11 @@ class Guess:
 
 
 def guess(value: Quantity) -> Any:
-    """Mark a start value as a guess, which the solver may change."""
+    """Mark a start value as a guess, which the solver may change.
+
+    Args:
+        value: a number in the declared unit, or a quantity.
+    """
     return Guess(value)
 
 
@@ -174,10 +178,13 @@ class Parameter(_Symbolic, Arithmetic):
 class Variable(_Symbolic):
     """Unknown that changes continuously; potential or flow in a connector.
 
-    Attributes:
+    Args:
+        unit: in Modelica notation.
+        description: one phrase.
         state: preference as a state: `always`, `prefer`, `default` or `avoid`.
         guess: first guess of its start value (SI).
         is_flow: whether it sums to zero in a connection.
+        bounds: as of `var`.
     """
 
     def __init__(

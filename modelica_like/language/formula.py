@@ -141,7 +141,8 @@ def as_formula(value: Any) -> Formula:
 def parse_formula(text: str) -> Formula:
     """Read a formula from text: arithmetic, names, quantities, `pi` and a few functions.
 
-    A quantity in it is a number, a blank and a unit: `2*J + 1182.6 kg.mm2`.
+    Args:
+        text: the formula; a quantity in it is a number, a blank and a unit: `2*J + 1182.6 kg.mm2`.
 
     Raises:
         NetlistError: the text is not a formula.

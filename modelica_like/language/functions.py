@@ -27,7 +27,11 @@ def _sx(value: Scalar) -> Any:
 
 
 def der(expression: Expr) -> Expr:
-    """Return the time derivative of a variable, or of an expression of variables (by the chain rule)."""
+    """Return the time derivative (by the chain rule).
+
+    Args:
+        expression: a variable, or an expression of variables.
+    """
     if isinstance(expression, Symbol) and expression is not TIME:
         return expression.derivative()
     total: Any = 0.0
@@ -64,7 +68,7 @@ def _elementary(function: Callable[[Any], Any], doc: str) -> Callable[[Scalar], 
     def of(x: Scalar) -> Expr:
         return function(_sx(x))
 
-    of.__name__, of.__doc__ = function.__name__, doc
+    of.__name__, of.__doc__ = function.__name__, f"{doc}\n\nArgs:\n    x: an expression or a number.\n"
     return of
 
 
@@ -83,17 +87,32 @@ floor = _elementary(
 
 
 def atan2(y: Scalar, x: Scalar) -> Expr:
-    """Angle in rad of the point (x, y)."""
+    """Return the angle of a point in rad.
+
+    Args:
+        y: its ordinate.
+        x: its abscissa.
+    """
     return ca.atan2(_sx(y), _sx(x))
 
 
 def minimum(x: Scalar, y: Scalar) -> Expr:
-    """Return the smaller of two values, without an event."""
+    """Return the smaller of two values, without an event.
+
+    Args:
+        x: an expression or a number.
+        y: another one.
+    """
     return ca.fmin(_sx(x), _sx(y))
 
 
 def maximum(x: Scalar, y: Scalar) -> Expr:
-    """Return the larger of two values, without an event."""
+    """Return the larger of two values, without an event.
+
+    Args:
+        x: an expression or a number.
+        y: another one.
+    """
     return ca.fmax(_sx(x), _sx(y))
 
 

@@ -91,14 +91,23 @@ class Mode:
 
 
 class BoundMode:
-    """The mode of one component in `equations()` and `events()`."""
+    """The mode of one component in `equations()` and `events()`.
+
+    Args:
+        mode: its declaration.
+        symbol: its symbol in expressions, the number of the mode.
+    """
 
     def __init__(self, mode: Mode, symbol: Symbol) -> None:
         self.mode = mode
         self.symbol = symbol
 
     def is_(self, *names: str) -> Expr:
-        """Condition: the mode is among `names`."""
+        """Return a condition that is true in some modes.
+
+        Args:
+            names: of these modes.
+        """
         condition: Any = None
         for name in names:
             this: Any = self.symbol == self.mode.number(name)
@@ -158,6 +167,11 @@ class BoundMode:
         return Transition(self, sources, target, when, moment, dict(reset or {}), NOWHERE, notice, because, fails)
 
     def initially(self, target: str, *, when: Expr) -> StartMode:
-        """Declare the mode at the start, if the condition is true there."""
+        """Declare the mode at the start.
+
+        Args:
+            target: name of the mode.
+            when: condition under which it is chosen, unless an earlier choice was.
+        """
         self.mode.number(target)
         return StartMode(self, target, when)

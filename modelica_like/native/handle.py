@@ -98,7 +98,7 @@ class Native:
         return self._read(self._instance.native.references(names), np.zeros(len(names)))
 
     def step(self, time: float) -> Vector:
-        """Set `inputs`, step to a time in s through all events, and read and return `outputs`.
+        """Set `inputs`, step to a time in s through all events, and return `outputs`, shape (outputs,).
 
         Raises:
             SolveError: the run cannot continue; use `restore` or `reset`.

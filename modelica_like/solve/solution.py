@@ -98,7 +98,7 @@ class Solution(Trajectories):
         return self._cache["variables"]
 
     def together(self, *keys: str | Any) -> dict[str, Vector]:
-        """Return several trajectories by path; variables are evaluated together, which is faster than one by one.
+        """Return several trajectories by path, each of shape (len(time),); faster than one by one.
 
         Raises:
             UnknownName: there is no such variable.

@@ -126,7 +126,7 @@ class Trajectories(ABC):
         return (*self.model.position, *self.model.discrete_position)
 
     def together(self, *keys: str | Any) -> dict[str, Vector]:
-        """Return several trajectories by path.
+        """Return several trajectories by path, each of shape (len(time),).
 
         Raises:
             UnknownName: there is no such variable.
