@@ -5,12 +5,11 @@ from __future__ import annotations
 from math import inf
 
 from components import icons
-from components.tabulated import Tabulated
+from components.tabulated import Flat, Tabulated
 from modelica_like.language import (
     Equations,
     Events,
     Input,
-    LanguageError,
     Output,
     Parameter,
     column,
@@ -19,8 +18,6 @@ from modelica_like.language import (
     signal_in,
     signal_out,
 )
-
-Flat = tuple[float, ...]
 
 
 class Table1D(Tabulated):
@@ -64,19 +61,8 @@ class Table2D(Tabulated):
     y: Output = signal_out("*", "value")
 
     def equations(self) -> Equations:
-        sizes = len(self.table), len(self.table[0])
-        if sizes != (len(self.first), len(self.second)):
-            raise LanguageError(
-                f"{self.label}: the table has {sizes[0]} rows and {sizes[1]} columns, but `first` has "
-                f"{len(self.first)} values and `second` {len(self.second)}.",
-                advice="`first` has one value for each row, `second` one for each column.",
-            )
-        along = [(first, self._row(values)) for first, values in zip(self.first, self.table, strict=True)]
-        yield self.y == self.scale * self.look_up(self.u1 / self.u1_scale, along)
-
-    def _row(self, values: Flat) -> float:
-        row = list(zip(self.second, values, strict=True))
-        return self.look_up(self.u2 / self.u2_scale, row)  # type: ignore[return-value]
+        u1, u2 = self.u1 / self.u1_scale, self.u2 / self.u2_scale
+        yield self.y == self.scale * self.look_up_map(u1, self.first, u2, self.second, self.table)
 
     def events(self) -> Events:
         for name, u, grid in (

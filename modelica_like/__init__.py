@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from modelica_like.draw import save_schematic as save_schematic
     from modelica_like.draw import schematic as schematic
     from modelica_like.errors import ModelicaLikeError as ModelicaLikeError
+    from modelica_like.explore import explore as explore
     from modelica_like.fmi.export import export_fmu as export_fmu
     from modelica_like.fmi.run import run_fmu as run_fmu
     from modelica_like.fmi.validate import validate_fmu as validate_fmu
@@ -59,6 +60,7 @@ _HOME = {
     "characteristic": "modelica_like.analyse.operating.curves",
     "compare": "modelica_like.report.compare",
     "cosim": "modelica_like.cosimulation.run",
+    "explore": "modelica_like.explore",
     "export_fmu": "modelica_like.fmi.export",
     "export_html": "modelica_like.native.page",
     "importance": "modelica_like.analyse.sweeps.importance",
@@ -88,5 +90,9 @@ def __getattr__(name: str) -> Any:
 
 
 _OFFERED = {name: _HOME[name] for name in ("Native", "schematic", "simulation_function")}
-_OFFERED["NativeLoop"] = "modelica_like.native.run"
+_OFFERED |= {
+    "NativeLoop": "modelica_like.native.run",
+    "plot": "modelica_like.solve.plot",
+    "sankey": "modelica_like.solve.sankey",
+}
 provide(tuple(_OFFERED), lambda name: getattr(import_module(_OFFERED[name]), name))

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 # Modules and their commands, in the order in which the help lists them.
 _GROUPS = {
     "models": ("check", "simulate"),
-    "pictures": ("draw", "report"),
+    "pictures": ("draw", "report", "explore"),
     "analysis": ("modes", "steady", "sweep", "sensitivity"),
     "export": ("export", "runtimes"),
     "cosimulation": ("split", "cosim"),

@@ -38,7 +38,7 @@ def split(
         from rich.console import Console
 
         from modelica_like.cosimulation.split import split as run
-        from modelica_like.cosimulation.ssp import split_to_ssp
+        from modelica_like.cosimulation.split import split_to_ssp
 
         with Console(stderr=True).status("loading") as status:
             if output.suffix.lower() == ".ssp":
@@ -79,8 +79,8 @@ def cosim(
         from modelica_like.cosimulation.solution import described_model
         from modelica_like.report.progress import Bar
         from modelica_like.report.run import cosimulation_report
-        from modelica_like.solve.plot import matching
         from modelica_like.solve.plot import plot as draw
+        from modelica_like.solve.trajectories import matching
 
         values = _numbers(assignments or ())
         with opened(system) as known, Bar(until or known.settings.until) as bar:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 from modelica_like.cli.declare import Option
-from modelica_like.cli.shared import Assignments, Debug, Netlist, assigned, load_netlist, out, told
+from modelica_like.cli.shared import Assignments, Debug, Netlist, assigned, load_netlist, note, out, told
 
 Start = Literal["given", "rest", "steady"]
 """Replacement of missing start values."""
@@ -22,9 +22,11 @@ def check(
     """Check a netlist: equations, unknowns, states, index, blocks, energy terms."""
     with told(debug):
         assembly = load_netlist(netlist, assignments)
+        from modelica_like.report.plausible import drive_notes
         from modelica_like.report.structure import structure_report
 
         out().print(structure_report(assembly))
+        note(*drive_notes(assembly))
         if start:
             from modelica_like.report.start import start_report
             from modelica_like.simulation import build
@@ -54,13 +56,14 @@ def simulate(
         # Errors in the file are reported before the solver is loaded.
         assembly = load_netlist(netlist, assignments)
         from modelica_like.cli.outcome import Outcome
+        from modelica_like.report.plausible import notes
         from modelica_like.report.progress import Bar
         from modelica_like.report.run import run_report
         from modelica_like.simulation import build
         from modelica_like.simulation import simulate as run
         from modelica_like.solve.display import Display
-        from modelica_like.solve.plot import matching
         from modelica_like.solve.plot import plot as draw
+        from modelica_like.solve.trajectories import matching
 
         model = build(assembly)
         matching(model, show or ())
@@ -72,6 +75,7 @@ def simulate(
             )
         energy = energy and made.stopped is None and made.attempt("The energy balance", made.solution.energy)
         made.tell(lambda one: run_report(one, energy=energy, debug=debug, display=shown), csv)
+        made.attempt("The notes", lambda: note(*notes(assembly, made.solution)))
         curves = (plot, lambda one: draw(one, show or (), display=shown))
         pictures = curves, (sankey, lambda one: one.energy().sankey(model.name))
         made.write(csv, units=units or bool(display), display=shown, pictures=pictures)

@@ -1,4 +1,4 @@
-"""Commands that show netlists and runs: draw, report."""
+"""Commands that show netlists and runs: draw, report, explore."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def report(
         from modelica_like.report.page import save_report
         from modelica_like.report.progress import Bar
         from modelica_like.simulation import build, simulate
-        from modelica_like.solve.plot import matching
+        from modelica_like.solve.trajectories import matching
 
         model = build(drive)
         matching(model, show or ())
@@ -47,3 +47,21 @@ def report(
             run = simulate(model, until, progress=bar)
         save_report(drive, run, path, show=show or ())
         say(str(path))
+
+
+def explore(
+    netlist: Netlist, assignments: Assignments = None, *,
+    until: Annotated[str | None, Option(metavar="TIME", help="End time, e.g. 2s; default: the netlist's.")] = None,
+    show: Annotated[list[str] | None, Option(metavar="PATTERN", help="Variables to draw, e.g. '*.w'.")] = None,
+    output: Annotated[Path, Option("--output", "-o", metavar="FOLDER", help="Where the page saves files.")] = Path(),
+    browser: Annotated[bool, Option(help="Open the browser.")] = True,
+    debug: Debug = False,
+) -> None:  # fmt: skip
+    """Open a page with sliders and curves that runs the drive on this machine."""
+    with told(debug):
+        drive = load_netlist(netlist, assignments)
+        from modelica_like.explore import Explorer
+
+        with Explorer(drive, until, show=show or (), folder=output) as explorer:
+            say(f"{explorer.address}\nCtrl-C ends it.")
+            explorer.show(browser=browser)

@@ -121,6 +121,12 @@ def say(text: str) -> None:
     out().print(escape(text), soft_wrap=True)
 
 
+def note(*sentences: str) -> None:
+    """Tell what looks like a slip, on stderr."""
+    if sentences:
+        warn("\n".join(["Please look at this:", *(f"- {sentence}" for sentence in sentences)]))
+
+
 def assigned(assignments: list[str] | None, option: str) -> dict[str, str]:
     """Split assignments at the equals sign."""
     pairs = [one.partition("=") for one in assignments or ()]

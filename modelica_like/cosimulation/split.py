@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from modelica_like.cosimulation.cut import Cut, CutNetlist, cut_netlist
 from modelica_like.cosimulation.files import write_system
 from modelica_like.cosimulation.parts import Maker, Takes, ends_of, orient
+from modelica_like.cosimulation.ssp import write_ssp
+from modelica_like.cosimulation.ssp_document import Version
 from modelica_like.cosimulation.system import Bond, Link, Port, Settings, System, Unit
 from modelica_like.errors import DuplicateName, NetlistError
 from modelica_like.fmi.export import export_fmu
+from modelica_like.fmi.package import known_version, target_file
 from modelica_like.initialize import initialize
 from modelica_like.language import Assembly, Component
 from modelica_like.netlist import load, save
@@ -98,6 +103,28 @@ def split(
     write_system(system, target / _SYSTEM)
     taken: dict[str, Takes] = {end.path: end.takes for cut, takes in chosen.items() for end in ends_of(cut, takes)}
     return Split(system, target / _SYSTEM, taken, tuple(notes))
+
+
+def split_to_ssp(
+    drive: Component | str | Path, at: Sequence[str] | str, path: str | Path, ssp_version: Version | str = "1.0",
+    **options: Any,
+) -> Split:  # fmt: skip
+    """Cut a drive at shafts, and write the parts as an SSP.
+
+    Args:
+        drive: a netlist file, or a component that has only parts and connections.
+        at: where to cut; see `split`.
+        path: the file to write, `….ssp`.
+        ssp_version: of the SSP standard.
+        options: of `split`.
+
+    Raises:
+        ModelicaLikeError: see `split` and `cosimulation.ssp.write_ssp`.
+    """
+    target, chosen = target_file(path, ".ssp", "An SSP"), known_version(ssp_version, Version, "SSP")
+    with tempfile.TemporaryDirectory(prefix="modelica_like_") as folder:
+        done = split(drive, at, folder, **options)
+        return replace(done, path=write_ssp(done.system, target, chosen))
 
 
 def _export(part: Assembly, title: str, file: Path, version: str, *, check: bool) -> str:

@@ -36,14 +36,15 @@ def layout(component: Component, *, depth: int = 1) -> Sheet:
     return sheet(diagram(component, depth))
 
 
-def schematic(component: Component, *, depth: int = 1) -> str:
+def schematic(component: Component, *, depth: int = 1, background: bool = True) -> str:
     """Draw a drive as SVG: power from west to east, a symbol for each machine element.
 
     Args:
         component: the drive.
         depth: number of levels of open assemblies.
+        background: fill the paper; a page has one already.
     """
-    return svg(layout(component, depth=depth), component.label)
+    return svg(layout(component, depth=depth), component.label, background=background)
 
 
 def check_format(path: Path) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
 from modelica_like.errors import FreeFlange, ModelicaLikeError, Source, WrongConnection
@@ -91,7 +91,7 @@ class Wiring:
         signals = [end for end in statement.ends if isinstance(end, Symbol)]
         others = [end for end in statement.ends if not isinstance(end, Symbol)]
         wrong = [s for s in signals if not isinstance(s.owner.fields.get(s.name), Input | Output)]
-        drivers = [] if wrong else [s for s in signals if _drives(scope, s)]
+        drivers = [] if wrong else _givers(scope, signals)
         if others:
             what = f"connect joins the signal {_name(signals[0])} with the connector {_name(others[0])}."
             advice = "Signals go to signals: use a sensor or a source between."
@@ -153,9 +153,18 @@ def _is_within(end: Connector | Symbol, scope: Component) -> bool:
     return node is scope
 
 
-def _drives(scope: Component, symbol: Symbol) -> bool:
-    kind = symbol.owner.fields[symbol.name]
-    return isinstance(kind, Input) if symbol.owner is scope else isinstance(kind, Output)
+def _givers(scope: Component, ends: Iterable[Connector | Symbol]) -> list[Symbol]:
+    """Return what gives a connection its signal: an own input, a part's output, or an own output without these."""
+    kinds = [(one, one.owner is scope, one.owner.fields[one.name]) for one in ends if isinstance(one, Symbol)]
+    first = [one for one, own, kind in kinds if isinstance(kind, Input if own else Output)]
+    return first or [one for one, _, kind in kinds if isinstance(kind, Output)]
+
+
+def taken(scope: Component, connection: Connection) -> list[str]:
+    """Return the own signals that a connection determines."""
+    givers = [id(one) for one in _givers(scope, connection.ends)]
+    own = [one for one in connection.ends if isinstance(one, Symbol) and one.owner is scope]
+    return [one.name for one in own if id(one) not in givers]
 
 
 def _name(end: Connector | Symbol) -> str:

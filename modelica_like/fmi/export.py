@@ -80,8 +80,8 @@ def export_fmu(
 ) -> Export:  # fmt: skip
     """Export a drive as an FMU: a model and a compiled run-time that need no Python.
 
-    Connectors that the drive leaves open (a netlist's `expose`) and adaptors that nothing inside drives become inputs
-    and outputs, in FMI 3 also terminals; so do inputs of parts that have no value.
+    Open connectors (a netlist's `expose`), adaptors that nothing drives and inputs without value are its inputs and
+    outputs, in FMI 3 also terminals.
 
     Args:
         drive: a component, a netlist file, or a compiled model.
@@ -94,13 +94,11 @@ def export_fmu(
         takes: what open ends take from outside: the `flow` (torque, force, current, heat flow) or the `potential`.
         embed: compile the model into the binaries, for importers that do not pass the location of resources.
         modes: `output` (enumerations), `local` (enumerations without output), or `integer` (outputs).
-        fixed_step: step size of Co-Simulation in s, or a time such as "1 ms", for hardware in the loop: the work of a
-            step is bounded, and a communication step is a whole number of them. By default accuracy chooses the steps.
+        fixed_step: step size of Co-Simulation in s, or such as "1 ms", for hardware in the loop: the work of a step is
+            bounded, and a communication step is a whole number of them. By default accuracy chooses the steps.
         tables: patterns of tables whose numbers become tunable parameters, such as `clutch.mu_pos`: arrays in FMI 3,
             scalars `clutch.mu_pos[2,1]` in FMI 2.
-        check: compare the FMU with IDAS, if it has a binary for this machine; `Export.check` has the result, with
-            fixed steps the error over the whole run. If they differ, a picture `…_check.png` is drawn next to the
-            FMU.
+        check: run the FMU, if it has a binary for this machine, against IDAS; a picture shows where they differ.
         strict: do not write an FMU that differs from IDAS.
         report: called with the present activity.
 
@@ -110,8 +108,7 @@ def export_fmu(
         MissingExtra: binaries for other platforms need zig.
         ModelicaLikeError: the model has an error.
     """
-    begin, tell = time.perf_counter(), report or silent
-    target = target_file(path, ".fmu", "An FMU")
+    begin, tell, target = time.perf_counter(), report or silent, target_file(path, ".fmu", "An FMU")
     chosen, kinds, names = known_version(version, Version, "FMI"), _kinds(kind), chosen_platforms(platforms)
     fixed, as_what = _fixed_step(fixed_step, kinds), _modes(modes)
     tell("compiling the model")

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Generator, Iterator, Mapping
 from contextlib import contextmanager
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar, cast, dataclass_transform
+from typing import Any, ClassVar, Self, TypeVar, cast, dataclass_transform
 
 from modelica_like.errors import DuplicateName, LanguageError, ModelicaLikeError, NetlistError, Source
 from modelica_like.language.declared import Connector, Declared, unknown
+from modelica_like.language.equation import Equations
 from modelica_like.language.expr import TIME, Expr
 from modelica_like.language.fields import Discrete, Field, Input, Output, Parameter, Value, param, require_identifier
 from modelica_like.language.icon import Icon
@@ -16,11 +17,8 @@ from modelica_like.language.mode import Mode
 from modelica_like.language.places import NOWHERE, caller
 from modelica_like.language.tables import REQUIRED, Rows, both_given, frozen_rows, rows
 from modelica_like.language.terminal import Terminal
+from modelica_like.language.transition import Events
 from modelica_like.upper import upper
-
-if TYPE_CHECKING:
-    from modelica_like.language.equation import Equations
-    from modelica_like.language.transition import Events
 
 
 @dataclass_transform(kw_only_default=True, field_specifiers=(param, rows))

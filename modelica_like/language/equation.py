@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, Protocol, cast
 
 import casadi as ca
 
@@ -14,9 +14,6 @@ from modelica_like.errors import LanguageError, Source
 from modelica_like.language.declared import Connector
 from modelica_like.language.expr import Expr, Symbol
 from modelica_like.language.places import NOWHERE
-
-if TYPE_CHECKING:
-    from modelica_like.language.component import Component
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +68,19 @@ def connect(first: Connector | Expr, *others: Connector | Expr) -> Connection:
     return Connection(cast(Any, ends))
 
 
-def series(*parts: Component) -> Equations:
+class InLine(Protocol):
+    """What has a place in a line: a component with two ends."""
+
+    def inlet_connector(self) -> Connector:
+        """Return the end that the part before is connected with."""
+        ...
+
+    def outlet_connector(self) -> Connector:
+        """Return the end that the next part is connected with."""
+        ...
+
+
+def series(*parts: InLine) -> Equations:
     """Connect the outlet of each part with the inlet of the next.
 
     Args:

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Self, cast, overload
 
 import casadi as ca
 
-from modelica_like.errors import LanguageError, UnknownName, did_you_mean
+from modelica_like.errors import LanguageError, Source, UnknownName, did_you_mean
 from modelica_like.language.expr import Expr, Scalar, Symbol, symbol_of
 from modelica_like.language.hold import Hold
 from modelica_like.language.places import NOWHERE
-from modelica_like.language.transition import StartMode, Transition
 
 
 class Mode:
@@ -151,7 +151,8 @@ class BoundMode:
             reset: new values of variables and discrete values, in SI units.
             notice: message in the report of a run, such as "exceeds {w_max} rad/s"; the name of the component comes
                 first, and names in braces become values of its parameters.
-            because: reason, such as "slip reached zero"; by default the condition as written.
+            because: why it happens, in a few words, such as "slip reached zero" or "is beyond {limit}" (the report
+                adds the value of the parameter); without it the report puts the condition into words.
             fails: whether the run ends there, with the notice as an error.
 
         Raises:
@@ -175,3 +176,41 @@ class BoundMode:
         """
         self.mode.number(target)
         return StartMode(self, target, when)
+
+
+@dataclass(frozen=True, eq=False)
+class Transition:
+    """Change of a mode at an event.
+
+    Attributes:
+        mode: the mode that changes.
+        sources: names of the modes to leave.
+        target: name of the mode to enter.
+        when: condition of a state event, or None.
+        at: time of a time event in s, or None.
+        reset: new values of states and discrete values.
+        notice: message for the user, without the name of the component.
+        because: reason in a few words.
+        fails: whether the run ends there, with an error.
+    """
+
+    mode: BoundMode
+    sources: tuple[str, ...]
+    target: str
+    when: Expr | None
+    at: Expr | None
+    reset: Mapping[Expr, Any]
+    source: Source = NOWHERE
+    notice: str = ""
+    because: str = ""
+    fails: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class StartMode:
+    """Choice of a mode at the start."""
+
+    mode: BoundMode
+    target: str
+    when: Expr
+    source: Source = NOWHERE

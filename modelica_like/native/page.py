@@ -8,7 +8,7 @@ import gzip
 import json
 import re
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
@@ -94,30 +94,57 @@ def export_html(
     report("simulating")
     end = seconds(until if until is not None else model.settings.get("until"))
     solution = simulate(model, end)
-    content = _content(model, chosen(solution, show), end, solution.options)
+    content = page_content(model, chosen(solution, show), end, solution.options)
     report("writing the page")
-    content["runtime"] = _text(runtime_library(BROWSER.name, report).read_bytes())
-    write_bytes(target, _page(model.name, description, content).encode())
+    variables = interface(model)
+    data = model_file(make_tables(model, variables.start), variables.variables, "{page}", solution.options.rtol)
+    content |= {
+        "model": _text(data), "runtime": _text(runtime_library(BROWSER.name, report).read_bytes()),
+        "layout": _layout(), "message_length": MESSAGE_LENGTH,
+    }  # fmt: skip
+    write_bytes(target, page(model.name, description, content, Path(__file__).parent / "wasm.js").encode())
     shown = sum(one["shown"] for one in content["variables"])
     size, elapsed = target.stat().st_size, time.perf_counter() - begin
     return Page(target, len(content["sliders"]) - 1, shown, size, elapsed)
 
 
-def _page(name: str, description: str, content: dict[str, Any]) -> str:
+def page(
+    name: str, description: str, content: Mapping[str, Any], runner: Path, *, schematic: str = "", more: str = "",
+    connect: str = "'none'",
+) -> str:  # fmt: skip
+    """Return a page with sliders and curves.
+
+    Args:
+        name: of the drive.
+        description: of the drive.
+        content: what `page_content` has returned, and what the runner reads.
+        runner: the script that runs the drive: it defines `openDrive`.
+        schematic: SVG above the curves.
+        more: HTML below the curves.
+        connect: where the page may ask, as its policy says it.
+    """
     folder = Path(__file__).parent
     # No text may contain the end of the script.
     data = json.dumps(content, ensure_ascii=False, separators=(",", ":")).replace("<", "\\u003c")
+    scripts = (HELPERS, runner, folder / "page.js")
     parts = {
-        "name": escape(name), "description": escape(description), "page": data,
-        "helpers": HELPERS.read_text(encoding="utf-8").rstrip(),
-        "script": (folder / "page.js").read_text(encoding="utf-8").rstrip(),
+        "name": escape(name), "description": escape(description), "page": data, "more": more, "connect": connect,
+        "schematic": schematic,
+        "script": "\n".join(one.read_text(encoding="utf-8").rstrip() for one in scripts),
     }  # fmt: skip
-    page = (folder / "page.html").read_text(encoding="utf-8")
-    return re.sub(r"\{\{(\w+)\}\}", lambda found: parts[found[1]], page)
+    text = (folder / "page.html").read_text(encoding="utf-8")
+    return re.sub(r"\{\{(\w+)\}\}", lambda found: parts[found[1]], text)
 
 
-def _content(model: CompiledDae, names: Sequence[str], until: float, options: Options) -> dict[str, Any]:
-    """Return the data of the script, without the run-time."""
+def page_content(model: CompiledDae, names: Sequence[str], until: float, options: Options) -> dict[str, Any]:
+    """Return what the script of a page reads: sliders, variables, modes and units.
+
+    Args:
+        model: the compiled model.
+        names: variables that are drawn at first.
+        until: end time in s.
+        options: of the runs.
+    """
     variables = interface(model)
     end = {
         "name": "end time", "group": "", "reference": None, "description": "", "unit": "s", "factor": 1.0,
@@ -125,8 +152,7 @@ def _content(model: CompiledDae, names: Sequence[str], until: float, options: Op
     }  # fmt: skip
     units, display = _Units(), Display(model)
     return {
-        "model": _text(model_file(make_tables(model, variables.start), variables.variables, "{page}", options.rtol)),
-        "layout": _layout(), "message_length": MESSAGE_LENGTH, "tool": tool(), "until": until,
+        "tool": tool(), "until": until,
         "rtol": options.rtol, "atol": options.atol, "points": options.points, "most_events": options.max_events,
         "sliders": [end, *_sliders(model, variables.by_name, display)],
         "variables": list(_variables(model, variables.by_name, set(names), units, display)),

@@ -87,7 +87,7 @@ def _type_in(name: str, modules: Mapping[str, ModuleType]) -> type[Component] | 
     if len(kinds) > 1:
         raise NetlistError(
             f"Two libraries have a component '{name}': {kinds[0].__module__} and {kinds[1].__module__}.",
-            advice=f'Write which one: "{kinds[1].__module__}:{name}".',
+            advice=f'Write the full name: "{kinds[1].__module__}:{name}".',
         )
     return kinds[0] if kinds else None
 

@@ -13,6 +13,7 @@ from modelica_like.initialize import Impact
 from modelica_like.solve.options import Options
 from modelica_like.solve.powers import POWERS, Powers, Results, results
 from modelica_like.solve.recorder import Event, Segment
+from modelica_like.upper import upper
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -114,9 +115,7 @@ class EnergyBalance:
 
     def sankey(self, title: str = "") -> Figure:
         """Draw an energy flow diagram."""
-        from modelica_like.solve.sankey import sankey
-
-        return sankey(self, title)
+        return upper("sankey")(self, title)
 
     @property
     def closure(self) -> float:

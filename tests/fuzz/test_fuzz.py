@@ -141,7 +141,7 @@ a = {{ file = "a.fmu", parameters = {{ J = {} }} }}
 LARGE = "1" + 400 * "0"
 
 
-@pytest.mark.parametrize(("given", "told"), [(LARGE, "is larger than any number that"), ("nan", "must be a finite")])
+@pytest.mark.parametrize(("given", "told"), [(LARGE, "is too large for a number"), ("nan", "must be a finite")])
 def test_values_of_fmus_are_finite_numbers(given: str, told: str, tmp_path: Path) -> None:
     (tmp_path / "two.toml").write_text(SYSTEM.format(given))
     with pytest.raises(ModelicaLikeError) as caught:

@@ -15,7 +15,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from modelica_like.analyse.replay.jumps import Jump, Work, event_time, make_jump
+from modelica_like.analyse.replay.jumps import Coincidence, Jump, Work, event_time, make_jump
 from modelica_like.analyse.replay.kinks import Kinks
 from modelica_like.analyse.replay.start import start_slopes
 from modelica_like.analyse.replay.step import CLOSE, Step, shortened, stuck, try_step
@@ -24,7 +24,7 @@ from modelica_like.analyse.slopes import Sizes
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import LanguageError
-from modelica_like.initialize import Point, StartKind, initialize
+from modelica_like.initialize import Point, StartKind, holding, initialize
 from modelica_like.solve.recorder import Event, Segment
 from modelica_like.solve.solution import Solution
 
@@ -63,6 +63,7 @@ class Replay:
         moves: steps and jumps; move k leads from node k to node k + 1.
         start_x: derivatives of the first node's states by (p, u), shape (nx, np + nu).
         start_d: derivatives of its discrete values, shape (nd, np + nu).
+        chances: motions of zero that modes hold from the start, by (x, theta) there.
     """
 
     functions: StepFunctions
@@ -70,6 +71,7 @@ class Replay:
     moves: list[Move] = field(default_factory=list)
     start_x: Vector = field(default_factory=lambda: np.zeros((0, 0)))
     start_d: Vector = field(default_factory=lambda: np.zeros((0, 0)))
+    chances: list[Coincidence] = field(default_factory=list)
 
     @property
     def model(self) -> CompiledDae:
@@ -130,20 +132,34 @@ class Replay:
         Returns:
             Shape (readings, m).
         """
-        result = np.zeros((len(readings), directions.shape[1]))
-        total = np.zeros((self.functions.nq, directions.shape[1]))
-        whole = np.vstack([self.start_x @ directions, directions, self.start_d @ directions])
+        begin = np.vstack([self.start_x @ directions, directions, self.start_d @ directions])
+        return self.carried(readings, begin, 0, len(self.moves))[0]
+
+    def carried(self, readings: Sequence[Reading], whole: Vector, first: int, last: int) -> tuple[Vector, Vector]:
+        """Carry derivatives from one node to another; return what is read on the way, and them at the end.
+
+        Args:
+            readings: what to differentiate.
+            whole: derivatives of (x, theta) at the node `first`, shape (nx + ntheta, m).
+            first: position of the first node.
+            last: position of the last one.
+
+        Returns:
+            Shapes (readings, m) and (nx + ntheta, m).
+        """
+        result = np.zeros((len(readings), whole.shape[1]))
+        total = np.zeros((self.functions.nq, whole.shape[1]))
         at_node = _by_node(readings)
-        for k, node in enumerate(self.nodes):
-            for number, row in at_node.get(id(node), ()):
+        for k in range(first, last + 1):
+            for number, row in at_node.get(id(self.nodes[k]), ()):
                 result[number] += row @ whole
-            if k < len(self.moves):
+            if k < last:
                 whole, gained = self.moves[k].forward(whole)
                 total += gained
         for number, reading in enumerate(readings):
             if reading.quadratures.size:
                 result[number] += reading.quadratures @ total
-        return result
+        return result, whole
 
     def adjoint(self, readings: Sequence[Reading]) -> Vector:
         """Derivatives of readings by all parameters and inputs.
@@ -230,14 +246,18 @@ class _Maker:
         begin_x, begin_d = start_slopes(self.model, point, kind)
         whole = np.concatenate([begin_x, np.eye(size.fixed), begin_d])
         work = Work.at(self.model, point)
+        work.resting.update(holding(self.model, point))
         work.share()
+        chances = work.chances()
         start_x, start_d = begin_x, work.d @ whole
         if self.events[0]:
             integrands = self.chain.functions.integrands
             jump = make_jump(self.model, point, tuple(self.events[0]), point, integrands, first=True)
+            chances += jump.chances
             whole = np.concatenate([start_x, np.eye(size.fixed), start_d])
             start_x, start_d, point = jump.x @ whole, jump.d @ whole, jump.after
         self.chain.start_x, self.chain.start_d = start_x, start_d
+        self.chain.chances += [replace(one, by=np.pad(one.by @ whole, (size.x, size.d))) for one in chances]
         self.chain.nodes.append(point)
 
     def jump(self, number: int) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 from modelica_like.analyse.replay.holds import impact, projection, share_slopes
 from modelica_like.analyse.slopes import Sizes, slopes
 from modelica_like.compile.buffers import Vector
-from modelica_like.compile.compiled import CompiledDae, CompiledTransition
+from modelica_like.compile.compiled import CompiledDae, CompiledTransition, HeldMotion
 from modelica_like.errors import NoGradient
 from modelica_like.initialize import Point, Strike, call, holding, share, solve_implicit
 from modelica_like.solve.recorder import Event
@@ -36,13 +36,13 @@ class Trigger:
 
 
 @dataclass(frozen=True)
-class Apart:
-    """Something that happens at the same time as an event, but for a different reason.
+class Coincidence:
+    """What is zero just at these parameters: the time between two events, or a motion that friction then holds.
 
     Attributes:
-        by: derivative of the distance in time by (x, theta) before the event, shape (nx + ntheta,).
-        size: scale of rounding, in s.
-        reason: of the error if the two do not stay together.
+        by: its derivative by (x, theta) before the event, shape (nx + ntheta,).
+        size: changes up to which it stays zero but for rounding.
+        reason: what to say where it does not.
     """
 
     by: Vector
@@ -59,7 +59,7 @@ class When:
 
     trigger: Trigger | None = None
     reason: NoGradient | None = None
-    apart: tuple[Apart, ...] = ()
+    apart: tuple[Coincidence, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -75,6 +75,7 @@ class Jump:
         d: derivatives of the discrete values after, shape (nd, nx + ntheta).
         gain: drop of the integrands at the event: quadratures grow by it times the shift of the event, shape (nq,).
         matters: whether anything depends on its time.
+        chances: motions of zero that modes hold from then on.
     """
 
     before: Point
@@ -85,6 +86,7 @@ class Jump:
     d: Vector
     gain: Vector
     matters: bool
+    chances: tuple[Coincidence, ...] = ()
 
     @property
     def trigger(self) -> Trigger | None:
@@ -152,6 +154,7 @@ def make_jump(
     work.share()
     for number in sorted({event.round for event in events}):
         work.fire([event for event in events if event.round == number])
+    chances = work.chances()
     rate_after = slopes(model, work.point, "ode").value
     gain = integrands(before) - integrands(work.point)
     # The time of the event matters only if states, rates or integrands jump.
@@ -165,7 +168,7 @@ def make_jump(
         work.x -= np.outer(rate_after, trigger.by)
         work.point.x = work.point.x - rate_after * trigger.shift
         solve_implicit(model, work.point)
-    return Jump(before, work.point, events, when, work.x, work.d, gain, bool(matters))
+    return Jump(before, work.point, events, when, work.x, work.d, gain, bool(matters), chances)
 
 
 def event_time(model: CompiledDae, before: Point, events: tuple[Event, ...], begin: Point) -> When:
@@ -173,6 +176,8 @@ def event_time(model: CompiledDae, before: Point, events: tuple[Event, ...], beg
     if not events:
         # Elements that hold the same motion share it again, and nothing else happens.
         return When()
+    # A step leaves the implicit unknowns as precise as its states need them; rates of guards need them better.
+    solve_implicit(model, before)
     found: list[tuple[Event, Trigger]] = []
     for event in events:
         if event.round or event.transition < 0:
@@ -188,11 +193,11 @@ def event_time(model: CompiledDae, before: Point, events: tuple[Event, ...], beg
     nx = len(before.x)
     spans = [float(np.max(np.abs(one.by[:nx]) * weights[:nx])) for _, one in found]
     size = _SAME * max(before.t - begin.t, abs(before.t), *spans)
-    apart: list[Apart] = []
+    apart: list[Coincidence] = []
     for other, second in found[1:]:
         by = _difference(model, before, trigger.by - second.by)
         if np.any(np.abs(by) * weights > size):
-            apart.append(Apart(by, size, _coincidence(first, other)))
+            apart.append(Coincidence(by, size, _together(first, other)))
     return When(trigger, None, tuple(apart))
 
 
@@ -231,13 +236,22 @@ def _grazing(event: Event) -> NoGradient:
     )
 
 
-def _coincidence(one: Event, other: Event) -> NoGradient:
+def _together(one: Event, other: Event) -> NoGradient:
     return NoGradient(
         f"No gradient at t = {one.time:.9g} s: '{one.mode}: {one.before} → {one.after}' and "
         f"'{other.mode}: {other.before} → {other.after}' happen at the same instant but for different reasons.",
         where=[one.source, other.source],
         why="A small change of a parameter decides which comes first, so the derivatives on both sides differ.",
         advice="Choose parameter values that separate the two events.",
+    )
+
+
+def _resting(model: CompiledDae, one: HeldMotion, t: float) -> NoGradient:
+    mode, motion = model.flat_discretes[one.mode], model.flat_variables[one.motion].path
+    return NoGradient(
+        f"No gradient at t = {t:.9g} s: {mode.path} begins as {mode.names[one.number]}, because {motion} is just zero.",
+        why="A small change of a parameter decides which way it moves first, so the derivatives of both sides differ.",
+        advice="Move the parameters away from this limit.",
     )
 
 
@@ -252,6 +266,8 @@ class Work:
     time: Vector | None = None
     struck: tuple[Vector, Vector] | None = None
     entered: set[int] = field(default_factory=set)
+    resting: set[int] = field(default_factory=set)
+    """Held motions that have not been stopped: they are zero."""
 
     @classmethod
     def at(cls, model: CompiledDae, point: Point) -> Work:
@@ -304,6 +320,8 @@ class Work:
             self.point.d[mode] = model.flat_discretes[mode].names.index(event.after)
         if knocked:
             self.share()
+            modes = {model.discrete_position[event.mode] for event in knocked}
+            self.resting.update(k for k in holding(model, self.point) if model.holds[k].mode in modes)
 
     def share(self) -> None:
         """Let elements share what they hold together, and solve the implicit equations."""
@@ -338,6 +356,17 @@ class Work:
         if struck:
             self.x = self.x + self._total(f"impact {struck}", None, lambda: impact(model, struck), at=trial)[1]
         self.point = strike.point
+
+    def chances(self) -> tuple[Coincidence, ...]:
+        """Tell which resting motions do not stay zero: friction then stops them, but not the same from both sides."""
+        model, found = self.model, list[Coincidence]()
+        for k in sorted(self.resting):
+            one = model.holds[k]
+            own = slopes(model, self.point, "variables", [one.motion])
+            size = _SAME * float(np.abs(own.x[0]) @ (np.abs(self.point.x) + model.nominals))
+            by = self._total("variables", [one.motion])[1][0]
+            found.append(Coincidence(by, size, _resting(model, one, self.point.t)))
+        return tuple(found)
 
     def _begin_again(self, entering: list[int]) -> list[int]:
         """Go back to the states before the first impact, hold all motions that were hit, and return these."""

@@ -23,8 +23,6 @@ STAGES = 7
 ABSOLUTE = 1e-2
 _ORDERS = 0.75
 _FINEST, _COARSEST = 1e-13, 1e-3
-_DENSE = 60
-"""Largest linear system of a step to solve as a dense one; for larger ones LAPACK would start threads."""
 
 
 @dataclass(frozen=True)
@@ -312,13 +310,12 @@ class StepFunctions:
 
 
 def _solve(matrix: Any, right: Any, order: list[int], *, transposed: bool = False) -> Any:
-    """Solve a linear system or its transpose: a small one as dense, a large one in an order that keeps it sparse.
+    """Solve a linear system or its transpose in an order that keeps it sparse, with pivots on the diagonal.
 
-    Both use the factors of the matrix itself: where nothing depends on an angle, its column has one entry, and the
-    multiplier of the angle stays exactly zero. Pivoting in the transpose would add rounding.
+    A pivot in the row of an angle, which may be a billion radians, would let its rounding into slips that modes hold at
+    zero. Both use the factors of the matrix itself: where nothing depends on an angle, its column has one entry, and
+    the multiplier of the angle stays exactly zero.
     """
-    if matrix.size1() <= _DENSE:
-        return ca.Linsol("solver", "lapacklu", matrix.sparsity()).solve(matrix, ca.densify(right), transposed)
     back, ordered = np.argsort(order).tolist(), matrix[order, order]
     linsol = ca.Linsol("solver", "csparse", ordered.sparsity())
     return linsol.solve(ordered, ca.densify(right)[order, :], transposed)[back, :]

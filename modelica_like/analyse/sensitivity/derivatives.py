@@ -148,7 +148,9 @@ def _by_existence(
     for edge, row in zip(on_edge, derivatives, strict=True):
         moving = [chosen[k].name for k in np.flatnonzero(edge.moved_by(np.abs(row) * weights))]
         error = edge.error
-        if moving and (named or len(reasons.keys() | moving) == len(chosen)):
+        if not moving or not edge.matters():
+            continue
+        if named or len(reasons.keys() | moving) == len(chosen):
             raise NoGradient(
                 error.what, where=error.where, why=error.why,
                 advice=f"Leave out {' and '.join(moving[:_NAMED])}, or {error.advice[0].lower()}{error.advice[1:]}",

@@ -158,7 +158,11 @@ class Writer:
         return Written(self.member(path.path, dots) if path.own else names.name(path.path, dots))
 
     def _subscript(self, node: ast.Subscript) -> Written:
-        return Written(rf"{self.write(node.value).inside(ATOM)}_{{{self.latex(node.slice)}}}")
+        indices = [self.latex(node.slice)]
+        while isinstance(node.value, ast.Subscript):
+            node = node.value
+            indices.insert(0, self.latex(node.slice))
+        return Written(rf"{self.write(node.value).inside(ATOM)}_{{{', '.join(indices)}}}")
 
     def _tuple(self, node: ast.Tuple | ast.List) -> Written:
         return Written(rf"\left({', '.join(map(self.latex, node.elts))}\right)")

@@ -88,8 +88,7 @@ def _index(types: Mapping[str, type[Component]]) -> str:
         modules.setdefault(kind.__module__, []).append(name)
     sections = [
         "# Components",
-        f"{len(types)} component types, by machine element. These pages are generated from the declarations: "
-        "`modelica-like docs -o docs/components --examples examples` writes them, so do not edit them by hand.",
+        f"{len(types)} component types, by machine element. These pages are generated from the declarations.",
         " · ".join(
             f"[{module_title(module)}](#{module_title(module).replace(' ', '-')})" for module in sorted(modules)
         ),
