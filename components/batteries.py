@@ -24,8 +24,8 @@ from modelica_like.language import (
 class Battery(Tabulated, Lossy, TwoPins):
     """Cells in series and parallel: open-circuit voltage over the state of charge, behind their internal resistance.
 
-    With R_1 and C_1, part of the resistance works with a delay (one RC element). The current is positive while the
-    battery is charged. What is in the cells counts from the start. Modelica Standard Library, Electrical.Batteries,
+    With R_1 and C_1, part of the resistance acts with a delay (one RC element). The current is positive while the
+    battery is charged. The stored energy is zero at the start. Modelica Standard Library, Electrical.Batteries,
     BatteryStacks.
     """
 

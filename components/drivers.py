@@ -1,4 +1,4 @@
-"""Drivers who follow a speed profile."""
+"""Driver models that follow a speed profile."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ from modelica_like.language import (
 
 
 class Driver(Component):
-    """Driver who follows a profile of speed over time, such as a driving cycle, with accelerator and brake.
+    """Driver model that follows a profile of speed over time, such as a driving cycle, with accelerator and brake.
 
-    A PI controller with anti-windup; what is positive goes to the accelerator, what is negative to the brake.
+    A PI controller with anti-windup; a positive output goes to the accelerator, a negative one to the brake.
     """
 
     icon = icons.DRIVER

@@ -71,10 +71,10 @@ class Chained(Component):
 
 
 class TransferFunction(Component):
-    """Transfer function y/u = k·num(s)/den(s); coefficients belong to falling powers of s·time_scale.
+    """Transfer function y/u = k·num(s)/den(s); coefficients are in falling powers of s·time_scale.
 
-    Its states are those of a chain of integrators (controllable canonical form); at the start they are zero if nothing
-    is said. Modelica Standard Library, Blocks.Continuous.TransferFunction.
+    Its states are those of a chain of integrators (controllable canonical form); at the start they are zero by
+    default. Modelica Standard Library, Blocks.Continuous.TransferFunction.
     """
 
     icon = icons.TRANSFER
