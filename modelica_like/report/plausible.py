@@ -161,6 +161,6 @@ def _resonances(run: Solution) -> Iterator[str]:
         if near and abs(near.frequency / frequency - 1.0) < _NEAR:
             damping = f"{abs(near.damping):.2g}"
             yield (
-                f"{path} = {frequency:.4g} Hz is near the eigenfrequency {near.frequency:.4g} Hz, whose damping is "
+                f"{path} = {frequency:.4g} Hz is near the natural frequency {near.frequency:.4g} Hz, whose damping is "
                 f"{damping}: expect resonance."
             )

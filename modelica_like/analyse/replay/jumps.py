@@ -249,8 +249,8 @@ def _together(one: Event, other: Event) -> NoGradient:
 def _resting(model: CompiledDae, one: HeldMotion, t: float) -> NoGradient:
     mode, motion = model.flat_discretes[one.mode], model.flat_variables[one.motion].path
     return NoGradient(
-        f"No gradient at t = {t:.9g} s: {mode.path} begins as {mode.names[one.number]}, because {motion} is just zero.",
-        why="A small change of a parameter decides which way it moves first, so the derivatives of both sides differ.",
+        f"No gradient at t = {t:.9g} s: {mode.path} begins as {mode.names[one.number]}, because {motion} is exactly zero.",
+        why="A small change of a parameter decides which way it moves first, so the derivatives on both sides differ.",
         advice="Move the parameters away from this limit.",
     )
 
