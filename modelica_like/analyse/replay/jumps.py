@@ -249,7 +249,7 @@ def _together(one: Event, other: Event) -> NoGradient:
 def _resting(model: CompiledDae, one: HeldMotion, t: float) -> NoGradient:
     mode, motion = model.flat_discretes[one.mode], model.flat_variables[one.motion].path
     return NoGradient(
-        f"No gradient at t = {t:.9g} s: {mode.path} begins as {mode.names[one.number]}, because {motion} is exactly zero.",
+        f"No gradient at t = {t:.9g} s: {mode.path} begins as {mode.names[one.number]}, because {motion} is zero.",
         why="A small change of a parameter decides which way it moves first, so the derivatives on both sides differ.",
         advice="Move the parameters away from this limit.",
     )
