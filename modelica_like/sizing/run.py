@@ -181,7 +181,7 @@ class _Run:
             reason = (
                 str(error) if isinstance(error, ValueError) else "it divides by zero or leaves the range of numbers."
             )
-            raise NetlistError(f"{where} cannot be computed:  {reason}") from None
+            raise NetlistError(f"{where} cannot be computed: {reason}") from None
         limits = self._each(name, "limits", lambda line, value: self._limit(result, line, value, where))
         published = self._each(
             name, "published", lambda line, value: self._on_line(result, line, value, f"{where}.published")

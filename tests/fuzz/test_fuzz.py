@@ -94,7 +94,7 @@ SIZINGS = {
     ),
     "a limit that is a list": (LIFE + "limits = { life = { min = [[0, 1]] } }\n", "checks.k.limits.life needs a line"),
     "a list of lists": (LIFE.replace('"150 N"', '["1 N", ["2 N"]]'), "checks.k.radial_load must be a list of numbers"),
-    "a ring inside of its planets": (RING, "checks.k cannot be computed:  A ring of 3 teeth cannot hold planets of"),
+    "a ring inside of its planets": (RING, "checks.k cannot be computed: A ring of 3 teeth cannot hold planets of"),
     "teeth without the ring": (RING.replace(", ring = 3", ""), "checks.k.teeth needs ring."),
     "a list without numbers": (LIFE.replace('"150 N"', "[]"), "checks.k.radial_load must be a list of numbers"),
     "a number without end": (
