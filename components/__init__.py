@@ -3,8 +3,8 @@
 from importlib import import_module
 from typing import Any
 
-# Modules and their public names, each loaded when first used: a netlist needs few of them. For type checkers and
-# editors the same stands in `__init__.pyi`.
+# Modules and their public names, each loaded on first use: a netlist needs few of them. For type checkers and
+# editors, `__init__.pyi` has the same.
 _NAMES = {
     "absorbers": "CentrifugalPendulum TunedAbsorber",
     "actuators": "ElectromagneticActuator HydraulicActuator PneumaticActuator",

@@ -1,4 +1,4 @@
-"""Symbols of the machine elements, as kinematic diagrams and circuit diagrams have them."""
+"""Symbols of the machine elements, as in kinematic diagrams and circuit diagrams."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def _rect(half_x: float, half_y: float, x: float = 0.0, y: float = 0.0) -> str:
 
 
 def _hatch(x: float, y: float, width: float, down: int = 1) -> str:
-    """A fixed edge with its strokes, drawn away from what it holds."""
+    """A fixed edge with its hatching."""
     strokes = " ".join(f"M{x + k:g} {y:g} l-4 {5 * down}" for k in range(4, int(width) + 1, 5))
     return f"M{x:g} {y:g} h{width:g} {strokes}"
 

@@ -34,7 +34,7 @@ class Inertia(Component):
 class Mass(Component):
     """Rigid sliding mass.
 
-    The acceleration force m·der(v) is the sum of both cut forces. On a slope, or hanging, its weight acts, too.
+    The acceleration force m·der(v) is the sum of both cut forces. On a slope, or hanging, its weight also acts.
     """
 
     icon = icons.MASS
@@ -43,7 +43,7 @@ class Mass(Component):
     m: Parameter = param("kg", "mass", min=0)
     L: Parameter = param("m", "distance from left to right end; without a value both ends are at s", default=None)
     angle: Parameter = param(
-        "rad", "rise of the way, 90° is upwards: m·g·sin(angle) acts against it; without a value there is no weight",
+        "rad", "slope of the path, 90° is upwards: m·g·sin(angle) acts against motion; no value: no weight",
         default=None,
     )  # fmt: skip
     g: Parameter = param("m/s2", "gravity", default=9.80665)

@@ -1,4 +1,4 @@
-"""Speed from pulses: what a Hall sensor with a frequency meter shows."""
+"""Speed from pulses, as shown by a Hall sensor with a frequency meter."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ _HYSTERESIS = 0.5
 class PulseSpeedSensor(Component):
     """Speed by counting pulses: magnets on a shaft, a Hall sensor, and a frequency meter with a gate time.
 
-    Every magnet that passes makes one pulse, whatever the direction. At the end of each gate the meter shows the mean
-    speed over it, in steps of 2·pi/(pulses·gate); in between it keeps what it has.
+    Every passing magnet makes one pulse, in either direction. At the end of each gate the meter shows the mean speed
+    over it, in steps of 2·pi/(pulses·gate); in between it holds this value.
     """
 
     icon = icons.SENSOR

@@ -82,7 +82,7 @@ def gear_strength(
         required_root_safety: smallest S_F.
 
     Raises:
-        ValueError: the teeth cannot be so.
+        ValueError: the geometry of the teeth is impossible.
     """
     diameter, factors = pair.pitch_diameter(pair.pinion_teeth), application * dynamic * face_load * transverse_load
     force = 2 * abs(torque) / diameter
@@ -124,7 +124,7 @@ def single_contact(pair: GearPair, ratio: Ratio, overlap: Ratio) -> Number:
     Args:
         pair: geometry.
         ratio: transverse contact ratio.
-        overlap: overlap ratio up to 1, from where on it has no influence; internal gears have none either.
+        overlap: overlap ratio, at most 1; no influence above it, or for internal gears.
     """
     tips = [
         pair.tip_over_base(pair.pinion_teeth, pair.pinion_shift),

@@ -59,8 +59,8 @@ def report(
 
 def explore(
     netlist: Netlist, assignments: Assignments = None, *,
-    until: Annotated[str | None, Option(metavar="TIME", help="End time, e.g. 2s; else the netlist's.")] = None,
-    show: Annotated[list[str] | None, Option(metavar="PATTERN", help="What to draw, e.g. '*.w'.")] = None,
+    until: Annotated[str | None, Option(metavar="TIME", help="End time, e.g. 2s; default: the netlist's.")] = None,
+    show: Annotated[list[str] | None, Option(metavar="PATTERN", help="Variables to draw, e.g. '*.w'.")] = None,
     output: Annotated[Path, Option("--output", "-o", metavar="FOLDER", help="Where the page saves files.")] = Path(),
     browser: Annotated[bool, Option(help="Open the browser.")] = True,
     debug: Debug = False,

@@ -1,4 +1,4 @@
-"""Schematics: drives draw themselves.
+"""Schematics of drives.
 
 A layered drawing, with power from west to east: columns by a linear programme, orders by crossings, heights by another
 linear programme, and lines along both. Symbols are declared by the components.
@@ -33,7 +33,7 @@ def layout(component: Component, *, depth: int = 1) -> Sheet:
 
     Args:
         component: the drive.
-        depth: how many levels of assemblies are open.
+        depth: number of levels of open assemblies.
     """
     return sheet(diagram(component, depth))
 
@@ -46,7 +46,7 @@ def schematic(
 
     Args:
         component: the drive.
-        depth: how many levels of assemblies are open.
+        depth: number of levels of open assemblies.
         background: fill the paper; a page has one already.
         run: a run of the drive, whose modes are shown by colours: held, sliding, open.
         at: time in s whose modes and powers are shown; by default modes at the end and mean powers.

@@ -1,4 +1,4 @@
-"""A schematic as SVG: plain attributes for every renderer, and dark colours where a browser asks for them."""
+"""A schematic as SVG: plain attributes for every renderer, and dark colours for browsers in dark mode."""
 
 from __future__ import annotations
 

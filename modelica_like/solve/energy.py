@@ -1,4 +1,4 @@
-"""Where the energy went: power in = change of stored energy + losses, for every component."""
+"""Energy balance: power in = change of stored energy + losses, for every component."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _ROUNDING = 1e-9
-"""Part of a component's largest power below which a difference of powers is rounding."""
+"""Part of a component's largest power that counts as rounding in a difference of powers."""
 _NOTHING = 1e-12
 """Part of the model's largest power below which a power is rounding."""
 _LAST_DIGITS = 1e-14
@@ -28,7 +28,7 @@ _CHANGES = 6
 """... and how often: that rounding has the same sign and size each time would be a rare accident."""
 _SAME_TIME = 1e-12
 _ADDED_UP = 10.0
-"""Drift, in relative tolerances of the run, from which it is told."""
+"""Smallest reported drift, in relative tolerances of the run."""
 
 
 @dataclass(frozen=True)
@@ -38,19 +38,19 @@ class EnergyRow:
     Attributes:
         component: path; empty for the model itself.
         inflow: through its connectors.
-        source: brought in from outside the model.
+        source: supplied from outside the model.
         stored: change of its stored energy.
         lost: dissipated.
-        at_events: part of `stored` that changed at once, in resets at events.
+        at_events: part of `stored` that changed by resets at events.
         residual: integral of power in + source power - loss - rate of the stored energy; zero if the component's
             equations keep the balance, whatever the precision of the integration.
-        drift: what the stored energy changed in excess of the integral of its rate: the integration error.
-        impact: part of `lost` that was lost at once, in impacts.
+        drift: change of the stored energy minus the integral of its rate: the integration error.
+        impact: part of `lost` that was lost in impacts.
         imbalance: largest |power in + source power - loss - rate of the stored energy| at any result, both sides of
             events included, as a fraction of the component's largest power; zero if it is rounding.
-        imbalance_time: when that was, in s.
-        gain: largest power that a negative loss gave, in W; zero if it is rounding.
-        gain_time: when that was, in s.
+        imbalance_time: its time, in s.
+        gain: largest power of a negative loss, in W; zero if it is rounding.
+        gain_time: its time, in s.
     """
 
     component: str
@@ -74,9 +74,9 @@ class EnergyBalance:
 
     Attributes:
         rows: one per component.
-        throughput: largest of: energy exchanged, brought in, dissipated, stored.
-        at_events: largest change of all stored energies together at an event, in J, that neither an impact nor a reset
-            explains.
+        throughput: largest of the energies exchanged, supplied, dissipated and stored.
+        at_events: largest change of all stored energies together at an event, in J, without an impact or a
+            reset.
         tolerance: relative tolerance of the run; 0 if it has none.
     """
 
@@ -93,7 +93,7 @@ class EnergyBalance:
 
     @property
     def source(self) -> float:
-        """Energy brought in from outside, J."""
+        """Energy supplied from outside, J."""
         return sum(row.source for row in self.rows)
 
     @property
@@ -113,12 +113,12 @@ class EnergyBalance:
 
     @property
     def efficiency(self) -> float:
-        """Energy that loads took away over that which sources and stores gave; nan where nothing gave any."""
+        """Energy that loads took away over energy from sources and stores; nan without any."""
         given = sum(max(row.source, 0.0) for row in self.rows) + max(-self.stored, 0.0)
         return self.delivered / given if given else float("nan")
 
     def sankey(self, title: str = "") -> Figure:
-        """Draw where the energy came from and where it went."""
+        """Draw an energy flow diagram."""
         return upper("sankey")(self, title)
 
     @property
@@ -135,7 +135,7 @@ class EnergyBalance:
 
     @property
     def notices(self) -> tuple[str, ...]:
-        """What is wrong, as sentences: powers that do not balance, negative losses, energies that drift."""
+        """Messages about errors: powers that do not balance, negative losses, energies that drift."""
         told: list[str] = []
         for row in self.rows:
             name = row.component or "The model itself"
@@ -176,7 +176,7 @@ class EnergyBalance:
 
     @property
     def impacts(self) -> tuple[str, ...]:
-        """What was lost in impacts, as sentences."""
+        """Messages about losses in impacts."""
         return tuple(
             f"{row.component or 'The model itself'} lost {row.impact:.6g} J in impacts."
             for row in self.rows
@@ -193,15 +193,15 @@ def energy_balance(
 ) -> EnergyBalance:
     """Integrate the energy terms of every component along a run.
 
-    It is a quadrature over the results of the run; where they are too coarse, IDAS integrates powers and states once
-    more from there. Where this fails, the coarser value stands: there is always a balance.
+    It is a quadrature over the results of the run; where they are too coarse, IDAS integrates powers and states
+    again. If this fails, the coarser value is kept: there is always a balance.
 
     Args:
         model: the compiled model.
         segments: smooth pieces of the run.
         options: of the run; the integrals are as precise as its relative tolerance.
-        events: mode changes; what their resets do to stored energies needs no explanation.
-        impacts: what components lost at once, at events.
+        events: mode changes; their resets may change stored energies.
+        impacts: losses of components at events.
     """
     count = len(model.components)
     audit, totals = _Audit(count), np.zeros((POWERS, count))
@@ -232,7 +232,7 @@ def energy_balance(
 class _Audit:
     """The largest imbalance of each component and its largest negative loss, with their times.
 
-    Besides, stored energies at both ends of smooth pieces, and when these begin.
+    It also has the stored energies at both ends of smooth pieces, and their start times.
     """
 
     def __init__(self, count: int) -> None:
@@ -245,7 +245,7 @@ class _Audit:
         self._points: dict[int, Point] = {}
 
     def see(self, some: Results) -> None:
-        """Look at some results of the run."""
+        """Audit some results of the run."""
         stored, lost, source, inflow, rate, _ = some.terms
         starts = np.unique(some.first)
         self.times.append(some.times[starts])
@@ -297,7 +297,7 @@ def _is_rounding(model: CompiledDae, point: Point, component: int) -> bool:
 
 
 def _unexplained(times: Vector, jumps: Vector, reset: Sequence[float], impacts: Sequence[Impact]) -> float:
-    """Return the largest change of all stored energies together at an instant that nothing explains, in J."""
+    """Return the largest unexplained change of all stored energies together at an instant, in J."""
     instants, place = np.unique(times, return_inverse=True)
     if not len(instants):
         return 0.0

@@ -12,7 +12,7 @@ from modelica_like.errors import UnknownName, did_you_mean
 
 
 def differentiated(path: str) -> str:
-    """Return the variable in `der(variable)`, or nothing if the path is another one."""
+    """Return the variable in `der(variable)`, or an empty text for other paths."""
     return path[4:-1].strip() if path.startswith("der(") and path.endswith(")") else ""
 
 
@@ -31,7 +31,7 @@ def rate_along(model: CompiledDae, name: str, times: Any, x: Vector, z: Vector, 
         Shape (n,), in the variable's unit per second.
 
     Raises:
-        UnknownName: there is no such variable, or it changes at events only.
+        UnknownName: there is no such variable, or it changes only at events.
     """
     if name not in model.position:
         near = did_you_mean(name, list(model.position)) or "."

@@ -1,4 +1,4 @@
-"""From flat equations to an index-1 system: states x with derivatives, and what stays implicit (z)."""
+"""From flat equations to an index-1 system: states x with derivatives, and implicit unknowns z."""
 
 from __future__ import annotations
 
@@ -35,14 +35,14 @@ class ReducedDae:
         values: expression of every node of the flat model in x, z, inputs, p, d and t.
         node_states: for every node (position in x, factor) if it is a state up to a factor, else None.
         blocks: blocks of the triangular form, with the names of their unknowns and the origins of their equations.
-        determinants: (names, origins, expression) whose zero makes a block singular.
+        determinants: (names, origins, expression); a block is singular if the expression is zero.
         implicit_blocks: (names, origins) of the blocks that stay implicit.
         level_values: expression of every level in x, z, inputs, p, d and t.
         explicit: (level, expression) of the explicit unknowns, each in states, z and earlier ones.
         index: structural index of the equations before the reduction.
         differentiated: origins of the differentiated equations.
         holds: motions that modes hold.
-        circuits: those that depend on each other.
+        circuits: held motions that depend on each other.
     """
 
     flat: FlatModel
@@ -97,7 +97,7 @@ class ReducedDae:
 
     @property
     def notices(self) -> tuple[str, ...]:
-        """What a reader should know: a high index and the states that were kept."""
+        """Notices for the reader: a high index and the chosen states."""
         if not self.differentiated:
             return ()
         places, count = list(dict.fromkeys(o.path or o.kind for o in self.differentiated)), len(self.differentiated)
@@ -138,7 +138,7 @@ def reduce(flat: FlatModel) -> ReducedDae:
 
 
 def _check_input_rates(system: System) -> None:
-    """Refuse a motion that an input prescribes where its derivative counts: it is not known."""
+    """Refuse a motion prescribed by an input if its derivative is needed, because that is not known."""
     for level in system.inputs:
         rate = system.derivative(level)
         if rate is not None and rate not in system.inputs:
@@ -224,13 +224,13 @@ def _unknowns(system: System, states: list[int]) -> list[int]:
 def _assemble(
     system: System, counts: list[int], states: list[int], unknowns: list[int], origins: list[Origin], solved: Solved
 ) -> ReducedDae:
-    """Put the parts of the reduced system together.
+    """Assemble the reduced system.
 
     Args:
         system: the equations over levels.
-        counts: how often each of them is differentiated.
+        counts: number of differentiations of each.
         states: levels that are states.
-        unknowns: levels that were solved for; positions in `solved` are positions in this list.
+        unknowns: solved levels; positions in `solved` are positions in this list.
         origins: of all equations, differentiated ones included; positions in blocks are positions in this list.
         solved: the blocks.
     """

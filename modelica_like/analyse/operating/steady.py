@@ -78,8 +78,8 @@ class OperatingPoint(Mapping[str, float]):
 
     def __str__(self) -> str:
         lines = [f"Operating point of {self.model.name}"]
-        lines += [f"  {path} brings in {s:.6g} W" for path, (s, _) in self.powers.items() if s > 0]
-        lines += [f"  {path} takes away {-s:.6g} W" for path, (s, _) in self.powers.items() if s < 0]
+        lines += [f"  {path} supplies {s:.6g} W" for path, (s, _) in self.powers.items() if s > 0]
+        lines += [f"  {path} takes {-s:.6g} W" for path, (s, _) in self.powers.items() if s < 0]
         lines += [f"  {path} loses {loss:.6g} W" for path, loss in self.losses.items()]
         if np.isfinite(self.efficiency):
             lines.append(f"  efficiency {100 * self.efficiency:.4g} %")
