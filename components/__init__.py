@@ -10,6 +10,7 @@ _NAMES = {
         "AngleToTorqueAdaptor CurrentToVoltageAdaptor ForceToPositionAdaptor HeatFlowToTemperatureAdaptor "
         "PositionToForceAdaptor TemperatureToHeatFlowAdaptor TorqueToAngleAdaptor VoltageToCurrentAdaptor"
     ),
+    "asynchronous_machines": "AsynchronousMachine AsynchronousMachineDQ",
     "batteries": "Battery",
     "belts": "TimingBelt",
     "bristle_friction": "LuGreFriction",
@@ -65,6 +66,7 @@ _NAMES = {
         "TranslationalSpringDamper"
     ),
     "stepped_signals": "BooleanPulse BooleanStep BooleanTable StepTable",
+    "synchronous_machines": "MappedDrive PMSynchronousDrive PMSynchronousMachine",
     "thermal": (
         "FixedTemperature HeatPort HeatSource PrescribedHeatFlow PrescribedTemperature TemperatureSensor "
         "ThermalConductor ThermalMass"
