@@ -6,6 +6,8 @@ from typing import Any
 # Modules and their public names, each loaded when first used: a netlist needs few of them. For type checkers and
 # editors the same stands in `__init__.pyi`.
 _NAMES = {
+    "absorbers": "CentrifugalPendulum TunedAbsorber",
+    "actuators": "ElectromagneticActuator HydraulicActuator PneumaticActuator",
     "adaptors": (
         "AngleToTorqueAdaptor CurrentToVoltageAdaptor ForceToPositionAdaptor HeatFlowToTemperatureAdaptor "
         "PositionToForceAdaptor TemperatureToHeatFlowAdaptor TorqueToAngleAdaptor VoltageToCurrentAdaptor"
@@ -15,8 +17,10 @@ _NAMES = {
     "belts": "TimingBelt",
     "bristle_friction": "LuGreFriction",
     "choppers": "HBridge",
+    "commutated_machines": "CommutatedDCMachine",
     "contacts": "DogClutch RigidBacklash",
     "control": "PI PID ClutchActuator Feedback FirstOrder Gain Integrator Limiter P Sum",
+    "couplings": "ArcSpring DualMassFlywheel ElasticCoupling HystereticCoupling OldhamCoupling RuptureCoupling",
     "dc_machines": "PermanentMagnetDCMachine SeparatelyExcitedDCMachine SeriesDCMachine ShuntDCMachine",
     "drivers": "Driver",
     "eddy_current_brakes": "EddyCurrentForce EddyCurrentTorque",
@@ -43,6 +47,7 @@ _NAMES = {
     "one_way": "Freewheel OneWayClutch TorqueLimiter",
     "planetary": "Differential IdealPlanetary LossyPlanetarySet PlanetarySet",
     "point_to_point": "KinematicPTP2",
+    "pulse_sensors": "PulseSpeedSensor",
     "sampled": "FrequencyMeter NormalNoise UniformNoise ZeroOrderHold",
     "screw_drives": "BallScrewDrive",
     "sensors": (
@@ -60,6 +65,7 @@ _NAMES = {
     "signals": "CoilForce Constant Product Pulse Ramp Sine Step Table TimeFormula Trapezoid",
     "slides": "ElastoGap MassWithStopAndFriction Rod StribeckFriction SupportFriction TranslationalBrake",
     "sources": "ConstantForce ConstantSpeed ConstantTorque Force Speed Torque TorqueStep",
+    "speed_clutches": "CentrifugalClutch ViscousClutch",
     "spindles": "BallScrew MachineTable",
     "springs": (
         "Damper ElastoBacklash ElastoBacklash2 Spring SpringDamper TranslationalDamper TranslationalSpring "
@@ -67,10 +73,12 @@ _NAMES = {
     ),
     "stepped_signals": "BooleanPulse BooleanStep BooleanTable StepTable",
     "synchronous_machines": "MappedDrive PMSynchronousDrive PMSynchronousMachine",
+    "synchronisers": "Synchroniser",
     "thermal": (
         "FixedTemperature HeatPort HeatSource PrescribedHeatFlow PrescribedTemperature TemperatureSensor "
         "ThermalConductor ThermalMass"
     ),
+    "thermal_clutches": "ThermalClutch",
     "torque_converters": "TorqueConverter",
     "translational_sensors": (
         "LinearAccelerationSensor LinearMultiSensor LinearPowerSensor RelativeLinearAccelerationSensor "
@@ -78,8 +86,7 @@ _NAMES = {
     ),
     "translational_sources": (
         "ConstantVelocity Force2 ForceStep InverseSpeedDependentForce LinearSpeedDependentForce "
-        "QuadraticSpeedDependentForce SignForce TranslationalAccelerate TranslationalPosition "
-        "TranslationalSpeed"
+        "QuadraticSpeedDependentForce SignForce TranslationalAccelerate TranslationalPosition TranslationalSpeed"
     ),
     "transmissions": "Lepelletier Ravigneaux",
     "tyres": "AxleLoads Tyre",

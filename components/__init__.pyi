@@ -1,3 +1,8 @@
+from components.absorbers import CentrifugalPendulum as CentrifugalPendulum
+from components.absorbers import TunedAbsorber as TunedAbsorber
+from components.actuators import ElectromagneticActuator as ElectromagneticActuator
+from components.actuators import HydraulicActuator as HydraulicActuator
+from components.actuators import PneumaticActuator as PneumaticActuator
 from components.adaptors import AngleToTorqueAdaptor as AngleToTorqueAdaptor
 from components.adaptors import CurrentToVoltageAdaptor as CurrentToVoltageAdaptor
 from components.adaptors import ForceToPositionAdaptor as ForceToPositionAdaptor
@@ -12,6 +17,7 @@ from components.batteries import Battery as Battery
 from components.belts import TimingBelt as TimingBelt
 from components.bristle_friction import LuGreFriction as LuGreFriction
 from components.choppers import HBridge as HBridge
+from components.commutated_machines import CommutatedDCMachine as CommutatedDCMachine
 from components.contacts import DogClutch as DogClutch
 from components.contacts import RigidBacklash as RigidBacklash
 from components.control import PI as PI
@@ -24,6 +30,12 @@ from components.control import Integrator as Integrator
 from components.control import Limiter as Limiter
 from components.control import P as P
 from components.control import Sum as Sum
+from components.couplings import ArcSpring as ArcSpring
+from components.couplings import DualMassFlywheel as DualMassFlywheel
+from components.couplings import ElasticCoupling as ElasticCoupling
+from components.couplings import HystereticCoupling as HystereticCoupling
+from components.couplings import OldhamCoupling as OldhamCoupling
+from components.couplings import RuptureCoupling as RuptureCoupling
 from components.dc_machines import PermanentMagnetDCMachine as PermanentMagnetDCMachine
 from components.dc_machines import SeparatelyExcitedDCMachine as SeparatelyExcitedDCMachine
 from components.dc_machines import SeriesDCMachine as SeriesDCMachine
@@ -91,6 +103,7 @@ from components.planetary import IdealPlanetary as IdealPlanetary
 from components.planetary import LossyPlanetarySet as LossyPlanetarySet
 from components.planetary import PlanetarySet as PlanetarySet
 from components.point_to_point import KinematicPTP2 as KinematicPTP2
+from components.pulse_sensors import PulseSpeedSensor as PulseSpeedSensor
 from components.sampled import FrequencyMeter as FrequencyMeter
 from components.sampled import NormalNoise as NormalNoise
 from components.sampled import UniformNoise as UniformNoise
@@ -144,6 +157,8 @@ from components.sources import Force as Force
 from components.sources import Speed as Speed
 from components.sources import Torque as Torque
 from components.sources import TorqueStep as TorqueStep
+from components.speed_clutches import CentrifugalClutch as CentrifugalClutch
+from components.speed_clutches import ViscousClutch as ViscousClutch
 from components.spindles import BallScrew as BallScrew
 from components.spindles import MachineTable as MachineTable
 from components.springs import Damper as Damper
@@ -158,6 +173,7 @@ from components.stepped_signals import BooleanPulse as BooleanPulse
 from components.stepped_signals import BooleanStep as BooleanStep
 from components.stepped_signals import BooleanTable as BooleanTable
 from components.stepped_signals import StepTable as StepTable
+from components.synchronisers import Synchroniser as Synchroniser
 from components.synchronous_machines import MappedDrive as MappedDrive
 from components.synchronous_machines import PMSynchronousDrive as PMSynchronousDrive
 from components.synchronous_machines import PMSynchronousMachine as PMSynchronousMachine
@@ -169,6 +185,7 @@ from components.thermal import PrescribedTemperature as PrescribedTemperature
 from components.thermal import TemperatureSensor as TemperatureSensor
 from components.thermal import ThermalConductor as ThermalConductor
 from components.thermal import ThermalMass as ThermalMass
+from components.thermal_clutches import ThermalClutch as ThermalClutch
 from components.torque_converters import TorqueConverter as TorqueConverter
 from components.translational_sensors import LinearAccelerationSensor as LinearAccelerationSensor
 from components.translational_sensors import LinearMultiSensor as LinearMultiSensor

@@ -49,6 +49,7 @@ PLAY = Icon(
 )
 CLUTCH = Icon(30, 48, lines="M-15 0 h9 M6 0 h9", heavy="M-6 -23 v46 M6 -23 v46", ports={"f_normalized": "N"},
               key=("capacity", "fn_max"))  # fmt: skip
+THERMAL_CLUTCH = replace(CLUTCH, lines="M-15 0 h9 M6 0 h9 M-2 10 v6 M2 10 v6 M-2 20 v6 M2 20 v6")
 MULTI_PLATE = Icon(36, 48, lines="M-18 0 h8 M10 0 h8 M-10 -23 h8 M-10 23 h8 M10 -17 h-8 M10 17 h-8",
                    heavy="M-10 -23 v46 M10 -17 v34 M-3 -23 v8 M-3 23 v-8 M3 -17 v9 M3 17 v-9",
                    ports={"f_normalized": "N"}, key=("capacity", "fn_max"))  # fmt: skip
@@ -63,6 +64,22 @@ DOGS = replace(
 ONE_WAY_CLUTCH = replace(CLUTCH, solid="M-4 -6 L5 0 L-4 6 Z")
 LIMITER_CLUTCH = Icon(44, 48, lines="M-22 0 h12 M2 0 h3 l2 -6 l4 12 l4 -12 l2 6 h3",
                       heavy="M-10 -23 v46 M2 -23 v46")  # fmt: skip
+ELASTIC_COUPLING = Icon(40, 44, lines="M-20 0 h10 M10 0 h10 M-10 -12 q10 -8 20 0 M-10 12 q10 8 20 0",
+                        heavy="M-10 -21 v42 M10 -21 v42")  # fmt: skip
+DUAL_MASS = Icon(44, 52, solid=f"{_rect(5, 25, -12)} {_rect(5, 25, 12)}", key=("J_1",),
+                 lines="M-22 0 h5 M17 0 h5 M-7 0 l2 -6 l3 12 l3 -12 l3 12 l3 -6")  # fmt: skip
+RUPTURE = Icon(40, 44, lines="M-20 0 h14 M6 0 h14 M-6 -12 h4 l4 4 h4 M-6 12 h4 l4 4 h4", heavy="M-6 -20 v40 M6 -20 v40",
+               key=("tau_break",))  # fmt: skip
+OLDHAM = Icon(48, 44, lines="M-24 -4 h12 M12 4 h12", heavy="M-12 -20 v32 M12 -12 v32", paper=_rect(6, 14),
+              key=("offset",))  # fmt: skip
+CENTRIFUGAL = replace(CLUTCH, heavy="M-6 -10 v20 M6 -23 v46", ports={},
+                      solid=f"{_circle(-6, -15, 5)} {_circle(-6, 15, 5)}", key=("m",))  # fmt: skip
+VISCOUS = replace(CLUTCH, lines="M-15 0 h9 M6 0 h9 M-3 -16 h6 M-3 -8 h6 M-3 8 h6 M-3 16 h6", ports={"fill": "N"},
+                  key=("tau_nominal",))  # fmt: skip
+SYNCHRO = replace(CLUTCH, heavy="M-6 -23 l-4 46 M2 -23 l-4 46 M8 -12 v24", lines="M-15 0 h5 M8 0 h7")
+ABSORBER = Icon(40, 48, solid=_rect(6, 22, 10), lines="M-20 0 h6 l3 -7 l5 14 l5 -14 l3 7 h2", key=("f",))
+PENDULUM = Icon(44, 52, paper=_circle(0, 6, 18), lines="M-22 6 h22 M0 6 v-16 l6 -10",
+                solid=f"{_circle(0, 6, 3)} {_circle(6, -20, 6)}", key=("m",))  # fmt: skip
 _PAIR, _HUBS = f"{_circle(-11, 0, 9)} {_circle(9, 0, 11)}", f"{_circle(-11, 0, 2.5)} {_circle(9, 0, 2.5)}"
 GEAR = Icon(48, 38, paper=_PAIR, solid=_HUBS, lines="M-24 0 h4 M20 0 h4", key=("ratio",))
 WORM = replace(GEAR, lines="M-24 0 h4 M20 0 h4 M-17 -5 l4 10 M-12 -7 l4 12 M-7 -6 l3 8")
@@ -110,6 +127,13 @@ VEHICLE = Icon(64, 36, paper="M-31 6 v-8 l8 -3 l8 -10 h22 l9 10 l14 3 v8 Z",
 AXLES = Icon(64, 30, paper="M-31 2 v-8 l8 -3 l8 -6 h22 l9 6 l14 3 v8 Z",
              lines="M-17 15 v-10 l-3 4 m3 -4 l3 4 M17 15 v-10 l-3 4 m3 -4 l3 4",
              ports={"flange": "W", "inclination": "N", "F_rear": ("E", -7), "F_front": ("E", 7)})  # fmt: skip
+
+# -- actuators -------------------------------------------------------------------------------------------------------
+
+MAGNET = Icon(48, 44, paper=_rect(14, 20, -8), solid=_rect(4, 20, 16), lines="M-22 -12 l28 24 M-22 12 l28 -24 M8 0 h4",
+              ports={"p": ("W", -12), "n": ("W", 12), "y": "E"}, key=("R",))  # fmt: skip
+PISTON = Icon(52, 34, paper=_rect(26, 14), solid=_rect(4, 14), lines="M4 0 h3 l2 -7 l4 14 l4 -14 l4 14 l2 -7 h3",
+              ports={"p_in": "W", "y": "E"}, key=("A",))  # fmt: skip
 
 # -- sources and loads -----------------------------------------------------------------------------------------------
 

@@ -31,8 +31,8 @@ class Table1D(Tabulated):
     table: tuple[tuple[float, float], ...] = rows(
         column("argument", scale="u_scale", rising=True), column("value", scale="scale")
     )
-    u_scale: Parameter = param("*", "what counts as 1 in the arguments", default=1.0)
-    scale: Parameter = param("*", "what counts as 1 in the values", default=1.0)
+    u_scale: Parameter = param("*", "scale of the arguments", default=1.0)
+    scale: Parameter = param("*", "scale of the values", default=1.0)
     y: Output = signal_out("*", "value")
 
     def equations(self) -> Equations:
@@ -55,9 +55,9 @@ class Table2D(Tabulated):
     first: Flat = rows(column("argument u1 of a row", scale="u1_scale", rising=True), flat=True)
     second: Flat = rows(column("argument u2 of a column", scale="u2_scale", rising=True), flat=True)
     table: tuple[Flat, ...] = rows(column("value", scale="scale"), more=True)
-    u1_scale: Parameter = param("*", "what counts as 1 in `first`", default=1.0)
-    u2_scale: Parameter = param("*", "what counts as 1 in `second`", default=1.0)
-    scale: Parameter = param("*", "what counts as 1 in the values", default=1.0)
+    u1_scale: Parameter = param("*", "scale of `first`", default=1.0)
+    u2_scale: Parameter = param("*", "scale of `second`", default=1.0)
+    scale: Parameter = param("*", "scale of the values", default=1.0)
     y: Output = signal_out("*", "value")
 
     def equations(self) -> Equations:

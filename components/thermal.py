@@ -52,7 +52,11 @@ class Lossy(Component, partial=True):
     def equations(self) -> Equations:
         yield from super().equations()
         if self.heat_port.used:
-            yield self.heat_port.Q_flow == -self.dissipation()
+            yield self.heat_port.Q_flow == -self.heat()
+
+    def heat(self) -> Expr:
+        """Return the heat flow in W that leaves at the heat port."""
+        return self.dissipation()
 
     def loss_power(self) -> Expr | float:
         return 0.0 if self.heat_port.used else self.dissipation()

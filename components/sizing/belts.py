@@ -5,7 +5,19 @@ from __future__ import annotations
 import math
 
 from components.sizing.maths import asin, cos, exp, floor, hypot, maximum, require, sin, sqrt
-from modelica_like.language.quantities import Angle, Area, Density, Force, Length, Power, Ratio, Speed, Teeth, Velocity
+from modelica_like.language.quantities import (
+    Angle,
+    Area,
+    Density,
+    Force,
+    Length,
+    Power,
+    Ratio,
+    Speed,
+    Stress,
+    Teeth,
+    Velocity,
+)
 from modelica_like.language.results import Result, line
 
 _NEWTON_STEPS = 8
@@ -145,3 +157,32 @@ def belt_forces(
         doubled_load=hypot(load, pull), centrifugal_force=centrifugal, load_at_rest=load + centrifugal,
         relief=2 * centrifugal * sin(angle / 2),
     )  # fmt: skip
+
+
+class TimingBeltLoad(Result):
+    """Load of a timing belt against its limits."""
+
+    power: Power = line("transmitted power, application factor included", at_most="power_limit")
+    power_limit: Power = line("power that the belt can transmit")
+    tooth_force: Force = line("force of one tooth in mesh")
+    flank_pressure: Stress = line("pressure on the flanks of the teeth", at_most="pressure_limit")
+    pressure_limit: Stress = line("permissible pressure on the flanks")
+
+
+def timing_belt_load(
+    pull: Force, velocity: Velocity, teeth_in_mesh: Teeth, width: Length, tooth_height: Length,
+    power_limit: Power = math.inf, pressure_limit: Stress = math.inf,
+) -> TimingBeltLoad:  # fmt: skip
+    """Compare power and flank pressure of a timing belt with their limits: p = F_t/(z_e·b·h) (document 002, 5.3).
+
+    Args:
+        pull: effective pull in N, application factor included.
+        velocity: of the belt in m/s.
+        teeth_in_mesh: whole number of teeth that carry.
+        width: of the belt in m.
+        tooth_height: in m; 1.27 mm of profile XL (ISO 5296).
+        power_limit: of the catalogue in W.
+        pressure_limit: in Pa.
+    """
+    force = pull / teeth_in_mesh
+    return TimingBeltLoad(pull * velocity, power_limit, force, force / (width * tooth_height), pressure_limit)

@@ -203,6 +203,30 @@ def generator_voltage(generator: DcMotor, speed: Speed, current: Current = 0.0) 
     return generator.constant * speed - generator.resistance * current
 
 
+class GeneratorPoint(Result):
+    """Operating point of a generator."""
+
+    torque: Torque = line("torque that drives it")
+    voltage: Voltage = line("voltage at its terminals")
+    input_power: Power = line("mechanical power M·w")
+    output_power: Power = line("electrical power U·I")
+    efficiency: Ratio = line("efficiency")
+
+
+def generator_point(generator: DcMotor, speed: Speed, current: Current) -> GeneratorPoint:
+    """Work out powers and efficiency of a generator: U = k·w - R·I, M = k·I + M_f + b·w (document 002, equation 15).
+
+    Args:
+        generator: its parameters.
+        speed: in rad/s.
+        current: that it delivers in A.
+    """
+    voltage = generator_voltage(generator, speed, current)
+    torque = generator.constant * current + generator.friction + generator.damping * speed
+    mechanical, electrical = torque * speed, voltage * current
+    return GeneratorPoint(torque, voltage, mechanical, electrical, electrical / mechanical)
+
+
 def series_motor_speed(torque: Torque, voltage: Voltage, mutual: Ratio, resistance: Resistance) -> Speed:
     """Return the speed in rad/s of a series machine with linear field: U/sqrt(c·M) - R/c.
 

@@ -29,8 +29,11 @@ def _choose(condition: Any, then: Any, otherwise: Any) -> Any:
 
 sqrt = _function(np.sqrt, ca.sqrt, "Square root.")
 exp = _function(np.exp, ca.exp, "Exponential function.")
+log = _function(np.log, ca.log, "Natural logarithm.")
+log10 = _function(np.log10, ca.log10, "Decimal logarithm.")
 sin = _function(np.sin, ca.sin, "Sine of an angle in rad.")
 cos = _function(np.cos, ca.cos, "Cosine of an angle in rad.")
+tan = _function(np.tan, ca.tan, "Tangent of an angle in rad.")
 acos = _function(np.arccos, ca.acos, "Angle in rad with a given cosine.")
 asin = _function(np.arcsin, ca.asin, "Angle in rad with a given sine.")
 floor = _function(np.floor, ca.floor, "Largest whole number not above a value.")

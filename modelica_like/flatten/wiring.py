@@ -39,7 +39,7 @@ class Wiring:
         if foreign:
             self._refuse(
                 f"{scope.label} connects {_name(foreign[0])} of a component that is not part of it.", statement.source,
-                "Name parts as self.…, so that the copy of this owner is meant.",
+                "Name parts as self.…, to use the copy of this owner.",
             )  # fmt: skip
         elif isinstance(statement, FreeEnd):
             self.freed.add(id(statement.connector))
@@ -97,7 +97,7 @@ class Wiring:
             advice = "Signals go to signals: use a sensor or a source between."
         elif wrong:
             what = f"connect joins {_name(wrong[0])}, which is neither an input nor an output."
-            advice = "Connect one output with any number of inputs; a sensor makes a signal of a variable."
+            advice = "Connect one output with any number of inputs; a sensor turns a variable into a signal."
         elif len(drivers) != 1:
             count = f"{len(drivers)} outputs ({', '.join(map(_name, drivers))})" if drivers else "no output"
             what = f"The connection of {', '.join(map(_name, signals))} has {count}."
@@ -112,7 +112,7 @@ class Wiring:
     def _drive(self, sink: Symbol, driver: Symbol, source: Source) -> None:
         key = (id(sink.owner), sink.name)
         if key in self.driven:
-            advice = "Keep one connection; add signals in a component of their own."
+            advice = "Keep one connection; add signals in a separate component."
             self._refuse(f"The input {_name(sink)} is connected twice.", (source, self.driven[key]), advice)
             return
         self.driven[key] = source

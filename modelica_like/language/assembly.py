@@ -56,7 +56,7 @@ class Assembly(Component):
 
     def _declare(self, name: str, field: Field) -> None:
         if name in self.fields or name in self._parts or name in self._connectors:
-            raise DuplicateName(f"{self.label}: '{name}' is already the name of something else.")
+            raise DuplicateName(f"{self.label}: '{name}' is already in use.")
         field.owner, field.name = self.label, name
         self._own_fields = {**self._own_fields, name: field}
 
@@ -160,7 +160,7 @@ class Assembly(Component):
         owner, _, name = path.rpartition(".")
         if owner and name in self.find(owner).connectors:
             raise WrongConnection(
-                f"{path} is a connector, and a series joins parts.",
+                f"{path} is a connector, but a series joins parts.",
                 advice=f"Write {owner} in the series, or join {path} in a connection of its own.",
             )
         return self.find(path)

@@ -97,7 +97,7 @@ class _Writer:
         if not origin:
             raise NetlistError(
                 f"{assembly.label} is an assembly without a file, so a netlist cannot name it.",
-                advice="Save it to a file of its own, load that file, and use it as the part.",
+                advice="Save it to a separate file, load that file, and use it as the part.",
             )
         relative = Path(os.path.relpath(origin, self.folder.resolve())).as_posix()
         return relative if relative.startswith(".") else f"./{relative}"
