@@ -36,7 +36,7 @@ _NAMES = {
     "gears": "IdealGear",
     "inertias": "Inertia Mass",
     "interfaces": "Compliant CompliantWithRelativeStates Flange LinearFlange",
-    "linear_blocks": "Derivative SecondOrder TransferFunction",
+    "linear_blocks": "Derivative SecondOrder StateSpace TransferFunction",
     "loads": "SpeedDependentLoad",
     "lossy_gears": "ConstantEfficiencyGear LossyGear",
     "motions": (

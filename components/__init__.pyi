@@ -79,6 +79,7 @@ from components.interfaces import Flange as Flange
 from components.interfaces import LinearFlange as LinearFlange
 from components.linear_blocks import Derivative as Derivative
 from components.linear_blocks import SecondOrder as SecondOrder
+from components.linear_blocks import StateSpace as StateSpace
 from components.linear_blocks import TransferFunction as TransferFunction
 from components.loads import SpeedDependentLoad as SpeedDependentLoad
 from components.lossy_gears import ConstantEfficiencyGear as ConstantEfficiencyGear

@@ -247,3 +247,4 @@ ASYNCHRONOUS = replace(MOTOR, text="M 3~", lines="M24 0 h2", key=("tau_k",),
                        ports={"flange": "E", "v": "W", "f": "N", "v_rel": "W"})  # fmt: skip
 SYNCHRONOUS = replace(MOTOR, text="MS", lines="M24 0 h2", ports={"flange": "E", "v_d": ("W", -10), "v_q": ("W", 10)})
 DRIVE = replace(MOTOR, text="MS", ports={"p_dc": ("W", -14), "n_dc": ("W", 14), "flange": "E", "tau_ref": "N"})
+STATE_SPACE = block("", text="A B")

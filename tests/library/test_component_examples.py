@@ -378,6 +378,8 @@ def filters(run: Solution) -> None:
         [quad(delayed, 0, 4)[0], quad(oscillating, 0, 4)[0], 0.5 * 8, 0]
     )
     assert 2 * run.at(2)["rotor[4].w"] == close(beyond)
+    # 3·8/((s + 2)·(s + 4)) is 3·(1 - 2·exp(-2 t) + exp(-4 t)) after a step.
+    assert 2 * run.final["rotor[5].w"] == close(3 * (4 - (1 - exp(-8)) + (1 - exp(-16)) / 4))
     assert run.at(1)["rate.y"] == close(0.5 * 4 * (1 - exp(-10)))
 
 
