@@ -12,6 +12,7 @@ _NAMES = {
         "AngleToTorqueAdaptor CurrentToVoltageAdaptor ForceToPositionAdaptor HeatFlowToTemperatureAdaptor "
         "PositionToForceAdaptor TemperatureToHeatFlowAdaptor TorqueToAngleAdaptor VoltageToCurrentAdaptor"
     ),
+    "asynchronous_machines": "AsynchronousMachine AsynchronousMachineDQ",
     "batteries": "Battery",
     "belts": "TimingBelt",
     "bristle_friction": "LuGreFriction",
@@ -35,7 +36,7 @@ _NAMES = {
     "gears": "IdealGear",
     "inertias": "Inertia Mass",
     "interfaces": "Compliant CompliantWithRelativeStates Flange LinearFlange",
-    "linear_blocks": "Derivative SecondOrder TransferFunction",
+    "linear_blocks": "Derivative SecondOrder StateSpace TransferFunction",
     "loads": "SpeedDependentLoad",
     "lossy_gears": "ConstantEfficiencyGear LossyGear",
     "motions": (
@@ -71,6 +72,7 @@ _NAMES = {
         "TranslationalSpringDamper"
     ),
     "stepped_signals": "BooleanPulse BooleanStep BooleanTable StepTable",
+    "synchronous_machines": "MappedDrive PMSynchronousDrive PMSynchronousMachine",
     "synchronisers": "Synchroniser",
     "thermal": (
         "FixedTemperature HeatPort HeatSource PrescribedHeatFlow PrescribedTemperature TemperatureSensor "

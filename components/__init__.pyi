@@ -11,6 +11,8 @@ from components.adaptors import PositionToForceAdaptor as PositionToForceAdaptor
 from components.adaptors import TemperatureToHeatFlowAdaptor as TemperatureToHeatFlowAdaptor
 from components.adaptors import TorqueToAngleAdaptor as TorqueToAngleAdaptor
 from components.adaptors import VoltageToCurrentAdaptor as VoltageToCurrentAdaptor
+from components.asynchronous_machines import AsynchronousMachine as AsynchronousMachine
+from components.asynchronous_machines import AsynchronousMachineDQ as AsynchronousMachineDQ
 from components.batteries import Battery as Battery
 from components.belts import TimingBelt as TimingBelt
 from components.bristle_friction import LuGreFriction as LuGreFriction
@@ -77,6 +79,7 @@ from components.interfaces import Flange as Flange
 from components.interfaces import LinearFlange as LinearFlange
 from components.linear_blocks import Derivative as Derivative
 from components.linear_blocks import SecondOrder as SecondOrder
+from components.linear_blocks import StateSpace as StateSpace
 from components.linear_blocks import TransferFunction as TransferFunction
 from components.loads import SpeedDependentLoad as SpeedDependentLoad
 from components.lossy_gears import ConstantEfficiencyGear as ConstantEfficiencyGear
@@ -172,6 +175,9 @@ from components.stepped_signals import BooleanStep as BooleanStep
 from components.stepped_signals import BooleanTable as BooleanTable
 from components.stepped_signals import StepTable as StepTable
 from components.synchronisers import Synchroniser as Synchroniser
+from components.synchronous_machines import MappedDrive as MappedDrive
+from components.synchronous_machines import PMSynchronousDrive as PMSynchronousDrive
+from components.synchronous_machines import PMSynchronousMachine as PMSynchronousMachine
 from components.thermal import FixedTemperature as FixedTemperature
 from components.thermal import HeatPort as HeatPort
 from components.thermal import HeatSource as HeatSource

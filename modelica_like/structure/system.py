@@ -169,11 +169,14 @@ def _name_levels(model: FlatModel, levels: list[Level], node_level: list[tuple[i
         rank = (order, one.kind in ("potential", "flow"), factor != 1.0, -preference, one.path.count("."), node)
         if order == 0:
             levels[level].preference = max(levels[level].preference, preference)
+            # The name says nothing about the guess: any of them that has one knows more than zero.
+            levels[level].guess = levels[level].guess or one.guess / factor
         if level not in best or rank < best[level]:
             best[level] = rank
             levels[level].name = model.node_name(node)
             levels[level].nominal = one.nominal
-            levels[level].guess = one.guess / factor if order == 0 else 0.0
+            if order == 0 and one.guess:
+                levels[level].guess = one.guess / factor
 
 
 def _node_values(
