@@ -22,6 +22,7 @@ _NAMES = {
     "control": "PI PID ClutchActuator Feedback FirstOrder Gain Integrator Limiter P Sum",
     "couplings": "ArcSpring DualMassFlywheel ElasticCoupling HystereticCoupling OldhamCoupling RuptureCoupling",
     "dc_machines": "PermanentMagnetDCMachine SeparatelyExcitedDCMachine SeriesDCMachine ShuntDCMachine",
+    "drag_losses": "ChurningGear DeepGrooveBearing",
     "drivers": "Driver",
     "eddy_current_brakes": "EddyCurrentForce EddyCurrentTorque",
     "electrical": (
@@ -32,13 +33,17 @@ _NAMES = {
     "fixed": "Disc Fixed TranslationalFixed",
     "flexible_shafts": "FlexibleShaft StribeckBearing",
     "friction": "BearingFriction Brake Clutch DryFriction MultiPlateClutch",
+    "gear_meshes": "GearMesh",
     "gearboxes": "Gearbox",
     "gears": "IdealGear",
+    "hoists": "HoldingBrake Rope WinchDrum",
     "inertias": "Inertia Mass",
     "interfaces": "Compliant CompliantWithRelativeStates Flange LinearFlange",
     "linear_blocks": "Derivative SecondOrder StateSpace TransferFunction",
+    "linkages": "Cam FourBar SliderCrank",
     "loads": "SpeedDependentLoad",
     "lossy_gears": "ConstantEfficiencyGear LossyGear",
+    "machine_loads": "CentrifugalPump Conveyor CuttingLoad DisplacementLoad FormingForce",
     "motions": (
         "InitializeFlange Move RelativeStates TranslationalInitializeFlange TranslationalMove "
         "TranslationalRelativeStates"
@@ -72,6 +77,7 @@ _NAMES = {
         "TranslationalSpringDamper"
     ),
     "stepped_signals": "BooleanPulse BooleanStep BooleanTable StepTable",
+    "switching": "Contactor Diode",
     "synchronous_machines": "MappedDrive PMSynchronousDrive PMSynchronousMachine",
     "synchronisers": "Synchroniser",
     "thermal": (
@@ -91,9 +97,11 @@ _NAMES = {
     "transmissions": "Lepelletier Ravigneaux",
     "tyres": "AxleLoads Tyre",
     "universal_joints": "UniversalJoint",
+    "variable_drives": "ChainDrive VariableGear",
     "vehicles": "RoadLoad RollingResistance Vehicle",
     "waves": "CombiTable Cosine Exponentials ExpSine LogFrequencySweep SawTooth Sinc VariableSine",
     "wheels": "IdealGearR2T IdealRollingWheel",
+    "worms": "WormGear",
 }
 _HOME = {name: module for module, names in _NAMES.items() for name in names.split()}
 
