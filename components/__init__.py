@@ -6,22 +6,28 @@ from typing import Any
 # Modules and their public names, each loaded when first used: a netlist needs few of them. For type checkers and
 # editors the same stands in `__init__.pyi`.
 _NAMES = {
+    "absorbers": "CentrifugalPendulum TunedAbsorber",
+    "actuators": "ElectromagneticActuator HydraulicActuator PneumaticActuator",
     "adaptors": (
         "AngleToTorqueAdaptor CurrentToVoltageAdaptor ForceToPositionAdaptor HeatFlowToTemperatureAdaptor "
         "PositionToForceAdaptor TemperatureToHeatFlowAdaptor TorqueToAngleAdaptor VoltageToCurrentAdaptor"
     ),
+    "batteries": "Battery",
     "belts": "TimingBelt",
     "bristle_friction": "LuGreFriction",
     "choppers": "HBridge",
     "commutated_machines": "CommutatedDCMachine",
     "contacts": "DogClutch RigidBacklash",
     "control": "PI PID ClutchActuator Feedback FirstOrder Gain Integrator Limiter P Sum",
+    "couplings": "ArcSpring DualMassFlywheel ElasticCoupling HystereticCoupling OldhamCoupling RuptureCoupling",
     "dc_machines": "PermanentMagnetDCMachine SeparatelyExcitedDCMachine SeriesDCMachine ShuntDCMachine",
+    "drivers": "Driver",
     "eddy_current_brakes": "EddyCurrentForce EddyCurrentTorque",
     "electrical": (
-        "Capacitor ConstantCurrent ConstantVoltage CurrentSensor CurrentSink Ground Inductor Pin Resistor "
-        "SignalVoltage Switch VariableResistor VoltageSensor"
+        "Capacitor ConstantCurrent ConstantVoltage CurrentSensor CurrentSink ElectricalPowerSensor Ground Inductor "
+        "Pin Resistor SignalCurrent SignalVoltage Switch VariableResistor VoltageSensor"
     ),
+    "engines": "CombustionEngine",
     "fixed": "Disc Fixed TranslationalFixed",
     "flexible_shafts": "FlexibleShaft StribeckBearing",
     "friction": "BearingFriction Brake Clutch DryFriction MultiPlateClutch",
@@ -29,22 +35,25 @@ _NAMES = {
     "gears": "IdealGear",
     "inertias": "Inertia Mass",
     "interfaces": "Compliant CompliantWithRelativeStates Flange LinearFlange",
+    "linear_blocks": "Derivative SecondOrder TransferFunction",
     "loads": "SpeedDependentLoad",
     "lossy_gears": "ConstantEfficiencyGear LossyGear",
     "motions": (
         "InitializeFlange Move RelativeStates TranslationalInitializeFlange TranslationalMove "
         "TranslationalRelativeStates"
     ),
+    "nonlinear_blocks": "DeadZone Hysteresis PulseCounter Quantizer SlewRateLimiter VariableLimiter",
     "one_way": "Freewheel OneWayClutch TorqueLimiter",
     "planetary": "Differential IdealPlanetary LossyPlanetarySet PlanetarySet",
     "point_to_point": "KinematicPTP2",
-    "pulse_sensors": "PulseSensor",
+    "sampled": "FrequencyMeter NormalNoise UniformNoise ZeroOrderHold",
     "screw_drives": "BallScrewDrive",
     "sensors": (
         "AngleSensor ForceSensor MultiSensor PositionSensor PowerSensor RelativeAngleSensor RelativeSpeedSensor "
         "SpeedLimit SpeedSensor TorqueSensor"
     ),
-    "shaft_sensors": "AccelerationSensor RelativeAccelerationSensor",
+    "servos": "PositionServo ServoMotor",
+    "shaft_sensors": "AccelerationSensor PulseSensor RelativeAccelerationSensor",
     "shaft_sources": (
         "Accelerate InverseSpeedDependentTorque LinearSpeedDependentTorque Position QuadraticSpeedDependentTorque "
         "SignTorque Torque2"
@@ -54,13 +63,19 @@ _NAMES = {
     "signals": "CoilForce Constant Product Pulse Ramp Sine Step Table TimeFormula Trapezoid",
     "slides": "ElastoGap MassWithStopAndFriction Rod StribeckFriction SupportFriction TranslationalBrake",
     "sources": "ConstantForce ConstantSpeed ConstantTorque Force Speed Torque TorqueStep",
+    "speed_clutches": "CentrifugalClutch ViscousClutch",
     "spindles": "BallScrew MachineTable",
     "springs": (
         "Damper ElastoBacklash ElastoBacklash2 Spring SpringDamper TranslationalDamper TranslationalSpring "
         "TranslationalSpringDamper"
     ),
     "stepped_signals": "BooleanPulse BooleanStep BooleanTable StepTable",
-    "thermal": "FixedTemperature HeatPort HeatSource TemperatureSensor ThermalConductor ThermalMass",
+    "synchronisers": "Synchroniser",
+    "thermal": (
+        "FixedTemperature HeatPort HeatSource PrescribedHeatFlow PrescribedTemperature TemperatureSensor "
+        "ThermalConductor ThermalMass"
+    ),
+    "thermal_clutches": "ThermalClutch",
     "torque_converters": "TorqueConverter",
     "translational_sensors": (
         "LinearAccelerationSensor LinearMultiSensor LinearPowerSensor RelativeLinearAccelerationSensor "
@@ -68,12 +83,12 @@ _NAMES = {
     ),
     "translational_sources": (
         "ConstantVelocity Force2 ForceStep InverseSpeedDependentForce LinearSpeedDependentForce "
-        "QuadraticSpeedDependentForce SignForce TranslationalAccelerate TranslationalPosition "
-        "TranslationalSpeed"
+        "QuadraticSpeedDependentForce SignForce TranslationalAccelerate TranslationalPosition TranslationalSpeed"
     ),
     "transmissions": "Lepelletier Ravigneaux",
+    "tyres": "AxleLoads Tyre",
     "universal_joints": "UniversalJoint",
-    "vehicles": "RollingResistance Vehicle",
+    "vehicles": "RoadLoad RollingResistance Vehicle",
     "waves": "CombiTable Cosine Exponentials ExpSine LogFrequencySweep SawTooth Sinc VariableSine",
     "wheels": "IdealGearR2T IdealRollingWheel",
 }

@@ -163,6 +163,17 @@ class ConstantCurrent(ElectricalSource):
         yield self.i == self.I
 
 
+class SignalCurrent(ElectricalSource):
+    """Current from p to n given by a signal."""
+
+    icon = icons.CURRENT
+    i_ref: Input = signal_in("A", "current")
+
+    def equations(self) -> Equations:
+        yield from super().equations()
+        yield self.i == self.i_ref
+
+
 class CurrentSink(ElectricalSource):
     """Electronic load: draws at p, and returns at n, the current of a signal, but drives none itself.
 
@@ -242,3 +253,22 @@ class CurrentSensor(Component):
         yield self.p.v == self.n.v
         yield self.p.i + self.n.i == 0
         yield self.i == self.p.i
+
+
+class ElectricalPowerSensor(Component):
+    """Power: the current from pc to nc times the voltage between pv and nv, as a wattmeter measures it."""
+
+    icon = icons.WATTMETER
+    pc = Pin("current in")
+    nc = Pin("current out")
+    pv = Pin("positive terminal of the voltage")
+    nv = Pin("negative terminal of the voltage")
+    inlet, outlet = "pc", "nc"
+    power: Output = signal_out("W", "power")
+
+    def equations(self) -> Equations:
+        yield self.pc.v == self.nc.v
+        yield self.pc.i + self.nc.i == 0
+        yield self.pv.i == 0
+        yield self.nv.i == 0
+        yield self.power == self.pc.i * (self.pv.v - self.nv.v)

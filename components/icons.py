@@ -49,6 +49,7 @@ PLAY = Icon(
 )
 CLUTCH = Icon(30, 48, lines="M-15 0 h9 M6 0 h9", heavy="M-6 -23 v46 M6 -23 v46", ports={"f_normalized": "N"},
               key=("capacity", "fn_max"))  # fmt: skip
+THERMAL_CLUTCH = replace(CLUTCH, lines="M-15 0 h9 M6 0 h9 M-2 10 v6 M2 10 v6 M-2 20 v6 M2 20 v6")
 MULTI_PLATE = Icon(36, 48, lines="M-18 0 h8 M10 0 h8 M-10 -23 h8 M-10 23 h8 M10 -17 h-8 M10 17 h-8",
                    heavy="M-10 -23 v46 M10 -17 v34 M-3 -23 v8 M-3 23 v-8 M3 -17 v9 M3 17 v-9",
                    ports={"f_normalized": "N"}, key=("capacity", "fn_max"))  # fmt: skip
@@ -63,6 +64,22 @@ DOGS = replace(
 ONE_WAY_CLUTCH = replace(CLUTCH, solid="M-4 -6 L5 0 L-4 6 Z")
 LIMITER_CLUTCH = Icon(44, 48, lines="M-22 0 h12 M2 0 h3 l2 -6 l4 12 l4 -12 l2 6 h3",
                       heavy="M-10 -23 v46 M2 -23 v46")  # fmt: skip
+ELASTIC_COUPLING = Icon(40, 44, lines="M-20 0 h10 M10 0 h10 M-10 -12 q10 -8 20 0 M-10 12 q10 8 20 0",
+                        heavy="M-10 -21 v42 M10 -21 v42")  # fmt: skip
+DUAL_MASS = Icon(44, 52, solid=f"{_rect(5, 25, -12)} {_rect(5, 25, 12)}", key=("J_1",),
+                 lines="M-22 0 h5 M17 0 h5 M-7 0 l2 -6 l3 12 l3 -12 l3 12 l3 -6")  # fmt: skip
+RUPTURE = Icon(40, 44, lines="M-20 0 h14 M6 0 h14 M-6 -12 h4 l4 4 h4 M-6 12 h4 l4 4 h4", heavy="M-6 -20 v40 M6 -20 v40",
+               key=("tau_break",))  # fmt: skip
+OLDHAM = Icon(48, 44, lines="M-24 -4 h12 M12 4 h12", heavy="M-12 -20 v32 M12 -12 v32", paper=_rect(6, 14),
+              key=("offset",))  # fmt: skip
+CENTRIFUGAL = replace(CLUTCH, heavy="M-6 -10 v20 M6 -23 v46", ports={},
+                      solid=f"{_circle(-6, -15, 5)} {_circle(-6, 15, 5)}", key=("m",))  # fmt: skip
+VISCOUS = replace(CLUTCH, lines="M-15 0 h9 M6 0 h9 M-3 -16 h6 M-3 -8 h6 M-3 8 h6 M-3 16 h6", ports={"fill": "N"},
+                  key=("tau_nominal",))  # fmt: skip
+SYNCHRO = replace(CLUTCH, heavy="M-6 -23 l-4 46 M2 -23 l-4 46 M8 -12 v24", lines="M-15 0 h5 M8 0 h7")
+ABSORBER = Icon(40, 48, solid=_rect(6, 22, 10), lines="M-20 0 h6 l3 -7 l5 14 l5 -14 l3 7 h2", key=("f",))
+PENDULUM = Icon(44, 52, paper=_circle(0, 6, 18), lines="M-22 6 h22 M0 6 v-16 l6 -10",
+                solid=f"{_circle(0, 6, 3)} {_circle(6, -20, 6)}", key=("m",))  # fmt: skip
 _PAIR, _HUBS = f"{_circle(-11, 0, 9)} {_circle(9, 0, 11)}", f"{_circle(-11, 0, 2.5)} {_circle(9, 0, 2.5)}"
 GEAR = Icon(48, 38, paper=_PAIR, solid=_HUBS, lines="M-24 0 h4 M20 0 h4", key=("ratio",))
 WORM = replace(GEAR, lines="M-24 0 h4 M20 0 h4 M-17 -5 l4 10 M-12 -7 l4 12 M-7 -6 l3 8")
@@ -94,6 +111,7 @@ RACK = Icon(48, 44, paper=_circle(0, -4, 15), solid=_circle(0, -4, 2.5),
             lines="M-24 13" + " l4 -4 l4 4" * 6, key=("r", "radius", "ratio"),
             ports={"flange_t": "E", "support_r": "S", "support_t": ("S", 10)})  # fmt: skip
 WHEEL = replace(RACK, lines=_hatch(-22, 12, 44), heavy="M-22 12 h44", solid=_circle(0, -4, 4))
+TYRE = replace(WHEEL, ports={"flange_t": "E", "F_z": "N"}, key=("mu",))
 
 # -- slides ----------------------------------------------------------------------------------------------------------
 
@@ -106,6 +124,16 @@ SLIDE_BRAKE = replace(SLIDEWAY, solid=_rect(10, 5, 0, -12), ports={"f_normalized
 VEHICLE = Icon(64, 36, paper="M-31 6 v-8 l8 -3 l8 -10 h22 l9 10 l14 3 v8 Z",
                solid=f"{_circle(-17, 8, 7)} {_circle(17, 8, 7)}", key=("m",),
                ports=dict.fromkeys(("Cr", "inclination", "v_wind"), "N"))  # fmt: skip
+AXLES = Icon(64, 30, paper="M-31 2 v-8 l8 -3 l8 -6 h22 l9 6 l14 3 v8 Z",
+             lines="M-17 15 v-10 l-3 4 m3 -4 l3 4 M17 15 v-10 l-3 4 m3 -4 l3 4",
+             ports={"flange": "W", "inclination": "N", "F_rear": ("E", -7), "F_front": ("E", 7)})  # fmt: skip
+
+# -- actuators -------------------------------------------------------------------------------------------------------
+
+MAGNET = Icon(48, 44, paper=_rect(14, 20, -8), solid=_rect(4, 20, 16), lines="M-22 -12 l28 24 M-22 12 l28 -24 M8 0 h4",
+              ports={"p": ("W", -12), "n": ("W", 12), "y": "E"}, key=("R",))  # fmt: skip
+PISTON = Icon(52, 34, paper=_rect(26, 14), solid=_rect(4, 14), lines="M4 0 h3 l2 -7 l4 14 l4 -14 l4 14 l2 -7 h3",
+              ports={"p_in": "W", "y": "E"}, key=("A",))  # fmt: skip
 
 # -- sources and loads -----------------------------------------------------------------------------------------------
 
@@ -131,6 +159,9 @@ BOUNDARY = Icon(36, 30, paper="M-18 -15 h24 l12 15 l-12 15 h-24 Z")
 
 # -- sensors ---------------------------------------------------------------------------------------------------------
 
+ENGINE = Icon(52, 52, paper=_rect(24, 24), solid=_circle(6, 6, 4), heavy="M-12 -16 h24", key=("J",),
+              lines="M24 0 h2 M-12 -24 v12 h24 v-12 M-10 -12 v-8 M10 -12 v-8 M0 -12 L6 6",
+              ports={"flange": "E", "pedal": "W"})  # fmt: skip
 _NEEDLE = "M-10 4 a11 11 0 0 1 20 0 M0 6 L6 -6"
 SENSOR = Icon(36, 36, paper=_circle(0, 0, 17), lines=_NEEDLE)
 BETWEEN_SENSOR = Icon(40, 36, paper=_circle(0, 0, 17), lines=f"M-20 0 h3 M17 0 h3 {_NEEDLE}", ports=dict.fromkeys(
@@ -166,7 +197,10 @@ AMMETER = Icon(40, 36, paper=_circle(0, 0, 17), lines="M-20 0 h3 M17 0 h3", text
 # -- heat ------------------------------------------------------------------------------------------------------------
 
 THERMAL_MASS = Icon(36, 36, solid=_rect(18, 18), text="C", key=("C",))
-TEMPERATURE = Icon(36, 36, paper=_circle(0, 0, 17), text="T", key=("T",))
+WATTMETER = Icon(40, 36, paper=_circle(0, 0, 17), lines="M-20 0 h3 M17 0 h3", text="W",
+                 ports={"pc": "W", "nc": "E", "pv": "N", "nv": ("S", -8), "power": ("S", 8)})  # fmt: skip
+SERVO = replace(MOTOR, text="SM", lines="M24 0 h2", ports={"flange": "E"}, key=("I_max",))
+TEMPERATURE = Icon(36, 36, paper=_circle(0, 0, 17), text="T", key=("T",), ports={"T": "N"})
 HEAT_SOURCE = replace(TEMPERATURE, text="Q", key=("Q_flow",))
 CONDUCTOR = Icon(
     48, 24, paper=_rect(16, 12), lines="M-24 0 h8 M16 0 h8 M-9 -5 l5 10 M-2 -5 l5 10 M5 -5 l5 10", key=("G",)
@@ -197,9 +231,15 @@ DIFFERENCE = Icon(30, 30, paper=_circle(0, 0, 15), lines="M-7 0 h14", ports={"u1
 PRODUCT = Icon(30, 30, paper=_circle(0, 0, 15), lines="M-6 -6 l12 12 M-6 6 l12 -12", ports={"u1": "W", "u2": "S"})
 LIMITER = block("M-14 9 h7 l14 -18 h7")
 INTEGRATOR = block("", text="∫")
+DERIVATIVE = block("", text="d/dt")
+TRANSFER = block("", text="b/a", key=("k",))
+DEAD_ZONE = block("M-14 10 l8 -10 h12 l8 -10", key=("u_max",))
+HYSTERESIS = block("M-14 8 h20 v-16 M14 -8 h-20 v16")
+NOISE = block("M-14 2 l3 -8 l3 12 l3 -7 l3 9 l3 -14 l3 10 l3 -4 l3 6 l4 -9")
 _CONTROL = {"u_s": ("W", 0.0), "u_m": ("S", 0.0), "u_ff": ("N", 0.0)}
 CONTROL_P = replace(block("", text="P", key=("k",)), ports=_CONTROL)
 CONTROL_PI = replace(block("", text="PI", key=("k",)), ports=_CONTROL)
 CONTROL_PID = replace(block("", text="PID", key=("k",)), ports=_CONTROL)
 PATH = block("M-14 10 q8 0 12 -10 q4 -10 16 -10")
 SCHEDULE = block("M-14 11 h7 v-7 h7 v-7 h7 v-8 h7")
+DRIVER = block("M-12 8 a12 12 0 1 1 24 0 M-9 -2 h18 M0 -2 v10")

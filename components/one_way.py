@@ -98,11 +98,9 @@ class OneWayClutch(Clutch):
         yield from self.measured()
 
 
-class TorqueLimiter(ShaftFriction, CompliantWithRelativeStates):
-    """Slipping coupling that protects a drive: rigid up to tau_max·peak, then it slips at tau_max."""
+class SlippingCoupling(ShaftFriction, CompliantWithRelativeStates, partial=True):
+    """Coupling that slips where the torque is too large; a subclass says from which torque on."""
 
-    icon = icons.LIMITER_CLUTCH
-    tau_max: Parameter = param("N.m", "torque at which it slips", min=0)
     phi_rel: Variable = var("rad", "relative angle, flange_b.phi - flange_a.phi", state="prefer", default=0)
     w_rel: Variable = var("rad/s", "slip speed", state="always")
 
@@ -113,6 +111,13 @@ class TorqueLimiter(ShaftFriction, CompliantWithRelativeStates):
     @property
     def friction(self) -> Expr:
         return self.tau
+
+
+class TorqueLimiter(SlippingCoupling):
+    """Slipping coupling that protects a drive: rigid up to tau_max·peak, then it slips at tau_max."""
+
+    icon = icons.LIMITER_CLUTCH
+    tau_max: Parameter = param("N.m", "torque at which it slips", min=0)
 
     def sliding_friction(self, speed: Expr | float) -> Expr:
         return self.tau_max

@@ -50,7 +50,7 @@ class ShiftSchedule(Component):
         column("gear", text=True), column("closed elements", text=True), default=_GEARS
     )
     """Gears and the elements closed in them; as it stands, that of a `Lepelletier` gearbox."""
-    time_scale: Parameter = param("s", "what counts as 1 in the times", default=1.0)
+    time_scale: Parameter = param("s", "scale of the times", default=1.0)
     a: Output = signal_out("1", "pressure of element a")
     b: Output = signal_out("1", "pressure of element b")
     c: Output = signal_out("1", "pressure of element c")
@@ -72,13 +72,13 @@ class ShiftSchedule(Component):
             if gear not in _NUMBERS and not (gear and set(gear) <= set(_DIGITS)):
                 raise LanguageError(
                     f"The pattern of a shift schedule has a gear '{gear}'.",
-                    advice="Call gears by their number, neutral N, reverse R.",
+                    advice="Write gears as numbers, neutral as N, reverse as R.",
                 )
         for (first, gear, duration), (second, following, _) in pairwise(self.shifts[1:]):
             if first + duration > second:
                 raise LanguageError(
                     f"The shift to gear {gear} ends at {first + duration:g} s, after that to {following} has begun.",
-                    advice="Let a shift begin when the one before has ended.",
+                    advice="Start each shift after the end of the one before.",
                 )
 
     def in_row(self, value: Callable[[int], float], ahead: int = 0) -> Expr | float:

@@ -167,8 +167,8 @@ class TimeFormula(Component):
     icon = icons.FORMULA
     formula: str
     """Arithmetic of `time` with numbers, pi, sqrt, abs, sin, cos, tan, exp, log, tanh, min, max."""
-    scale: Parameter = param("*", "what counts as 1", default=1.0)
-    time_scale: Parameter = param("s", "time that counts as 1", default=1.0)
+    scale: Parameter = param("*", "scale of the formula", default=1.0)
+    time_scale: Parameter = param("s", "scale of the time", default=1.0)
     y: Output = signal_out("*", "signal")
 
     def equations(self) -> Equations:
@@ -280,7 +280,7 @@ class Rowwise(Component, partial=True):
     """Signal from a table over time, with a time event at every row."""
 
     icon = icons.TABLE_BLOCK
-    time_scale: Parameter = param("s", "what counts as 1 in the times", default=1.0)
+    time_scale: Parameter = param("s", "scale of the times", default=1.0)
     y: Output = signal_out("*", "signal")
     row: Discrete = discrete("1", "number of the last row that was passed", start=-1.0)
     kinks = Mode("ahead", description="rows still ahead")
@@ -310,7 +310,7 @@ class Table(Rowwise):
     extrapolate: Literal["linear", "hold", "error"] = "linear"
     """Beyond the ends let the last slope go on (`linear`), `hold` the last value, or end the run (`error`)."""
     end = Mode("ahead", "passed", description="whether the table has ended")
-    scale: Parameter = param("*", "what counts as 1 in the values", default=1.0)
+    scale: Parameter = param("*", "scale of the values", default=1.0)
 
     def moments(self) -> tuple[float, ...]:
         return () if self.smooth else tuple(moment for moment, _ in self.table)

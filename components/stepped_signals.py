@@ -26,7 +26,7 @@ class StepTable(Rowwise):
     table: tuple[tuple[float, float], ...] = rows(
         column("time", scale="time_scale", rising=True), column("value", scale="scale")
     )
-    scale: Parameter = param("*", "what counts as 1 in the values", default=1.0)
+    scale: Parameter = param("*", "scale of the values", default=1.0)
 
     def moments(self) -> tuple[float, ...]:
         return tuple(moment for moment, _ in self.table)

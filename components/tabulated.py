@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Literal
 
-from modelica_like.language import Component, Events, Expr, Mode, all_of, any_of, interpolate
+from modelica_like.language import Component, Events, Expr, LanguageError, Mode, all_of, any_of, interpolate
 
+Flat = tuple[float, ...]
 _ROUNDING = 1e-10
 
 
@@ -25,6 +26,22 @@ class Tabulated(Component, partial=True):
     def look_up(self, x: Expr | float, table: Sequence[Sequence[float]], column: int = 1) -> Expr:
         """Return a value of a table at x, which counts like its first column."""
         return interpolate(x, [r[0] for r in table], [r[column] for r in table], self.smooth, self.extrapolate)
+
+    def look_up_map(self, x: Expr | float, first: Flat, y: Expr | float, second: Flat, table: Sequence[Flat]) -> Expr:
+        """Return a value of a map: along its rows over `second` at y, and then across them over `first` at x.
+
+        Raises:
+            LanguageError: the table has another size than `first` and `second`.
+        """
+        sizes = len(table), len(table[0])
+        if sizes != (len(first), len(second)):
+            raise LanguageError(
+                f"{self.label}: the table has {sizes[0]} rows and {sizes[1]} columns, but there are "
+                f"{len(first)} values for rows and {len(second)} for columns.",
+                advice="Give one value for each row, and one for each column.",
+            )
+        along = [self.look_up(y, list(zip(second, values, strict=True))) for values in table]
+        return interpolate(x, first, along, self.smooth, self.extrapolate)  # type: ignore[arg-type]
 
     def leaving(
         self, name: str, x: Expr, table: Sequence[Sequence[float]], *conditions: Expr, least: float = 0.0

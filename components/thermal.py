@@ -9,12 +9,14 @@ from modelica_like.language import (
     Domain,
     Equations,
     Expr,
+    Input,
     Output,
     Parameter,
     Variable,
     der,
     flow,
     param,
+    signal_in,
     signal_out,
     var,
 )
@@ -50,7 +52,11 @@ class Lossy(Component, partial=True):
     def equations(self) -> Equations:
         yield from super().equations()
         if self.heat_port.used:
-            yield self.heat_port.Q_flow == -self.dissipation()
+            yield self.heat_port.Q_flow == -self.heat()
+
+    def heat(self) -> Expr:
+        """Return the heat flow in W that leaves at the heat port."""
+        return self.dissipation()
 
     def loss_power(self) -> Expr | float:
         return 0.0 if self.heat_port.used else self.dissipation()
@@ -124,6 +130,34 @@ class HeatSource(Component):
 
     def source_power(self) -> Expr:
         return self.Q_flow
+
+
+class PrescribedHeatFlow(Component):
+    """Heat flow into the connected body, given by a signal."""
+
+    icon = icons.HEAT_SOURCE
+    port = HeatPort("surface")
+    Q_flow: Input = signal_in("W", "heat flow into the connected body")
+
+    def equations(self) -> Equations:
+        yield self.port.Q_flow == -self.Q_flow
+
+    def source_power(self) -> Expr:
+        return self.Q_flow
+
+
+class PrescribedTemperature(Component):
+    """Surroundings whose temperature is a signal, whatever heat they take."""
+
+    icon = icons.TEMPERATURE
+    port = HeatPort("surface")
+    T: Input = signal_in("K", "temperature")
+
+    def equations(self) -> Equations:
+        yield self.port.T == self.T
+
+    def source_power(self) -> Expr:
+        return -self.port.Q_flow
 
 
 class ThermalConductor(Component):

@@ -48,7 +48,7 @@ class TorqueConverter(Tabulated, Lossy, TwoFlanges):
         column("speed ratio", rising=True), column("torque of the turbine over that of the pump", min=0),
         default=((0.0, 1.0),),
     )  # fmt: skip
-    C_scale: Parameter = param("N.m.s2/rad2", "what counts as 1 in capacity", default=1.0)
+    C_scale: Parameter = param("N.m.s2/rad2", "scale of `capacity`", default=1.0)
     w_still: Parameter = param("rad/s", "speed that counts as standstill", default=1e-6, min=1e-12)
     w_pump: Variable = var("rad/s", "speed of the pump relative to the housing")
     w_turbine: Variable = var("rad/s", "speed of the turbine relative to the housing")

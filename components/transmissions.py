@@ -29,7 +29,7 @@ class WithPlanetarySets(Component, partial=True):
         if self.given("mesh_efficiency") and not self.losses:
             raise LanguageError(
                 f"{self.label} has a mesh_efficiency, but no losses.",
-                advice="Say `losses = true`, or take the efficiency out.",
+                advice="Set `losses = true`, or remove the efficiency.",
             )
 
 

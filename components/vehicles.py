@@ -50,6 +50,30 @@ class RollingResistance(Lossy, LinearOneFlange):
         return self.f * self.v
 
 
+class RoadLoad(Lossy, LinearOneFlange):
+    """Driving resistance F_0 + F_1·v + F_2·v², as a coast-down gives it; it does not hold at standstill."""
+
+    icon = icons.LOAD
+    F_0: Parameter = param("N", "resistance at standstill", min=0)
+    F_1: Parameter = param("N.s/m", "part that grows with the velocity", default=0.0, min=0)
+    F_2: Parameter = param("N.s2/m2", "part that grows with its square", default=0.0, min=0)
+    v0: Parameter = param("m/s", "velocity from which on the sign is the full one", default=0.1, min=1e-12)
+    reg: Literal["exp", "sine", "linear", "cosine"] = "exp"
+    """Between -v0 and v0: tanh(50·v/v0) (`exp`), a quarter of a sine, a straight line, or one minus a cosine."""
+    v: Variable = var("m/s", "velocity")
+    f: Variable = var("N", "force against forward motion")
+
+    def equations(self) -> Equations:
+        yield from super().equations()
+        yield der(self.s) == self.v
+        growing = self.F_1 * self.v + self.F_2 * self.v * absolute(self.v)
+        yield self.f == self.F_0 * sign_law(self.v / self.v0, self.reg) + growing
+        yield self.flange.f == self.f
+
+    def dissipation(self) -> Expr:
+        return self.f * self.v
+
+
 class Vehicle(Component):
     """Vehicle with drag, rolling resistance and slope, driven by a wheel, and coupled to others at flange_t.
 

@@ -165,7 +165,7 @@ class CombiTable(Component):
     """Interpolate with a continuous slope instead of straight lines."""
     extrapolate: Literal["linear", "hold", "error"] = "linear"
     """Beyond the ends let the last slopes go on (`linear`), `hold` the last values, or end the run (`error`)."""
-    time_scale: Parameter = param("s", "what counts as 1 in the times", default=1.0)
+    time_scale: Parameter = param("s", "scale of the times", default=1.0)
 
     def build(self) -> None:
         times, *columns = zip(*self.table, strict=True)

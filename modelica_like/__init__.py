@@ -1,6 +1,6 @@
 """Acausal component models of drive-trains.
 
-Written once, simulated, differentiated and exported from one description.
+One description of a drive is simulated, differentiated and exported.
 """
 
 from __future__ import annotations
@@ -90,5 +90,9 @@ def __getattr__(name: str) -> Any:
 
 
 _OFFERED = {name: _HOME[name] for name in ("Native", "schematic", "simulation_function")}
-_OFFERED["NativeLoop"] = "modelica_like.native.run"
+_OFFERED |= {
+    "NativeLoop": "modelica_like.native.run",
+    "plot": "modelica_like.solve.plot",
+    "sankey": "modelica_like.solve.sankey",
+}
 provide(tuple(_OFFERED), lambda name: getattr(import_module(_OFFERED[name]), name))

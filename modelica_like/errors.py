@@ -159,7 +159,7 @@ class InitializationError(ModelicaLikeError):
 
 
 class MissingStart(InitializationError):
-    """The initialisation lacks an equation."""
+    """The initialization lacks an equation."""
 
 
 class ContradictingStart(InitializationError):

@@ -60,7 +60,7 @@ def build(drive: Model, free: Iterable[str] = (), *, tables: Iterable[str] = ())
     """
     if isinstance(drive, CompiledDae):
         if tables:
-            raise LanguageError("Tables of a compiled model stay what they are.", advice="Build it with `tables`.")
+            raise LanguageError("Tables of a compiled model cannot change.", advice="Build it with `tables`.")
         return drive
     if isinstance(drive, Trajectories):
         raise needs_equations(drive)
@@ -192,7 +192,7 @@ def seconds(until: float | str | None, name: str = "until") -> float:
     if until is None:
         raise ValueOutOfRange(
             "There is no end time.",
-            advice='Say simulate(…, until="2 s"), or put `until` under [simulate] in the netlist.',
+            advice='Write simulate(…, until="2 s"), or put `until` under [simulate] in the netlist.',
         )
     try:
         return to_si(until, _SECOND, name)

@@ -16,6 +16,8 @@ from components.sizing.belts import pitch_diameter as pitch_diameter
 from components.sizing.belts import strand_resultant as strand_resultant
 from components.sizing.belts import timing_belt_load as timing_belt_load
 from components.sizing.belts import wrap_angle as wrap_angle
+from components.sizing.clutch_heat import ClutchHeat as ClutchHeat
+from components.sizing.clutch_heat import clutch_heat as clutch_heat
 from components.sizing.clutches import ClutchSelection as ClutchSelection
 from components.sizing.clutches import MachineTableClutch as MachineTableClutch
 from components.sizing.clutches import clutch_selection as clutch_selection
@@ -134,6 +136,7 @@ __all__ = [
     "BeltForces",
     "BeltGeometry",
     "BeltSpeedLimit",
+    "ClutchHeat",
     "ClutchSelection",
     "CommutationRipple",
     "DcMotor",
@@ -181,6 +184,7 @@ __all__ = [
     "belt_velocity",
     "bending_stress",
     "centre_distance",
+    "clutch_heat",
     "clutch_selection",
     "commutated",
     "commutation_ripple",

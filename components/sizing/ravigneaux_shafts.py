@@ -47,7 +47,7 @@ def known_shaft(member: str) -> str:
         ValueError: there is no such shaft.
     """
     if member not in MEMBERS:
-        raise ValueError(f"'{member}' is no shaft of a Ravigneaux set; there are {', '.join(MEMBERS)}.")
+        raise ValueError(f"'{member}' is not a shaft of a Ravigneaux set; there are {', '.join(MEMBERS)}.")
     return member
 
 

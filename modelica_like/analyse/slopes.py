@@ -41,7 +41,7 @@ class Sizes:
 
     @property
     def fixed(self) -> int:
-        """Parameters and inputs: what does not change during a run."""
+        """Parameters and inputs: all that is constant during a run."""
         return self.p + self.u
 
 
@@ -148,7 +148,7 @@ def columns_of(model: CompiledDae, names: Iterable[str]) -> list[int]:
     """Return the positions in (p, u) of parameters and inputs.
 
     Raises:
-        UnknownName: a name is none of the model's.
+        UnknownName: the model has no such parameter or input.
     """
     return _found(model, names, model.fixed_position, "input or parameter")
 
@@ -167,7 +167,7 @@ def steady_change(model: CompiledDae, point: Point, theta: Vector, guess: Vector
         model: the compiled model.
         point: the steady state.
         theta: changes of (p, u, d), shape (ntheta, columns).
-        guess: changes of the states which what equilibrium leaves open keeps to, shape (nx, columns); none by default.
+        guess: changes of the states that equilibrium does not determine, shape (nx, columns); none by default.
     """
     moving, rates = moving_states(model), slopes(model, point, "ode")
     change = np.zeros((len(rates.x), theta.shape[1])) if guess is None else guess.copy()

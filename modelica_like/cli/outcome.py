@@ -70,8 +70,8 @@ class Outcome:
                 self.attempt(f"The picture {file.name}", lambda file=file, draw=draw: self._draw(file, draw), file)
         if self.stopped is not None:
             files = ", ".join(self._written)
-            kept = f"is in {files}" if files else "is lost: no --csv or --plot was asked for"
-            self.stopped.add_note(f"What was computed up to t = {self.solution.time[-1]:.6g} s {kept}.")
+            kept = f"are in {files}" if files else "are lost: neither --csv nor --plot is given"
+            self.stopped.add_note(f"The results up to t = {self.solution.time[-1]:.6g} s {kept}.")
             raise self.stopped
         if self._unwritten is not None:
             raise self._unwritten

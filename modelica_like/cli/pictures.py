@@ -12,7 +12,7 @@ from modelica_like.cli.shared import Assignments, Debug, Netlist, load_netlist, 
 def draw(
     netlist: Netlist, assignments: Assignments = None, *,
     output: Annotated[Path | None, Option("--output", "-o", metavar="FILE", help="A .svg, .png or .pdf file.")] = None,
-    depth: Annotated[int, Option(metavar="N", help="How many levels of assemblies are open.")] = 1,
+    depth: Annotated[int, Option(metavar="N", help="Levels of assemblies to open.")] = 1,
     debug: Debug = False,
 ) -> None:  # fmt: skip
     """Draw the schematic of a netlist: power from left to right."""
@@ -28,8 +28,8 @@ def draw(
 def report(
     netlist: Netlist, assignments: Assignments = None, *,
     output: Annotated[Path | None, Option("--output", "-o", metavar="FILE", help="The page, .html.")] = None,
-    until: Annotated[str | None, Option(metavar="TIME", help="End time, e.g. 2s; else the netlist's.")] = None,
-    show: Annotated[list[str] | None, Option(metavar="PATTERN", help="What to draw, e.g. '*.w'.")] = None,
+    until: Annotated[str | None, Option(metavar="TIME", help="End time, e.g. 2s; default: the netlist's.")] = None,
+    show: Annotated[list[str] | None, Option(metavar="PATTERN", help="Variables to draw, e.g. '*.w'.")] = None,
     debug: Debug = False,
 ) -> None:  # fmt: skip
     """Simulate a netlist and write a page about it: schematic, events, curves, energies, numbers."""
@@ -39,7 +39,7 @@ def report(
         from modelica_like.report.page import save_report
         from modelica_like.report.progress import Bar
         from modelica_like.simulation import build, simulate
-        from modelica_like.solve.plot import matching
+        from modelica_like.solve.trajectories import matching
 
         model = build(drive)
         matching(model, show or ())

@@ -71,8 +71,8 @@ def _explained(error: BaseException) -> tuple[str, int]:
         return "\n".join([str(error), *notes]), exit_code(error)
     if isinstance(error, OSError):
         return f"{error.filename or 'A temporary file'}: {error.strerror or error}.", BAD_INPUT
-    what = f"This should not happen: {type(error).__name__}: {error}"
-    return f"{what}\nRun again with --debug, and report what it shows.", SOLVE_FAILED
+    what = f"Internal error: {type(error).__name__}: {error}"
+    return f"{what}\nRun again with --debug, and report the output.", SOLVE_FAILED
 
 
 def _check(tables: Iterable[Path], pictures: Iterable[Path], files: Iterable[Path]) -> None:
@@ -119,6 +119,12 @@ def say(text: str) -> None:
     from rich.markup import escape
 
     out().print(escape(text), soft_wrap=True)
+
+
+def note(*sentences: str) -> None:
+    """Tell what looks like a slip, on stderr."""
+    if sentences:
+        warn("\n".join(["Please look at this:", *(f"- {sentence}" for sentence in sentences)]))
 
 
 def assigned(assignments: list[str] | None, option: str) -> dict[str, str]:

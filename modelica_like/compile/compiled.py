@@ -233,7 +233,8 @@ class CompiledDae:
                 one = self.flat_parameters[self.parameter_position[path]]
                 if not one.tunable:
                     raise LanguageError(
-                        f"{path} cannot change after compilation.", advice="Set it in the model and build that again."
+                        f"{path} cannot change after compilation.",
+                        advice="Set it in the model and build the model again.",
                     )
                 p[self.parameter_position[path]] = one.checked(to_si(value, one.unit, path), value)
             elif path in inputs:

@@ -79,9 +79,9 @@ def _unit(key: str, entry: Any) -> Unit:
     table, name = {"file": entry} if isinstance(entry, str) else entry, _name(key)
     known = isinstance(table, dict) and isinstance(table.get("file"), str) and "\0" not in table["file"]
     if not known or set(table) - {"file", "parameters"}:
-        raise NetlistError(f'{key} must be a table: {{ file = "{name}.fmu" }}, with `parameters` if there are any.')
+        raise NetlistError(f'{key} must be a table: {{ file = "{name}.fmu" }}, optionally with `parameters`.')
     if not name.isidentifier():
-        raise NetlistError(f"{key}: the name of an FMU is a word: letters, digits and _.")
+        raise NetlistError(f"{key}: the name of an FMU must be a word: letters, digits and _.")
     parameters = table.get("parameters", {})
     if not isinstance(parameters, dict) or not all(isinstance(v, int | float) for v in parameters.values()):
         raise NetlistError(f"{key}.parameters must be a table of numbers, in the FMU's units.")
@@ -94,7 +94,7 @@ def _link(key: str, entry: Any) -> Link:
     if len(ends) < 2:
         raise NetlistError(
             f"{key} must be a list of an output and the inputs that take it.",
-            advice='Each is the name of an FMU and of its variable: ["motor.flange.tau", "load.tau"].',
+            advice='Write the FMU and its variable: ["motor.flange.tau", "load.tau"].',
         )
     source, *targets = (Port(*end.split(".", 1)) for end in ends)
     return Link(_name(key), source, tuple(targets))

@@ -85,7 +85,7 @@ class Balance(Energies):
 
 @dataclass
 class Counts:
-    """What a run took: communication steps, steps taken back, the shortest and the longest."""
+    """What a run took: communication steps, rejected steps, the shortest and the longest."""
 
     steps: int = 0
     rejected: int = 0
@@ -233,7 +233,7 @@ class Master:
             size *= min(max(change, _SHORTEST), _LONGEST)
 
     def _attempt(self, time: float, size: float, tolerance: float, observer: Observer) -> float:
-        """Try a step; return its error over the tolerance. The step is taken back if that is above one."""
+        """Try a step; return its error over the tolerance. The step is rejected if that is above one."""
         begin, states = self._memory(), [slave.save() for slave in self.slaves]
         try:
             error, middle = self._once_and_halved(time, size, tolerance, states, begin, observer)

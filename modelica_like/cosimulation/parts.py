@@ -135,7 +135,7 @@ class Maker:
         if part_of(path) in self.assembly._parts and part_of(path) not in self.found.groups[group]:
             raise NetlistError(
                 f"A formula needs {path}, which the cut puts into another FMU.",
-                why=f"It stands in one of {', '.join(self.found.groups[group])}.",
+                why=f"It is in one of {', '.join(self.found.groups[group])}.",
                 advice="Give both parts a parameter of the netlist: [parameters].",
             )
 
@@ -193,7 +193,7 @@ def _bad_end(model: CompiledDae, assembly: Assembly, end: End) -> str:
         if found and end.takes == "potential":
             return f"{end.path} is rigid: its {outputs[0]} would depend on the acceleration"
         if found:
-            return f"{end.path} stores nothing: its {outputs[0]} would follow {inputs[0]} at once"
+            return f"{end.path} stores no energy: its {outputs[0]} would depend directly on {inputs[0]}"
     return ""
 
 

@@ -197,7 +197,7 @@ def tell_loss(system: System, calling: int, error: FmuCrashed | FmuTimeout) -> M
     """Return the error of a lost process, with the name of the FMU that was called last."""
     unit = system.units[calling]
     if isinstance(error, FmuTimeout):
-        return FmuTimeout(error.what, why=f"{unit.name} ({unit.file.name}) was at work.", advice=error.advice)
+        return FmuTimeout(error.what, why=f"{unit.name} ({unit.file.name}) was running.", advice=error.advice)
     what = f"{unit.name} ({unit.file.name}){error.what.removeprefix(system.name)}"
     return FmuCrashed(what, why=f"The FMUs of {system.name} ran in a process of their own.")
 
@@ -205,35 +205,35 @@ def tell_loss(system: System, calling: int, error: FmuCrashed | FmuTimeout) -> M
 def tell_error(system: System, folder: Path) -> None:
     """Raise what the process has left to tell."""
     units = {unit.name: f"{unit.name} ({unit.file.name})" for unit in system.units}
-    shorter = "If what the FMUs exchange grows without bounds, take a shorter step."
+    shorter = "If the exchanged values grow without bounds, choose a shorter step."
     failures.tell_error(folder, units, _FAILURES, system=system.name, shorter=shorter)
 
 
 _FAILURES: failures.Failures = failures.FAILURES | {
     "no output": (UnknownName, "{system} has no variable '{name}'{hint}", "", ""),
-    "too old": (FmuRefused, "{unit} is an FMU of FMI 1.0.", "", "Co-simulation takes FMI 2.0 and 3.0."),
+    "too old": (FmuRefused, "{unit} is an FMU of FMI 1.0.", "", "Co-simulation supports FMI 2.0 and 3.0."),
     "no co-simulation": (
         FmuRefused, "{unit} has no Co-Simulation part.", "", "Export it as a Co-Simulation FMU.",
     ),
     "no rollback": (
         FmuRefused,
-        "{unit} cannot go back to a saved state, or does not take steps of any length, so the step cannot vary.",
+        "{unit} cannot restore a saved state, or cannot take steps of any length, so the step cannot vary.",
         "It needs both canGetAndSetFMUState and canHandleVariableCommunicationStepSize.",
         "Run with a fixed step, without tolerance.",
     ),
     "not settled": (
         FmuFailed,
-        "{unit}: {name} does not come to rest at t = {time:.6g} s when inputs follow outputs.",
-        "{system} has an algebraic loop: the output follows inputs at once that follow this output at once.",
+        "{unit}: {name} does not settle at t = {time:.6g} s when inputs follow outputs.",
+        "{system} has an algebraic loop: the output depends directly on inputs that depend directly on this output.",
         "Cut where a mass, a spring or a controller with a state is between the FMUs.",
     ),
     "not finite": (
         FmuFailed, "{unit}: {name} is not finite at t = {time:.6g} s.", "",
-        "If the values before it grow without bounds, take a shorter step.",
+        "If the values before it grow without bounds, choose a shorter step.",
     ),
     "step": (
         StepFailed, "{system}: after t = {time:.6g} s no step is short enough for the tolerance of the coupling.", "",
         "Give a larger tolerance, or a fixed step.",
     ),
-    "ends": (FmuFailed, "{unit} wants to end the run after t = {time:g} s.", "", ""),
+    "ends": (FmuFailed, "{unit} asks to end the run after t = {time:g} s.", "", ""),
 }  # fmt: skip

@@ -47,7 +47,7 @@ class CosimSolution(RecordedSolution):
     Attributes:
         couplings: energies at the bonds.
         steps: number of communication steps.
-        rejected: number of steps that were taken back.
+        rejected: number of rejected steps.
         shortest: shortest communication step in s.
         longest: longest communication step in s.
         notices: what should be known about the run: inputs to which nothing is connected.
@@ -97,7 +97,7 @@ def _columns(system: System, units: Sequence[Sequence[Mapping[str, Any]]]) -> li
 
 
 def _bond_columns(system: System) -> list[RecordedVariable]:
-    told = ("power", "W", "power through the coupling"), ("residual_energy", "J", "energy that the coupling has made")
+    told = ("power", "W", "power through the coupling"), ("residual_energy", "J", "energy created by the coupling")
     return [RecordedVariable(f"{bond.name}.{name}", unit, text) for bond in system.bonds for name, unit, text in told]
 
 

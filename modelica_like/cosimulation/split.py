@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from modelica_like.cosimulation.cut import Cut, CutNetlist, cut_netlist
 from modelica_like.cosimulation.files import write_system
 from modelica_like.cosimulation.parts import Maker, Takes, ends_of, orient
+from modelica_like.cosimulation.ssp import write_ssp
+from modelica_like.cosimulation.ssp_document import Version
 from modelica_like.cosimulation.system import Bond, Link, Port, Settings, System, Unit
 from modelica_like.errors import DuplicateName, NetlistError
 from modelica_like.fmi.export import export_fmu
+from modelica_like.fmi.package import known_version, target_file
 from modelica_like.initialize import initialize
 from modelica_like.language import Assembly, Component
 from modelica_like.netlist import load, save
@@ -40,7 +45,10 @@ class Split:
     notes: tuple[str, ...] = ()
 
     def __str__(self) -> str:
-        words = {"flow": "takes the load, and tells how it moves", "potential": "is moved, and tells its load"}
+        words = {
+            "flow": "receives the load and returns the motion",
+            "potential": "receives the motion and returns the load",
+        }
         lines = [f"{self.path}: {', '.join(unit.file.name for unit in self.system.units)}"]
         return "\n".join([*lines, *(f"  {path} {words[takes]}" for path, takes in self.ends.items()), *self.notes])
 
@@ -80,7 +88,7 @@ def split(
     titles = _titles(found, names)
     settings = _settings(assembly.__dict__["_simulate"].get("until"), step, master)
     maker = Maker(assembly, found)
-    tell("looking for the causality")
+    tell("choosing the causality")
     chosen = orient(maker)
     values = _start_values(assembly)
     target.mkdir(parents=True, exist_ok=True)
@@ -95,6 +103,28 @@ def split(
     write_system(system, target / _SYSTEM)
     taken: dict[str, Takes] = {end.path: end.takes for cut, takes in chosen.items() for end in ends_of(cut, takes)}
     return Split(system, target / _SYSTEM, taken, tuple(notes))
+
+
+def split_to_ssp(
+    drive: Component | str | Path, at: Sequence[str] | str, path: str | Path, ssp_version: Version | str = "1.0",
+    **options: Any,
+) -> Split:  # fmt: skip
+    """Cut a drive at shafts, and write the parts as an SSP.
+
+    Args:
+        drive: a netlist file, or a component that has only parts and wires.
+        at: where to cut; see `split`.
+        path: the file to write, `….ssp`.
+        ssp_version: of the SSP standard.
+        options: of `split`.
+
+    Raises:
+        ModelicaLikeError: see `split` and `cosimulation.ssp.write_ssp`.
+    """
+    target, chosen = target_file(path, ".ssp", "An SSP"), known_version(ssp_version, Version, "SSP")
+    with tempfile.TemporaryDirectory(prefix="modelica_like_") as folder:
+        done = split(drive, at, folder, **options)
+        return replace(done, path=write_ssp(done.system, target, chosen))
 
 
 def _export(part: Assembly, title: str, file: Path, version: str, *, check: bool) -> str:
@@ -126,9 +156,9 @@ def _titles(found: CutNetlist, names: Sequence[str]) -> list[str]:
         )
     for name in names:
         if not name.isidentifier():
-            raise NetlistError(f"'{name}' is no name of an FMU: letters, digits and _.")
+            raise NetlistError(f"'{name}' is not a name for an FMU: use letters, digits and _.")
     if len(set(names)) < len(names):
-        raise DuplicateName(f"Two FMUs cannot have one name: {', '.join(names)}.")
+        raise DuplicateName(f"Two FMUs cannot have the same name: {', '.join(names)}.")
     return list(names)
 
 

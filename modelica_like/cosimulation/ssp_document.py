@@ -119,7 +119,7 @@ def _units(top: Element, used: list[tuple[DescribedFmu, str]]) -> None:
             continue
         definition = fmu.units.get(unit, UnitDefinition(unit))
         if known.setdefault(unit, definition) != definition:
-            raise NetlistError(f"Two FMUs mean different units by '{unit}', which an SSP cannot say.")
+            raise NetlistError(f"Two FMUs define the unit '{unit}' differently, which an SSP cannot express.")
     if known:
         group = element(top, "ssd:Units")
         for name in sorted(known):

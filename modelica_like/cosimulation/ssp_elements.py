@@ -83,7 +83,7 @@ class Files:
             return etree.fromstring(file.read_bytes(), parser, base_url=str(file))
         except etree.XMLSyntaxError as error:
             raise NetlistError(
-                f"{file.name} in {self.name} is no XML: {error.msg}.", where=Source(file.name, error.lineno or 0)
+                f"{file.name} in {self.name} is not XML: {error.msg}.", where=Source(file.name, error.lineno or 0)
             ) from None
 
     def find(self, uri: str, place: Source) -> Path:
@@ -93,7 +93,7 @@ class Files:
         if parts.scheme or parts.netloc or parts.fragment or not inside.is_relative_to(self.folder.resolve()):
             raise NetlistError(
                 f"'{uri}' does not lie in {self.name}.", where=place,
-                advice="Only files of the archive itself are taken, such as resources/motor.fmu.",
+                advice="Only files of the archive itself can be used, such as resources/motor.fmu.",
             )  # fmt: skip
         if not inside.is_file():
             raise NetlistError(f"{self.name} has no file '{uri}'.", where=place)
@@ -127,7 +127,7 @@ def number(xml: Any, attribute: str, default: float | None = None) -> float:
     try:
         value = float(needed(xml, attribute))
     except ValueError:
-        raise NetlistError(f"{local(xml)}: {attribute} = '{text}' is no number.", where=place(xml)) from None
+        raise NetlistError(f"{local(xml)}: {attribute} = '{text}' is not a number.", where=place(xml)) from None
     if not isfinite(value):
         raise NetlistError(f"{local(xml)}: {attribute} = '{text}' is not finite.", where=place(xml))
     return value
@@ -150,7 +150,7 @@ def read_element(xml: Any, path: ElementPath, files: Files) -> Element:
     kind = local(xml)
     if kind == "SignalDictionaryReference":
         raise NetlistError(
-            f"{'.'.join(path)} is a reference to a signal dictionary, which is not supported.", where=place(xml),
+            f"{'.'.join(path)} refers to a signal dictionary, which is not supported.", where=place(xml),
             advice="Connect the components directly.",
         )  # fmt: skip
     element = Element(path, xml, None if kind == "System" else _fmu(xml, files))
@@ -176,12 +176,12 @@ def _fmu(xml: Any, files: Files) -> Path:
     name, kind = needed(xml, "name"), xml.get("type", FMU_TYPE)
     if kind != FMU_TYPE:
         raise NetlistError(
-            f"{name} is no FMU but of type {kind}, which is not supported.", where=place(xml),
-            advice="Put the FMUs of an SSP inside into the system itself.",
+            f"{name} is not an FMU but has the type {kind}, which is not supported.", where=place(xml),
+            advice="Put the FMUs of the inner SSP into the system itself.",
         )  # fmt: skip
     how = xml.get("implementation", "any")
     if how not in ("any", "CoSimulation"):
-        raise NetlistError(f"{name} is to be run as {how}; systems are run by co-simulation.", where=place(xml))
+        raise NetlistError(f"{name} asks for {how}, but systems run as co-simulation.", where=place(xml))
     return files.find(needed(xml, "source"), place(xml))
 
 
@@ -221,7 +221,7 @@ def _parameters(binding: Any, files: Files, units: Units) -> Iterator[tuple[str,
     if kind != _VALUES:
         raise NetlistError(f"Parameters of type {kind} are not supported.", where=place(binding))
     if source and binding.get("sourceBase", "SSD") != "SSD":
-        raise NetlistError("Parameters inside of a component's file are not supported.", where=place(binding))
+        raise NetlistError("Parameters inside a component's file are not supported.", where=place(binding))
     inside = binding.iterfind("ssd:ParameterValues/ssv:ParameterSet", NAMES)
     for group in [files.root(files.find(source, place(binding)))] if source else inside:
         known = {**units, **unit_definitions(group)}

@@ -43,7 +43,9 @@ def read_structure(name: str, folder: Path) -> System:
     if top.tag != f"{{{NAMES['ssd']}}}SystemStructureDescription":
         raise NetlistError(f"{SSP.description} in {name} describes no system structure.", where=place(top))
     if top.get("version", "").partition(".")[0] not in ("1", "2"):
-        raise NetlistError(f"{name} is of SSP {top.get('version')}; there are 1.0 and 2.0.", where=place(top))
+        raise NetlistError(
+            f"{name} has the SSP version {top.get('version')}; 1.0 and 2.0 are supported.", where=place(top)
+        )
     inside = top.find("ssd:System", NAMES)
     if inside is None:
         raise NetlistError(f"{name} has no system.", where=place(top))
@@ -88,14 +90,14 @@ class _Reader:
             if ssp.local(one).endswith("Transformation") and not _is_identity(one):
                 raise NetlistError(
                     f"A connection with a {ssp.local(one)} is not supported.", where=place(xml),
-                    advice="Let one of both FMUs do the conversion.",
+                    advice="Do the conversion in one of the FMUs.",
                 )  # fmt: skip
         ends = [self._end(system, xml, which) for which in ("start", "end")]
         gives = [self._gives(system, end) for end in ends]
         if gives == [False, True]:  # which end is the start says nothing about the direction
             ends.reverse()
         elif gives[0] == gives[1] and None not in gives:
-            what = "two connectors that give a value" if gives[0] else "two connectors that take a value"
+            what = "two connectors that provide a value" if gives[0] else "two connectors that receive a value"
             raise NetlistError(f"A connection joins {what}: {' and '.join(map(_text, ends))}.", where=place(xml))
         source, target = ends
         if target in self.drives:
@@ -108,7 +110,7 @@ class _Reader:
     def _end(self, system: Element, xml: Any, which: str) -> Target:
         name, connector = xml.get(f"{which}Element"), needed(xml, f"{which}Connector")
         if xml.get(f"{which}Indices"):
-            raise NetlistError("Connections of single elements of arrays are not supported.", where=place(xml))
+            raise NetlistError("Connections to single elements of arrays are not supported.", where=place(xml))
         if name and name not in system.children:
             raise NetlistError(f"{system.label} has no element '{name}'.", where=place(xml))
         element = system.children[name] if name else system
@@ -125,7 +127,7 @@ class _Reader:
         way = [self.drives[target]]
         while way[-1].source in self.drives:
             if way[-1].source in [drive.source for drive in way[:-1]]:
-                raise NetlistError(f"{_text(target)} is driven by a circle of connections.", where=way[0].place)
+                raise NetlistError(f"{_text(target)} is driven by a loop of connections.", where=way[0].place)
             way.append(self.drives[way[-1].source])
         return way
 
@@ -155,7 +157,7 @@ class _Reader:
             raise NetlistError(
                 f"{_text(target)} and {_text(way[-1].source)} have different units, {first.name} and {other.name}, "
                 "and conversion is not supported.",
-                where=way[0].place, advice="Let one of both FMUs do the conversion.",
+                where=way[0].place, advice="Do the conversion in one of the FMUs.",
             )  # fmt: skip
 
     def _units_of(self, end: Target) -> list[UnitDefinition]:
@@ -221,7 +223,9 @@ def _flat_names(components: list[Element]) -> dict[ElementPath, str]:
     for one in components:
         name = _word("_".join(one.path))
         if name in names.values():
-            raise DuplicateName(f"Two FMUs would be called {name}.", where=place(one.xml), advice="Rename one of them.")
+            raise DuplicateName(
+                f"Two FMUs would have the name {name}.", where=place(one.xml), advice="Rename one of them."
+            )
         names[one.path] = name
     return names
 

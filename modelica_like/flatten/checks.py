@@ -29,13 +29,19 @@ def unit_of_field(owner: Declared, name: str) -> Unit:
     return declared
 
 
-def check_balance(component: Component, equations: list[Equation]) -> None:
+def check_balance(component: Component, equations: list[Equation], joined: set[str]) -> None:
     """Check that a component has as many equations as unknowns of its own.
+
+    Args:
+        component: of the class that is checked.
+        equations: its own.
+        joined: own signals in its connections; an output there has its equation.
 
     Raises:
         ComponentUnbalanced: it does not.
     """
-    own = [n for n, f in component.fields.items() if isinstance(f, Variable) and not isinstance(f, Input)]
+    unknown = [n for n, f in component.fields.items() if isinstance(f, Variable) and not isinstance(f, Input)]
+    own = [n for n in unknown if n not in joined]
     flows: list[str] = []
     if not component.parts:
         for name, connector in component.connectors.items():

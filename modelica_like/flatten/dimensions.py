@@ -161,7 +161,7 @@ def check_equation(left: Expr, right: Expr, dimensions: Dimensions, component: s
         units = dimensions.unit(left), dimensions.unit(right)
     if _MIXED in units and ANY not in units:
         raise UnitMismatch(
-            f"{place}: the branches of choose(…) or where(…) differ in unit; they only stand in `… == 0`."
+            f"{place}: the branches of choose(…) or where(…) differ in unit; this is allowed only in `… == 0`."
         )
     if not same_dimension(*units):
         raise UnitMismatch(f"{place}: left {units[0]}, right {units[1]}.")
@@ -199,7 +199,7 @@ def _told(label: str, where: tuple[Source, ...], owner: str, source: Source | No
         raise UnitMismatch(f"{label}: {clash.what} differ: {clash.left} and {clash.right}.", where=where) from None
     except _NotANumber:
         raise LanguageError(
-            f"{owner}: a number in it is nan.",
+            f"{owner}: an expression contains nan.",
             where=source or (),
-            advice="Functions of `math` do not understand symbols: take sqrt, sin and so on from the language.",
+            advice="Functions of `math` do not work on symbols: import sqrt, sin and so on from the language.",
         ) from None

@@ -105,7 +105,7 @@ def _equation(
             gain = ca.if_else(ca.SX(symbol) == number, slope, 0)
             return row, gain, _only(ca.substitute(residual, symbol, ca.SX(number)), rate)
     raise LanguageError(
-        f"{mode.label} holds {motion.name} in '{name}', but no equation says there that der({motion.name}) is zero.",
+        f"{mode.label} holds {motion.name} in '{name}', but no equation sets der({motion.name}) is zero.",
         advice=f"Write {mode.name}.choose(…, {name}=der(self.{motion.name})) == 0.",
     )
 

@@ -81,7 +81,9 @@ class Parameters:
     def _dependent(self, component: Component, name: str, path: str, value: Value) -> Any:
         if path in self._open:
             circle = " → ".join([*self._open[self._open.index(path) :], path])
-            raise CyclicAssembly(f"Parameters depend on each other in a circle: {circle}.", advice="Give one a number.")
+            raise CyclicAssembly(
+                f"Parameters depend on each other in a circle: {circle}.", advice="Give one of them a number."
+            )
         self._open.append(path)
         # A value given in an assembly speaks the assembly's names, a default those of the component itself.
         scope = component._owner if name in component._values and isinstance(component._owner, Component) else component

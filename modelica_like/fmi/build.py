@@ -82,7 +82,7 @@ def native_platform() -> str:
     name = f"{_MACHINES.get(machine.machine(), machine.machine())}-{_SYSTEMS.get(machine.system(), machine.system())}"
     if name not in PLATFORMS:
         raise ExportError(
-            f"There are no FMU binaries for this machine ({name}).", advice=f"Choose among {', '.join(PLATFORMS)}."
+            f"There are no FMU binaries for this machine ({name}).", advice=f"Choose from {', '.join(PLATFORMS)}."
         )
     return name
 

@@ -131,7 +131,7 @@ def compare_with_idas(path: Path, model: CompiledDae, kind: Literal["me", "cs"],
     except FmuFailed as error:
         return Check(f"{fails} {error}", differs=True)
     except SolveError as error:
-        return Check(f"{unknown}, as IDAS gave up: {error.what}")
+        return Check(f"{unknown}, because IDAS gave up: {error.what}")
     curves = compare_solutions(truth, run, list(nominals), ("IDAS", "FMU"), _LEAST_RANGE)
     if fixed_step:
         shares = ", ".join(f"{d.signal} {d.relative:.2g}" for d in curves.deviations[:_LISTED])
@@ -143,7 +143,7 @@ def compare_with_idas(path: Path, model: CompiledDae, kind: Literal["me", "cs"],
         return Check(curves=curves)
     usual = compare_solutions(truth, _idas(model, end, points, rtol), list(nominals), ("", ""), _LEAST_RANGE)
     beyond = [d for d in off if d.relative > _ALLOWANCE * usual[d.signal].relative]
-    reason = "by more than its tolerance explains" if beyond else f"as the tolerance {rtol:g} lets it"
+    reason = "by more than its tolerance explains" if beyond else f"as its tolerance {rtol:g} lets it"
     shares = ", ".join(f"{d.signal} by {d.relative:.2g}" for d in (beyond or off)[:_TOLD])
     told = f"Until t = {end:g} s the FMU differs from IDAS {reason}: {shares} of the range."
     return Check(told, curves, bool(beyond))

@@ -80,8 +80,8 @@ def export_fmu(
 ) -> Export:  # fmt: skip
     """Export a drive as an FMU: a model and a compiled run-time that need no Python.
 
-    Connectors that the drive leaves open (a netlist's `expose`) and adaptors that nothing inside drives become inputs
-    and outputs, in FMI 3 also terminals; so do inputs of parts that have no value.
+    Open connectors (a netlist's `expose`), adaptors that nothing drives and inputs without value are its inputs and
+    outputs, in FMI 3 also terminals.
 
     Args:
         drive: a component, a netlist file, or a compiled model.
@@ -94,13 +94,11 @@ def export_fmu(
         takes: what open ends take from outside: the `flow` (torque, force, current, heat flow) or the `potential`.
         embed: compile the model into the binaries, for importers that do not tell where resources are.
         modes: `output` (enumerations), `local` (enumerations that are no outputs), or `integer` (outputs).
-        fixed_step: step size of Co-Simulation in s, or a time such as "1 ms", for hardware in the loop: the work of a
-            step is bounded, and a communication step is a whole number of them. By default accuracy chooses the steps.
+        fixed_step: step size of Co-Simulation in s, or such as "1 ms", for hardware in the loop: the work of a step is
+            bounded, and a communication step is a whole number of them. By default accuracy chooses the steps.
         tables: patterns of tables whose numbers are to be tunable parameters, such as `clutch.mu_pos`: an array each in
             FMI 3, scalars `clutch.mu_pos[2,1]` in FMI 2.
-        check: run the FMU against IDAS, where it has a binary for this machine; the `check` of what is returned tells
-            what that shows, with fixed steps their error over the whole run. Where they differ, a picture
-            `…_check.png` is drawn next to the FMU.
+        check: run the FMU, if it has a binary for this machine, against IDAS; a picture shows where they differ.
         strict: do not write an FMU that differs from IDAS.
         report: called with what is being done.
 
@@ -110,8 +108,7 @@ def export_fmu(
         MissingExtra: binaries for other platforms need zig.
         ModelicaLikeError: something is wrong with the model.
     """
-    begin, tell = time.perf_counter(), report or silent
-    target = target_file(path, ".fmu", "An FMU")
+    begin, tell, target = time.perf_counter(), report or silent, target_file(path, ".fmu", "An FMU")
     chosen, kinds, names = known_version(version, Version, "FMI"), _kinds(kind), chosen_platforms(platforms)
     fixed, as_what = _fixed_step(fixed_step, kinds), _modes(modes)
     tell("compiling the model")
@@ -155,8 +152,8 @@ def _fixed_step(asked: float | str | None, kinds: tuple[Kind, ...]) -> float:
     step = positive_step(asked)
     if step and "cs" not in kinds:
         raise ExportError(
-            "A fixed step belongs to Co-Simulation, and only Model Exchange is exported.",
-            why="In Model Exchange the importer chooses the steps.", advice="Export cs, too.",
+            "A fixed step is for Co-Simulation, but only Model Exchange is exported.",
+            why="In Model Exchange the importer chooses the steps.", advice="Also export cs.",
         )  # fmt: skip
     return step
 
@@ -274,12 +271,12 @@ def _written(
         found = problems(draft)
         if found:
             raise ExportError(
-                f"The FMU does not pass its checks: {'; '.join(found[:3])}.", why="This is a fault of the export."
+                f"The FMU does not pass its checks: {'; '.join(found[:3])}.", why="This is an error of the exporter."
             )
         kind = "cs" if "cs" in about.kinds else "me"
         check = compare_with_idas(draft, model, kind, about.fixed_step) if run else Check()
         if strict and check.differs:
-            raise ExportError(check.sentence, advice="Without `strict` it is written all the same, with a picture.")
+            raise ExportError(check.sentence, advice="Without `strict` it is still written, with a picture.")
     if not check.differs or check.curves is None:
         return check
     picture = target.with_name(f"{target.stem}_check.png")

@@ -15,13 +15,13 @@ Failures = dict[str, tuple[type[ModelicaLikeError], str, str, str]]
 
 FAILURES: Failures = {
     "unknown": (UnknownName, "{unit} has no variable '{name}'{hint}", "", ""),
-    "no input": (UnknownName, "{unit}: '{name}' is no input but {causality}. {has}", "", ""),
+    "no input": (UnknownName, "{unit}: '{name}' is not an input but {causality}. {has}", "", ""),
     "scheduled": (
         FmuRefused,
         "{unit} is for Scheduled Execution only: its importer activates its tasks one by one, by a schedule.",
-        "", "Export it for Model Exchange or Co-Simulation, too.",
+        "", "Also export it for Model Exchange or Co-Simulation.",
     ),
-    "no kind": (FmuRefused, "{unit} has no {wanted} part.", "", "Ask for the other kind, or for none."),
+    "no kind": (FmuRefused, "{unit} has no {wanted} part.", "", "Choose the other kind, or none."),
     "failed": (FmuFailed, "{unit} failed: {text}.", "{said}", "{shorter}"),
 }  # fmt: skip
 
@@ -47,7 +47,7 @@ def tell_error(folder: Path, units: Mapping[str, str], failures: Failures = FAIL
         "causality": f"{'an' if causality[0] in 'aeiou' else 'a'} {causality}",
         "text": printable(error.get("text", "")).strip().rstrip("."),
         "shorter": words.get("shorter", "") if "DoStep" in error.get("text", "") else "",  # advice for steps only
-        "said": "\n".join(f"It said: {printable(text)}" for text in error.get("messages", ())[-3:]),
+        "said": "\n".join(f"It reported: {printable(text)}" for text in error.get("messages", ())[-3:]),
     }  # fmt: skip
     kind, *sentences = failures[error["kind"]]
     what, why, advice = (sentence.format(**told) for sentence in sentences)

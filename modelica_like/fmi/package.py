@@ -48,7 +48,7 @@ def target_file(path: str | Path, ending: str, what: str) -> Path:
     if target.suffix.lower() != ending:
         raise ExportError(f"{what} is a file with the ending {ending}, not '{target.name}'.")
     if not target.absolute().parent.is_dir():
-        raise ExportError(f"There is no folder '{target.parent}' for {target.name}.", advice="Make it first.")
+        raise ExportError(f"There is no folder '{target.parent}' for {target.name}.", advice="Create it first.")
     check_writable(target)
     return target
 

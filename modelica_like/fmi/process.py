@@ -64,7 +64,7 @@ def run_child(name: str, script: Path, folder: Path, timeout: float, environment
             advice="Give it more time with `timeout`, or a shorter run.",
         )
     if not any((folder / file).exists() for file in ("meta.json", "error.json")):
-        raise FmuCrashed(f"{name} {_death(code)}{_reached(folder)}.", why="It ran in a process of its own.")
+        raise FmuCrashed(f"{name} {_death(code)}{_reached(folder)}.", why="It ran in a separate process.")
 
 
 def _wait(command: Sequence[str], folder: Path, timeout: float, environment: dict[str, str]) -> int | None:
@@ -93,7 +93,7 @@ def _end(process: subprocess.Popen[bytes]) -> None:
 
 def _death(code: int) -> str:
     if code >= 0:
-        return f"ended its process by itself, with exit code {code},"
+        return f"ended its process with exit code {code},"
     try:
         return f"crashed with {signal.Signals(-code).name}"
     except ValueError:
@@ -102,4 +102,4 @@ def _death(code: int) -> str:
 
 def _reached(folder: Path) -> str:
     (time,) = struct.unpack("d", (folder / "progress").read_bytes()[:8])
-    return " before its first step had ended" if isnan(time) else f" after t = {time:g} s"
+    return " before the end of its first step" if isnan(time) else f" after t = {time:g} s"

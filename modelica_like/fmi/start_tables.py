@@ -52,7 +52,7 @@ class StartTables:
 
 
 def start_tables(model: CompiledDae) -> StartTables:
-    """Choose among the start values of a model as a simulation does.
+    """Choose from the start values of a model as a simulation does.
 
     Raises:
         MissingStart, ContradictingStart: they do not determine all states.

@@ -72,7 +72,7 @@ def unpack(path: Path, target: Path, limits: Limits = LIMITS, kind: Kind = FMU) 
             archive.extractall(target)
     except (zipfile.BadZipFile, zlib.error, NotImplementedError, EOFError) as error:
         raise FmuRefused(
-            f"{path.name} is no {kind.name}: it is not a sound zip archive.", why=_sentence(error)
+            f"{path.name} is not an {kind.name}: it is not a valid zip archive.", why=_sentence(error)
         ) from None
     except (IsADirectoryError, NotADirectoryError, FileExistsError):
         raise FmuRefused(f"{path.name} is refused: a file in it has the name of a folder.") from None
@@ -105,7 +105,7 @@ def printable(text: str) -> str:
 
 
 def _sentence(error: Exception) -> str:
-    text = str(error) or "It ends too early."
+    text = str(error) or "It is truncated."
     return text if text.endswith(".") else f"{text}."
 
 
@@ -119,7 +119,7 @@ def _look_through(name: str, members: Sequence[zipfile.ZipInfo], limits: Limits,
         seen.add(member.filename)
     _check_size(name, members, limits, kind)
     if kind.description not in seen:
-        raise FmuRefused(f"{name} is no {kind.name}: it has no {kind.description}.")
+        raise FmuRefused(f"{name} is not an {kind.name}: it has no {kind.description}.")
 
 
 def _objection(member: zipfile.ZipInfo, seen: set[str]) -> str:
@@ -130,16 +130,16 @@ def _objection(member: zipfile.ZipInfo, seen: set[str]) -> str:
     if ".." in PurePosixPath(inside.replace("\\", "/")).parts:
         return "leads out of the archive"
     if len(inside) > _LONGEST or any(len(part.encode(errors="replace")) > _LONGEST_PART for part in inside.split("/")):
-        return "has a longer name than file systems take"
+        return "has a longer name than file systems allow"
     if "\\" in inside:
-        return "has a backslash where the standard asks for a slash"
+        return "has a backslash where the standard requires a slash"
     if kind == stat.S_IFLNK:
         return "is a link"
     if kind not in (0, stat.S_IFREG, stat.S_IFDIR):
         return "is neither a file nor a folder"
     if member.flag_bits & _ENCRYPTED:
         return "is encrypted"
-    return "is there twice" if member.filename in seen else ""
+    return "occurs twice" if member.filename in seen else ""
 
 
 def _check_size(name: str, members: Sequence[zipfile.ZipInfo], limits: Limits, kind: Kind) -> None:
@@ -149,7 +149,7 @@ def _check_size(name: str, members: Sequence[zipfile.ZipInfo], limits: Limits, k
     if unpacked > limits.harmless and unpacked > limits.ratio * packed:
         raise FmuRefused(
             f"{name} is refused: {_size(packed)} would unpack to {_size(unpacked)}.",
-            why=f"What shrinks to less than 1/{limits.ratio:g} is more likely an archive bomb than an {kind.name}.",
+            why=f"A file that shrinks to less than 1/{limits.ratio:g} is more likely a zip bomb than an {kind.name}.",
         )
 
 

@@ -157,7 +157,7 @@ def _checks(path: Path, folder: Path, timeout: float) -> Iterator[Check]:
     schemas = [_schema_check(name, folder / file, version, schema) for name, (file, schema) in _SCHEMAS.items()]
     yield from schemas
     problems = [str(problem).replace("\n", " ") for problem in fmpy.validation.validate_fmu(str(folder))]
-    yield Check("fmpy validate_fmu", FAILED if problems else PASSED, " ".join(problems) or "It finds nothing.")
+    yield Check("fmpy validate_fmu", FAILED if problems else PASSED, " ".join(problems) or "It finds no errors.")
     if schemas[0].verdict == FAILED:
         return
     subject = _Subject(path, fmpy.read_model_description(str(folder), validate=False), timeout)
@@ -188,13 +188,13 @@ def _schema_check(name: str, file: Path, version: str, schema: str) -> Check:
     try:
         document = etree.parse(file)
     except etree.XMLSyntaxError as error:
-        return Check(name, FAILED, f"It is no XML: {error.msg}.")
+        return Check(name, FAILED, f"It is not XML: {error.msg}.")
     xsd = Path(str(fmpy.__file__)).parent / "schema" / f"fmi{kind}" / f"fmi{'' if kind == '1' else kind}{schema}.xsd"
     if not xsd.exists():
-        return Check(name, FAILED, "It does not say which version of the standard it follows.")
+        return Check(name, FAILED, "It does not state its version of the standard.")
     rules = etree.XMLSchema(etree.parse(xsd))
     if rules.validate(document):
-        return Check(name, PASSED, "It keeps to the schema.")
+        return Check(name, PASSED, "It conforms to the schema.")
     found = "; ".join(f"line {entry.line}: {entry.message}" for entry in list(rules.error_log)[:3])
     return Check(name, FAILED, found)
 

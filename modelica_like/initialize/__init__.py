@@ -96,7 +96,7 @@ def _unsettled(model: CompiledDae, point: Point) -> InitializationError:
     changing = [one.path for one, old, new in pairs if old != new]
     names = changing or [one.path for one in model.flat_discretes if one.names]
     return InitializationError(
-        f"The modes at the start do not settle: {', '.join(names)} and the start values change each other in a circle.",
+        f"The modes at the start do not settle: {', '.join(names)} and the start values keep changing each other.",
         advice="Give start values of states, which no mode changes.",
     )
 

@@ -76,7 +76,7 @@ class StartPlan:
 
 
 def start_plan(model: CompiledDae, kind: StartKind, point: Point) -> StartPlan:
-    """Choose among the start values of a model.
+    """Choose from the start values of a model.
 
     Structure decides. Where numbers say that rows chosen by structure depend on each other (several clutches between
     the same shafts), numbers decide: defaults and zeros that say nothing new are left out, start values that are given
@@ -252,7 +252,7 @@ class _Choice:
             what = f"{count} equations: give {which}{shown} start values"
         parts = dict.fromkeys(name.removeprefix("der(").rstrip(")").rpartition(".")[0] for name in names)
         return MissingStart(
-            f"Initialisation (not the model) lacks {what}.",
+            f"Initialization (not the model) lacks {what}.",
             where=[model.places[part] for part in parts if part in model.places][:3],
             advice='Or start from rest (start = "rest") or in the steady state (start = "steady").',
         )

@@ -71,7 +71,7 @@ def _singular(
     told = held if len(holding) > 1 and held else [name for name in names if name in model.implicit] or names
     why, advice = _reason(model, holding, held, alone=len(origins) == 1)
     if zeros := [] if len(holding) > 1 else _zeros(model, owners, regular):
-        why = f"{_and(zeros)} {'is' if len(zeros) == 1 else 'are'} zero: that leaves these unknowns open."
+        why = f"{_and(zeros)} {'is' if len(zeros) == 1 else 'are'} zero, so these unknowns are undetermined."
         advice = f"Give {'it' if len(zeros) == 1 else 'one of them'} another value."
     shown = ", ".join(told[:6]) + (", …" if len(told) > 6 else "")
     return SingularAtStart(

@@ -144,7 +144,7 @@ class StartProblem:
         check_singular(self.model, point)
         given = [start_name(self.model, self.model.starts[k]) for k in plan.rows]
         resting = [self.model.flat_variables[k].path for k in plan.resting if k < len(self.model.flat_variables)]
-        have = f"{', '.join(given[:6])} {'have' if len(given) > 1 else 'has'} the value asked for" if given else ""
+        have = f"{', '.join(given[:6])} {'have' if len(given) > 1 else 'has'} the requested value" if given else ""
         rest = f"{', '.join(resting[:6])} {'are' if len(resting) > 1 else 'is'} at rest" if resting else ""
         return InitializationError(
             f"No start was found at which {' and '.join(filter(None, (have, rest))) or 'the equations are met'}.",
@@ -162,7 +162,7 @@ class StartProblem:
         wrong = "contradict each other" if partners else "cannot be met"
         raise ContradictingStart(
             f"{' and '.join([*partners, self._told(number)])} {wrong}: {start_name(self.model, entry)} "
-            f"follows to be {actual:g}.",
+            f"would be {actual:g}.",
             where=[o.source for o in self.model.differentiated if o.source.file][:3],
             advice="Remove one of the start values, or make one a guess.",
         )

@@ -15,8 +15,8 @@ from modelica_like.initialize.point import Point, call
 _MAX_NEWTON = 50
 _STEADY = 1e-6
 _NEAR = (
-    "Give guesses near the motion that is steady, such as guess(100) for a speed; "
-    "an operating point can begin from the end of a run, too."
+    "Give guesses near the steady motion, such as guess(100) for a speed; "
+    "an operating point can also start from the end of a run."
 )
 
 

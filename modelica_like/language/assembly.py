@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from copy import copy
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -12,7 +13,7 @@ from modelica_like.language.component import Component
 from modelica_like.language.declared import Connector, unknown
 from modelica_like.language.equation import Equations, connect, free, series
 from modelica_like.language.expr import Expr, Symbol, symbol_of
-from modelica_like.language.fields import Parameter, Variable, param
+from modelica_like.language.fields import Field, Input, Output, Parameter, Variable, param
 from modelica_like.language.places import NOWHERE, caller
 
 
@@ -49,20 +50,25 @@ class Assembly(Component):
 
     def add_parameter(self, name: str, value: Any) -> None:
         """Declare a parameter of the assembly; its unit is that of its value."""
-        if name in self.fields or name in self._parts:
-            raise DuplicateName(f"{self.label}: '{name}' is already the name of something else.")
-        field: Parameter = param("*")
-        field.owner, field.name = self.label, name
-        field.default = value
+        field: Parameter = param("*", default=value)
+        self._declare(name, field)
         field.read(value)
+
+    def _declare(self, name: str, field: Field) -> None:
+        if name in self.fields or name in self._parts or name in self._connectors:
+            raise DuplicateName(f"{self.label}: '{name}' is already in use.")
+        field.owner, field.name = self.label, name
         self._own_fields = {**self._own_fields, name: field}
 
     def expose(self, name: str, end: str) -> None:
-        """Make an inner connector an outer one of the assembly."""
+        """Make an inner connector or signal an outer one of the assembly."""
         inner = self._resolve(end)
-        if isinstance(inner, Symbol):
+        if isinstance(inner, Connector):
+            setattr(self, name, type(inner)(inner.description, free=inner.may_be_free))
+        elif isinstance(field := inner.owner.fields[inner.name], Input | Output):
+            self._declare(name, copy(field))
+        else:
             raise unknown("connector", self.label, end, [])
-        setattr(self, name, type(inner)(inner.description, free=inner.may_be_free))
         self._own_connectors = (*self._own_connectors, (name, end))
 
     def place(self, key: str, source: Source) -> None:
@@ -92,7 +98,7 @@ class Assembly(Component):
 
     @property
     def exposed(self) -> tuple[tuple[str, str], ...]:
-        """Outer connectors and the inner ones they stand for."""
+        """Outer connectors and signals, and the inner ones they stand for."""
         return self._own_connectors
 
     def __getattr__(self, name: str) -> Expr:
@@ -140,8 +146,7 @@ class Assembly(Component):
         for end in self._free:
             yield f"free.{end}", lambda end=end: [free(self._connector(end))]
         for name, end in self._own_connectors:
-            joined = self._connectors[name]
-            yield f"expose.{name}", lambda joined=joined, end=end: [connect(joined, self._connector(end))]
+            yield f"expose.{name}", lambda name=name, end=end: [connect(self._resolve(name), self._resolve(end))]
 
     def _series(self, names: Sequence[str]) -> list[Any]:
         components: list[Component] = []
@@ -155,7 +160,7 @@ class Assembly(Component):
         owner, _, name = path.rpartition(".")
         if owner and name in self.find(owner).connectors:
             raise WrongConnection(
-                f"{path} is a connector, and a series joins parts.",
+                f"{path} is a connector, but a series joins parts.",
                 advice=f"Write {owner} in the series, or join {path} in a connection of its own.",
             )
         return self.find(path)

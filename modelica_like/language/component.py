@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Generator, Iterator, Mapping
 from contextlib import contextmanager
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar, cast, dataclass_transform
+from typing import Any, ClassVar, Self, TypeVar, cast, dataclass_transform
 
 from modelica_like.errors import DuplicateName, LanguageError, ModelicaLikeError, NetlistError, Source
 from modelica_like.language.declared import Connector, Declared, unknown
+from modelica_like.language.equation import Equations
 from modelica_like.language.expr import TIME, Expr
 from modelica_like.language.fields import Discrete, Field, Input, Output, Parameter, Value, param, require_identifier
 from modelica_like.language.icon import Icon
@@ -16,11 +17,8 @@ from modelica_like.language.mode import Mode
 from modelica_like.language.places import NOWHERE, caller
 from modelica_like.language.tables import REQUIRED, Rows, both_given, frozen_rows, rows
 from modelica_like.language.terminal import Terminal
+from modelica_like.language.transition import Events
 from modelica_like.upper import upper
-
-if TYPE_CHECKING:
-    from modelica_like.language.equation import Equations
-    from modelica_like.language.transition import Events
 
 
 @dataclass_transform(kw_only_default=True, field_specifiers=(param, rows))
@@ -74,7 +72,7 @@ class Component(Declared):
 
     def __init__(self, **values: Any) -> None:
         if self._partial:
-            what = f"{type(self).__name__} is partial: it is only a base of other components."
+            what = f"{type(self).__name__} is partial: it is only a base class."
             raise LanguageError(what, where=caller())
         self._values: dict[str, Value] = {}
         self._starts: dict[str, Value] = {}
@@ -183,7 +181,7 @@ class Component(Declared):
             cls._tables[name].read(f"{cls.__name__}.{name}", cls._class_fields, frozen_rows(value))
             return
         if type(value) is int and abs(value) > _MOST:  # it may be a number of parts, which would be made
-            raise NetlistError(f"{cls.__name__}.{name} is larger than {_MOST}; no drive has as many parts.")
+            raise NetlistError(f"{cls.__name__}.{name} is larger than {_MOST}; no drive has that many parts.")
         hint = next(str(_annotated(base)[name]) for base in cls.__mro__ if name in _annotated(base))
         if hint.startswith("Literal[") and value not in (choices := hint[9:-2].split("', '")):
             raise NetlistError(f"{cls.__name__}.{name} = {value!r} must be {' or '.join(choices)}.")
@@ -337,7 +335,7 @@ class Component(Declared):
     def _adopt(self, name: str, value: Component | list[Component]) -> None:
         taken = (self.fields, self._connectors, self._structural, self._class_modes)
         if any(name in names for names in taken) or hasattr(Component, name):
-            raise DuplicateName(f"{self.label}: '{name}' is already the name of something else.", where=caller())
+            raise DuplicateName(f"{self.label}: '{name}' is already in use.", where=caller())
         require_identifier(name, type(self).__name__)
         if isinstance(value, list):
             adopted: Any = [self._owned(f"{name}[{k}]", part) for k, part in enumerate(value, 1)]

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, Protocol, cast
 
 import casadi as ca
 
@@ -14,9 +14,6 @@ from modelica_like.errors import LanguageError, Source
 from modelica_like.language.declared import Connector
 from modelica_like.language.expr import Expr, Symbol
 from modelica_like.language.places import NOWHERE
-
-if TYPE_CHECKING:
-    from modelica_like.language.component import Component
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +64,19 @@ def connect(first: Connector | Expr, *others: Connector | Expr) -> Connection:
     return Connection(cast(Any, ends))
 
 
-def series(*parts: Component) -> Equations:
+class InLine(Protocol):
+    """What has a place in a line: a component with two ends."""
+
+    def inlet_connector(self) -> Connector:
+        """Return the end that the part before is connected with."""
+        ...
+
+    def outlet_connector(self) -> Connector:
+        """Return the end that the next part is connected with."""
+        ...
+
+
+def series(*parts: InLine) -> Equations:
     """Connect the outlet of each part with the inlet of the next."""
     for left, right in pairwise(parts):
         yield connect(left.outlet_connector(), right.inlet_connector())
@@ -104,13 +113,13 @@ def as_equation(item: Any, source: Source, component: str) -> Equation:
             return Equation(*(reversed(sides) if _is_turned(*sides, source.text) else sides), source=source)
         if item.is_constant():
             raise LanguageError(
-                f"{component} has an equation whose two sides are the same, or only numbers.",
+                f"{component} has an equation whose two sides are the same, or have only numbers.",
                 where=source, advice="An equation relates unknowns: left == right.",
             )  # fmt: skip
     if isinstance(item, bool):
         raise LanguageError(
             f"{component} has an equation that Python evaluated to {item}.",
-            where=source, advice="Keep a symbol on the left: `self.tau == 0`, not `0 == self.tau`.",
+            where=source, advice="Write a symbol on the left: `self.tau == 0`, not `0 == self.tau`.",
         )  # fmt: skip
     raise LanguageError(
         f"{component}.equations() yields {type(item).__name__} instead of an equation.",

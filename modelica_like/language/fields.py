@@ -20,7 +20,7 @@ StatePreference = Literal["always", "prefer", "default", "avoid"]
 
 @dataclass(frozen=True)
 class Guess:
-    """A start value that the initialisation may change."""
+    """A start value that the initialization may change."""
 
     value: Any
 

@@ -135,7 +135,7 @@ def as_formula(value: Any) -> Formula:
         return Formula("number", (float(value),))
     if hasattr(value, "unit_text"):
         return Formula("name", (value,))
-    raise NetlistError(f"'{value!r}' cannot stand in a formula of parameters.")
+    raise NetlistError(f"'{value!r}' cannot be used in a formula of parameters.")
 
 
 def parse_formula(text: str) -> Formula:

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Self, cast, overload
 
 import casadi as ca
 
-from modelica_like.errors import LanguageError, UnknownName, did_you_mean
+from modelica_like.errors import LanguageError, Source, UnknownName, did_you_mean
 from modelica_like.language.expr import Expr, Scalar, Symbol, symbol_of
 from modelica_like.language.hold import Hold
 from modelica_like.language.places import NOWHERE
-from modelica_like.language.transition import StartMode, Transition
 
 
 class Mode:
@@ -142,7 +142,8 @@ class BoundMode:
             reset: new values of variables and discrete values, in SI units.
             notice: what the report of a run says, such as "exceeds {w_max} rad/s": the name of the component comes
                 first, and values of its parameters stand for their names.
-            because: why it happens, in a few words, such as "slip reached zero"; else the condition as it is written.
+            because: why it happens, in a few words, such as "slip reached zero" or "is beyond {limit}" (the report
+                adds the value of the parameter); without it the report puts the condition into words.
             fails: the run ends there, with the notice as an error.
 
         Raises:
@@ -161,3 +162,41 @@ class BoundMode:
         """Declare the mode at the start, if the condition holds there."""
         self.mode.number(target)
         return StartMode(self, target, when)
+
+
+@dataclass(frozen=True, eq=False)
+class Transition:
+    """Change of a mode at an event.
+
+    Attributes:
+        mode: the mode that changes.
+        sources: names of the modes it may leave.
+        target: name of the mode it enters.
+        when: condition of a state event, or None.
+        at: time of a time event in s, or None.
+        reset: new values of states and discrete values.
+        notice: what the user is told when it happens, without the name of the component.
+        because: why it happens, in a few words.
+        fails: the run ends there, with an error.
+    """
+
+    mode: BoundMode
+    sources: tuple[str, ...]
+    target: str
+    when: Expr | None
+    at: Expr | None
+    reset: Mapping[Expr, Any]
+    source: Source = NOWHERE
+    notice: str = ""
+    because: str = ""
+    fails: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class StartMode:
+    """Choice of a mode at the start."""
+
+    mode: BoundMode
+    target: str
+    when: Expr
+    source: Source = NOWHERE

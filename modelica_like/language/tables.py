@@ -32,7 +32,7 @@ class Column:
     max: float
 
     def unit_in(self, fields: Mapping[str, Field]) -> Unit:
-        """Return the unit of the numbers: that of the parameter that says what counts as 1, or its own."""
+        """Return the unit of the numbers: that of the scale parameter, or its own."""
         return fields[self.scale].unit if self.scale else parse_unit(self.unit)
 
     def described(self, fields: Mapping[str, Field]) -> str:
@@ -67,7 +67,7 @@ class Rows:
             given: tuple of rows, tuples; cells are numbers in the column's unit, quantities, or texts.
 
         Returns:
-            The table, in SI units, and the parameters that say what counts as 1 in columns with quantities.
+            The table, in SI units, and the scale parameters of columns with quantities.
 
         Raises:
             NetlistError: it does not have the shape of the table, or a column does not rise.
@@ -124,7 +124,7 @@ class Rows:
                 if column.rising and not isinstance(after[k], Expr) and not before[k] < after[k]:
                     raise NetlistError(
                         f"{label}, row {number}: the {column.what} {after[k]:g} is not above {before[k]:g}, that of "
-                        "the row before.", advice="Sort the rows, each once.",
+                        "the row before.", advice="Sort the rows and remove duplicates.",
                     )  # fmt: skip
 
 
@@ -165,7 +165,7 @@ def frozen_rows(value: Any) -> Any:
 def both_given(label: str, scale: str) -> ModelicaLikeError:
     """Return the error about a table with quantities whose unit is given, too."""
     return NetlistError(
-        f"{label} has quantities, and {scale} says what counts as 1.",
+        f"{label} has quantities, but {scale} scales plain numbers.",
         advice=f"Write numbers and {scale}, or quantities without {scale}.",
     )
 
@@ -179,7 +179,7 @@ def column(
     Args:
         what: one phrase.
         unit: in Modelica notation.
-        scale: parameter that says what counts as 1 in numbers, with its unit; quantities need none.
+        scale: parameter with a unit that multiplies plain numbers; quantities need none.
         rising: every value is above the one before.
         text: it holds texts, not numbers.
         min: smallest permitted value, in units of the scale or in SI units.

@@ -46,7 +46,7 @@ def with_tunable_tables(root: _Root, patterns: Iterable[str]) -> _Root:
                 raise LanguageError(
                     f"The numbers of {path} cannot be parameters: "
                     + ("its parts are made from it." if owner.parts else "it has texts."),
-                    advice="Ask for the table of the part." if owner.parts else "",
+                    advice="Name the table of the part." if owner.parts else "",
                 )
             if not kept:
                 owner.__dict__["_own_fields"] = {**owner._own_fields, **_cells(owner, name, rows)}

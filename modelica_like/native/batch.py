@@ -71,7 +71,7 @@ class Batch:
         Args:
             parameters: in the order of `model.p`, unchecked, shape (runs, parameters).
             inputs: in the order of `model.u`, shape (runs, inputs).
-            stop: not zero as soon as nobody waits for them any more.
+            stop: becomes nonzero when the results are no longer needed.
 
         Returns:
             Numbers, shape (runs, readings), and which runs failed, shape (runs,). What does not happen is nan.
@@ -84,5 +84,5 @@ class Batch:
         stops = ctypes.pointer(ctypes.c_int(0) if stop is None else stop)
         arguments = BatchArguments(*self._span, options.rtol, options.atol, *counts, *places, stops)
         if self._native.library.batch(self._native.address, ctypes.byref(arguments)) < 0:
-            raise MemoryError(f"There is no memory for runs of {self._native.name}.")
+            raise MemoryError(f"There is not enough memory for runs of {self._native.name}.")
         return values, failed.astype(bool)

@@ -106,7 +106,7 @@ class Instance:
         self.library = self.native.library
         self.address = self.library.new(self.native.address)
         if not self.address:
-            raise MemoryError(f"There is no memory for an instance of {model.name}.")
+            raise MemoryError(f"There is not enough memory for an instance of {model.name}.")
         # The model must outlive it.
         weakref.finalize(self, _free, self.library, self.address, self.native)
 

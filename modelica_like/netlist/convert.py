@@ -83,6 +83,6 @@ def value_text(component: Component, name: str) -> Any:
 
 def _not_only_wires(component: Component, what: str) -> NetlistError:
     return NetlistError(
-        f"{type(component).__name__} has {what} of its own; a netlist holds only parts and wires.",
+        f"{type(component).__name__} has {what} of its own; a netlist contains only parts and connections.",
         advice="Use it as a part of a netlist instead.",
     )

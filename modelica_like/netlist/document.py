@@ -77,7 +77,7 @@ def read_text(path: Path) -> str:
         raise NetlistError(f"The netlist '{path}' cannot be read: {error.strerror}.") from None
     if len(data) > MAX_BYTES:
         raise NetlistError(
-            f"'{path.name}' is larger than {MAX_BYTES // 10**6} MB; no netlist is.", where=Source(str(path))
+            f"'{path.name}' is larger than {MAX_BYTES // 10**6} MB, the limit for netlists.", where=Source(str(path))
         )
     try:
         return data.decode("utf-8-sig").replace("\r\n", "\n")
@@ -147,7 +147,7 @@ def _not_toml(message: str, lines: Lines) -> ModelicaLikeError:
         return DuplicateName(f"{what} is declared twice.", where=dict.fromkeys([lines.line(first), lines.line(second)]))
     match = re.search(r"^(.*) \(at (?:line (\d+), column \d+|end of document)\)$", message)
     number = int(match.group(2)) if match and match.group(2) else len(lines.text)
-    reason = match.group(1) if match else "nested too deep"
+    reason = match.group(1) if match else "nested too deeply"
     place = lines.line(number)
     if match and (key := re.search(r"^Duplicate inline table key '(.*)'$", match.group(1))):
         return DuplicateName(f"{key.group(1)} is given twice.", where=place)
@@ -261,7 +261,7 @@ def _ends(key: str, value: Any) -> list[str]:
     if isinstance(value, list) and any(isinstance(one, list) for one in value):
         raise NetlistError(
             f"{key} must be a list of names.",
-            advice="Give every list an entry of its own: each entry joins what it names.",
+            advice="Write a separate entry for every list.",
         )
     if len(_names(key, value)) < 2:
         raise NetlistError(f"{key} must name at least two ends.")
@@ -279,7 +279,7 @@ def check_part(key: str, value: Any) -> Any:
         if not isinstance(table, dict):
             raise NetlistError(f'{key} must be a table: {{ is = "Inertia", J = "1 kg.m2" }}.')
         if not isinstance(table.get("is"), str):
-            raise NetlistError(f"{key} has no type.", advice='Say what it is, such as is = "Inertia".')
+            raise NetlistError(f"{key} has no type.", advice='Give its type, such as is = "Inertia".')
         _whole(100_000)(f"{key}: count", table.get("count", 1))
     return value
 
@@ -311,7 +311,7 @@ def duration(key: str, value: Any) -> Any:
 
 def _start_kind(key: str, value: Any) -> str:
     if value not in get_args(StartKind):
-        raise NetlistError(f"{key} = {value!r} must be one of {', '.join(get_args(StartKind))}.")
+        raise NetlistError(f"{key} = {value!r} must be {' or '.join(get_args(StartKind))}.")
     return value
 
 

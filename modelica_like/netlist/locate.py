@@ -120,7 +120,9 @@ def _statements(text: str, lines: Lines) -> Iterator[tuple[int, list[tuple[str, 
             tokens.append((kind, token))
             in_value = kind == "equals"
         if depth > _MAX_DEPTH or len(tokens) > 2 * _MAX_DEPTH:
-            raise NetlistError("Brackets or keys are nested too deep for a netlist.", where=Source(lines.file, number))
+            raise NetlistError(
+                "Brackets or keys are nested too deeply for a netlist.", where=Source(lines.file, number)
+            )
         number += token.count("\n")
     if tokens:
         yield first, tokens

@@ -66,7 +66,7 @@ class _Loader:
         key = path.resolve()
         if key in chain:
             names = " contains ".join(file.name for file in (*chain[chain.index(key) :], key))
-            raise CyclicAssembly(f"A netlist contains itself: {names}.", advice="Take one of them out.")
+            raise CyclicAssembly(f"A netlist contains itself: {names}.", advice="Remove one of them.")
         if key not in self.assemblies:
             self.assemblies[key] = self.build(parse(read_text(path), str(path)), (*chain, key))
         return self.assemblies[key]
@@ -184,8 +184,8 @@ class _Task:
 
 def _among_equations(name: str) -> NetlistError:
     return NetlistError(
-        f"{name} is an FMU, which cannot stand among equations.",
-        why="An FMU computes its outputs in steps of its own, and its equations are not known.",
+        f"{name} is an FMU, which cannot be part of a system of equations.",
+        why="An FMU computes its outputs in its own steps, and its equations are not known.",
         advice="Run the netlist as a co-simulation: cosim(…) or `modelica-like cosim`.",
     )
 
@@ -199,4 +199,4 @@ def new_component(kind: type[Component], values: dict[str, Any]) -> Component:
         return kind(**structural)
     except (TypeError, ValueError, LookupError, ArithmeticError) as error:
         given = ", ".join(f"{key} = {value!r}" for key, value in structural.items())
-        raise NetlistError(f"{kind.__name__} cannot be made with {given}: {error}.") from error
+        raise NetlistError(f"{kind.__name__} cannot be created with {given}: {error}.") from error

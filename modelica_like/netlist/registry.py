@@ -61,7 +61,7 @@ def library_module(entry: EntryPoint) -> ModuleType:
     if spec is not None and spec.origin not in (None, _place(module)):
         raise NetlistError(
             f"The library '{entry.name}' is hidden by '{_place(module)}', which has taken its name '{entry.value}'.",
-            advice="Give that module another name.",
+            advice="Rename that module.",
         )
     return module
 
@@ -177,7 +177,7 @@ def _own_module(name: str, folders: list[str]) -> ModuleType:
     if known is not None and Path(_place(known)).resolve().parent not in (Path(home), Path(home) / top):
         raise NetlistError(
             f"The module '{top}' of '{home}' cannot be used: '{_place(known)}' is loaded under this name.",
-            advice="Give one of the two another name.",
+            advice="Rename one of the two.",
         )
     module = imported(name, f"The module '{name}'", [home])
     if home not in sys.path:
@@ -194,5 +194,5 @@ def type_name(kind: type[Component]) -> str:
     if _library_type(kind.__name__) is kind:
         return kind.__name__
     if "." in kind.__qualname__:
-        raise NetlistError(f"{kind.__qualname__} is not at the top of its module, so a netlist cannot name it.")
+        raise NetlistError(f"{kind.__qualname__} is not at the top level of its module, so a netlist cannot name it.")
     return f"{kind.__module__}:{kind.__name__}"

@@ -12,7 +12,7 @@ from tomlkit.items import Item, Table
 
 from modelica_like.errors import NetlistError
 from modelica_like.language import Assembly, Component
-from modelica_like.language.fields import Field, Value
+from modelica_like.language.fields import Field, Parameter, Value
 from modelica_like.language.formula import Formula
 from modelica_like.language.tables import frozen_rows
 from modelica_like.netlist.convert import as_assembly
@@ -51,7 +51,11 @@ class _Writer:
     def document(self, assembly: Assembly) -> tomlkit.TOMLDocument:
         parts = {name: self.part(name, part) for name, part in assembly._parts.items()}
         sections: dict[str, Mapping[str, Any]] = {
-            "parameters": {name: plain(_given(assembly, name).given) for name in assembly.fields},
+            "parameters": {
+                name: plain(_given(assembly, name).given)
+                for name, field in assembly.fields.items()
+                if isinstance(field, Parameter)
+            },
             "parts": {name: _inline(entry) for name, entry in parts.items()},
             "series": {name: list(ends) for name, ends in assembly.chains.items()},
             "connect": {name: list(ends) for name, ends in assembly.wires.items()},
@@ -93,7 +97,7 @@ class _Writer:
         if not origin:
             raise NetlistError(
                 f"{assembly.label} is an assembly without a file, so a netlist cannot name it.",
-                advice="Save it to a file of its own, load that file, and use it as the part.",
+                advice="Save it to a separate file, load that file, and use it as the part.",
             )
         relative = Path(os.path.relpath(origin, self.folder.resolve())).as_posix()
         return relative if relative.startswith(".") else f"./{relative}"

@@ -63,7 +63,7 @@ def comparison_report(comparison: Comparison) -> RenderableType:
     if comparison.events:
         parts += ["", _event_table(comparison)]
     if comparison.interpolated:
-        parts += ["", "[dim]Their results lie at different times; the second is interpolated linearly.[/]"]
+        parts += ["", "[dim]Their results have different times; the second is interpolated linearly.[/]"]
     return Group(*parts)
 
 

@@ -12,7 +12,6 @@ from rich.table import Table
 from modelica_like.language.transition import NAME_IN_NOTICE
 from modelica_like.report.types import table
 from modelica_like.solve.display import Display
-from modelica_like.solve.recorder import Event
 from modelica_like.solve.trajectories import Trajectories
 from modelica_like.units import parse_unit
 
@@ -51,16 +50,31 @@ def _head(solution: Trajectories, notices: Iterable[str], *, debug: bool = False
 def events_table(solution: Trajectories, *, debug: bool = False) -> Table:
     """Return the mode changes; of many only the first and the last. `debug` names the lines of their transitions."""
     columns = 6 if debug else 5
-    rows = [_event_row(solution, event)[:columns] for event in solution.events]
+    told = reasons(solution)
+    rows = [
+        (f"{one.time:.9g}", one.mode, one.before, one.after, why, f"{one.source}".partition(" `")[0])[:columns]
+        for one, why in zip(solution.events, told, strict=True)
+    ]
     if len(rows) > _SHOWN:
         rows[_SHOWN // 2 : -_SHOWN // 2] = [("…", *[""] * (len(rows[0]) - 1))]
     heads = ("time in s>", "mode", "from", "to", "because", "declared in")[:columns]
     return table(_mode_changes(len(solution.events)), *heads, rows=rows)
 
 
-def _event_row(solution: Trajectories, event: Event) -> tuple[str, ...]:
-    reason = "an impact" if event.transition < 0 else solution.model.transitions[event.transition].because
-    return f"{event.time:.9g}", event.mode, event.before, event.after, reason, f"{event.source}".partition(" `")[0]
+def reasons(solution: Trajectories) -> list[str]:
+    """Return in words why each of the events happened, parameters with their values."""
+    known: dict[tuple[str, int], str] = {}
+
+    def valued(path: str) -> str:
+        unit = str(solution.model.units[path])
+        return f"{path.rpartition('.')[2]} = {solution[path][0]:g}{'' if unit == '1' else f' {unit}'}"
+
+    for event in solution.events:
+        key, (component, dot, _) = (event.mode, event.transition), event.mode.rpartition(".")
+        if key not in known:
+            because = "an impact" if event.transition < 0 else solution.model.transitions[event.transition].because
+            known[key] = NAME_IN_NOTICE.sub(lambda name, owner=component + dot: valued(owner + name[1]), because)
+    return [known[event.mode, event.transition] for event in solution.events]
 
 
 def notices(solution: Trajectories) -> list[str]:
@@ -139,9 +153,7 @@ def couplings_table(solution: CosimSolution) -> Table:
          f"{one.residual / one.throughput:.1e}" if one.throughput else "", f"{one.mismatch:.3g}")
         for one in solution.couplings
     ]  # fmt: skip
-    return table(
-        "energy at the couplings in J", "coupling", "through>", "made by it>", "share>", "mismatch>", rows=rows
-    )
+    return table("energy at the couplings in J", "coupling", "through>", "created>", "share>", "mismatch>", rows=rows)
 
 
 def steps_line(solution: CosimSolution) -> str:
@@ -149,5 +161,5 @@ def steps_line(solution: CosimSolution) -> str:
     sizes = f"{solution.shortest:.3g} s"
     if solution.longest > solution.shortest * (1 + 1e-6):
         sizes += f" to {solution.longest:.3g} s"
-    back = f", {solution.rejected} taken back" if solution.rejected else ""
+    back = f", {solution.rejected} rejected" if solution.rejected else ""
     return f"{solution.steps} communication steps of {sizes}{back}, {solution.statistics.seconds:.2f} s"

@@ -64,13 +64,13 @@ def read_csv(path: Path) -> RecordedSolution:
     with path.open(newline="", encoding="utf-8-sig") as file:
         rows = [row for row in csv.reader(file) if row]
     if len(rows) < 2 or rows[0][0].strip().strip('"') != "time":
-        raise NetlistError(f"{path.name}: a table begins with a line of names, of which the first is `time`.")
+        raise NetlistError(f"{path.name}: a table must begin with a line of names; the first one is `time`.")
     names = [name.strip() for name in rows[0]]
     units = None if _is_number(rows[1][0]) else rows[1]
     first = 1 if units is None else 2
     values = np.array([_numbers(path.name, k, row, len(names)) for k, row in enumerate(rows[first:], first + 1)])
     if not len(values) or np.any(np.diff(values[:, 0]) < 0):
-        raise NetlistError(f"{path.name}: the times must rise.")
+        raise NetlistError(f"{path.name}: the times must increase.")
     columns = [RecordedVariable(name, unit) for name, unit in zip(names, units or ["1"] * len(names), strict=True)]
     model = RecordedModel(path.stem, tuple(columns[1:]), (), {})
     return RecordedSolution(model, values[:, 0], values[:, 1:].T, np.empty((0, len(values))), 0.0)

@@ -153,7 +153,9 @@ class _Run:
     def _enter(self, name: str) -> None:
         if name in self.open:
             chain = " needs ".join([*self.open[self.open.index(name) :], name])
-            raise CyclicAssembly(f"Values need each other in a circle: {chain}.", advice="Give one of them a value.")
+            raise CyclicAssembly(
+                f"Values depend on each other in a circle: {chain}.", advice="Give one of them a value."
+            )
         self.open.append(name)
 
     def checked(self, name: str) -> CheckedResult:
@@ -179,7 +181,7 @@ class _Run:
             reason = (
                 str(error) if isinstance(error, ValueError) else "it divides by zero or leaves the range of numbers."
             )
-            raise NetlistError(f"{where} cannot be worked out: {reason}") from None
+            raise NetlistError(f"{where} cannot be computed:  {reason}") from None
         limits = self._each(name, "limits", lambda line, value: self._limit(result, line, value, where))
         published = self._each(
             name, "published", lambda line, value: self._on_line(result, line, value, f"{where}.published")
@@ -205,7 +207,7 @@ class _Run:
     def _limit(self, result: Any, name: str, value: Any, where: str) -> tuple[Any, Any]:
         if not isinstance(value, dict) or not value or set(value) - {"min", "max"}:
             raise NetlistError(
-                f"{where}.limits.{name} must say min or max.", advice='Write { max = "100 N.m" } or { min = 1.5 }.'
+                f"{where}.limits.{name} must have min or max.", advice='Write { max = "100 N.m" } or { min = 1.5 }.'
             )
         place = f"{where}.limits"
         smallest, largest = (
@@ -219,7 +221,7 @@ class _Run:
         if name not in known:
             raise UnknownName(f"{where}: the result has no line '{name}'{did_you_mean(name, known) or '.'}")
         if isinstance(value, list) or isinstance(getattr(result, name), str | bool | tuple):
-            raise NetlistError(f"{where}.{name} compares one number with a line that is a number.")
+            raise NetlistError(f"{where}.{name} needs a line with a number, and a number to compare it with.")
         return self.converter.quantity(unit_of_line(result, name), value, f"{where}.{name}")
 
 
@@ -236,7 +238,7 @@ def _line(result: Any, rest: str, path: str) -> Value:
         if match.group(2):
             value = _element(value, int(match.group(2)), path)
     if isinstance(value, str | bool | tuple):
-        raise NetlistError(f"'{path}' is no number.")
+        raise NetlistError(f"'{path}' is not a number.")
     return Value(value, unit_of_line(owner, last))
 
 

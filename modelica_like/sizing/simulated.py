@@ -88,9 +88,7 @@ class Simulations:
     def _unit(self, run: Solution, path: str) -> str:
         if path not in run.names:
             raise UnknownName(f"{run.model.name} has no variable '{path}'{did_you_mean(path, run.names) or '.'}")
-        from modelica_like.solve.plot import unit_of
-
-        return unit_of(run, path)
+        return run.unit_of(path)
 
     def _run(self, table: Mapping[str, Any]) -> Solution:
         values = table.get("set", {})

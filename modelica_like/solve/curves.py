@@ -10,10 +10,10 @@ import numpy as np
 
 from modelica_like.compile.compiled import Vector
 from modelica_like.errors import UnknownName, ValueOutOfRange
-from modelica_like.solve.plot import fitting, plot_curves, unit_of
 from modelica_like.solve.ranges import ranges
 from modelica_like.solve.recorder import Event
-from modelica_like.solve.trajectories import Trajectories
+from modelica_like.solve.style import COLOURS, picture, with_unit
+from modelica_like.solve.trajectories import Trajectories, fitting
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 _Rows = np.ndarray[Any, np.dtype[np.intp]]
 _Marks = np.ndarray[Any, np.dtype[np.bool_]]
 
+_MOST_CURVES = 4
 _SAME_TIME = 1e-9
 _SAME_INSTANT = 1e-8
 """Time within which a mode that is left again counts as passed through."""
@@ -106,8 +107,30 @@ class Curves:
         return grid.times, _difference(self.first, self.second, signal, grid)
 
     def plot(self, *patterns: str) -> Figure:
-        """Draw both over each other, and their difference below; by default the signals that deviate most."""
-        return plot_curves(self, patterns)
+        """Draw signals of both, and below each the difference relative to its range.
+
+        Args:
+            patterns: of the signals; by default those that deviate most.
+
+        Raises:
+            UnknownName: nothing fits a pattern.
+        """
+        names = [row.signal for row in self.deviations]
+        names = fitting(names, patterns, "Neither has a signal") if patterns else names[:_MOST_CURVES]
+        first, second, count = self.first, self.second, len(names)
+        with picture("", 2 * count, 0.8 + 2.6 * count, height_ratios=[2.0, 1.0] * count) as (figure, rows):
+            for name, upper, lower in zip(names, rows[::2], rows[1::2], strict=True):
+                upper.plot(first.time, first[name], color=COLOURS[0], label=self.labels[0])
+                upper.plot(second.time, second[name], "--", color=COLOURS[1], label=self.labels[1])
+                upper.set_ylabel(with_unit(name, self[name].unit))
+                scale = self[name].largest / self[name].relative if self[name].relative else 1.0
+                times, difference = self.difference(name)
+                lower.plot(times, difference / scale, color="#444444", linewidth=1.0)
+                lower.set_ylabel("difference\n/ range")
+            rows[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)
+            rows[-1].set_xlabel("time in s")
+            figure.align_ylabels(rows)
+        return figure
 
 
 def compare_solutions(
@@ -238,4 +261,4 @@ def _deviation(first: Trajectories, second: Trajectories, name: str, grid: _Grid
     difference = np.where(np.isnan(difference), np.inf, difference)
     k = int(np.argmax(difference))
     largest = float(difference[k])
-    return Deviation(name, unit_of(first, name), largest, largest / scale, float(grid.times[k]))
+    return Deviation(name, first.unit_of(name), largest, largest / scale, float(grid.times[k]))

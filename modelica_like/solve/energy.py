@@ -13,6 +13,7 @@ from modelica_like.initialize import Impact
 from modelica_like.solve.options import Options
 from modelica_like.solve.powers import POWERS, Powers, Results, results
 from modelica_like.solve.recorder import Event, Segment
+from modelica_like.upper import upper
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -114,9 +115,7 @@ class EnergyBalance:
 
     def sankey(self, title: str = "") -> Figure:
         """Draw where the energy came from and where it went."""
-        from modelica_like.solve.sankey import sankey
-
-        return sankey(self, title)
+        return upper("sankey")(self, title)
 
     @property
     def closure(self) -> float:
@@ -144,7 +143,7 @@ class EnergyBalance:
             if row.gain:
                 told.append(f"{name} has a negative loss, {-row.gain:.6g} W at {row.gain_time:.9g} s.")
         if self.at_events > _ROUNDING * self.throughput:
-            told.append(f"At an event {self.at_events:.6g} J appear or vanish that no impact and no reset explains.")
+            told.append(f"At an event {self.at_events:.6g} J appear or vanish without an impact or a reset.")
         if self.tolerance and self.drift > _ADDED_UP * self.tolerance:
             worst = max(self.rows, key=lambda row: abs(row.drift))
             told.append(

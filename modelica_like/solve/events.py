@@ -202,7 +202,7 @@ class EventLoop:
             return False
         self._failures = 0
         self.record.notices.append(
-            f"At {self.now.t:.9g} s the integrator gave up; from there its tolerance is {self.integrator.rtol:g} "
+            f"At {self.now.t:.9g} s the integrator gave up; from there on its tolerance is {self.integrator.rtol:g} "
             f"instead of {self.options.rtol:g}."
         )
         return True

@@ -20,15 +20,15 @@ from modelica_like.solve.options import Options
 _FLAGS = {
     "IDA_TOO_MUCH_WORK": "it took too many steps",
     "IDA_TOO_MUCH_ACC": "the tolerance is too small for the arithmetic",
-    "IDA_ERR_FAIL": "its error test failed again and again, or the step became too small",
+    "IDA_ERR_FAIL": "its error test failed repeatedly, or the step became too small",
     "IDA_CONV_FAIL": "the nonlinear equations of a step did not converge",
-    "IDA_LSETUP_FAIL": "the Jacobian could not be factorised",
+    "IDA_LSETUP_FAIL": "the Jacobian could not be factorized",
     "IDA_LSOLVE_FAIL": "the linear system of a step could not be solved",
     "IDA_RES_FAIL": "the equations could not be evaluated",
     "IDA_REP_RES_ERR": "the equations gave values that are not finite",
     "IDA_NO_RECOVERY": "no consistent start of the segment was found",
     "IDA_CONSTR_FAIL": "a constraint was violated",
-    "IDA_ILL_INPUT": "an input was not acceptable to it",
+    "IDA_ILL_INPUT": "an input was invalid",
 }
 
 _FIRST_STEP = 1e-5

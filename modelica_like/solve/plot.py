@@ -4,31 +4,25 @@ from __future__ import annotations
 
 import io
 from collections.abc import Mapping, Sequence
-from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from modelica_like.errors import NetlistError, UnknownName, did_you_mean
+from modelica_like.errors import NetlistError
 from modelica_like.solve.display import QUANTITIES, Display
+from modelica_like.solve.recorder import Event
 from modelica_like.solve.style import COLOURS, picture, with_unit
+from modelica_like.solve.trajectories import Trajectories, matching
 from modelica_like.writing import check_writable, write_bytes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from modelica_like.compile.compiled import CompiledDae
-    from modelica_like.solve.curves import Curves
-    from modelica_like.solve.recorded import RecordedModel
-    from modelica_like.solve.recorder import Event
-    from modelica_like.solve.trajectories import Trajectories
-
 _USUAL = ("rad/s", "N.m", "m/s", "N")
 _MOST = 6
 _MOST_EVENTS = 40
-_MOST_CURVES = 4
 
 
 def plot(
@@ -57,34 +51,6 @@ def plot(
         _mark_events(rows, solution.events)
         rows[-1].set_xlabel("time in s")
         rows[-1].set_xlim(solution.time[0], solution.time[-1])
-    return figure
-
-
-def plot_curves(curves: Curves, patterns: Sequence[str] = ()) -> Figure:
-    """Draw signals of both, and below each the difference relative to its range.
-
-    Args:
-        curves: two trajectories.
-        patterns: of the signals; by default those that deviate most.
-
-    Raises:
-        UnknownName: nothing fits a pattern.
-    """
-    names = [row.signal for row in curves.deviations]
-    names = fitting(names, patterns, "Neither has a signal") if patterns else names[:_MOST_CURVES]
-    first, second = curves.first, curves.second
-    with picture("", 2 * len(names), 0.8 + 2.6 * len(names), height_ratios=[2.0, 1.0] * len(names)) as (figure, rows):
-        for name, upper, lower in zip(names, rows[::2], rows[1::2], strict=True):
-            upper.plot(first.time, first[name], color=COLOURS[0], label=curves.labels[0])
-            upper.plot(second.time, second[name], "--", color=COLOURS[1], label=curves.labels[1])
-            upper.set_ylabel(with_unit(name, curves[name].unit))
-            scale = curves[name].largest / curves[name].relative if curves[name].relative else 1.0
-            times, difference = curves.difference(name)
-            lower.plot(times, difference / scale, color="#444444", linewidth=1.0)
-            lower.set_ylabel("difference\n/ range")
-        rows[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)
-        rows[-1].set_xlabel("time in s")
-        figure.align_ylabels(rows)
     return figure
 
 
@@ -131,30 +97,6 @@ def chosen(solution: Trajectories, patterns: Sequence[str]) -> list[str]:
     return matching(solution.model, patterns) if patterns else _usual(solution)
 
 
-def matching(model: CompiledDae | RecordedModel, patterns: Sequence[str]) -> list[str]:
-    """Return the variables and modes of a model that fit patterns, before it is run.
-
-    Raises:
-        UnknownName: nothing fits a pattern.
-    """
-    return fitting((*model.position, *model.discrete_position), patterns, f"{model.name} has no variable")
-
-
-def fitting(known: Sequence[str], patterns: Sequence[str], missing: str) -> list[str]:
-    """Return the names that fit patterns; `missing` is what to say before a pattern that none fits.
-
-    Raises:
-        UnknownName: nothing fits a pattern.
-    """
-    names: dict[str, None] = {}
-    for pattern in patterns:
-        some = [name for name in known if name == pattern or fnmatchcase(name, pattern)]
-        if not some:
-            raise UnknownName(f"{missing} '{pattern}'{did_you_mean(pattern, known) or '.'}")
-        names.update(dict.fromkeys(some))
-    return list(names)
-
-
 def _usual(solution: Trajectories) -> list[str]:
     """Choose speeds, torques and forces of parts; curves that coincide are drawn once, and those at rest not at all."""
     names: list[str] = []
@@ -167,14 +109,6 @@ def _usual(solution: Trajectories) -> list[str]:
                 curves.setdefault(np.round(values / scale, 6).tobytes() + f"{scale:.6g}".encode(), path)
         names += list(curves.values())[:_MOST]
     return names
-
-
-def unit_of(solution: Trajectories, name: str) -> str:
-    """Return the coherent SI unit of a variable; that of a mode is `1`."""
-    model = solution.model
-    if name in model.position:
-        return str(model.flat_variables[model.position[name]].unit)
-    return str(model.flat_discretes[model.discrete_position[name]].unit)
 
 
 def quantity(unit: str) -> str:

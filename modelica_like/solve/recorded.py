@@ -137,8 +137,8 @@ class RecordedSolution(Trajectories):
         """
         if not self.model.components:
             raise MissingValue(
-                f"{self.model.name} tells no energies.",
-                why="None of its variables is called ….stored_energy, ….loss_power or ….source_power.",
+                f"{self.model.name} has no energies.",
+                why="It has no variables ….stored_energy, ….loss_power or ….source_power.",
             )
         rows = tuple(self._energy_row(component) for component in self.model.components)
         throughput = max(

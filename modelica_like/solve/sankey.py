@@ -6,13 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from modelica_like.solve.energy import EnergyBalance
 from modelica_like.solve.style import picture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-    from modelica_like.solve.energy import EnergyBalance
 
 _BROUGHT, _STORED, _HEAT, _TAKEN = "#0072b2", "#009e73", "#d55e00", "#56b4e9"
 _GAP = 0.035

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from fnmatch import fnmatchcase
 from typing import TYPE_CHECKING, Any
 
 from modelica_like.compile.compiled import Vector
-from modelica_like.errors import NetlistError, ValueOutOfRange, missing_extra
+from modelica_like.errors import NetlistError, UnknownName, ValueOutOfRange, did_you_mean, missing_extra
 from modelica_like.initialize import Point
 from modelica_like.language.expr import Symbol
 from modelica_like.language.mode import BoundMode
 from modelica_like.solve.recorder import Event
+from modelica_like.upper import upper
 
 if TYPE_CHECKING:
     import pandas
@@ -33,7 +35,7 @@ class Statistics:
         evaluations: evaluations of the equations.
         integrations: calls of the integrator (panels and event locations).
         events: mode changes.
-        seconds: wall time of initialisation and integration.
+        seconds: wall time of initialization and integration.
     """
 
     steps: int
@@ -125,6 +127,13 @@ class Trajectories(ABC):
         """Paths of all variables, modes and discrete values."""
         return (*self.model.position, *self.model.discrete_position)
 
+    def unit_of(self, name: str) -> str:
+        """Return the coherent SI unit of a variable; that of a mode is `1`."""
+        model = self.model
+        if name in model.position:
+            return str(model.flat_variables[model.position[name]].unit)
+        return str(model.flat_discretes[model.discrete_position[name]].unit)
+
     def together(self, *keys: str | Any) -> dict[str, Vector]:
         """Return several trajectories by path.
 
@@ -150,9 +159,7 @@ class Trajectories(ABC):
             UnknownName: nothing fits a pattern.
             UnitError: a variable cannot be shown in a unit.
         """
-        from modelica_like.solve.plot import plot
-
-        return plot(self, patterns, title=title, display=display)
+        return upper("plot")(self, patterns, title=title, display=display)
 
     def to_pandas(self) -> pandas.DataFrame:
         """Return a table with time as index and one column per variable.
@@ -191,3 +198,27 @@ def needs_equations(run: Trajectories) -> NetlistError:
         f"{run.model.name}: this needs the drive with its equations, not trajectories.",
         advice="Give the netlist, the component or the compiled model.",
     )
+
+
+def matching(model: Any, patterns: Sequence[str]) -> list[str]:
+    """Return the variables and modes of a model that fit patterns, before it is run.
+
+    Raises:
+        UnknownName: nothing fits a pattern.
+    """
+    return fitting((*model.position, *model.discrete_position), patterns, f"{model.name} has no variable")
+
+
+def fitting(known: Sequence[str], patterns: Sequence[str], missing: str) -> list[str]:
+    """Return the names that fit patterns; `missing` is what to say before a pattern that none fits.
+
+    Raises:
+        UnknownName: nothing fits a pattern.
+    """
+    names: dict[str, None] = {}
+    for pattern in patterns:
+        some = [name for name in known if name == pattern or fnmatchcase(name, pattern)]
+        if not some:
+            raise UnknownName(f"{missing} '{pattern}'{did_you_mean(pattern, known) or '.'}")
+        names.update(dict.fromkeys(some))
+    return list(names)

@@ -96,8 +96,8 @@ class BlockSolver:
     def _not_square(self, columns: list[int]) -> StructureError:
         names = ", ".join(str(self.unknowns[column]) for column in columns[:6])
         return StructureError(
-            f"After index reduction the equations do not determine {names or 'anything more, but some are left'}.",
-            advice="Look for rigid parts that form a loop, or a part that only the derivative of an input could move.",
+            f"After index reduction the equations do not determine {names or 'all unknowns'}.",
+            advice="Look for rigid parts that form a loop, or a part whose motion needs the derivative of an input.",
         )
 
     def _solve(self, rows: tuple[int, ...], columns: tuple[int, ...]) -> None:

@@ -80,7 +80,7 @@ def _underdetermined(
     return Underdetermined(
         f"{system.model.name}: {equations} equations, {unknowns} unknowns. {where}",
         where=_places(origins),
-        advice=f"{missing} more equation{'s are' if missing > 1 else ' is'} needed: connect what is open, or fix it.",
+        advice=f"{missing} more equation{'s are' if missing > 1 else ' is'} needed: connect open ends, or fix them.",
     )
 
 
@@ -89,8 +89,8 @@ def _overdetermined(model: FlatModel, origins: list[Origin], over: list[str], un
     unknowns = f"{len(over)} unknown{'s' if len(over) != 1 else ''} ({_list(over) or 'none'})"
     what = f"{len(origins)} equations determine only {unknowns}: {_list(parts)}."
     if len(parts) == 1 and under:
-        why = f"On the other hand {_list(under)} lack{'s' if len(under) == 1 else ''} an equation."
-        advice = f"Look at the equations of {parts[0]}: is another variable meant in one of them?"
+        why = f"In addition, {_list(under)} lack{'s' if len(under) == 1 else ''} an equation."
+        advice = f"Check the equations of {parts[0]}: does one of them use the wrong variable?"
         return Overdetermined(what, where=_places(origins), why=why, advice=advice)
     return doubly_fixed(model, origins, what, "Two rigid parts fix the same {potential} or {flow}.")
 
@@ -117,7 +117,7 @@ def doubly_fixed(model: FlatModel, origins: Sequence[Origin], what: str, why: st
     if domain.reference and network and not any(_kind(model, path) == domain.reference for path in network):
         where = [model.components[path].place_of() for path in network][:_SHOWN]
         what = f"The network of {_list(network)} has no {domain.reference}."
-        why = f"Every {domain.potential} in it counts from another one; none is zero."
+        why = f"Every {domain.potential} in it is relative to another one; none is zero."
         advice = f'Connect a part that is = "{domain.reference}" to it.'
     return Overdetermined(what.format(**words), where=where, why=why.format(**words), advice=advice)
 

@@ -150,7 +150,7 @@ def _check_input_rates(system: System) -> None:
             raise StructureError(
                 f"{system.levels[rate].name} is the derivative of the input {system.levels[level].name}, "
                 "which is not known.",
-                advice="Give the derivative as an input of its own, or filter the input before it prescribes a motion.",
+                advice="Give the derivative as a separate input, or filter the input before it prescribes a motion.",
             )
 
 
@@ -224,7 +224,7 @@ def _check_inputs(system: System, equations: Any, rows: list[int]) -> None:
             raise StructureError(
                 f"{origin.path or origin.kind}: the derivative of an input ({names}) would be needed.",
                 where=origin.source,
-                advice="Give the derivative as an input of its own, or filter the input before it prescribes a motion.",
+                advice="Give the derivative as a separate input, or filter the input before it prescribes a motion.",
             )
 
 

@@ -78,7 +78,7 @@ def _quantity(value: object, unit: Unit, name: str) -> tuple[float, Unit]:
         try:
             return float(value), unit
         except OverflowError:
-            raise ValueOutOfRange(f"{name} is larger than any number that computes.") from None
+            raise ValueOutOfRange(f"{name} is too large for a number.") from None
     return _foreign(value, unit, name)
 
 

@@ -201,7 +201,7 @@ class _Parser:
                 unit, divided = unit / self.factor(), True
             elif divided:
                 raise UnitError(
-                    f"'{self.text}' is ambiguous: put what stands after the '/' in parentheses, as in J/(kg.K)."
+                    f"'{self.text}' is ambiguous: put everything after the '/' in parentheses, as in J/(kg.K)."
                 )
             else:
                 unit = unit * self.factor()

@@ -72,7 +72,7 @@ def test_an_interrupted_sweep_records_nothing_false(processes: str, tmp_path: Pa
     result = command(tmp_path, "-c", PRESSED, "25", *words, *keep)
     assert result.returncode == 130, result.stderr
     told = re.fullmatch(
-        r"Interrupted\. (\d+) of 120 runs are in runs\.zarr: the same sweep goes on there\.\n", result.stderr
+        r"Interrupted\. (\d+) of 120 runs are in runs\.zarr: the same sweep resumes there\.\n", result.stderr
     )
     assert told is not None, result.stderr
     assert 25 <= int(told[1]) < 120

@@ -141,13 +141,13 @@ def test_lists_in_structural_fields_become_tuples():
 
 @pytest.mark.parametrize("name", ["R", "switch", "label_number"])
 def test_a_part_cannot_take_the_name_of_a_declaration(name):
-    with pytest.raises(DuplicateName, match="already the name of something else"):
+    with pytest.raises(DuplicateName, match="already in use"):
         setattr(Resistor(), name, Resistor())
 
 
 @pytest.mark.parametrize("name", ["equations", "find", "path", "fields"])
 def test_a_part_cannot_take_the_name_of_a_method(name):
-    with pytest.raises(DuplicateName, match="already the name of something else"):
+    with pytest.raises(DuplicateName, match="already in use"):
         setattr(Resistor(), name, Resistor())
 
 

@@ -447,7 +447,7 @@ def test_energy_that_appears_at_an_event_is_noticed() -> None:
     balance = simulate(Sampled(x=0.0), 2.0).energy()
     assert balance.at_events == pytest.approx(8.0, rel=1e-12)
     assert balance[""].at_events == pytest.approx(8.0, rel=1e-12)
-    assert balance.notices == ("At an event 8 J appear or vanish that no impact and no reset explains.",)
+    assert balance.notices == ("At an event 8 J appear or vanish without an impact or a reset.",)
 
 
 def test_an_impact_explains_what_vanishes_and_is_lost() -> None:

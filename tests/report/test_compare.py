@@ -149,9 +149,9 @@ MESSAGES = {
         ("0,0", "1,1"),
         ("time,x", "0,0"),
         (),
-        "a.csv: a table begins with a line of names, of which the first is `time`.",
+        "a.csv: a table must begin with a line of names; the first one is `time`.",
     ),
-    "times that fall": (("time,x", "1,0", "0,1"), ("time,x", "0,0"), (), "a.csv: the times must rise."),
+    "times that fall": (("time,x", "1,0", "0,1"), ("time,x", "0,0"), (), "a.csv: the times must increase."),
     "a word": (("time,x", "0,0", "1,fast"), ("time,x", "0,0"), (), "a.csv:3: 'fast' is not a number."),
     "a value too many": (("time,x", "0,0", "1,1,1"), ("time,x", "0,0"), (), "a.csv:3: 3 values under 2 names."),
 }

@@ -39,6 +39,8 @@ CASES: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
              spindle_inertia=0.016, hub_inertia=0.004, spindle_speed=628.0, gear_input_inertia=0.014,
              gear_output_inertia=0.007), {}),
     "clutch_selection": (given(power=40.0, speed=139.6, rated_torque=0.6, service_factor=2.0), {}),
+    "clutch_heat": (given(work=4000.0, frequency=0.02, single_limit=20e3, transition_frequency=0.01, heat_capacity=90.0,
+                         conductance=3.0, air=293.15, hottest=450.0, wear_work=1e9), {}),
     "belt_geometry": (given(small_teeth=10.0, large_teeth=30.0, pitch=5.08e-3, belt_length=0.33), {}),
     "belt_forces": (given(pull=25.0, angle=2.85, friction=0.5, velocity=3.4, section=19e-6, density=1200.0), {}),
     "timing_belt_load": (given(pull=25.0, velocity=3.4, teeth_in_mesh=4.0, width=9.5e-3, tooth_height=1.27e-3,

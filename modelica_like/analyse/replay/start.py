@@ -1,4 +1,4 @@
-"""How start values depend on parameters: the start system, differentiated."""
+"""Derivatives of start values by parameters: the start system, differentiated."""
 
 from __future__ import annotations
 
@@ -35,13 +35,13 @@ def start_slopes(model: CompiledDae, point: Point, kind: StartKind) -> tuple[Vec
         for name in ("discrete_starts", "start_values")
     ]
     system = () if kind == "steady" else _start_system(model, plan, point)
-    # Of many parameters few have a part in the start: only their columns are followed.
+    # Few of many parameters influence the start: only their columns are computed.
     parts = [*jacobians, *system[1:2]]
     moved = sorted({column for one in parts for column in _columns(one)}) if system else list(range(size.fixed))
     starts, values = (np.asarray(one[:, moved].full()) for one in jacobians)
     states = np.zeros((size.x, len(moved)))
     if kind == "steady":
-        # What equilibrium leaves open keeps to its start value, or default.
+        # States that equilibrium does not determine keep their start values or defaults.
         for number, entry in enumerate(model.starts):
             if entry.strength == "default" and entry.state is not None:
                 states[entry.state[0]] = values[number] / entry.state[1]

@@ -25,7 +25,7 @@ def component_pages(folder: Path, examples: Path | None = None, types: Sequence[
 
     Args:
         folder: where the pages will be.
-        examples: folder of netlists that the pages name.
+        examples: folder of folder of netlists to link.
         types: names as in netlists; without any, all types of the installed libraries, with an index.
 
     Raises:

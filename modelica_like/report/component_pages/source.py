@@ -352,7 +352,7 @@ class _Reader(Writer):
         when = self.latex(options["when"]) if "when" in options else f"t = {self.latex(options['at'])}"
         reset, notice = options.get("reset", ast.Dict([], [])), options.get("notice", ast.Constant(""))
         reset = self.local.get(reset.id) if isinstance(reset, ast.Name) else reset
-        if not isinstance(reset, ast.Dict):
+        if not isinstance(reset, ast.Dict) or None in reset.keys:  # None stands for `**others`
             raise Unwritable
         pairs = zip(filter(None, reset.keys), reset.values, strict=True)
         resets = "; ".join(f"${self.latex(what)} := {self.latex(new)}$" for what, new in pairs)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from modelica_like.solve.plot import chosen, unit_of
+from modelica_like.solve.plot import chosen
 from modelica_like.solve.plot import quantity as quantity_of
 from modelica_like.solve.solution import Solution
 
@@ -31,7 +31,7 @@ def curves(run: Solution, patterns: Sequence[str] = ()) -> dict[str, Any]:
     rows = _thinned(run)
     panels: dict[str, dict[str, Any]] = {}
     for name, values in run.together(*names).items():
-        unit = unit_of(run, name)
+        unit = run.unit_of(name)
         panel = panels.setdefault(unit, {"title": quantity_of(unit), "unit": unit, "curves": []})
         panel["curves"].append({"name": name, "values": [float(f"{value:.6g}") for value in values[rows]]})
     return {

@@ -19,7 +19,8 @@ from modelica_like.language import Component
 from modelica_like.native.page import HELPERS
 from modelica_like.report.analysis import shares
 from modelica_like.report.page.curves import curves
-from modelica_like.report.run import notices, statistics_line
+from modelica_like.report.plausible import notes as plausible
+from modelica_like.report.run import notices, reasons, statistics_line
 from modelica_like.report.start import start_values
 from modelica_like.solve.energy import EnergyBalance
 from modelica_like.solve.recorder import Event
@@ -61,7 +62,7 @@ def report(drive: Component, run: Solution, *, show: Sequence[str] = ()) -> str:
     folder = Path(__file__).parent
     sections = [
         ("Schematic", f'<div class="wide">{schematic(drive, background=False)}</div>'),
-        ("What happens", _happens(run)),
+        ("What happens", _happens(drive, run)),
         ("Curves", '<div id="curves"></div><p class="hint">Move over a curve to read it, drag to zoom, double-click to '
                    "see all.</p>"),
         ("Energy", _attempt(lambda: _energy(run.energy()))),
@@ -100,27 +101,26 @@ def _table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     return f"<table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table>" if lines else ""
 
 
-def _happens(run: Solution) -> str:
+def _happens(drive: Component, run: Solution) -> str:
     """Events in words, those of one instant together, and what the run has to say."""
-    instants: dict[float, dict[str, list[Event]]] = {}
-    for event in run.events:
-        instants.setdefault(event.time, {}).setdefault(event.mode, []).append(event)
+    instants: dict[float, dict[str, list[tuple[Event, str]]]] = {}
+    for event, why in zip(run.events, reasons(run), strict=True):
+        instants.setdefault(event.time, {}).setdefault(event.mode, []).append((event, why))
     lines = [
         f"<li><b>{time:.6g} s</b> {'; '.join(escape(_told(run, events)) for events in modes.values())}.</li>"
         for time, modes in list(instants.items())[:_MOST_EVENTS]
     ]
     lines += [f"<li>… {len(instants) - _MOST_EVENTS} more instants</li>"] if len(instants) > _MOST_EVENTS else []
-    said = "".join(f'<p class="notice">{escape(sentence)}</p>' for sentence in notices(run))
+    said = "".join(f'<p class="notice">{escape(sentence)}</p>' for sentence in (*notices(run), *plausible(drive, run)))
     return said + (f"<ul>{''.join(lines)}</ul>" if lines else "<p>No mode changes.</p>")
 
 
-def _told(run: Solution, events: Sequence[Event]) -> str:
+def _told(run: Solution, events: Sequence[tuple[Event, str]]) -> str:
     """Return what becomes of a mode at an instant: `clutch becomes stuck (slip reached zero)`."""
-    component = events[0].mode.rpartition(".")[0] or run.model.name
-    known = run.model.transitions
-    reasons = dict.fromkeys("an impact" if one.transition < 0 else known[one.transition].because for one in events)
-    told = ", ".join(filter(None, reasons))
-    return f"{component} becomes {events[-1].after.replace('_', ' ')}" + (f" ({told})" if told else "")
+    last = events[-1][0]
+    component = last.mode.rpartition(".")[0] or run.model.name
+    told = ", ".join(dict.fromkeys(why for _, why in events))
+    return f"{component} becomes {last.after.replace('_', ' ')} ({told})"
 
 
 def _energy(balance: EnergyBalance) -> str:
