@@ -74,8 +74,8 @@ def sweep(
 
     Returns:
         A dataset over the parameters (a grid) or over `sample`: the outputs with their units, and `failure`, the
-        message of each failed run (empty for the others). Its attribute `solver` names the solver, `checked` is the number of
-        runs repeated by IDAS, and `notice` lists differences and the runs left to IDAS.
+        message of each failed run (empty for the others). Its attribute `solver` names the solver, `checked` is the
+        number of runs repeated by IDAS, and `notice` lists differences and the runs left to IDAS.
 
     Raises:
         UnknownName: a name is not known.
