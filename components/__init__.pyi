@@ -118,7 +118,6 @@ from components.planetary import IdealPlanetary as IdealPlanetary
 from components.planetary import LossyPlanetarySet as LossyPlanetarySet
 from components.planetary import PlanetarySet as PlanetarySet
 from components.point_to_point import KinematicPTP2 as KinematicPTP2
-from components.pulse_sensors import PulseSpeedSensor as PulseSpeedSensor
 from components.sampled import FrequencyMeter as FrequencyMeter
 from components.sampled import NormalNoise as NormalNoise
 from components.sampled import UniformNoise as UniformNoise
