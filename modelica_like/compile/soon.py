@@ -18,6 +18,11 @@ Guards are judged that much later, so that one that just left zero counts by its
 _JOINS: dict[int, Callable[[Any, Any], Any]] = {ca.OP_FMIN: ca.fmin, ca.OP_FMAX: ca.fmax}
 
 
+def time_resolution(t: float) -> float:
+    """Return the time resolution of events at a time, in s."""
+    return TIME_RESOLUTION * max(1.0, abs(t))
+
+
 def guards_soon(reduced: ReducedDae, guards: Any) -> Any:
     """Follow guards for one time resolution.
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from modelica_like.compile.compiled import Circuit, CompiledDae, Vector
 from modelica_like.compile.functions import ROUNDING
-from modelica_like.compile.soon import TIME_RESOLUTION
+from modelica_like.compile.soon import time_resolution
 from modelica_like.flatten.holds import TERMS
 from modelica_like.initialize.point import Point, call, solve_implicit, variable_slopes
 from modelica_like.language.hold import UNLIMITED
@@ -320,7 +320,7 @@ class Strike:
 
     def _unbearable(self, table: Any, impulses: dict[int, float], reactions: dict[int, float]) -> list[int]:
         """The motions whose reactions exceed what their elements can bear for an instant."""
-        instant = 10.0 * TIME_RESOLUTION * max(1.0, abs(self.point.t))
+        instant = 10.0 * time_resolution(self.point.t)
         scale = max((abs(one) for one in impulses.values()), default=0.0)
         found: list[int] = []
         for k, impulse in impulses.items():

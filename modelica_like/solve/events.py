@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, CompiledTransition, Vector
-from modelica_like.compile.soon import TIME_RESOLUTION
+from modelica_like.compile.soon import time_resolution
 from modelica_like.errors import StepFailed
 from modelica_like.initialize import Point
 from modelica_like.solve.between import Between
@@ -281,7 +281,7 @@ class EventLoop:
 
     def _look_behind(self, looks: Looks, cell: Cell, located: Located, late: list[int]) -> list[CompiledTransition]:
         """Go on by the time resolution; what is still positive there wants to fire, else the search begins anew."""
-        behind = located.point.t + TIME_RESOLUTION * max(1.0, abs(located.point.t))
+        behind = located.point.t + time_resolution(located.point.t)
         located.point, guards = looks.at(min(behind, cell.t + cell.width), cell)
         return [self.guards.state_events[g] for g in late if guards[0][g] > 0]
 

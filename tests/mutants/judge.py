@@ -175,29 +175,25 @@ def _limit(seconds: float) -> None:
 
 def forked(work: Callable[[int], int], seconds: float) -> Verdict:
     """Do some work in a child, which may write lines `number test`; its children end with it, at the latest in time."""
-    here, there = os.pipe()
-    child = os.fork()
-    if not child:
-        code = BROKEN
-        try:
-            os.setpgid(0, 0)
-            code = work(there)
-        finally:  # whatever happens, this process never comes back
-            os._exit(code)
-    os.close(there)
-    status, end = None, time.monotonic() + seconds
-    while status is None:
-        time.sleep(0.02)
-        done, told = os.waitpid(child, os.WNOHANG)
-        if done:
-            status = told
-        elif time.monotonic() > end:
-            os.kill(child, signal.SIGKILL)
-    with contextlib.suppress(ProcessLookupError):
-        os.killpg(child, signal.SIGKILL)
-    with os.fdopen(here, encoding="utf-8") as lines:
-        last = (["", *lines.read().splitlines()])[-1]
-    number, _, test = last.partition(" ")
+    with tempfile.TemporaryFile() as told:
+        child = os.fork()
+        if not child:
+            code = BROKEN
+            try:
+                os.setpgid(0, 0)
+                code = work(told.fileno())
+            finally:  # whatever happens, this process never comes back
+                os._exit(code)
+        done, end = 0, time.monotonic() + seconds
+        while not done:
+            time.sleep(0.02)
+            done, status = os.waitpid(child, os.WNOHANG)
+            if not done and time.monotonic() > end:
+                os.kill(child, signal.SIGKILL)
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(child, signal.SIGKILL)
+        told.seek(0)
+        number, _, test = ["", *told.read().decode().splitlines()][-1].partition(" ")
     return Verdict(os.waitstatus_to_exitcode(status), test, int(number or 0))
 
 

@@ -146,6 +146,23 @@ class Lines:
         found.texts = {file: (ROOT / file).read_text(encoding="utf-8") for file in files}
         return found
 
+    def update(self, newer: Lines) -> None:
+        """Take over what some files of tests run now, on the present texts."""
+        files = {test.partition("::")[0] for test in newer.seconds}
+        left = {test: time for test, time in self.seconds.items() if test.partition("::")[0] not in files}
+        self.seconds = left | newer.seconds
+        for file, text in newer.texts.items():
+            old, new = self.runs.get(file, {}), newer.runs.get(file, {})
+            before = _same_lines(self.texts.get(file, ""), text)
+            self.runs[file] = {
+                line: {test for test in old.get(before.get(line, 0), ()) if not test or test in left}
+                | new.get(line, set())
+                for line in before.keys() | new.keys()
+            }
+        for name in self.classes.keys() | newer.classes.keys():
+            self.classes[name] = self.classes[name] & left.keys() | newer.classes[name]
+        self.texts = newer.texts
+
     def tests(self, change: Change, text: str, declared: bool) -> dict[str, float]:
         """Tests that run a change, fastest first, with their times.
 

@@ -1,6 +1,7 @@
 """Small wrong changes of the product, one after the other: does a test that runs them fail?
 
     python tests/mutants/mutants.py --record             which test runs which line; once, and after greater changes
+    python tests/mutants/mutants.py --record tests/…     the same for files of tests that are new or changed
     python tests/mutants/mutants.py --sample 300         a random sample; `--seed 2` another one
     python tests/mutants/mutants.py --in solve/guards.py [--at 63]    all changes of a file, or of a line
     python tests/mutants/mutants.py --list …             only tells them
@@ -40,6 +41,7 @@ PICTURES = ("plot.py", "sankey.py", "style.py")
 """They draw; what they draw is looked at."""
 PAGES = "tests/report/test_component_pages.py::test_the_pages_are_current"
 """They tell defaults and limits."""
+_RECORD = "lines.pickle"
 
 
 def sources() -> list[str]:
@@ -65,35 +67,26 @@ def known(change: Change) -> bool:
     return any(about == f"{one['file']} {one['place']}: {one['change']}" for one in equivalents())
 
 
-def record(jobs: int) -> None:
-    """Run the tests and keep which line each of them runs."""
+def record(tests: list[str], jobs: int) -> None:
+    """Run all tests, or some files of them once more, and keep which line each of them runs."""
     CACHE.mkdir(parents=True, exist_ok=True)
-    for old in CACHE.iterdir():
+    for old in CACHE.glob("*.part"):
         old.unlink()
     paths = os.pathsep.join((str(ROOT), str(Path(__file__).parent)))
     told = {**os.environ, "PYTHONPATH": paths, "OPENBLAS_NUM_THREADS": "1", FILES: os.pathsep.join(sources())}
-    command = [
-        "-m",
-        "pytest",
-        "-q",
-        "-n",
-        str(jobs),
-        "-m",
-        "not slow",
-        "-p",
-        "lines",
-        "--ignore",
-        "tests/mutants",
-        "tests",
-    ]
-    subprocess.run([sys.executable, *command], cwd=ROOT, env=told, check=True)
-    (CACHE / "lines.pickle").write_bytes(pickle.dumps(Lines.merged(sorted(CACHE.glob("*.part")), sources())))
+    options = ["-q", "-n", str(jobs), "-m", "not slow", "-p", "lines", "--ignore", "tests/mutants"]
+    subprocess.run([sys.executable, "-m", "pytest", *options, *(tests or ["tests"])], cwd=ROOT, env=told, check=True)
+    found = Lines.merged(sorted(CACHE.glob("*.part")), sources())
+    if tests:
+        newer, found = found, recorded()
+        found.update(newer)
+    (CACHE / _RECORD).write_bytes(pickle.dumps(found))
 
 
 @cache
 def recorded() -> Lines:
     """What `--record` found."""
-    file = CACHE / "lines.pickle"
+    file = CACHE / _RECORD
     if not file.exists():
         raise SystemExit("Which test runs which line is not known yet: call this with --record.")
     return pickle.loads(file.read_bytes())
@@ -154,7 +147,7 @@ def _fine(test: str) -> bool:
 def main() -> None:
     """Try the changes that are asked for."""
     read = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    read.add_argument("--record", action="store_true")
+    read.add_argument("--record", nargs="*", metavar="TESTS")
     read.add_argument("--sample", type=int, default=0)
     read.add_argument("--seed", type=int, default=1)
     read.add_argument("--in", dest="inside", default="")
@@ -163,8 +156,8 @@ def main() -> None:
     read.add_argument("--jobs", type=int, default=os.cpu_count())
     read.add_argument("--longest", type=float, default=LONGEST, help="time of the processor for one change, in s")
     asked = read.parse_args()
-    if asked.record:
-        record(asked.jobs)
+    if asked.record is not None:
+        record(asked.record, asked.jobs)
         return
     found = [one for file in sources() if asked.inside in file for one in changes(ROOT, file) if wanted(one)]
     found = [one for one in found if not asked.at or one.line == asked.at]

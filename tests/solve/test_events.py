@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from modelica_like import Solution, simulate
+from modelica_like.compile.soon import time_resolution
 from modelica_like.errors import SolveError
 from modelica_like.language import (
     Component,
@@ -47,6 +48,10 @@ def story(run: Solution) -> list[tuple[str, str]]:
 
 def times(run: Solution) -> np.ndarray:
     return np.array([event.time for event in run.events])
+
+
+def test_events_are_as_sharp_as_the_numbers_of_time() -> None:
+    assert [time_resolution(t) for t in (-1e6, -0.5, 0.0, 2.0)] == pytest.approx([1e-4, 1e-10, 1e-10, 2e-10])
 
 
 # -- location --------------------------------------------------------------------------------------------------------
