@@ -26,6 +26,8 @@ ROOT = Path(__file__).parents[2]
 CACHE = ROOT / "build" / "mutants"
 FILES = "MUTANTS_FILES"
 """Environment variable of a recording run: what is looked at."""
+_IMPORT = "+"
+"""Begins the context of what the import of a file of tests runs; that of a fixture begins with @."""
 
 
 def cpu() -> float:
@@ -63,6 +65,15 @@ class Recorder:
         self.classes[item.nodeid] = {
             f"{base.__module__}.{base.__qualname__}" for kind in _used() for base in kind.__mro__
         }
+        return result
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_make_collect_report(self, collector: pytest.Collector) -> Iterator[Any]:
+        if not isinstance(collector, pytest.Module):
+            return (yield)
+        self.measured.switch_context(_IMPORT + collector.nodeid)
+        result = yield
+        self.measured.switch_context("")
         return result
 
     @pytest.hookimpl(wrapper=True)
@@ -108,7 +119,7 @@ class Lines:
 
     Attributes:
         seconds: time of the processor by test, with the fixtures it shares with others.
-        runs: tests by file and line.
+        runs: tests by file and line; with a + before it, a file of tests whose import runs the line.
         classes: tests by component class, derived ones included.
         texts: the files as they were.
     """
@@ -155,7 +166,11 @@ class Lines:
             old, new = self.runs.get(file, {}), newer.runs.get(file, {})
             before = _same_lines(self.texts.get(file, ""), text)
             self.runs[file] = {
-                line: {test for test in old.get(before.get(line, 0), ()) if not test or test in left}
+                line: {
+                    one
+                    for one in old.get(before.get(line, 0), ())
+                    if one in left or (one[:1] == _IMPORT and one[1:] not in files)
+                }
                 | new.get(line, set())
                 for line in before.keys() | new.keys()
             }
@@ -163,18 +178,26 @@ class Lines:
             self.classes[name] = self.classes[name] & left.keys() | newer.classes[name]
         self.texts = newer.texts
 
-    def tests(self, change: Change, text: str, declared: bool) -> dict[str, float]:
-        """Tests that run a change, fastest first, with their times.
+    def tests(self, change: Change, text: str) -> tuple[dict[str, float], dict[str, float]]:
+        """Tests that run a change, and tests whose file runs it when it is imported; fastest first, with their times.
 
         Args:
-            change: what is changed.
+            change: what is changed, in a function.
             text: the file without the change.
-            declared: it is executed at import; then tests of the class, or else of the file, are meant.
         """
-        found = set() if declared else self._of_statement(change, text)
-        if declared or "" in found:
-            found = self._of_class(change)
-        return {test: self.seconds[test] for test in sorted(found, key=lambda one: (self.seconds[one], one))}
+        found = self._of_statement(change, text)
+        files = {one.removeprefix(_IMPORT) for one in found if one.startswith(_IMPORT)}
+        return self._sorted(found), self._sorted(test for test in self.seconds if test.partition("::")[0] in files)
+
+    def users(self, change: Change) -> dict[str, float]:
+        """Tests that use the component class that a change is in, or else anything of its file."""
+        module = change.file.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
+        kind = self.classes.get(f"{module}.{change.place.split('.')[0]}")
+        return self._sorted(kind or set[str]().union(*self.runs.get(change.file, {}).values()))
+
+    def _sorted(self, tests: Iterable[str]) -> dict[str, float]:
+        known = [test for test in tests if test in self.seconds]
+        return {test: self.seconds[test] for test in sorted(known, key=lambda one: (self.seconds[one], one))}
 
     def _of_statement(self, change: Change, text: str) -> set[str]:
         """Tests that run the line, or else the statement that it is in (a compound one ends before its body), or else,
@@ -182,12 +205,7 @@ class Lines:
         first, last = _statement(text, change.line)
         runs, before = self.runs.get(change.file, {}), _same_lines(self.texts.get(change.file, ""), text)
         at = [runs.get(before[one], set()) for one in (change.line, *range(first, last + 1)) if one in before]
-        return (at[0] or set[str]().union(*at)) if at else {""}
-
-    def _of_class(self, change: Change) -> set[str]:
-        module = change.file.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
-        every = set[str]().union(*self.runs.get(change.file, {}).values()) - {""}
-        return self.classes.get(f"{module}.{change.place.split('.')[0]}", set()) or every
+        return (at[0] or set[str]().union(*at)) if at else set(self.users(change))
 
 
 @cache

@@ -31,7 +31,7 @@ from multiprocessing.util import Finalize
 from pathlib import Path
 
 from changes import Change, changes
-from judge import LONGEST, PASSED, Judge, Order, at_import
+from judge import LONGEST, PASSED, Judge, Order, Verdict, at_import
 from lines import CACHE, FILES, ROOT, Lines
 
 FOLDERS = ("components", *(f"modelica_like/{name}" for name in (
@@ -121,21 +121,30 @@ def tried(change: Change, longest: float) -> Tried:
     text = (ROOT / change.file).read_text(encoding="utf-8")
     if known(change) or change.applied(text) == text:
         return Tried(change, "equivalent", "")
-    declared = at_import(change, text)
-    tests = recorded().tests(change, text, declared)
-    if declared:
-        tests[PAGES] = recorded().seconds[PAGES]
-    begin, broken = time.monotonic(), 0
-    while True:
-        verdict = _judge.run(Order(tests, change, longest))
+    if at_import(change, text):
+        users = recorded().users(change)
+        orders = [Order({**users, PAGES: recorded().seconds[PAGES]}, change, longest, anew=True)]
+    else:
+        run, imported = recorded().tests(change, text)
+        orders = [Order(run, change, longest), Order(imported, change, longest, anew=True)]
+    begin, ran = time.monotonic(), 0
+    for order in orders:
+        verdict = _decided(order)
+        if verdict.code != PASSED:
+            return Tried(change, "killed", f"{verdict.test or 'import'}, {time.monotonic() - begin:.0f} s")
+        ran += verdict.ran
+    count = sum(len(order.tests) for order in orders)
+    return Tried(change, "survived", f"{ran} of {count} tests, {time.monotonic() - begin:.0f} s")
+
+
+def _decided(order: Order) -> Verdict:
+    """Run tests, again and again without those that fail anyway."""
+    while order.tests:
+        verdict = _judge.run(order)
         if verdict.code == PASSED or not verdict.test or _fine(verdict.test):
-            break
-        del tests[verdict.test]
-        broken += 1
-    seconds = f"{time.monotonic() - begin:.0f} s" + (f", {broken} fail anyway" if broken else "")
-    if verdict.code == PASSED:
-        return Tried(change, "survived", f"{verdict.ran} of {len(tests)} tests, {seconds}")
-    return Tried(change, "killed", f"{verdict.test or 'import'}, {seconds}")
+            return verdict
+        del order.tests[verdict.test]
+    return Verdict(PASSED)
 
 
 @cache
