@@ -164,9 +164,8 @@ def candidates(values: Vector, rates: Vector, active: Any, step: float) -> Itera
 
 
 def _nearly(g0: float, g1: float, r0: float, r1: float) -> bool:
-    """Whether the cubic through both ends with the given slopes comes near zero, by a bound, and then by samples."""
-    low = -_NEAR * (abs(g0) + abs(g1))
-    return r1 < -_NOISE and max(g0 + r0 / 3, g1 - r1 / 3) > low and float(np.max(_CUBIC @ [g0, r0, g1, r1])) > low
+    """Whether the cubic through both ends with the given slopes comes near zero, by samples."""
+    return r1 < -_NOISE and float(np.max(_CUBIC @ [g0, r0, g1, r1])) > -_NEAR * (abs(g0) + abs(g1))
 
 
 def _hermite(s: Vector) -> Vector:

@@ -280,7 +280,7 @@ class Integrator:
         reached = _reached(text) ** 2 if gentle else _reached(text) / (self._seconds or 1.0)
         moment = start.t + span * reached
         speed = np.abs(call(self.model, self.model.ode, start)) / self.weights(start.x)
-        worst = self.model.states[int(np.nanargmax(speed))] if np.any(np.isfinite(speed)) else self.model.states[0]
+        worst = self.model.states[int(np.argmax(np.nan_to_num(speed)))]
         return StepFailed(
             f"IDAS gave up at about t = {moment:.6g} s: {reason}{f' ({flag})' if flag else ''}.",
             why=f"{worst} changes fastest relative to its tolerance.",

@@ -15,9 +15,9 @@ nothing, with the reason.
 from __future__ import annotations
 
 import argparse
+import hashlib
 import os
 import pickle
-import random
 import re
 import subprocess
 import sys
@@ -42,6 +42,7 @@ PICTURES = ("plot.py", "sankey.py", "style.py")
 PAGES = "tests/report/test_component_pages.py::test_the_pages_are_current"
 """They tell defaults and limits."""
 _RECORD = "lines.pickle"
+_ANY_LINE = re.compile(r":\d+ ")
 
 
 def sources() -> list[str]:
@@ -63,8 +64,18 @@ def equivalents() -> list[dict[str, str]]:
 
 def known(change: Change) -> bool:
     """Is it listed as equivalent?"""
-    about = re.sub(r":\d+ ", " ", str(change), count=1)
+    about = _ANY_LINE.sub(" ", str(change), count=1)
     return any(about == f"{one['file']} {one['place']}: {one['change']}" for one in equivalents())
+
+
+def sample(found: list[Change], size: int, seed: int) -> list[Change]:
+    """Choose by hashes of what changes and where, so that another line in another file chooses no other sample."""
+    alike, order = Counter[str](), list[tuple[bytes, Change]]()
+    for one in found:
+        about = _ANY_LINE.sub(" ", str(one), count=1)
+        alike[about] += 1
+        order.append((hashlib.sha256(f"{seed} {about} {alike[about]}".encode()).digest(), one))
+    return [one for _, one in sorted(order, key=lambda entry: entry[0])[:size]]
 
 
 def record(tests: list[str], jobs: int) -> None:
@@ -72,7 +83,7 @@ def record(tests: list[str], jobs: int) -> None:
     CACHE.mkdir(parents=True, exist_ok=True)
     for old in CACHE.glob("*.part"):
         old.unlink()
-    paths = os.pathsep.join((str(ROOT), str(Path(__file__).parent)))
+    paths = os.pathsep.join((str(ROOT), str(Path(__file__).parent), os.environ.get("PYTHONPATH", "")))
     told = {**os.environ, "PYTHONPATH": paths, "OPENBLAS_NUM_THREADS": "1", FILES: os.pathsep.join(sources())}
     options = ["-q", "-n", str(jobs), "-m", "not slow", "-p", "lines", "--ignore", "tests/mutants"]
     subprocess.run([sys.executable, "-m", "pytest", *options, *(tests or ["tests"])], cwd=ROOT, env=told, check=True)
@@ -171,7 +182,7 @@ def main() -> None:
     found = [one for file in sources() if asked.inside in file for one in changes(ROOT, file) if wanted(one)]
     found = [one for one in found if not asked.at or one.line == asked.at]
     if asked.sample:
-        found = random.Random(asked.seed).sample(found, min(asked.sample, len(found)))
+        found = sample(found, asked.sample, asked.seed)
     if asked.list:
         sys.stdout.writelines(f"{one}\n" for one in found)
         return
