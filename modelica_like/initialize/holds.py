@@ -327,7 +327,7 @@ class Strike:
             own = self.model.holds[k]
             forward, backward = table[k, 1:3]
             capacity, sign = (forward, 1.0) if impulse > 0.0 else (backward, -1.0)
-            if capacity >= UNLIMITED or own.loose < 0:
+            if own.loose < 0:
                 continue
             margin = max(capacity - sign * reactions[k], 0.0) * instant
             if abs(impulse) > margin + _SAYS_NOTHING * scale:

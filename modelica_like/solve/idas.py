@@ -135,7 +135,7 @@ class Integrator:
 
     def _make(self, outputs: int, steps: int, gentle: bool, first: float) -> ca.Function:
         length = 1.0 if gentle or self._seconds is None else self._seconds
-        problem = dict(scaled_problem(self.model, gentle=gentle, scaled=gentle or self._seconds is None))
+        problem = dict(scaled_problem(self.model, gentle=gentle, scaled=self._seconds is None))
         del problem["inner"], problem["span"]
         grid = np.arange(1, outputs + 1) / outputs
         grid = (np.sqrt(grid) if gentle else grid * length).tolist()

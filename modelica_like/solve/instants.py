@@ -123,7 +123,7 @@ class Instants:
 
     def _share_anew(self, now: Point, wanting: list[CompiledTransition]) -> list[CompiledTransition]:
         """Before one of several that hold a motion gives way, let the others take more; what still wants to fire."""
-        if not any(now.d[one.first : one.first + len(one.members)].any() for one in self.model.circuits):
+        if not any(now.d[one.entries].any() for one in self.model.circuits):
             return wanting
         share(self.model, now)
         solve_implicit(self.model, now)

@@ -162,7 +162,7 @@ class _Finder:
 
     def _call(self, node: ast.Call) -> Iterator[tuple[int, int, str, int]]:
         name = node.func.id if isinstance(node.func, ast.Name) else getattr(node.func, "attr", "")
-        if name in ("param", "structural", "state", "variable"):
+        if name in ("param", "structural", "state", "variable", "connect"):  # a connection has no direction
             return
         _, end = self._span(node.func)
         if name in _CALLS:

@@ -84,6 +84,19 @@ def test_slopes_that_are_nothing_but_rounding_are_left_out() -> None:
     assert len(unknown) == 0
 
 
+def test_looks_may_be_left_out() -> None:
+    seen = looks(TIMES**2, 2 * TIMES)
+    assert seen.every(1) is seen
+    half = seen.every(2)
+    assert (half.count, half.width) == (4, 0.5)
+    np.testing.assert_array_equal(half.x[0], TIMES[::2] ** 2)
+    assert half.within(1) is None
+    few = seen.every(4).within(1)
+    assert few is not None
+    np.testing.assert_array_equal(few.times, TIMES[4:])
+    assert seen.intervals(np.array([2.0, 2.1, 2.26, 3.99, 4.0])).tolist() == [0, 0, 1, 7, 7]
+
+
 def test_a_kink_between_looks_is_noticed() -> None:
     values, slopes = np.maximum(TIMES - 2.9, 0.0), np.where(TIMES > 2.9, 1.0, 0.0)
     _, unknown = between(looks(values, slopes))
