@@ -54,7 +54,7 @@ def test_the_end_and_the_events() -> None:
 
 
 def test_energies_are_integrals_of_columns() -> None:
-    """Motor 20 + 8 J, brake 4 + 12 J, wheel 4 J more; what a component keeps or takes has come through its connectors."""
+    """Motor 20 + 8 J, brake 4 + 12 J, wheel 4 J more; what they keep or take has come through connectors."""
     balance = recorded(*COLUMNS).energy()
     assert (balance.source, balance.lost, balance.stored) == (28.0, 16.0, 4.0)
     assert {row.component: row.inflow for row in balance} == {"motor": -28.0, "brake": 16.0, "wheel": 4.0}
