@@ -3,8 +3,8 @@
 from importlib import import_module
 from typing import Any
 
-# Modules and their public names, each loaded when first used: a netlist needs few of them. For type checkers and
-# editors the same stands in `__init__.pyi`.
+# Modules and their public names, each loaded on first use: a netlist needs few of them. For type checkers and
+# editors, `__init__.pyi` has the same.
 _NAMES = {
     "absorbers": "CentrifugalPendulum TunedAbsorber",
     "actuators": "ElectromagneticActuator HydraulicActuator PneumaticActuator",
@@ -12,6 +12,7 @@ _NAMES = {
         "AngleToTorqueAdaptor CurrentToVoltageAdaptor ForceToPositionAdaptor HeatFlowToTemperatureAdaptor "
         "PositionToForceAdaptor TemperatureToHeatFlowAdaptor TorqueToAngleAdaptor VoltageToCurrentAdaptor"
     ),
+    "asynchronous_machines": "AsynchronousMachine AsynchronousMachineDQ",
     "batteries": "Battery",
     "belts": "TimingBelt",
     "bristle_friction": "LuGreFriction",
@@ -38,7 +39,7 @@ _NAMES = {
     "hoists": "HoldingBrake Rope WinchDrum",
     "inertias": "Inertia Mass",
     "interfaces": "Compliant CompliantWithRelativeStates Flange LinearFlange",
-    "linear_blocks": "Derivative SecondOrder TransferFunction",
+    "linear_blocks": "Derivative SecondOrder StateSpace TransferFunction",
     "linkages": "Cam FourBar SliderCrank",
     "loads": "SpeedDependentLoad",
     "lossy_gears": "ConstantEfficiencyGear LossyGear",
@@ -51,7 +52,6 @@ _NAMES = {
     "one_way": "Freewheel OneWayClutch TorqueLimiter",
     "planetary": "Differential IdealPlanetary LossyPlanetarySet PlanetarySet",
     "point_to_point": "KinematicPTP2",
-    "pulse_sensors": "PulseSpeedSensor",
     "sampled": "FrequencyMeter NormalNoise UniformNoise ZeroOrderHold",
     "screw_drives": "BallScrewDrive",
     "sensors": (
@@ -77,6 +77,7 @@ _NAMES = {
     ),
     "stepped_signals": "BooleanPulse BooleanStep BooleanTable StepTable",
     "switching": "Contactor Diode",
+    "synchronous_machines": "MappedDrive PMSynchronousDrive PMSynchronousMachine",
     "synchronisers": "Synchroniser",
     "thermal": (
         "FixedTemperature HeatPort HeatSource PrescribedHeatFlow PrescribedTemperature TemperatureSensor "

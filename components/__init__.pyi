@@ -11,6 +11,8 @@ from components.adaptors import PositionToForceAdaptor as PositionToForceAdaptor
 from components.adaptors import TemperatureToHeatFlowAdaptor as TemperatureToHeatFlowAdaptor
 from components.adaptors import TorqueToAngleAdaptor as TorqueToAngleAdaptor
 from components.adaptors import VoltageToCurrentAdaptor as VoltageToCurrentAdaptor
+from components.asynchronous_machines import AsynchronousMachine as AsynchronousMachine
+from components.asynchronous_machines import AsynchronousMachineDQ as AsynchronousMachineDQ
 from components.batteries import Battery as Battery
 from components.belts import TimingBelt as TimingBelt
 from components.bristle_friction import LuGreFriction as LuGreFriction
@@ -83,6 +85,7 @@ from components.interfaces import Flange as Flange
 from components.interfaces import LinearFlange as LinearFlange
 from components.linear_blocks import Derivative as Derivative
 from components.linear_blocks import SecondOrder as SecondOrder
+from components.linear_blocks import StateSpace as StateSpace
 from components.linear_blocks import TransferFunction as TransferFunction
 from components.linkages import Cam as Cam
 from components.linkages import FourBar as FourBar
@@ -115,7 +118,6 @@ from components.planetary import IdealPlanetary as IdealPlanetary
 from components.planetary import LossyPlanetarySet as LossyPlanetarySet
 from components.planetary import PlanetarySet as PlanetarySet
 from components.point_to_point import KinematicPTP2 as KinematicPTP2
-from components.pulse_sensors import PulseSpeedSensor as PulseSpeedSensor
 from components.sampled import FrequencyMeter as FrequencyMeter
 from components.sampled import NormalNoise as NormalNoise
 from components.sampled import UniformNoise as UniformNoise
@@ -188,6 +190,9 @@ from components.stepped_signals import StepTable as StepTable
 from components.switching import Contactor as Contactor
 from components.switching import Diode as Diode
 from components.synchronisers import Synchroniser as Synchroniser
+from components.synchronous_machines import MappedDrive as MappedDrive
+from components.synchronous_machines import PMSynchronousDrive as PMSynchronousDrive
+from components.synchronous_machines import PMSynchronousMachine as PMSynchronousMachine
 from components.thermal import FixedTemperature as FixedTemperature
 from components.thermal import HeatPort as HeatPort
 from components.thermal import HeatSource as HeatSource

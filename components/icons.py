@@ -1,4 +1,4 @@
-"""Symbols of the machine elements, as kinematic diagrams and circuit diagrams have them."""
+"""Symbols of the machine elements, as in kinematic diagrams and circuit diagrams."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def _rect(half_x: float, half_y: float, x: float = 0.0, y: float = 0.0) -> str:
 
 
 def _hatch(x: float, y: float, width: float, down: int = 1) -> str:
-    """A fixed edge with its strokes, drawn away from what it holds."""
+    """A fixed edge with its hatching."""
     strokes = " ".join(f"M{x + k:g} {y:g} l-4 {5 * down}" for k in range(4, int(width) + 1, 5))
     return f"M{x:g} {y:g} h{width:g} {strokes}"
 
@@ -275,3 +275,8 @@ CONTROL_PID = replace(block("", text="PID", key=("k",)), ports=_CONTROL)
 PATH = block("M-14 10 q8 0 12 -10 q4 -10 16 -10")
 SCHEDULE = block("M-14 11 h7 v-7 h7 v-7 h7 v-8 h7")
 DRIVER = block("M-12 8 a12 12 0 1 1 24 0 M-9 -2 h18 M0 -2 v10")
+ASYNCHRONOUS = replace(MOTOR, text="M 3~", lines="M24 0 h2", key=("tau_k",),
+                       ports={"flange": "E", "v": "W", "f": "N", "v_rel": "W"})  # fmt: skip
+SYNCHRONOUS = replace(MOTOR, text="MS", lines="M24 0 h2", ports={"flange": "E", "v_d": ("W", -10), "v_q": ("W", 10)})
+DRIVE = replace(MOTOR, text="MS", ports={"p_dc": ("W", -14), "n_dc": ("W", 14), "flange": "E", "tau_ref": "N"})
+STATE_SPACE = block("", text="A B")

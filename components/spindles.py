@@ -6,6 +6,7 @@ from math import pi
 
 from components import icons
 from components.friction import DryFriction
+from components.inertias import OnSlope
 from components.interfaces import Flange, LinearFlange
 from components.slides import SlideSticking
 from components.wheels import RotationToTranslation
@@ -28,7 +29,7 @@ class BallScrew(RotationToTranslation):
         return self.lead / (2 * pi)
 
 
-class MachineTable(SlideSticking, DryFriction):
+class MachineTable(SlideSticking, DryFriction, OnSlope):
     """Machine table on a slideway: a mass with a constant process force, and dry friction with stiction."""
 
     icon = icons.TABLE
@@ -58,10 +59,7 @@ class MachineTable(SlideSticking, DryFriction):
         yield a.s == self.s
         yield b.s == self.s
         yield der(self.s) == self.v
-        yield self.m * der(self.v) == a.f + b.f - self.f_load - self.f
-
-    def stored_energy(self) -> Expr:
-        return 0.5 * self.m * self.v**2
+        yield self.m * der(self.v) == a.f + b.f - self.f_load - self.f - self.weight
 
     def source_power(self) -> Expr:
         return -self.f_load * self.v

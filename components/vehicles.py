@@ -1,4 +1,4 @@
-"""Vehicles in one dimension, and what resists them."""
+"""Vehicles in one dimension, and their resistances."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class RollingResistance(Lossy, LinearOneFlange):
     weight: Parameter = param("N", "weight on the wheels", min=0)
     Cr: Input = signal_in("1", "rolling resistance coefficient", default=0.015)
     inclination: Input = signal_in("1", "rise of the road over its run", default=0.0)
-    v0: Parameter = param("m/s", "velocity from which on the sign is the full one", default=0.1, min=1e-12)
+    v0: Parameter = param("m/s", "velocity above which the sign is ±1", default=0.1, min=1e-12)
     reg: Literal["exp", "sine", "linear", "cosine"] = "exp"
     """Between -v0 and v0: tanh(50·v/v0) (`exp`), a quarter of a sine, a straight line, or one minus a cosine."""
     v: Variable = var("m/s", "velocity of the wheels")
@@ -56,7 +56,7 @@ class RoadLoad(Lossy, LinearOneFlange):
     F_0: Parameter = param("N", "resistance at standstill", min=0)
     F_1: Parameter = param("N.s/m", "part that grows with the velocity", default=0.0, min=0)
     F_2: Parameter = param("N.s2/m2", "part that grows with its square", default=0.0, min=0)
-    v0: Parameter = param("m/s", "velocity from which on the sign is the full one", default=0.1, min=1e-12)
+    v0: Parameter = param("m/s", "velocity above which the sign is ±1", default=0.1, min=1e-12)
     reg: Literal["exp", "sine", "linear", "cosine"] = "exp"
     """Between -v0 and v0: tanh(50·v/v0) (`exp`), a quarter of a sine, a straight line, or one minus a cosine."""
     v: Variable = var("m/s", "velocity")
@@ -92,7 +92,7 @@ class Vehicle(Supported):
     Cd: Parameter = param("1", "drag coefficient", default=0.5, min=0)
     rho: Parameter = param("kg/m3", "density of the air", default=1.2, min=0)
     g: Parameter = param("m/s2", "gravity", default=9.80665)
-    v0: Parameter = param("m/s", "velocity from which on it rolls with the full resistance", default=1e-3, min=1e-12)
+    v0: Parameter = param("m/s", "velocity above which the rolling resistance is full", default=1e-3, min=1e-12)
     Cr: Input = signal_in("1", "rolling resistance coefficient", default=0.015)
     inclination: Input = signal_in("1", "rise of the road over its run", default=0.0)
     v_wind: Input = signal_in("m/s", "velocity of the wind, positive from behind", default=0.0)

@@ -10,7 +10,7 @@ from modelica_like.language import Component, Equations, Expr, Parameter, param
 class RotationToTranslation(Component, partial=True):
     """Element that turns the angle of a shaft into the travel of a slide: s = travel·phi, without loss.
 
-    Angle and position count from the housings of the shaft and of the slide; these stand still unless something is
+    Angle and position count from the housings of the shaft and of the slide; which are at rest unless something is
     connected to them.
     """
 
