@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from components import icons
 from components.electrical import Pin
-from components.interfaces import Flange, Supported
+from components.rotors import Rotor
 from components.thermal import Conducting
 from modelica_like.language import (
     Equations,
@@ -25,7 +25,7 @@ _RPM = 0.10471975511965977
 _LINEAR_BELOW = 1e-3
 
 
-class DCMachine(Conducting, Supported, partial=True):
+class DCMachine(Conducting, Rotor, partial=True):
     """Linear DC machine: induced voltage k·flux·w, torque k·flux·i, with the flux relative to its nominal value.
 
     Armature: v = R·ia + v_brush + v_core, v_core = La·der(i) + k·flux·w, where ia - i flows through the conductance of
@@ -39,8 +39,7 @@ class DCMachine(Conducting, Supported, partial=True):
     icon = icons.MOTOR
     ap = Pin("positive armature terminal")
     an = Pin("negative armature terminal")
-    flange = Flange("shaft end")
-    inlet, outlet = "ap", "flange"
+    inlet = "ap"
     V_nominal: Parameter = param("V", "nominal voltage", default=100.0)
     I_nominal: Parameter = param("A", "nominal armature current", default=100.0)
     w_nominal: Parameter = param("rad/s", "nominal speed", default=1425 * _RPM, min=1e-12)
@@ -68,9 +67,6 @@ class DCMachine(Conducting, Supported, partial=True):
     v_core: Variable = var("V", "voltage at air gap and armature inductance")
     v_induced: Variable = var("V", "induced voltage")
     tau_electrical: Variable = var("N.m", "torque of the air gap on the rotor")
-    phi: Variable = var("rad", "angle of the rotor relative to the housing")
-    w: Variable = var("rad/s", "speed of the rotor relative to the housing")
-    w_rotor: Variable = var("rad/s", "speed of the rotor")
 
     # -- differences of the types --------------------------------------------------------------------------------
 
@@ -154,12 +150,7 @@ class DCMachine(Conducting, Supported, partial=True):
             yield self.La * der(self.i) == self.v_core - self.v_induced
         yield self.v_induced == constant * self.flux() * self.w
         yield self.tau_electrical == constant * self.flux() * self.i
-        yield self.phi == self.flange.phi - self.phi_support
-        yield der(self.phi) == self.w
-        yield self.w_rotor == der(self.flange.phi)
-        inner = self.tau_electrical - self.friction_torque() - self.stray_torque()
-        yield self.Jr * der(self.w_rotor) == inner + self.flange.tau
-        yield from self.support_torque(-inner)
+        yield from self.turning(self.Jr, self.tau_electrical - self.friction_torque() - self.stray_torque())
 
     def stored_energy(self) -> Expr:
         field = 0.0 if self.quasi_static else 0.5 * self.La * self.i**2 + self.excitation_energy()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from components import icons
-from components.interfaces import Flange
+from components.interfaces import Flange, Supported
 from components.thermal import Lossy
 from modelica_like.language import (
     Component,
@@ -102,10 +102,11 @@ class LossyPlanetarySet(Lossy, PlanetarySet):
         return self.tau_loss * self.w_rel
 
 
-class Differential(Component):
+class Differential(Supported):
     """Bevel gear differential: both wheels get half the torque, the cage turns with the mean of their speeds.
 
-    An `IdealPlanetary` with equal torque arms, behind the final drive of the given ratio.
+    An `IdealPlanetary` with equal torque arms, behind the final drive of the given ratio. All angles count from the
+    housing, which carries what the final drive changes of the torque.
     """
 
     icon = icons.DIFFERENTIAL
@@ -117,6 +118,8 @@ class Differential(Component):
 
     def equations(self) -> Equations:
         drive, left, right = self.flange, self.left, self.right
-        yield 2 * drive.phi == self.ratio * (left.phi + right.phi)
+        housing = self.phi_support
+        yield 2 * (drive.phi - housing) == self.ratio * (left.phi + right.phi - 2 * housing)
         yield left.tau == right.tau
         yield 2 * left.tau == -self.ratio * drive.tau
+        yield from self.support_torque(drive.tau + left.tau + right.tau)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from components import icons
 from components.friction import DryFriction, Rows, Sticking
+from components.inertias import OnSlope
 from components.interfaces import LinearCompliantWithRelativeStates, LinearFlange, SlideInHousing
 from components.tabulated import Tabulated
 from components.thermal import Lossy
@@ -189,7 +190,7 @@ class TranslationalBrake(Tabulated, SlideFriction):
         yield from self.leaving("mu_pos", absolute(self.v) / self.v_scale, self.mu_pos, self.f_normalized > 0)
 
 
-class MassWithStopAndFriction(SlideSticking, DryFriction):
+class MassWithStopAndFriction(SlideSticking, DryFriction, OnSlope):
     """Sliding mass between hard stops, with the friction of R. Stribeck.
 
     A mass that meets a stop rebounds with e times its speed; with e = 0 it comes to rest there at once, and its kinetic
@@ -200,7 +201,6 @@ class MassWithStopAndFriction(SlideSticking, DryFriction):
     icon = icons.TABLE
     flange_a = LinearFlange("left end", free=True)
     flange_b = LinearFlange("right end", free=True)
-    m: Parameter = param("kg", "mass", min=0)
     L: Parameter = param("m", "length of the mass", default=0.0, min=0)
     smin: Parameter = param("m", "position of the left stop, where flange_a meets it", default=-25.0)
     smax: Parameter = param("m", "position of the right stop, where flange_b meets it", default=25.0)
@@ -260,7 +260,7 @@ class MassWithStopAndFriction(SlideSticking, DryFriction):
         yield a.s == self.s - 0.5 * self.L
         yield b.s == self.s + 0.5 * self.L
         yield der(self.s) == self.v
-        yield self.m * der(self.v) == a.f + b.f - self.f
+        yield self.m * der(self.v) == a.f + b.f - self.f - self.weight
 
     def events(self) -> Events:
         mode, stop = self.mode, self.stop
@@ -281,6 +281,3 @@ class MassWithStopAndFriction(SlideSticking, DryFriction):
             "right", "none", when=all_of(negate(mode.is_("stuck")), self.v < 0), because="moves away from the stop"
         )
         yield from super().events()
-
-    def stored_energy(self) -> Expr:
-        return 0.5 * self.m * self.v**2

@@ -24,12 +24,16 @@ class RotationToTranslation(Component, partial=True):
         """Return the travel per angle in m/rad."""
         raise NotImplementedError
 
+    def pull(self) -> Expr:
+        """Return the force that its slide end takes from the shaft, against forward motion if negative."""
+        return self.flange_t.f
+
     def equations(self) -> Equations:
         shaft, slide = self.flange_r, self.flange_t
         phi = shaft.phi - self.support_r.phi if self.support_r.used else shaft.phi
         s = slide.s - self.support_t.s if self.support_t.used else slide.s
         yield s == self.travel() * phi
-        yield shaft.tau == -self.travel() * slide.f
+        yield shaft.tau == -self.travel() * self.pull()
         if self.support_r.used:
             yield self.support_r.tau == -shaft.tau
         if self.support_t.used:

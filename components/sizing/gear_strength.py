@@ -8,9 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from components.sizing.gear_geometry import INTERNAL_CORRECTION, INTERNAL_FORM, GearPair, tooth_form
-from components.sizing.maths import Number, cos, is_symbolic, maximum, minimum, sqrt, tan, where
+from components.sizing.maths import Number, cos, is_symbolic, maximum, minimum, require, sqrt, tan, where
 from modelica_like.language.quantities import Angle, Force, Ratio, Stress, Torque
 from modelica_like.language.results import Result, line
+
+_INCOMPLETE = "A gear pair needs a torque, a module, a width and a pinion with teeth; only the wheel's may be negative."
 
 
 @dataclass(frozen=True)
@@ -82,8 +84,9 @@ def gear_strength(
         required_root_safety: smallest S_F.
 
     Raises:
-        ValueError: the geometry of the teeth is impossible.
+        ValueError: the geometry of the teeth is impossible, or there is no torque.
     """
+    require(_INCOMPLETE, abs(torque) > 0, pair.module > 0, pair.face_width > 0, pair.pinion_teeth > 0)
     diameter, factors = pair.pitch_diameter(pair.pinion_teeth), application * dynamic * face_load * transverse_load
     force = 2 * abs(torque) / diameter
     zone, sharing, single = contact_factors(pair)

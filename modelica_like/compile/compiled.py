@@ -18,6 +18,7 @@ from modelica_like.flatten.model import FlatDiscrete, FlatParameter, FlatVariabl
 from modelica_like.flatten.template import TransitionForm
 from modelica_like.structure.holds import Circuit as Circuit
 from modelica_like.structure.holds import HeldMotion as HeldMotion
+from modelica_like.structure.motion import Motion
 from modelica_like.units import Unit, to_si
 from modelica_like.upper import upper
 
@@ -209,6 +210,13 @@ class CompiledDae:
     def arguments(self) -> dict[str, Any]:
         """Fresh symbols for the arguments of the functions."""
         return {name: ca.SX.sym(name, self.ode.size1_in(k)) for k, name in enumerate(self.ode.name_in())}
+
+    @property
+    def motion(self) -> Motion:
+        """How expressions of `arguments` change along the solution."""
+        given = self.arguments
+        ode, alg = (function(*given.values()) for function in (self.ode, self.alg))
+        return Motion(given["t"], given["x"], given["z"], ode, alg)
 
     @cached_property
     def rising(self) -> tuple[tuple[int, int], ...]:

@@ -59,7 +59,8 @@ class Line:
         paths: corners of each.
         dots: where three or more meet.
         arrows: tips at inputs, and the direction they point to.
-        ports: joined ports.
+        ports: what it joins.
+        tips: where it meets the symbols.
     """
 
     stroke: Stroke
@@ -67,6 +68,7 @@ class Line:
     dots: list[Point] = field(default_factory=list)
     arrows: list[tuple[Point, str]] = field(default_factory=list)
     ports: list[Port] = field(default_factory=list)
+    tips: dict[Port, Point] = field(default_factory=dict)
 
 
 @dataclass(eq=False)
@@ -158,6 +160,7 @@ def _fitted(made: Sheet) -> Sheet:
     for line in made.lines:
         line.paths = [[(x, y - top) for x, y in path] for path in line.paths]
         line.dots = [(x, y - top) for x, y in line.dots]
+        line.tips = {port: (x, y - top) for port, (x, y) in line.tips.items()}
         line.arrows = [((x, y - top), way) for (x, y), way in line.arrows]
     made.height = max(bottoms, default=0.0) - top
     return made
@@ -364,5 +367,6 @@ def _lead(part: Placed, room: tuple[float, float], lines: dict[Port, Line]) -> N
             px = x + port.along
             path = [(edge, exit_y), (px, exit_y), (px, y + (half_y if port.side == "S" else -half_y))]
         line.paths.append(path)
+        line.tips[port] = path[-1]
         if port.signal < 0 and not part.sheet and not part.node.border:
             line.arrows.append((path[-1], {"W": "E", "E": "W", "N": "S", "S": "N"}[port.side]))

@@ -24,7 +24,7 @@ from modelica_like.initialize.point import implicit_at as implicit_at
 from modelica_like.initialize.point import is_linear as is_linear
 from modelica_like.initialize.point import newton_at as newton_at
 from modelica_like.initialize.point import solve_implicit as solve_implicit
-from modelica_like.initialize.point import variable_slopes as variable_slopes
+from modelica_like.initialize.slopes import variable_slopes as variable_slopes
 from modelica_like.initialize.start import StartProblem
 from modelica_like.initialize.steady import check_modes_hold, modes_between, solve_steady
 

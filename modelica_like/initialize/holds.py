@@ -10,9 +10,10 @@ import numpy as np
 
 from modelica_like.compile.compiled import Circuit, CompiledDae, Vector
 from modelica_like.compile.functions import ROUNDING
-from modelica_like.compile.soon import TIME_RESOLUTION
+from modelica_like.compile.soon import time_resolution
 from modelica_like.flatten.holds import TERMS
-from modelica_like.initialize.point import Point, call, solve_implicit, variable_slopes
+from modelica_like.initialize.point import Point, call, solve_implicit
+from modelica_like.initialize.slopes import variable_slopes
 from modelica_like.language.hold import UNLIMITED
 
 _DEPENDENT = 1e-9
@@ -320,14 +321,14 @@ class Strike:
 
     def _unbearable(self, table: Any, impulses: dict[int, float], reactions: dict[int, float]) -> list[int]:
         """The motions whose reactions exceed the impulsive capacity of their elements."""
-        instant = 10.0 * TIME_RESOLUTION * max(1.0, abs(self.point.t))
+        instant = 10.0 * time_resolution(self.point.t)
         scale = max((abs(one) for one in impulses.values()), default=0.0)
         found: list[int] = []
         for k, impulse in impulses.items():
             own = self.model.holds[k]
             forward, backward = table[k, 1:3]
             capacity, sign = (forward, 1.0) if impulse > 0.0 else (backward, -1.0)
-            if capacity >= UNLIMITED or own.loose < 0:
+            if own.loose < 0:
                 continue
             margin = max(capacity - sign * reactions[k], 0.0) * instant
             if abs(impulse) > margin + _SAYS_NOTHING * scale:

@@ -11,6 +11,7 @@ from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import InitializationError
 from modelica_like.initialize.kept import RANK, Matrix, find_kept, solve_kept
 from modelica_like.initialize.point import Point, call
+from modelica_like.initialize.slopes import slopes
 
 _MAX_NEWTON = 50
 _STEADY = 1e-6
@@ -124,3 +125,23 @@ def check_modes_hold(model: CompiledDae, point: Point) -> None:
                 where=one.source,
                 advice=_NEAR,
             )
+
+
+def steady_change(model: CompiledDae, point: Point, theta: Vector, guess: Vector | None = None) -> Vector:
+    """Return how the states of a steady state change: the implicit function theorem.
+
+    Args:
+        model: the compiled model.
+        point: the steady state.
+        theta: changes of (p, u, d), shape (ntheta, columns).
+        guess: changes of the states that equilibrium does not determine, shape (nx, columns); none by default.
+    """
+    moving, rates = moving_states(model), slopes(model, point, "ode")
+    change = np.zeros((len(rates.x), theta.shape[1])) if guess is None else guess.copy()
+    inner = rates.x[np.ix_(moving, moving)]
+    kept = find_kept(model, point, moving, inner)
+    held = slopes(model, point, "variables", kept.held)
+    right = rates.theta[moving] @ theta + inner @ change[moving]
+    of_held = held.theta @ theta + held.x[:, moving] @ change[moving]
+    change[moving] += solve_kept(kept, inner, -right, -of_held)
+    return change

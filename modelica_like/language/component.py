@@ -41,7 +41,6 @@ class Component(Declared):
     _tables: ClassVar[dict[str, Rows]] = {}
     _given_tables: Mapping[str, Any] = {}
     _measured: Mapping[str, str] = {}
-    _own_fields: Mapping[str, Field] = {}
     _class_modes: ClassVar[dict[str, Mode]] = {}
 
     def __init_subclass__(cls, partial: bool = False, **options: Any) -> None:
@@ -124,11 +123,6 @@ class Component(Declared):
         return name in self._values or self.fields[name].default is not None
 
     # -- values ------------------------------------------------------------------------------------------------------
-
-    @property
-    def fields(self) -> dict[str, Field]:
-        """Declared fields, and those of this instance only."""
-        return {**self._class_fields, **self._own_fields} if self._own_fields else self._class_fields
 
     def give(self, name: str, value: Any) -> None:
         """Set a parameter, input, start value, start mode, structural field or replaceable part by name.

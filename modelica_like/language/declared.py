@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from copy import copy
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Self
 
 from modelica_like.errors import UnknownName, did_you_mean
-from modelica_like.language.expr import Expr
+from modelica_like.language.expr import Expr, Symbol, symbol_of
 from modelica_like.language.fields import Field
 from modelica_like.language.icon import Stroke
 
@@ -16,6 +17,7 @@ class Declared:
     """An object with declared fields, an owner and a name there."""
 
     _class_fields: ClassVar[dict[str, Field]] = {}
+    _own_fields: Mapping[str, Field] = {}
     _owner: Declared | None = None
     _name: str = ""
 
@@ -26,8 +28,26 @@ class Declared:
 
     @property
     def fields(self) -> dict[str, Field]:
-        """Declared parameters, variables, signals and discrete values, by name."""
-        return self._class_fields
+        """Declared parameters, variables, signals and discrete values, and those that this one alone has, by name."""
+        return {**self._class_fields, **self._own_fields} if self._own_fields else self._class_fields
+
+    def declare_array(self, name: str, size: int, field: Field) -> None:
+        """Declare variables or signals `name[1]` to `name[size]`, in `build`: structural fields say how many.
+
+        Args:
+            name: of all of them.
+            size: how many; what was declared under this name before is gone.
+            field: of each, such as `var("N.m", "torque")`.
+        """
+        kept = {key: one for key, one in self._own_fields.items() if not key.startswith(f"{name}[")}
+        for key in (f"{name}[{k}]" for k in range(1, size + 1)):
+            kept[key] = copy(field)
+            kept[key].owner, kept[key].name = type(self).__name__, key
+        self.__dict__["_own_fields"] = kept
+
+    def array(self, name: str) -> list[Symbol]:
+        """Return the variables or signals of an array."""
+        return [symbol_of(self, key) for key in self._own_fields if key.startswith(f"{name}[")]
 
     def is_constant(self, name: str) -> bool:
         """Return whether a field keeps its value between events."""

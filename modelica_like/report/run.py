@@ -62,7 +62,7 @@ def events_table(solution: Trajectories, *, debug: bool = False) -> Table:
 
 
 def reasons(solution: Trajectories) -> list[str]:
-    """Return in words why each of the events happened, parameters with their values."""
+    """Return in words why each of the events happened, parameters with their values; nothing where nobody knows."""
     known: dict[tuple[str, int], str] = {}
 
     def valued(path: str) -> str:
@@ -72,7 +72,8 @@ def reasons(solution: Trajectories) -> list[str]:
     for event in solution.events:
         key, (component, dot, _) = (event.mode, event.transition), event.mode.rpartition(".")
         if key not in known:
-            because = "an impact" if event.transition < 0 else solution.model.transitions[event.transition].because
+            by_itself = "an impact" if event.source.file else ""  # FMUs do not tell why
+            because = by_itself if event.transition < 0 else solution.model.transitions[event.transition].because
             known[key] = NAME_IN_NOTICE.sub(lambda name, owner=component + dot: valued(owner + name[1]), because)
     return [known[event.mode, event.transition] for event in solution.events]
 

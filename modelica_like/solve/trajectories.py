@@ -9,7 +9,7 @@ from fnmatch import fnmatchcase
 from typing import TYPE_CHECKING, Any
 
 from modelica_like.compile.compiled import Vector
-from modelica_like.errors import NetlistError, UnknownName, ValueOutOfRange, did_you_mean, missing_extra
+from modelica_like.errors import NetlistError, UnknownName, ValueOutOfRange, did_you_mean, extra_module
 from modelica_like.initialize import Point
 from modelica_like.language.expr import Symbol
 from modelica_like.language.mode import BoundMode
@@ -167,12 +167,8 @@ class Trajectories(ABC):
         Raises:
             MissingExtra: pandas is not installed.
         """
-        try:
-            import pandas
-        except ImportError:
-            raise missing_extra("pandas", "data") from None
-        columns = self.together(*self.names)
-        return pandas.DataFrame(columns, index=pandas.Index(self.time, name="time"))
+        pandas = extra_module("pandas", "data")
+        return pandas.DataFrame(self.together(*self.names), index=pandas.Index(self.time, name="time"))
 
     def to_xarray(self) -> xarray.Dataset:
         """Return a dataset over time, with units and descriptions as attributes.
@@ -180,16 +176,13 @@ class Trajectories(ABC):
         Raises:
             MissingExtra: xarray is not installed.
         """
-        try:
-            import xarray
-        except ImportError:
-            raise missing_extra("xarray", "data") from None
         info = {
             v.path: {"units": str(v.unit), "long_name": v.description}
             for v in (*self.model.flat_variables, *self.model.flat_discretes)
         }
         arrays = {name: ("time", values, info[name]) for name, values in self.together(*self.names).items()}
-        return xarray.Dataset(arrays, coords={"time": ("time", self.time, {"units": "s"})})
+        time = {"time": ("time", self.time, {"units": "s"})}
+        return extra_module("xarray", "data").Dataset(arrays, coords=time)
 
 
 def needs_equations(run: Trajectories) -> NetlistError:

@@ -14,6 +14,7 @@ from modelica_like.structure.blocks import Block, BlockSolver, Solved
 from modelica_like.structure.diagnose import check_solvable
 from modelica_like.structure.holds import Circuit, HeldMotion, add_approaches, find_circuits, share_reactions
 from modelica_like.structure.index import Pantelides, prefer_relative_states
+from modelica_like.structure.motion import Motion
 from modelica_like.structure.prescribed import Flags
 from modelica_like.structure.states import select_states
 from modelica_like.structure.system import System, build_system
@@ -81,13 +82,7 @@ class ReducedDae:
 
     def total_derivative(self, expressions: Any) -> Any:
         """Return the time derivative of expressions in x, z, p, d and t along the solution (inputs held)."""
-        time = self.flat.time
-        rates = ca.jtimes(expressions, self.x, self.ode) + ca.jtimes(expressions, time, ca.SX(1))
-        if self.z.numel() and ca.depends_on(expressions, self.z):
-            drift = ca.jtimes(self.alg, self.x, self.ode) + ca.jtimes(self.alg, time, ca.SX(1))
-            z_rates = -ca.solve(ca.densify(ca.jacobian(self.alg, self.z)), drift)
-            rates = rates + ca.jtimes(expressions, self.z, z_rates)
-        return rates
+        return Motion(self.flat.time, self.x, self.z, self.ode, self.alg).rate(expressions)
 
     def __repr__(self) -> str:
         return f"<{self}>"
@@ -174,15 +169,8 @@ def _top_slopes(system: System, counts: list[int]) -> list[dict[int, float]]:
     rows = [k for k, count in enumerate(counts) if count]
     if not rows:
         return slopes
-    model = system.model
-    symbols = system.everything
     # d e^(c) / d v^(d) equals d e / d v^(d - c), so the original equations are enough.
-    jacobian = ca.jacobian(system.residual[rows], symbols)
-    function = ca.Function("slopes", [symbols, model.p, model.d, model.time], [jacobian])
-    point = [0.3 + 0.61803398875 * (k % 7 + 1) for k in range(len(system.symbols))]
-    starts = [one.start if isinstance(one.start, int | float) else 0.0 for one in model.discretes]
-    starts += [0.0] * (model.d.numel() - len(starts))
-    values = function(point, [one.value for one in model.parameters], starts, 0.0)
+    values = system.generic(ca.jacobian(system.residual[rows], system.everything))
     for place, column, value in zip(*values.sparsity().get_triplet(), values.nonzeros(), strict=True):
         level = system.levels[column]
         row = rows[place]

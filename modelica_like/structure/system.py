@@ -71,6 +71,15 @@ class System:
         """The column of all symbols."""
         return self.column(list(range(len(self.symbols))))
 
+    def generic(self, expressions: Any) -> ca.DM:
+        """Return numbers at a point that is not special; parameters have their values, modes their starts."""
+        model = self.model
+        function = ca.Function("generic", [self.everything, model.p, model.d, model.time], [expressions])
+        point = [0.3 + 0.61803398875 * (k % 7 + 1) for k in range(len(self.symbols))]
+        starts = [one.start if isinstance(one.start, int | float) else 0.0 for one in model.discretes]
+        starts += [0.0] * (model.d.numel() - len(starts))
+        return function(point, [one.value for one in model.parameters], starts, 0.0)
+
     def add_level(self, chain: int) -> int:
         """Extend a chain by one derivative."""
         below = self.levels[self.chains[chain][-1]]
@@ -160,11 +169,14 @@ def _name_levels(model: FlatModel, levels: list[Level], node_level: list[tuple[i
         rank = (order, one.kind in ("potential", "flow"), factor != 1.0, -preference, one.path.count("."), node)
         if order == 0:
             levels[level].preference = max(levels[level].preference, preference)
+            # The name says nothing about the guess: any of them that has one knows more than zero.
+            levels[level].guess = levels[level].guess or one.guess / factor
         if level not in best or rank < best[level]:
             best[level] = rank
             levels[level].name = model.node_name(node)
             levels[level].nominal = one.nominal
-            levels[level].guess = one.guess / factor if order == 0 else 0.0
+            if order == 0 and one.guess:
+                levels[level].guess = one.guess / factor
 
 
 def _node_values(

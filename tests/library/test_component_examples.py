@@ -356,6 +356,23 @@ def waves(run: Solution) -> None:
 
 
 @numbers
+def hall_sensor(run: Solution) -> None:
+    """3950/60·t² magnets have come while the speed grows; whole pulses of every half second are shown after it."""
+    passed = [int(3950 / 60 * moment**2) for moment in (0, 0.5, 1, 1.5, 2)]
+    shown = [2 * pi * (passed[k + 1] - passed[k]) / (4 * 0.5) for k in range(4)]
+    assert [run.at(moment)["meter.y"] for moment in (0.3, 0.7, 1.3, 1.8, 2.1)] == close([0, *shown])
+
+
+@numbers
+def commutation(run: Solution) -> None:
+    half, voltage = pi / 4, 0.0467 * 4000 * pi / 30
+    square = (half / sin(half)) ** 2 * (0.5 + sin(2 * half) / (4 * half))
+    assert run.energy()["motor"].source == close(voltage**2 / 8 * square * 0.06)
+    induced = run["generator.v_induced"]
+    assert [np.max(induced), np.min(induced)] == close([voltage * half / sin(half), voltage * half / tan(half)])
+
+
+@numbers
 def limited_control(run: Solution) -> None:
     assert run.at(0.2)["ramp.y"] == close(50 * 0.2)
     assert run.at(0.39)["rotor.w"] - run.at(0.3)["rotor.w"] == close(0.09 * (4 - 2) / 0.1)
@@ -378,6 +395,8 @@ def filters(run: Solution) -> None:
         [quad(delayed, 0, 4)[0], quad(oscillating, 0, 4)[0], 0.5 * 8, 0]
     )
     assert 2 * run.at(2)["rotor[4].w"] == close(beyond)
+    # 3·8/((s + 2)·(s + 4)) is 3·(1 - 2·exp(-2 t) + exp(-4 t)) after a step.
+    assert 2 * run.final["rotor[5].w"] == close(3 * (4 - (1 - exp(-8)) + (1 - exp(-16)) / 4))
     assert run.at(1)["rate.y"] == close(0.5 * 4 * (1 - exp(-10)))
 
 
@@ -448,20 +467,32 @@ def driving_cycle(run: Solution) -> None:
 
 
 @numbers
-def hall_sensor(run: Solution) -> None:
-    """Pulses 4·phi/(2·pi) = 3950/60·t² while the speed grows; whole pulses of every half second are shown after it."""
-    passed = [int(3950 / 60 * moment**2) for moment in (0, 0.5, 1, 1.5, 2)]
-    shown = [2 * pi * (passed[k + 1] - passed[k]) / (4 * 0.5) for k in range(4)]
-    assert [run.at(moment)["sensor.w"] for moment in (0.3, 0.7, 1.3, 1.8, 2.1)] == close([0, *shown])
+def asynchronous_machines(run: Solution) -> None:
+    w_s = 2 * pi * 50 / 2
+    # Torque over slip is nearly a straight line there: 20 N·m = 2·tau_k·s·s_k/(s² + s_k²).
+    slip = 0.2 * (200 - sqrt(200**2 - 20**2)) / 20
+    assert run.final["fan.w"] == pytest.approx(w_s * (1 - slip), rel=1e-6)
+    impedance = (0.4 + 2j * pi * 50 * 2e-3, 2j * pi * 50 * 0.06, 2j * pi * 50 * 3e-3)
+
+    def torque(s: float) -> float:
+        rotor = impedance[2] + 0.3 / s
+        both = rotor * impedance[1] / (rotor + impedance[1])
+        return 1.5 * abs(320 / (impedance[0] + both) * both / rotor) ** 2 * 0.3 / s / w_s
+
+    assert torque(1 - run.final["pump.w"] / w_s) == pytest.approx(20, rel=1e-4)
 
 
 @numbers
-def commutation(run: Solution) -> None:
-    half, voltage = pi / 4, 0.0467 * 4000 * pi / 30
-    square = (half / sin(half)) ** 2 * (0.5 + sin(2 * half) / (4 * half))
-    assert run.energy()["motor"].source == close(voltage**2 / 8 * square * 0.06)
-    induced = run["generator.v_induced"]
-    assert [np.max(induced), np.min(induced)] == close([voltage * half / sin(half), voltage * half / tan(half)])
+def electric_drives(run: Solution) -> None:
+    assert run.final["axle.w"] == close(200 + 200 / 0.5 * (2 - 0.02 * (1 - exp(-2 / 0.02))))
+    assert -run.final["axle.w"] * 200 / 0.94 + run.final["pack.v"] * run.final["motor.i_dc"] == pytest.approx(
+        0, abs=1e-3
+    )
+    # Short-circuited at 100 rad/s: currents by Ohm's law, and a braking torque.
+    i_d, i_q = np.linalg.solve([[0.05, -400 * 3e-4], [400 * 3e-4, 0.05]], [0.0, -400 * 0.08])
+    assert [run.final["shorted.i_d"], run.final["shorted.i_q"]] == close([i_d, i_q])
+    assert run.final["spindle.w"] == pytest.approx(1200, rel=1e-6)
+    assert run.final["servo.i_d"] < -50
 
 
 def test_every_netlist_has_numbers_and_a_line_on_the_page() -> None:

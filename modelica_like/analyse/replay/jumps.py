@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from modelica_like.analyse.replay.holds import impact, projection, share_slopes
-from modelica_like.analyse.slopes import Sizes, slopes
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae, CompiledTransition, HeldMotion
 from modelica_like.errors import NoGradient
 from modelica_like.initialize import Point, Strike, call, holding, share, solve_implicit
+from modelica_like.initialize.slopes import Sizes, slopes
 from modelica_like.solve.recorder import Event
 
 _GRAZING = 1e-6
