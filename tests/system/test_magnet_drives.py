@@ -172,3 +172,29 @@ def test_every_engagement_heats_the_clutch(bench: Solution) -> None:
     warm = bench.at(2.5)["clutch.T"] - 293.15
     assert bench.at(3.9)["clutch.T"] - 293.15 == pytest.approx(warm * exp(-0.3 / 60 * 1.4), rel=1e-6)
     assert warm == pytest.approx(first / 60 * exp(-0.3 / 60 * (2.5 - 0.2)), rel=5e-3)
+
+
+def test_the_pages_have_these_numbers(run: Solution, bench: Solution) -> None:
+    pages = EXAMPLES.parent / "docs" / "examples"
+    tool, dc = ((pages / name).read_text(encoding="utf-8") for name in ("machine_tool_startup.md", "dc_bench.md"))
+    left = next(event.time for event in run.events if (event.mode, event.before) == ("coil.stop", "driven"))
+    slips = next(event.time for event in run.events if event.mode == "clutch.mode" and event.time > 3)
+    fine = simulate(EXAMPLES / "machine_tool_magnet.toml", "0.5 s", points=20_000)
+    torques = ", ".join(f"{-np.min(fine[f'{name}.tau']):.1f}" for name in ("shaft1", "shaft2", "clutch"))
+    for line in (
+        f"| the armature starts / ms | {1e3 * pull_in():.3f} |",
+        f"| it presses / ms | {1e3 * moment(run, 'coil.stop', 'driven'):.3f} |",
+        f"| the clutch locks / s | {moment(run, 'clutch.mode', 'stuck'):.5f} |",
+        f"| largest torque of shaft 1, shaft 2, clutch / N·m | {torques} |",
+        f"| switched off, it slips after / ms | {1e3 * (slips - 3):.2f} |",
+        f"| the armature lets go after / ms | {1e3 * (left - 3):.2f} |",
+        f"| the plates get warmer by / K | {np.max(run['clutch.T'][run.time < 1]) - OIL:.2f} |",
+    ):
+        assert line in tool
+    locked = next(event.time for event in bench.events if (event.mode, event.after) == ("clutch.mode", "stuck"))
+    for line in (
+        f"| clutch locks / s | {locked:.4f} |",
+        f"| friction work of one engagement / J | {bench.at(3.9)['clutch.W']:.2f} |",
+        f"| the plates get warmer by / K | {bench.at(1.9)['clutch.T'] - 293.15:.3f} |",
+    ):
+        assert line in dc
