@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from components import icons
-from components.interfaces import Flange, Supported
+from components.interfaces import Flange
+from components.rotors import Rotor
 from components.tabulated import Flat, Tabulated
 from modelica_like.language import (
     Equations,
@@ -26,18 +27,17 @@ from modelica_like.language import (
 )
 
 
-class CombustionEngine(Tabulated, Supported):
+class CombustionEngine(Tabulated, Rotor):
     """Engine whose torque is a map over speed and pedal, with drag, idle controller and rev limit.
 
     The torque of combustion is that of the map times 1 + Σ a·cos(order·phi + phase), the sum over the firing orders;
-    against it acts the drag, which is all that is left while the fuel is cut. A PI controller presses the pedal so far
-    that the speed does not fall below w_idle. Above w_max the fuel is cut until the speed has fallen by w_band, and
-    below w_stall the engine goes out, until something turns it faster than w_start.
+    the drag acts against it, alone while the fuel is cut. A PI controller presses the pedal to keep the speed above
+    w_idle. Above w_max the fuel is cut until the speed has fallen by w_band, and
+    below w_stall the engine stalls, until it is turned faster than w_start.
     """
 
     icon = icons.ENGINE
     flange = Flange("crankshaft", free=True)
-    outlet = "flange"
     pedal: Input = signal_in("1", "pedal, 0 to 1", default=0.0)
     speeds: Flat = rows(column("speed of a row", scale="w_scale", rising=True), flat=True)
     pedals: Flat = rows(column("pedal of a column", rising=True), flat=True)
@@ -59,9 +59,6 @@ class CombustionEngine(Tabulated, Supported):
     w_band: Parameter = param("rad/s", "by which the speed falls until it is given again", default=5.0, min=0)
     w_stall: Parameter = param("rad/s", "speed below which the engine goes out", default=0.0, min=0)
     w_start: Parameter = param("rad/s", "speed from which it runs again", default="1.2 * w_stall", min=0)
-    phi: Variable = var("rad", "angle of the crankshaft relative to the housing")
-    w: Variable = var("rad/s", "speed of the crankshaft relative to the housing")
-    w_rotor: Variable = var("rad/s", "speed of the crankshaft")
     idle: Variable = var("1", "integral of the idle controller", default=0.0)
     throttle: Variable = var("1", "pedal of driver or idle controller")
     tau_combustion: Variable = var("N.m", "torque of the combustion")
@@ -83,9 +80,6 @@ class CombustionEngine(Tabulated, Supported):
 
     def equations(self) -> Equations:
         yield from super().equations()
-        yield self.phi == self.flange.phi - self.phi_support
-        yield der(self.phi) == self.w
-        yield self.w_rotor == der(self.flange.phi)
         yield from self.idling()
         speed = self.w / self.w_scale
         mean = self.tau_scale * self.look_up_map(speed, self.speeds, self.throttle, self.pedals, self.torque)
@@ -93,9 +87,7 @@ class CombustionEngine(Tabulated, Supported):
         yield self.tau_combustion == self.fuel.choose(given=mean * firing, cut=0, out=0)
         turning = maximum(minimum(self.w / self.w_0, 1), -1)
         yield self.tau_drag == turning * self.tau_scale * self.look_up(absolute(speed), self.drag)
-        inner = self.tau_combustion - self.tau_drag
-        yield self.J * der(self.w_rotor) == inner + self.flange.tau
-        yield from self.support_torque(-inner)
+        yield from self.turning(self.J, self.tau_combustion - self.tau_drag)
 
     def events(self) -> Events:
         fuel, w = self.fuel, self.w

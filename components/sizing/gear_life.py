@@ -82,7 +82,7 @@ class LoadStage:
 
 
 class StageDamage(Result):
-    """What a step of a load spectrum takes of the life."""
+    """Share of the life used by a step of a load spectrum."""
 
     load: Ratio = line("torque over nominal torque")
     cycles: Ratio = line("load cycles of a tooth of the pinion")

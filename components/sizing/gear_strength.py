@@ -84,7 +84,7 @@ def gear_strength(
         required_root_safety: smallest S_F.
 
     Raises:
-        ValueError: there is no such pair, or it has no torque.
+        ValueError: the geometry of the teeth is impossible, or there is no torque.
     """
     require(_INCOMPLETE, abs(torque) > 0, pair.module > 0, pair.face_width > 0, pair.pinion_teeth > 0)
     diameter, factors = pair.pitch_diameter(pair.pinion_teeth), application * dynamic * face_load * transverse_load
@@ -127,7 +127,7 @@ def single_contact(pair: GearPair, ratio: Ratio, overlap: Ratio) -> Number:
     Args:
         pair: geometry.
         ratio: transverse contact ratio.
-        overlap: overlap ratio up to 1, from where on it has no influence; internal gears have none either.
+        overlap: overlap ratio, at most 1; no influence above it, or for internal gears.
     """
     tips = [
         pair.tip_over_base(pair.pinion_teeth, pair.pinion_shift),

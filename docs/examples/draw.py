@@ -37,6 +37,7 @@ PICTURES: dict[str, tuple[str, ...]] = {
         "selector.gear",
     ),
     "dc_bench": ("motor.w", "clutch_pulley.w", "flywheel.w", "motor.ia", "generator.v", "clutch.tau"),
+    "winch": ("motor.w", "load.v", "motor.ia", "rope.tension", "load.s"),
     "dc_bench_cycles": ("clutch_pulley.w", "flywheel.w", "coil.i", "coil.y", "clutch.T"),
     "machine_tool_magnet": ("coil.i", "coil.f", "clutch.tau", "J2.w", "J3.w", "clutch.T"),
     "dc_bench_speed_control": ("motor.w", "converter.v", "motor.ia", "sink.i", "clutch.tau"),

@@ -395,6 +395,8 @@ def filters(run: Solution) -> None:
         [quad(delayed, 0, 4)[0], quad(oscillating, 0, 4)[0], 0.5 * 8, 0]
     )
     assert 2 * run.at(2)["rotor[4].w"] == close(beyond)
+    # 3·8/((s + 2)·(s + 4)) is 3·(1 - 2·exp(-2 t) + exp(-4 t)) after a step.
+    assert 2 * run.final["rotor[5].w"] == close(3 * (4 - (1 - exp(-8)) + (1 - exp(-16)) / 4))
     assert run.at(1)["rate.y"] == close(0.5 * 4 * (1 - exp(-10)))
 
 
@@ -462,6 +464,35 @@ def driving_cycle(run: Solution) -> None:
     assert run.at(33)["engine.y"] == pytest.approx(120 + 2 * 15 + 0.4 * 15**2, rel=1e-3)
     assert np.max(np.abs(run["driver.v_ref"] - run["car.v"])) < 0.4
     assert np.max(run["driver.brake"]) == pytest.approx(1200 * 15 / 8 / 8000, rel=0.1)
+
+
+@numbers
+def asynchronous_machines(run: Solution) -> None:
+    w_s = 2 * pi * 50 / 2
+    # Torque over slip is nearly a straight line there: 20 N·m = 2·tau_k·s·s_k/(s² + s_k²).
+    slip = 0.2 * (200 - sqrt(200**2 - 20**2)) / 20
+    assert run.final["fan.w"] == pytest.approx(w_s * (1 - slip), rel=1e-6)
+    impedance = (0.4 + 2j * pi * 50 * 2e-3, 2j * pi * 50 * 0.06, 2j * pi * 50 * 3e-3)
+
+    def torque(s: float) -> float:
+        rotor = impedance[2] + 0.3 / s
+        both = rotor * impedance[1] / (rotor + impedance[1])
+        return 1.5 * abs(320 / (impedance[0] + both) * both / rotor) ** 2 * 0.3 / s / w_s
+
+    assert torque(1 - run.final["pump.w"] / w_s) == pytest.approx(20, rel=1e-4)
+
+
+@numbers
+def electric_drives(run: Solution) -> None:
+    assert run.final["axle.w"] == close(200 + 200 / 0.5 * (2 - 0.02 * (1 - exp(-2 / 0.02))))
+    assert -run.final["axle.w"] * 200 / 0.94 + run.final["pack.v"] * run.final["motor.i_dc"] == pytest.approx(
+        0, abs=1e-3
+    )
+    # Short-circuited at 100 rad/s: currents by Ohm's law, and a braking torque.
+    i_d, i_q = np.linalg.solve([[0.05, -400 * 3e-4], [400 * 3e-4, 0.05]], [0.0, -400 * 0.08])
+    assert [run.final["shorted.i_d"], run.final["shorted.i_q"]] == close([i_d, i_q])
+    assert run.final["spindle.w"] == pytest.approx(1200, rel=1e-6)
+    assert run.final["servo.i_d"] < -50
 
 
 def test_every_netlist_has_numbers_and_a_line_on_the_page() -> None:

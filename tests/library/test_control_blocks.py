@@ -26,6 +26,7 @@ from components import (
     SecondOrder,
     Sine,
     SlewRateLimiter,
+    StateSpace,
     Step,
     TransferFunction,
     UniformNoise,
@@ -224,3 +225,32 @@ def test_noise_is_uniform_or_normal() -> None:
     assert values.mean() == pytest.approx(2.0, abs=4 * 0.5 / 2000**0.5)
     assert values.std() == pytest.approx(0.5, abs=4 * 0.5 / 4000**0.5)
     assert log(np.mean((values - 2) ** 4)) == pytest.approx(log(3 * 0.5**4), abs=0.3)
+
+
+A, B, C = ((0.0, 1.0), (-4.0, -0.4)), ((0.0, 1.0), (2.0, 0.0)), ((1.0, 0.0), (1.0, 1.0), (0.0, 3.0))
+D = ((0.0, 0.5), (0.0, 0.0), (1.0, 0.0))
+
+
+@pytest.mark.parametrize("through", [D, None])
+def test_a_state_space(through: Any) -> None:
+    """Two signals, three outputs; one starts away from zero."""
+    block = StateSpace(A=A, B=B, C=C, time_scale=0.5, **({"D": through} if through else {}))
+    block.set("x[2]", 0.7)
+    parts = {"b": block, "one": Sine(f=0.4), "two": Ramp(height=2.0, duration=4.0)}
+    connect = {"1": ["one.y", "b.u[1]"], "2": ["two.y", "b.u[2]"]}
+    run = simulate(Assembly("d", parts=parts, connect=connect), 4.0, **TIGHT)
+    fine = np.linspace(0, 4, 40001)
+    signals = np.column_stack([np.sin(0.8 * pi * fine), fine / 2])
+    system = (2 * np.array(A), 2 * np.array(B), np.array(C), np.array(through or np.zeros((3, 2))))
+    reference = lsim(system, signals, fine, [0, 0.7])[1]
+    for k in range(3):
+        np.testing.assert_allclose(run[f"b.y[{k + 1}]"], np.interp(run.time, fine, reference[:, k]), atol=1e-6)
+
+
+@pytest.mark.parametrize(("name", "told"), [("A", "give 1 of 1"), ("B", "give 2 of 1"), ("D", "give 1 of 1")])
+def test_what_is_no_state_space(name: str, told: str) -> None:
+    values = {"A": A, "B": ((1.0,), (0.0,)), "C": ((1.0, 0.0),)} | {name: ((1.0, 2.0, 3.0),)}
+    if name == "B":
+        values["B"] = ((1.0,),)
+    with pytest.raises(ModelicaLikeError, match=told):
+        StateSpace(**values)
