@@ -86,10 +86,11 @@ def test_engaging(run: Solution) -> None:
     def locks(t: float, y: Any) -> float:
         return y[5] - y[4]
 
-    for event in (seated, moves, locks):
-        event.terminal, event.direction = True, 1
+    ends: Any
+    for ends in (seated, moves, locks):
+        ends.terminal, ends.direction = True, 1
     current = U / R * (1 - exp(-pull_in() * R * (1 + GAP / X0) / L))
-    options = {"method": "DOP853", "rtol": 1e-10, "atol": 1e-12}
+    options: dict[str, Any] = {"method": "DOP853", "rtol": 1e-10, "atol": 1e-12}
     flight = solve_ivp(armature, (pull_in(), 0.1), [current, 0, 0], events=seated, **options)
     assert moment(run, "coil.stop", "driven") == pytest.approx(flight.t[-1], abs=1e-7)
     idle = motor_speed - drag / h0
