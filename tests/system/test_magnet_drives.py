@@ -96,14 +96,10 @@ def test_engaging(run: Solution) -> None:
     idle = motor_speed - drag / h0
     # Residual torque heats the plates from the start.
     warm = OIL + drag * idle / G * (1 - exp(-G / C * flight.t[-1]))
-    # The armature's blow presses the plates: friction passes µ·R times its impulse on, with the mu_p of high pressure.
-    push = MASS * flight.y[2, -1] * radius * float(np.interp(idle, SLIPS, MU)) * fade(warm, FORCE)
-    after = idle - push / J2, push / J3
-    warm += push * (idle + after[0] - after[1]) / 2 / C
-    start = [flight.y[0, -1], drag / k0, idle, drag / k1, *after, drag / k2, 0, warm]
+    start = [flight.y[0, -1], drag / k0, idle, drag / k1, idle, 0, drag / k2, 0, warm]
     first = solve_ivp(engaging, (flight.t[-1], 1.0), start, args=(False,), max_step=1e-4,
                       events=lambda t, y, _: moves(t, y), **options)  # fmt: skip
-    when = brentq(lambda t: moves(t, np.array([np.interp(t, first.t, row) for row in first.y])), 0.0291, 0.0300)
+    when = brentq(lambda t: moves(t, np.array([np.interp(t, first.t, row) for row in first.y])), 0.0291, 0.0330)
     assert moment(run, "load.mode", "forward") == pytest.approx(when, abs=2e-6)
     state = [np.interp(when, first.t, row) for row in first.y]
     ends = lambda t, y, _: locks(t, y)  # noqa: E731
@@ -131,13 +127,10 @@ def test_disengaging(run: Solution) -> None:
 
 def test_heat_and_wear(run: Solution) -> None:
     early, late = run.at(1.0), run.at(2.9)
-    assert late["clutch.T"] - OIL == pytest.approx((early["clutch.T"] - OIL) * exp(-G / C * 1.9), rel=1e-6)
+    # The solver's tolerance counts for the temperature, not for its rise.
+    assert late["clutch.T"] == pytest.approx(OIL + (early["clutch.T"] - OIL) * exp(-G / C * 1.9), rel=1e-8)
     assert run.final["clutch.wear"] == pytest.approx(1e-15 * run.final["clutch.W"] / 0.245, rel=1e-9)
-    # The balance has what is lost over time; the friction of the armature's blow is 0.83 J more.
-    blow = moment(run, "coil.stop", "driven")
-    heat = run.at(blow + 1e-9)["clutch.W"] - run.at(blow - 1e-9)["clutch.W"]
-    assert run.final["clutch.W"] - heat == pytest.approx(run.energy()["clutch"].lost, rel=1e-6)
-    assert heat == pytest.approx(0.829, abs=1e-3)
+    assert run.final["clutch.W"] == pytest.approx(run.energy()["clutch"].lost, rel=1e-6)
 
 
 def test_cold_and_hot_oil() -> None:
