@@ -83,7 +83,7 @@ def test_wrong_calls_are_told(fmus):
     assert start(fmu.component, references(["clutch1.mode"]), 1) == 1
     assert "not of type Real" in said[-1]
     assert start(fmu.component, references(["clutch1.tau"]), 1) == 1
-    assert "Derivatives by clutch1.tau are not available" in said[-1]
+    assert "Derivatives with respect to clutch1.tau are not available" in said[-1]
     assert start(fmu.component, references(["J1.w"]), 1) == 0
     fmu.exitInitializationMode()
     assert read(fmu.component, references(["clutch1.mode"]), 1, room.ctypes.data) == 1

@@ -159,7 +159,7 @@ NOTHING(GetIntervalFraction, ANY_PHASE, "clocks", ((void)a, (void)b, (void)q), f
 #define REFUSED(name, why, unused, ...) CALL(name, ANY_PHASE, (unused, 1), fail(c, why), __VA_ARGS__)
 REFUSED(ActivateModelPartition, "This model has no scheduled execution.", ((void)k, (void)t), fmi3ValueReference k,
     fmi3Float64 t)
-#define SEE_DESCRIPTION "What a variable depends on is told by the description of the model."
+#define SEE_DESCRIPTION "The model description lists the dependencies of variables."
 REFUSED(GetNumberOfVariableDependencies, SEE_DESCRIPTION, ((void)v, (void)n), fmi3ValueReference v, size_t *n)
 REFUSED(GetVariableDependencies, SEE_DESCRIPTION, ((void)v, (void)a, (void)r, (void)b, (void)k, (void)n),
     fmi3ValueReference v, size_t a[], fmi3ValueReference r[], size_t b[], fmi3DependencyKind k[], size_t n)

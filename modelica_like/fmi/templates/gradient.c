@@ -160,7 +160,7 @@ static void check_shifts(Instance *c, Gradient *g) {
     for (int j = 0; j < g->n; j++) {
         if (!matters) g->tangents[j].shift = 0;
         else if (!isfinite(g->tangents[j].shift))
-            gradient_lose(c, "that event's guard only touches zero", g->tangents[j].by);
+            gradient_lose(c, "the guard of that event only touches zero", g->tangents[j].by);
     }
 }
 
@@ -172,7 +172,7 @@ int gradient_round(Instance *c, int round, unsigned char *wanting, int any) {
     if (g->passing && round < g->n_rounds) memcpy(wanting, g->rounds + n * (size_t)round, n);
     if (g->passing) return round < g->n_rounds;
     g->n_rounds = any ? round + 1 : round;
-    if (any && round >= MOST_ROUNDS) gradient_lose(c, "an event has too many rounds there", NULL);
+    if (any && round >= MOST_ROUNDS) gradient_lose(c, "that event has too many rounds", NULL);
     else if (any) memcpy(g->rounds + n * (size_t)round, wanting, n);
     return any;
 }
@@ -230,7 +230,7 @@ static void pass_tangents(Instance *c, Gradient *g, Result (*pass)(Instance *c))
     c->log = whole.log;
     c->noted = whole.noted;
     c->struck = whole.struck;
-    if (other != NULL) gradient_lose(c, "with a little more or less of it, other modes follow", other);
+    if (other != NULL) gradient_lose(c, "a small change of it leads to other modes there", other);
     evaluate_now(c, &c->model->tapes.rates, c->work.rhs);
     move_on(c, g, c->work.rhs, -1);
 }
@@ -301,7 +301,7 @@ static double *value_of(Instance *c, const Variable *v) {
 static Result begin(Instance *c, const uint32_t by[], size_t n) {
     if (allowed(c, "modelica_like_gradient_start", PHASE_INITIALIZATION) != RESULT_OK) return RESULT_ERROR;
     if (!c->co_simulation || c->model->settings->fixed_step > 0)
-        return fail(c, "Derivatives go along with Co-Simulation in steps as long as accuracy allows.");
+        return fail(c, "Derivatives of a run need Co-Simulation with adaptive steps.");
     if (by == NULL && n > 0) return fail(c, "The argument by is a null pointer.");
     if (check_knowns(c, by, n) != RESULT_OK) return RESULT_ERROR;
     gradient_end(c);
@@ -325,7 +325,7 @@ static Result read_gradient(Instance *c, const uint32_t of[], size_t n, double g
     if (g == NULL || of == NULL || gradient == NULL)
         return fail(c, "An argument is a null pointer, or modelica_like_gradient_start has not been called.");
     if (g->why != NULL)
-        return fail(c, "There are no derivatives by %s behind t = %.9g s: %s.", g->by, g->lost_at, g->why);
+        return fail(c, "There are no derivatives with respect to %s after t = %.9g s: %s.", g->by, g->lost_at, g->why);
     if (check_unknowns(c, of, n) != RESULT_OK || factor_implicit(c, c->work.order) != RESULT_OK) return RESULT_ERROR;
     for (int j = 0; j < g->n; j++) {
         load_tangent(c, &g->tangents[j], 1);

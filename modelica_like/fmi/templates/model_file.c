@@ -77,7 +77,7 @@ static Model *read_all(FILE *file, Allocate allocate, Release release, char *mes
     unsigned char *bytes = size > 0 && fseek(file, 0, SEEK_SET) == 0 ? allocate((size_t)size, 1) : NULL;
     Model *m = NULL;
     if (bytes == NULL) return REFUSE("The model file is empty, or there is not enough memory for it.");
-    if (fread(bytes, 1, (size_t)size, file) != (size_t)size) (void)REFUSE("The model file cannot be read to its end.");
+    if (fread(bytes, 1, (size_t)size, file) != (size_t)size) (void)REFUSE("The model file cannot be read completely.");
     else m = model_read(bytes, (size_t)size, allocate, release, message);
     if (m == NULL) release(bytes);
     else m->own = bytes;
@@ -89,9 +89,8 @@ Model *model_open(const char *location, Allocate allocate, Release release, char
     FILE *file;
     Model *m;
     if (location == NULL || *location == 0)
-        return REFUSE(
-            "The importer does not tell where the FMU's resources are, so its model cannot be read. Export it "
-            "with the model compiled in (--embed).");
+        return REFUSE("The importer does not say where the FMU's resources are, so its model cannot be read. Export it "
+                      "with the model compiled in (--embed).");
     if (!resource_path(location, ON_WINDOWS, path, sizeof path))
         return REFUSE("The location of the FMU's resources names no folder: '%.300s'.", location);
     file = open_file(path);

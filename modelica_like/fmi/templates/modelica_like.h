@@ -13,7 +13,8 @@
 #define EXPORTED __attribute__((visibility("default")))
 #endif
 
-/* In initialization mode: by what; n = 0: by nothing any more. A reset, or going back to a copy, ends the derivatives.
+/* In initialization mode: by what to differentiate; n = 0: by nothing. A reset, or going back to a copy, ends the
+ * derivatives.
  */
 EXPORTED int modelica_like_gradient_start(void *instance, const uint32_t by[], size_t n);
 

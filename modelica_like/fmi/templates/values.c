@@ -192,7 +192,7 @@ Result set_input_rate(Instance *c, uint32_t reference, int order, double rate) {
     const Variable *v = known_variable(c, reference, TYPE_FLOAT64);
     if (order != 1) return fail(c, "Inputs have derivatives of order 1 only.");
     if (v == NULL) return RESULT_ERROR;
-    if (v->kind != KIND_INPUT) return refuse_value(c, v, "it is no input, so it has no input derivative.");
+    if (v->kind != KIND_INPUT) return refuse_value(c, v, "it is not an input, so it has no input derivative.");
     if (!isfinite(rate)) return refuse_value(c, v, "the derivative is not a finite number.");
     if (c->u_rate[v->index] == rate) return RESULT_OK;
     touch_inputs(c);
