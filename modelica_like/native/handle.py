@@ -38,7 +38,7 @@ class Native:
         start: `given`, `rest` or `steady`; by default that of the netlist.
         rtol: relative tolerance.
         atol: absolute tolerance, in nominal values.
-        by: parameters, inputs that are held, and start values by which `gradient` differentiates.
+        by: parameters, inputs that are held, and start values; `gradient` differentiates with respect to them.
         fixed_step: step size in s, or a time such as "1 ms", for bounded work per step; steps and output intervals
             are whole numbers of it. By default the step size is adaptive.
 
@@ -115,11 +115,13 @@ class Native:
         return self.outputs
 
     def gradient(self) -> Vector:
-        """Derivatives of `outputs` now by what `by` names, through all events since the start: shape (outputs, by).
+        """Return the derivatives of `outputs` with respect to `by`, through all events since the start.
+
+        Returns:
+            Shape (outputs, by).
 
         Raises:
-            NoGradient: the run has none, since it passed an event where a small change leads to other modes, or since
-                it went back to a copy.
+            NoGradient: at an event a small change leads to other modes, or a copy was restored.
         """
         self._read(self._references[1], self.outputs)  # after events that come first
         found = np.zeros((len(self.outputs), self._by.size))
