@@ -31,7 +31,7 @@ _FINEST = 1e-12
 """What is integrated again is so much more precise than the run, but no more than this."""
 _NEAR = 8
 """Intervals that are integrated again as well rather than to start once more behind them."""
-_MORE, _LEAST, _DEEPEST = 4, 4, 6
+_MORE, _LEAST, _DEEPEST = 4, 4, 12
 """Finer results per interval, intervals for which there are so many at least, and how often that is done."""
 _FAILURES = 20
 """Failures of IDAS in a piece of a run from which the results have to do."""

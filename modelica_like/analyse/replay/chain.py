@@ -15,11 +15,12 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from modelica_like.analyse.replay.jumps import Coincidence, Jump, Work, event_time, make_jump
+from modelica_like.analyse.replay.jumps import Jump, Work, make_jump
 from modelica_like.analyse.replay.kinks import Kinks
 from modelica_like.analyse.replay.start import start_slopes
 from modelica_like.analyse.replay.step import CLOSE, Step, shortened, stuck, try_step
 from modelica_like.analyse.replay.steps import StepFunctions, Tolerances
+from modelica_like.analyse.replay.when import Coincidence, event_time
 from modelica_like.analyse.slopes import Sizes
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae
