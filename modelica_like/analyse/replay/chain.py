@@ -1,9 +1,9 @@
-"""A run once more, as a chain of smooth steps and jumps whose derivatives are exact, forward and adjoint.
+"""A run repeated as a chain of smooth steps and jumps with exact derivatives, forward and adjoint.
 
 The mode sequence of a solution is given. Each smooth segment is integrated again by collocation over its known
-interval, without looking for events; each event is a jump at its known time. Where the guard or the moment puts the
-event a little earlier or later, the states are carried there and back at the rates before and after (the saltation of
-M. A. Aizerman, F. R. Gantmakher, 1958), so the chain has the first derivatives of the run with its moving events.
+interval, without looking for events; each event is a jump at its known time. If the guard or the moment moves the
+event a little, the states are carried there and back at the rates before and after (the saltation of
+M. A. Aizerman, F. R. Gantmakher, 1958), so the chain has the first derivatives of the run with moving events.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from modelica_like.analyse.replay.start import start_slopes
 from modelica_like.analyse.replay.step import CLOSE, Step, shortened, stuck, try_step
 from modelica_like.analyse.replay.steps import StepFunctions, Tolerances
 from modelica_like.analyse.replay.when import Coincidence, event_time
-from modelica_like.analyse.slopes import Sizes
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import LanguageError
 from modelica_like.initialize import Point, StartKind, holding, initialize
+from modelica_like.initialize.slopes import Sizes
 from modelica_like.solve.recorder import Event, Segment
 from modelica_like.solve.solution import Solution
 
@@ -41,7 +41,7 @@ Move = Step | Jump
 
 @dataclass(frozen=True)
 class Reading:
-    """A number read off a replay, and how it depends on what is there.
+    """A number read off a replay, with its derivatives.
 
     Attributes:
         value: the number.
@@ -95,7 +95,7 @@ class Replay:
         return ((k, move) for k, move in enumerate(self.moves) if isinstance(move, Jump))
 
     def at(self, t: float) -> Point:
-        """Return the node at a time within the run; a step that it lies in becomes two.
+        """Return the node at a time within the run; it splits the step that contains the time.
 
         Raises:
             StepFailed: one of them did not converge.
@@ -109,7 +109,7 @@ class Replay:
         return self.split(k, made)
 
     def split(self, k: int, first: Step) -> Point:
-        """Let step k be two, with a given first one; return the node between them.
+        """Split step k, with a given first part; return the node between the parts.
 
         Raises:
             StepFailed: the second one did not converge.
@@ -200,10 +200,10 @@ def replay(
     Args:
         solution: the run.
         quadratures: what to integrate along it, an SX column in the model's `arguments`.
-        name: tells these quadratures from others in the model's cache.
-        start: kind of start of the run; by default what the netlist says.
+        name: identifies these quadratures in the model's cache.
+        start: kind of start of the run; by default that of the netlist.
         stops: times that are to be nodes, in s.
-        tolerances: how precisely.
+        tolerances: of the steps.
 
     Raises:
         NoGradient: an event of the run has no derivative.
@@ -213,7 +213,7 @@ def replay(
     model = solution.model
     if not model.states:
         raise LanguageError(
-            f"{model.name} has no states: nothing develops over time, so there is no run to differentiate.",
+            f"{model.name} has no states, so there is no run to differentiate.",
             advice="Compare runs with other parameter values instead.",
         )
     integrands = ca.SX(0, 1) if quadratures is None else quadratures
@@ -240,7 +240,7 @@ class _Maker:
             self.events[event.segment].append(event)
 
     def start(self, kind: StartKind) -> None:
-        """The first node, and how it depends on parameters."""
+        """The first node and its derivatives by the parameters."""
         size = Sizes.of(self.model)
         t0 = float(self.solution.segments[0].times[0])
         point = initialize(self.model, t0, kind) if self.events[0] else self.solution.segments[0].start
@@ -274,9 +274,9 @@ class _Maker:
         self.h = _FIRST * min(self.h, self.span)
 
     def _relocate(self, late: float) -> bool:
-        """End the segment just before its event, if it does not yet: behind it, slopes can be different ones.
+        """End the segment just before its event, because slopes can differ behind it.
 
-        What is left of the shift spoils derivatives by its product with the rates of the fastest motion.
+        The remaining shift times the rates of the fastest motion is an error of the derivatives.
         """
         last, small = self.chain.moves[-1] if self.chain.moves else None, CLOSE * max(1.0, abs(self.chain.nodes[-1].t))
         if late == 0.0 or 0.0 < late <= 2.0 * small or not isinstance(last, Step):
@@ -336,7 +336,7 @@ class _Maker:
         return step
 
     def _passed(self, step: Step, begin: Vector) -> tuple[int, tuple[float, float]] | None:
-        """Which kink lies behind the step at the first of its stages, how far in, and its function there."""
+        """Which kink is passed at the first of the step's stages, how far in, and its function there."""
         for point in [*step.inside(), step.after]:
             values = self.kinks.at(point)
             passed = np.flatnonzero(self.kinks.passed(begin, values))

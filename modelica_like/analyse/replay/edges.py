@@ -1,4 +1,4 @@
-"""Edges: parameter values at which a run has other derivatives on one side than on the other."""
+"""Edges: parameter values at which the derivatives of a run differ on both sides."""
 
 from __future__ import annotations
 
@@ -13,26 +13,26 @@ from numpy.typing import NDArray
 from modelica_like.analyse.replay.chain import Reading, Replay
 from modelica_like.analyse.replay.holds import impact
 from modelica_like.analyse.replay.jumps import Jump
-from modelica_like.analyse.slopes import Sizes, slopes
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae, CompiledTransition
 from modelica_like.errors import NoGradient
 from modelica_like.initialize import Point, call, holding, share, solve_implicit, variable_slopes
+from modelica_like.initialize.slopes import Sizes, slopes
 from modelica_like.solve.guards import Guards
 
 _STILL = 1e-7
-"""Values of a guard, relative to its largest one, that may be zero; and to what a parameter changes, that are."""
+"""A guard is possibly zero below this share of its largest value, and zero below this share of a parameter's effect."""
 _ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
 class Edge:
-    """Where a run may be on an edge: it is, if the reading changes with a parameter.
+    """A possible edge of a run: it is one if the reading changes with a parameter.
 
     Attributes:
         reading: what is zero on the edge.
-        least: change per relative change of a parameter up to which it is rounding.
-        error: what to say.
+        least: change per relative change of a parameter that counts as rounding.
+        error: the error for the user.
         matters: whether what is asked for is another one on the other side.
     """
 
@@ -42,7 +42,7 @@ class Edge:
     matters: Callable[[], bool] = lambda: True
 
     def moved_by(self, changes: Vector) -> NDArray[np.bool_]:
-        """Return which parameters lead away from the edge, so that there is no derivative by them.
+        """Return which parameters lead away from the edge; derivatives by these do not exist.
 
         Args:
             changes: changes of the reading per relative change of each parameter, shape (parameters,).
@@ -55,7 +55,7 @@ def edges(chain: Replay, readings: Sequence[Reading]) -> list[Edge]:
 
     Args:
         chain: the run.
-        readings: what is asked for; it may depend on the times of jumps.
+        readings: the requested ones, which may depend on the times of jumps.
     """
     timed = {id(node) for one in readings for node, _ in one.parts}
     chances = [(chain.nodes[0], one) for one in chain.chances]
@@ -67,12 +67,12 @@ def edges(chain: Replay, readings: Sequence[Reading]) -> list[Edge]:
 
 
 def _ties(chain: Replay, readings: Sequence[Reading]) -> list[Edge]:
-    """Guards that are zero all along a segment, without firing: torque that is just what friction can bear."""
+    """Guards that are zero all along a segment without firing: a torque that equals the friction limit."""
     model = chain.model
     guards, found = Guards(model), list[Edge]()
     if not guards.count:
         return found
-    # Those that may not fire are -1.
+    # Guards that cannot fire are -1.
     values, rates = np.array([guards.at(node)[:2] for node in chain.nodes]).transpose(1, 0, 2)
     near = _STILL * np.maximum(1.0, np.abs(values).max(axis=0))
     still_at = (np.abs(values) <= near) & (np.abs(rates) * (chain.nodes[-1].t - chain.nodes[0].t) <= near)
@@ -80,7 +80,7 @@ def _ties(chain: Replay, readings: Sequence[Reading]) -> list[Edge]:
     for last in [*(k for k, _ in chain.jumps), len(chain.nodes) - 1]:
         still = np.all(still_at[first : last + 1], axis=0)
         if isinstance(move := chain.moves[last] if last < len(chain.moves) else None, Jump):
-            # What fires at the end of the segment was on its way.
+            # A guard that fires at the end of the segment was approaching zero.
             fired = [model.transitions[one.transition] for one in move.events if one.transition >= 0 and not one.round]
             still[[guards.positions[id(one)] for one in fired if not one.timed]] = False
         if chain.nodes[last].t > chain.nodes[first].t:
@@ -90,7 +90,7 @@ def _ties(chain: Replay, readings: Sequence[Reading]) -> list[Edge]:
         for still, group in groupby(segments, lambda one, k=k: bool(one[2][k])):
             if still and (those := list(group)):
                 found.append(_tie(chain, readings, event, those[0][0], those[-1][1]))
-    # What fires just at the end of the run does so only on one side.
+    # A guard that fires exactly at the end of the run fires on one side only.
     last = len(chain.nodes) - 1
     fires = (np.abs(values[last]) <= near) & ~still_at[last] & (rates[last] > 0.0)
     return found + [_tie(chain, readings, guards.state_events[k], last, last) for k in np.flatnonzero(fires)]
@@ -106,9 +106,9 @@ def _tie(chain: Replay, readings: Sequence[Reading], one: CompiledTransition, fi
     largest = max(abs(float(call(model, model.guards, node)[one.index])) for node in chain.nodes)
     error = NoGradient(
         f"No gradient from t = {chain.nodes[first].t:.9g} s on: {mode.path} stays {mode.names[int(point.d[one.mode])]} "
-        f"just at the limit at which it becomes {mode.names[one.target]}.",
+        f"exactly at the limit where it becomes {mode.names[one.target]}.",
         where=one.source,
-        why="A small change of a parameter decides whether it does, so the derivatives of both sides differ.",
+        why="A small change of a parameter decides whether it changes, so the derivatives on both sides differ.",
         advice="Move the parameters away from this limit.",
     )
     return Edge(

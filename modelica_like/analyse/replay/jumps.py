@@ -1,4 +1,4 @@
-"""Events of a replay as linear maps: where the event goes, and what it changes."""
+"""Events of a replay as linear maps: the shift of the event, and the changes it causes."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ import numpy as np
 
 from modelica_like.analyse.replay.holds import impact, projection, share_slopes
 from modelica_like.analyse.replay.when import Coincidence, Trigger, When, at_rest, event_time
-from modelica_like.analyse.slopes import Sizes, slopes
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.initialize import Point, Strike, holding, share, solve_implicit
+from modelica_like.initialize.slopes import Sizes, slopes
 from modelica_like.solve.recorder import Event
 
 _SMOOTH = 1e-9
@@ -21,17 +21,17 @@ _SMOOTH = 1e-9
 
 @dataclass(frozen=True)
 class Jump:
-    """An instant at which modes change, carried back and forth to the recorded time.
+    """A change of modes, shifted to the recorded time.
 
     Attributes:
         before: point before.
         after: point after, at the same time.
         events: the mode changes.
-        when: what decides when it happens.
+        when: the cause of its time.
         x: derivatives of the states after by (x, theta) before, shape (nx, nx + ntheta).
         d: derivatives of the discrete values after, shape (nd, nx + ntheta).
-        gain: what the integrands lose at the event: quadratures grow by it times the shift of the event, shape (nq,).
-        matters: whether it matters when it happens.
+        gain: drop of the integrands at the event: quadratures grow by it times the shift of the event, shape (nq,).
+        matters: whether anything depends on its time.
         chances: motions of zero that modes hold from then on.
     """
 
@@ -52,7 +52,7 @@ class Jump:
 
     @property
     def quadratures(self) -> Vector:
-        """What the quadratures gain because the event is not exactly at its recorded time."""
+        """Change of the quadratures because the event is not exactly at its recorded time."""
         return self.gain * (0.0 if self.trigger is None else self.trigger.shift)
 
     def time(self) -> Trigger:
@@ -68,7 +68,7 @@ class Jump:
 
     @property
     def by_time(self) -> Vector:
-        """Derivative of its time by (x, theta) before it; zero where nothing moves it."""
+        """Derivative of its time by (x, theta) before it; zero without a trigger."""
         return np.zeros(self.x.shape[1]) if self.trigger is None else self.trigger.by
 
     def forward(self, whole: Vector) -> tuple[Vector, Vector]:
@@ -93,7 +93,7 @@ def make_jump(
         model: the compiled model.
         before: the point before the event, at its recorded time.
         events: the mode changes there, in the order in which they happened.
-        begin: beginning of the segment before: what a guard changes since then decides whether it is grazing.
+        begin: beginning of the segment before; the change of a guard since then decides whether it grazes zero.
         integrands: gives the integrands of the quadratures at a point.
         first: the event is at the start of the run, and stays there.
 
@@ -114,7 +114,7 @@ def make_jump(
     chances = work.chances()
     rate_after = slopes(model, work.point, "ode").value
     gain = integrands(before) - integrands(work.point)
-    # Only where states, rates or integrands jump does it matter when the event happens.
+    # The time of the event matters only if states, rates or integrands jump.
     states, rates = np.abs(before.x - work.point.x), np.abs(rate_before - rate_after)
     matters = np.any(np.abs(gain) > _SMOOTH)
     matters |= np.any(rates > _SMOOTH * (model.nominals + np.abs(rate_before) + np.abs(rate_after)))
@@ -146,7 +146,7 @@ class Work:
 
     @classmethod
     def at(cls, model: CompiledDae, point: Point) -> Work:
-        """Begin with a point itself."""
+        """Start with the point itself."""
         size = Sizes.of(model)
         columns = size.x + size.theta
         return cls(model, point.copy(), np.eye(size.x, columns), np.eye(size.d, columns, size.x + size.fixed))
@@ -220,7 +220,7 @@ class Work:
             return
         strike = Strike(model, point.copy(), entering)
         if strike.hard:
-            # All impacts at this instant are one, from the speeds before the first.
+            # All impacts at this instant are solved together, from the speeds before the first.
             entering = self._begin_again(entering)
             point = self.point
             strike = Strike(model, point.copy(), entering)
@@ -247,7 +247,7 @@ class Work:
         return at_rest(self.model, self.point, hold, by)
 
     def _begin_again(self, entering: list[int]) -> list[int]:
-        """Go back to the states before the first impact, and hold all that has been hit; return what that is."""
+        """Go back to the states before the first impact, hold all motions that were hit, and return these."""
         self.entered.update(entering)
         if self.struck is None:
             self.struck = self.point.x, self.x
@@ -264,7 +264,7 @@ class Work:
         return float(value[0]), slope[0]
 
     def _project(self, targets: list[int], values: list[tuple[float, Vector]]) -> None:
-        """Move the states as little as possible until variables have their new values; see solve.events."""
+        """Change the states as little as possible until variables have their new values; see solve.events."""
         model = self.model
         nodes = [model.reset_nodes[k] for k in targets]
         solve_implicit(model, self.point)

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from modelica_like.analyse.slopes import slopes
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae, CompiledTransition
 from modelica_like.errors import NoGradient
 from modelica_like.initialize import Point, call, holding, solve_implicit
+from modelica_like.initialize.slopes import slopes
 from modelica_like.solve.recorder import Event
 
 _GRAZING = 1e-6
@@ -49,9 +49,9 @@ class Coincidence:
 
 @dataclass(frozen=True)
 class When:
-    """What decides when an event happens, why nothing does, and what else would do so for a different reason.
+    """The cause of an event's time, why there is none, and other causes at the same time.
 
-    There is no trigger at the start of the run, and where nothing depends on the time of the event.
+    There is no trigger at the start of the run, or if nothing depends on the time of the event.
     """
 
     trigger: Trigger | None = None
@@ -60,9 +60,9 @@ class When:
 
 
 def event_time(model: CompiledDae, before: Point, events: tuple[Event, ...], begin: Point) -> When:
-    """Find out what decides when the event happens: what fires in the first round."""
+    """Find the cause of the event's time: the transitions that fire in the first round."""
     if not events:
-        # Elements that hold the same motion share it anew, and nothing else happens.
+        # Elements that hold the same motion share it again, and nothing else happens.
         return When()
     # A step leaves the implicit unknowns as precise as its states need them; rates of guards need them better.
     solve_implicit(model, before)
@@ -90,7 +90,7 @@ def event_time(model: CompiledDae, before: Point, events: tuple[Event, ...], beg
 
 
 def _difference(model: CompiledDae, before: Point, by: Vector) -> Vector:
-    """By what two triggers differ, but for motions that modes hold: nothing moves those."""
+    """The difference of two triggers, without motions that modes hold, which cannot move."""
     nodes = [model.holds[k].motion for k in holding(model, before)]
     if not nodes or not np.any(by[: len(before.x)]):
         return by
@@ -119,7 +119,7 @@ def _grazing(event: Event) -> NoGradient:
         f"No gradient at t = {event.time:.9g} s: {event.mode} changes from {event.before} to {event.after} "
         "where its condition only grazes zero.",
         where=event.source,
-        why="A small change of a parameter moves the event by much, or lets it vanish.",
+        why="A small change of a parameter moves the event far, or removes it.",
         advice="Move the parameters away from this limit.",
     )
 
@@ -129,8 +129,8 @@ def _together(one: Event, other: Event) -> NoGradient:
         f"No gradient at t = {one.time:.9g} s: '{one.mode}: {one.before} → {one.after}' and "
         f"'{other.mode}: {other.before} → {other.after}' happen at the same instant but for different reasons.",
         where=[one.source, other.source],
-        why="A small change of a parameter decides which comes first, so the derivatives of both sides differ.",
-        advice="Move the parameters apart.",
+        why="A small change of a parameter decides which comes first, so the derivatives on both sides differ.",
+        advice="Choose parameter values that separate the two events.",
     )
 
 
@@ -149,8 +149,8 @@ def at_rest(model: CompiledDae, point: Point, hold: int, by: Vector) -> Coincide
     own = slopes(model, point, "variables", [one.motion])
     size = SAME * float(np.abs(own.x[0]) @ (np.abs(point.x) + model.nominals))
     error = NoGradient(
-        f"No gradient at t = {point.t:.9g} s: {held}, because {motion} is just zero.",
-        why="A small change of a parameter decides which way it moves first, so the derivatives of both sides differ.",
+        f"No gradient at t = {point.t:.9g} s: {held}, because {motion} is zero.",
+        why="A small change of a parameter decides which way it moves first, so the derivatives on both sides differ.",
         advice="Move the parameters away from this limit.",
     )
     return Coincidence(by, size, error)
