@@ -162,8 +162,12 @@ class Replay:
                 result[number] += reading.quadratures @ total
         return result, whole
 
-    def adjoint(self, readings: Sequence[Reading]) -> Vector:
+    def adjoint(self, readings: Sequence[Reading], kept: dict[int, Vector] | None = None) -> Vector:
         """Derivatives of readings by all parameters and inputs.
+
+        Args:
+            readings: what to differentiate.
+            kept: positions of nodes; gets the derivatives by (x, theta) there, shape (nx + ntheta, readings).
 
         Returns:
             Shape (readings, np + nu).
@@ -178,6 +182,8 @@ class Replay:
                 whole = self.moves[k].adjoint(whole, Q)
             for number, row in at_node.get(id(self.nodes[k]), ()):
                 whole[:, number] += row
+            if kept is not None and k in kept:
+                kept[k] = whole.copy()
         x, fixed, d = np.split(whole, [size.x, size.x + size.fixed])
         return x.T @ self.start_x + fixed.T + d.T @ self.start_d
 
