@@ -1,7 +1,7 @@
 # make demo   the machine-table and machine-tool start-ups, computed against published values
 # make test   the formats, the types, the layers, and all tests that are not slow: ten minutes on two cores
 # make slow   the slow tests; continuous integration runs them, too
-# make docs   the pages of all component types
+# make site   the documentation as pages for a browser, in build/site/html
 # make release   the wheel for all platforms and the sdist, in dist/, tried in a new environment
 # make try   the wheel in dist/, in a new environment
 # make fmus   the reference FMUs, from their C sources, to build/fmus
@@ -17,7 +17,7 @@ PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constr
 COMPILED := ls modelica_like/fmi/runtimes/* >/dev/null 2>&1 || echo "No C compiler was found: the run-time of FMUs is \
 compiled at first use. Install cc, gcc or clang, or zig by $(BIN)/pip install 'modelica-like[cross]'."
 
-.PHONY: demo test lint types layers pytest slow benchmark docs release try fmus format clean
+.PHONY: demo test lint types layers pytest slow benchmark release try fmus format clean site
 
 demo: .venv/installed
 	$(BIN)/modelica-like demo
@@ -54,8 +54,8 @@ benchmark: .venv/installed-dev
 	$(BIN)/python benchmarks/linearize.py 100 1000
 	$(BIN)/python benchmarks/sweep.py 900
 
-docs: .venv/installed
-	$(BIN)/modelica-like docs -o docs/components --examples examples
+site: .venv/installed-dev
+	$(BIN)/python docs/site/build.py
 
 release: .venv/installed-dev
 	rm -rf dist

@@ -3,46 +3,63 @@
 from importlib import import_module
 from typing import Any
 
-# Modules and their public names, each loaded when first used: a netlist needs few of them. For type checkers and
-# editors the same stands in `__init__.pyi`.
+# Modules and their public names, each loaded on first use: a netlist needs few of them. For type checkers and
+# editors, `__init__.pyi` has the same.
 _NAMES = {
+    "absorbers": "CentrifugalPendulum TunedAbsorber",
+    "actuators": "ElectromagneticActuator HydraulicActuator PneumaticActuator",
     "adaptors": (
         "AngleToTorqueAdaptor CurrentToVoltageAdaptor ForceToPositionAdaptor HeatFlowToTemperatureAdaptor "
         "PositionToForceAdaptor TemperatureToHeatFlowAdaptor TorqueToAngleAdaptor VoltageToCurrentAdaptor"
     ),
+    "asynchronous_machines": "AsynchronousMachine AsynchronousMachineDQ",
+    "batteries": "Battery",
     "belts": "TimingBelt",
     "bristle_friction": "LuGreFriction",
     "choppers": "HBridge",
+    "commutated_machines": "CommutatedDCMachine",
     "contacts": "DogClutch RigidBacklash",
     "control": "PI PID ClutchActuator Feedback FirstOrder Gain Integrator Limiter P Sum",
+    "couplings": "ArcSpring DualMassFlywheel ElasticCoupling HystereticCoupling OldhamCoupling RuptureCoupling",
     "dc_machines": "PermanentMagnetDCMachine SeparatelyExcitedDCMachine SeriesDCMachine ShuntDCMachine",
+    "drag_losses": "ChurningGear DeepGrooveBearing",
+    "drivers": "Driver",
     "eddy_current_brakes": "EddyCurrentForce EddyCurrentTorque",
     "electrical": (
-        "Capacitor ConstantCurrent ConstantVoltage CurrentSensor CurrentSink Ground Inductor Pin Resistor "
-        "SignalVoltage Switch VariableResistor VoltageSensor"
+        "Capacitor ConstantCurrent ConstantVoltage CurrentSensor CurrentSink ElectricalPowerSensor Ground Inductor "
+        "Pin Resistor SignalCurrent SignalVoltage Switch VariableResistor VoltageSensor"
     ),
+    "engines": "CombustionEngine",
     "fixed": "Disc Fixed TranslationalFixed",
     "flexible_shafts": "FlexibleShaft StribeckBearing",
     "friction": "BearingFriction Brake Clutch DryFriction MultiPlateClutch",
+    "gear_meshes": "GearMesh",
     "gearboxes": "Gearbox",
     "gears": "IdealGear",
+    "hoists": "HoldingBrake Rope WinchDrum",
     "inertias": "Inertia Mass",
     "interfaces": "Compliant CompliantWithRelativeStates Flange LinearFlange",
+    "linear_blocks": "Derivative SecondOrder StateSpace TransferFunction",
+    "linkages": "Cam FourBar SliderCrank",
     "loads": "SpeedDependentLoad",
     "lossy_gears": "ConstantEfficiencyGear LossyGear",
+    "machine_loads": "CentrifugalPump Conveyor CuttingLoad DisplacementLoad FormingForce",
     "motions": (
         "InitializeFlange Move RelativeStates TranslationalInitializeFlange TranslationalMove "
         "TranslationalRelativeStates"
     ),
+    "nonlinear_blocks": "DeadZone Hysteresis PulseCounter Quantizer SlewRateLimiter VariableLimiter",
     "one_way": "Freewheel OneWayClutch TorqueLimiter",
     "planetary": "Differential IdealPlanetary LossyPlanetarySet PlanetarySet",
     "point_to_point": "KinematicPTP2",
+    "sampled": "FrequencyMeter NormalNoise UniformNoise ZeroOrderHold",
     "screw_drives": "BallScrewDrive",
     "sensors": (
         "AngleSensor ForceSensor MultiSensor PositionSensor PowerSensor RelativeAngleSensor RelativeSpeedSensor "
         "SpeedLimit SpeedSensor TorqueSensor"
     ),
-    "shaft_sensors": "AccelerationSensor RelativeAccelerationSensor",
+    "servos": "PositionServo ServoMotor",
+    "shaft_sensors": "AccelerationSensor PulseSensor RelativeAccelerationSensor",
     "shaft_sources": (
         "Accelerate InverseSpeedDependentTorque LinearSpeedDependentTorque Position QuadraticSpeedDependentTorque "
         "SignTorque Torque2"
@@ -52,13 +69,21 @@ _NAMES = {
     "signals": "CoilForce Constant Product Pulse Ramp Sine Step Table TimeFormula Trapezoid",
     "slides": "ElastoGap MassWithStopAndFriction Rod StribeckFriction SupportFriction TranslationalBrake",
     "sources": "ConstantForce ConstantSpeed ConstantTorque Force Speed Torque TorqueStep",
+    "speed_clutches": "CentrifugalClutch ViscousClutch",
     "spindles": "BallScrew MachineTable",
     "springs": (
         "Damper ElastoBacklash ElastoBacklash2 Spring SpringDamper TranslationalDamper TranslationalSpring "
         "TranslationalSpringDamper"
     ),
     "stepped_signals": "BooleanPulse BooleanStep BooleanTable StepTable",
-    "thermal": "FixedTemperature HeatPort HeatSource TemperatureSensor ThermalConductor ThermalMass",
+    "switching": "Contactor Diode",
+    "synchronous_machines": "MappedDrive PMSynchronousDrive PMSynchronousMachine",
+    "synchronisers": "Synchroniser",
+    "thermal": (
+        "FixedTemperature HeatPort HeatSource PrescribedHeatFlow PrescribedTemperature TemperatureSensor "
+        "ThermalConductor ThermalMass"
+    ),
+    "thermal_clutches": "ThermalClutch",
     "torque_converters": "TorqueConverter",
     "translational_sensors": (
         "LinearAccelerationSensor LinearMultiSensor LinearPowerSensor RelativeLinearAccelerationSensor "
@@ -66,14 +91,16 @@ _NAMES = {
     ),
     "translational_sources": (
         "ConstantVelocity Force2 ForceStep InverseSpeedDependentForce LinearSpeedDependentForce "
-        "QuadraticSpeedDependentForce SignForce TranslationalAccelerate TranslationalPosition "
-        "TranslationalSpeed"
+        "QuadraticSpeedDependentForce SignForce TranslationalAccelerate TranslationalPosition TranslationalSpeed"
     ),
     "transmissions": "Lepelletier Ravigneaux",
+    "tyres": "AxleLoads Tyre",
     "universal_joints": "UniversalJoint",
-    "vehicles": "RollingResistance Vehicle",
+    "variable_drives": "ChainDrive VariableGear",
+    "vehicles": "RoadLoad RollingResistance Vehicle",
     "waves": "CombiTable Cosine Exponentials ExpSine LogFrequencySweep SawTooth Sinc VariableSine",
     "wheels": "IdealGearR2T IdealRollingWheel",
+    "worms": "WormGear",
 }
 _HOME = {name: module for module, names in _NAMES.items() for name in names.split()}
 

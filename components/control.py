@@ -30,7 +30,7 @@ _SETTLED_AFTER = 9
 
 
 def at_limits(limit: BoundMode, free: Expr, low: Expr, high: Expr) -> Events:
-    """Yield the events of a signal, free of limits, that meets and leaves its limits."""
+    """Yield the events at which an unlimited signal reaches and leaves its limits."""
     yield limit.initially("high", when=free > high)
     yield limit.initially("low", when=free < low)
     yield limit.go("free", "high", when=free > high)
@@ -97,123 +97,131 @@ class Limiter(Component):
         yield from at_limits(self.limit, self.u, self.lowest, self.y_max)
 
 
-class P(Component):
-    """Proportional controller y = k·(u_s - u_m), limited to ±y_max where that is given; it needs no anti-windup."""
-
-    icon = icons.CONTROL_P
-    u_s: Input = signal_in("*", "set value")
-    u_m: Input = signal_in("*", "measured value")
-    k: Parameter = param("*", "gain, output over error")
-    y_max: Parameter = param("*", "limit of the output; without a value it has none", default=None)
-    y: Output = signal_out("*", "output")
-    limit = Mode("free", "high", "low", description="limit of the output")
-
-    def free_output(self) -> Expr:
-        """Return the output without limit."""
-        return self.k * (self.u_s - self.u_m)
-
-    def equations(self) -> Equations:
-        free = self.free_output()
-        limited = self.given("y_max")
-        yield self.y == (self.limit.choose(free=free, high=self.y_max, low=-self.y_max) if limited else free)
-
-    def events(self) -> Events:
-        if self.given("y_max"):
-            yield from at_limits(self.limit, self.free_output(), -self.y_max, self.y_max)
-
-
 class FirstOrder(Component):
-    """Signal that follows another with a time constant."""
+    """Signal that follows another with a time constant: T·der(y) = k·u - y."""
 
     icon = icons.RISE
     u: Input = signal_in("*", "signal")
     T: Parameter = param("s", "time constant", min=1e-12)
+    k: Parameter = param("*", "output over signal at rest", default=1.0)
     y: Output = signal_out("*", "delayed signal")
 
     def equations(self) -> Equations:
-        yield self.T * der(self.y) == self.u - self.y
+        yield self.T * der(self.y) == self.k * self.u - self.y
 
 
 class Integrator(Component):
-    """Integral of a signal over time."""
+    """Integral of a signal over time, times k."""
 
     icon = icons.INTEGRATOR
     u: Input = signal_in("*", "signal")
+    k: Parameter = param("*", "factor", default=1.0)
     y: Output = signal_out("*", "integral")
 
     def equations(self) -> Equations:
-        yield der(self.y) == self.u
+        yield der(self.y) == self.k * self.u
 
 
-class PI(Component):
-    """Proportional-integral controller y = k·(e + 1/Ti·∫e dt) + u_ff, e = u_s - u_m.
+class Controller(Component, partial=True):
+    """Controller of an error u_s - u_m, whose output may have limits.
 
-    With y_max given, the output is limited to ±y_max. What exceeds the limit is fed back to the integral with the time
-    constant Ni·Ti, so that it does not wind up (anti-windup by back-calculation, as in the Modelica Standard Library,
-    Blocks.Continuous.LimPID).
+    With y_max given, the output is limited to ±y_max; with y_min given, too, to y_min and y_max.
     """
 
-    icon = icons.CONTROL_PI
     u_s: Input = signal_in("*", "set value")
     u_m: Input = signal_in("*", "measured value")
     u_ff: Input = signal_in("*", "feed-forward, in units of the output", default=0.0)
     k: Parameter = param("*", "gain, output over error")
-    Ti: Parameter = param("s", "reset time", min=1e-12)
-    y_max: Parameter = param("*", "limit of the output; without a value it has none", default=None)
-    Ni: Parameter = param("1", "time constant of the anti-windup over Ti", default=0.9, min=1e-12)
+    y_max: Parameter = param("*", "upper limit of the output; without a value it has none", default=None)
+    y_min: Parameter = param("*", "lower limit of the output; without a value -y_max", default=None)
     y: Output = signal_out("*", "output")
-    e: Output = signal_out("*", "error")
-    integral: Output = signal_out("*", "integral of the error over Ti")
     limit = Mode("free", "high", "low", description="limit of the output")
+
+    @property
+    def lowest(self) -> Expr:
+        """Lower limit."""
+        return self.y_min if self.given("y_min") else -self.y_max
 
     def free_output(self) -> Expr:
         """Return the output without limit."""
-        return self.k * (self.e + self.integral) + self.u_ff
+        raise NotImplementedError
 
     def equations(self) -> Equations:
-        yield self.e == self.u_s - self.u_m
-        if self.given("y_max"):
-            excess = self.free_output() - self.y
-            yield self.Ti * der(self.integral) == self.e - excess / (self.k * self.Ni)
-            yield self.y == self.limit.choose(free=self.free_output(), high=self.y_max, low=-self.y_max)
-        else:
-            yield self.Ti * der(self.integral) == self.e
-            yield self.y == self.free_output()
+        free = self.free_output()
+        limited = self.given("y_max")
+        yield self.y == (self.limit.choose(free=free, high=self.y_max, low=self.lowest) if limited else free)
 
     def events(self) -> Events:
         if self.given("y_max"):
-            yield from at_limits(self.limit, self.free_output(), -self.y_max, self.y_max)
+            yield from at_limits(self.limit, self.free_output(), self.lowest, self.y_max)
 
 
-class PID(Component):
-    """Controller y = k·(e + 1/Ti·∫e dt + Td·der(e)), e = u_s - u_m; the derivative is filtered with Td/Nd."""
+class P(Controller):
+    """Proportional controller y = k·(u_s - u_m) + u_ff; it needs no anti-windup."""
 
-    icon = icons.CONTROL_PID
-    u_s: Input = signal_in("*", "set value")
-    u_m: Input = signal_in("*", "measured value")
-    k: Parameter = param("*", "gain, output over error")
+    icon = icons.CONTROL_P
+
+    def free_output(self) -> Expr:
+        return self.k * (self.u_s - self.u_m) + self.u_ff
+
+
+class PI(Controller):
+    """Proportional-integral controller y = k·(wp·u_s - u_m + 1/Ti·∫e dt) + u_ff, e = u_s - u_m.
+
+    What exceeds a limit is fed back to the integral with the time constant Ni·Ti, so that it does not wind up
+    (anti-windup by back-calculation, as in the Modelica Standard Library, Blocks.Continuous.LimPID).
+    """
+
+    icon = icons.CONTROL_PI
     Ti: Parameter = param("s", "reset time", min=1e-12)
-    Td: Parameter = param("s", "derivative time", min=1e-12)
-    Nd: Parameter = param("1", "derivative time over that of its filter", default=10.0, min=1e-12)
-    y: Output = signal_out("*", "output")
+    Ni: Parameter = param("1", "time constant of the anti-windup over Ti", default=0.9, min=1e-12)
+    wp: Parameter = param("1", "weight of the set value in the proportional part", default=1.0, min=0)
     e: Output = signal_out("*", "error")
     integral: Output = signal_out("*", "integral of the error over Ti")
-    smoothed: Output = signal_out("*", "filtered error")
+
+    def free_output(self) -> Expr:
+        return self.k * (self.wp * self.u_s - self.u_m + self.integral) + self.u_ff
 
     def equations(self) -> Equations:
+        yield from super().equations()
         yield self.e == self.u_s - self.u_m
-        yield self.Ti * der(self.integral) == self.e
-        yield self.Td / self.Nd * der(self.smoothed) == self.e - self.smoothed
-        yield self.y == self.k * (self.e + self.integral + self.Nd * (self.e - self.smoothed))
+        excess = (self.free_output() - self.y) / (self.k * self.Ni) if self.given("y_max") else 0
+        yield self.Ti * der(self.integral) == self.e - excess
+
+
+class PID(PI):
+    """Controller y = k·(wp·u_s - u_m + 1/Ti·∫e dt + Td·der(wd·u_s - u_m)) + u_ff, e = u_s - u_m.
+
+    The derivative is filtered with the time constant Td/Nd. This is the LimPID of the Modelica Standard Library,
+    Blocks.Continuous, but that wd is 1 if nothing is said.
+    """
+
+    icon = icons.CONTROL_PID
+    Td: Parameter = param("s", "derivative time", min=1e-12)
+    Nd: Parameter = param("1", "derivative time over that of its filter", default=10.0, min=1e-12)
+    wd: Parameter = param("1", "weight of the set value in the derivative part", default=1.0, min=0)
+    smoothed: Output = signal_out("*", "filtered error, with the set value weighted")
+
+    @property
+    def ahead(self) -> Expr:
+        """How far the weighted error is ahead of the filtered one."""
+        return self.wd * self.u_s - self.u_m - self.smoothed
+
+    def free_output(self) -> Expr:
+        return super().free_output() + self.k * self.Nd * self.ahead
+
+    def equations(self) -> Equations:
+        yield from super().equations()
+        yield self.Td / self.Nd * der(self.smoothed) == self.ahead
 
 
 class ClutchActuator(Component):
     """Electromagnetic actuator of a clutch or brake: delay, rise and release of the torque (VDI 2241).
 
     After switching on nothing happens for the response delay t11. Then the torque rises linearly to its full value in
-    the time t12; after switching off it falls linearly to zero in the time t2. As an exponential, like the current of a
-    coil, it has 90 % of its full value after t12, and 10 % after t2, as data sheets state these times: its distance
-    from the final value is divided by ten in each of them. Its output goes to `f_normalized`.
+    the time t12; after switching off it falls linearly to zero in the time t2. With `exponential`, like the current of
+    a coil, it reaches 90 % of its full value after t12, and falls to 10 % after t2, as in data sheets: in each of these
+    times its distance from the final value is divided by ten. Its output goes to `f_normalized`.
     """
 
     icon = icons.RISE
@@ -229,18 +237,18 @@ class ClutchActuator(Component):
     coil = Mode("off", "waiting", "rising", "on", "falling", description="state of the coil")
 
     def remaining(self, distance: Expr, time: Expr) -> Expr:
-        """Return how far the torque still is from its final value."""
+        """Return the distance of the torque from its final value."""
         decades = (self.time - self.since) / time
         return distance * exp(-_LN_10 * decades) if self.exponential else distance - decades
 
     def arrival(self, distance: Expr, time: Expr) -> Expr:
-        """Return when it has its final value."""
+        """Return the time at which it has its final value."""
         return self.since + time * (_SETTLED_AFTER if self.exponential else distance)
 
     def equations(self) -> Equations:
         rising = 1 - self.remaining(1 - self.level, self.t12)
         falling = self.remaining(self.level, self.t2)
-        # At rest exactly 0 and 1: a clutch that is closed by 1e-30 of its force would be another mode.
+        # Exactly 0 and 1 at rest: a clutch closed with 1e-30 of its force would be in another mode.
         yield self.y == self.coil.choose(off=0, waiting=0, rising=rising, on=1, falling=falling)
 
     def events(self) -> Events:

@@ -163,12 +163,23 @@ class ConstantCurrent(ElectricalSource):
         yield self.i == self.I
 
 
+class SignalCurrent(ElectricalSource):
+    """Current from p to n given by a signal."""
+
+    icon = icons.CURRENT
+    i_ref: Input = signal_in("A", "current")
+
+    def equations(self) -> Equations:
+        yield from super().equations()
+        yield self.i == self.i_ref
+
+
 class CurrentSink(ElectricalSource):
     """Electronic load: draws at p, and returns at n, the current of a signal, but drives none itself.
 
-    It cannot have less than its smallest resistance: where the voltage does not suffice for the current, e.g. because a
-    generator comes to rest, that resistance is what is left of it; at a reversed voltage it draws nothing. Where an
-    inductance is in series, whose current cannot jump, it needs a capacitor in parallel, as such loads have one.
+    It has a smallest resistance: if the voltage does not suffice for the current, e.g. because a generator comes to
+    rest, the load is this resistance; at a reversed voltage it draws nothing. In series with an inductance, whose
+    current cannot jump, it needs a capacitor in parallel, like real loads.
     """
 
     icon = icons.CURRENT
@@ -182,7 +193,7 @@ class CurrentSink(ElectricalSource):
         yield self.load.choose(sinking=sinking, empty=empty, reversed=self.i) == 0
 
     def events(self) -> Events:
-        # Where nothing is to be drawn, no voltage is too low.
+        # Without a current to draw, no voltage is too low.
         load, drawn = self.load, self.i_ref > 0
         fails = all_of(drawn, self.v < self.R_min * self.i_ref)
         yield load.initially("reversed", when=all_of(drawn, self.v < 0))
@@ -242,3 +253,22 @@ class CurrentSensor(Component):
         yield self.p.v == self.n.v
         yield self.p.i + self.n.i == 0
         yield self.i == self.p.i
+
+
+class ElectricalPowerSensor(Component):
+    """Power: the current from pc to nc times the voltage between pv and nv, as a wattmeter measures it."""
+
+    icon = icons.WATTMETER
+    pc = Pin("current in")
+    nc = Pin("current out")
+    pv = Pin("positive terminal of the voltage")
+    nv = Pin("negative terminal of the voltage")
+    inlet, outlet = "pc", "nc"
+    power: Output = signal_out("W", "power")
+
+    def equations(self) -> Equations:
+        yield self.pc.v == self.nc.v
+        yield self.pc.i + self.nc.i == 0
+        yield self.pv.i == 0
+        yield self.nv.i == 0
+        yield self.power == self.pc.i * (self.pv.v - self.nv.v)

@@ -31,7 +31,28 @@ class Inertia(Component):
         return 0.5 * self.J * self.w**2
 
 
-class Mass(Component):
+class OnSlope(Component, partial=True):
+    """Mass whose weight acts where its way has a slope."""
+
+    m: Parameter = param("kg", "mass", min=0)
+    angle: Parameter = param(
+        "rad", "slope of the path, 90° is upwards: m·g·sin(angle) acts against motion; no value: no weight",
+        default=None,
+    )  # fmt: skip
+    g: Parameter = param("m/s2", "gravity", default=9.80665)
+    s: Variable = var("m", "position")
+    v: Variable = var("m/s", "velocity")
+
+    @property
+    def weight(self) -> Expr | float:
+        """Part of the weight against positive motion."""
+        return self.m * self.g * sin(self.angle) if self.given("angle") else 0.0
+
+    def stored_energy(self) -> Expr:
+        return 0.5 * self.m * self.v**2 + self.weight * self.s
+
+
+class Mass(OnSlope):
     """Rigid sliding mass.
 
     The acceleration force m·der(v) is the sum of both cut forces. On a slope, or hanging, its weight acts, too.
@@ -40,20 +61,7 @@ class Mass(Component):
     icon = icons.MASS
     flange_a = LinearFlange("left end", free=True)
     flange_b = LinearFlange("right end", free=True)
-    m: Parameter = param("kg", "mass", min=0)
     L: Parameter = param("m", "distance from left to right end; without a value both ends are at s", default=None)
-    angle: Parameter = param(
-        "rad", "rise of the way, 90° is upwards: m·g·sin(angle) acts against it; without a value there is no weight",
-        default=None,
-    )  # fmt: skip
-    g: Parameter = param("m/s2", "gravity", default=9.80665)
-    s: Variable = var("m", "position")
-    v: Variable = var("m/s", "velocity")
-
-    @property
-    def weight(self) -> Expr:
-        """Part of the weight against positive motion."""
-        return self.m * self.g * sin(self.angle)
 
     def equations(self) -> Equations:
         a, b = self.flange_a, self.flange_b
@@ -61,8 +69,4 @@ class Mass(Component):
         yield a.s == self.s - half
         yield b.s == self.s + half
         yield der(self.s) == self.v
-        yield self.m * der(self.v) == a.f + b.f - (self.weight if self.given("angle") else 0.0)
-
-    def stored_energy(self) -> Expr:
-        kinetic = 0.5 * self.m * self.v**2
-        return kinetic + self.weight * self.s if self.given("angle") else kinetic
+        yield self.m * der(self.v) == a.f + b.f - self.weight

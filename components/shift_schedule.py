@@ -35,9 +35,9 @@ _DIGITS = "0123456789"
 class ShiftSchedule(Component):
     """Pressures of five shift elements, gear after gear at fixed times.
 
-    In a shift the pressures of the elements that are closed next rise, and those of the elements that are opened fall,
-    along straight lines during the same time: so the torque is handed over while both slip, without a gap and without
-    two gears being locked at once. Elements that stay closed keep their pressure.
+    In a shift the pressures of closing elements rise linearly while those of opening elements fall: the torque passes
+    over while both slip, without a gap and without two gears locked at once. Elements that stay closed keep their
+    pressure.
     """
 
     icon = icons.SCHEDULE
@@ -49,8 +49,8 @@ class ShiftSchedule(Component):
     pattern: tuple[tuple[str, str], ...] = rows(
         column("gear", text=True), column("closed elements", text=True), default=_GEARS
     )
-    """Gears and the elements closed in them; as it stands, that of a `Lepelletier` gearbox."""
-    time_scale: Parameter = param("s", "what counts as 1 in the times", default=1.0)
+    """Gears and their closed elements; the default is that of a `Lepelletier` gearbox."""
+    time_scale: Parameter = param("s", "scale of the times", default=1.0)
     a: Output = signal_out("1", "pressure of element a")
     b: Output = signal_out("1", "pressure of element b")
     c: Output = signal_out("1", "pressure of element c")
@@ -72,17 +72,17 @@ class ShiftSchedule(Component):
             if gear not in _NUMBERS and not (gear and set(gear) <= set(_DIGITS)):
                 raise LanguageError(
                     f"The pattern of a shift schedule has a gear '{gear}'.",
-                    advice="Call gears by their number, neutral N, reverse R.",
+                    advice="Write gears as numbers, neutral as N, reverse as R.",
                 )
         for (first, gear, duration), (second, following, _) in pairwise(self.shifts[1:]):
             if first + duration > second:
                 raise LanguageError(
                     f"The shift to gear {gear} ends at {first + duration:g} s, after that to {following} has begun.",
-                    advice="Let a shift begin when the one before has ended.",
+                    advice="Start each shift after the end of the one before.",
                 )
 
     def in_row(self, value: Callable[[int], float], ahead: int = 0) -> Expr | float:
-        """Return what belongs to the present row, or to one some rows ahead."""
+        """Return the value of the present row, or of one some rows ahead."""
         last = len(self.shifts) - 1
         chosen: Expr | float = value(last)
         for k in reversed(range(last)):

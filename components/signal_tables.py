@@ -5,12 +5,11 @@ from __future__ import annotations
 from math import inf
 
 from components import icons
-from components.tabulated import Tabulated
+from components.tabulated import Flat, Tabulated
 from modelica_like.language import (
     Equations,
     Events,
     Input,
-    LanguageError,
     Output,
     Parameter,
     column,
@@ -20,13 +19,11 @@ from modelica_like.language import (
     signal_out,
 )
 
-Flat = tuple[float, ...]
-
 
 class Table1D(Tabulated):
     """Characteristic curve: y from a table over a signal.
 
-    Modelica Standard Library, Blocks.Tables.CombiTable1Ds; beyond the rows that goes on along the last slope.
+    Modelica Standard Library, Blocks.Tables.CombiTable1Ds; which continues the last slope beyond the rows.
     """
 
     icon = icons.TABLE_BLOCK
@@ -34,8 +31,8 @@ class Table1D(Tabulated):
     table: tuple[tuple[float, float], ...] = rows(
         column("argument", scale="u_scale", rising=True), column("value", scale="scale")
     )
-    u_scale: Parameter = param("*", "what counts as 1 in the arguments", default=1.0)
-    scale: Parameter = param("*", "what counts as 1 in the values", default=1.0)
+    u_scale: Parameter = param("*", "scale of the arguments", default=1.0)
+    scale: Parameter = param("*", "scale of the values", default=1.0)
     y: Output = signal_out("*", "value")
 
     def equations(self) -> Equations:
@@ -49,7 +46,7 @@ class Table2D(Tabulated):
     """Map: y from a table over two signals, e.g. the torque of an engine over its speed and throttle.
 
     Row by row along u2, and then across the rows along u1. Modelica Standard Library, Blocks.Tables.CombiTable2Ds,
-    whose first row and column are here `second` and `first`; beyond the rows that goes on along the last slope.
+    whose first row and column are here `second` and `first`; which continues the last slope beyond the rows.
     """
 
     icon = icons.TABLE_BLOCK
@@ -58,25 +55,14 @@ class Table2D(Tabulated):
     first: Flat = rows(column("argument u1 of a row", scale="u1_scale", rising=True), flat=True)
     second: Flat = rows(column("argument u2 of a column", scale="u2_scale", rising=True), flat=True)
     table: tuple[Flat, ...] = rows(column("value", scale="scale"), more=True)
-    u1_scale: Parameter = param("*", "what counts as 1 in `first`", default=1.0)
-    u2_scale: Parameter = param("*", "what counts as 1 in `second`", default=1.0)
-    scale: Parameter = param("*", "what counts as 1 in the values", default=1.0)
+    u1_scale: Parameter = param("*", "scale of `first`", default=1.0)
+    u2_scale: Parameter = param("*", "scale of `second`", default=1.0)
+    scale: Parameter = param("*", "scale of the values", default=1.0)
     y: Output = signal_out("*", "value")
 
     def equations(self) -> Equations:
-        sizes = len(self.table), len(self.table[0])
-        if sizes != (len(self.first), len(self.second)):
-            raise LanguageError(
-                f"{self.label}: the table has {sizes[0]} rows and {sizes[1]} columns, but `first` has "
-                f"{len(self.first)} values and `second` {len(self.second)}.",
-                advice="`first` has one value for each row, `second` one for each column.",
-            )
-        along = [(first, self._row(values)) for first, values in zip(self.first, self.table, strict=True)]
-        yield self.y == self.scale * self.look_up(self.u1 / self.u1_scale, along)
-
-    def _row(self, values: Flat) -> float:
-        row = list(zip(self.second, values, strict=True))
-        return self.look_up(self.u2 / self.u2_scale, row)  # type: ignore[return-value]
+        u1, u2 = self.u1 / self.u1_scale, self.u2 / self.u2_scale
+        yield self.y == self.scale * self.look_up_map(u1, self.first, u2, self.second, self.table)
 
     def events(self) -> Events:
         for name, u, grid in (

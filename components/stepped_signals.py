@@ -21,12 +21,12 @@ from modelica_like.language import (
 
 
 class StepTable(Rowwise):
-    """Signal that keeps the value of a row until the next one; before the first row it has the value of that."""
+    """Signal that keeps the value of a row until the next one; before the first row it has the first value."""
 
     table: tuple[tuple[float, float], ...] = rows(
         column("time", scale="time_scale", rising=True), column("value", scale="scale")
     )
-    scale: Parameter = param("*", "what counts as 1 in the values", default=1.0)
+    scale: Parameter = param("*", "scale of the values", default=1.0)
 
     def moments(self) -> tuple[float, ...]:
         return tuple(moment for moment, _ in self.table)

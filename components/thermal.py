@@ -9,12 +9,14 @@ from modelica_like.language import (
     Domain,
     Equations,
     Expr,
+    Input,
     Output,
     Parameter,
     Variable,
     der,
     flow,
     param,
+    signal_in,
     signal_out,
     var,
 )
@@ -23,7 +25,7 @@ _ROOM = 293.15
 
 
 class HeatPort(Connector):
-    """Where heat enters: temperature, and the heat flow into the component."""
+    """Heat port: temperature, and the heat flow into the component."""
 
     domain = Domain("heat flow", "temperature", "a thermal conductor")
     stroke = icons.HEAT
@@ -37,8 +39,8 @@ class HeatPort(Connector):
 class Lossy(Component, partial=True):
     """Element that turns work into heat.
 
-    With its heat port connected the loss flows out there, into the thermal part of the model; otherwise it leaves the
-    model. A subclass says how much it is.
+    If its heat port is connected, the loss flows out there into the thermal part of the model; otherwise it leaves the
+    model. A subclass defines the loss.
     """
 
     heat_port = HeatPort("where the loss goes as heat", optional=True)
@@ -50,14 +52,18 @@ class Lossy(Component, partial=True):
     def equations(self) -> Equations:
         yield from super().equations()
         if self.heat_port.used:
-            yield self.heat_port.Q_flow == -self.dissipation()
+            yield self.heat_port.Q_flow == -self.heat()
+
+    def heat(self) -> Expr:
+        """Return the heat flow in W that leaves at the heat port."""
+        return self.dissipation()
 
     def loss_power(self) -> Expr | float:
         return 0.0 if self.heat_port.used else self.dissipation()
 
 
 class Conducting(Lossy, partial=True):
-    """Element whose conductors get warmer, and their resistance with them: by alpha20 of its value at 20 °C per kelvin.
+    """Element with conductors whose resistance rises with temperature: by alpha20 of its value at 20 °C per kelvin.
 
     Copper: 3.92e-3/K.
     """
@@ -81,7 +87,7 @@ class Conducting(Lossy, partial=True):
 class ThermalMass(Component):
     """Body of one temperature that stores heat, e.g. the lining of a clutch: C·der(T) is the heat flow into it.
 
-    Its stored energy counts from 20 °C.
+    Its stored energy is zero at 20 °C.
     """
 
     icon = icons.THERMAL_MASS
@@ -124,6 +130,34 @@ class HeatSource(Component):
 
     def source_power(self) -> Expr:
         return self.Q_flow
+
+
+class PrescribedHeatFlow(Component):
+    """Heat flow into the connected body, given by a signal."""
+
+    icon = icons.HEAT_SOURCE
+    port = HeatPort("surface")
+    Q_flow: Input = signal_in("W", "heat flow into the connected body")
+
+    def equations(self) -> Equations:
+        yield self.port.Q_flow == -self.Q_flow
+
+    def source_power(self) -> Expr:
+        return self.Q_flow
+
+
+class PrescribedTemperature(Component):
+    """Surroundings whose temperature is a signal, whatever heat they take."""
+
+    icon = icons.TEMPERATURE
+    port = HeatPort("surface")
+    T: Input = signal_in("K", "temperature")
+
+    def equations(self) -> Equations:
+        yield self.port.T == self.T
+
+    def source_power(self) -> Expr:
+        return -self.port.Q_flow
 
 
 class ThermalConductor(Component):

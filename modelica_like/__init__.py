@@ -1,6 +1,6 @@
 """Acausal component models of drive-trains.
 
-Written once, simulated, differentiated and exported from one description.
+One description of a drive is simulated, differentiated and exported.
 """
 
 from __future__ import annotations
@@ -11,6 +11,12 @@ from typing import TYPE_CHECKING, Any
 from modelica_like.upper import provide
 
 if TYPE_CHECKING:
+    from modelica_like.analyse.after.orders import order_map as order_map
+    from modelica_like.analyse.after.orders import order_response as order_response
+    from modelica_like.analyse.after.spectra import WoehlerLine as WoehlerLine
+    from modelica_like.analyse.after.spectra import duty as duty
+    from modelica_like.analyse.after.spectra import load_spectrum as load_spectrum
+    from modelica_like.analyse.after.steps import step_metrics as step_metrics
     from modelica_like.analyse.calibration.calibrate import calibrate as calibrate
     from modelica_like.analyse.linear.campbell import campbell as campbell
     from modelica_like.analyse.linear.linearize import linearize as linearize
@@ -26,6 +32,7 @@ if TYPE_CHECKING:
     from modelica_like.draw import save_schematic as save_schematic
     from modelica_like.draw import schematic as schematic
     from modelica_like.errors import ModelicaLikeError as ModelicaLikeError
+    from modelica_like.explore import explore as explore
     from modelica_like.fmi.export import export_fmu as export_fmu
     from modelica_like.fmi.run import run_fmu as run_fmu
     from modelica_like.fmi.validate import validate_fmu as validate_fmu
@@ -53,17 +60,23 @@ _HOME = {
     "Options": "modelica_like.solve.options",
     "Solution": "modelica_like.solve.solution",
     "Trajectories": "modelica_like.solve.trajectories",
+    "WoehlerLine": "modelica_like.analyse.after.spectra",
     "build": "modelica_like.simulation",
     "calibrate": "modelica_like.analyse.calibration.calibrate",
     "campbell": "modelica_like.analyse.linear.campbell",
     "characteristic": "modelica_like.analyse.operating.curves",
     "compare": "modelica_like.report.compare",
     "cosim": "modelica_like.cosimulation.run",
+    "duty": "modelica_like.analyse.after.spectra",
+    "explore": "modelica_like.explore",
     "export_fmu": "modelica_like.fmi.export",
     "export_html": "modelica_like.native.page",
     "importance": "modelica_like.analyse.sweeps.importance",
     "linearize": "modelica_like.analyse.linear.linearize",
     "load": "modelica_like.netlist",
+    "load_spectrum": "modelica_like.analyse.after.spectra",
+    "order_map": "modelica_like.analyse.after.orders",
+    "order_response": "modelica_like.analyse.after.orders",
     "run_fmu": "modelica_like.fmi.run",
     "save_report": "modelica_like.report.page",
     "save_schematic": "modelica_like.draw",
@@ -73,6 +86,7 @@ _HOME = {
     "simulation_function": "modelica_like.analyse.sensitivity.function",
     "split": "modelica_like.cosimulation.split",
     "steady": "modelica_like.analyse.operating.steady",
+    "step_metrics": "modelica_like.analyse.after.steps",
     "sweep": "modelica_like.analyse.sweeps.sweep",
     "validate_fmu": "modelica_like.fmi.validate",
 }
@@ -88,5 +102,9 @@ def __getattr__(name: str) -> Any:
 
 
 _OFFERED = {name: _HOME[name] for name in ("Native", "schematic", "simulation_function")}
-_OFFERED["NativeLoop"] = "modelica_like.native.run"
+_OFFERED |= {
+    "NativeLoop": "modelica_like.native.run",
+    "plot": "modelica_like.solve.plot",
+    "sankey": "modelica_like.solve.sankey",
+}
 provide(tuple(_OFFERED), lambda name: getattr(import_module(_OFFERED[name]), name))

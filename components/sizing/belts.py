@@ -5,7 +5,19 @@ from __future__ import annotations
 import math
 
 from components.sizing.maths import asin, cos, exp, floor, hypot, maximum, require, sin, sqrt
-from modelica_like.language.quantities import Angle, Area, Density, Force, Length, Power, Ratio, Speed, Teeth, Velocity
+from modelica_like.language.quantities import (
+    Angle,
+    Area,
+    Density,
+    Force,
+    Length,
+    Power,
+    Ratio,
+    Speed,
+    Stress,
+    Teeth,
+    Velocity,
+)
 from modelica_like.language.results import Result, line
 
 _NEWTON_STEPS = 8
@@ -17,7 +29,7 @@ def pitch_diameter(teeth: Teeth, pitch: Length) -> Length:
 
 
 def centre_distance(belt_length: Length, small: Length, large: Length) -> Length:
-    """Return the centre distance in m of an open belt by the rule of the books.
+    """Return the centre distance in m of an open belt by the approximate rule.
 
     e = a + sqrt(a² - (d2 - d1)²/8) with a = L/4 - pi/8·(d1 + d2) (Roloff/Matek; document 002, equation 18).
 
@@ -60,8 +72,8 @@ class BeltGeometry(Result):
     ratio: Ratio = line("speed of the small pulley over speed of the large one")
     small_diameter: Length = line("pitch diameter of the small pulley")
     large_diameter: Length = line("pitch diameter of the large pulley")
-    centre_distance: Length = line("centre distance by the rule of the books")
-    exact_distance: Length = line("centre distance at which the belt fits exactly")
+    centre_distance: Length = line("centre distance by the approximate rule")
+    exact_distance: Length = line("exact centre distance")
     take_up: Length = line("travel for tensioning, 0.5 % of the belt's length")
     wrap_angle: Angle = line("wrap angle of the small pulley")
     engaged: Teeth = line("teeth in mesh before rounding down")
@@ -111,7 +123,7 @@ class BeltForces(Result):
     shaft_load: Force = line("load of the shaft: vector sum of both strands")
     along_centres: Force = line("its component along the line of centres")
     across_centres: Force = line("its component across the line of centres")
-    doubled_load: Force = line("load if the effective pull is added once more: counted twice in document 002")
+    doubled_load: Force = line("load with the effective pull counted twice, as in document 002")
     centrifugal_force: Force = line("tension by centrifugal force, A·rho·v²")
     load_at_rest: Force = line("load of the shaft at rest by Roloff/Matek, F_w + F_z")
     relief: Force = line("relief of the shaft in motion, 2·F_z·sin(wrap angle/2)")
@@ -123,8 +135,8 @@ def belt_forces(
     """Work out strand forces and shaft load (Eytelwein, Roloff/Matek; document 002, equations 23 to 28).
 
     F1 = F_t·m/(m - 1) and F2 = F_t/(m - 1) with m = exp(mu·beta). For a timing belt, which cannot slip, Eytelwein's
-    ratio is a habit of sizing. The shaft load already is the sum of both strands; document 002 adds the effective pull
-    to it at a right angle, which counts it twice (`doubled_load`).
+    ratio is a convention of sizing. The shaft load is already the sum of both strands; document 002 adds the effective
+    pull to it at a right angle, which counts it twice (`doubled_load`).
 
     Args:
         pull: effective pull in N.
@@ -145,3 +157,32 @@ def belt_forces(
         doubled_load=hypot(load, pull), centrifugal_force=centrifugal, load_at_rest=load + centrifugal,
         relief=2 * centrifugal * sin(angle / 2),
     )  # fmt: skip
+
+
+class TimingBeltLoad(Result):
+    """Load of a timing belt against its limits."""
+
+    power: Power = line("transmitted power, application factor included", at_most="power_limit")
+    power_limit: Power = line("power that the belt can transmit")
+    tooth_force: Force = line("force of one tooth in mesh")
+    flank_pressure: Stress = line("pressure on the flanks of the teeth", at_most="pressure_limit")
+    pressure_limit: Stress = line("permissible pressure on the flanks")
+
+
+def timing_belt_load(
+    pull: Force, velocity: Velocity, teeth_in_mesh: Teeth, width: Length, tooth_height: Length,
+    power_limit: Power = math.inf, pressure_limit: Stress = math.inf,
+) -> TimingBeltLoad:  # fmt: skip
+    """Compare power and flank pressure of a timing belt with their limits: p = F_t/(z_e·b·h) (document 002, 5.3).
+
+    Args:
+        pull: effective pull in N, application factor included.
+        velocity: of the belt in m/s.
+        teeth_in_mesh: whole number of teeth that carry.
+        width: of the belt in m.
+        tooth_height: in m; 1.27 mm of profile XL (ISO 5296).
+        power_limit: of the catalogue in W.
+        pressure_limit: in Pa.
+    """
+    force = pull / teeth_in_mesh
+    return TimingBeltLoad(pull * velocity, power_limit, force, force / (width * tooth_height), pressure_limit)

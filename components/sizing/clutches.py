@@ -6,6 +6,7 @@ import math
 
 from modelica_like.language.quantities import (
     Acceleration,
+    Angle,
     Energy,
     Inertia,
     Length,
@@ -23,7 +24,7 @@ _RULE = 9550.0
 
 
 def referred_mass(mass: Mass, velocity: Velocity, speed: Speed) -> Inertia:
-    """Return the inertia in kg.m2 that stands for a mass in kg: J = m·(v/w)², v in m/s, w in rad/s (document 000)."""
+    """Return the equivalent inertia in kg.m2 of a mass in kg: J = m·(v/w)², v in m/s, w in rad/s (document 000)."""
     return mass * (velocity / speed) ** 2
 
 
@@ -32,15 +33,25 @@ def referred_inertia(inertia: Inertia, ratio: Ratio) -> Inertia:
     return inertia / ratio**2
 
 
+def slip_angle(speed: Speed, time: Time) -> Angle:
+    """Return the angle in rad by which a clutch slips while the slip falls evenly to zero: phi = (w_A - w_L0)·t/2.
+
+    Args:
+        speed: difference of speeds at the beginning in rad/s.
+        time: slipping time in s (document 000).
+    """
+    return speed * time / 2
+
+
 def friction_work(torque: Torque, speed: Speed, time: Time) -> Energy:
-    """Return the friction work in J of one engagement under constant torque from rest: W = M·w·t/2 (document 000).
+    """Return the friction work in J of one engagement under constant torque: W = M·phi (document 000).
 
     Args:
         torque: clutch torque in N.m.
         speed: difference of speeds at the beginning in rad/s.
         time: slipping time in s.
     """
-    return torque * speed * time / 2
+    return torque * slip_angle(speed, time)
 
 
 class MachineTableClutch(Result):
@@ -57,18 +68,20 @@ class MachineTableClutch(Result):
     ratio: Ratio = line("speed of the motor over speed of the spindle")
     load_torque: Torque = line("load torque referred to the clutch")
     clutch_torque: Torque = line("torque the clutch has to transmit")
+    slip_angle: Angle = line("angle by which the clutch slips")
     friction_work: Energy = line("friction work of one engagement")
 
 
 def machine_table_clutch(
     motor_speed: Speed, acceleration_time: Time, load_torque: Torque, table_mass: Mass, table_velocity: Velocity,
     spindle_inertia: Inertia, hub_inertia: Inertia = 0.0, spindle_speed: Speed | None = None,
-    gear_input_inertia: Inertia = 0.0, gear_output_inertia: Inertia = 0.0,
+    gear_input_inertia: Inertia = 0.0, gear_output_inertia: Inertia = 0.0, load_speed: Speed = 0.0,
 ) -> MachineTableClutch:  # fmt: skip
-    """Size the clutch between a running motor and a machine table at rest (document 000).
+    """Size the clutch between a running motor and a machine table at rest, or already moving (document 000).
 
-    J_T = m·(u/w)², J_red = J_K + J_in + (J_out + J_S)/i² + J_T, M_B = J_red·w/t, M_K = M_B + M_L/i, W = M_K·w·t/2. The
-    hub lies wholly on the driven side of the friction surfaces; the screw has no loss.
+    J_T = m·(u/w)², J_red = J_K + J_in + (J_out + J_S)/i² + J_T, M_B = J_red·(w - w_L0)/t, M_K = M_B + M_L/i,
+    phi = (w - w_L0)·t/2, W = M_K·phi. The hub is entirely on the driven side of the friction surfaces; the screw has no
+    loss.
 
     Args:
         motor_speed: speed of motor and clutch in rad/s.
@@ -81,20 +94,22 @@ def machine_table_clutch(
         spindle_speed: in rad/s; without a gear that of the motor.
         gear_input_inertia: gear on the motor shaft in kg.m2.
         gear_output_inertia: gear on the spindle in kg.m2.
+        load_speed: speed of the clutch's driven side before it closes, w_L0, in rad/s.
     """
     fast = motor_speed if spindle_speed is None else spindle_speed
     ratio = motor_speed / fast
     table = referred_mass(table_mass, table_velocity, motor_speed)
     spindle, gear = referred_inertia(spindle_inertia, ratio), referred_inertia(gear_output_inertia, ratio)
     total = hub_inertia + gear_input_inertia + gear + spindle + table
-    acceleration = motor_speed / acceleration_time
+    slip = motor_speed - load_speed
+    acceleration = slip / acceleration_time
     torque = total * acceleration + load_torque / ratio
     return MachineTableClutch(
         motor_speed=motor_speed, lead=2 * math.pi * table_velocity / fast, table_inertia=table,
         spindle_inertia=spindle, gear_output_inertia=gear, referred_inertia=total,
         acceleration=acceleration, acceleration_torque=total * acceleration, ratio=ratio,
-        load_torque=load_torque / ratio, clutch_torque=torque,
-        friction_work=friction_work(torque, motor_speed, acceleration_time),
+        load_torque=load_torque / ratio, clutch_torque=torque, slip_angle=slip_angle(slip, acceleration_time),
+        friction_work=friction_work(torque, slip, acceleration_time),
     )  # fmt: skip
 
 

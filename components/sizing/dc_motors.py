@@ -48,7 +48,7 @@ def measured_lines(
     voltage: Voltage, no_load_speed: Speed, speed_drop: Compliance, no_load_current: Current,
     current_rise: CurrentSlope,
 ) -> MotorLines:  # fmt: skip
-    """Name the straight lines through measured points: w = w0 - s·M, I = I0 + a·M.
+    """Return the straight lines through measured points: w = w0 - s·M, I = I0 + a·M.
 
     Args:
         voltage: in V.
@@ -130,7 +130,7 @@ def torque_at_speed(lines: MotorLines, speed: Speed) -> Torque:
 
 
 class MotorSummary(Result):
-    """What the characteristic curves of a motor tell."""
+    """Key values of the characteristic curves of a motor."""
 
     no_load_speed: Speed = line("speed without load")
     no_load_current: Current = line("current without load")
@@ -201,6 +201,30 @@ def overload_current(clutch_torque: Torque, ratio: Ratio, generator: DcMotor, sp
 def generator_voltage(generator: DcMotor, speed: Speed, current: Current = 0.0) -> Voltage:
     """Return the terminal voltage in V of a generator: k·w - R·I (document 002, equation 10)."""
     return generator.constant * speed - generator.resistance * current
+
+
+class GeneratorPoint(Result):
+    """Operating point of a generator."""
+
+    torque: Torque = line("torque that drives it")
+    voltage: Voltage = line("voltage at its terminals")
+    input_power: Power = line("mechanical power M·w")
+    output_power: Power = line("electrical power U·I")
+    efficiency: Ratio = line("efficiency")
+
+
+def generator_point(generator: DcMotor, speed: Speed, current: Current) -> GeneratorPoint:
+    """Work out powers and efficiency of a generator: U = k·w - R·I, M = k·I + M_f + b·w (document 002, equation 15).
+
+    Args:
+        generator: its parameters.
+        speed: in rad/s.
+        current: that it delivers in A.
+    """
+    voltage = generator_voltage(generator, speed, current)
+    torque = generator.constant * current + generator.friction + generator.damping * speed
+    mechanical, electrical = torque * speed, voltage * current
+    return GeneratorPoint(torque, voltage, mechanical, electrical, electrical / mechanical)
 
 
 def series_motor_speed(torque: Torque, voltage: Voltage, mutual: Ratio, resistance: Resistance) -> Speed:

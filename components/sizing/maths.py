@@ -1,4 +1,4 @@
-"""Functions that work alike on floats, numpy arrays and CasADi expressions."""
+"""Functions for floats, NumPy arrays and CasADi expressions."""
 
 from __future__ import annotations
 
@@ -29,8 +29,11 @@ def _choose(condition: Any, then: Any, otherwise: Any) -> Any:
 
 sqrt = _function(np.sqrt, ca.sqrt, "Square root.")
 exp = _function(np.exp, ca.exp, "Exponential function.")
+log = _function(np.log, ca.log, "Natural logarithm.")
+log10 = _function(np.log10, ca.log10, "Decimal logarithm.")
 sin = _function(np.sin, ca.sin, "Sine of an angle in rad.")
 cos = _function(np.cos, ca.cos, "Cosine of an angle in rad.")
+tan = _function(np.tan, ca.tan, "Tangent of an angle in rad.")
 acos = _function(np.arccos, ca.acos, "Angle in rad with a given cosine.")
 asin = _function(np.arcsin, ca.asin, "Angle in rad with a given sine.")
 floor = _function(np.floor, ca.floor, "Largest whole number not above a value.")
@@ -79,14 +82,14 @@ def solve(rows: Sequence[Sequence[Number]], right: Sequence[Number]) -> list[Num
 
 
 def settled(value: Number, scale: Number) -> Number:
-    """Return a value, or zero for what rounding left of a difference of values of the size of `scale`."""
+    """Return a value, or zero if it is rounding in a difference of values of the size of `scale`."""
     if is_symbolic(value, scale):
         return value
     return where(np.abs(value) > _ROUNDING * np.abs(scale), value, 0.0 * np.abs(value))
 
 
 def require(message: str, *conditions: Number) -> None:
-    """Refuse numbers that mean nothing; a symbolic condition cannot be decided, so it passes.
+    """Refuse invalid numbers; a symbolic condition cannot be decided, so it passes.
 
     Raises:
         ValueError: with the message.

@@ -12,7 +12,9 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
+from components.sizing import DcMotor, commutated, dc_motor_point
 from modelica_like import load, simulate
+from modelica_like.sizing import size
 from modelica_like.solve.plot import save_plot
 from modelica_like.solve.style import COLOURS, STYLE
 
@@ -35,6 +37,10 @@ PICTURES: dict[str, tuple[str, ...]] = {
         "selector.gear",
     ),
     "dc_bench": ("motor.w", "clutch_pulley.w", "flywheel.w", "motor.ia", "generator.v", "clutch.tau"),
+    "winch": ("motor.w", "load.v", "motor.ia", "rope.tension", "load.s"),
+    "dc_bench_cycles": ("clutch_pulley.w", "flywheel.w", "coil.i", "coil.y", "clutch.T"),
+    "machine_tool_magnet": ("coil.i", "coil.f", "clutch.tau", "J2.w", "J3.w", "clutch.T"),
+    "dc_bench_speed_control": ("motor.w", "converter.v", "motor.ia", "sink.i", "clutch.tau"),
     "dc_machines/series_runaway": ("machine.w", "machine.ia", "machine.tau_electrical"),
     "msl/rotational/First": ("inertia1.w", "inertia2.w", "inertia3.w", "torque.tau", "spring.tau"),
     "msl/rotational/Friction": ("inertia3.w", "inertia2.w", "inertia1.w", "clutch.tau", "brake.tau"),
@@ -61,6 +67,8 @@ END = {"fan": "4 s", "ravigneaux": "20 ms"}
 # -- curves that no single run shows -----------------------------------------------------------------------------------
 
 RPM = 30 / pi
+SET_A = {"k": 0.04668892, "R": 0.7943932, "friction": 0.04949025}
+WEIGHTS = (0.0133, 0.0255, 0.0349, 0.0484, 0.0559, 0.0647, 0.0842, 0.0986)
 SET_C = {"k": 0.04768, "R": 0.7291, "friction": 0.04457}
 DASHED = {"printed lines": (0, (4, 4)), "separately excited": (0, (4, 4)), "shunt": (0, (1, 3))}
 READINGS: dict[str, dict[str, Any]] = {
@@ -90,7 +98,8 @@ def panels(title: str, xlabel: str, rows: Mapping[str, Sequence[Curve]]) -> Figu
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(8.0, 0.8 + 2.1 * len(rows)), layout="constrained")
         told: set[str] = set()
-        for axes, (label, row) in zip(figure.subplots(len(rows), 1, sharex=True), rows.items(), strict=True):
+        grid = figure.subplots(len(rows), 1, sharex=True, squeeze=False)[:, 0]
+        for axes, (label, row) in zip(grid, rows.items(), strict=True):
             for curve in row:
                 style = DASHED.get(curve.name, "-")
                 axes.plot(curve.x, curve.y, linestyle=style, label=curve.name, color=colours[curve.name])
@@ -162,6 +171,41 @@ def startups() -> Figure:
     return panels("machine_tool_startup", "time in s", rows)
 
 
+def disengaging() -> Figure:
+    """The coil is switched off after 3 s."""
+    drive = load(EXAMPLES / "machine_tool_startup.toml")
+    drive.set("coil.stop_time", "3 s")
+    drive.set("coil.T_off", "20 ms")
+    run = simulate(drive, "9 s", points=9000)
+    rows = {
+        "speed in rad/s": {"ω2, motor side": "J2.w", "ω3, load side": "J3.w"},
+        "torque in N·m": {"clutch": "clutch.tau", "shaft 2": "shaft2.tau"},
+    }
+    late = run.time >= 2.9
+    signs = {"speed in rad/s": 1, "torque in N·m": -1}
+    return panels(
+        "machine_tool_startup, switched off at 3 s",
+        "time in s",
+        {
+            label: [Curve(name, run.time[late], signs[label] * run[path][late]) for name, path in names.items()]
+            for label, names in rows.items()
+        },
+    )
+
+
+def backlash() -> Figure:
+    """The torque of the second shaft, with several plays."""
+    rows: dict[str, list[Curve]] = {"torque of shaft 2 in N·m": [], "speed ω4 in rad/s": []}
+    for play in (0.0, 0.5, 2.0):
+        netlist = "machine_tool_backlash" if play else "machine_tool_startup"
+        values = {"backlash": play * pi / 180} if play else {}
+        run = simulate(EXAMPLES / f"{netlist}.toml", "0.7 s", parameters=values, points=2000)
+        part = run.time > 0.25
+        for row, path, sign in zip(rows.values(), ("shaft2.tau", "J4.w"), (-1, 1), strict=True):
+            row.append(Curve(f"{play:g}° play", run.time[part], sign * run[path][part]))
+    return panels("machine_tool_backlash", "time in s", rows)
+
+
 def readings() -> Figure:
     """The load side's speed and the clutch's torque, for each reading of the document's formulas."""
     rows: dict[str, list[Curve]] = {"speed ω3 in rad/s": [], "clutch torque in N·m": []}
@@ -195,13 +239,81 @@ def direct_switch_on() -> Figure:
     return run.plot("motor.w", "motor.ia", "motor.tau_electrical")
 
 
+def sections() -> Figure:
+    """Figure 13 of document 002: shear forces, bending moments and torque of both shafts, as published."""
+    made = size(EXAMPLES / "sizing" / "test_bench.toml")
+    first, second = made["shaft_I_sections"].diagram, made["shaft_II"].diagram
+    place = [*(1e3 * cut.at for cut in first), np.nan, *(100 + 1e3 * cut.at for cut in second)]
+
+    def curve(name: str, line: str, scale: float) -> Curve:
+        values = (scale * np.array([getattr(cut, line) for cut in shaft]) for shaft in (first, second))
+        return Curve(name, place, np.concatenate([next(values), [np.nan], next(values)]))
+
+    rows = {
+        "shear force in N": [curve("in y", "shear_y", 1), curve("in z", "shear_z", 1)],
+        "bending moment in N·mm": [
+            curve("in y", "bending_y", 1e3),
+            curve("in z", "bending_z", 1e3),
+            curve("resultant", "bending", 1e3),
+        ],
+        "torque in N·mm": [curve("torque", "torque", 1e3)],
+    }
+    return panels("test_bench: both shafts", "position in mm; shaft II begins at 100", rows)
+
+
+def ripples() -> Figure:
+    """Figure 3 of document 002, for rotors of one to eight loops."""
+    turn = np.linspace(0, 2 * pi, 721)
+    curves = [Curve(f"{n} loops" if n > 1 else "one loop", 180 / pi * turn, commutated(turn, n)) for n in (1, 2, 4, 8)]
+    return panels("Torque or voltage of commutated loops", "electrical angle in degrees", {"over the largest": curves})
+
+
+def families() -> Figure:
+    """Diagrams 01 to 03 and 06 of document 002: set A over the supply, beside the points whose values are printed."""
+    motor = DcMotor(SET_A["k"], SET_A["R"], SET_A["friction"], 0.0)
+    supply = np.linspace(0.1, 24, 240)
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(8.0, 7.2), layout="constrained")
+        voltage, current, bench = figure.subplots(3, 1)
+        for load_torque in (0.0, *WEIGHTS):
+            made = dc_motor_point(motor, supply, load_torque)
+            turns = made.speed > 0
+            colour = COLOURS[0] if load_torque == 0 else COLOURS[1]
+            voltage.plot(supply[turns], made.speed[turns] * RPM, color=colour, linewidth=1)
+            current.plot(made.speed[turns] * RPM, made.current[turns], color=colour, linewidth=1)
+        torque = np.array((0.0, *WEIGHTS))
+        speed, amperes = 4736.5 - 3480 * torque, 1.06 + 20 * torque
+        voltage.plot(0 * torque + 24, speed, "k.", label="printed lines at 24 V")
+        current.plot(speed, amperes, "k.", label="printed lines at 24 V")
+        turning = dc_motor_point(motor, supply, SET_A["friction"]).speed * RPM
+        bench.plot(supply, np.maximum(turning, 0), label="motor = generator, set A", color=COLOURS[0])
+        bench.plot((21.5, 24), (4000, 4550), "k.", label="document: motor")
+        bench.plot(24, 4550 * 0.98, "kx", label="document: generator with 2 % slip")
+        for axes, x, y, title in (
+            (voltage, "supply in V", "n in 1/min", "01, 02: speed, no load and M1 to M8"),
+            (current, "n in 1/min", "I in A", "03: current, no load and M1 to M8"),
+            (bench, "supply in V", "n in 1/min", "06: speed on the bench"),
+        ):
+            axes.set_xlabel(x)
+            axes.set_ylabel(y)
+            axes.set_title(f"Diagram {title}", loc="left", fontsize=10)
+            axes.legend(loc="upper left")
+        current.set_ylim(0.8, 4.2)
+    return figure
+
+
 FIGURES: dict[str, Callable[[], Figure]] = {
     "dc_bench_motor": motor_curves,
     "dc_bench_release": release,
     "dc_bench_overload": overload,
     "dc_bench_direct": direct_switch_on,
+    "dc_bench_families": families,
+    "dc_bench_ripple": ripples,
+    "test_bench_sections": sections,
     "dc_machines": machine_curves,
     "machine_tool_damping": startups,
+    "machine_tool_release": disengaging,
+    "machine_tool_backlash": backlash,
     "machine_tool_readings": readings,
 }
 

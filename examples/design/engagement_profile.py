@@ -31,7 +31,7 @@ class Profile(Component):
     y1: Parameter = param("1", "height at the second time", default=0.4, min=0)
     y2: Parameter = param("1", "height at the third time", default=0.7, min=0)
     y3: Parameter = param("1", "height at the last time", default=1.0, min=0)
-    time_scale: Parameter = param("s", "what counts as 1 in the times", default=1.0)
+    time_scale: Parameter = param("s", "scale of the times", default=1.0)
     y: Output = signal_out("1", "signal")
 
     def equations(self) -> Equations:

@@ -1,1 +1,1 @@
-"""What a symbolic model is for beyond its trajectory: sensitivities, modes, sweeps, calibration."""
+"""Analyses beyond a single run: sensitivities, modes, sweeps, calibration."""

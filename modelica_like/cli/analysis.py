@@ -1,4 +1,4 @@
-"""Commands on what a drive does: small motions, operating points, sweeps, exact derivatives."""
+"""Commands that analyse drives: small motions, operating points, sweeps, exact derivatives."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from modelica_like.cli.shared import Assignments, Debug, Netlist, load_netlist, 
 def modes(
     netlist: Netlist, assignments: Assignments = None, *,
     at: Annotated[
-        str, Option(metavar="WHEN", help="Time, e.g. 0.5s, or start: given, rest, steady.")
+        str, Option(metavar="WHEN", help="Time, e.g. 0.5s, or kind of start: given, rest, steady.")
     ] = "given",
     shapes: Annotated[Path | None, Option(metavar="FILE", help="Draw the shapes of the modes.")] = None,
     show: Annotated[list[str] | None, Option(metavar="NAME", help="Variables along the shapes.")] = None,
@@ -22,7 +22,7 @@ def modes(
     outputs: Annotated[list[str] | None, Option("--output", metavar="NAME", help="Variable.")] = None,
     debug: Debug = False,
 ) -> None:  # fmt: skip
-    """Linearise a netlist at a point: eigenvalues, damping, where the energy of each mode is."""
+    """Linearize a netlist at a point: eigenvalues, damping, energy shares of each mode."""
     with told(debug, pictures=[shapes, bode]):
         assembly = load_netlist(netlist, assignments)
         from modelica_like.analyse.linear.linearize import linearize, when
@@ -48,11 +48,11 @@ def steady(
     hold: Annotated[
         list[str] | None, Option(metavar="NAME=VALUE", help="Hold a variable, e.g. 'motor.w=4000 rpm'.")
     ] = None,
-    by: Annotated[list[str] | None, Option(metavar="PARAMETER", help="Find it, one for each held one.")] = None,
+    by: Annotated[list[str] | None, Option(metavar="PARAMETER", help="Parameter to find, one per --hold.")] = None,
     over: Annotated[
         str | None, Option(metavar="NAME=VALUES", help="A curve, e.g. 'load=0:0.25:26' or 'load=0,0.1,0.2'.")
     ] = None,
-    after: Annotated[str | None, Option(metavar="TIME", help="Begin from the end of a run, e.g. 2s.")] = None,
+    after: Annotated[str | None, Option(metavar="TIME", help="Start from the end of a run, e.g. 2s.")] = None,
     show: Annotated[list[str] | None, Option(metavar="NAME", help="Variables of the table and the plot.")] = None,
     plot: Annotated[Path | None, Option(metavar="FILE", help="Draw the curve.")] = None,
     debug: Debug = False,
@@ -81,12 +81,12 @@ def steady(
 def sweep(
     netlist: Netlist,
     over: Annotated[list[str], Option(metavar="NAME=VALUES", help="E.g. 'gear.ratio=2:4:21' or 'mu=0.1,0.3'.")],
-    of: Annotated[list[str], Option(metavar="OUTPUT", help="What to read off each run, e.g. 'max(shaft.tau)'.")],
+    of: Annotated[list[str], Option(metavar="OUTPUT", help="Output of each run, e.g. 'max(shaft.tau)'.")],
     assignments: Assignments = None, *,
-    until: Annotated[str | None, Option(metavar="TIME", help="End time, e.g. 2s; else the netlist's.")] = None,
-    checkpoint: Annotated[Path | None, Option(metavar="FOLDER", help="Keeps what is done.")] = None,
-    processes: Annotated[int | None, Option(metavar="N", help="At once on this machine; else one per core.")] = None,
-    scheduler: Annotated[str | None, Option(metavar="ADDRESS", help="Dask, e.g. tcp://host:8786.")] = None,
+    until: Annotated[str | None, Option(metavar="TIME", help="End time, e.g. 2s; default: the netlist's.")] = None,
+    checkpoint: Annotated[Path | None, Option(metavar="FOLDER", help="Store finished runs here.")] = None,
+    processes: Annotated[int | None, Option(metavar="N", help="Parallel runs; default: one per core.")] = None,
+    scheduler: Annotated[str | None, Option(metavar="ADDRESS", help="Dask scheduler, e.g. tcp://host:8786.")] = None,
     solver: Annotated[Solver, Option(help="The compiled run-time of FMUs, or IDAS.")] = "native",
     output: Annotated[Path | None, Option("--output", "-o", metavar="FILE", help=".csv, .parquet, .nc.")] = None,
     debug: Debug = False,
@@ -112,12 +112,12 @@ def sweep(
 
 def sensitivity(
     netlist: Netlist,
-    of: Annotated[list[str], Option(metavar="OUTPUT", help="What to differentiate, e.g. 'max(shaft.tau)'.")],
-    to: Annotated[list[str] | None, Option(metavar="PARAMETER", help="By what; else by all.")] = None,
+    of: Annotated[list[str], Option(metavar="OUTPUT", help="Output to differentiate, e.g. 'max(shaft.tau)'.")],
+    to: Annotated[list[str] | None, Option(metavar="PARAMETER", help="Parameter or input; default: all.")] = None,
     assignments: Assignments = None, *,
-    until: Annotated[str | None, Option(metavar="TIME", help="End time, e.g. 2s; else the netlist's.")] = None,
+    until: Annotated[str | None, Option(metavar="TIME", help="End time, e.g. 2s; default: the netlist's.")] = None,
     start: Annotated[Start | None, Option(help="Start values: as given, from rest, or the steady state.")] = None,
-    tornado: Annotated[Path | None, Option(metavar="FILE", help="Draw a tornado plot of the first.")] = None,
+    tornado: Annotated[Path | None, Option(metavar="FILE", help="Draw a tornado plot of the first output.")] = None,
     debug: Debug = False,
 ) -> None:  # fmt: skip
     """Differentiate a run exactly, through its events: ranking tables, tornado plot."""

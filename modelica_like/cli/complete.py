@@ -1,4 +1,4 @@
-"""The complete command line: help and mistakes are told by Typer, from the commands' own declarations."""
+"""The complete command line: Typer shows help and errors from the declarations of the commands."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from modelica_like.cli.declare import Argument, Option, WrongUse
 def application(commands: dict[str, Callable[..., None]]) -> typer.Typer:
     """Return the application with these commands, in this order."""
     app = typer.Typer(
-        help="Drive-trains written once, acausally: check, simulate and describe netlists.",
+        help="Acausal drive-train models: check, simulate, analyse and export netlists.",
         no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False,
     )  # fmt: skip
     for name, command in commands.items():

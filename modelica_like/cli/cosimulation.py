@@ -9,9 +9,9 @@ from modelica_like.cli.declare import Argument, Option, WrongUse
 from modelica_like.cli.shared import Assignments, Debug, Netlist, load_netlist, say, told
 
 Master = Literal["jacobi", "gauss-seidel"]
-"""In which order FMUs step."""
+"""Order in which FMUs step."""
 Inputs = Literal["linear", "hold"]
-"""How inputs move between communication points."""
+"""Inputs between communication points."""
 
 
 def split(
@@ -28,8 +28,8 @@ def split(
         list[str] | None, Option("--name", metavar="NAME", help="Name of an FMU, in the order of the netlist.")
     ] = None,
     fmi: Annotated[str, Option(metavar="VERSION", help="FMI version: 2.0 or 3.0.")] = "2.0",
-    ssp: Annotated[str, Option(metavar="VERSION", help="SSP version of an SSP: 1.0 or 2.0.")] = "1.0",
-    check: Annotated[bool, Option(help="Run every FMU against IDAS before it is handed over.")] = True,
+    ssp: Annotated[str, Option(metavar="VERSION", help="SSP version: 1.0 or 2.0.")] = "1.0",
+    check: Annotated[bool, Option(help="Compare every FMU with IDAS.")] = True,
     debug: Debug = False,
 ) -> None:  # fmt: skip
     """Cut a drive at shafts into FMUs, with the system file that `cosim` runs."""
@@ -38,7 +38,7 @@ def split(
         from rich.console import Console
 
         from modelica_like.cosimulation.split import split as run
-        from modelica_like.cosimulation.ssp import split_to_ssp
+        from modelica_like.cosimulation.split import split_to_ssp
 
         with Console(stderr=True).status("loading") as status:
             if output.suffix.lower() == ".ssp":
@@ -57,17 +57,17 @@ def cosim(
     assignments: Annotated[
         list[str] | None, Option("--set", metavar="FMU.PATH=VALUE", help="Set a value in an FMU, in its units.")
     ] = None, *,
-    until: Annotated[str | None, Option(metavar="TIME", help="End time, e.g. 2s; else the system's.")] = None,
+    until: Annotated[str | None, Option(metavar="TIME", help="End time, e.g. 2s; default: the system's.")] = None,
     step: Annotated[str | None, Option(metavar="TIME", help="Communication step, e.g. 0.1ms.")] = None,
     tolerance: Annotated[
-        float | None, Option(metavar="RTOL", help="Relative tolerance of the coupling: the step varies.")
+        float | None, Option(metavar="RTOL", help="Relative tolerance of the coupling, for a variable step.")
     ] = None,
     master: Annotated[Master | None, Option(help="All at once, or one after the other.")] = None,
-    inputs: Annotated[Inputs | None, Option(help="Inputs on straight lines, or held.")] = None,
+    inputs: Annotated[Inputs | None, Option(help="Interpolate inputs linearly, or hold them.")] = None,
     csv: Annotated[Path | None, Option(metavar="FILE", help="Write a table: .csv, .parquet, .nc.")] = None,
     units: Annotated[bool, Option("--units", help="Units in a second header line of the table.")] = False,
     plot: Annotated[Path | None, Option(metavar="FILE", help="Draw the results: .png, .svg or .pdf.")] = None,
-    show: Annotated[list[str] | None, Option(metavar="PATTERN", help="What to draw, e.g. '*.w'.")] = None,
+    show: Annotated[list[str] | None, Option(metavar="PATTERN", help="Variables to draw, e.g. '*.w'.")] = None,
     timeout: Annotated[float, Option(metavar="SECONDS", help="Time limit.")] = 600.0,
     debug: Debug = False,
 ) -> None:  # fmt: skip
@@ -79,8 +79,8 @@ def cosim(
         from modelica_like.cosimulation.solution import described_model
         from modelica_like.report.progress import Bar
         from modelica_like.report.run import cosimulation_report
-        from modelica_like.solve.plot import matching
         from modelica_like.solve.plot import plot as draw
+        from modelica_like.solve.trajectories import matching
 
         values = _numbers(assignments or ())
         with opened(system) as known, Bar(until or known.settings.until) as bar:

@@ -10,16 +10,16 @@ from modelica_like.cli.declare import Option
 from modelica_like.cli.shared import Assignments, Debug, Netlist, load_netlist, say, told
 
 Takes = Literal["flow", "potential"]
-"""What open ends take from outside."""
+"""Quantity that open ends take from outside."""
 Modes = Literal["output", "local", "integer"]
-"""What modes are in an FMU."""
+"""Variables of modes in an FMU."""
 
 
 def export(
     netlist: Netlist, assignments: Assignments = None, *,
-    output: Annotated[Path | None, Option("-o", "--output", metavar="FILE", help="The FMU; else NETLIST.fmu.")] = None,
+    output: Annotated[Path | None, Option("-o", "--output", metavar="FILE", help="Default: NETLIST.fmu.")] = None,
     html: Annotated[
-        Path | None, Option(metavar="FILE", help="A page that simulates in a browser; with -o besides the FMU.")
+        Path | None, Option(metavar="FILE", help="Write a page that simulates in a browser; with -o also an FMU.")
     ] = None,
     fmi: Annotated[str, Option(metavar="VERSION", help="FMI version: 2.0 or 3.0.")] = "2.0",
     kind: Annotated[str, Option(metavar="KINDS", help="me, cs, or both: me,cs.")] = "me,cs",
@@ -27,23 +27,23 @@ def export(
         str, Option(metavar="NAMES", help="native, all, none, or names such as x86_64-windows, with commas.")
     ] = "native",
     outputs: Annotated[
-        list[str] | None, Option("--show", metavar="PATTERN", help="Further outputs, e.g. '*.w'; a page's curves.")
+        list[str] | None, Option("--show", metavar="PATTERN", help="Additional outputs, e.g. '*.w'; in a page: curves.")
     ] = None,
     ends: Annotated[
-        list[str] | None, Option("--open", metavar="PATH", help="A free connector that is open, e.g. J.flange_b.")
+        list[str] | None, Option("--open", metavar="PATH", help="A free connector to open, e.g. J.flange_b.")
     ] = None,
     takes: Annotated[Takes, Option(help="What open ends take: flow (torque) or potential (angle).")] = "flow",
     embed: Annotated[
-        bool, Option("--embed", help="Compile the model into the binary, for importers that do not name resources.")
+        bool, Option("--embed", help="Compile the model into the binary, for importers that do not locate resources.")
     ] = False,
     modes: Annotated[Modes, Option(help="Modes as enumeration outputs, local ones, or integer outputs.")] = "output",
     fixed_step: Annotated[
-        str | None, Option(metavar="TIME", help="Co-Simulation in steps of this size, with bounded work: 1ms.")
+        str | None, Option(metavar="TIME", help="Co-Simulation with fixed steps and bounded work, e.g. 1ms.")
     ] = None,
     tables: Annotated[
         list[str] | None, Option(metavar="PATTERN", help="Tables whose numbers are tunable, e.g. '*.mu_pos'.")
     ] = None,
-    check: Annotated[bool, Option(help="Run the FMU against IDAS before it is handed over.")] = True,
+    check: Annotated[bool, Option(help="Compare the FMU with IDAS.")] = True,
     strict: Annotated[bool, Option("--strict", help="Do not write an FMU that differs from IDAS.")] = False,
     debug: Debug = False,
 ) -> None:  # fmt: skip

@@ -11,7 +11,7 @@ from modelica_like.cli.shared import Debug, out, say, told
 
 
 def describe(
-    kind: Annotated[str, Argument(metavar="TYPE", help="type as a netlist names it", show_default=False)],
+    kind: Annotated[str, Argument(metavar="TYPE", help="component type, as in a netlist", show_default=False)],
     *, debug: Debug = False,
 ) -> None:  # fmt: skip
     """Describe a component type: parameters, units, connectors, equations."""
@@ -42,13 +42,13 @@ def library(*, debug: Debug = False) -> None:
 
 
 def docs(
-    output: Annotated[Path, Option("--output", "-o", metavar="FOLDER", help="where the pages go")],
+    output: Annotated[Path, Option("--output", "-o", metavar="FOLDER", help="folder for the pages")],
     types: Annotated[
-        list[str] | None, Argument(metavar="TYPE", help="types as netlists name them", show_default=False)
+        list[str] | None, Argument(metavar="TYPE", help="component types, as in a netlist", show_default=False)
     ] = None,
     *,
     examples: Annotated[
-        Path | None, Option(metavar="FOLDER", help="netlists that the pages name", show_default=False)
+        Path | None, Option(metavar="FOLDER", help="folder of netlists to link", show_default=False)
     ] = None,
     debug: Debug = False,
 ) -> None:

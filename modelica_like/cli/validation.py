@@ -11,7 +11,7 @@ from modelica_like.errors import NetlistError
 
 _HOMES = (Path(__file__).parents[1], Path(__file__).parents[2])
 DEMO = next((home / "examples/demo.py" for home in _HOMES if (home / "examples").is_dir()), Path("examples/demo.py"))
-"""Lies beside its netlists: in the package, or in a copy of the source next to it."""
+"""In the folder of its netlists: in the package, or in a copy of the source."""
 
 
 def size(
@@ -38,7 +38,7 @@ def demo(
     pictures: Annotated[Path, Option(metavar="FOLDER", help="Where to write the pictures.")] = Path("build/demo"),
     *, debug: Debug = False,
 ) -> None:  # fmt: skip
-    """Run the start-ups of the examples against their published values."""
+    """Run the start-ups of the examples and compare them with the published values."""
     with told(debug):
         from runpy import run_path
 
@@ -65,13 +65,13 @@ def validate(
 
 def compare(
     a: Annotated[Path, Argument(metavar="A", help="netlist, FMU, system or CSV file", show_default=False)],
-    b: Annotated[Path, Argument(metavar="B", help="what to compare it with", show_default=False)],
+    b: Annotated[Path, Argument(metavar="B", help="what to compare with", show_default=False)],
     signals: Annotated[
-        list[str] | None, Option(metavar="PATTERN", help="What to compare, e.g. '*.w'; else all.")
+        list[str] | None, Option(metavar="PATTERN", help="Signals to compare, e.g. '*.w'; default: all.")
     ] = None,
-    until: Annotated[float | None, Option(metavar="SECONDS", help="End time of what is run.")] = None,
-    points: Annotated[int, Option(metavar="N", help="Number of equal intervals of what is run.")] = 500,
-    tolerance: Annotated[float | None, Option(metavar="RTOL", help="Relative tolerance of what is run.")] = None,
+    until: Annotated[float | None, Option(metavar="SECONDS", help="End time of simulations.")] = None,
+    points: Annotated[int, Option(metavar="N", help="Number of equal intervals of simulations.")] = 500,
+    tolerance: Annotated[float | None, Option(metavar="RTOL", help="Relative tolerance of simulations.")] = None,
     plot: Annotated[Path | None, Option(metavar="FILE", help="Draw the largest deviations.")] = None,
     *, debug: Debug = False,
 ) -> None:  # fmt: skip

@@ -1,4 +1,4 @@
-"""Where a netlist is cut: connections are taken apart, and the parts fall into groups."""
+"""Cut a netlist: separate connections, and divide the parts into groups."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Wire:
 
 @dataclass(frozen=True)
 class Cut:
-    """A wire taken apart: the end that was named, or the output of a signal, and all others."""
+    """A separated connection: the named end, or the output of a signal, and all other ends."""
 
     name: str
     near: str
@@ -55,7 +55,7 @@ def cut_netlist(assembly: Assembly, at: Sequence[str]) -> CutNetlist:
 
     Raises:
         UnknownName: there is no such shaft.
-        NetlistError: the place cannot be cut, or the netlist does not fall apart there.
+        NetlistError: the place cannot be cut, or the cut does not separate the netlist.
     """
     if not at:
         raise NetlistError(f"{assembly.label}: there is nothing to cut.", advice="Name a shaft, e.g. --at shaft.")
@@ -129,7 +129,7 @@ def _near_end(assembly: Assembly, wires: Sequence[Wire], name: str) -> str:
         if len(others) > 1 and any(wire.ends == ends and not wire.signal for wire in wires):
             raise NetlistError(
                 f"{name} joins {len(ends)} ends: {', '.join(ends)}.", where=assembly.source_of(f"connect.{name}"),
-                advice="Name the end that is to be cut off.",
+                advice="Name the end to cut off.",
             )  # fmt: skip
         return first
     connected = [end for wire in wires for end in wire.ends]
@@ -146,7 +146,7 @@ def _near_end(assembly: Assembly, wires: Sequence[Wire], name: str) -> str:
         before = f"{name}.{part.inlet_connector().path.rpartition('.')[2]}"
     except UnknownName:
         listing = ", ".join(ends) or "none that is connected"
-        raise NetlistError(f"It is not clear where {name} is to be cut.", advice=f"Name an end: {listing}.") from None
+        raise NetlistError(f"It is not clear where to cut {name}.", advice=f"Name an end: {listing}.") from None
     return behind if behind in connected else before
 
 
@@ -155,11 +155,11 @@ def _nowhere(assembly: Assembly, name: str, connected: Sequence[str]) -> Excepti
         chain = ", ".join(assembly.chains[name])
         return NetlistError(
             f"{name} is a whole series: {chain}.", where=assembly.source_of(f"series.{name}"),
-            advice="Name the part behind which it is to be cut.",
+            advice="Name the part behind which to cut.",
         )  # fmt: skip
     if part_of(name) in assembly._parts and name.count(".") > 1:
         return NetlistError(
-            f"{name} lies inside of {part_of(name)}; only connections of the netlist itself can be cut.",
+            f"{name} is inside {part_of(name)}; only connections of the netlist itself can be cut.",
             advice=f"Split {part_of(name)}'s own netlist, or cut at one of its ends.",
         )
     known = [*assembly.parts, *assembly.wires, *connected]
@@ -170,7 +170,7 @@ def _nowhere(assembly: Assembly, name: str, connected: Sequence[str]) -> Excepti
 
 
 def _check_can_open(assembly: Assembly, ends: Sequence[str]) -> None:
-    """Refuse inputs that have a value where nothing is connected: they would not become inputs of an FMU."""
+    """Refuse inputs with a default value: they would not become inputs of an FMU."""
     for end in ends:
         owner, _, name = end.rpartition(".")
         if assembly.find(owner).value(name) is not None:
@@ -210,11 +210,11 @@ def _check_apart(assembly: Assembly, found: CutNetlist, cut: Cut) -> None:
         return
     near, far = part_of(cut.near), part_of(inside[0])
     if near == far:
-        raise NetlistError(f"{cut.near} lies inside of the array {near}, which cannot be cut.", where=cut.source)
+        raise NetlistError(f"{cut.near} is inside the array {near}, which cannot be cut.", where=cut.source)
     raise NetlistError(
-        f"{assembly.label} does not fall apart between {cut.near} and {inside[0]}.", where=cut.source,
+        f"{assembly.label} does not separate between {cut.near} and {inside[0]}.", where=cut.source,
         why=f"{near} and {far} are also joined by {' – '.join(_way(found.wires, near, far))}.",
-        advice="Cut there, too: --at can be given several times.",
+        advice="Cut there as well: --at can be given several times.",
     )  # fmt: skip
 
 

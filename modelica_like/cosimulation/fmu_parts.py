@@ -1,4 +1,4 @@
-"""Netlists with FMUs as parts: all other parts become one more FMU, and they run together."""
+"""Netlists with FMUs as parts: all other parts become another FMU, and all FMUs run together."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ from modelica_like.simulation import seconds
 from modelica_like.units import ONE, parse_unit, to_si
 
 _OWN = ("is", "file")
-_ONLY_SIGNALS = "An FMU has signals only: join its inputs and outputs in [connect]."
+_ONLY_SIGNALS = "An FMU has only signals: connect its inputs and outputs in [connect]."
 
 
 def system_of_netlist(path: Path, work: Path) -> System:
-    """Make a system of a netlist that has FMUs among its parts; several errors come together.
+    """Make a system from a netlist with FMUs as parts; all errors are reported together.
 
-    The FMUs, whose files are named relative to the netlist, are units of their own; all other parts are exported into a
-    folder as one FMU with the netlist's name.
+    Each FMU is a unit, with its file name relative to the netlist; all other parts are exported into a folder as one
+    FMU with the netlist's name.
     """
     document = parse(read_text(path), str(path))
     fmus = {name: entry for name, entry in document.parts.items() if _is_fmu(entry)}
     if not fmus:
         raise NetlistError(
-            f"{document.name} has no FMU among its parts, so there is nothing to run together.",
+            f"{document.name} has no FMU among its parts, so there is nothing to co-simulate.",
             advice="Simulate it, or cut it into FMUs with `modelica-like split`.",
         )
     return _Joiner(document, fmus, path).system(work)
@@ -55,7 +55,7 @@ class _End:
 
 
 class _Joiner:
-    """Tells the FMUs of a netlist from its other parts, and collects what is wrong."""
+    """Separates the FMUs of a netlist from its other parts, and collects errors."""
 
     def __init__(self, document: Document, fmus: Mapping[str, Any], path: Path) -> None:
         self.document, self.fmus, self.path = document, fmus, path
@@ -100,7 +100,7 @@ class _Joiner:
 
     def _unit(self, name: str, entry: Any) -> Unit:
         if isinstance(entry, list) or "count" in entry:
-            raise NetlistError(f"{name}: FMUs cannot stand in an array.", advice="Declare each of them as a part.")
+            raise NetlistError(f"{name}: an array cannot contain FMUs.", advice="Declare each FMU as a part.")
         if not isinstance(entry.get("file"), str):
             raise NetlistError(f"{name} names no file.", advice=f'Write {{ is = "FMU", file = "{name}.fmu" }}.')
         file = self.path.parent / entry["file"]
@@ -114,8 +114,8 @@ class _Joiner:
         if not self.about[name].cosimulation:
             raise NetlistError(
                 f"{name}: {file.name} has no Co-Simulation part, only Model Exchange.",
-                why="Its equations would need a solver, which the tool that exported it has left out.",
-                advice="Export it once more, for Co-Simulation.",
+                why="Its equations need a solver, which this FMU does not contain.",
+                advice="Export it again for Co-Simulation.",
             )
         values = flattened({key: value for key, value in entry.items() if key not in _OWN})
         return Unit(name, file, {key: self._value(name, key, value) for key, value in values.items()})
@@ -143,7 +143,7 @@ class _Joiner:
         for section, name, ends in places:
             for fmu in [_part(end) for end in ends if _part(end) in self.fmus]:
                 where = self.document.lines.source(section, *([name] if section != "free" else []))
-                self.errors.append(NetlistError(f"{fmu} cannot stand in [{section}].", where=where, why=_ONLY_SIGNALS))
+                self.errors.append(NetlistError(f"{fmu} cannot be in [{section}].", where=where, why=_ONLY_SIGNALS))
         for section in ("start", "guess"):
             for name in getattr(self.document, section):
                 if _part(name) in self.fmus:
@@ -159,7 +159,7 @@ class _Joiner:
         return {name: ends for name, ends in wires if not any(_part(end) in self.fmus for end in ends)}
 
     def _rest(self) -> tuple[Assembly | None, dict[str, list[str]]]:
-        """Return the other parts, joined as far as no FMU stands between, and the connections that cross."""
+        """Return the other parts with the connections among them, and the connections to FMUs."""
         plain = self._plain()
         crossing = {name: ends for name, ends in self.document.connect.items() if name not in plain}
         self.given = {end: name for name, ends in plain.items() for end in ends}
@@ -174,7 +174,7 @@ class _Joiner:
         sources, targets = [e for e in found if not e.takes], [e for e in found if e.takes]
         if len(sources) != 1:
             names = ", ".join(map(str, sources or targets))
-            what = "nothing gives the signal" if not sources else "several ends give the signal"
+            what = "no output drives it" if not sources else "multiple outputs drive it"
             raise NetlistError(f"{name}: {what}: {names}.", advice="Join one output with the inputs that take it.")
         (source,) = sources
         for target in targets:
@@ -188,14 +188,14 @@ class _Joiner:
     def _give(self, end: str, name: str) -> None:
         if (other := self.given.setdefault(end, name)) != name:
             where = [self.document.lines.source("connect", one) for one in (other, name)]
-            raise NetlistError(f"{end} is given twice, by {other} and {name}.", where=where, advice="Take one out.")
+            raise NetlistError(f"{end} is given twice, by {other} and {name}.", where=where, advice="Remove one.")
 
     def _end(self, end: str, rest: Assembly | None) -> _End:
         part, _, variable = end.partition(".")
         if part in self.fmus:
             causality = self._variable(part, variable).causality
             if "arameter" in causality or causality == "independent":
-                raise NetlistError(f"{end} is a parameter of an FMU, no signal.")
+                raise NetlistError(f"{end} is a parameter of an FMU, not a signal.")
             return _End(Port(part, variable), causality == "input", foreign=True)
         return _End(Port(self.title, end), self._takes(end, rest), foreign=False)
 
@@ -208,10 +208,10 @@ class _Joiner:
             return isinstance(owner.fields[name], Input)
         if isinstance(inner := getattr(owner, name, None), Connector):
             raise NetlistError(
-                f"{end} is a {type(inner).__name__}, and an FMU has signals only.",
+                f"{end} is a {type(inner).__name__}, and an FMU has only signals.",
                 why="A shaft, slide or wire carries torque and motion in both directions; an FMU computes one from the "
                 "other.",
-                advice="Put an adaptor on it, such as TorqueToAngleAdaptor, and join that one's signals.",
+                advice="Put an adaptor on it, such as TorqueToAngleAdaptor, and connect its signals.",
             )  # fmt: skip
         raise UnknownName(f"{owner.label} has no signal '{name}'{did_you_mean(name, owner.fields) or '.'}")
 

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from modelica_like.cosimulation.cut import Cut, CutNetlist, cut_netlist
 from modelica_like.cosimulation.files import write_system
 from modelica_like.cosimulation.parts import Maker, Takes, ends_of, orient
+from modelica_like.cosimulation.ssp import write_ssp
+from modelica_like.cosimulation.ssp_document import Version
 from modelica_like.cosimulation.system import Bond, Link, Port, Settings, System, Unit
 from modelica_like.errors import DuplicateName, NetlistError
 from modelica_like.fmi.export import export_fmu
+from modelica_like.fmi.package import known_version, target_file
 from modelica_like.initialize import initialize
 from modelica_like.language import Assembly, Component
 from modelica_like.netlist import load, save
@@ -31,7 +36,7 @@ class Split:
         system: the FMUs and their connections.
         path: its TOML file.
         ends: what each end of a cut takes from the other side: `flow` (torque) or `potential` (angle and speed).
-        notes: what the runs of the FMUs against IDAS have told.
+        notes: results of the comparisons with IDAS.
     """
 
     system: System
@@ -40,7 +45,10 @@ class Split:
     notes: tuple[str, ...] = ()
 
     def __str__(self) -> str:
-        words = {"flow": "takes the load, and tells how it moves", "potential": "is moved, and tells its load"}
+        words = {
+            "flow": "receives the load and returns the motion",
+            "potential": "receives the motion and returns the load",
+        }
         lines = [f"{self.path}: {', '.join(unit.file.name for unit in self.system.units)}"]
         return "\n".join([*lines, *(f"  {path} {words[takes]}" for path, takes in self.ends.items()), *self.notes])
 
@@ -52,20 +60,20 @@ def split(
 ) -> Split:  # fmt: skip
     """Cut a drive at shafts into FMUs, and write the system that `cosim` runs.
 
-    The start values are those of the whole drive: a state keeps the start value that it was given, others are given the
-    number that the drive starts with.
+    The start values are those of the whole drive: a state keeps its given start value, other variables start with the
+    number from the start of the drive.
 
     Args:
-        drive: a netlist file, or a component that has only parts and wires.
-        at: names of parts (the cut is behind them), of their ends (`shaft.flange_a`), or of entries of `[connect]`; a
-            signal can be cut, too.
-        folder: where to write; it is made if it does not exist.
-        names: of the FMUs, in the order of the netlist; by default that of the first part of each.
-        version: FMI version; inputs can move on straight lines in 2.0 only.
+        drive: a netlist file, or a component that has only parts and connections.
+        at: names of parts (the cut is behind them), of their ends (`shaft.flange_a`), or of entries of `[connect]`;
+            signals can also be cut.
+        folder: for the files; it is created if it does not exist.
+        names: of the FMUs, in the order of the netlist; by default the name of the first part of each.
+        version: FMI version; only 2.0 interpolates inputs linearly.
         step: communication step to write into the system, in s.
         master: `jacobi` or `gauss-seidel`, to write into the system.
-        check: whether to run each FMU against IDAS.
-        report: called with what is being done.
+        check: whether to compare each FMU with IDAS.
+        report: called with the present activity.
 
     Raises:
         UnknownName, NetlistError: there is no such shaft, or the drive cannot be cut there.
@@ -80,7 +88,7 @@ def split(
     titles = _titles(found, names)
     settings = _settings(assembly.__dict__["_simulate"].get("until"), step, master)
     maker = Maker(assembly, found)
-    tell("looking for the causality")
+    tell("choosing the causality")
     chosen = orient(maker)
     values = _start_values(assembly)
     target.mkdir(parents=True, exist_ok=True)
@@ -97,8 +105,30 @@ def split(
     return Split(system, target / _SYSTEM, taken, tuple(notes))
 
 
+def split_to_ssp(
+    drive: Component | str | Path, at: Sequence[str] | str, path: str | Path, ssp_version: Version | str = "1.0",
+    **options: Any,
+) -> Split:  # fmt: skip
+    """Cut a drive at shafts, and write the parts as an SSP.
+
+    Args:
+        drive: a netlist file, or a component that has only parts and connections.
+        at: where to cut; see `split`.
+        path: the file to write, `….ssp`.
+        ssp_version: of the SSP standard.
+        options: of `split`.
+
+    Raises:
+        ModelicaLikeError: see `split` and `cosimulation.ssp.write_ssp`.
+    """
+    target, chosen = target_file(path, ".ssp", "An SSP"), known_version(ssp_version, Version, "SSP")
+    with tempfile.TemporaryDirectory(prefix="modelica_like_") as folder:
+        done = split(drive, at, folder, **options)
+        return replace(done, path=write_ssp(done.system, target, chosen))
+
+
 def _export(part: Assembly, title: str, file: Path, version: str, *, check: bool) -> str:
-    """Write a part as a netlist and as an FMU, and return what its check has told."""
+    """Write a part as a netlist and as an FMU, and return the result of its check."""
     part.__dict__["_name"] = title
     save(part, file.with_suffix(".toml"))
     return export_fmu(part, file, version, {"cs"}, check=check).check.sentence
@@ -126,9 +156,9 @@ def _titles(found: CutNetlist, names: Sequence[str]) -> list[str]:
         )
     for name in names:
         if not name.isidentifier():
-            raise NetlistError(f"'{name}' is no name of an FMU: letters, digits and _.")
+            raise NetlistError(f"'{name}' is not a name for an FMU: use letters, digits and _.")
     if len(set(names)) < len(names):
-        raise DuplicateName(f"Two FMUs cannot have one name: {', '.join(names)}.")
+        raise DuplicateName(f"Two FMUs cannot have the same name: {', '.join(names)}.")
     return list(names)
 
 

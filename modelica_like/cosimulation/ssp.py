@@ -2,49 +2,43 @@
 
 from __future__ import annotations
 
-import tempfile
-from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from modelica_like.cosimulation.described import DescribedFmu, described
-from modelica_like.cosimulation.split import Split, split
 from modelica_like.cosimulation.ssp_document import Version, ssd
 from modelica_like.cosimulation.ssp_reader import read_structure
 from modelica_like.cosimulation.system import System, check_system
 from modelica_like.errors import NetlistError, UnknownName, did_you_mean
 from modelica_like.fmi.package import known_version, target_file, write_archive
 from modelica_like.fmi.unpack import SSP, printable, unpack
-from modelica_like.language import Component
 
 
 def write_ssp(system: System, path: str | Path, version: Version | str = "1.0") -> Path:
     """Write a system and its FMUs as an SSP.
 
-    The same system gives the same bytes. What the standard has no words for (master, step, tolerance, bonds) is kept
-    in an annotation, which other tools leave alone.
+    The same system gives the same bytes. Settings outside the standard (master, step, tolerance, bonds) are in an
+    annotation, which other tools ignore.
 
     Args:
         system: the system.
         path: the file to write, `….ssp`; it is replaced.
-        version: of the SSP standard, `1.0` or `2.0`, which knows the types of FMI 3.0.
+        version: of the SSP standard, `1.0` or `2.0` (with the types of FMI 3.0).
 
     Returns:
         The file.
 
     Raises:
-        UnknownName: there is no such version, or an FMU has not a variable of the system.
+        UnknownName: there is no such version, or an FMU lacks a variable of the system.
         ExportError: the file has another ending, or its folder does not exist.
-        NetlistError: the system is not sound.
-        FmuRefused: a file is no FMU.
+        NetlistError: the system is not valid.
+        FmuRefused: a file is not an FMU.
         OSError: a file cannot be read or written.
     """
     target, chosen = target_file(path, ".ssp", "An SSP"), known_version(version, Version, "SSP")
     check_system(system)
     for name in (system.name, *(one.name for one in (*system.links, *system.bonds))):
         if not name.isprintable():
-            raise NetlistError(f"The name '{printable(name)}' has characters that XML does not know.")
+            raise NetlistError(f"The name '{printable(name)}' has characters that XML does not allow.")
     fmus = {unit.name: described(unit.file) for unit in system.units}
     _check_variables(system, fmus)
     homes: dict[Path, str] = {}
@@ -54,28 +48,6 @@ def write_ssp(system: System, path: str | Path, version: Version | str = "1.0") 
     files = {home: file.read_bytes() for file, home in homes.items()}
     write_archive(target, files | {SSP.description: ssd(system, fmus, sources, chosen)})
     return target
-
-
-def split_to_ssp(
-    drive: Component | str | Path, at: Sequence[str] | str, path: str | Path, ssp_version: Version | str = "1.0",
-    **options: Any,
-) -> Split:  # fmt: skip
-    """Cut a drive at shafts, and write the parts as an SSP.
-
-    Args:
-        drive: a netlist file, or a component that has only parts and wires.
-        at: where to cut; see `split`.
-        path: the file to write, `….ssp`.
-        ssp_version: of the SSP standard.
-        options: of `split`.
-
-    Raises:
-        ModelicaLikeError: see `split` and `write_ssp`.
-    """
-    target, chosen = target_file(path, ".ssp", "An SSP"), known_version(ssp_version, Version, "SSP")
-    with tempfile.TemporaryDirectory(prefix="modelica_like_") as folder:
-        done = split(drive, at, folder, **options)
-        return replace(done, path=write_ssp(done.system, target, chosen))
 
 
 def _check_variables(system: System, fmus: dict[str, DescribedFmu]) -> None:
@@ -91,12 +63,12 @@ def _check_variables(system: System, fmus: dict[str, DescribedFmu]) -> None:
 def load_ssp(path: Path, work: Path) -> System:
     """Read an SSP: the system of its SystemStructure.ssd, flat.
 
-    Systems inside of the system are taken apart; the names of their FMUs are joined with `_`. The SSP is unpacked into
-    an empty folder, where the FMUs of the system lie.
+    Nested systems are flattened; the names of their FMUs are joined with `_`. The SSP is unpacked into an empty folder,
+    which contains the FMUs of the system.
 
     Raises:
-        FmuRefused: the file is no SSP, or is unsafe to unpack.
-        NetlistError, UnknownName: it says something that cannot be run, or contradicts itself.
+        FmuRefused: the file is not an SSP, or is unsafe to unpack.
+        NetlistError, UnknownName: the system cannot be run, or contradicts itself.
         OSError: the file cannot be read.
     """
     return read_structure(path.name, unpack(path, work, kind=SSP))

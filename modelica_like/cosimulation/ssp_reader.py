@@ -22,7 +22,7 @@ _GIVES = {
     True: ("output", "calculatedParameter", "constant", "local"),
     False: ("input", "parameter", "structuralParameter"),
 }
-"""Kinds of connectors that give a value to a connection: of an element inside, of the system itself."""
+"""Kinds of connectors that provide a value: of an element inside, of the system itself."""
 _NAMED = ("input", "output", "parameter", "structuralParameter", "calculatedParameter", "constant", "local")
 
 
@@ -43,7 +43,9 @@ def read_structure(name: str, folder: Path) -> System:
     if top.tag != f"{{{NAMES['ssd']}}}SystemStructureDescription":
         raise NetlistError(f"{SSP.description} in {name} describes no system structure.", where=place(top))
     if top.get("version", "").partition(".")[0] not in ("1", "2"):
-        raise NetlistError(f"{name} is of SSP {top.get('version')}; there are 1.0 and 2.0.", where=place(top))
+        raise NetlistError(
+            f"{name} has the SSP version {top.get('version')}; 1.0 and 2.0 are supported.", where=place(top)
+        )
     inside = top.find("ssd:System", NAMES)
     if inside is None:
         raise NetlistError(f"{name} has no system.", where=place(top))
@@ -51,7 +53,7 @@ def read_structure(name: str, folder: Path) -> System:
 
 
 class _Reader:
-    """Flattens a tree of elements; `drives` says what drives a connector."""
+    """Flattens a tree of elements; `drives` maps each connector to its source."""
 
     def __init__(self, top: Any, root: Element, files: Files) -> None:
         self.top, self.root, self.files = top, root, files
@@ -88,14 +90,14 @@ class _Reader:
             if ssp.local(one).endswith("Transformation") and not _is_identity(one):
                 raise NetlistError(
                     f"A connection with a {ssp.local(one)} is not supported.", where=place(xml),
-                    advice="Let one of both FMUs do the conversion.",
+                    advice="Do the conversion in one of the FMUs.",
                 )  # fmt: skip
         ends = [self._end(system, xml, which) for which in ("start", "end")]
         gives = [self._gives(system, end) for end in ends]
-        if gives == [False, True]:  # which end is the start says nothing about the direction
+        if gives == [False, True]:  # the start of a connection does not define its direction
             ends.reverse()
         elif gives[0] == gives[1] and None not in gives:
-            what = "two connectors that give a value" if gives[0] else "two connectors that take a value"
+            what = "two connectors that provide a value" if gives[0] else "two connectors that receive a value"
             raise NetlistError(f"A connection joins {what}: {' and '.join(map(_text, ends))}.", where=place(xml))
         source, target = ends
         if target in self.drives:
@@ -108,7 +110,7 @@ class _Reader:
     def _end(self, system: Element, xml: Any, which: str) -> Target:
         name, connector = xml.get(f"{which}Element"), needed(xml, f"{which}Connector")
         if xml.get(f"{which}Indices"):
-            raise NetlistError("Connections of single elements of arrays are not supported.", where=place(xml))
+            raise NetlistError("Connections to single elements of arrays are not supported.", where=place(xml))
         if name and name not in system.children:
             raise NetlistError(f"{system.label} has no element '{name}'.", where=place(xml))
         element = system.children[name] if name else system
@@ -116,16 +118,16 @@ class _Reader:
         return element.path, connector
 
     def _gives(self, system: Element, end: Target) -> bool | None:
-        """Tell whether an end gives a value inside of a system, or None where it may do both."""
+        """Return whether an end provides a value inside a system, or None if it may do both."""
         kind = self.elements[end[0]].connectors[end[1]].kind
         return kind in _GIVES[end[0] != system.path] if kind in _NAMED else None
 
     def _origin(self, target: Target) -> list[_Drive]:
-        """Return the connections on the way from a component's input back to where its value comes from."""
+        """Return the connections from a component's input back to the source of its value."""
         way = [self.drives[target]]
         while way[-1].source in self.drives:
             if way[-1].source in [drive.source for drive in way[:-1]]:
-                raise NetlistError(f"{_text(target)} is driven by a circle of connections.", where=way[0].place)
+                raise NetlistError(f"{_text(target)} is driven by a loop of connections.", where=way[0].place)
             way.append(self.drives[way[-1].source])
         return way
 
@@ -147,7 +149,7 @@ class _Reader:
         return Port(self.names[target[0]], target[1])
 
     def _check_units(self, target: Target, way: list[_Drive]) -> None:
-        """Refuse connections on which a unit would have to be converted."""
+        """Refuse connections that would need a unit conversion."""
         ends = [target, *(drive.source for drive in way)]
         first, *others = [unit for end in ends for unit in self._units_of(end)] or [UnitDefinition("1")]
         other = next((unit for unit in others if not first.same_scale(unit)), None)
@@ -155,7 +157,7 @@ class _Reader:
             raise NetlistError(
                 f"{_text(target)} and {_text(way[-1].source)} have different units, {first.name} and {other.name}, "
                 "and conversion is not supported.",
-                where=way[0].place, advice="Let one of both FMUs do the conversion.",
+                where=way[0].place, advice="Do the conversion in one of the FMUs.",
             )  # fmt: skip
 
     def _units_of(self, end: Target) -> list[UnitDefinition]:
@@ -166,14 +168,14 @@ class _Reader:
     # -- values ------------------------------------------------------------------------------------------------------
 
     def _parameters(self, outer: Mapping[Target, Target]) -> dict[ElementPath, dict[str, float]]:
-        """Return the values of each component: those bound to it, and those bound to what drives it from outside."""
+        """Return the values of each component: those bound to it, and those bound to its sources outside."""
         bound = ssp.bound_values(self.root, self.files, self.units)
         found: dict[ElementPath, dict[str, float]] = {path: {} for path in self.fmus}
         for target in {**bound, **outer}:
             source = outer[target] if outer.get(target) in bound else target
             (path, name), fmu = target, self.fmus.get(target[0])
             if source not in bound or fmu is None or name not in fmu.variables:
-                continue  # the standard lets values go that nothing takes
+                continue  # the standard ignores values without a receiver
             given, own = bound[source], fmu.unit_of(name)
             # A value that was given for a connector of a system is in the connector's unit if it has none.
             unit = given.unit if source == target else given.unit or self._unit_of(source)
@@ -216,12 +218,14 @@ def _unused(name: str, links: Sequence[Link]) -> str:
 
 
 def _flat_names(components: list[Element]) -> dict[ElementPath, str]:
-    """Return names of components that no dot, blank or sign disturbs."""
+    """Return names of components without dots, blanks and special characters."""
     names: dict[ElementPath, str] = {}
     for one in components:
         name = _word("_".join(one.path))
         if name in names.values():
-            raise DuplicateName(f"Two FMUs would be called {name}.", where=place(one.xml), advice="Rename one of them.")
+            raise DuplicateName(
+                f"Two FMUs would have the name {name}.", where=place(one.xml), advice="Rename one of them."
+            )
         names[one.path] = name
     return names
 

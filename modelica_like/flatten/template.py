@@ -1,4 +1,4 @@
-"""Templates: the equations of a component class, written out once and used for all its instances."""
+"""Templates: the equations of a component class, made once for all its instances."""
 
 from __future__ import annotations
 
@@ -12,13 +12,16 @@ from modelica_like.errors import LanguageError, Source
 from modelica_like.flatten.checks import check_balance, check_units, unit_of_field
 from modelica_like.flatten.conditions import guard_of
 from modelica_like.flatten.holds import HoldForm, hold_forms
+from modelica_like.flatten.reasons import reason
+from modelica_like.flatten.wiring import taken
 from modelica_like.language.component import Component
 from modelica_like.language.declared import Declared
 from modelica_like.language.equation import Connection, Equation, FreeEnd, as_statement
 from modelica_like.language.expr import TIME, Symbol, flagged_motion, is_expression, symbol_of, symbols_in
 from modelica_like.language.fields import Parameter, Variable
+from modelica_like.language.mode import StartMode, Transition
 from modelica_like.language.places import located
-from modelica_like.language.transition import EventStatement, StartMode, Transition, as_event
+from modelica_like.language.transition import EventStatement, as_event
 from modelica_like.language.tunable import symbols_in_tables
 from modelica_like.units import ANY, Unit
 
@@ -61,8 +64,8 @@ class TransitionForm(Generic[ModeT, ResetT]):
         timed: whether it is a time event.
         index: position in the guards, or in the moments.
         resets: what else changes; in a template pairs of what is reset (slot path) and the position in the resets.
-        notice: what the user is told when it happens.
-        because: why it happens, in words.
+        notice: message for the user.
+        because: why it happens, in words; names of parameters in braces stand for name and value.
         fails: whether the run ends there, with an error.
     """
 
@@ -122,7 +125,7 @@ class Names:
         self.discretes: dict[str, Symbol] = {}
 
     def add(self, expressions: Iterable[Any]) -> None:
-        """Take in the symbols of some expressions."""
+        """Add the symbols of expressions."""
         for expression in expressions:
             if not is_expression(expression):
                 continue
@@ -207,7 +210,8 @@ def _build(component: Component) -> Template:
     events = [as_event(item, source, kind) for item, source in located(component.events(), f"{kind}.events()")]
     equations = [s for s in statements if isinstance(s, Equation)]
     wiring = tuple(s for s in statements if isinstance(s, Connection | FreeEnd))
-    check_balance(component, equations)
+    joined = {name for one in wiring if isinstance(one, Connection) for name in taken(component, one)}
+    check_balance(component, equations, joined)
     inferred = check_units(component, equations, events)
     residuals = [e.left - e.right for e in equations]
     changes = _Changes(component, events)
@@ -243,7 +247,7 @@ def _build(component: Component) -> Template:
 
 
 class _Changes:
-    """What the events of a component change, and when."""
+    """Events of a component: conditions and changes."""
 
     def __init__(self, component: Component, events: list[EventStatement]) -> None:
         self.component = component
@@ -280,22 +284,23 @@ class _Changes:
         forms: list[ClassTransition] = []
         position = 0
         for index, t in enumerate(self.transitions):
-            symbols = [symbols_in(target)[0] for target in t.reset]
-            paths = [relative_path(one.owner, self.component, one.name) for one in symbols]
+            paths = [self._path(symbols_in(target)[0]) for target in t.reset]
             resets = tuple((path, position + k) for k, path in enumerate(paths))
             position += len(paths)
             numbers, target = tuple(t.mode.mode.number(name) for name in t.sources), t.mode.mode.number(t.target)
-            words = t.source, t.notice, t.reason(), t.fails
+            words = t.source, t.notice, reason(t, self._path), t.fails
             forms.append(TransitionForm(self._mode(t), numbers, target, t.at is not None, index, resets, *words))
         return tuple(forms)
 
     def _mode(self, statement: Transition | StartMode) -> str:
-        symbol = statement.mode.symbol
-        return relative_path(symbol.owner, self.component, symbol.name)
+        return self._path(statement.mode.symbol)
+
+    def _path(self, symbol: Symbol) -> str:
+        return symbol.name if symbol is TIME else relative_path(symbol.owner, self.component, symbol.name)
 
 
 def _energy_terms(component: Component, wiring: Iterable[Connection | FreeEnd]) -> list[Any]:
-    """Stored energy, loss, source power, then the power into each connector; what passes on to parts is theirs."""
+    """Stored energy, loss, source power, then the power into each connector, without those of parts."""
     passed_on = {id(end) for one in wiring if isinstance(one, Connection) for end in one.ends}
     terms: list[Any] = [component.stored_energy(), component.loss_power(), component.source_power()]
     own = [c for c in component.connectors.values() if c.used and id(c) not in passed_on]

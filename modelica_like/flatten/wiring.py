@@ -1,8 +1,8 @@
-"""Connection sets: who is joined to whom, and which equations follow."""
+"""Connection sets and their equations."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
 from modelica_like.errors import FreeFlange, ModelicaLikeError, Source, WrongConnection
@@ -33,13 +33,13 @@ class Wiring:
     inferred: dict[tuple[int, str], Unit] = field(default_factory=dict)
 
     def add(self, scope: Component, statement: Connection | FreeEnd) -> None:
-        """Take in what a component says about the connectors of its parts and its own."""
+        """Add the connections declared by a component."""
         ends = (statement.connector,) if isinstance(statement, FreeEnd) else statement.ends
         foreign = [end for end in ends if not _is_within(end, scope)]
         if foreign:
             self._refuse(
                 f"{scope.label} connects {_name(foreign[0])} of a component that is not part of it.", statement.source,
-                "Name parts as self.…, so that the copy of this owner is meant.",
+                "Name parts as self.…, to use the copy of this owner.",
             )  # fmt: skip
         elif isinstance(statement, FreeEnd):
             self.freed.add(id(statement.connector))
@@ -52,7 +52,7 @@ class Wiring:
         for end in ends:
             if type(end) is not type(ends[0]):
                 self.errors.append(_different_kinds(ends[0], end, source))
-                # That they are not connected now is a consequence, not another mistake.
+                # Their missing connection is a consequence, not another error.
                 self.freed.update(id(one) for one in ends)
                 return
         keys = [self._key(scope, end, source) for end in ends]
@@ -84,20 +84,20 @@ class Wiring:
         yield from groups.values()
 
     def is_connected(self, connector: Connector) -> bool:
-        """Tell whether something is connected to it from outside its component."""
+        """Return whether it is connected from outside its component."""
         return (id(connector), True) in self.parent
 
     def _add_signals(self, scope: Component, statement: Connection) -> None:
         signals = [end for end in statement.ends if isinstance(end, Symbol)]
         others = [end for end in statement.ends if not isinstance(end, Symbol)]
         wrong = [s for s in signals if not isinstance(s.owner.fields.get(s.name), Input | Output)]
-        drivers = [] if wrong else [s for s in signals if _drives(scope, s)]
+        drivers = [] if wrong else _givers(scope, signals)
         if others:
             what = f"connect joins the signal {_name(signals[0])} with the connector {_name(others[0])}."
             advice = "Signals go to signals: use a sensor or a source between."
         elif wrong:
             what = f"connect joins {_name(wrong[0])}, which is neither an input nor an output."
-            advice = "Connect one output with any number of inputs; a sensor makes a signal of a variable."
+            advice = "Connect one output with any number of inputs; a sensor turns a variable into a signal."
         elif len(drivers) != 1:
             count = f"{len(drivers)} outputs ({', '.join(map(_name, drivers))})" if drivers else "no output"
             what = f"The connection of {', '.join(map(_name, signals))} has {count}."
@@ -112,7 +112,7 @@ class Wiring:
     def _drive(self, sink: Symbol, driver: Symbol, source: Source) -> None:
         key = (id(sink.owner), sink.name)
         if key in self.driven:
-            advice = "Keep one connection; add signals in a component of their own."
+            advice = "Keep one connection; add signals in a separate component."
             self._refuse(f"The input {_name(sink)} is connected twice.", (source, self.driven[key]), advice)
             return
         self.driven[key] = source
@@ -153,9 +153,18 @@ def _is_within(end: Connector | Symbol, scope: Component) -> bool:
     return node is scope
 
 
-def _drives(scope: Component, symbol: Symbol) -> bool:
-    kind = symbol.owner.fields[symbol.name]
-    return isinstance(kind, Input) if symbol.owner is scope else isinstance(kind, Output)
+def _givers(scope: Component, ends: Iterable[Connector | Symbol]) -> list[Symbol]:
+    """Return what gives a connection its signal: an own input, a part's output, or an own output without these."""
+    kinds = [(one, one.owner is scope, one.owner.fields[one.name]) for one in ends if isinstance(one, Symbol)]
+    first = [one for one, own, kind in kinds if isinstance(kind, Input if own else Output)]
+    return first or [one for one, _, kind in kinds if isinstance(kind, Output)]
+
+
+def taken(scope: Component, connection: Connection) -> list[str]:
+    """Return the own signals that a connection determines."""
+    givers = [id(one) for one in _givers(scope, connection.ends)]
+    own = [one for one in connection.ends if isinstance(one, Symbol) and one.owner is scope]
+    return [one.name for one in own if id(one) not in givers]
 
 
 def _name(end: Connector | Symbol) -> str:

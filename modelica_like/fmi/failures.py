@@ -1,4 +1,4 @@
-"""What a process that runs FMUs has left to tell, in sentences."""
+"""Messages for errors reported by processes that run FMUs."""
 
 from __future__ import annotations
 
@@ -11,29 +11,29 @@ from modelica_like.errors import FmuFailed, FmuRefused, ModelicaLikeError, Unkno
 from modelica_like.fmi.unpack import printable
 
 Failures = dict[str, tuple[type[ModelicaLikeError], str, str, str]]
-"""What it is, and the sentences what, why and what to do, by the kind of failure."""
+"""Error class and the sentences what, why and advice, by the kind of failure."""
 
 FAILURES: Failures = {
     "unknown": (UnknownName, "{unit} has no variable '{name}'{hint}", "", ""),
-    "no input": (UnknownName, "{unit}: '{name}' is no input but {causality}. {has}", "", ""),
+    "no input": (UnknownName, "{unit}: '{name}' is not an input but {causality}. {has}", "", ""),
     "scheduled": (
         FmuRefused,
         "{unit} is for Scheduled Execution only: its importer activates its tasks one by one, by a schedule.",
-        "", "Export it for Model Exchange or Co-Simulation, too.",
+        "", "Also export it for Model Exchange or Co-Simulation.",
     ),
-    "no kind": (FmuRefused, "{unit} has no {wanted} part.", "", "Ask for the other kind, or for none."),
+    "no kind": (FmuRefused, "{unit} has no {wanted} part.", "", "Choose the other kind, or none."),
     "failed": (FmuFailed, "{unit} failed: {text}.", "{said}", "{shorter}"),
 }  # fmt: skip
 
 
 def tell_error(folder: Path, units: Mapping[str, str], failures: Failures = FAILURES, **words: str) -> None:
-    """Raise what the process has left to tell.
+    """Raise the error that the process has reported.
 
     Args:
-        folder: its workplace.
-        units: what to call the FMUs, by their names in the job.
-        failures: what can go wrong.
-        words: further words of the sentences.
+        folder: of the process.
+        units: names of the FMUs for messages, by their names in the job.
+        failures: known kinds of failure.
+        words: more values for the sentences.
     """
     if not (folder / "error.json").exists():
         return
@@ -47,7 +47,7 @@ def tell_error(folder: Path, units: Mapping[str, str], failures: Failures = FAIL
         "causality": f"{'an' if causality[0] in 'aeiou' else 'a'} {causality}",
         "text": printable(error.get("text", "")).strip().rstrip("."),
         "shorter": words.get("shorter", "") if "DoStep" in error.get("text", "") else "",  # advice for steps only
-        "said": "\n".join(f"It said: {printable(text)}" for text in error.get("messages", ())[-3:]),
+        "said": "\n".join(f"It reported: {printable(text)}" for text in error.get("messages", ())[-3:]),
     }  # fmt: skip
     kind, *sentences = failures[error["kind"]]
     what, why, advice = (sentence.format(**told) for sentence in sentences)

@@ -1,4 +1,4 @@
-"""Why a block of equations has no unique solution, in sentences."""
+"""Messages about blocks of equations without a unique solution."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _ANOTHER = 0.7
 
 
 class Place(Protocol):
-    """Where a block is singular: time, states, implicit unknowns, modes and discrete values."""
+    """Point where a block is singular: time, states, implicit unknowns, modes and discrete values."""
 
     t: float
     x: Vector
@@ -63,7 +63,7 @@ def _singular(
     model: CompiledDae, point: Place, number: int, block: tuple[tuple[str, ...], tuple[Origin, ...]],
     regular: Callable[[Vector], bool],
 ) -> SingularAtStart:  # fmt: skip
-    """Return the error for a block of unknowns and origins; `regular` tells whether it is for other parameters."""
+    """Return the error for a block of unknowns and origins; `regular` checks it for other parameters."""
     names, origins = block
     owners = dict.fromkeys(origin.path for origin in origins)
     holding = [path for path in owners if _holds(model, point.d, path)]
@@ -71,7 +71,7 @@ def _singular(
     told = held if len(holding) > 1 and held else [name for name in names if name in model.implicit] or names
     why, advice = _reason(model, holding, held, alone=len(origins) == 1)
     if zeros := [] if len(holding) > 1 else _zeros(model, owners, regular):
-        why = f"{_and(zeros)} {'is' if len(zeros) == 1 else 'are'} zero: that leaves these unknowns open."
+        why = f"{_and(zeros)} {'is' if len(zeros) == 1 else 'are'} zero, so these unknowns are undetermined."
         advice = f"Give {'it' if len(zeros) == 1 else 'one of them'} another value."
     shown = ", ".join(told[:6]) + (", …" if len(told) > 6 else "")
     return SingularAtStart(
@@ -83,7 +83,7 @@ def _singular(
 
 
 def _zeros(model: CompiledDae, owners: Container[str], regular: Callable[[Vector], bool]) -> list[str]:
-    """Parameters of some components that are zero where any other number makes the block regular."""
+    """Parameters of the components that are zero, if another value makes the block regular."""
     found: list[str] = []
     for k, one in enumerate(model.flat_parameters):
         if model.p[k] == 0.0 and one.path.rpartition(".")[0] in owners:
@@ -94,7 +94,7 @@ def _zeros(model: CompiledDae, owners: Container[str], regular: Callable[[Vector
 
 
 def is_regular(matrix: Any) -> bool:
-    """Tell whether a square matrix is finite and regular, whatever the units of its rows and columns are."""
+    """Return whether a square matrix is finite and regular, in any units of its rows and columns."""
     if not np.isfinite(matrix).all():
         return False
     for axis in (1, 0):

@@ -1,8 +1,9 @@
-"""Components put together without a class of their own: what a netlist becomes."""
+"""Assemblies of components without a class, as read from netlists."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from copy import copy
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -12,14 +13,23 @@ from modelica_like.language.component import Component
 from modelica_like.language.declared import Connector, unknown
 from modelica_like.language.equation import Equations, connect, free, series
 from modelica_like.language.expr import Expr, Symbol, symbol_of
-from modelica_like.language.fields import Parameter, Variable, param
+from modelica_like.language.fields import Field, Input, Output, Parameter, Variable, param
 from modelica_like.language.places import NOWHERE, caller
 
 
 class Assembly(Component):
     """Parts and their connections, named at run time.
 
-    Wires are kept as text (`"clutch.flange_a"`), as in a netlist; they are resolved when the model is used.
+    Connections are stored as text (`"clutch.flange_a"`), as in a netlist, and resolved when the model is used.
+
+    Args:
+        name: of the model.
+        parts: components, or lists of them, by name.
+        connect: paths of the ends of each connection, by its name.
+        series: names of the parts of each chain, by its name.
+        free: paths of connectors that stay unconnected on purpose.
+        parameters: values by name.
+        description: one phrase.
     """
 
     _own_connectors: tuple[tuple[str, str], ...]
@@ -49,28 +59,33 @@ class Assembly(Component):
 
     def add_parameter(self, name: str, value: Any) -> None:
         """Declare a parameter of the assembly; its unit is that of its value."""
-        if name in self.fields or name in self._parts:
-            raise DuplicateName(f"{self.label}: '{name}' is already the name of something else.")
-        field: Parameter = param("*")
-        field.owner, field.name = self.label, name
-        field.default = value
+        field: Parameter = param("*", default=value)
+        self._declare(name, field)
         field.read(value)
+
+    def _declare(self, name: str, field: Field) -> None:
+        if name in self.fields or name in self._parts or name in self._connectors:
+            raise DuplicateName(f"{self.label}: '{name}' is already in use.")
+        field.owner, field.name = self.label, name
         self._own_fields = {**self._own_fields, name: field}
 
     def expose(self, name: str, end: str) -> None:
-        """Make an inner connector an outer one of the assembly."""
+        """Make an inner connector or signal an outer one of the assembly."""
         inner = self._resolve(end)
-        if isinstance(inner, Symbol):
+        if isinstance(inner, Connector):
+            setattr(self, name, type(inner)(inner.description, free=inner.may_be_free))
+        elif isinstance(field := inner.owner.fields[inner.name], Input | Output):
+            self._declare(name, copy(field))
+        else:
             raise unknown("connector", self.label, end, [])
-        setattr(self, name, type(inner)(inner.description, free=inner.may_be_free))
         self._own_connectors = (*self._own_connectors, (name, end))
 
     def place(self, key: str, source: Source) -> None:
-        """Remember where in the netlist a wire, series or part stands."""
+        """Store the place of a connection, series or part in the netlist."""
         self._places[key] = source
 
     def source_of(self, key: str) -> Source:
-        """Return where in the netlist a wire, series or part stands; of a drive built in Python, where a part is."""
+        """Return the place of a connection, series or part in the netlist, or of a part in Python."""
         if not self._places and key.startswith("parts."):
             return replace(self._made, text=key)
         return self._places.get(key, NOWHERE)
@@ -92,13 +107,13 @@ class Assembly(Component):
 
     @property
     def exposed(self) -> tuple[tuple[str, str], ...]:
-        """Outer connectors and the inner ones they stand for."""
+        """Outer connectors and signals, and the inner ones they stand for."""
         return self._own_connectors
 
     def __getattr__(self, name: str) -> Expr:
         if name in self.__dict__.get("_own_fields", {}):
             return symbol_of(self, name)
-        if name in ("description", "simulate", "display", "origin"):  # unless a part is called so
+        if name in ("description", "simulate", "display", "origin"):  # unless a part has this name
             return self.__dict__[f"_{name}"]
         raise AttributeError(f"{type(self).__name__} '{self.__dict__.get('_name', '')}' has no '{name}'")
 
@@ -109,7 +124,7 @@ class Assembly(Component):
             super().__setattr__(name, value)
 
     def equations(self) -> Equations:
-        """Yield the connections; what is wrong with them is told together."""
+        """Yield the connections; all their errors are reported together."""
         errors: list[ModelicaLikeError] = []
         for key, make in self._wiring():
             source = self.source_of(key)
@@ -124,7 +139,7 @@ class Assembly(Component):
             raise raise_together_or_one(errors)
 
     def _told(self, key: str) -> Source:
-        """Return where to look for an entry: its line in a netlist, or the call that made the assembly."""
+        """Return the place of an entry: its line in a netlist, or the call that created the assembly."""
         if self._places:
             return self.source_of(key)
         kind, _, name = key.partition(".")
@@ -132,7 +147,7 @@ class Assembly(Component):
         return replace(self._made, text=key if given is None else f"{key} = {list(given)}")
 
     def _wiring(self) -> Iterator[tuple[str, Callable[[], list[Any]]]]:
-        """Yield every entry of the netlist with what makes its statements."""
+        """Yield every entry of the netlist with the function that makes its statements."""
         for key, ends in self._wires.items():
             yield f"connect.{key}", lambda ends=ends: [connect(*map(self._resolve, ends))]
         for key, names in self._chains.items():
@@ -140,8 +155,7 @@ class Assembly(Component):
         for end in self._free:
             yield f"free.{end}", lambda end=end: [free(self._connector(end))]
         for name, end in self._own_connectors:
-            joined = self._connectors[name]
-            yield f"expose.{name}", lambda joined=joined, end=end: [connect(joined, self._connector(end))]
+            yield f"expose.{name}", lambda name=name, end=end: [connect(self._resolve(name), self._resolve(end))]
 
     def _series(self, names: Sequence[str]) -> list[Any]:
         components: list[Component] = []
@@ -155,7 +169,7 @@ class Assembly(Component):
         owner, _, name = path.rpartition(".")
         if owner and name in self.find(owner).connectors:
             raise WrongConnection(
-                f"{path} is a connector, and a series joins parts.",
+                f"{path} is a connector, but a series joins parts.",
                 advice=f"Write {owner} in the series, or join {path} in a connection of its own.",
             )
         return self.find(path)

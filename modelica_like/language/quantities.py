@@ -1,4 +1,4 @@
-"""Units of the arguments and results of design checks: all numbers are in SI, tables show the units of the workshop."""
+"""Units of the arguments and results of design checks: all numbers are in SI units, tables show practical units."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from typing import Annotated, Any
 import casadi as ca
 
 Number = Any
-"""A float, a numpy array (all arrays of one call fit each other by broadcasting) or a CasADi SX, MX or DM."""
+"""A float, a NumPy array (all arrays of one call broadcast) or a CasADi SX, MX or DM."""
 
 
 def is_symbolic(*values: Number) -> bool:
-    """Tell whether any of the values belongs to CasADi."""
+    """Return whether any of the values is a CasADi type."""
     return any(isinstance(value, ca.SX | ca.MX | ca.DM) for value in values)
 
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """What a number measures.
+    """Unit of a number.
 
     Attributes:
         unit: unit of the number, coherent SI.
@@ -53,6 +53,10 @@ Torque = Annotated[Number, Quantity("N.m", "N.m")]
 SmallTorque = Annotated[Number, Quantity("N.m", "N.mm", 1e-3)]
 Stress = Annotated[Number, Quantity("Pa", "N/mm2", 1e6)]
 Energy = Annotated[Number, Quantity("J", "J")]
+Frequency = Annotated[Number, Quantity("1/s", "1/h", 1 / 3600)]
+Temperature = Annotated[Number, Quantity("K", "K")]
+HeatCapacity = Annotated[Number, Quantity("J/K", "J/K")]
+Conductance = Annotated[Number, Quantity("W/K", "W/K")]
 Power = Annotated[Number, Quantity("W", "W")]
 Voltage = Annotated[Number, Quantity("V", "V")]
 Current = Annotated[Number, Quantity("A", "A")]
@@ -60,4 +64,6 @@ Resistance = Annotated[Number, Quantity("Ohm", "Ohm")]
 MotorConstant = Annotated[Number, Quantity("N.m/A", "N.m/A")]
 Damping = Annotated[Number, Quantity("N.m.s/rad", "N.m.s/rad")]
 Compliance = Annotated[Number, Quantity("rad/(N.m.s)", "rpm/(N.mm)", math.pi / 30 * 1e3)]
+Flux = Annotated[Number, Quantity("Wb", "mWb", 1e-3)]
+Field = Annotated[Number, Quantity("T", "T")]
 CurrentSlope = Annotated[Number, Quantity("A/(N.m)", "A/(N.mm)", 1e3)]

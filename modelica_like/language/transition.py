@@ -1,85 +1,32 @@
-"""What `events()` yields: transitions of modes, and choices of the mode at the start."""
+"""What `events()` may yield: transitions of modes, and choices of the mode at the start."""
 
 from __future__ import annotations
 
-import ast
 import re
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
 
 from modelica_like.errors import LanguageError, Source, did_you_mean
-from modelica_like.language.expr import TIME, Expr, Symbol, symbols_in
+from modelica_like.language.expr import TIME, Symbol, symbols_in
 from modelica_like.language.fields import Discrete, Input, Parameter, Variable
-from modelica_like.language.places import NOWHERE
+from modelica_like.language.mode import StartMode, Transition
 
-if TYPE_CHECKING:
-    from modelica_like.language.mode import BoundMode
-
-NAME_IN_NOTICE = re.compile(r"\{(\w+)\}")
-"""A parameter in the notice of a transition."""
-
-
-@dataclass(frozen=True, eq=False)
-class Transition:
-    """Change of a mode at an event.
-
-    Attributes:
-        mode: the mode that changes.
-        sources: names of the modes it may leave.
-        target: name of the mode it enters.
-        when: condition of a state event, or None.
-        at: time of a time event in s, or None.
-        reset: new values of states and discrete values.
-        notice: what the user is told when it happens, without the name of the component.
-        because: why it happens, in a few words.
-        fails: the run ends there, with an error.
-    """
-
-    mode: BoundMode
-    sources: tuple[str, ...]
-    target: str
-    when: Expr | None
-    at: Expr | None
-    reset: Mapping[Expr, Any]
-    source: Source = NOWHERE
-    notice: str = ""
-    because: str = ""
-    fails: bool = False
-
-    def reason(self) -> str:
-        """Return in words why it happens: as declared, or the condition as it is written."""
-        if self.because or self.at is not None:
-            return self.because or "its time has come"
-        try:
-            call: Any = ast.parse(self.source.text.removeprefix("yield ").strip(), mode="eval").body
-            written = next(one.value for one in call.keywords if one.arg == "when")
-        except (SyntaxError, AttributeError, StopIteration):  # not written as one call
-            return ""
-        return ast.unparse(written).replace("self.", "")
-
-
-@dataclass(frozen=True, eq=False)
-class StartMode:
-    """Choice of a mode at the start."""
-
-    mode: BoundMode
-    target: str
-    when: Expr
-    source: Source = NOWHERE
+NAME_IN_NOTICE = re.compile(r"\{([\w.]+)\}")
+"""A parameter in the notice or the reason of a transition."""
 
 
 EventStatement = Transition | StartMode
 Events = Iterator[EventStatement]
-"""What `events()` returns."""
+"""Return type of `events()`."""
 
 
 def as_event(item: Any, source: Source, component: str) -> EventStatement:
-    """Read what `events()` yielded.
+    """Read an item yielded by `events()`.
 
     Args:
-        item: what it yielded.
-        source: where.
+        item: the item.
+        source: its place.
         component: name of the class, for messages.
 
     Raises:
@@ -97,12 +44,12 @@ def as_event(item: Any, source: Source, component: str) -> EventStatement:
 
 
 def _check_transition(transition: Transition, source: Source, component: str) -> None:
-    """Check that the time of a time event is known ahead, and that only variables and discrete values are reset."""
+    """Check that a time event is known in advance, and that only variables and discrete values are reset."""
     asked = () if transition.at is None else symbols_in(transition.at)
     moving = [s for s in asked if s is TIME or isinstance(_field(s), Variable)]
     if moving:
         raise LanguageError(
-            f"{component}: the time of an event depends on {moving[0].name}, so it is not known ahead.",
+            f"{component}: the time of an event depends on {moving[0].name}, so it is not known in advance.",
             where=source, advice="Write it as a state event, `when=…`.",
         )  # fmt: skip
     for target in transition.reset:
@@ -116,13 +63,14 @@ def _check_transition(transition: Transition, source: Source, component: str) ->
 
 
 def _check_notice(transition: Transition, source: Source, component: str) -> None:
-    """Check that the names in a notice are parameters."""
+    """Check that the names in a notice and in a reason are parameters."""
     fields = transition.mode.symbol.owner.fields
     parameters = [name for name, field in fields.items() if isinstance(field, Parameter)]
-    for name in NAME_IN_NOTICE.findall(transition.notice):
+    told = {"notice": transition.notice, "reason": transition.because}
+    for kind, name in ((kind, name) for kind, text in told.items() for name in NAME_IN_NOTICE.findall(text)):
         if name not in parameters:
             raise LanguageError(
-                f"{component}: the notice of an event names {name}, "
+                f"{component}: the {kind} of an event names {name}, "
                 f"which is not a parameter{did_you_mean(name, parameters) or '.'}",
                 where=source,
             )

@@ -1,104 +1,9 @@
 /* A drive as a page. PAGE (see page.py) has the compiled run-time, the model, what can be set and what can be shown. */
 const PAGE = JSON.parse(document.getElementById("page").textContent);
 const MODES = PAGE.modes.filter((one) => one.names); // the others are discrete values
-const OK = 0, FAILED = 1, MORE = 2, MOST_MARKS = 40; // more events are not marked
-const BREATH = 1000, PATIENCE = 40; // steps between two looks at the clock; ms until the page answers again
+const MOST_MARKS = 40, MOST_KEPT = 5; // more events are not marked; earlier runs that stay drawn
 const at = (id) => document.getElementById(id);
 const escaped = (text) => text.replace(/[&<>"]/g, (letter) => `&#${letter.charCodeAt(0)};`);
-
-async function bytes(text) {
-  const packed = new Blob([Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0))]);
-  const stream = packed.stream().pipeThrough(new DecompressionStream("gzip"));
-  return new Uint8Array(await new Response(stream).arrayBuffer());
-}
-
-/* ---- the compiled run-time: native.c tells what its functions do ---- */
-
-class Drive {
-  constructor(library, file) {
-    [this.c, this.places] = [library, {}];
-    library._initialize();
-    const why = this.room("message", PAGE.message_length);
-    const model = library.native_open(this.put("file", file), file.length, why);
-    this.handle = model === 0 ? 0 : library.native_new(model);
-    if (this.handle === 0) throw new Error(model === 0 ? this.text(why) : "There is not enough memory.");
-    this.run = this.room("run", PAGE.layout.size);
-  }
-
-  /* Returns the address of room that is kept by a name, and grows. */
-  room(name, size) {
-    this.places[name] = this.c.realloc(this.places[name] ?? 0, Math.max(size, 8));
-    if (this.places[name] === 0) throw new Error("There is not enough memory.");
-    return this.places[name];
-  }
-
-  put(name, numbers) {
-    const place = this.room(name, numbers.byteLength);
-    new numbers.constructor(this.c.memory.buffer, place, numbers.length).set(numbers);
-    return place;
-  }
-
-  text(place) {
-    const found = new Uint8Array(this.c.memory.buffer, place, PAGE.message_length);
-    return new TextDecoder().decode(found.slice(0, found.indexOf(0)));
-  }
-
-  field(name, value) {
-    const view = new DataView(this.c.memory.buffer, this.run), place = PAGE.layout[name];
-    if (value !== undefined) view.setInt32(place, value, true);
-    return view.getInt32(place, true);
-  }
-
-  /* Runs with [reference, SI value] pairs. Returns what was written, with a message where it could not go on, or null
-   * where it is no longer wanted. */
-  async simulate(values, references, until, wanted) {
-    const widths = { points: { times: 1, outputs: references.length }, events: { events: 7 } };
-    const rooms = { points: PAGE.points + 64, events: 64 };
-    new Uint8Array(this.c.memory.buffer, this.run, PAGE.layout.size).fill(0);
-    const fields = { n_outputs: references.length, steps: BREATH };
-    fields.references = this.put("references", Uint32Array.from(references));
-    for (const name in fields) this.field(name, fields[name]);
-    this.make(widths, rooms);
-    let code = this.begin(values, until), message = "", clock = performance.now();
-    for (let go = code === OK; go; go = code === MORE && message === "") {
-      code = this.c.native_run(this.handle, until, BigInt(PAGE.points), this.run);
-      if (this.field("n_events") > PAGE.most_events) message = `There were more than ${PAGE.most_events} events.`;
-      if (code !== MORE) break;
-      for (const counted in rooms) if (2 * this.field(`n_${counted}`) >= rooms[counted]) rooms[counted] *= 2;
-      this.make(widths, rooms);
-      if (performance.now() - clock < PATIENCE) continue;
-      await new Promise((later) => setTimeout(later));
-      if (!wanted()) return null;
-      clock = performance.now();
-    }
-    if (code === FAILED) message = this.text(this.c.native_message(this.handle));
-    return this.written(widths, rooms, message);
-  }
-
-  make(widths, rooms) {
-    for (const [counted, arrays] of Object.entries(widths)) {
-      this.field(`room_${counted}`, rooms[counted]);
-      for (const name in arrays) this.field(name, this.room(name, 8 * arrays[name] * rooms[counted]));
-    }
-  }
-
-  begin(values, until) {
-    const c = this.c, references = this.put("set", Uint32Array.from(values, (pair) => pair[0]));
-    const numbers = this.put("numbers", Float64Array.from(values, (pair) => pair[1]));
-    return c.native_reset(this.handle, 0, until, PAGE.rtol, PAGE.atol) ||
-      c.native_set(this.handle, BigInt(values.length), references, numbers) || c.native_begin(this.handle);
-  }
-
-  written(widths, rooms, message) {
-    const counts = this.room("counts", 32), found = { message };
-    const read = (place, size) => new Float64Array(this.c.memory.buffer, place, size).slice();
-    for (const [counted, arrays] of Object.entries(widths))
-      for (const name in arrays)
-        found[name] = read(this.places[name], arrays[name] * Math.min(this.field(`n_${counted}`), rooms[counted]));
-    this.c.native_counts(this.handle, counts);
-    return Object.assign(found, { steps: read(counts, 1)[0] });
-  }
-}
 
 /* ---- controls: values are in the shown unit, positions from 0 to 1 ---- */
 
@@ -147,7 +52,9 @@ const LEFT = 58, RIGHT = 14, TOP = 6, BOTTOM = 20, HEIGHT = 165, ROW = 36, COLOU
 
 /* What a run has for a variable, in its shown unit. */
 function values(result, variable) {
-  const width = asked.length, column = asked.indexOf(variable.reference), unit = PAGE.units[variable.unit];
+  const width = result.references.length, column = result.references.indexOf(variable.reference);
+  if (column < 0) return []; // nobody asked for it then
+  const unit = PAGE.units[variable.unit];
   return result.times.map((_, k) => (result.outputs[k * width + column] - unit.offset) / unit.factor);
 }
 
@@ -159,8 +66,8 @@ function range(curves) {
 }
 
 class Picture {
-  constructor(result, original) {
-    Object.assign(this, { result, original, times: result.times, end: until.now, width: at("curves").clientWidth });
+  constructor(result, earlier) {
+    Object.assign(this, { result, earlier, times: result.times, end: until.now, width: at("curves").clientWidth });
     this.x = (t) => LEFT + (t / this.end) * (this.width - LEFT - RIGHT);
     const instants = new Map();
     for (let k = 0; k < result.events.length; k += 7) {
@@ -183,7 +90,7 @@ class Picture {
 
   path(times, curve, y, attributes) {
     let line = "", pen = "M";
-    for (let k = 0; k < times.length && times[k] <= this.end; k++) {
+    for (let k = 0; k < curve.length && times[k] <= this.end; k++) {
       if (Number.isFinite(curve[k])) line += `${pen}${this.x(times[k]).toFixed(1)} ${y(curve[k]).toFixed(1)}`;
       pen = Number.isFinite(curve[k]) ? "L" : "M";
     }
@@ -193,15 +100,17 @@ class Picture {
   panel(variables) {
     const unit = PAGE.units[variables[0].unit], stroke = (k) => `stroke="var(--c${k % COLOURS})"`;
     const curves = variables.map((one) => values(this.result, one));
-    const before = this.original === null ? [] : variables.map((one) => values(this.original, one));
-    let [low, high] = range([...curves, ...before]);
+    const before = this.earlier.map((run) => variables.map((one) => values(run, one)));
+    let [low, high] = range([...curves, ...before.flat()]);
     const margin = 0.05 * (high - low) || 0.1 * Math.abs(high) || 1;
     [low, high] = [low - margin, high + margin];
     const y = (value) => TOP + ((high - value) / (high - low)) * (HEIGHT - TOP - BOTTOM);
     const grid = ticks(low, high, 5).map((value) =>
       `<line class="grid" x1="${LEFT}" x2="${this.width - RIGHT}" y1="${y(value)}" y2="${y(value)}"/>` +
       `<text x="${LEFT - 6}" y="${y(value) + 4}" text-anchor="end">${short(value)}</text>`);
-    const paths = [...before.map((one, k) => this.path(this.original.times, one, y, `class="before" ${stroke(k)}`)),
+    const paths = [
+      ...before.flatMap((curves, run) =>
+        curves.map((one, k) => this.path(this.earlier[run].times, one, y, `class="before" ${stroke(k)}`))),
       ...curves.map((one, k) => this.path(this.times, one, y, `class="${k < COLOURS ? "" : "more"}" ${stroke(k)}`))];
     const legend = variables.map((one, k) => {
       const value = element("b"), mark = element("i");
@@ -261,7 +170,7 @@ class Picture {
 
 const until = PAGE.sliders.find((one) => one.reference === null);
 const shown = new Set(PAGE.variables.filter((one) => one.shown));
-let drive = null, picture = null, original = null, asked = [], turn = 0, waiting = false;
+let drive = null, picture = null, original = null, turn = 0, waiting = false, kept = [];
 
 function ask() {
   turn += 1;
@@ -276,26 +185,25 @@ async function update() {
   const mine = turn, wanted = () => mine === turn, begin = performance.now();
   const references = [...shown, ...MODES].map((one) => one.reference);
   const changed = PAGE.sliders.filter((one) => one.reference !== null && one.now !== one.value);
-  if (references.join() !== asked.join()) original = null;
+  if (references.join() !== original?.references.join()) original = null;
   const given = changed.map((one) => [one.reference, one.now * one.factor + one.offset]);
   const result = await drive.simulate(given, references, until.now, wanted);
   if (result === null) return;
   const computed = performance.now();
-  asked = references;
   if (original === null) original = changed.length ? await drive.simulate([], references, PAGE.until, wanted) : result;
   if (!wanted()) return;
   at("said").textContent = result.message;
   at("curves").classList.toggle("stale", result.times.length < 2);
-  if (result.times.length >= 2) picture = new Picture(result, changed.length ? original : null);
+  if (result.times.length >= 2) picture = new Picture(result, [...(changed.length ? [original] : []), ...kept]);
   const events = result.events.length / 7, drawn = performance.now();
   at("status").textContent = `${result.steps} steps, ${events} mode change${events === 1 ? "" : "s"}; the run took ` +
     `${(computed - begin).toFixed(1)} ms, the picture ${(drawn - computed).toFixed(1)} ms. Made by ${PAGE.tool}.`;
   Object.assign(at("status").dataset, { turn: mine, run: computed - begin, draw: drawn - computed });
+  document.dispatchEvent(new Event("drawn"));
 }
 
 async function begin() {
-  const { instance } = await WebAssembly.instantiate(await bytes(PAGE.runtime), {});
-  drive = new Drive(instance.exports, await bytes(PAGE.model));
+  drive = await openDrive();
   ask();
 }
 
@@ -308,7 +216,8 @@ function listen() {
     shown.add(found);
     ask();
   };
-  at("reset").onclick = () => PAGE.sliders.forEach((one) => one.put(one.value));
+  at("reset").onclick = () => (kept = [], PAGE.sliders.forEach((one) => one.put(one.value)));
+  at("keep").onclick = () => (kept = [...kept, picture.result].slice(-MOST_KEPT), ask());
   at("curves").onpointermove = (event) => picture?.read(event.clientX);
   at("curves").onpointerleave = () => picture?.read(null);
   new ResizeObserver(() => picture && picture.width !== at("curves").clientWidth && ask()).observe(at("curves"));

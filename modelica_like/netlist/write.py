@@ -12,7 +12,7 @@ from tomlkit.items import Item, Table
 
 from modelica_like.errors import NetlistError
 from modelica_like.language import Assembly, Component
-from modelica_like.language.fields import Field, Value
+from modelica_like.language.fields import Field, Parameter, Value
 from modelica_like.language.formula import Formula
 from modelica_like.language.tables import frozen_rows
 from modelica_like.netlist.convert import as_assembly
@@ -27,14 +27,14 @@ def save(component: Component, path: str | Path) -> None:
 
 
 def dumps(component: Component, *, folder: str | Path = ".") -> str:
-    """Write a component as the text of a netlist; what reads it back is the same tree.
+    """Write a component as the text of a netlist; reading it gives the same tree.
 
     Args:
-        component: an assembly, or a component that has only parts and wires.
-        folder: where the text will lie; netlists used as parts are named relative to it.
+        component: an assembly, or a component that has only parts and connections.
+        folder: of the text; netlists used as parts are named relative to it.
 
     Raises:
-        NetlistError: the component has what no netlist can hold, such as equations of its own.
+        NetlistError: the component has something a netlist cannot contain, such as equations of its own.
     """
     assembly = component if isinstance(component, Assembly) else as_assembly(component)
     return tomlkit.dumps(_Writer(Path(folder)).document(assembly))
@@ -51,7 +51,11 @@ class _Writer:
     def document(self, assembly: Assembly) -> tomlkit.TOMLDocument:
         parts = {name: self.part(name, part) for name, part in assembly._parts.items()}
         sections: dict[str, Mapping[str, Any]] = {
-            "parameters": {name: plain(_given(assembly, name).given) for name in assembly.fields},
+            "parameters": {
+                name: plain(_given(assembly, name).given)
+                for name, field in assembly.fields.items()
+                if isinstance(field, Parameter)
+            },
             "parts": {name: _inline(entry) for name, entry in parts.items()},
             "series": {name: list(ends) for name, ends in assembly.chains.items()},
             "connect": {name: list(ends) for name, ends in assembly.wires.items()},
@@ -80,7 +84,7 @@ class _Writer:
         return {"is": entries[0].pop("is"), "count": len(entries), **entries[0]} if same else entries
 
     def entry(self, path: str, part: Component) -> dict[str, Any]:
-        """Return the table of one part: its type, and what differs from a new one of that type."""
+        """Return the table of one part: its type, and the differences from a new one of that type."""
         if isinstance(part, Assembly):
             return {"is": self.file_of(part), **self.changes(path, part, load(part.__dict__["_origin"]))}
         structural = {key: plain(part._given_tables.get(key, part.__dict__[key])) for key in part._structural}
@@ -93,7 +97,7 @@ class _Writer:
         if not origin:
             raise NetlistError(
                 f"{assembly.label} is an assembly without a file, so a netlist cannot name it.",
-                advice="Save it to a file of its own, load that file, and use it as the part.",
+                advice="Save it to a separate file, load that file, and use it as the part.",
             )
         relative = Path(os.path.relpath(origin, self.folder.resolve())).as_posix()
         return relative if relative.startswith(".") else f"./{relative}"
@@ -127,10 +131,10 @@ def _given(component: Component, name: str) -> Value:
 
 
 def plain(value: Any) -> Any:
-    """Return a value as TOML has it; numbers and texts stay as the user wrote them.
+    """Return a value for TOML; numbers and texts stay as written.
 
     Raises:
-        NetlistError: TOML has nothing for it.
+        NetlistError: TOML has no such value.
     """
     if isinstance(value, bool | int | float | str):
         return value

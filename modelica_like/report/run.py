@@ -1,4 +1,4 @@
-"""What a run was: events, energies and statistics as tables; of a co-simulation, also its couplings and steps."""
+"""A run as text: events, energies and statistics as tables; for a co-simulation also couplings and steps."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from rich.table import Table
 from modelica_like.language.transition import NAME_IN_NOTICE
 from modelica_like.report.types import table
 from modelica_like.solve.display import Display
-from modelica_like.solve.recorder import Event
 from modelica_like.solve.trajectories import Trajectories
 from modelica_like.units import parse_unit
 
@@ -29,9 +28,9 @@ def run_report(
 
     Args:
         solution: the run.
-        energy: False: leave out the energy balance.
-        debug: name the line of every event's transition.
-        display: units by quantity, beside those of the netlist, such as {"energy": "kJ"}.
+        energy: whether to show the energy balance.
+        debug: whether to show the source line of every event's transition.
+        display: units by quantity, in addition to those of the netlist, such as {"energy": "kJ"}.
     """
     parts = _head(solution, notices(solution), debug=debug)
     if energy:
@@ -49,22 +48,38 @@ def _head(solution: Trajectories, notices: Iterable[str], *, debug: bool = False
 
 
 def events_table(solution: Trajectories, *, debug: bool = False) -> Table:
-    """Return the mode changes; of many only the first and the last. `debug` names the lines of their transitions."""
+    """Return the mode changes; of many only the first and the last. `debug` shows the lines of their transitions."""
     columns = 6 if debug else 5
-    rows = [_event_row(solution, event)[:columns] for event in solution.events]
+    told = reasons(solution)
+    rows = [
+        (f"{one.time:.9g}", one.mode, one.before, one.after, why, f"{one.source}".partition(" `")[0])[:columns]
+        for one, why in zip(solution.events, told, strict=True)
+    ]
     if len(rows) > _SHOWN:
         rows[_SHOWN // 2 : -_SHOWN // 2] = [("…", *[""] * (len(rows[0]) - 1))]
     heads = ("time in s>", "mode", "from", "to", "because", "declared in")[:columns]
     return table(_mode_changes(len(solution.events)), *heads, rows=rows)
 
 
-def _event_row(solution: Trajectories, event: Event) -> tuple[str, ...]:
-    reason = "an impact" if event.transition < 0 else solution.model.transitions[event.transition].because
-    return f"{event.time:.9g}", event.mode, event.before, event.after, reason, f"{event.source}".partition(" `")[0]
+def reasons(solution: Trajectories) -> list[str]:
+    """Return in words why each of the events happened, parameters with their values; nothing where nobody knows."""
+    known: dict[tuple[str, int], str] = {}
+
+    def valued(path: str) -> str:
+        unit = str(solution.model.units[path])
+        return f"{path.rpartition('.')[2]} = {solution[path][0]:g}{'' if unit == '1' else f' {unit}'}"
+
+    for event in solution.events:
+        key, (component, dot, _) = (event.mode, event.transition), event.mode.rpartition(".")
+        if key not in known:
+            by_itself = "an impact" if event.source.file else ""  # FMUs do not tell why
+            because = by_itself if event.transition < 0 else solution.model.transitions[event.transition].because
+            known[key] = NAME_IN_NOTICE.sub(lambda name, owner=component + dot: valued(owner + name[1]), because)
+    return [known[event.mode, event.transition] for event in solution.events]
 
 
 def notices(solution: Trajectories) -> list[str]:
-    """Return what a run and its events have to say: one sentence for each kind of event, with the time of the first."""
+    """Return the notices of a run and its events: one sentence for each kind of event, with the time of the first."""
     told: dict[tuple[str, str], str] = {}
     for event in (one for one in solution.events if one.transition >= 0):
         notice, (component, dot, _) = solution.model.transitions[event.transition].notice, event.mode.rpartition(".")
@@ -75,9 +90,9 @@ def notices(solution: Trajectories) -> list[str]:
 
 
 def energy_table(solution: Trajectories, display: Mapping[str, str] | None = None) -> Table:
-    """Return the energy balance; of many components only those that exchanged most."""
+    """Return the energy balance; of many components only those with the largest exchange."""
     balance = solution.energy()
-    # Where nothing collides there is no column for it.
+    # Without impacts there is no column for them.
     collides = any(row.impact for row in balance)
     columns = ["component", "in>", "from outside>", "stored>", "lost>", *["of it in impacts>"][: int(collides)]]
     unit = Display(solution.model, display).of_quantity("J")
@@ -133,21 +148,19 @@ def cosimulation_report(solution: CosimSolution) -> RenderableType:
 
 
 def couplings_table(solution: CosimSolution) -> Table:
-    """Return the energies at the couplings: what one FMU has sent and the other has not got, the coupling has lost."""
+    """Return the energies at the couplings; the difference of sent and received energy is lost in the coupling."""
     rows = [
         (one.name, f"{one.throughput:.6g}", f"{one.residual:.3g}",
          f"{one.residual / one.throughput:.1e}" if one.throughput else "", f"{one.mismatch:.3g}")
         for one in solution.couplings
     ]  # fmt: skip
-    return table(
-        "energy at the couplings in J", "coupling", "through>", "made by it>", "share>", "mismatch>", rows=rows
-    )
+    return table("energy at the couplings in J", "coupling", "through>", "created>", "share>", "mismatch>", rows=rows)
 
 
 def steps_line(solution: CosimSolution) -> str:
-    """Return how many communication steps it took."""
+    """Return the numbers of communication steps."""
     sizes = f"{solution.shortest:.3g} s"
     if solution.longest > solution.shortest * (1 + 1e-6):
         sizes += f" to {solution.longest:.3g} s"
-    back = f", {solution.rejected} taken back" if solution.rejected else ""
+    back = f", {solution.rejected} rejected" if solution.rejected else ""
     return f"{solution.steps} communication steps of {sizes}{back}, {solution.statistics.seconds:.2f} s"

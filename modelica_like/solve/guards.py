@@ -1,4 +1,4 @@
-"""Guards along a segment: where does a transition want to fire?"""
+"""Guards along a segment: the times at which transitions fire."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from modelica_like.solve.idas import along
 
 _LOCATED = 1e-13
 _NOISE = 1e-30
-"""A decaying signal ends by swinging around zero with such values; that is no event."""
+"""Values with which a decaying signal oscillates around zero; this is not an event."""
 _LARGE = 1e300
 _MAX_TRIALS = 60
 _GUESSING, _GUESSED = 12, 1e-6
 _NEAR = 0.1
-"""A top between two results is looked at if it is this near zero, relative to the values at both ends."""
+"""A maximum between two results is checked if it is this close to zero, relative to the values at both ends."""
 
 
 class Guards:
-    """Evaluates guards and their rates, and knows which are active in which mode."""
+    """Evaluates guards and their rates, with the active ones of each mode."""
 
     def __init__(self, model: CompiledDae) -> None:
         self.model = model
@@ -38,7 +38,7 @@ class Guards:
         self._active: dict[bytes, Any] = {}
 
     def active(self, d: Vector) -> Any:
-        """Return the numbers of the guards that may fire, by the modes."""
+        """Return the numbers of the guards that are active in the modes."""
         key = d[: len(self.model.flat_discretes)].tobytes()
         if key not in self._active:
             may = [k for k, one in enumerate(self.state_events) if int(d[one.mode]) in one.sources]
@@ -46,11 +46,11 @@ class Guards:
         return self._active[key]
 
     def at(self, point: Point) -> list[Vector]:
-        """Return guards, their rates, and guards one time resolution later; those that may not fire are -1."""
+        """Return guards, their rates, and guards one time resolution later; inactive ones are -1."""
         return self._at(point.t, point.x, point.z, self.model.p, self.model.u, point.d)
 
     def follow(self, point: Point) -> list[Vector]:
-        """Let the implicit unknowns follow the states by one or two steps of Newton's method; guards as by `at`.
+        """Solve for the implicit unknowns by one or two steps of Newton's method; guards as by `at`.
 
         Returns:
             Guards, their rates, guards soon, and the implicit unknowns before the last step.
@@ -67,7 +67,7 @@ class Guards:
         return near(t, x.ravel(), z, model.p, model.u, d)[0].reshape(len(x), -1)
 
     def wanting(self, point: Point) -> list[CompiledTransition]:
-        """State events that want to fire now: positive, or about to be within the time resolution."""
+        """State events that fire now: positive, or positive within the time resolution."""
         if not self.count:
             return []
         return [self.state_events[k] for k in (self.at(point)[2] > 0).nonzero()[0]]
@@ -85,7 +85,7 @@ class Guards:
 
 
 def _seen(model: CompiledDae) -> ca.Function:
-    """Guards, their rates and the states' in one function: they share most of what they compute."""
+    """Guards, their rates and those of the states in one function, because they share most operations."""
     arguments = list(model.arguments.values())
     rates = model.guard_rates(*arguments)
     rates = ca.densify(ca.if_else(ca.fabs(rates) <= _LARGE, rates, 0))
@@ -94,7 +94,7 @@ def _seen(model: CompiledDae) -> ca.Function:
 
 
 def _clean(model: CompiledDae, events: list[CompiledTransition]) -> ca.Function:
-    """Guards, rates and guards a moment later, with what the modes say."""
+    """Guards, rates and guards a moment later, with inactive ones set by the modes."""
     arguments, d = list(model.arguments.values()), model.arguments["d"]
     values, rates, _ = _seen(model)(*arguments)
     soon = _numbers(model.guards_soon(*arguments))
@@ -122,7 +122,7 @@ def _following(model: CompiledDae, at: ca.Function) -> ca.Function:
 
 
 def _numbers(guards: Any) -> Any:
-    """Let a guard that is not a number be false, and what is nothing but rounding zero."""
+    """Set a guard that is not a number to false, and rounding to zero."""
     sizes = ca.fabs(guards)
     rounding = ca.logic_and(sizes < _NOISE, sizes > JUST_TRUE)
     numbers = ca.if_else(guards > _LARGE, _LARGE, ca.if_else(guards >= -_LARGE, guards, -1))
@@ -139,12 +139,12 @@ class Candidate:
 
 
 def candidates(values: Vector, rates: Vector, active: Any, step: float) -> Iterator[list[Candidate]]:
-    """Give the intervals, one after the other, in which active guards may become positive.
+    """Yield the intervals in which active guards may become positive.
 
     Args:
         values: guards at successive times, shape (guards, times).
         rates: their time derivatives.
-        active: numbers of those that count.
+        active: numbers of the active ones.
         step: longest distance of two times in s.
     """
     values, rates = values[active], rates[active]
@@ -176,14 +176,14 @@ def _hermite(s: Vector) -> Vector:
 _CUBIC = _hermite(np.linspace(0.05, 0.95, 19))
 
 Trial = Callable[[float], tuple[Point, list[Vector]]]
-"""Goes from the beginning of an interval by a time, and gives the point there with guards, rates, and guards soon."""
+"""Steps from the beginning of an interval by a time; returns the point with guards, rates, and guards soon."""
 Ends = dict[int, tuple[float, float, float, float]]
 """By guard: values at both ends of an interval, and changes over it by the rates at both ends."""
 
 
 @dataclass
 class Located:
-    """An event: where, which guards are at zero there, and all guards a moment later."""
+    """An event: its point, the guards that are zero there, and all guards a moment later."""
 
     point: Point
     guards: list[int]
@@ -194,7 +194,7 @@ def locate(trial: Trial, span: float, ends: Ends, group: list[Candidate], t: flo
     """Find the earliest time in (0, span] at which a guard of the group becomes positive.
 
     Args:
-        trial: goes into the interval.
+        trial: steps into the interval.
         span: length of the interval in s.
         ends: guards at its ends.
         group: the guards that become positive in the interval.
@@ -231,7 +231,7 @@ def locate(trial: Trial, span: float, ends: Ends, group: list[Candidate], t: flo
 
 
 def _positive_top(trial: Trial, span: float, ends: Ends, group: list[Candidate]) -> float | None:
-    """Look for a time at which a guard that rises and falls again is positive; None if it stays below zero."""
+    """Search for a time at which a guard that rises and falls again is positive; None if it stays below zero."""
     for one in group:
         g, low, high = one.guard, 0.0, span
         rising, falling = ends[g][2] / span, ends[g][3] / span
@@ -245,7 +245,7 @@ def _positive_top(trial: Trial, span: float, ends: Ends, group: list[Candidate])
                 low, rising = guess, rate
             else:
                 high, falling = guess, rate
-            # What is left of the rise cannot reach zero any more.
+            # The remaining rise cannot reach zero.
             if value + abs(rate) * (high - low) < 0 or high - low < 1e-12:
                 break
             straight = low + (high - low) * rising / (rising - falling) if falling < 0 < rising else low
@@ -260,7 +260,7 @@ def _event(point: Point, guards: list[Vector], watched: Ends, tolerance: float) 
 
 
 def _newton(watched: list[tuple[float, float]]) -> float | None:
-    """Newton step to the earliest zero of the rising guards; None where one has risen before, and falls again."""
+    """Newton step to the earliest zero of the rising guards; None if one has risen before, and falls again."""
     if any(value > 0 and rate <= 0 for value, rate in watched):
         return None
     return min((-value / rate for value, rate in watched if rate > 0), default=None)

@@ -4,31 +4,25 @@ from __future__ import annotations
 
 import io
 from collections.abc import Mapping, Sequence
-from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from modelica_like.errors import NetlistError, UnknownName, did_you_mean
+from modelica_like.errors import NetlistError
 from modelica_like.solve.display import QUANTITIES, Display
+from modelica_like.solve.recorder import Event
 from modelica_like.solve.style import COLOURS, picture, with_unit
+from modelica_like.solve.trajectories import Trajectories, matching
 from modelica_like.writing import check_writable, write_bytes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from modelica_like.compile.compiled import CompiledDae
-    from modelica_like.solve.curves import Curves
-    from modelica_like.solve.recorded import RecordedModel
-    from modelica_like.solve.recorder import Event
-    from modelica_like.solve.trajectories import Trajectories
-
 _USUAL = ("rad/s", "N.m", "m/s", "N")
 _MOST = 6
 _MOST_EVENTS = 40
-_MOST_CURVES = 4
 
 
 def plot(
@@ -38,12 +32,12 @@ def plot(
 
     Args:
         solution: the run.
-        patterns: names or patterns (`*.w`) of what to draw; by default speeds, torques and forces of the parts.
+        patterns: names or patterns (`*.w`) of the curves; by default speeds, torques and forces of the parts.
         title: heading; by default the name of the model.
-        display: units by path, pattern or quantity, beside those of the netlist, such as {"speed": "rpm"}.
+        display: units by path, pattern or quantity, in addition to those of the netlist, such as {"speed": "rpm"}.
 
     Raises:
-        UnknownName: nothing fits a pattern.
+        UnknownName: nothing matches a pattern.
         UnitError: a variable cannot be shown in a unit.
     """
     shown = Display(solution.model, display)
@@ -60,39 +54,11 @@ def plot(
     return figure
 
 
-def plot_curves(curves: Curves, patterns: Sequence[str] = ()) -> Figure:
-    """Draw signals of both, and below each the difference relative to its range.
-
-    Args:
-        curves: two trajectories.
-        patterns: of the signals; by default those that deviate most.
-
-    Raises:
-        UnknownName: nothing fits a pattern.
-    """
-    names = [row.signal for row in curves.deviations]
-    names = fitting(names, patterns, "Neither has a signal") if patterns else names[:_MOST_CURVES]
-    first, second = curves.first, curves.second
-    with picture("", 2 * len(names), 0.8 + 2.6 * len(names), height_ratios=[2.0, 1.0] * len(names)) as (figure, rows):
-        for name, upper, lower in zip(names, rows[::2], rows[1::2], strict=True):
-            upper.plot(first.time, first[name], color=COLOURS[0], label=curves.labels[0])
-            upper.plot(second.time, second[name], "--", color=COLOURS[1], label=curves.labels[1])
-            upper.set_ylabel(with_unit(name, curves[name].unit))
-            scale = curves[name].largest / curves[name].relative if curves[name].relative else 1.0
-            times, difference = curves.difference(name)
-            lower.plot(times, difference / scale, color="#444444", linewidth=1.0)
-            lower.set_ylabel("difference\n/ range")
-        rows[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)
-        rows[-1].set_xlabel("time in s")
-        figure.align_ylabels(rows)
-    return figure
-
-
 def check_picture(path: Path) -> None:
-    """Tell before a run why a picture cannot be written.
+    """Raise an error before a run if a picture cannot be written.
 
     Raises:
-        NetlistError: matplotlib does not know the format.
+        NetlistError: matplotlib does not support the format.
         OSError: it cannot be written there.
     """
     from matplotlib.backend_bases import FigureCanvasBase
@@ -112,51 +78,27 @@ def save_plot(figure: Figure, path: Path, **options: Any) -> None:
         options: of matplotlib's `savefig`.
 
     Raises:
-        NetlistError: matplotlib does not know the format.
+        NetlistError: matplotlib does not support the format.
         OSError: the file cannot be written.
     """
     check_picture(path)
-    # In memory first: not every format tells that a disk is full.
+    # In memory first: not every format reports a full disk.
     content = io.BytesIO()
     figure.savefig(content, format=path.suffix[1:].lower(), **options)
     write_bytes(path, content.getvalue())
 
 
 def chosen(solution: Trajectories, patterns: Sequence[str]) -> list[str]:
-    """Return the names that fit the patterns, or a sensible choice if there are none.
+    """Return the names that match the patterns, or a default choice without patterns.
 
     Raises:
-        UnknownName: nothing fits a pattern.
+        UnknownName: nothing matches a pattern.
     """
     return matching(solution.model, patterns) if patterns else _usual(solution)
 
 
-def matching(model: CompiledDae | RecordedModel, patterns: Sequence[str]) -> list[str]:
-    """Return the variables and modes of a model that fit patterns, before it is run.
-
-    Raises:
-        UnknownName: nothing fits a pattern.
-    """
-    return fitting((*model.position, *model.discrete_position), patterns, f"{model.name} has no variable")
-
-
-def fitting(known: Sequence[str], patterns: Sequence[str], missing: str) -> list[str]:
-    """Return the names that fit patterns; `missing` is what to say before a pattern that none fits.
-
-    Raises:
-        UnknownName: nothing fits a pattern.
-    """
-    names: dict[str, None] = {}
-    for pattern in patterns:
-        some = [name for name in known if name == pattern or fnmatchcase(name, pattern)]
-        if not some:
-            raise UnknownName(f"{missing} '{pattern}'{did_you_mean(pattern, known) or '.'}")
-        names.update(dict.fromkeys(some))
-    return list(names)
-
-
 def _usual(solution: Trajectories) -> list[str]:
-    """Choose speeds, torques and forces of parts; curves that coincide are drawn once, and those at rest not at all."""
+    """Choose speeds, torques and forces of parts, without curves at rest; coinciding curves are drawn once."""
     names: list[str] = []
     for unit in _USUAL:
         curves: dict[bytes, str] = {}
@@ -169,16 +111,8 @@ def _usual(solution: Trajectories) -> list[str]:
     return names
 
 
-def unit_of(solution: Trajectories, name: str) -> str:
-    """Return the coherent SI unit of a variable; that of a mode is `1`."""
-    model = solution.model
-    if name in model.position:
-        return str(model.flat_variables[model.position[name]].unit)
-    return str(model.flat_discretes[model.discrete_position[name]].unit)
-
-
 def quantity(unit: str) -> str:
-    """Return what is measured in a unit, for titles."""
+    """Return the quantity of a unit, for titles."""
     return QUANTITIES.get(unit, "value")
 
 
@@ -205,7 +139,7 @@ def _mark_events(panels: Sequence[Axes], events: Sequence[Event]) -> None:
 
 
 def _spaced(events: Sequence[Event], gap: float) -> list[Event]:
-    """Return the last event of each instant, as far as there is room for a label between them."""
+    """Return the last event of each instant, if there is space for a label."""
     shown: list[Event] = []
     for event in {event.time: event for event in events}.values():
         if not shown or event.time - shown[-1].time > gap:

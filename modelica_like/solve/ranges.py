@@ -1,4 +1,4 @@
-"""How large signals are: what deviations are measured by."""
+"""Ranges of signals, as the scale of deviations."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from modelica_like.solve.plot import unit_of
 from modelica_like.solve.trajectories import Trajectories
 
 _NOISE = 1e-6
@@ -15,8 +14,8 @@ _NOISE = 1e-6
 def ranges(solution: Trajectories, names: Iterable[str], least: float = _NOISE) -> dict[str, float]:
     """Return the range of each signal, largest minus smallest value.
 
-    The slip of a clutch that sticks is rounding noise and has no range of its own. So what moves less than a share of
-    the largest value among the signals of its unit is taken to have that range.
+    The slip of a stuck clutch is rounding noise without a range. So the range is at least a share of the largest value
+    among the signals of its unit.
 
     Args:
         solution: the run.
@@ -26,6 +25,6 @@ def ranges(solution: Trajectories, names: Iterable[str], least: float = _NOISE) 
     spans = {name: float(np.ptp(solution[name])) for name in names}
     largest: dict[str, float] = {}
     for name in spans:
-        unit = unit_of(solution, name)
+        unit = solution.unit_of(name)
         largest[unit] = max(largest.get(unit, 0.0), float(np.abs(solution[name]).max()))
-    return {name: max(span, least * largest[unit_of(solution, name)]) or 1.0 for name, span in spans.items()}
+    return {name: max(span, least * largest[solution.unit_of(name)]) or 1.0 for name, span in spans.items()}

@@ -19,7 +19,7 @@ def isolate(residual: Any, unknown: Any) -> Any | None:
     """Return the expression of `unknown` that makes `residual` zero.
 
     Only an unknown that occurs once, under sums, signs and products with expressions of other symbols, is isolated; it
-    keeps the arithmetic as the author wrote it. None if that is not possible.
+    keeps the author's arithmetic. None if that is not possible.
     """
     trail = _find(residual, leaf_id(unknown))
     if trail is None:

@@ -106,7 +106,7 @@ def test_what_the_run_time_cannot_do_idas_does_and_what_cannot_be_is_told():
     assert told == reference["failure"].to_numpy().tolist()
     assert told[2] == "mass.J = -1.0 is out of range: it must be at least 0 kg.m2."
     assert told[1]
-    assert found.attrs["notice"] == "IDAS did 1 of 4 runs, which the native run-time could not do."
+    assert found.attrs["notice"] == "IDAS did 1 of 4 runs, where the native run-time failed."
 
 
 def test_runs_that_are_others_with_idas_are_told(monkeypatch):
@@ -120,7 +120,7 @@ def test_runs_that_are_others_with_idas_are_told(monkeypatch):
     found = sweep(build(braked()), {"mass.J": np.linspace(2.0, 4.0, 150)}, ["mass.w"], until=1.0)
     assert found.attrs["checked"] == 3
     assert found.attrs["notice"] == (
-        "3 of 3 runs that IDAS did once more are others with it:\n"
+        "In 3 of 3 repeated runs IDAS has other results:\n"
         "  run 0: mass.w = 8.01 instead of 8\n"
         f"  run 100: mass.w = {10 - 4 / (2 + 200 / 149) + 0.01:.9g} instead of {10 - 4 / (2 + 200 / 149):.9g}\n"
         "  run 149: mass.w = 9.01 instead of 9"
@@ -182,4 +182,4 @@ def test_the_report_tells_what_idas_had_to_do(capsys):
 
     found = sweep(build(braked()), {"mass.J": [2.0, 0.0]}, ["mass.w"], until=1.0)
     Console(width=200).print(sweep_report(found))
-    assert "IDAS did 1 of 2 runs, which the native run-time could not do." in capsys.readouterr().out
+    assert "IDAS did 1 of 2 runs, where the native run-time failed." in capsys.readouterr().out

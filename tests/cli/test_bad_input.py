@@ -58,8 +58,8 @@ BAD = {
     "nan": (changed('"1 kg.m2"', "nan"), 5, "Inertia.J must be a finite number, not nan."),
     "empty": ("", 0, "'bad.toml' is empty."),
     "not TOML": (changed('is = "Inertia"', "is Inertia"), 5, "'bad.toml' is not TOML:"),
-    "brackets": ("[" * 10_000_000, 0, "'bad.toml' is larger than 2 MB; no netlist is."),
-    "fewer brackets": ("x = " + "[" * 1_900_000, 0, "Brackets or keys are nested too deep for a netlist."),
+    "brackets": ("[" * 10_000_000, 0, "'bad.toml' is larger than 2 MB, the limit for netlists."),
+    "fewer brackets": ("x = " + "[" * 1_900_000, 0, "Brackets or keys are nested too deeply for a netlist."),
 }
 
 

@@ -19,7 +19,8 @@ def parts(tmp_path_factory: pytest.TempPathFactory) -> Path:
     assert result.exit_code == 0, result.stderr
     assert result.stdout == (
         f"{folder}/system.toml: motor.fmu, wheel.fmu\n"
-        "  shaft.flange_b is moved, and tells its load\n  J2.flange_a takes the load, and tells how it moves\n"
+        "  shaft.flange_b receives the motion and returns the load\n"
+        "  J2.flange_a receives the load and returns the motion\n"
     )
     return folder
 

@@ -21,6 +21,7 @@ CALLS = [
     "simulate --no-energy a.toml --points=250 --energy --no-energy --sankey s.svg --plot p.png",
     "draw a.toml -o a.svg --depth 2",
     "report a.toml -o a.html --until 1s --show *.w",
+    "explore a.toml --until 1s --show *.w -o folder --no-browser",
     "modes a.toml --at=0.5s --input u --output a.w --output b.w --shapes m.png --bode b.svg",
     "steady a.toml --hold motor.w=4000 --by load --over load=0:0.25:26 --after 2s",
     "sweep a.toml --over a=1:2:3 --of max(x) --of b -o out.csv --processes 4 --checkpoint folder",

@@ -24,10 +24,13 @@ STEP = Fraction(1, 2**70)
 PRECISE = 1e-9
 """Errors relative to the largest speed per relative change of a parameter."""
 SMOOTH = (0, 1, 2, 3, 4, 5, 7, 8, 9, 11, 12, 13, 14, 16, 17, 18, 19, 20, 21, 22)
-EDGES = {6: 0.25, 10: 2.0, 15: 2.0, 55: 1.0, 57: 0.25, 101: 0.5, 112: 0.25, 202: 0.5, 285: 1.0}
+TIES = (10, 55, 253, 295, 306, 317)
+"""Drives in ties that later friction makes up for: the derivatives of both sides are the same in the end."""
+EDGES = {6: 0.25, 10: 2.0, 15: 2.0, 55: 1.0, 57: 0.25, 101: 0.5, 112: 0.25, 178: 0.5, 202: 0.5, 285: 1.0}
 """Drives on an edge, and a time by which it shows.
 
-Torques are just what friction bears, or events happen at one instant, or at the end.
+Torques are just what friction bears, an impact leaves friction a slip of zero, or events happen at one instant, or at
+the end.
 """
 
 
@@ -81,7 +84,7 @@ def gradient(drive: Drive, method: Method) -> np.ndarray:
     return result.derivatives * [one.value for one in result.parameters] / (max(run_exactly(drive).largest) or 1.0)
 
 
-@pytest.mark.parametrize("number", SMOOTH)
+@pytest.mark.parametrize("number", SMOOTH + TIES)
 def test_a_gradient_is_exact(number):
     drive = random_drive(number)
     above, below = exactly(drive)
@@ -90,7 +93,7 @@ def test_a_gradient_is_exact(number):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number", SMOOTH)
+@pytest.mark.parametrize("number", SMOOTH + TIES)
 def test_an_adjoint_gradient_is_exact(number):
     drive = random_drive(number)
     assert gradient(drive, "adjoint") == pytest.approx(exactly(drive)[0], abs=PRECISE)
@@ -101,5 +104,5 @@ def test_on_an_edge_there_is_none(number):
     drive = replace(random_drive(number), until=EDGES[number])
     above, below = exactly(drive)
     assert np.abs(above - below).max() > 1e-3
-    with pytest.raises(NoGradient, match=r"just at the limit|for different reasons"):
+    with pytest.raises(NoGradient, match=r"exactly at the limit|for different reasons|because .* is zero"):
         gradient(drive, "adjoint")

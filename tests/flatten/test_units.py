@@ -106,7 +106,7 @@ def test_right_equations(equation):
         (lambda c: c.x == c.x**c.k, "the base of a variable power and a number differ: m and 1."),
         (
             lambda c: c.f == c.mode.choose(a=c.x, b=c.tau),
-            "the branches of choose(…) or where(…) differ in unit; they only stand in `… == 0`.",
+            "the branches of choose(…) or where(…) differ in unit; this is allowed only in `… == 0`.",
         ),
         (lambda c: c.w == der(c.x), "left rad/s, right m/s."),
         (lambda c: c.phi == cos(c.phi) * c.time, "left rad, right s."),

@@ -72,7 +72,7 @@ def test_an_unknown_machine_is_told(monkeypatch):
     monkeypatch.setattr(module.machine, "system", lambda: "Linux")
     assert told(ExportError, native_platform) == (
         "There are no FMU binaries for this machine (riscv64-linux).\n"
-        "Choose among x86_64-linux, aarch64-linux, x86_64-windows, aarch64-windows, x86_64-darwin, aarch64-darwin."
+        "Choose from x86_64-linux, aarch64-linux, x86_64-windows, aarch64-windows, x86_64-darwin, aarch64-darwin."
     )
 
 

@@ -83,8 +83,8 @@ AGAIN = "Export the model again."
 def test_damage_is_told(reader):
     data = written("two_mass.toml")
     assert told(reader, data) == ""
-    assert told(reader, b"") == f"The model file is damaged (it is cut off). {AGAIN}"
-    assert told(reader, data[:-8]) == f"The model file is damaged (it is cut off). {AGAIN}"
+    assert told(reader, b"") == f"The model file is damaged (it is truncated). {AGAIN}"
+    assert told(reader, data[:-8]) == f"The model file is damaged (it is truncated). {AGAIN}"
     assert told(reader, b"PK" + data[2:]) == f"The model file is damaged (it is another kind of file). {AGAIN}"
     assert told(reader, data[:-1] + b"\x01") == f"The model file is damaged (its checksum is wrong). {AGAIN}"
     count = len(SECTIONS)

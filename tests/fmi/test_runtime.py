@@ -125,7 +125,7 @@ def test_what_is_missing_is_told(version, tmp_path):
     made, said = instantiated(version, folder, token, None)
     assert not made
     assert said == [
-        "The importer does not tell where the FMU's resources are, so its model cannot be read. Export it with the "
+        "The importer does not say where the FMU's resources are, so its model cannot be read. Export it with the "
         "model compiled in (--embed)."
     ]
     made, said = instantiated(version, folder, token, b"/no/where")
@@ -135,7 +135,7 @@ def test_what_is_missing_is_told(version, tmp_path):
     model.write_bytes(model.read_bytes()[:-100])
     made, said = instantiated(version, folder, token, str(model.parent).encode())
     assert not made
-    assert said == ["The model file is damaged (it is cut off). Export the model again."]
+    assert said == ["The model file is damaged (it is truncated). Export the model again."]
 
 
 # -- where the library is ----------------------------------------------------------------------------------------------

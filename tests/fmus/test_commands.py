@@ -27,7 +27,7 @@ def test_validate_of_a_broken_file_fails(run: CliRunner, tmp_path: Path) -> None
     (tmp_path / "drive.fmu").write_text("nothing")
     result = run.invoke(app, ["validate", str(tmp_path / "drive.fmu")])
     assert result.exit_code == 1
-    assert "archive  failed   drive.fmu is no FMU: it is not a sound zip archive." in result.stdout
+    assert "archive  failed   drive.fmu is not an FMU: it is not a valid zip archive." in result.stdout
 
 
 def test_validate_of_no_file(run: CliRunner, tmp_path: Path) -> None:

@@ -82,17 +82,17 @@ BAD = "bad (hostile_fmi2.fmu)"
 OWN = "The FMUs of bench ran in a process of their own."
 MISDEEDS: dict[str, tuple[float, type[ModelicaLikeError], str]] = {
     "crash": (1.0, FmuCrashed, f"{BAD} crashed with SIGSEGV after t = 0.49 s.\n{OWN}"),
-    "crash at the start": (5.0, FmuCrashed, f"{BAD} crashed with SIGSEGV before its first step had ended.\n{OWN}"),
-    "leave": (3.0, FmuCrashed, f"{BAD} ended its process by itself, with exit code 0, after t = 0.49 s.\n{OWN}"),
+    "crash at the start": (5.0, FmuCrashed, f"{BAD} crashed with SIGSEGV before the end of its first step.\n{OWN}"),
+    "leave": (3.0, FmuCrashed, f"{BAD} ended its process with exit code 0, after t = 0.49 s.\n{OWN}"),
     "hang": (
         2.0, FmuTimeout,
         "bench did not finish within 3 s, and was stopped after t = 0.49 s.\n"
-        f"{BAD} was at work.\nGive it more time with `timeout`, or a shorter run.",
+        f"{BAD} was running.\nGive it more time with `timeout`, or a shorter run.",
     ),
     "fail": (
         4.0, FmuFailed,
         f"{BAD} failed: fmi2DoStep failed with status 3 (error).\n"
-        "If what the FMUs exchange grows without bounds, take a shorter step.",
+        "If the exchanged values grow without bounds, choose a shorter step.",
     ),
 }  # fmt: skip
 

@@ -86,7 +86,7 @@ def test_energies_need_energy_terms(reference_fmus: Built) -> None:
     with pytest.raises(MissingValue) as told:
         run_fmu(reference_fmus["two_mass", "2.0"]).energy()
     assert str(told.value) == (
-        "two_mass tells no energies.\nNone of its variables is called ….stored_energy, ….loss_power or ….source_power."
+        "two_mass has no energies.\nIt has no variables ….stored_energy, ….loss_power or ….source_power."
     )
 
 

@@ -13,19 +13,19 @@ from modelica_like.fmi.run import run_fmu
 Built = Mapping[tuple[str, str], Path]
 
 CRASH, HANG, LEAVE, FAIL, CRASH_AT_START = 1.0, 2.0, 3.0, 4.0, 5.0
-IN_ITS_OWN = "It ran in a process of its own."
+IN_ITS_OWN = "It ran in a separate process."
 
 MISDEEDS = {
     "crash": (CRASH, FmuCrashed, f"hostile_fmi2.fmu crashed with SIGSEGV after t = 0.49 s.\n{IN_ITS_OWN}"),
     "crash at the start": (
         CRASH_AT_START,
         FmuCrashed,
-        f"hostile_fmi2.fmu crashed with SIGSEGV before its first step had ended.\n{IN_ITS_OWN}",
+        f"hostile_fmi2.fmu crashed with SIGSEGV before the end of its first step.\n{IN_ITS_OWN}",
     ),
     "leave": (
         LEAVE,
         FmuCrashed,
-        f"hostile_fmi2.fmu ended its process by itself, with exit code 0, after t = 0.49 s.\n{IN_ITS_OWN}",
+        f"hostile_fmi2.fmu ended its process with exit code 0, after t = 0.49 s.\n{IN_ITS_OWN}",
     ),
     "hang": (
         HANG,
@@ -61,7 +61,7 @@ MISTAKES = {
     "input": (
         {"inputs": {"J1.J": 1.0}},
         UnknownName,
-        "two_mass_fmi2.fmu: 'J1.J' is no input but a parameter. It has motor.tau.",
+        "two_mass_fmi2.fmu: 'J1.J' is not an input but a parameter. It has motor.tau.",
     ),
     "table": (
         {"inputs": {"motor.tau": [(1.0, 0.0), (0.0, 1.0)]}},
@@ -89,7 +89,7 @@ def test_tells_mistakes(mistake: str, reference_fmus: Built) -> None:
 def test_tells_a_missing_kind(reference_fmus: Built) -> None:
     with pytest.raises(FmuRefused) as told:
         run_fmu(reference_fmus["dc_bench", "2.0"], kind="me")
-    assert str(told.value) == ("dc_bench_fmi2.fmu has no ModelExchange part.\nAsk for the other kind, or for none.")
+    assert str(told.value) == ("dc_bench_fmi2.fmu has no ModelExchange part.\nChoose the other kind, or none.")
 
 
 def test_tells_scheduled_execution(tmp_path: Path) -> None:
@@ -105,5 +105,5 @@ def test_tells_scheduled_execution(tmp_path: Path) -> None:
 
 
 def test_a_component_without_inputs_says_so(reference_fmus: Built) -> None:
-    with pytest.raises(UnknownName, match=r"'k' is no input but a parameter\. It has none\.$"):
+    with pytest.raises(UnknownName, match=r"'k' is not an input but a parameter\. It has none\.$"):
         run_fmu(reference_fmus["dc_bench", "2.0"], inputs={"k": 1.0})

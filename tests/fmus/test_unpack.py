@@ -73,7 +73,7 @@ REFUSED = {
     "backslashes outside": (member(r"..\outside"), r"bad.fmu is refused: '..\outside' leads out of the archive."),
     "backslashes": (
         member(r"binaries\linux64"),
-        r"bad.fmu is refused: 'binaries\linux64' has a backslash where the standard asks for a slash.",
+        r"bad.fmu is refused: 'binaries\linux64' has a backslash where the standard requires a slash.",
     ),
     "an absolute path": (member("/tmp/outside"), "bad.fmu is refused: '/tmp/outside' is an absolute path."),
     "a drive": (member("C:/outside"), "bad.fmu is refused: 'C:/outside' is an absolute path."),
@@ -81,14 +81,17 @@ REFUSED = {
         member("../\x1b[31mred"),
         "bad.fmu is refused: '../\N{REPLACEMENT CHARACTER}[31mred' leads out of the archive.",
     ),
-    "a name twice": (twice, "bad.fmu is refused: 'modelDescription.xml' is there twice."),
+    "a name twice": (twice, "bad.fmu is refused: 'modelDescription.xml' occurs twice."),
     "a bomb": (
         bomb,
         "bad.fmu is refused: 19.93 kB would unpack to 20 MB.\n"
-        "What shrinks to less than 1/200 is more likely an archive bomb than an FMU.",
+        "A file that shrinks to less than 1/200 is more likely a zip bomb than an FMU.",
     ),
     "too many files": (too_many, "bad.fmu is refused: it holds 10001 files, more than 10000."),
-    "no description": (lambda archive: archive.writestr("x", ""), "bad.fmu is no FMU: it has no modelDescription.xml."),
+    "no description": (
+        lambda archive: archive.writestr("x", ""),
+        "bad.fmu is not an FMU: it has no modelDescription.xml.",
+    ),
     "a document type": (entities, DOCUMENT_TYPE),
     "a document type in UTF-16": (entities_in_utf_16, DOCUMENT_TYPE),
 }
@@ -138,7 +141,7 @@ def test_refuses_what_is_no_archive(keep: int, reference_fmus: dict[tuple[str, s
     path.write_bytes(reference_fmus["two_mass", "2.0"].read_bytes()[:keep])
     with pytest.raises(FmuRefused) as refusal:
         run_fmu(path)
-    assert str(refusal.value) == "half.fmu is no FMU: it is not a sound zip archive.\nFile is not a zip file."
+    assert str(refusal.value) == "half.fmu is not an FMU: it is not a valid zip archive.\nFile is not a zip file."
 
 
 def test_refuses_damaged_content(reference_fmus: dict[tuple[str, str], Path], tmp_path: Path) -> None:
@@ -148,5 +151,5 @@ def test_refuses_damaged_content(reference_fmus: dict[tuple[str, str], Path], tm
     path.write_bytes(content)
     target = tmp_path / "unpacked"
     target.mkdir()
-    with pytest.raises(FmuRefused, match=r"^damaged\.fmu is no FMU: it is not a sound zip archive"):
+    with pytest.raises(FmuRefused, match=r"^damaged\.fmu is not an FMU: it is not a valid zip archive"):
         unpack(path, target)

@@ -56,7 +56,7 @@ def test_libcosim_crashes_on_fmi_3_of_whatever_origin(reference_fmus: Built) -> 
     assert validation.passed
     assert validation["ecos CS"].verdict == PASSED
     assert validation["libcosim CS"].sentence == (
-        "stick_slip_fmi3.fmu in libcosim crashed with SIGSEGV before its first step had ended. "
+        "stick_slip_fmi3.fmu in libcosim crashed with SIGSEGV before the end of its first step. "
         "It does so with every FMU of FMI 3.0: the importer is at fault."
     )
     subject = validate._Subject(reference_fmus["machine_table", "3.0"], _description("3.0", reference_fmus), 60)
@@ -100,9 +100,9 @@ BROKEN = {
     "a version of which nothing is known": (
         replaced('fmiVersion="2.0"', 'fmiVersion="7.0"'),
         "schema of model description",
-        "It does not say which version of the standard it follows.",
+        "It does not state its version of the standard.",
     ),
-    "no XML": (replaced("</fmiModelDescription>", ""), "schema of model description", "It is no XML: "),
+    "no XML": (replaced("</fmiModelDescription>", ""), "schema of model description", "It is not XML: "),
     "another token": (replaced('guid="{machine_table}"', 'guid="{other}"'), "FMPy CS", "machine_table"),
 }
 
@@ -120,7 +120,7 @@ def test_tells_what_is_wrong(fault: str, reference_fmus: Built, tmp_path: Path) 
 def test_no_archive(tmp_path: Path) -> None:
     (tmp_path / "text.fmu").write_text("no archive")
     validation = validate_fmu(tmp_path / "text.fmu")
-    assert [check.sentence for check in validation.checks] == ["text.fmu is no FMU: it is not a sound zip archive."]
+    assert [check.sentence for check in validation.checks] == ["text.fmu is not an FMU: it is not a valid zip archive."]
     assert not validation.passed
 
 
@@ -141,7 +141,7 @@ def test_values_that_are_not_finite(builder: ModuleType, tmp_path: Path) -> None
 def test_crashes_in_every_importer_are_told(builder: ModuleType, tmp_path: Path) -> None:
     validation = validate_fmu(hostile_from_the_start(builder, 1, tmp_path))
     failed = {check.name: check.sentence for check in validation.checks if check.verdict == FAILED}
-    crashed = "crashed with SIGSEGV before its first step had ended."
+    crashed = "crashed with SIGSEGV before the end of its first step."
     assert failed["ecos CS"] == f"hostile_fmi2.fmu in ecos {crashed}"
     assert failed["libcosim CS"] == f"hostile_fmi2.fmu in libcosim {crashed}"
     assert failed["FMPy CS"].startswith("hostile_fmi2.fmu crashed with SIGSEGV after t = 0.49")

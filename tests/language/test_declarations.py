@@ -118,7 +118,7 @@ def test_symbols_are_the_same_each_time_and_differ_between_instances():
 
 
 def test_a_partial_class_is_only_a_base():
-    with pytest.raises(LanguageError, match=r"TwoPins is partial: it is only a base of other components\.") as caught:
+    with pytest.raises(LanguageError, match=r"TwoPins is partial: it is only a base class\.") as caught:
         TwoPins()
     assert caught.value.where[0].file == __file__
 
@@ -141,13 +141,13 @@ def test_lists_in_structural_fields_become_tuples():
 
 @pytest.mark.parametrize("name", ["R", "switch", "label_number"])
 def test_a_part_cannot_take_the_name_of_a_declaration(name):
-    with pytest.raises(DuplicateName, match="already the name of something else"):
+    with pytest.raises(DuplicateName, match="already in use"):
         setattr(Resistor(), name, Resistor())
 
 
 @pytest.mark.parametrize("name", ["equations", "find", "path", "fields"])
 def test_a_part_cannot_take_the_name_of_a_method(name):
-    with pytest.raises(DuplicateName, match="already the name of something else"):
+    with pytest.raises(DuplicateName, match="already in use"):
         setattr(Resistor(), name, Resistor())
 
 

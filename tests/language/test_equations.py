@@ -133,8 +133,8 @@ def test_a_number_on_the_left_stays_an_equation_or_is_refused():
 @pytest.mark.parametrize(
     ("equation", "message"),
     [
-        (lambda c: c.tau == c.tau, "Wrong has an equation whose two sides are the same, or only numbers."),
-        (lambda c: c.tau - c.tau == 0, "Wrong has an equation whose two sides are the same, or only numbers."),
+        (lambda c: c.tau == c.tau, "Wrong has an equation whose two sides are the same, or have only numbers."),
+        (lambda c: c.tau - c.tau == 0, "Wrong has an equation whose two sides are the same, or have only numbers."),
         (lambda c: 1 == 2, "Wrong has an equation that Python evaluated to False."),
         (lambda c: c.flange_a == c.flange_b, "Wrong has an equation that Python evaluated to False."),
         (lambda c: c.tau, "Wrong.equations() yields Symbol instead of an equation."),
@@ -184,7 +184,7 @@ def test_a_function_of_math_makes_nan_of_a_symbol():
             yield from super().equations()
             yield self.tau == self.tau * math.sqrt(self.phi_rel)
 
-    with pytest.raises(LanguageError, match=r"^Lost: a number in it is nan\.") as caught:
+    with pytest.raises(LanguageError, match=r"^Lost: an expression contains nan\.") as caught:
         flatten(Lost())
     assert "math.sqrt" in caught.value.where[0].text
     assert "take sqrt" in caught.value.advice

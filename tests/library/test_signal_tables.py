@@ -58,7 +58,7 @@ def test_a_map_holds_and_tells_which_argument_leaves_it() -> None:
 
 
 def test_a_map_of_another_size_is_refused() -> None:
-    with pytest.raises(ModelicaLikeError, match="the table has 3 rows and 4 columns, but `first` has 2 values"):
+    with pytest.raises(ModelicaLikeError, match="3 rows and 4 columns, but there are 2 values for rows and 4"):
         swept(
             Table2D(first=FIRST[:2], second=SECOND, table=MAP), "u1", "u2", u1=Ramp(duration=1.0), u2=Ramp(duration=1.0)
         )

@@ -71,6 +71,19 @@ CASES = [
         [0.3],
     ),
     (
+        CoilForce(amplitude="5 N.m", T=0.2, start_time=0.3, stop_time=0.7, T_off="40 ms"),
+        lambda t: (
+            0.0
+            if t < 0.3
+            else 5 * (1 - np.exp(-(t - 0.3) / 0.2)) ** 2
+            if t < 0.7
+            else 5 * ((1 - np.exp(-2)) * np.exp(-(t - 0.7) / 0.04)) ** 2
+            if t < 0.7 + 0.36 * np.log(10)
+            else 0.0
+        ),
+        [0.3, 0.7, 0.7 + 0.36 * np.log(10)],
+    ),
+    (
         Pulse(amplitude="2 N.m", period=0.5, width=0.4, offset="1 N.m", start_time=0.3),
         pulse,
         [0.3, 0.5, 0.8, 1.0, 1.3, 1.5, 1.8, 2.0],

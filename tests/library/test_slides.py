@@ -19,6 +19,7 @@ from components import (
     LinearMultiSensor,
     LinearPowerSensor,
     LinearSpeedDependentForce,
+    MachineTable,
     Mass,
     MassWithStopAndFriction,
     QuadraticSpeedDependentForce,
@@ -293,3 +294,18 @@ def following(signal: Component, source: Component) -> Assembly:
     parts = {"signal": signal, "drive": source, "mass": Mass(m=2.0)}
     wires = {"signal": ["signal.y", "drive.s_ref"]}
     return Assembly("slide", parts=parts, series={"slide": ["drive", "mass"]}, connect=wires)
+
+
+@pytest.mark.parametrize("kind", ["stop", "table"])
+@pytest.mark.parametrize(("angle", "moves"), [(20.0, False), (40.0, True)])
+def test_masses_stand_on_their_slope_or_slide(kind: str, angle: float, moves: bool) -> None:
+    """8 kg and 40 N of friction: m·g·sin(angle) is 26.8 N or 50.4 N."""
+    values: dict[str, Any] = {"m": 8.0, "angle": f"{angle} deg", "s": 2.0, "v": 0.0}
+    stops = MassWithStopAndFriction(F_Coulomb=40.0, smin=-5.0, **values)
+    mass = stops if kind == "stop" else MachineTable(f_friction=40.0, **values)
+    run = simulate(Assembly("d", parts={"m": mass}), 1.0, rtol=1e-9)
+    pull = 8 * 9.80665 * np.sin(np.radians(angle))
+    assert run.final["m.v"] == pytest.approx(-(pull - 40) / 8 if moves else 0.0, rel=1e-8)
+    assert run.final["m.f"] == pytest.approx(-40 if moves else -pull, rel=1e-8)
+    assert run.energy().closure < 1e-8
+    assert run.energy()["m"].lost == pytest.approx(0.5 * (pull - 40) / 8 * 40 if moves else 0.0, rel=1e-6, abs=1e-9)

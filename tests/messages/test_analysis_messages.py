@@ -93,12 +93,12 @@ Install it with: pip install "modelica-like[analyse]\""""),
 control is not installed.
 Install it with: pip install "modelica-like[analyse]\""""),
     "a Campbell diagram over two": (ValueOutOfRange, lambda: campbell(model(), {}, "mass.w"), """\
-A Campbell diagram goes over one parameter, not 0."""),
+A Campbell diagram varies one parameter, not 0."""),
     "a Campbell diagram of one point": (ValueOutOfRange, lambda: campbell(model(), {"mass.J": [1.0]}, "mass.w", at="given"), """\
 A Campbell diagram needs at least two values of mass.J."""),
     "nothing holds": (ValueOutOfRange, lambda: steady(MOTOR, {"motor.w": 400.0}), """\
-dc_bench_motor: motor.w cannot be held by nothing: each held variable takes one parameter.
-Say for example steady(drive, {"motor.w": "3000 rpm"}, by="load.tau_constant")."""),
+dc_bench_motor: motor.w cannot be held by nothing: each held variable needs one parameter.
+Write for example steady(drive, {"motor.w": "3000 rpm"}, by="load.tau_constant")."""),
     "a held name": (UnknownName, lambda: steady(MOTOR, {"motor.x": 400.0}, by="first_load"), """\
 dc_bench_motor has no variable 'motor.x'; did you mean 'motor.w'?"""),
     "a name of an operating point": (UnknownName, lambda: steady(MOTOR)["motor.x"], """\
@@ -108,13 +108,13 @@ dc_bench_motor: motor.w cannot be held by last_load: in steady state it does not
 Choose a parameter that changes it, such as the torque of a load."""),
     "a point of a curve": (InitializationError, lambda: characteristic(model(), {"torque.tau_constant": [1.0]}), """\
 At torque.tau_constant = 1.0: No steady state was found at t = 0 s: mass.w keeps changing.
-Check that the drive has an equilibrium. Give guesses near the motion that is steady, such as guess(100) for a speed; an operating point can begin from the end of a run, too."""),
+Check that the drive has an equilibrium. Give guesses near the steady motion, such as guess(100) for a speed; an operating point can also start from the end of a run."""),
     "a curve over two": (ValueOutOfRange, lambda: characteristic(model(), {}), """\
-A characteristic curve goes over one quantity, not 0."""),
+A characteristic curve varies one quantity, not 0."""),
     "a curve over nothing": (ValueOutOfRange, lambda: characteristic(model(), {"mass.J": []}), """\
-There is no value of mass.J to go over."""),
+mass.J: no values are given."""),
     "a sweep over nothing": (ValueOutOfRange, lambda: swept(over={}), """\
-A sweep goes over at least one parameter."""),
+A sweep needs at least one parameter."""),
     "a sweep of nothing": (ValueOutOfRange, lambda: swept(outputs=[]), """\
 A sweep needs at least one output, and positive numbers of processes and runs in a chunk."""),
     "no values": (ValueOutOfRange, lambda: swept(over={"mass.J": []}), """\
@@ -128,7 +128,7 @@ gear.ratio follows from other parameters.
 Vary those, or sweep the netlist itself."""),
     "no scheduler": (WorkersLost, lambda: swept(scheduler="nowhere://127.0.0.1:1"), """\
 There is no Dask scheduler at nowhere://127.0.0.1:1.
-Its address looks like tcp://host:8786."""),
+An address looks like tcp://host:8786."""),
     "no values of the output": (ValueOutOfRange, lambda: importance(model(), {"mass.J": (-1.0, 1.0)}, ["mass.w"], samples=4, until=1.0), """\
 mass.w has no value in 6 of 12 runs: mass.J = -0.09687008894979954 is out of range: it must be at least 0 kg.m2.
 Narrow the ranges until all runs succeed."""),
@@ -152,7 +152,7 @@ Measured columns must have the same length, and at least one row."""),
 Accelerated has no variable or parameter 'mass.v'; did you mean 'mass.w'?"""),
     "a model that cannot be computed": (CalibrationFailed, lambda: fitted(OperatingPoints({"torque.tau_constant": [1.0], "mass.w": [1.0]}, given=["torque.tau_constant"])), """\
 Accelerated could not be calibrated: No steady state was found at t = 0 s: mass.w keeps changing.
-Give a guess with which the model can be computed, or narrower bounds."""),
+Give a guess for which the model can be solved, or narrower bounds."""),
     "a value that was not calibrated": (UnknownName, lambda: fitted(Numbers({"mass.w": 2.0}, until=1.0))["mass.phi"], """\
 'mass.phi' was not calibrated: mass.J."""),
     "no assignment": (ValueOutOfRange, lambda: read_assignment("motor.w"), """\
@@ -177,8 +177,8 @@ def test_a_checkpoint_of_another_sweep(tmp_path):
     with pytest.raises(CheckpointMismatch) as caught:
         swept(over={"mass.J": [1.0, 3.0]}, checkpoint=tmp_path / "runs.zarr")
     assert str(caught.value) == (
-        "runs.zarr holds another sweep: the model, its values, the points or the outputs differ.\n"
-        "Give another file, or remove this one to begin anew."
+        "runs.zarr is from another sweep: the model, its values, the points or the outputs differ.\n"
+        "Name another file, or delete this one to start again."
     )
 
 
@@ -193,7 +193,7 @@ def test_a_table_that_is_none(tmp_path):
     file = tmp_path / "measured.csv"
     for text, told in (
         ("time,mass.w\n0,abc\n", "measured.csv is not a table of numbers: could not convert string to float: 'abc'."),
-        ("time,mass.w\n0,1,2\n", "measured.csv: rows have not as many columns as the title line."),
+        ("time,mass.w\n0,1,2\n", "measured.csv: the rows and the title line differ in their number of columns."),
     ):
         file.write_text(text)
         with pytest.raises(NetlistError) as caught:
@@ -208,6 +208,6 @@ def test_workers_that_die_again_and_again(monkeypatch):
         list(in_processes(job, [(0, [[1.0], [2.0]])], 1))
     assert str(caught.value) == (
         "2 runs of the sweep were not done: worker processes of this machine died 3 times.\n"
-        "What was done is in the checkpoint, if there is one: start the sweep again with it. If they died at their "
-        'start: a script that sweeps keeps its own work behind if __name__ == "__main__":, or says processes=1.'
+        "Finished runs are in the checkpoint, if there is one: start the sweep again with it. If they died at startup: "
+        'put the work of a script under if __name__ == "__main__":, or set processes=1.'
     )

@@ -228,7 +228,7 @@ case(
     "no equation holds what a mode holds",
     lambda: flatten(Loosely()),
     """\
-Loosely.plates holds w_rel in 'stuck', but no equation says there that der(w_rel) is zero.
+Loosely.plates holds w_rel in 'stuck', but no equation sets der(w_rel) is zero.
 Write plates.choose(…, stuck=der(self.w_rel)) == 0.""",
 )
 case(
@@ -236,7 +236,7 @@ case(
     "an equation that says nothing",
     lambda: flatten(Numbers()),
     """\
-Numbers has an equation whose two sides are the same, or only numbers.
+Numbers has an equation whose two sides are the same, or have only numbers.
   in test_component_messages.py:{numbers} `yield self.x == self.x`
 An equation relates unknowns: left == right.""",
 )
@@ -267,7 +267,7 @@ case(
     errors.CyclicAssembly,
     "parameters in a circle",
     lambda: flatten(Circle()),
-    "Parameters depend on each other in a circle: a → b → a.\nGive one a number.",
+    "Parameters depend on each other in a circle: a → b → a.\nGive one of them a number.",
 )
 case(
     errors.NetlistError,
@@ -359,7 +359,7 @@ case(
     """\
 Turning has another mode sequence at these parameter values: as mode change 1, 'mode: rising → falling' is missing.
 A function with a fixed mode sequence has derivatives only as long as the sequence stays.
-Bound the parameters, begin elsewhere, or allow it with any_sequence=True.""",
+Bound the parameters, start elsewhere, or allow it with any_sequence=True.""",
 )
 case(
     errors.MissingExtra,

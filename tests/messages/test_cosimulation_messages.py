@@ -52,24 +52,24 @@ CUTS: dict[str, tuple[Assembly, list[str], str]] = {
     "series": (
         DRIVE, ["main"],
         "main is a whole series: J1, shaft, J2.\n"
-        '  in drive.toml:8 `main = ["J1", "shaft", "J2"]`\nName the part behind which it is to be cut.',
+        '  in drive.toml:8 `main = ["J1", "shaft", "J2"]`\nName the part behind which to cut.',
     ),
     "inside": (
         DRIVE, ["J1.flange_b.phi"],
-        "J1.flange_b.phi lies inside of J1; only connections of the netlist itself can be cut.\n"
+        "J1.flange_b.phi is inside J1; only connections of the netlist itself can be cut.\n"
         "Split J1's own netlist, or cut at one of its ends.",
     ),
     "node": (
         NODE, ["x"],
         "x joins 3 ends: J1.flange_b, shaft.flange_a, d.flange_a.\n"
-        '  in drive.toml:9 `x = ["J1.flange_b", "shaft.flange_a", "d.flange_a"]`\nName the end that is to be cut off.',
+        '  in drive.toml:9 `x = ["J1.flange_b", "shaft.flange_a", "d.flange_a"]`\nName the end to cut off.',
     ),
-    "unclear": (METER, ["meter"], "It is not clear where meter is to be cut.\nName an end: meter.p, meter.n."),
+    "unclear": (METER, ["meter"], "It is not clear where to cut meter.\nName an end: meter.p, meter.n."),
     "another way": (
         TWO_WAYS, ["shaft"],
-        "drive does not fall apart between shaft.flange_b and J2.flange_a.\n"
+        "drive does not separate between shaft.flange_b and J2.flange_a.\n"
         '  in drive.toml:9 `main = ["J1", "shaft", "J2"]`\n'
-        "shaft and J2 are also joined by shaft – other – J2.\nCut there, too: --at can be given several times.",
+        "shaft and J2 are also joined by shaft – other – J2.\nCut there as well: --at can be given several times.",
     ),
     "default": (
         ENGAGED, ["engage"],
@@ -78,7 +78,7 @@ CUTS: dict[str, tuple[Assembly, list[str], str]] = {
     ),
     "array": (
         DIRECT, ["J[1]"],
-        "J[1].flange_b lies inside of the array J, which cannot be cut.\n"
+        "J[1].flange_b is inside the array J, which cannot be cut.\n"
         '  in drive.toml:6 `a = ["J[1].flange_b", "J[2].flange_a"]`',
     ),
 }  # fmt: skip
@@ -104,8 +104,8 @@ SPLITS: dict[str, tuple[Assembly, list[str], dict[str, Any], str]] = {
         netlist({"J1": J, "a": SHAFT, "b": SHAFT, "J2": J}, '[series]\nmain = ["J1", "a", "b", "J2"]'), ["a"], {},
         "a: neither side of the cut can take the motion while the other takes the load.\n"
         '  in drive.toml:9 `main = ["J1", "a", "b", "J2"]`\n'
-        "b.flange_a stores nothing: its phi would follow tau at once; "
-        f"a.flange_b stores nothing: its phi would follow tau at once.\n{WHERE_TO_CUT}",
+        "b.flange_a stores no energy: its phi would depend directly on tau; "
+        f"a.flange_b stores no energy: its phi would depend directly on tau.\n{WHERE_TO_CUT}",
     ),
     "exclusive": (
         netlist({"J1": J, "gear": '{ is = "IdealGear", ratio = 2 }', "J2": J}, '[series]\nmain = ["J1", "gear", "J2"]'),
@@ -113,14 +113,14 @@ SPLITS: dict[str, tuple[Assembly, list[str], dict[str, Any], str]] = {
     ),
     "formula": (
         netlist({**PARTS, "shaft": SHAFT.replace("c = 1", 'c = "2*J2.J"')}, f"{CHAIN}\n{STARTS}"), ["shaft"], {},
-        "A formula needs J2.J, which the cut puts into another FMU.\nIt stands in one of J1, shaft.\n"
+        "A formula needs J2.J, which the cut puts into another FMU.\nIt is in one of J1, shaft.\n"
         "Give both parts a parameter of the netlist: [parameters].",
     ),
     "few names": (DRIVE, ["shaft"], {"names": ["a"]}, "There are 2 FMUs, but 1 name.\nThey are: J1, shaft; J2."),
     "no name": (
-        DRIVE, ["shaft"], {"names": ["a", "b.c"]}, "'b.c' is no name of an FMU: letters, digits and _.",
+        DRIVE, ["shaft"], {"names": ["a", "b.c"]}, "'b.c' is not a name for an FMU: use letters, digits and _.",
     ),
-    "one name": (DRIVE, ["shaft"], {"names": ["a", "a"]}, "Two FMUs cannot have one name: a, a."),
+    "one name": (DRIVE, ["shaft"], {"names": ["a", "a"]}, "Two FMUs cannot have the same name: a, a."),
     "master": (
         DRIVE, ["shaft"], {"master": "jakobi"},
         "There is no master 'jakobi'; did you mean 'jacobi'?\nThere are jacobi and gauss-seidel.",
@@ -161,12 +161,13 @@ FILES: dict[str, tuple[str, str]] = {
     "section": ("fmus = 3", "fmus must be a table: [fmus].\n  in bench.toml:1 `fmus = 3`"),
     "fmu": (
         "fmus.a = 3",
-        'fmus.a must be a table: { file = "a.fmu" }, with `parameters` if there are any.\n'
+        'fmus.a must be a table: { file = "a.fmu" }, optionally with `parameters`.\n'
         "  in bench.toml:1 `fmus.a = 3`",
     ),
     "fmu's name": (
         'fmus."b c" = "x.fmu"',
-        "fmus.b c: the name of an FMU is a word: letters, digits and _.\n  in bench.toml:1 `fmus.\"b c\" = \"x.fmu\"`",
+        "fmus.b c: the name of an FMU must be a word: letters, digits and _.\n"
+        "  in bench.toml:1 `fmus.\"b c\" = \"x.fmu\"`",
     ),
     "parameters": (
         'fmus.a = { file = "a.fmu", parameters = { m = "2 kg" } }',
@@ -176,7 +177,7 @@ FILES: dict[str, tuple[str, str]] = {
     "connection": (
         GOOD + 'e = ["a.phi"]',
         "connect.e must be a list of an output and the inputs that take it.\n  in bench.toml:7 `e = [\"a.phi\"]`\n"
-        'Each is the name of an FMU and of its variable: ["motor.flange.tau", "load.tau"].',
+        'Write the FMU and its variable: ["motor.flange.tau", "load.tau"].',
     ),
     "bond": (
         GOOD + '[bonds]\nshaft = "tau"',
@@ -277,15 +278,15 @@ FAILURES: dict[str, tuple[dict[str, Any], str]] = {
     ),
     "no input": (
         {"kind": "no input", "unit": "b", "name": "w", "causality": "output", "known": ["tau"]},
-        "b (b.fmu): 'w' is no input but an output. It has tau.",
+        "b (b.fmu): 'w' is not an input but an output. It has tau.",
     ),
     "no input at all": (
         {"kind": "no input", "unit": "b", "name": "w", "causality": "output", "known": []},
-        "b (b.fmu): 'w' is no input but an output. It has none.",
+        "b (b.fmu): 'w' is not an input but an output. It has none.",
     ),
     "FMI 1.0": (
         {"kind": "too old", "unit": "a"},
-        "a (a.fmu) is an FMU of FMI 1.0.\nCo-simulation takes FMI 2.0 and 3.0.",
+        "a (a.fmu) is an FMU of FMI 1.0.\nCo-simulation supports FMI 2.0 and 3.0.",
     ),
     "model exchange": (
         {"kind": "no co-simulation", "unit": "a"},
@@ -293,31 +294,31 @@ FAILURES: dict[str, tuple[dict[str, Any], str]] = {
     ),
     "no rollback": (
         {"kind": "no rollback", "unit": "a"},
-        "a (a.fmu) cannot go back to a saved state, or does not take steps of any length, so the step cannot vary.\n"
+        "a (a.fmu) cannot restore a saved state, or cannot take steps of any length, so the step cannot vary.\n"
         "It needs both canGetAndSetFMUState and canHandleVariableCommunicationStepSize.\n"
         "Run with a fixed step, without tolerance.",
     ),
     "loop": (
         {"kind": "not settled", "unit": "a", "name": "tau", "time": 0.25},
-        "a (a.fmu): tau does not come to rest at t = 0.25 s when inputs follow outputs.\n"
-        "bench has an algebraic loop: the output follows inputs at once that follow this output at once.\n"
+        "a (a.fmu): tau does not settle at t = 0.25 s when inputs follow outputs.\n"
+        "bench has an algebraic loop: the output depends directly on inputs that depend directly on this output.\n"
         "Cut where a mass, a spring or a controller with a state is between the FMUs.",
     ),
     "no number": (
         {"kind": "not finite", "unit": "a", "name": "tau", "time": 0.25},
         "a (a.fmu): tau is not finite at t = 0.25 s.\n"
-        "If the values before it grow without bounds, take a shorter step.",
+        "If the values before it grow without bounds, choose a shorter step.",
     ),
     "step": (
         {"kind": "step", "time": 0.25},
         "bench: after t = 0.25 s no step is short enough for the tolerance of the coupling.\n"
         "Give a larger tolerance, or a fixed step.",
     ),
-    "ends": ({"kind": "ends", "unit": "a", "time": 0.25}, "a (a.fmu) wants to end the run after t = 0.25 s."),
+    "ends": ({"kind": "ends", "unit": "a", "time": 0.25}, "a (a.fmu) asks to end the run after t = 0.25 s."),
     "failed": (
         {"kind": "failed", "unit": "a", "text": "fmi2DoStep failed.", "messages": ["giving up"]},
-        "a (a.fmu) failed: fmi2DoStep failed.\nIt said: giving up\n"
-        "If what the FMUs exchange grows without bounds, take a shorter step.",
+        "a (a.fmu) failed: fmi2DoStep failed.\nIt reported: giving up\n"
+        "If the exchanged values grow without bounds, choose a shorter step.",
     ),
 }  # fmt: skip
 

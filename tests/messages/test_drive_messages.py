@@ -180,7 +180,7 @@ case(
     ),
     """\
 connect joins rotor.w, which is neither an input nor an output.
-Connect one output with any number of inputs; a sensor makes a signal of a variable.""",
+Connect one output with any number of inputs; a sensor turns a variable into a signal.""",
 )
 case(
     errors.UnknownName,
@@ -195,7 +195,7 @@ case(
     "a connector in a series",
     lambda: flatten(Assembly(parts={"j": Inertia(J=1.0)}, series={"s": ["j.flange_a", "j"]})),  # connector in series
     """\
-j.flange_a is a connector, and a series joins parts.
+j.flange_a is a connector, but a series joins parts.
   in test_drive_messages.py:{connector in series} `series.s = ['j.flange_a', 'j']`
 Write j in the series, or join j.flange_a in a connection of its own.""",
 )
@@ -212,7 +212,7 @@ case(
     "a name twice",
     lambda: Assembly("drive", parts={"m": Inertia()}, parameters={"m": 1.0}),  # twice
     """\
-drive: 'm' is already the name of something else.
+drive: 'm' is already in use.
   in test_drive_messages.py:{twice} `Assembly("drive", parts={"m": Inertia()}, parameters={"m": 1.0})`""",
 )
 case(
@@ -249,7 +249,7 @@ Geared: 3 equations, 4 unknowns. a.phi, b.phi, a.flange_b.tau, gear.flange_b.tau
   in gears.py:{gears.py:yield a.phi - self.phi_support == self.ratio * (b.phi - self.phi_support)} \
 `yield a.phi - self.phi_support == self.ratio * (b.phi - self.phi_support)`
   in gears.py:{gears.py:yield self.ratio * a.tau + b.tau == 0} `yield self.ratio * a.tau + b.tau == 0`
-1 more equation is needed: connect what is open, or fix it.""",
+1 more equation is needed: connect open ends, or fix them.""",
 )
 case(
     errors.Overdetermined,
@@ -292,8 +292,8 @@ case(
 2 equations determine only 1 unknown (x): Typo.
   in test_drive_messages.py:{typo two} `yield self.x + self.x**5 == 2`
   in test_drive_messages.py:{typo one} `yield self.x + self.x**3 == 1`
-On the other hand y lacks an equation.
-Look at the equations of Typo: is another variable meant in one of them?""",
+In addition, y lacks an equation.
+Check the equations of Typo: does one of them use the wrong variable?""",
 )
 case(
     errors.StructureError,
@@ -301,7 +301,7 @@ case(
     lambda: reduce(flatten(Follower())),
     """\
 der(rotor.w) is the derivative of the input w_ref, which is not known.
-Give the derivative as an input of its own, or filter the input before it prescribes a motion.""",
+Give the derivative as a separate input, or filter the input before it prescribes a motion.""",
 )
 
 
@@ -313,7 +313,7 @@ case(
     "a start value is missing",
     lambda: start(Geared(), a__w=1.0),
     """\
-Initialisation (not the model) lacks one equation: give a.phi a start value.
+Initialization (not the model) lacks one equation: give a.phi a start value.
 Or start from rest (start = "rest") or in the steady state (start = "steady").""",
 )
 case(
@@ -321,7 +321,7 @@ case(
     "start values contradict each other",
     lambda: start(Geared(), a__phi=0.0, a__w=1.0, b__w=1.0),
     """\
-a.w = 1 and b.w = 1 contradict each other: b.w follows to be 0.5.
+a.w = 1 and b.w = 1 contradict each other: b.w would be 0.5.
   in gears.py:{gears.py:yield a.phi - self.phi_support == self.ratio * (b.phi - self.phi_support)} \
 `yield a.phi - self.phi_support == self.ratio * (b.phi - self.phi_support)`
 Remove one of the start values, or make one a guess.""",
@@ -331,7 +331,7 @@ case(
     "no start",
     lambda: start(Parabola(), y=0.5),
     """\
-No start was found at which y has the value asked for.
+No start was found at which y has the requested value.
 Give guesses near the solution, or start values of states.""",
 )
 case(
@@ -348,8 +348,8 @@ case(
     lambda: initialize(build(drive(a="push.flange load.flange_a")), start="steady"),
     """\
 No steady state was found at t = 0 s: load.w keeps changing.
-Check that the drive has an equilibrium. Give guesses near the motion that is steady, such as guess(100) for \
-a speed; an operating point can begin from the end of a run, too.""",
+Check that the drive has an equilibrium. Give guesses near the steady motion, such as guess(100) for \
+a speed; an operating point can also start from the end of a run.""",
 )
 
 

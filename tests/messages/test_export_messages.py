@@ -48,7 +48,7 @@ def flywheel() -> Assembly:
             "J has no connector 'flange'; did you mean 'flange_b'? It has flange_a, flange_b.",
         ),
         ({"path": "drive.zip"}, ExportError, "An FMU is a file with the ending .fmu, not 'drive.zip'."),
-        ({"path": "nowhere/drive.fmu"}, ExportError, "There is no folder 'nowhere' for drive.fmu.\nMake it first."),
+        ({"path": "nowhere/drive.fmu"}, ExportError, "There is no folder 'nowhere' for drive.fmu.\nCreate it first."),
     ],
 )
 def test_wrong_requests(
@@ -87,7 +87,7 @@ def test_a_fault_of_the_export_is_told(tmp_path: Path, monkeypatch: pytest.Monke
     with pytest.raises(ExportError) as caught:
         export_fmu(flywheel(), tmp_path / "d.fmu", platforms=())
     assert str(caught.value) == (
-        "The FMU does not pass its checks: line 3 is wrong; line 4 too.\nThis is a fault of the export."
+        "The FMU does not pass its checks: line 3 is wrong; line 4 too.\nThis is an error of the exporter."
     )
     assert list(tmp_path.iterdir()) == []
 
@@ -124,7 +124,7 @@ def test_where_idas_gives_up_the_fmu_is_written(tmp_path: Path, monkeypatch: pyt
     monkeypatch.setattr(check, "simulate", give_up)
     done = export_fmu(flywheel(), tmp_path / "d.fmu", strict=True)
     assert str(done).splitlines()[1:] == [
-        "The FMU runs, but nothing was compared, as IDAS gave up: IDAS gave up at about t = 0.1 s."
+        "The FMU runs, but nothing was compared, because IDAS gave up: IDAS gave up at about t = 0.1 s."
     ]
     assert done.path.exists()
 
@@ -136,4 +136,4 @@ def test_a_drift_of_phase_is_what_tolerances_do(tmp_path: Path) -> None:
     drive.simulate["until"] = "2 s"
     found = export_fmu(drive, tmp_path / "d.fmu").check
     assert not found.differs
-    assert found.sentence.startswith("Until t = 0.2 s the FMU differs from IDAS as the tolerance 1e-07 lets it: ")
+    assert found.sentence.startswith("Until t = 0.2 s the FMU differs from IDAS as its tolerance 1e-07 lets it: ")

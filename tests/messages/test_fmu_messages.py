@@ -14,17 +14,17 @@ ENDS = {
     "crashes": (
         "import os, signal; os.kill(os.getpid(), signal.SIGSEGV)",
         pytest.raises(FmuCrashed),
-        "drive.fmu crashed with SIGSEGV before its first step had ended.\nIt ran in a process of its own.",
+        "drive.fmu crashed with SIGSEGV before the end of its first step.\nIt ran in a separate process.",
     ),
     "leaves": (
         "import struct; open('progress', 'wb').write(struct.pack('d', 0.25)); raise SystemExit(7)",
         pytest.raises(FmuCrashed),
-        "drive.fmu ended its process by itself, with exit code 7, after t = 0.25 s.\nIt ran in a process of its own.",
+        "drive.fmu ended its process with exit code 7, after t = 0.25 s.\nIt ran in a separate process.",
     ),
     "hangs": (
         "while True: pass",
         pytest.raises(FmuTimeout),
-        "drive.fmu did not finish within 0.5 s, and was stopped before its first step had ended.\n"
+        "drive.fmu did not finish within 0.5 s, and was stopped before the end of its first step.\n"
         "Give it more time with `timeout`, or a shorter run.",
     ),
 }
@@ -45,7 +45,8 @@ def test_what_an_fmu_says(tmp_path: Path) -> None:
     with pytest.raises(FmuFailed) as told:
         tell_error(tmp_path, {"": "drive.fmu"})
     assert str(told.value) == (
-        "drive.fmu failed: fmi2DoStep failed.\nIt said: x is \N{REPLACEMENT CHARACTER}[31mnan\nIt said: giving up"
+        "drive.fmu failed: fmi2DoStep failed.\n"
+        "It reported: x is \N{REPLACEMENT CHARACTER}[31mnan\nIt reported: giving up"
     )
 
 
@@ -54,4 +55,4 @@ def test_no_fmu(tmp_path: Path) -> None:
     with pytest.raises(FmuRefused) as told:
         run_fmu(tmp_path / "drive.fmu")
     assert isinstance(told.value, ModelicaLikeError)
-    assert str(told.value) == "drive.fmu is no FMU: it is not a sound zip archive.\nFile is not a zip file."
+    assert str(told.value) == "drive.fmu is not an FMU: it is not a valid zip archive.\nFile is not a zip file."

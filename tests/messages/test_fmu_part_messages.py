@@ -40,7 +40,7 @@ def wired(wire: str, parts: str = MOTOR) -> str:
 CASES = {
     "no FMU": (
         '[parts]\nJ = { is = "Inertia", J = 1 }',
-        "bench has no FMU among its parts, so there is nothing to run together.\n"
+        "bench has no FMU among its parts, so there is nothing to co-simulate.\n"
         "Simulate it, or cut it into FMUs with `modelica-like split`.",
     ),
     "missing file": (
@@ -55,20 +55,20 @@ CASES = {
     ),
     "no archive": (
         '[parts]\nmotor = { is = "FMU", file = "text.fmu" }',
-        "text.fmu is no FMU: it is not a sound zip archive.\n"
+        "text.fmu is not an FMU: it is not a valid zip archive.\n"
         + line('motor = { is = "FMU", file = "text.fmu" }', 2) + "\nFile is not a zip file.",
     ),
     "Model Exchange only": (
         '[parts]\nmotor = { is = "FMU", file = "exchange.fmu" }',
         "motor: exchange.fmu has no Co-Simulation part, only Model Exchange.\n"
         + line('motor = { is = "FMU", file = "exchange.fmu" }', 2)
-        + "\nIts equations would need a solver, which the tool that exported it has left out.\n"
-        "Export it once more, for Co-Simulation.",
+        + "\nIts equations need a solver, which this FMU does not contain.\n"
+        "Export it again for Co-Simulation.",
     ),
     "array": (
         '[parts]\nmotor = { is = "FMU", file = "motor.fmu", count = 2 }',
-        "motor: FMUs cannot stand in an array.\n"
-        + line('motor = { is = "FMU", file = "motor.fmu", count = 2 }', 2) + "\nDeclare each of them as a part.",
+        "motor: an array cannot contain FMUs.\n"
+        + line('motor = { is = "FMU", file = "motor.fmu", count = 2 }', 2) + "\nDeclare each FMU as a part.",
     ),
     "unknown parameter": (
         '[parts]\nmotor = { is = "FMU", file = "motor.fmu", kk = 1 }',
@@ -82,13 +82,13 @@ CASES = {
     ),
     "series": (
         f'[parts]\n{MOTOR}{OTHERS}[series]\nmain = ["motor", "J"]',
-        "motor cannot stand in [series].\n" + line('main = ["motor", "J"]', 7)
-        + "\nAn FMU has signals only: join its inputs and outputs in [connect].",
+        "motor cannot be in [series].\n" + line('main = ["motor", "J"]', 7)
+        + "\nAn FMU has only signals: connect its inputs and outputs in [connect].",
     ),
     "free end": (
         f'free = ["motor.shaft"]\n[parts]\n{MOTOR}{OTHERS}',
-        "motor cannot stand in [free].\n" + line('free = ["motor.shaft"]', 1)
-        + "\nAn FMU has signals only: join its inputs and outputs in [connect].",
+        "motor cannot be in [free].\n" + line('free = ["motor.shaft"]', 1)
+        + "\nAn FMU has only signals: connect its inputs and outputs in [connect].",
     ),
     "start value": (
         f'[parts]\n{MOTOR}{OTHERS}[start]\n"motor.w" = 1',
@@ -101,13 +101,13 @@ CASES = {
     ),
     "parameter": (
         wired('x = ["k.y", "motor.k"]'),
-        "motor.k is a parameter of an FMU, no signal.\n" + line('x = ["k.y", "motor.k"]', 7),
+        "motor.k is a parameter of an FMU, not a signal.\n" + line('x = ["k.y", "motor.k"]', 7),
     ),
     "flange": (
         wired('x = ["motor.tau", "J.flange_a"]'),
-        "J.flange_a is a Flange, and an FMU has signals only.\n" + line('x = ["motor.tau", "J.flange_a"]', 7)
+        "J.flange_a is a Flange, and an FMU has only signals.\n" + line('x = ["motor.tau", "J.flange_a"]', 7)
         + "\nA shaft, slide or wire carries torque and motion in both directions; an FMU computes one from the other."
-        "\nPut an adaptor on it, such as TorqueToAngleAdaptor, and join that one's signals.",
+        "\nPut an adaptor on it, such as TorqueToAngleAdaptor, and connect its signals.",
     ),
     "unknown signal": (
         wired('x = ["motor.tau", "end.taw"]'),
@@ -119,22 +119,22 @@ CASES = {
     ),
     "two outputs": (
         wired('x = ["motor.tau", "motor.w", "end.tau"]'),
-        "x: several ends give the signal: motor.tau, motor.w.\n" + line('x = ["motor.tau", "motor.w", "end.tau"]', 7)
+        "x: multiple outputs drive it: motor.tau, motor.w.\n" + line('x = ["motor.tau", "motor.w", "end.tau"]', 7)
         + f"\n{JOIN}",
     ),
     "no output": (
         wired('x = ["motor.u", "end.tau"]'),
-        "x: nothing gives the signal: motor.u, end.tau.\n" + line('x = ["motor.u", "end.tau"]', 7) + f"\n{JOIN}",
+        "x: no output drives it: motor.u, end.tau.\n" + line('x = ["motor.u", "end.tau"]', 7) + f"\n{JOIN}",
     ),
     "driven twice": (
         f'[parts]\n{MOTOR}\n[connect]\nx = ["motor.tau", "motor.u"]\ny = ["motor.w", "motor.u"]',
         "motor.u is given twice, by x and y.\n"
-        + line('x = ["motor.tau", "motor.u"]', 4) + "\n" + line('y = ["motor.w", "motor.u"]', 5) + "\nTake one out.",
+        + line('x = ["motor.tau", "motor.u"]', 4) + "\n" + line('y = ["motor.w", "motor.u"]', 5) + "\nRemove one.",
     ),
     "given twice among the others": (
         wired('x = ["k.y", "end.tau"]\ny = ["motor.tau", "end.tau"]'),
         "end.tau is given twice, by x and y.\n"
-        + line('x = ["k.y", "end.tau"]', 7) + "\n" + line('y = ["motor.tau", "end.tau"]', 8) + "\nTake one out.",
+        + line('x = ["k.y", "end.tau"]', 7) + "\n" + line('y = ["motor.tau", "end.tau"]', 8) + "\nRemove one.",
     ),
 }  # fmt: skip
 
@@ -164,7 +164,7 @@ def test_an_fmu_among_equations() -> None:
     with pytest.raises(ModelicaLikeError) as told:
         loads(f"[parts]\n{MOTOR}", "bench.toml")
     assert str(told.value) == (
-        "motor is an FMU, which cannot stand among equations.\n" + line(MOTOR, 2)
-        + "\nAn FMU computes its outputs in steps of its own, and its equations are not known.\n"
+        "motor is an FMU, which cannot be part of a system of equations.\n" + line(MOTOR, 2)
+        + "\nAn FMU computes its outputs in its own steps, and its equations are not known.\n"
         "Run the netlist as a co-simulation: cosim(…) or `modelica-like cosim`."
     )  # fmt: skip

@@ -55,7 +55,7 @@ MESSAGES = {
     ),
     "no type": (
         "[parts]\na = { J = 1 }\n",
-        'parts.a has no type.\n  in bad.toml:2 `a = { J = 1 }`\nSay what it is, such as is = "Inertia".',
+        'parts.a has no type.\n  in bad.toml:2 `a = { J = 1 }`\nGive its type, such as is = "Inertia".',
     ),
     "no parts": ('name = "x"\n', "x has no parts.\n  in bad.toml\nDeclare them in [parts]."),
     "one end": (
@@ -65,7 +65,7 @@ MESSAGES = {
     "lists in a list": (
         '[parts]\na = { is = "Inertia" }\n[connect]\nw = [["a.flange_a", "a.flange_b"]]\n',
         'connect.w must be a list of names.\n  in bad.toml:4 `w = [["a.flange_a", "a.flange_b"]]`\n'
-        "Give every list an entry of its own: each entry joins what it names.",
+        "Write a separate entry for every list.",
     ),
     "start of a parameter": (
         '[parts]\na = { is = "Inertia", J = 1 }\n[start]\n"a.J" = 1\n',
@@ -106,7 +106,7 @@ MESSAGES = {
     "itself": (
         '[parts]\na = { is = "./bad.toml" }\n',
         "A netlist contains itself: bad.toml contains bad.toml.\n"
-        '  in bad.toml:2 `a = { is = "./bad.toml" }`\nTake one of them out.',
+        '  in bad.toml:2 `a = { is = "./bad.toml" }`\nRemove one of them.',
     ),
     "empty": ("", "'bad.toml' is empty.\n  in bad.toml\nA netlist has at least one part in [parts]."),
     "not TOML": (
@@ -116,9 +116,9 @@ MESSAGES = {
     "not a text": (b"\x89PNG\n\xff", "'bad.toml' is not a text file (UTF-8).\n  in bad.toml:1"),
     "brackets": (
         "x = " + "[" * 1_000_000,
-        "Brackets or keys are nested too deep for a netlist.\n  in bad.toml:1",
+        "Brackets or keys are nested too deeply for a netlist.\n  in bad.toml:1",
     ),
-    "too large": ("[" * 10_000_000, "'bad.toml' is larger than 2 MB; no netlist is.\n  in bad.toml"),
+    "too large": ("[" * 10_000_000, "'bad.toml' is larger than 2 MB, the limit for netlists.\n  in bad.toml"),
     "two errors": (
         '[parts]\na = { is = "Inertia", J = -1 }\nb = { is = "Inertia", K = 1 }\n',
         "Inertia.J = -1 is out of range: it must be at least 0 kg.m2.\n"

@@ -123,7 +123,7 @@ CASES: dict[str, tuple[type[ModelicaLikeError], Callable[[], Any], str]] = {
         """\
 No gradient at t = 1.57079619 s: mode changes from below to above where its condition only grazes zero.
   in test_sensitivity_messages.py:{touch} `yield self.mode.go("below", "above", when=self.x > self.level)`
-A small change of a parameter moves the event by much, or lets it vanish.
+A small change of a parameter moves the event far, or removes it.
 Move the parameters away from this limit.""",
     ),
     "two events at once": (
@@ -133,8 +133,8 @@ Move the parameters away from this limit.""",
 No gradient at t = 0.5 s: 'first: below → above' and 'second: below → above' happen at the same instant but for different reasons.
   in test_sensitivity_messages.py:{one} `yield self.first.go("below", "above", when=self.x > self.one)`
   in test_sensitivity_messages.py:{two} `yield self.second.go("below", "above", when=self.x > self.two)`
-A small change of a parameter decides which comes first, so the derivatives of both sides differ.
-Leave out one, or move the parameters apart.""",
+A small change of a parameter decides which comes first, so the derivatives on both sides differ.
+Leave out one, or choose parameter values that separate the two events.""",
     ),
     "another mode sequence": (
         NoGradient,
@@ -142,17 +142,17 @@ Leave out one, or move the parameters apart.""",
         """\
 machine_table_direct has another mode sequence at these parameter values: as mode change 1, 'clutch.mode: backward → stuck' is missing.
 A function with a fixed mode sequence has derivatives only as long as the sequence stays.
-Bound the parameters, begin elsewhere, or allow it with any_sequence=True.""",
+Bound the parameters, start elsewhere, or allow it with any_sequence=True.""",
     ),
     "a step of the replay": (StepFailed, past_the_end, """\
 The replay of the run stalled at t = 1 s: its steps do not converge.
 Look for a function without a slope there, or for a mode that should have changed."""),
     "a model without states": (LanguageError, lambda: sensitivities(Timeless(), ["x"], ["T"], until="1 s"), """\
-Timeless has no states: nothing develops over time, so there is no run to differentiate.
+Timeless has no states, so there is no run to differentiate.
 Compare runs with other parameter values instead."""),
     "an output that does not exist": (UnknownName, lambda: table("table.x"), """\
 machine_table_direct has no variable 'table.x'; did you mean 'table.v'?
-Besides variables there are max(…), min(…), integral(…), at(…, time), series(…), time(mode: before -> after), and of components loss_energy, source_energy, lock_time, unlock_time."""),
+Other outputs are max(…), min(…), integral(…), at(…, time), series(…), time(mode: before -> after), and of components loss_energy, source_energy, lock_time, unlock_time."""),
     "a mode that does not exist": (UnknownName, lambda: table("time(clutch.node -> stuck)"), """\
 machine_table_direct has no mode 'clutch.node'; did you mean 'clutch.mode'?"""),
     "a mode change that does not exist": (UnknownName, lambda: table("time(clutch.mode -> stack)"), """\
@@ -162,7 +162,7 @@ clutch.mode has no mode 'stack'; did you mean 'stuck'? It has free, stuck, start
 Write time(clutch.mode: forward -> stuck), and a number if it happens again: time(clutch.mode -> stuck, 2)."""),
     "an energy with an impact": (NoGradient, lambda: sensitivities(lagging(), ["freewheel.loss_energy"], ["front.J"]), """\
 No gradient of freewheel.loss_energy: freewheel loses 8.33333 J in an impact at t = 0 s.
-Only the loss of power over time is differentiated, not what an impact takes at once.
+Only losses over time are differentiated, not the energy of an impact.
 Ask for integral(freewheel.loss_power), which leaves impacts out, or for speeds after the impact."""),
     "a mode change that does not happen": (UnknownName, lambda: table("time(clutch.mode -> stuck, 2)"), """\
 'time(clutch.mode -> stuck, 2)' does not happen after the start of the run.
@@ -174,12 +174,12 @@ machine_table_direct has no parameter 'load_torqe'; did you mean 'load_torque'?"
     "a parameter that follows from others": (
         LanguageError, lambda: sensitivities(build(DIRECT), ["table.s"], ["clutch.capacity"]), """\
 clutch.capacity follows from other parameters (motor_speed, acceleration_time, load_torque, lead, table_mass, hub_inertia, spindle_inertia).
-Ask for these, or hand over the drive as it was before it was compiled or run: clutch.capacity then moves on its own."""),
+Ask for these, or pass the drive before it is compiled or run: clutch.capacity is then decoupled from its formula."""),
     "a parameter that is a formula of numbers": (LanguageError, lambda: sensitivities(of_numbers(), ["table.s"], ["ratio"]), """\
 ratio is given by a formula of numbers.
-Hand over the drive as it was before it was compiled or run: ratio then moves on its own."""),
+Pass the drive before it is compiled or run: ratio is then decoupled from its formula."""),
     "a parameter that is fixed": (LanguageError, lambda: sensitivities(Counted(x=0.0), ["x"], ["n"], until=1.0), """\
-n cannot change after compilation, so nothing can be differentiated by it.
+n cannot change after compilation, so there are no derivatives with respect to it.
 Compare runs of models that were built with other values."""),
     "no output": (ValueOutOfRange, lambda: table(), """\
 There is no output to differentiate: give at least one name."""),
@@ -187,7 +187,7 @@ There is no output to differentiate: give at least one name."""),
 There is no parameter as input: give at least one name."""),
     "a method that does not exist": (UnknownName, lambda: table("table.s", method="adjiont"), """\
 There is no method 'adjiont'; did you mean 'adjoint'?
-Derivatives are found by forward or adjoint, or by what is cheaper: auto."""),
+The methods are forward, adjoint and auto (the cheaper of both)."""),
     "an output that was not asked for": (UnknownName, lambda: table("table.s")["table.v", "load_torque"], """\
 There is no output 'table.v' in these sensitivities; did you mean 'table.s'?"""),
     "a precision out of range": (ValueOutOfRange, lambda: table("table.s", precision=1e-20), """\

@@ -80,7 +80,7 @@ CIRCLE = elements(f'<ssd:System name="s">{INNER}</ssd:System>{A}') + wires(
     wire("s/y", "s/x"), "\n", wire("s/x", "s/y"), "\n", wire("s/y", "a/u")
 )
 DIRECT = "Connect the components directly."
-SELF = "Let one of both FMUs do the conversion."
+SELF = "Do the conversion in one of the FMUs."
 SYSTEMS: dict[str, tuple[str, str, str]] = {
     "no name": (
         elements('<ssd:Component source="a.fmu"/>'), "",
@@ -96,7 +96,7 @@ SYSTEMS: dict[str, tuple[str, str, str]] = {
     ),
     "two names": (
         elements(A.replace('name="a"', 'name="a b"'), A.replace('name="a"', 'name="a-b"')), "",
-        f"Two FMUs would be called a_b.\n  in {IN_SYSTEM}:3 `<Component name=\"a-b\" source=\"a.fmu\">`\n"
+        f"Two FMUs would have the name a_b.\n  in {IN_SYSTEM}:3 `<Component name=\"a-b\" source=\"a.fmu\">`\n"
         "Rename one of them.",
     ),
     "no FMU": (
@@ -106,27 +106,27 @@ SYSTEMS: dict[str, tuple[str, str, str]] = {
     "outside": (
         elements(A.replace("a.fmu", "../a.fmu")), "",
         f"'../a.fmu' does not lie in bench.ssp.\n  in {IN_SYSTEM}:3 `<Component name=\"a\" source=\"../a.fmu\">`\n"
-        "Only files of the archive itself are taken, such as resources/motor.fmu.",
+        "Only files of the archive itself can be used, such as resources/motor.fmu.",
     ),
     "from the net": (
         elements(A.replace("a.fmu", "file:///a.fmu")), "",
         f"'file:///a.fmu' does not lie in bench.ssp.\n  in {IN_SYSTEM}:3 `<Component name=\"a\" source=\"file:///a.fmu\">`\n"
-        "Only files of the archive itself are taken, such as resources/motor.fmu.",
+        "Only files of the archive itself can be used, such as resources/motor.fmu.",
     ),
     "package": (
         elements('<ssd:Component name="a" source="a.ssp" type="application/x-ssp-package"/>'), "",
-        "a is no FMU but of type application/x-ssp-package, which is not supported.\n"
+        "a is not an FMU but has the type application/x-ssp-package, which is not supported.\n"
         f'  in {IN_SYSTEM}:3 `<Component name="a" source="a.ssp" type="application/x-ssp-package">`\n'
-        "Put the FMUs of an SSP inside into the system itself.",
+        "Put the FMUs of the inner SSP into the system itself.",
     ),
     "model exchange": (
         elements('<ssd:Component name="a" source="a.fmu" implementation="ModelExchange"/>'), "",
-        "a is to be run as ModelExchange; systems are run by co-simulation.\n"
+        "a asks for ModelExchange, but systems run as co-simulation.\n"
         f'  in {IN_SYSTEM}:3 `<Component name="a" source="a.fmu" implementation="ModelExchange">`',
     ),
     "dictionary": (
         elements('<ssd:SignalDictionaryReference name="bus" dictionary="can"/>'), "",
-        "bus is a reference to a signal dictionary, which is not supported.\n"
+        "bus refers to a signal dictionary, which is not supported.\n"
         f"  in {IN_SYSTEM}:3 `<SignalDictionaryReference name=\"bus\" dictionary=\"can\">`\n{DIRECT}",
     ),
     "element": (
@@ -139,12 +139,12 @@ SYSTEMS: dict[str, tuple[str, str, str]] = {
     ),
     "two outputs": (
         elements(A, B) + wires(wire("a/w", "b/w")), "",
-        "A connection joins two connectors that give a value: a.w and b.w.\n"
+        "A connection joins two connectors that provide a value: a.w and b.w.\n"
         f"{at(5, 'a/w', 'b/w')}",
     ),
     "two inputs": (
         elements(A, B) + wires(wire("a/u", "b/u")), "",
-        "A connection joins two connectors that take a value: a.u and b.u.\n"
+        "A connection joins two connectors that receive a value: a.u and b.u.\n"
         f"{at(5, 'a/u', 'b/u')}",
     ),
     "driven twice": (
@@ -154,7 +154,7 @@ SYSTEMS: dict[str, tuple[str, str, str]] = {
     ),
     "circle": (
         CIRCLE, "",
-        f"a.u is driven by a circle of connections.\n{at(7, 's/y', 'a/u')}",
+        f"a.u is driven by a loop of connections.\n{at(7, 's/y', 'a/u')}",
     ),
     "transformation": (
         elements(A, B) + wires(wire("a/w", "b/u", '<ssc:LinearTransformation factor="2"/>')), "",
@@ -163,7 +163,7 @@ SYSTEMS: dict[str, tuple[str, str, str]] = {
     ),
     "array": (
         elements(A, B) + wires(wire("a/w", "b/u", more=' startIndices="1"')), "",
-        "Connections of single elements of arrays are not supported.\n"
+        "Connections to single elements of arrays are not supported.\n"
         + at(5, "a/w", "b/u", ' startIndices="1"'),
     ),
     "units": (
@@ -182,7 +182,7 @@ SYSTEMS: dict[str, tuple[str, str, str]] = {
     ),
     "parameters of a component": (
         bound("", 'source="x.ssv" sourceBase="component"'), "",
-        "Parameters inside of a component's file are not supported.\n"
+        "Parameters inside a component's file are not supported.\n"
         f'  in {IN_SYSTEM}:4 `<ParameterBinding source="x.ssv" sourceBase="component">`',
     ),
     "text": (
@@ -195,7 +195,7 @@ SYSTEMS: dict[str, tuple[str, str, str]] = {
     ),
     "no number": (
         values('<ssv:Parameter name="J"><ssv:Real value="x"/></ssv:Parameter>'), "",
-        f"Real: value = 'x' is no number.\n  in {IN_SYSTEM}:4 `<Real value=\"x\">`",
+        f"Real: value = 'x' is not a number.\n  in {IN_SYSTEM}:4 `<Real value=\"x\">`",
     ),
     "not finite": (
         values('<ssv:Parameter name="J"><ssv:Real value="INF"/></ssv:Parameter>'), "",
@@ -244,19 +244,19 @@ def test_a_parameter_file_that_is_no_xml(tmp_path: Path) -> None:
         archive.writestr("x.ssv", "<a>")
 
     assert told(write, tmp_path) == (
-        "x.ssv in bench.ssp is no XML: Premature end of data in tag a line 1, line 1, column 4.\n  in x.ssv:1"
+        "x.ssv in bench.ssp is not XML: Premature end of data in tag a line 1, line 1, column 4.\n  in x.ssv:1"
     )
 
 
 DOCUMENTS = {
     "no XML": (
-        "<a", f"{IN_SYSTEM} in bench.ssp is no XML: Couldn't find end of Start Tag a line 1, line 1, column 3.\n"
+        "<a", f"{IN_SYSTEM} in bench.ssp is not XML: Couldn't find end of Start Tag a line 1, line 1, column 3.\n"
         f"  in {IN_SYSTEM}:1",
     ),
     "other XML": ("<a/>", f"{IN_SYSTEM} in bench.ssp describes no system structure.\n  in {IN_SYSTEM}:1 `<a>`"),
     "version": (
         f'{TOP.replace("1.0", "3.0")}</ssd:SystemStructureDescription>',
-        f"bench.ssp is of SSP 3.0; there are 1.0 and 2.0.\n"
+        f"bench.ssp has the SSP version 3.0; 1.0 and 2.0 are supported.\n"
         f'  in {IN_SYSTEM}:1 `<SystemStructureDescription version="3.0" name="bench">`',
     ),
     "no system": (
@@ -290,7 +290,7 @@ def bomb(archive: zipfile.ZipFile) -> None:
 
 
 UNSAFE: dict[str, tuple[Callable[[zipfile.ZipFile], None], str]] = {
-    "no SSP": (lambda archive: archive.writestr("x", ""), f"bench.ssp is no SSP: it has no {IN_SYSTEM}."),
+    "no SSP": (lambda archive: archive.writestr("x", ""), f"bench.ssp is not an SSP: it has no {IN_SYSTEM}."),
     "outside": (
         lambda archive: archive.writestr("../outside", ""),
         "bench.ssp is refused: '../outside' leads out of the archive.",
@@ -298,7 +298,7 @@ UNSAFE: dict[str, tuple[Callable[[zipfile.ZipFile], None], str]] = {
     "link": (link, "bench.ssp is refused: 'resources/way_out' is a link."),
     "bomb": (
         bomb, "bench.ssp is refused: … kB would unpack to 20 MB.\n"
-        "What shrinks to less than 1/200 is more likely an archive bomb than an SSP.",
+        "A file that shrinks to less than 1/200 is more likely a zip bomb than an SSP.",
     ),
 }  # fmt: skip
 
@@ -314,7 +314,7 @@ def test_no_archive(tmp_path: Path) -> None:
     (tmp_path / "bench.ssp").write_text("x")
     with pytest.raises(ModelicaLikeError) as error:
         load_system(tmp_path / "bench.ssp", tmp_path)
-    assert str(error.value) == "bench.ssp is no SSP: it is not a sound zip archive.\nFile is not a zip file."
+    assert str(error.value) == "bench.ssp is not an SSP: it is not a valid zip archive.\nFile is not a zip file."
 
 
 def test_an_fmu_without_a_readable_description(tmp_path: Path) -> None:
@@ -327,7 +327,7 @@ def test_an_fmu_without_a_readable_description(tmp_path: Path) -> None:
 WRITTEN: dict[str, tuple[str, str, str]] = {
     "version": ("bench.ssp", "3.0", "SSP 3.0 is not supported.\nThere are 1.0 and 2.0."),
     "ending": ("bench.zip", "1.0", "An SSP is a file with the ending .ssp, not 'bench.zip'."),
-    "folder": ("no/bench.ssp", "1.0", "There is no folder 'no' for bench.ssp.\nMake it first."),
+    "folder": ("no/bench.ssp", "1.0", "There is no folder 'no' for bench.ssp.\nCreate it first."),
     "variable": ("bench.ssp", "1.0", "a (a.fmu) has no variable 'ww'; did you mean 'w'?"),
 }
 
@@ -348,4 +348,4 @@ def test_a_unit_with_two_meanings(tmp_path: Path) -> None:
     links = tuple(Link(f"w{one}", Port(one, "w"), (Port(one, "u"),)) for one in "ab")
     with pytest.raises(ModelicaLikeError) as error:
         write_ssp(System("bench", tuple(units), links), tmp_path / "bench.ssp")
-    assert str(error.value) == "Two FMUs mean different units by 'rpm', which an SSP cannot say."
+    assert str(error.value) == "Two FMUs define the unit 'rpm' differently, which an SSP cannot express."

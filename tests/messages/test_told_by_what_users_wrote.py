@@ -12,6 +12,7 @@ from modelica_like.cli import app
 from modelica_like.errors import (
     ComponentUnbalanced,
     FreeFlange,
+    LanguageError,
     ModelicaLikeError,
     Overdetermined,
     SingularAtStart,
@@ -26,14 +27,20 @@ from modelica_like.language import (
     Mode,
     Parameter,
     Variable,
+    absolute,
+    all_of,
     connect,
     der,
     flow,
+    negate,
     param,
     series,
+    tanh,
     var,
+    where,
 )
 from modelica_like.netlist import loads
+from modelica_like.report.run import reasons
 from modelica_like.units import parse_unit
 
 CIRCUIT = """
@@ -130,7 +137,7 @@ CASES: dict[str, tuple[type[ModelicaLikeError], Callable[[], object], str]] = {
 The network of u, r has no Ground.
   in circuit.toml:3 `u = { is = "ConstantVoltage", V = "10 V" }`
   in circuit.toml:4 `r = { is = "Resistor", R = "1 Ohm" }`
-Every voltage in it counts from another one; none is zero.
+Every voltage in it is relative to another one; none is zero.
 Connect a part that is = "Ground" to it.""",
     ),
     "two voltages between the same pins": (
@@ -166,7 +173,7 @@ The Jacobian is singular at t = 0 s in block 1 (fast.flange_b.tau, gear.flange_b
   in inertias.py:{inertias.py:yield self.J * der(self.w) == a.tau + b.tau} `yield self.J * der(self.w) == a.tau + b.tau`
   in gears.py:{gears.py:yield self.ratio * a.tau + b.tau == 0} `yield self.ratio * a.tau + b.tau == 0`
   in gears.py:{gears.py:yield a.phi - self.phi_support == self.ratio * (b.phi - self.phi_support)} `yield a.phi - self.phi_support == self.ratio * (b.phi - self.phi_support)`
-gear.ratio is zero: that leaves these unknowns open.
+gear.ratio is zero, so these unknowns are undetermined.
 Give it another value.""",  # noqa: E501
     ),
     "an equation drives an input": (
@@ -258,11 +265,38 @@ class Counter(Component):
         there = self.mode.go("high", "over", when=self.x > 2 * self.limit)
         yield there
         yield self.mode.go("over", "low", at=self.late)
+        yield self.mode.go("low", "over", when=all_of(negate(-self.x >= -self.late), self.mode.is_("low")))
+        yield self.mode.go("high", "over", when=tanh(self.x / self.limit) > where(self.x > self.late, 1, 0))
+        yield self.mode.go("high", "low", when=absolute(self.x) < self.limit, because="is back below {limit}")
 
 
-def test_a_condition_without_words_is_told_as_it_is_written() -> None:
+def test_a_condition_without_words_is_put_into_words() -> None:
     transitions = build(Counter(x=0.0)).transitions
-    assert [one.because for one in transitions] == ["x > limit", "", "its time has come"]
+    assert [one.because for one in transitions] == [
+        "rising x rose above {limit}",
+        "rising x rose above 2*limit",
+        "its time is reached",
+        "rising x rose above {late} and mode is low",
+        "its condition on x holds",
+        "is back below {limit}",
+    ]
+
+
+def test_parameters_in_a_reason_have_their_values() -> None:
+    run = simulate(Counter(x=0.0, limit="400 ms"), 0.45)
+    assert reasons(run) == ["rising x rose above limit = 0.4 s", "its condition on x holds"]
+
+
+class Misspelt(Counter):
+    """A reason that names what is no parameter."""
+
+    def events(self) -> Events:
+        yield self.mode.go("low", "high", when=self.x > self.limit, because="beyond {limt}")
+
+
+def test_a_reason_names_parameters_only() -> None:
+    with pytest.raises(LanguageError, match=r"names limt, which is not a parameter; did you mean 'limit'\?"):
+        build(Misspelt(x=0.0))
 
 
 def test_brackets_in_paths_are_no_markup(grip: str, tmp_path: Path) -> None:

@@ -1,15 +1,17 @@
 """What a netlist means: the tree it becomes."""
 
 import math
+from math import exp
 from pathlib import Path
 
 import pytest
 
 from components import Clutch, IdealGear, Inertia, Mass
 from modelica_like import simulate
+from modelica_like.draw.diagram import diagram
 from modelica_like.errors import CyclicAssembly, NetlistError, UnknownName, WiringErrors
 from modelica_like.language import Assembly
-from modelica_like.netlist import load, loads
+from modelica_like.netlist import dumps, load, loads
 
 DRIVE = """
 name = "drive"
@@ -181,3 +183,31 @@ def test_parts_may_be_called_like_methods(tmp_path: Path) -> None:
     )
     run = simulate(tmp_path / "drive.toml", 20.0)
     assert run.final["wires.w"] == pytest.approx(0.5, rel=1e-6)
+
+
+def test_signals_leave_an_assembly(tmp_path: Path) -> None:
+    """4 N.m·s·(e + ∫e) on 1 kg m²: e = (10 - 20 t)·exp(-2 t) rad/s."""
+    (tmp_path / "control.toml").write_text(
+        '[parts]\npi = { is = "PI", k = "2 N.m.s", Ti = "1 s" }\ntwice = { is = "Gain", k = 2 }\n'
+        '[connect]\nw = ["pi.y", "twice.u"]\n[start]\n"pi.integral" = 0\n'
+        '[expose]\nwanted = "pi.u_s"\nmeasured = "pi.u_m"\ntorque = "twice.y"\n'
+    )
+    (tmp_path / "drive.toml").write_text(
+        '[parts]\ncontrol = { is = "./control.toml", wanted = "10 rad/s" }\ntorque = { is = "Torque" }\n'
+        'rotor = { is = "Inertia", J = 1, phi = 0, w = 0 }\nspeed = { is = "SpeedSensor" }\n'
+        '[series]\nshaft = ["torque", "rotor", "speed"]\n'
+        '[connect]\ndrive = ["control.torque", "torque.tau"]\nmeasured = ["speed.w", "control.measured"]\n'
+    )
+    run = simulate(tmp_path / "drive.toml", 3.0, rtol=1e-9)
+    assert run.final["rotor.w"] == pytest.approx(10 + 50 * exp(-6), rel=1e-7)
+    assert run.final["control.torque"] == run.final["control.twice.y"]
+    control = load(tmp_path / "control.toml")
+    (tmp_path / "again.toml").write_text(dumps(control, folder=tmp_path))
+    assert dict(load(tmp_path / "again.toml").exposed) == dict(control.exposed)
+    assert {node.name for node in diagram(control, 0).nodes} >= {"wanted", "measured", "torque"}
+
+
+def test_only_connectors_and_signals_leave_an_assembly(tmp_path: Path) -> None:
+    (tmp_path / "bad.toml").write_text('[parts]\na = { is = "Inertia", J = 1 }\n[expose]\nx = "a.w"\n')
+    with pytest.raises(UnknownName, match=r"has no connector 'a\.w'"):
+        load(tmp_path / "bad.toml")

@@ -185,7 +185,9 @@ def test_netlists_inside_are_named_by_file(tmp_path: Path) -> None:
 
 
 def test_what_no_netlist_can_hold_is_told() -> None:
-    with pytest.raises(NetlistError, match="OwnEquation has x of its own; a netlist holds only parts and wires"):
+    with pytest.raises(
+        NetlistError, match="OwnEquation has x of its own; a netlist contains only parts and connections"
+    ):
         dumps(OwnEquation())
     with pytest.raises(NetlistError, match="inner is an assembly without a file"):
         dumps(Assembly("a", parts={"inner": Assembly("b", parts={"m": Inertia(J=1)})}))
@@ -193,5 +195,5 @@ def test_what_no_netlist_can_hold_is_told() -> None:
     class Local(Component):
         """A class that no file can name."""
 
-    with pytest.raises(NetlistError, match=r"Local is not at the top of its module"):
+    with pytest.raises(NetlistError, match=r"Local is not at the top level of its module"):
         dumps(Assembly("a", parts={"m": Local()}))

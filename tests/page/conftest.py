@@ -65,11 +65,11 @@ class Browser:
                 return answer["result"]
             self._note(answer)
 
-    def open(self, page: Path, width: int = 1200, height: int = 900) -> None:
-        """Open a file, and wait until the first curves are drawn."""
+    def open(self, page: Path | str, width: int = 1200, height: int = 900) -> None:
+        """Open a file or an address, and wait until the first curves are drawn."""
         self.resize(width, height)
         self.complaints.clear()
-        self.call("Page.navigate", url=page.as_uri())
+        self.call("Page.navigate", url=page if isinstance(page, str) else page.as_uri())
         self.run("new Promise((go) => { const look = () => "
                  "(document.getElementById('status')?.textContent || document.getElementById('said')?.textContent "
                  "|| document.documentElement?.dataset.ready) "

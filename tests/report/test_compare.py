@@ -10,6 +10,7 @@ from modelica_like import linearize, sensitivities, simulate, steady
 from modelica_like.errors import ModelicaLikeError, NetlistError
 from modelica_like.report.compare import Comparison, compare
 from modelica_like.report.files import write_solution
+from modelica_like.report.run import reasons
 from modelica_like.report.sources import read_csv, trajectories
 from modelica_like.solve.recorded import RecordedModel, RecordedSolution, RecordedVariable
 
@@ -149,9 +150,9 @@ MESSAGES = {
         ("0,0", "1,1"),
         ("time,x", "0,0"),
         (),
-        "a.csv: a table begins with a line of names, of which the first is `time`.",
+        "a.csv: a table must begin with a line of names; the first one is `time`.",
     ),
-    "times that fall": (("time,x", "1,0", "0,1"), ("time,x", "0,0"), (), "a.csv: the times must rise."),
+    "times that fall": (("time,x", "1,0", "0,1"), ("time,x", "0,0"), (), "a.csv: the times must increase."),
     "a word": (("time,x", "0,0", "1,fast"), ("time,x", "0,0"), (), "a.csv:3: 'fast' is not a number."),
     "a value too many": (("time,x", "0,0", "1,1,1"), ("time,x", "0,0"), (), "a.csv:3: 3 values under 2 names."),
 }
@@ -193,3 +194,7 @@ def test_what_needs_equations_says_so_of_recorded_data(tmp_path: Path) -> None:
     for run in needing:
         with pytest.raises(NetlistError, match="a: this needs the drive with its equations, not trajectories"):
             run()
+
+
+def test_nobody_knows_why_a_mode_of_an_fmu_changes() -> None:
+    assert reasons(recorded("clutch", [0.0, 1.0, 1.0], [0.0, 1.0, 1.0], [0, 0, 1])) == [""]

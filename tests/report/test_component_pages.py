@@ -43,13 +43,6 @@ def pages() -> dict[File, str]:
     return component_pages(FOLDER, EXAMPLES)
 
 
-def test_the_pages_are_current(pages: dict[File, str]) -> None:
-    """Otherwise: modelica-like docs -o docs/components --examples examples."""
-    committed = {file: file.read_text(encoding="utf-8") for file in FOLDER.rglob("*.md")}
-    assert sorted(committed) == sorted(pages)
-    assert [file.name for file, text in pages.items() if committed[file] != text] == []
-
-
 def test_every_type_occurs_in_an_example() -> None:
     assert sorted(library_types().keys() - examples_by_type(EXAMPLES).keys()) == []
 
@@ -63,12 +56,12 @@ def test_every_page_says_everything(pages: dict[File, str]) -> None:
 
 
 def test_links_of_the_pages_lead_somewhere(pages: dict[File, str]) -> None:
-    front = ROOT / "docs" / "README.md"
+    written = {file.resolve() for file in pages}
     broken = [
         (file.name, link)
-        for file, text in {**pages, front: front.read_text(encoding="utf-8")}.items()
+        for file, text in pages.items()
         for link in re.findall(r"\]\(([^)#]+)", text)
-        if not (file.parent / link).exists()
+        if not (file.parent / link).exists() and (file.parent / link).resolve() not in written
     ]
     assert broken == []
 

@@ -19,6 +19,8 @@ NUMBERS = {
     "alpha": (DIRECT.acceleration, 3141.5, 3141.593, +0.003),
     "M_B": (DIRECT.acceleration_torque, 71.63, 71.78432, +0.215),
     "M_K": (DIRECT.clutch_torque, 86.63, 86.78432, +0.178),
+    "phi": (DIRECT.slip_angle, None, 62.83185, None),
+    "g.phi": (GEARED.slip_angle, None, 15.07964, None),
     "W_KS": (DIRECT.friction_work, 5443, 5452.82, +0.180),
     "g.omega_M": (GEARED.motor_speed, 150.8, 150.7964, -0.002),
     "g.J_Gab_red": (GEARED.gear_output_inertia, 0.1215, 0.1215278, +0.023),
@@ -51,6 +53,14 @@ def test_friction_work_is_half_of_what_the_motor_delivers() -> None:
     motor_work = DIRECT.clutch_torque * DIRECT.motor_speed * 0.2
     assert motor_work == pytest.approx(10905.64, rel=1e-6)
     assert friction_work(DIRECT.clutch_torque, DIRECT.motor_speed, 0.2) == pytest.approx(motor_work / 2)
+
+
+def test_table_that_moves_already() -> None:
+    """From half the speed: half the acceleration torque, half the angle, and W = M·(w_A - w_L0)·t/2."""
+    moving = machine_table_clutch(6000 * RPM, 0.2, 15.0, 500.0, 1.5, 0.016, 0.004, load_speed=3000 * RPM)
+    assert moving.slip_angle == pytest.approx(100 * math.pi * 0.2 / 2)
+    assert moving.clutch_torque == pytest.approx(71.78432 / 2 + 15, rel=1e-6)
+    assert moving.friction_work == pytest.approx((71.78432 / 2 + 15) * 10 * math.pi, rel=1e-6)
 
 
 def test_referring_keeps_the_kinetic_energy() -> None:

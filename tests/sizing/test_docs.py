@@ -35,3 +35,19 @@ def test_sizing_files(number: int, tmp_path: Path) -> None:
 def test_every_example_is_on_the_page() -> None:
     for path in (ROOT / "examples" / "sizing").glob("*.toml"):
         assert f"`{path.name}`" in PAGE
+
+
+@pytest.mark.parametrize(
+    ("page", "files"),
+    [("test_bench", ("test_bench", "test_bench_motor")), ("ravigneaux", ("ravigneaux_strength",))],
+)
+def test_page_has_the_numbers_of_the_files(page: str, files: tuple[str, ...]) -> None:
+    """Every row of a page that names a check has its line as `size` prints it."""
+    text = (ROOT / "docs" / "examples" / f"{page}.md").read_text(encoding="utf-8")
+    sizings = [size(ROOT / "examples" / "sizing" / f"{name}.toml") for name in files]
+    checks = {check.name: check for sizing in sizings for check in sizing.checks}
+    rows = re.findall(r"^\| `(\w+)\.(\w+)` \| ([^|]+) \|([^|]*)\|", text, re.MULTILINE)
+    assert len(rows) > 10
+    for check, name, value, unit in rows:
+        line = next(line for line in checks[check].result.lines() if line.name == name)
+        assert (line.value, line.unit) == (value, unit.strip()), f"{check}.{name}"

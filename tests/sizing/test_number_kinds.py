@@ -9,10 +9,22 @@ import numpy as np
 import pytest
 
 from components import sizing
-from components.sizing import DcMotor, Load, MotorLines, RavigneauxTeeth, Section
+from components.sizing import (
+    DcMotor,
+    GearMaterial,
+    GearPair,
+    Load,
+    LoadStage,
+    MotorLines,
+    RavigneauxTeeth,
+    Section,
+    ShaftMaterial,
+)
 
 LINES = MotorLines(24.0, 496.0, 364.0, 1.06, 20.0)
 TEETH = RavigneauxTeeth(21, 39, 13, 10, 60)
+PAIR = GearPair(17, 43, 3e-3, 0.03, 0.3, 0.1, 0.2)
+STRENGTH = sizing.gear_strength(PAIR, 150.0, GearMaterial(1500e6, 461e6))
 LOADS = [Load(0.0, -40.5, -25.0, 0.6), Load(0.06, 1.0, 2.0, -0.6, 0.1, 0.2)]
 
 
@@ -27,8 +39,18 @@ CASES: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
              spindle_inertia=0.016, hub_inertia=0.004, spindle_speed=628.0, gear_input_inertia=0.014,
              gear_output_inertia=0.007), {}),
     "clutch_selection": (given(power=40.0, speed=139.6, rated_torque=0.6, service_factor=2.0), {}),
+    "clutch_heat": (given(work=4000.0, frequency=0.02, single_limit=20e3, transition_frequency=0.01, heat_capacity=90.0,
+                         conductance=3.0, air=293.15, hottest=450.0, wear_work=1e9), {}),
     "belt_geometry": (given(small_teeth=10.0, large_teeth=30.0, pitch=5.08e-3, belt_length=0.33), {}),
     "belt_forces": (given(pull=25.0, angle=2.85, friction=0.5, velocity=3.4, section=19e-6, density=1200.0), {}),
+    "timing_belt_load": (given(pull=25.0, velocity=3.4, teeth_in_mesh=4.0, width=9.5e-3, tooth_height=1.27e-3,
+                              power_limit=300.0, pressure_limit=1.5e6), {}),
+    "machine_constant": (given(conductors=100.0, pole_pairs=2.0, flux=1.5e-3, parallel_pairs=1.0), {}),
+    "commutation_ripple": (given(loops=2.0, pole_pairs=1.0), {}),
+    "generator_point": (given(generator=DcMotor(0.05, 0.8, 0.04, 1e-4), speed=480.0, current=2.0), {}),
+    "shaft_fatigue": (given(bending=1.05, torque=0.6, diameter=6e-3, material=ShaftMaterial(430e6, 275e6, 215e6, 125e6),
+                            large_diameter=8e-3, fillet=2e-3, bending_factor=1.25, torsion_factor=1.3, alternating=0.5,
+                            required_safety=2.5), {}),
     "belt_speed_limit": (given(speed=418.9, diameter=0.016, limit=523.0, velocity_limit=80.0), {}),
     "speed_limit": (given(speed=418.9, limit=157.0, ratio=3.0), {}),
     "shaft_statics": (given(loads=LOADS), given(bearings=[0.025, 0.037])),
@@ -37,6 +59,10 @@ CASES: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "shaft_diameter": (given(bending=1.3, strength=275e6, safety=2.5, diameter=6e-3), {}),
     "stepped_shaft": (given(loads=LOADS, yield_strength=275e6, required_safety=2.5), given(
         bearings=[0.025, 0.037], sections=[Section(0.022, 6e-3, 2e-3), Section(0.06, 8e-3)])),
+    "gear_strength": (given(pair=PAIR, torque=150.0, material=GearMaterial(1500e6, 461e6), application=1.25,
+                            dynamic=1.1, face_load=1.2, transverse_load=1.1, flank_life=0.9, root_life=0.9,
+                            flank_influence=0.95, root_influence=0.95, pinion_reversal=0.7), {}),
+    "gear_life": (given(strength=STRENGTH, wheel_cycles=0.4, spectrum=[LoadStage(4.0, 1e4), LoadStage(2.0, 1e6)]), {}),
     "bearing_life": (given(radial_load=150.0, speed=139.6, dynamic_rating=2600.0, static_rating=1060.0,
                           speed_limit=3351.0, exponent=3.0, axial_load=10.0, radial_factor=0.56, axial_factor=1.6), {}),
     "flywheel_for_time": (given(time=0.2, torque=0.6, speed=139.6, density=2700.0, radius=0.045, width_limit=0.1), {}),

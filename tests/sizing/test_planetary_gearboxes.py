@@ -128,7 +128,7 @@ def test_assembly() -> None:
 
 
 def test_shafts_that_do_not_exist() -> None:
-    with pytest.raises(ValueError, match="'sun' is no shaft of a Ravigneaux set"):
+    with pytest.raises(ValueError, match="'sun' is not a shaft of a Ravigneaux set"):
         gear("sun")
     with pytest.raises(ValueError, match="three different shafts"):
         gear("carrier", "carrier")

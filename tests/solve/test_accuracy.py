@@ -65,7 +65,7 @@ def test_time_derivative_of_an_implicit_unknown() -> None:
         def equations(self) -> Equations:
             yield self.y + self.y**3 == self.time / self.second
 
-        second: Parameter = param("s", "time that counts as 1", default=1.0)
+        second: Parameter = param("s", "scale of the time", default=1.0)
 
     run = simulate(Cubic(), 2.0)
     np.testing.assert_allclose(run["der(y)"], 1 / (1 + 3 * run["y"] ** 2), rtol=1e-10)

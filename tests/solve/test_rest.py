@@ -111,7 +111,7 @@ def test_of_two_clutches_in_parallel_one_may_have_an_angle(start):
 def test_two_angles_of_clutches_in_parallel_must_agree(start):
     found = start(Parallel(), "rest", c__phi_rel=0.25, d__phi_rel=0.25)
     assert found["b.phi"] - found["a.phi"] == pytest.approx(0.25, rel=1e-15)
-    with pytest.raises(ContradictingStart, match=r"d\.phi_rel = 0\.5 .*: d\.phi_rel follows to be 0\.25\."):
+    with pytest.raises(ContradictingStart, match=r"d\.phi_rel = 0\.5 .*: d\.phi_rel would be 0\.25\."):
         start(Parallel(), "rest", c__phi_rel=0.25, d__phi_rel=0.5)
 
 

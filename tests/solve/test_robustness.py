@@ -228,7 +228,7 @@ def test_a_model_without_events_keeps_what_was_computed_too() -> None:
     assert run.time[-1] == pytest.approx(1.0, abs=0.05)
     np.testing.assert_allclose(1 / run["x"], 1 - run.time, rtol=0, atol=1e-5)
     (notice,) = run.notices
-    assert notice.endswith("the integrator gave up; from there its tolerance is 1e-06 instead of 1e-07.")
+    assert notice.endswith("the integrator gave up; from there on its tolerance is 1e-06 instead of 1e-07.")
 
 
 def test_what_should_be_known_about_a_run_is_in_its_report() -> None:

@@ -87,7 +87,7 @@ def test_too_many_equations_here_and_too_few_there():
 
     with pytest.raises(Overdetermined, match=r"2 equations determine only 1 unknown \(x\): Mistaken\.") as caught:
         reduce(flatten(Mistaken()))
-    assert caught.value.why == "On the other hand y lacks an equation."
+    assert caught.value.why == "In addition, y lacks an equation."
     assert {one.line for one in caught.value.where} == {line_of("self.x == sin"), line_of("2 * self.x == exp")}
 
 
@@ -125,13 +125,13 @@ def test_too_few_equations_are_told_with_the_one_that_there_is() -> None:
     assert [(Path(one.file).name, one.line) for one in caught.value.where] == [
         (Path(__file__).name, line_of("sin(term.x)"))
     ]
-    assert caught.value.advice == "2 more equations are needed: connect what is open, or fix it."
+    assert caught.value.advice == "2 more equations are needed: connect open ends, or fix them."
 
 
 def test_of_many_unknowns_the_first_are_named() -> None:
     with pytest.raises(Underdetermined, match=r"terms\[5\]\.x, … \(9 in all\) occur only .* 1 for 9") as caught:
         reduce(without_terms(Sum(count=8)))
-    assert caught.value.advice == "8 more equations are needed: connect what is open, or fix it."
+    assert caught.value.advice == "8 more equations are needed: connect open ends, or fix them."
 
 
 def test_an_unknown_without_any_equation() -> None:

@@ -108,7 +108,7 @@ def test_products_keep_the_declared_names() -> None:
         ("Nm", "Unknown unit 'Nm'; did you mean 'N.m'?"),
         ("kgm2", "Unknown unit 'kgm' in 'kgm2'; did you mean 'kg.m2'?"),
         ("N.radn", "Unknown unit 'radn' in 'N.radn'; did you mean 'N.rad'?"),
-        ("J/kg.K", "'J/kg.K' is ambiguous: put what stands after the '/' in parentheses, as in J/(kg.K)."),
+        ("J/kg.K", "'J/kg.K' is ambiguous: put everything after the '/' in parentheses, as in J/(kg.K)."),
         ("dB", "Unit 'dB' is logarithmic; give a plain number."),
         ("m+s", "'m+s' is not a unit."),
         ("(m", "'(m' is not a unit."),

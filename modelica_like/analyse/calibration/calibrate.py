@@ -26,7 +26,7 @@ __all__ = ["Calibration", "Numbers", "OperatingPoints", "Trajectories", "calibra
 
 Matrix = np.ndarray[Any, np.dtype[np.float64]]
 _RANK = 1e-8
-"""Relative size of a singular value below which a combination of parameters does not show in the data."""
+"""Relative size of a singular value below which the data do not determine a combination of parameters."""
 _CONFIDENCE = 0.95
 
 
@@ -41,10 +41,10 @@ class Calibration:
         units: their coherent SI units.
         residuals: deviations of the model, each divided by the uncertainty of its measurement, shape (numbers,).
         labels: what each residual belongs to.
-        covariance: of the values, shape (parameters, parameters), scaled to the scatter of the residuals (where there
-            are no more numbers than parameters, by the stated uncertainties); nan for what the data do not determine.
+        covariance: of the values, shape (parameters, parameters), scaled to the scatter of the residuals (with no more
+            numbers than parameters, by the stated uncertainties); nan for undetermined parameters.
         rank: number of combinations of parameters that the data determine.
-        undetermined: combinations that they do not, as weights of relative changes, by parameter.
+        undetermined: combinations that the data do not determine, as weights of relative changes, by parameter.
         at_bounds: parameters that stopped at a bound.
         starts: sum of squares reached from each start.
     """
@@ -99,7 +99,7 @@ class Calibration:
             lines.append(f"  {name:{width}}  {value:.6g} {spread} {unit}{note}".rstrip())
         for combination in self.undetermined:
             parts = ", ".join(f"{name} {100 * weight:+.0f} %" for name, weight in combination.items())
-            lines.append(f"  The data do not tell this change: {parts}.")
+            lines.append(f"  The data do not determine this combination: {parts}.")
         worst = int(np.argmax(np.abs(self.residuals)))
         lines.append(f"  largest residual {self.residuals[worst]:+.3g} of its uncertainty: {self.labels[worst]}")
         return "\n".join(lines)
@@ -109,7 +109,7 @@ def calibrate(
     drive: Model, data: Sequence[Measurement] | Measurement, parameters: Mapping[str, tuple[Any, Any]], *,
     guess: Mapping[str, Any] | None = None, starts: int = 1, seed: int = 0,
 ) -> Calibration:  # fmt: skip
-    """Find the parameters with which a drive fits measurements best, in the sense of weighted least squares.
+    """Find the parameters that fit measurements best, by weighted least squares.
 
     Residuals are deviations over the uncertainties that the data state; gradients are exact.
 
@@ -117,14 +117,14 @@ def calibrate(
         drive: a component, a netlist file or a compiled model.
         data: measurements: `OperatingPoints`, `Trajectories`, `Numbers`.
         parameters: path of each parameter with its lower and upper bound.
-        guess: where to begin; by default the values of the model, moved into the bounds.
-        starts: number of starts: after the first, from a Latin hypercube between the bounds. The best result counts.
-        seed: of those.
+        guess: start values; by default those of the model, moved into the bounds.
+        starts: number of starts; all but the first from a Latin hypercube between the bounds. The best result is kept.
+        seed: of the Latin hypercube.
 
     Raises:
         UnknownName: a name is not known.
         ValueOutOfRange: there are no data, or bounds are not in order.
-        CalibrationFailed: the model could not be computed from any start.
+        CalibrationFailed: the model could not be solved from any start.
         MissingExtra: scipy is not installed.
     """
     model = build(drive, free=parameters)
@@ -143,7 +143,7 @@ def calibrate(
     if not found:
         raise CalibrationFailed(
             f"{model.name} could not be calibrated: {failures[-1].what}", where=failures[-1].where,
-            advice="Give a guess with which the model can be computed, or narrower bounds.",
+            advice="Give a guess for which the model can be solved, or narrower bounds.",
         )  # fmt: skip
     best = min(found, key=lambda one: one.cost)
     return problem.result(best, tuple(2 * one.cost for one in found))
@@ -157,7 +157,7 @@ class _Problem:
     ) -> None:
         self.model, self.data, self.names = model, data, tuple(parameters)
         for name in self.names:
-            # Tells what is wrong with a name.
+            # Raises an error for a wrong name.
             model.with_parameters({name: parameters[name][0]})
         self.units = tuple(str(model.units[name]) for name in self.names)
         bounds = np.array([[to_si(v, model.units[name], name) for v in parameters[name]] for name in self.names])
@@ -188,7 +188,7 @@ class _Problem:
         )  # fmt: skip
 
     def evaluate(self, q: Matrix) -> tuple[Matrix, Matrix]:
-        """Return residuals and Jacobian; both are asked for at the same point."""
+        """Return residuals and Jacobian; the solver asks for both at the same point."""
         key = q.tobytes()
         if self._at is None or self._at[0] != key:
             model = self.at(q)
@@ -202,7 +202,7 @@ class _Problem:
         return self.model.with_parameters(dict(zip(self.names, map(float, values), strict=True)))
 
     def result(self, found: Any, costs: tuple[float, ...]) -> Calibration:
-        """Work out covariance and rank at the solution."""
+        """Compute covariance and rank at the solution."""
         residuals, slopes = self.evaluate(found.x)
         values = self.low + self.span * found.x
         sizes = np.where(values == 0.0, self.span, np.abs(values))
@@ -223,7 +223,7 @@ class _Problem:
     def _covariance(self, right: Matrix, singular: Matrix, known: Any, residuals: Matrix, sizes: Matrix) -> Matrix:
         rank = int(known.sum())
         freedom = len(residuals) - rank
-        # As many numbers as parameters: there is no scatter to judge by but the stated uncertainties.
+        # As many numbers as parameters: there is no scatter, only the stated uncertainties.
         scatter = float(residuals @ residuals) / freedom if freedom > 0 else 1.0
         covariance = (right[known].T / singular[known] ** 2) @ right[known] * scatter
         touched = np.any(np.abs(right[~known]) > 1e-3, axis=0)

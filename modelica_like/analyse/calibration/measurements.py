@@ -23,15 +23,15 @@ Matrix = np.ndarray[Any, np.dtype[np.float64]]
 
 
 Residuals = tuple[Matrix, Matrix, list[str]]
-"""Deviations over uncertainties, shape (numbers,), their derivatives by parameters in SI units, and what each is."""
+"""Deviations over uncertainties, shape (numbers,), their derivatives by parameters in SI units, and their labels."""
 
 
 class Measurement(ABC):
-    """What a model is compared with."""
+    """Data for a comparison with a model."""
 
     @abstractmethod
     def residuals(self, model: CompiledDae, names: Sequence[str]) -> Residuals:
-        """Compare a model that has the values to judge, and differentiate by the parameters `names`."""
+        """Compare a model that has the values under test, and differentiate by the parameters `names`."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ class OperatingPoints(Measurement):
     uncertainty: Mapping[str, Any] = field(default_factory=dict)
 
     def residuals(self, model: CompiledDae, names: Sequence[str]) -> Residuals:
-        """Find the steady state of every row; each begins from the one before."""
+        """Find the steady state of every row, each starting from the one before."""
         columns = _in_si(model, read_table(self.table))
         measured = [name for name in columns if name not in self.given]
         sizes = np.array([_of_column(model, self.uncertainty, name, columns[name]) for name in measured])
@@ -159,7 +159,7 @@ def _csv(path: Path) -> Mapping[str, Any]:
     except ValueError as error:
         raise NetlistError(f"{path.name} is not a table of numbers: {error}.") from None
     if rows.ndim != 2 or rows.shape[1] != len(titles):
-        raise NetlistError(f"{path.name}: rows have not as many columns as the title line.")
+        raise NetlistError(f"{path.name}: the rows and the title line differ in their number of columns.")
     return dict(zip(titles, rows.T, strict=True))
 
 

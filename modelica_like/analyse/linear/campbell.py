@@ -1,4 +1,4 @@
-"""Campbell diagram: frequencies of the modes over a speed, and where orders of excitation meet them."""
+"""Campbell diagram: frequencies of the modes over a speed, and their crossings with orders of excitation."""
 
 from __future__ import annotations
 
@@ -114,7 +114,7 @@ def campbell(
         drive: a component, a netlist file or a compiled model.
         over: path of one parameter or input, and the values that it takes.
         speed: path of the speed that the orders count, a variable in rad/s.
-        at: where to linearise for each value, as in `linearize`.
+        at: where to linearize for each value, as in `linearize`.
         orders: excitations per revolution, such as 1 for an imbalance, or a number of teeth.
 
     Raises:
@@ -123,7 +123,7 @@ def campbell(
         ModelicaLikeError: a point cannot be found.
     """
     if len(over) != 1:
-        raise ValueOutOfRange(f"A Campbell diagram goes over one parameter, not {len(over)}.")
+        raise ValueOutOfRange(f"A Campbell diagram varies one parameter, not {len(over)}.")
     (path, values) = next(iter(over.items()))
     model = build(drive, free=[path])
     linear = [linearize(model.with_parameters({path: value}), at, outputs=[speed]) for value in values]
@@ -133,7 +133,7 @@ def campbell(
     speeds = np.array([call(one.model, one.model.variables, one.point)[row] for one in linear])
     order = np.argsort(speeds, kind="stable")
     ahead = [(values := linear[k].eigenvalues())[values.imag > 0] for k in order]
-    # Each mode goes on as the nearest one.
+    # Each mode continues as the nearest one.
     curves = [ahead[0][np.argsort(ahead[0].imag, kind="stable")]]
     for values in ahead[1:]:
         curves.append(_nearest(curves[-1], values))
@@ -141,7 +141,7 @@ def campbell(
 
 
 def _nearest(before: Any, after: Any) -> Any:
-    """Assign eigenvalues one to one, the closest pairs first; a mode that is overdamped now has none (nan)."""
+    """Assign eigenvalues one to one, the closest pairs first; a mode that becomes overdamped has none (nan)."""
     result = np.full(len(before), np.nan + 0j)
     if not len(after):
         return result

@@ -1,4 +1,4 @@
-"""Motions that modes hold: the plates of a clutch that stick move as one."""
+"""Motions that modes hold: the plates of a stuck clutch move as one."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from modelica_like.analyse.slopes import slopes
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.initialize import Point, holding, share, variable_slopes
+from modelica_like.initialize.slopes import slopes
 
 Matrix = np.ndarray[Any, np.dtype[np.float64]]
 _ZERO = 1e-9
@@ -19,7 +19,7 @@ _ZERO = 1e-9
 
 @dataclass(frozen=True)
 class Motions:
-    """The motions that are left where modes hold some.
+    """The motions that modes leave free.
 
     Attributes:
         keep: positions of the states that can move on their own.
@@ -74,7 +74,7 @@ def _held_speeds(model: CompiledDae, point: Point) -> Iterator[Vector]:
     share(model, free)
     rates = _rate_slopes(model, point), _rate_slopes(model, free)
     for slope in variable_slopes(model, point, [one.motion for one in held]):
-        # What creeps follows its torque: its rate depends on something, here compared with that of what is let go.
+        # A creep speed follows its torque: its rate depends on something; compare it with the rate of a free motion.
         present, let_go = (np.abs(slope @ one).max() for one in rates)
         if np.any(slope) and not present > _ZERO * let_go:
             yield slope / np.linalg.norm(slope)
@@ -90,7 +90,7 @@ def _held_angles(model: CompiledDae, point: Point, motions: Motions) -> Matrix:
     by_states = (full[:, :count] / model.nominals) @ motions.shape * model.nominals[motions.keep]
     left = np.hstack([by_states, full[:, count:]]) / scale
     still = _null(left.T)
-    # Of what stands still now, that which does so only because the speeds are held.
+    # Of all motions at rest, those that rest only because the speeds are held.
     moved = (full / scale).T @ still
     _, sizes, right = np.linalg.svd(moved, full_matrices=False) if still.size else (None, np.zeros(0), np.zeros((0, 0)))
     held = still @ right[sizes > _ZERO].T if still.size else np.zeros((len(rows), 0))

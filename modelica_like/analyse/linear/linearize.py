@@ -1,4 +1,4 @@
-"""Linearisation at a point, right through locked and open clutches."""
+"""Linearization at a point, with clutches open or locked."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from typing import get_args
 
 from modelica_like.analyse.linear.held import free_motions
 from modelica_like.analyse.linear.model import LinearModel
-from modelica_like.analyse.slopes import columns_of, nodes_of, slopes
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.initialize import Point, StartKind, initialize
+from modelica_like.initialize.slopes import columns_of, nodes_of, slopes
 from modelica_like.simulation import Model, build, simulate
 from modelica_like.solve.solution import Solution
 from modelica_like.units import parse_unit, to_si
@@ -22,10 +22,10 @@ At = float | str | None
 
 
 def point_of(drive: Drive, at: At = None) -> tuple[CompiledDae, Point]:
-    """Return the model and the point of its motion that `at` means.
+    """Return the model and the point that `at` describes.
 
     Args:
-        drive: what is analysed.
+        drive: a component, a netlist file, a compiled model, or a solution.
         at: a time in s, or a kind of start; by default the end of a solution, otherwise the given start.
 
     Raises:
@@ -53,16 +53,16 @@ def when(text: str) -> At:
 
 
 def _kind(name: str) -> StartKind:
-    # initialize() tells which names there are.
+    # initialize() raises the error with the known names.
     return next((kind for kind in get_args(StartKind) if kind == name), name)  # type: ignore[return-value]
 
 
 def linearize(
     drive: Drive, at: At = None, *, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None,
 ) -> LinearModel:  # fmt: skip
-    """Linearise a drive about a point of its motion, in the modes that are active there.
+    """Linearize a drive about a point of its motion, in the modes that are active there.
 
-    Surfaces that stick move as one: what a mode holds is no state of its own.
+    Surfaces that stick move as one: a held motion is not a state.
 
     Args:
         drive: a component, a netlist file, a compiled model, or a solution.

@@ -1,4 +1,4 @@
-"""Linear models of small motions, and their modes: eigenvalues, shapes, participation, where their energy is."""
+"""Linear models of small motions, and their modes: eigenvalues, shapes, participation, energy shares."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from typing import TYPE_CHECKING, Any
 import casadi as ca
 import numpy as np
 
-from modelica_like.analyse.slopes import implicit_slopes, nodes_of
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import extra_module
 from modelica_like.initialize import Point, variable_slopes
+from modelica_like.initialize.slopes import implicit_slopes, nodes_of
 from modelica_like.solve.style import COLOURS, picture
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _STILL = 1e-9
-"""Eigenvalues below this share of the largest are zero: motions that nothing brings back."""
+"""Eigenvalues below this share of the largest are zero: motions without a restoring force."""
 _DEFECTIVE = 1e-13
 _SHOWN = 12
 _POINTS = 600
@@ -39,7 +39,7 @@ class LinearModel:
         C: shape (outputs, states).
         D: shape (outputs, inputs).
         states: names of the states that can move.
-        held: names of the states that modes hold: they follow from the others, or stay as they are.
+        held: names of the states that modes hold: they follow from the others, or are constant.
         inputs: names of inputs and parameters.
         outputs: names of variables.
         units: coherent SI unit of every name.
@@ -69,9 +69,9 @@ class LinearModel:
         return np.linalg.eigvals(self.A)
 
     def modes(self) -> Modes:
-        """Return eigenvalues, damping, shapes, participation, and where the energy of each mode is."""
+        """Return eigenvalues, damping, shapes, participation and energy shares of each mode."""
         values, right = np.linalg.eig(self.A)
-        # Repeated eigenvalues may lack eigenvectors: what is not determined counts as absent.
+        # Repeated eigenvalues may lack eigenvectors; undetermined parts count as zero.
         left = np.linalg.pinv(right, rcond=_DEFECTIVE).T
         values = np.where(np.abs(values) <= _STILL * np.abs(values).max(initial=0.0), 0.0, values)
         chosen = [k for k, value in enumerate(values) if value.imag >= 0.0]
@@ -162,8 +162,8 @@ class Mode:
     Attributes:
         eigenvalue: in rad/s, that with the positive imaginary part.
         shape: deviations of all states of the model, complex, the largest (in nominal values) equal to one.
-        participation: share of each state that is free, by name; they add up to one.
-        stored: share of each component in the stored energy, by path; they add up to one.
+        participation: share of each free state, by name; the sum is one.
+        stored: share of each component in the stored energy, by path; the sum is one.
         lost: share of each component in the lost power, by path.
     """
 
@@ -215,7 +215,7 @@ class Mode:
 
 @dataclass(frozen=True, eq=False)
 class Modes(Sequence[Mode]):
-    """All modes of a linear model, the slowest oscillation first, then what does not oscillate."""
+    """All modes of a linear model: oscillations, the slowest first, then real eigenvalues."""
 
     linear: LinearModel = field(repr=False)
     modes: tuple[Mode, ...]
@@ -236,11 +236,11 @@ class Modes(Sequence[Mode]):
         return variable_slopes(model, self.linear.point, nodes_of(model, names)) @ self.modes[mode].shape
 
     def plot(self, names: Sequence[str], count: int = 4) -> Figure:
-        """Draw variables along the drive in the first oscillating modes, at the instant of the largest deviation.
+        """Draw variables along the drive in the first oscillating modes, at the time of the largest deviation.
 
         Args:
             names: variables of one unit, such as speeds.
-            count: at most so many modes.
+            count: largest number of modes.
         """
         chosen = [k for k, mode in enumerate(self.modes) if mode.oscillates][:count]
         number = max(len(chosen), 1)
@@ -299,7 +299,7 @@ def _curvature(model: CompiledDae) -> ca.Function:
 
 
 def _shares(components: Sequence[str], amounts: Any) -> dict[str, float]:
-    """Shares of what is there; the whole first, so that small ones are seen as small."""
+    """Shares of the total, computed from it, so that small values stay small."""
     total = float(np.abs(amounts).sum())
     if not total:
         return {}

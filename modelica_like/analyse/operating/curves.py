@@ -1,4 +1,4 @@
-"""Characteristic curves: operating points over a parameter, or over what a parameter holds."""
+"""Characteristic curves: operating points over a parameter, or over a variable that a parameter controls."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Curves:
     """Operating points along a curve.
 
     Attributes:
-        over: path of what was varied.
+        over: path of the varied quantity.
         points: one per value.
     """
 
@@ -42,8 +42,8 @@ class Curves:
         """Draw columns, one panel each.
 
         Args:
-            paths: what to draw.
-            over: the horizontal axis; by default what was varied.
+            paths: columns to draw.
+            over: the horizontal axis; by default the varied quantity.
         """
         over, number = over or self.over, max(len(paths), 1)
         with picture(self.points[0].model.name, number, 0.8 + 1.9 * number) as (figure, rows):
@@ -77,15 +77,15 @@ class Curves:
 def characteristic(
     drive: Model, over: Mapping[str, Iterable[Any]], *, by: str = "", near: OperatingPoint | Solution | None = None,
 ) -> Curves:  # fmt: skip
-    """Follow the steady states of a drive over a parameter, or over a variable that a parameter holds.
+    """Follow the steady states of a drive over a parameter, or over a variable that a parameter controls.
 
     n(M), I(M) and eta(M) of a motor: `characteristic(motor, {"load.tau_constant": torques})`.
 
     Args:
         drive: a component, a netlist file or a compiled model.
-        over: path of one parameter, input or variable, and the values it takes; each begins from the one before.
-        by: if it is a variable: the parameter that holds it there.
-        near: where to begin, as in `steady`.
+        over: path of one parameter, input or variable, and its values; each point starts from the one before.
+        by: for a variable: the parameter that controls it.
+        near: where to start, as in `steady`.
 
     Raises:
         ValueOutOfRange: `over` is not one name with at least one value.
@@ -93,7 +93,7 @@ def characteristic(
         InitializationError: there is no steady state for a value; the message names it.
     """
     if len(over) != 1:
-        raise ValueOutOfRange(f"A characteristic curve goes over one quantity, not {len(over)}.")
+        raise ValueOutOfRange(f"A characteristic curve varies one quantity, not {len(over)}.")
     (path, values) = next(iter(over.items()))
     model = build(drive, free=[path, by])
     points: list[OperatingPoint] = []
@@ -106,5 +106,5 @@ def characteristic(
             error.what = f"At {path} = {value}: {error.what}"
             raise
     if not points:
-        raise ValueOutOfRange(f"There is no value of {path} to go over.")
+        raise ValueOutOfRange(f"{path}: no values are given.")
     return Curves(path, tuple(points))

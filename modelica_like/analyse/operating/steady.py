@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from modelica_like.analyse.slopes import Sizes, columns_of, nodes_of, slopes, steady_change
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import InitializationError, UnknownName, ValueOutOfRange, did_you_mean
 from modelica_like.initialize import Point, call, holding, initialize
-from modelica_like.initialize.steady import check_modes_hold, solve_steady
+from modelica_like.initialize.slopes import Sizes, columns_of, nodes_of, slopes
+from modelica_like.initialize.steady import check_modes_hold, solve_steady, steady_change
 from modelica_like.simulation import Model, build
 from modelica_like.solve.trajectories import Trajectories
 from modelica_like.units import to_si
@@ -49,7 +49,7 @@ class OperatingPoint(Mapping[str, float]):
 
     @property
     def powers(self) -> dict[str, tuple[float, float]]:
-        """Power of every component in W: what it brings in from outside (negative: takes away), and what it loses."""
+        """Power of every component in W: supplied from outside (negative: taken away), and lost."""
         terms = call(self.model, self.model.energy, self.point).reshape(-1, len(self.model.components))
         rows = zip(self.model.components, terms[_ENERGY_SOURCE], terms[_ENERGY_LOSS], strict=True)
         return {path: (float(source), float(loss)) for path, source, loss in rows}
@@ -62,9 +62,9 @@ class OperatingPoint(Mapping[str, float]):
 
     @property
     def efficiency(self) -> float:
-        """Power that loads take away over the power that sources bring in; nan where nothing drives.
+        """Power that loads take away over the power that sources supply; nan without a source.
 
-        A load that turns its power into heat itself, such as a brake, takes nothing away.
+        A load that turns its power into heat, such as a brake, takes nothing away.
         """
         sources = [source for source, _ in self.powers.values()]
         brought = sum(one for one in sources if one > 0)
@@ -78,8 +78,8 @@ class OperatingPoint(Mapping[str, float]):
 
     def __str__(self) -> str:
         lines = [f"Operating point of {self.model.name}"]
-        lines += [f"  {path} brings in {s:.6g} W" for path, (s, _) in self.powers.items() if s > 0]
-        lines += [f"  {path} takes away {-s:.6g} W" for path, (s, _) in self.powers.items() if s < 0]
+        lines += [f"  {path} supplies {s:.6g} W" for path, (s, _) in self.powers.items() if s > 0]
+        lines += [f"  {path} takes {-s:.6g} W" for path, (s, _) in self.powers.items() if s < 0]
         lines += [f"  {path} loses {loss:.6g} W" for path, loss in self.losses.items()]
         if np.isfinite(self.efficiency):
             lines.append(f"  efficiency {100 * self.efficiency:.4g} %")
@@ -91,9 +91,9 @@ def steady(
     drive: Model, hold: Mapping[str, Any] | None = None, by: Sequence[str] | str = (), *,
     parameters: Mapping[str, Any] | None = None, near: OperatingPoint | Trajectories | None = None,
 ) -> OperatingPoint:  # fmt: skip
-    """Find a steady state of a drive: all derivatives zero, except of states that nothing depends on.
+    """Find a steady state of a drive: all derivatives are zero, except those of states on which nothing depends.
 
-    With `hold`, variables get given values, and as many parameters are found that do it: the load at which a motor
+    With `hold`, variables take given values, and as many parameters are adjusted: the load at which a motor
     turns at a given speed is `steady(bench, {"motor.w": "4000 rpm"}, by="load.tau_constant")`.
 
     Args:
@@ -101,8 +101,8 @@ def steady(
         hold: values of variables, numbers in SI units or quantities.
         by: the parameters or inputs to find, as many as are held.
         parameters: other values of parameters and inputs.
-        near: what to begin from: another operating point, or the end of a run with its modes (clutches that have
-            locked); otherwise the guesses of the model.
+        near: start from another operating point, or from the end of a run with its modes (locked clutches);
+            otherwise from the guesses of the model.
 
     Raises:
         ValueOutOfRange: not as many parameters as held variables.
@@ -131,13 +131,13 @@ def _settle(model: CompiledDae, near: Point | None) -> Point:
         solve_steady(model, point)
         check_modes_hold(model, point)
     except InitializationError:
-        # The modes of the neighbour do not hold here.
+        # The modes of the neighbour are not valid here.
         return initialize(model, 0.0, "steady")
     return point
 
 
 class _Target:
-    """Variables with given values, and the parameters that are to bring them there.
+    """Variables with given values, and the parameters to adjust.
 
     Raises:
         ValueOutOfRange: not as many parameters as variables.
@@ -148,8 +148,8 @@ class _Target:
         if len(hold) != len(free):
             held, found = ", ".join(hold) or "nothing", ", ".join(free) or "nothing"
             raise ValueOutOfRange(
-                f"{model.name}: {held} cannot be held by {found}: each held variable takes one parameter.",
-                advice='Say for example steady(drive, {"motor.w": "3000 rpm"}, by="load.tau_constant").',
+                f"{model.name}: {held} cannot be held by {found}: each held variable needs one parameter.",
+                advice='Write for example steady(drive, {"motor.w": "3000 rpm"}, by="load.tau_constant").',
             )
         self.paths, self.free = list(hold), list(free)
         self.rows = nodes_of(model, self.paths)
@@ -179,7 +179,7 @@ class _Target:
         )
 
     def _miss(self, model: CompiledDae, point: Point) -> Vector:
-        """What variables miss, over their sizes."""
+        """Distances of variables from their values, over their sizes."""
         return (call(model, model.variables, point)[self.rows] - self.wanted) / self.sizes
 
     def _closer(
@@ -193,7 +193,7 @@ class _Target:
                 if np.max(np.abs(miss := self._miss(other, there))) < before:
                     return other, there, miss
             except (InitializationError, ValueOutOfRange):
-                # No steady state that far away: a shorter step may have one.
+                # No steady state that far away: a shorter step may find one.
                 pass
             step = step / 2
         return None

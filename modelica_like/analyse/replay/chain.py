@@ -1,9 +1,9 @@
-"""A run once more, as a chain of smooth steps and jumps whose derivatives are exact, forward and adjoint.
+"""A run repeated as a chain of smooth steps and jumps with exact derivatives, forward and adjoint.
 
 The mode sequence of a solution is given. Each smooth segment is integrated again by collocation over its known
-interval, without looking for events; each event is a jump at its known time. Where the guard or the moment puts the
-event a little earlier or later, the states are carried there and back at the rates before and after (the saltation of
-M. A. Aizerman, F. R. Gantmakher, 1958), so the chain has the first derivatives of the run with its moving events.
+interval, without looking for events; each event is a jump at its known time. If the guard or the moment moves the
+event a little, the states are carried there and back at the rates before and after (the saltation of
+M. A. Aizerman, F. R. Gantmakher, 1958), so the chain has the first derivatives of the run with moving events.
 """
 
 from __future__ import annotations
@@ -15,16 +15,16 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from modelica_like.analyse.replay.jumps import Jump, Work, event_time, make_jump
+from modelica_like.analyse.replay.jumps import Coincidence, Jump, Work, event_time, make_jump
 from modelica_like.analyse.replay.kinks import Kinks
 from modelica_like.analyse.replay.start import start_slopes
 from modelica_like.analyse.replay.step import CLOSE, Step, shortened, stuck, try_step
 from modelica_like.analyse.replay.steps import StepFunctions, Tolerances
-from modelica_like.analyse.slopes import Sizes
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import LanguageError
-from modelica_like.initialize import Point, StartKind, initialize
+from modelica_like.initialize import Point, StartKind, holding, initialize
+from modelica_like.initialize.slopes import Sizes
 from modelica_like.solve.recorder import Event, Segment
 from modelica_like.solve.solution import Solution
 
@@ -40,7 +40,7 @@ Move = Step | Jump
 
 @dataclass(frozen=True)
 class Reading:
-    """A number read off a replay, and how it depends on what is there.
+    """A number read off a replay, with its derivatives.
 
     Attributes:
         value: the number.
@@ -63,6 +63,7 @@ class Replay:
         moves: steps and jumps; move k leads from node k to node k + 1.
         start_x: derivatives of the first node's states by (p, u), shape (nx, np + nu).
         start_d: derivatives of its discrete values, shape (nd, np + nu).
+        chances: motions of zero that modes hold from the start, by (x, theta) there.
     """
 
     functions: StepFunctions
@@ -70,6 +71,7 @@ class Replay:
     moves: list[Move] = field(default_factory=list)
     start_x: Vector = field(default_factory=lambda: np.zeros((0, 0)))
     start_d: Vector = field(default_factory=lambda: np.zeros((0, 0)))
+    chances: list[Coincidence] = field(default_factory=list)
 
     @property
     def model(self) -> CompiledDae:
@@ -92,7 +94,7 @@ class Replay:
         return ((k, move) for k, move in enumerate(self.moves) if isinstance(move, Jump))
 
     def at(self, t: float) -> Point:
-        """Return the node at a time within the run; a step that it lies in becomes two.
+        """Return the node at a time within the run; it splits the step that contains the time.
 
         Raises:
             StepFailed: one of them did not converge.
@@ -106,7 +108,7 @@ class Replay:
         return self.split(k, made)
 
     def split(self, k: int, first: Step) -> Point:
-        """Let step k be two, with a given first one; return the node between them.
+        """Split step k, with a given first part; return the node between the parts.
 
         Raises:
             StepFailed: the second one did not converge.
@@ -130,20 +132,34 @@ class Replay:
         Returns:
             Shape (readings, m).
         """
-        result = np.zeros((len(readings), directions.shape[1]))
-        total = np.zeros((self.functions.nq, directions.shape[1]))
-        whole = np.vstack([self.start_x @ directions, directions, self.start_d @ directions])
+        begin = np.vstack([self.start_x @ directions, directions, self.start_d @ directions])
+        return self.carried(readings, begin, 0, len(self.moves))[0]
+
+    def carried(self, readings: Sequence[Reading], whole: Vector, first: int, last: int) -> tuple[Vector, Vector]:
+        """Carry derivatives from one node to another; return what is read on the way, and them at the end.
+
+        Args:
+            readings: what to differentiate.
+            whole: derivatives of (x, theta) at the node `first`, shape (nx + ntheta, m).
+            first: position of the first node.
+            last: position of the last one.
+
+        Returns:
+            Shapes (readings, m) and (nx + ntheta, m).
+        """
+        result = np.zeros((len(readings), whole.shape[1]))
+        total = np.zeros((self.functions.nq, whole.shape[1]))
         at_node = _by_node(readings)
-        for k, node in enumerate(self.nodes):
-            for number, row in at_node.get(id(node), ()):
+        for k in range(first, last + 1):
+            for number, row in at_node.get(id(self.nodes[k]), ()):
                 result[number] += row @ whole
-            if k < len(self.moves):
+            if k < last:
                 whole, gained = self.moves[k].forward(whole)
                 total += gained
         for number, reading in enumerate(readings):
             if reading.quadratures.size:
                 result[number] += reading.quadratures @ total
-        return result
+        return result, whole
 
     def adjoint(self, readings: Sequence[Reading]) -> Vector:
         """Derivatives of readings by all parameters and inputs.
@@ -183,10 +199,10 @@ def replay(
     Args:
         solution: the run.
         quadratures: what to integrate along it, an SX column in the model's `arguments`.
-        name: tells these quadratures from others in the model's cache.
-        start: kind of start of the run; by default what the netlist says.
+        name: identifies these quadratures in the model's cache.
+        start: kind of start of the run; by default that of the netlist.
         stops: times that are to be nodes, in s.
-        tolerances: how precisely.
+        tolerances: of the steps.
 
     Raises:
         NoGradient: an event of the run has no derivative.
@@ -196,7 +212,7 @@ def replay(
     model = solution.model
     if not model.states:
         raise LanguageError(
-            f"{model.name} has no states: nothing develops over time, so there is no run to differentiate.",
+            f"{model.name} has no states, so there is no run to differentiate.",
             advice="Compare runs with other parameter values instead.",
         )
     integrands = ca.SX(0, 1) if quadratures is None else quadratures
@@ -223,21 +239,25 @@ class _Maker:
             self.events[event.segment].append(event)
 
     def start(self, kind: StartKind) -> None:
-        """The first node, and how it depends on parameters."""
+        """The first node and its derivatives by the parameters."""
         size = Sizes.of(self.model)
         t0 = float(self.solution.segments[0].times[0])
         point = initialize(self.model, t0, kind) if self.events[0] else self.solution.segments[0].start
         begin_x, begin_d = start_slopes(self.model, point, kind)
         whole = np.concatenate([begin_x, np.eye(size.fixed), begin_d])
         work = Work.at(self.model, point)
+        work.resting.update(holding(self.model, point))
         work.share()
+        chances = work.chances()
         start_x, start_d = begin_x, work.d @ whole
         if self.events[0]:
             integrands = self.chain.functions.integrands
             jump = make_jump(self.model, point, tuple(self.events[0]), point, integrands, first=True)
+            chances += jump.chances
             whole = np.concatenate([start_x, np.eye(size.fixed), start_d])
             start_x, start_d, point = jump.x @ whole, jump.d @ whole, jump.after
         self.chain.start_x, self.chain.start_d = start_x, start_d
+        self.chain.chances += [replace(one, by=np.pad(one.by @ whole, (size.x, size.d))) for one in chances]
         self.chain.nodes.append(point)
 
     def jump(self, number: int) -> None:
@@ -253,9 +273,9 @@ class _Maker:
         self.h = _FIRST * min(self.h, self.span)
 
     def _relocate(self, late: float) -> bool:
-        """End the segment just before its event, if it does not yet: behind it, slopes can be different ones.
+        """End the segment just before its event, because slopes can differ behind it.
 
-        What is left of the shift spoils derivatives by its product with the rates of the fastest motion.
+        The remaining shift times the rates of the fastest motion is an error of the derivatives.
         """
         last, small = self.chain.moves[-1] if self.chain.moves else None, CLOSE * max(1.0, abs(self.chain.nodes[-1].t))
         if late == 0.0 or 0.0 < late <= 2.0 * small or not isinstance(last, Step):
@@ -315,7 +335,7 @@ class _Maker:
         return step
 
     def _passed(self, step: Step, begin: Vector) -> tuple[int, tuple[float, float]] | None:
-        """Which kink lies behind the step at the first of its stages, how far in, and its function there."""
+        """Which kink is passed at the first of the step's stages, how far in, and its function there."""
         for point in [*step.inside(), step.after]:
             values = self.kinks.at(point)
             passed = np.flatnonzero(self.kinks.passed(begin, values))

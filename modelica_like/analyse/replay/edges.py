@@ -1,41 +1,48 @@
-"""Edges: parameter values at which a run has other derivatives on one side than on the other."""
+"""Edges: parameter values at which the derivatives of a run differ on both sides."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import groupby, product
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from modelica_like.analyse.replay.chain import Reading, Replay
+from modelica_like.analyse.replay.holds import impact
 from modelica_like.analyse.replay.jumps import Jump
-from modelica_like.analyse.slopes import slopes
 from modelica_like.compile.buffers import Vector
+from modelica_like.compile.compiled import CompiledDae, CompiledTransition
 from modelica_like.errors import NoGradient
+from modelica_like.initialize import Point, call, holding, share, solve_implicit, variable_slopes
+from modelica_like.initialize.slopes import Sizes, slopes
 from modelica_like.solve.guards import Guards
 
 _STILL = 1e-7
-"""Values of a guard, relative to its largest one, that may be zero; and to what a parameter changes, that are."""
+"""A guard is possibly zero below this share of its largest value, and zero below this share of a parameter's effect."""
 _ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
 class Edge:
-    """Where a run may be on an edge: it is, if the reading changes with a parameter.
+    """A possible edge of a run: it is one if the reading changes with a parameter.
 
     Attributes:
         reading: what is zero on the edge.
-        least: change per relative change of a parameter up to which it is rounding.
-        error: what to say.
+        least: change per relative change of a parameter that counts as rounding.
+        error: the error for the user.
+        matters: whether what is asked for is another one on the other side.
     """
 
     reading: Reading
     least: float
     error: NoGradient
+    matters: Callable[[], bool] = lambda: True
 
     def moved_by(self, changes: Vector) -> NDArray[np.bool_]:
-        """Return which parameters lead away from the edge, so that there is no derivative by them.
+        """Return which parameters lead away from the edge; derivatives by these do not exist.
 
         Args:
             changes: changes of the reading per relative change of each parameter, shape (parameters,).
@@ -48,55 +55,102 @@ def edges(chain: Replay, readings: Sequence[Reading]) -> list[Edge]:
 
     Args:
         chain: the run.
-        readings: what is asked for; it may depend on the times of jumps.
+        readings: the requested ones, which may depend on the times of jumps.
     """
     timed = {id(node) for one in readings for node, _ in one.parts}
-    found = [
-        Edge(Reading(0.0, ((jump.before, one.by),)), one.size, one.reason)
-        for _, jump in chain.jumps
-        for one in (jump.when.apart if jump.matters or id(jump.before) in timed else ())
-    ]
-    return found + _ties(chain)
+    chances = [(chain.nodes[0], one) for one in chain.chances]
+    for _, jump in chain.jumps:
+        apart = jump.when.apart if jump.matters or id(jump.before) in timed else ()
+        chances += [(jump.before, one) for one in (*apart, *jump.chances)]
+    found = [Edge(Reading(0.0, ((node, one.by),)), one.size, one.reason) for node, one in chances]
+    return found + _ties(chain, readings)
 
 
-def _ties(chain: Replay) -> list[Edge]:
-    """Guards that are zero all along a segment, without firing: torque that is just what friction can bear."""
+def _ties(chain: Replay, readings: Sequence[Reading]) -> list[Edge]:
+    """Guards that are zero all along a segment without firing: a torque that equals the friction limit."""
     model = chain.model
     guards, found = Guards(model), list[Edge]()
     if not guards.count:
         return found
-    # Those that may not fire are -1.
+    # Guards that cannot fire are -1.
     values, rates = np.array([guards.at(node)[:2] for node in chain.nodes]).transpose(1, 0, 2)
     near = _STILL * np.maximum(1.0, np.abs(values).max(axis=0))
     still_at = (np.abs(values) <= near) & (np.abs(rates) * (chain.nodes[-1].t - chain.nodes[0].t) <= near)
-    first = 0
+    first, segments = 0, list[tuple[int, int, Any]]()
     for last in [*(k for k, _ in chain.jumps), len(chain.nodes) - 1]:
-        lasts = chain.nodes[last].t > chain.nodes[first].t
         still = np.all(still_at[first : last + 1], axis=0)
         if isinstance(move := chain.moves[last] if last < len(chain.moves) else None, Jump):
-            # What fires at the end of the segment was on its way.
+            # A guard that fires at the end of the segment was approaching zero.
             fired = [model.transitions[one.transition] for one in move.events if one.transition >= 0 and not one.round]
             still[[guards.positions[id(one)] for one in fired if not one.timed]] = False
-        if lasts:
-            found += [_tie(chain, guards, int(k), first, last) for k in np.flatnonzero(still)]
+        if chain.nodes[last].t > chain.nodes[first].t:
+            segments.append((first, last, still))
         first = last + 1
-    # What fires just at the end of the run does so only on one side.
+    for k, event in enumerate(guards.state_events):
+        for still, group in groupby(segments, lambda one, k=k: bool(one[2][k])):
+            if still and (those := list(group)):
+                found.append(_tie(chain, readings, event, those[0][0], those[-1][1]))
+    # A guard that fires exactly at the end of the run fires on one side only.
     last = len(chain.nodes) - 1
     fires = (np.abs(values[last]) <= near) & ~still_at[last] & (rates[last] > 0.0)
-    return found + [_tie(chain, guards, int(k), last, last) for k in np.flatnonzero(fires)]
+    return found + [_tie(chain, readings, guards.state_events[k], last, last) for k in np.flatnonzero(fires)]
 
 
-def _tie(chain: Replay, guards: Guards, guard: int, first: int, last: int) -> Edge:
-    model, point, one = chain.model, chain.nodes[last], guards.state_events[guard]
+def _tie(chain: Replay, readings: Sequence[Reading], one: CompiledTransition, first: int, last: int) -> Edge:
+    model, point = chain.model, chain.nodes[last]
     mode = model.flat_discretes[one.mode]
     part = slopes(model, point, "guards", [one.index])
     x = np.max([np.abs(node.x) for node in chain.nodes], axis=0) + model.nominals
     terms = np.abs(part.by[0]) @ np.abs(np.concatenate([x, model.p, model.u, point.d]))
+    # The slope of an acceleration that the others hold at zero is nothing but rounding, and so are its terms.
+    largest = max(abs(float(call(model, model.guards, node)[one.index])) for node in chain.nodes)
     error = NoGradient(
         f"No gradient from t = {chain.nodes[first].t:.9g} s on: {mode.path} stays {mode.names[int(point.d[one.mode])]} "
-        f"just at the limit at which it becomes {mode.names[one.target]}.",
+        f"exactly at the limit where it becomes {mode.names[one.target]}.",
         where=one.source,
-        why="A small change of a parameter decides whether it does, so the derivatives of both sides differ.",
+        why="A small change of a parameter decides whether it changes, so the derivatives on both sides differ.",
         advice="Move the parameters away from this limit.",
     )
-    return Edge(Reading(float(part.value[0]), ((point, part.by[0]),)), _ROUNDING * float(terms), error)
+    return Edge(
+        Reading(float(part.value[0]), ((point, part.by[0]),)), _ROUNDING * max(float(terms), largest), error,
+        lambda: _felt(chain, readings, first, last, one.mode),
+    )  # fmt: skip
+
+
+def _felt(chain: Replay, readings: Sequence[Reading], first: int, last: int, mode: int) -> bool:
+    """Whether it is felt at all that a surface slides in a tie, or sticks: later friction may make up for it.
+
+    On both sides of the limit accelerations differ by what the surface does when it slides, and by nothing else. Where
+    it sticks after the tie, it stops at once.
+    """
+    model, size, end = chain.model, Sizes.of(chain.model), len(chain.moves)
+    own = [k for k, one in enumerate(model.holds) if one.mode == mode]
+    until = min(last + 1, end)
+    for hold, begin in product(own, {first, last}):
+        change = _sliding(model, chain.nodes[begin], hold)
+        nominals = model.nominals * np.max(np.abs(change) / model.nominals)
+        sizes = [sum(float(np.abs(row[: size.x]) @ nominals) for _, row in one.parts) for one in readings]
+        read, whole = chain.carried(readings, np.pad(change, (0, size.theta))[:, None], begin, until)
+        if until > last and hold in holding(model, chain.nodes[until]):
+            stop = slopes(model, chain.nodes[until], f"impact {[hold]}", None, lambda hold=hold: impact(model, [hold]))
+            whole[: size.x] += stop.x @ whole[: size.x]
+        later = chain.carried(readings, whole, until, end)[0] if until > last else 0.0
+        if np.any(np.maximum(np.abs(read), np.abs(later))[:, 0] > _ROUNDING * np.array(sizes)):
+            return True
+    return not own
+
+
+def _sliding(model: CompiledDae, point: Point, hold: int) -> Vector:
+    """Accelerations of all states for an acceleration of 1 of a motion that can be held; zeros where others hold it."""
+    one, others = model.holds[hold], [k for k in holding(model, point) if k != hold]
+    motions = variable_slopes(model, point, [one.motion, *(model.holds[k].motion for k in others)])
+    left = (
+        motions[0] - motions[1:].T @ np.linalg.lstsq(motions[1:].T, motions[0], rcond=None)[0] if others else motions[0]
+    )
+    if np.abs(left).max() <= _ROUNDING * np.abs(motions[0]).max():
+        return np.zeros(len(point.x))
+    held = point.copy()
+    held.d[one.mode] = one.number
+    share(model, held)
+    solve_implicit(model, held)
+    return slopes(model, held, "ode").theta[:, Sizes.of(model).fixed + one.approach]

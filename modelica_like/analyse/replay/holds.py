@@ -1,4 +1,4 @@
-"""Impacts, shared reactions and projections, differentiated; see initialize.holds."""
+"""Derivatives of impacts, shared reactions and projections; see initialize.holds."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from modelica_like.initialize.holds import terms
 from modelica_like.language.hold import UNLIMITED
 
 Total = Callable[..., tuple[Vector, Vector]]
-"""Value of a function at a point, and its derivatives by (x, theta) before an event; takes what `slopes` takes."""
+"""Value of a function at a point, and its derivatives by (x, theta) before an event; arguments as for `slopes`."""
 
 _RESTITUTION = 3
 _ROUNDING = 1e-9
 
 
 def impact(model: CompiledDae, struck: Sequence[int]) -> ca.Function:
-    """Return the jump of the states by which an impact stops motions, at a point with the modes in which it passes.
+    """Return the jump of the states by which an impact stops motions, at a point with the modes of the impact.
 
     Args:
         model: the compiled model.
-        struck: positions of the held motions that are stopped.
+        struck: positions of the stopped motions.
     """
     given = model.arguments
     arguments = list(given.values())
@@ -46,7 +46,7 @@ def impact(model: CompiledDae, struck: Sequence[int]) -> ca.Function:
 
 
 def projection(model: CompiledDae, nodes: list[int]) -> ca.Function:
-    """Return the smallest change of the states that changes variables by as much as its last argument says."""
+    """Return the smallest change of the states that changes variables by the last argument."""
     slopes, symbols = _following(model, nodes)
     missing = ca.MX.sym("missing", len(nodes))
     change = ca.mtimes(slopes.T, ca.solve(ca.mtimes(slopes, slopes.T), missing, "lapacklu"))
@@ -90,7 +90,7 @@ def share_slopes(model: CompiledDae, point: Point, circuit: Circuit, columns: in
 
 
 def _relative(model: CompiledDae, point: Point, members: list[int], total: Total) -> Vector:
-    """Derivatives of capacities over the capacities; what nothing limits, or bears nothing, has none."""
+    """Derivatives of capacities over the capacities; zero for unlimited and zero capacities."""
     given = terms(model, point)[members, 1:3]
     rows = [k * TERMS + 1 + int(np.argmax(pair)) for k, pair in zip(members, given, strict=True)]
     values, slopes = total("hold_terms", rows)
@@ -99,7 +99,7 @@ def _relative(model: CompiledDae, point: Point, members: list[int], total: Total
 
 
 def _turned(model: CompiledDae, point: Point, members: list[int], own: int, free: list[int], total: Total) -> Vector:
-    """Derivatives of a dependence of motions over its parts; one part is 1, and others than the `free` ones are 0."""
+    """Derivatives of a dependence of motions over its parts; one part is 1, and all but the `free` ones are 0."""
     nodes = [model.holds[k].motion for k in members]
     motions, parts = variable_slopes(model, point, nodes), np.zeros(len(nodes))
     parts[own] = 1.0

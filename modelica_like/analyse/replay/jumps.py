@@ -1,4 +1,4 @@
-"""Events of a replay as linear maps: where the event goes, and what it changes."""
+"""Events of a replay as linear maps: the shift of the event, and the changes it causes."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from modelica_like.analyse.replay.holds import impact, projection, share_slopes
-from modelica_like.analyse.slopes import Sizes, slopes
 from modelica_like.compile.buffers import Vector
-from modelica_like.compile.compiled import CompiledDae, CompiledTransition
+from modelica_like.compile.compiled import CompiledDae, CompiledTransition, HeldMotion
 from modelica_like.errors import NoGradient
 from modelica_like.initialize import Point, Strike, call, holding, share, solve_implicit
+from modelica_like.initialize.slopes import Sizes, slopes
 from modelica_like.solve.recorder import Event
 
 _GRAZING = 1e-6
@@ -36,13 +36,13 @@ class Trigger:
 
 
 @dataclass(frozen=True)
-class Apart:
-    """Something that happens at the same instant as an event, but for a different reason.
+class Coincidence:
+    """What is zero just at these parameters: the time between two events, or a motion that friction then holds.
 
     Attributes:
-        by: derivative of the distance in time by (x, theta) before the event, shape (nx + ntheta,).
-        size: what is rounding is measured by, in s.
-        reason: what to say where they do not stay together.
+        by: its derivative by (x, theta) before the event, shape (nx + ntheta,).
+        size: changes up to which it stays zero but for rounding.
+        reason: what to say where it does not.
     """
 
     by: Vector
@@ -52,29 +52,30 @@ class Apart:
 
 @dataclass(frozen=True)
 class When:
-    """What decides when an event happens, why nothing does, and what else would do so for a different reason.
+    """The cause of an event's time, why there is none, and other causes at the same time.
 
-    There is no trigger at the start of the run, and where nothing depends on the time of the event.
+    There is no trigger at the start of the run, or if nothing depends on the time of the event.
     """
 
     trigger: Trigger | None = None
     reason: NoGradient | None = None
-    apart: tuple[Apart, ...] = ()
+    apart: tuple[Coincidence, ...] = ()
 
 
 @dataclass(frozen=True)
 class Jump:
-    """An instant at which modes change, carried back and forth to the recorded time.
+    """A change of modes, shifted to the recorded time.
 
     Attributes:
         before: point before.
         after: point after, at the same time.
         events: the mode changes.
-        when: what decides when it happens.
+        when: the cause of its time.
         x: derivatives of the states after by (x, theta) before, shape (nx, nx + ntheta).
         d: derivatives of the discrete values after, shape (nd, nx + ntheta).
-        gain: what the integrands lose at the event: quadratures grow by it times the shift of the event, shape (nq,).
-        matters: whether it matters when it happens.
+        gain: drop of the integrands at the event: quadratures grow by it times the shift of the event, shape (nq,).
+        matters: whether anything depends on its time.
+        chances: motions of zero that modes hold from then on.
     """
 
     before: Point
@@ -85,6 +86,7 @@ class Jump:
     d: Vector
     gain: Vector
     matters: bool
+    chances: tuple[Coincidence, ...] = ()
 
     @property
     def trigger(self) -> Trigger | None:
@@ -93,7 +95,7 @@ class Jump:
 
     @property
     def quadratures(self) -> Vector:
-        """What the quadratures gain because the event is not exactly at its recorded time."""
+        """Change of the quadratures because the event is not exactly at its recorded time."""
         return self.gain * (0.0 if self.trigger is None else self.trigger.shift)
 
     def time(self) -> Trigger:
@@ -109,7 +111,7 @@ class Jump:
 
     @property
     def by_time(self) -> Vector:
-        """Derivative of its time by (x, theta) before it; zero where nothing moves it."""
+        """Derivative of its time by (x, theta) before it; zero without a trigger."""
         return np.zeros(self.x.shape[1]) if self.trigger is None else self.trigger.by
 
     def forward(self, whole: Vector) -> tuple[Vector, Vector]:
@@ -134,7 +136,7 @@ def make_jump(
         model: the compiled model.
         before: the point before the event, at its recorded time.
         events: the mode changes there, in the order in which they happened.
-        begin: beginning of the segment before: what a guard changes since then decides whether it is grazing.
+        begin: beginning of the segment before; the change of a guard since then decides whether it grazes zero.
         integrands: gives the integrands of the quadratures at a point.
         first: the event is at the start of the run, and stays there.
 
@@ -152,9 +154,10 @@ def make_jump(
     work.share()
     for number in sorted({event.round for event in events}):
         work.fire([event for event in events if event.round == number])
+    chances = work.chances()
     rate_after = slopes(model, work.point, "ode").value
     gain = integrands(before) - integrands(work.point)
-    # Only where states, rates or integrands jump does it matter when the event happens.
+    # The time of the event matters only if states, rates or integrands jump.
     states, rates = np.abs(before.x - work.point.x), np.abs(rate_before - rate_after)
     matters = np.any(np.abs(gain) > _SMOOTH)
     matters |= np.any(rates > _SMOOTH * (model.nominals + np.abs(rate_before) + np.abs(rate_after)))
@@ -165,14 +168,16 @@ def make_jump(
         work.x -= np.outer(rate_after, trigger.by)
         work.point.x = work.point.x - rate_after * trigger.shift
         solve_implicit(model, work.point)
-    return Jump(before, work.point, events, when, work.x, work.d, gain, bool(matters))
+    return Jump(before, work.point, events, when, work.x, work.d, gain, bool(matters), chances)
 
 
 def event_time(model: CompiledDae, before: Point, events: tuple[Event, ...], begin: Point) -> When:
-    """Find out what decides when the event happens: what fires in the first round."""
+    """Find the cause of the event's time: the transitions that fire in the first round."""
     if not events:
-        # Elements that hold the same motion share it anew, and nothing else happens.
+        # Elements that hold the same motion share it again, and nothing else happens.
         return When()
+    # A step leaves the implicit unknowns as precise as its states need them; rates of guards need them better.
+    solve_implicit(model, before)
     found: list[tuple[Event, Trigger]] = []
     for event in events:
         if event.round or event.transition < 0:
@@ -188,16 +193,16 @@ def event_time(model: CompiledDae, before: Point, events: tuple[Event, ...], beg
     nx = len(before.x)
     spans = [float(np.max(np.abs(one.by[:nx]) * weights[:nx])) for _, one in found]
     size = _SAME * max(before.t - begin.t, abs(before.t), *spans)
-    apart: list[Apart] = []
+    apart: list[Coincidence] = []
     for other, second in found[1:]:
         by = _difference(model, before, trigger.by - second.by)
         if np.any(np.abs(by) * weights > size):
-            apart.append(Apart(by, size, _coincidence(first, other)))
+            apart.append(Coincidence(by, size, _together(first, other)))
     return When(trigger, None, tuple(apart))
 
 
 def _difference(model: CompiledDae, before: Point, by: Vector) -> Vector:
-    """By what two triggers differ, but for motions that modes hold: nothing moves those."""
+    """The difference of two triggers, without motions that modes hold, which cannot move."""
     nodes = [model.holds[k].motion for k in holding(model, before)]
     if not nodes or not np.any(by[: len(before.x)]):
         return by
@@ -226,18 +231,27 @@ def _grazing(event: Event) -> NoGradient:
         f"No gradient at t = {event.time:.9g} s: {event.mode} changes from {event.before} to {event.after} "
         "where its condition only grazes zero.",
         where=event.source,
-        why="A small change of a parameter moves the event by much, or lets it vanish.",
+        why="A small change of a parameter moves the event far, or removes it.",
         advice="Move the parameters away from this limit.",
     )
 
 
-def _coincidence(one: Event, other: Event) -> NoGradient:
+def _together(one: Event, other: Event) -> NoGradient:
     return NoGradient(
         f"No gradient at t = {one.time:.9g} s: '{one.mode}: {one.before} → {one.after}' and "
         f"'{other.mode}: {other.before} → {other.after}' happen at the same instant but for different reasons.",
         where=[one.source, other.source],
-        why="A small change of a parameter decides which comes first, so the derivatives of both sides differ.",
-        advice="Move the parameters apart.",
+        why="A small change of a parameter decides which comes first, so the derivatives on both sides differ.",
+        advice="Choose parameter values that separate the two events.",
+    )
+
+
+def _resting(model: CompiledDae, one: HeldMotion, t: float) -> NoGradient:
+    mode, motion = model.flat_discretes[one.mode], model.flat_variables[one.motion].path
+    return NoGradient(
+        f"No gradient at t = {t:.9g} s: {mode.path} begins as {mode.names[one.number]}, because {motion} is zero.",
+        why="A small change of a parameter decides which way it moves first, so the derivatives on both sides differ.",
+        advice="Move the parameters away from this limit.",
     )
 
 
@@ -252,10 +266,12 @@ class Work:
     time: Vector | None = None
     struck: tuple[Vector, Vector] | None = None
     entered: set[int] = field(default_factory=set)
+    resting: set[int] = field(default_factory=set)
+    """Held motions that have not been stopped: they are zero."""
 
     @classmethod
     def at(cls, model: CompiledDae, point: Point) -> Work:
-        """Begin with a point itself."""
+        """Start with the point itself."""
         size = Sizes.of(model)
         columns = size.x + size.theta
         return cls(model, point.copy(), np.eye(size.x, columns), np.eye(size.d, columns, size.x + size.fixed))
@@ -304,6 +320,8 @@ class Work:
             self.point.d[mode] = model.flat_discretes[mode].names.index(event.after)
         if knocked:
             self.share()
+            modes = {model.discrete_position[event.mode] for event in knocked}
+            self.resting.update(k for k in holding(model, self.point) if model.holds[k].mode in modes)
 
     def share(self) -> None:
         """Let elements share what they hold together, and solve the implicit equations."""
@@ -316,7 +334,7 @@ class Work:
             self.d[own] = share_slopes(model, self.point, circuit, columns, self._total)
 
     def _stop_motions(self, before: Vector) -> None:
-        """Stop what modes have begun to hold since `before`, also where it stands still already."""
+        """Stop the motions that modes hold since `before`, including those already at rest."""
         model, point = self.model, self.point
         held = holding(model, point)
         entering = [k for k in held if before[model.holds[k].mode] != model.holds[k].number]
@@ -324,7 +342,7 @@ class Work:
             return
         strike = Strike(model, point.copy(), entering)
         if strike.hard:
-            # All impacts at this instant are one, from the speeds before the first.
+            # All impacts at this instant are solved together, from the speeds before the first.
             entering = self._begin_again(entering)
             point = self.point
             strike = Strike(model, point.copy(), entering)
@@ -339,8 +357,19 @@ class Work:
             self.x = self.x + self._total(f"impact {struck}", None, lambda: impact(model, struck), at=trial)[1]
         self.point = strike.point
 
+    def chances(self) -> tuple[Coincidence, ...]:
+        """Tell which resting motions do not stay zero: friction then stops them, but not the same from both sides."""
+        model, found = self.model, list[Coincidence]()
+        for k in sorted(self.resting):
+            one = model.holds[k]
+            own = slopes(model, self.point, "variables", [one.motion])
+            size = _SAME * float(np.abs(own.x[0]) @ (np.abs(self.point.x) + model.nominals))
+            by = self._total("variables", [one.motion])[1][0]
+            found.append(Coincidence(by, size, _resting(model, one, self.point.t)))
+        return tuple(found)
+
     def _begin_again(self, entering: list[int]) -> list[int]:
-        """Go back to the states before the first impact, and hold all that has been hit; return what that is."""
+        """Go back to the states before the first impact, hold all motions that were hit, and return these."""
         self.entered.update(entering)
         if self.struck is None:
             self.struck = self.point.x, self.x
@@ -357,7 +386,7 @@ class Work:
         return float(value[0]), slope[0]
 
     def _project(self, targets: list[int], values: list[tuple[float, Vector]]) -> None:
-        """Move the states as little as possible until variables have their new values; see solve.events."""
+        """Change the states as little as possible until variables have their new values; see solve.events."""
         model = self.model
         nodes = [model.reset_nodes[k] for k in targets]
         solve_implicit(model, self.point)

@@ -1,6 +1,6 @@
 """Places inside a smooth segment at which equations change their slope: breakpoints of tables, |x|, min, max, where.
 
-States pass them smoothly, their sensitivities do not: a step must end there.
+States are smooth there, their sensitivities are not: a step must end there.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ class Kinks:
 
     Args:
         model: the compiled model.
-        segments: the run; how large the functions become in it tells what is zero but for rounding.
+        segments: the run; the size of the functions in it sets the scale of rounding.
     """
 
     def __init__(self, model: CompiledDae, segments: Sequence[Segment] = ()) -> None:
@@ -47,12 +47,12 @@ class Kinks:
         return fast(point.t, point.x, point.z, model.p, model.u, point.d)[0]
 
     def passed(self, before: Vector, after: Vector) -> Any:
-        """Which kinks lie between two points (or rows of points); one at which a point lies does not."""
+        """Which kinks lie between two points (or rows of points), without kinks at the points themselves."""
         zero = self._zero if before.ndim == 1 else self._zero[:, None]
         return (before * after < 0.0) & (np.abs(before) > zero) & (np.abs(after) > zero)
 
     def seen(self) -> Vector:
-        """Times at which the results of the run first lie behind a kink, in s."""
+        """Times of the first results of the run behind each kink, in s."""
         found = [times[1:][self.passed(values[:, :-1], values[:, 1:]).any(axis=0)] for times, values in self._along]
         return np.concatenate([np.zeros(0), *found])
 
@@ -64,7 +64,7 @@ class Kinks:
 
 
 def _switches(model: CompiledDae) -> ca.Function:
-    """Arguments of the operations that have a kink, as far as they move during a segment."""
+    """Arguments of operations with a kink, if they change during a segment."""
     given = list(model.arguments.values())
     equations = ca.Function("equations", given, [model.ode(*given), model.alg(*given)])
     found: dict[str, Any] = {}
@@ -77,7 +77,7 @@ def _switches(model: CompiledDae) -> ca.Function:
 
 
 def _arguments(function: ca.Function, given: list[Any]) -> list[Any]:
-    """Evaluate a function by its instructions; collect what its kinked operations look at."""
+    """Evaluate a function by its instructions; collect the arguments of its operations with a kink."""
     work: dict[int, Any] = {}
     found: list[Any] = []
     for k in range(function.n_instructions()):

@@ -1,4 +1,4 @@
-"""How start values depend on parameters: the start system, differentiated."""
+"""Derivatives of start values by parameters: the start system, differentiated."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from modelica_like.analyse.slopes import Sizes, steady_change
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.initialize import Point, StartKind, StartPlan, start_plan
+from modelica_like.initialize.slopes import Sizes
+from modelica_like.initialize.steady import steady_change
 
 _MAX_NEWTON = 50
 
@@ -35,13 +36,13 @@ def start_slopes(model: CompiledDae, point: Point, kind: StartKind) -> tuple[Vec
         for name in ("discrete_starts", "start_values")
     ]
     system = () if kind == "steady" else _start_system(model, plan, point)
-    # Of many parameters few have a part in the start: only their columns are followed.
+    # Few of many parameters influence the start: only their columns are computed.
     parts = [*jacobians, *system[1:2]]
     moved = sorted({column for one in parts for column in _columns(one)}) if system else list(range(size.fixed))
     starts, values = (np.asarray(one[:, moved].full()) for one in jacobians)
     states = np.zeros((size.x, len(moved)))
     if kind == "steady":
-        # What equilibrium leaves open keeps to its start value, or default.
+        # States that equilibrium does not determine keep their start values or defaults.
         for number, entry in enumerate(model.starts):
             if entry.strength == "default" and entry.state is not None:
                 states[entry.state[0]] = values[number] / entry.state[1]

@@ -1,4 +1,4 @@
-"""One smooth step of the replay: solved, differentiated, and shortened up to where something changes its sign."""
+"""One smooth step of the replay: solved, differentiated, and shortened to a change of sign."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _ITERATIONS = 12
 _CONVERGED = 1e-2
 _TRIALS = 40
 CLOSE = 2e-13
-"""How far before an event or a kink a step ends, relative to the time."""
+"""Distance of a step's end from the following event or kink, relative to the time."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ def try_step(functions: StepFunctions, point: Point, h: float, last: Step | None
         functions: of the model.
         point: its beginning.
         h: its length in s.
-        last: the step before, or one from the same beginning, which tells where to look for it.
+        last: the step before, or one from the same beginning, as a first guess.
     """
     model, nx, nz = functions.model, functions.nx, functions.nz
     theta = model.p, model.u, point.d
@@ -119,7 +119,7 @@ def shortened(
         value: the function.
         low: a length and the function there, before the change.
         high: the same behind it.
-        zero: what is zero for the function, on either side, relative to its values at `low` and `high`.
+        zero: tolerance of zero on either side, relative to the values at `low` and `high`.
 
     Returns:
         The step, or None if it would have no length or does not converge.
@@ -138,7 +138,7 @@ def shortened(
         f = value(made.after)
         if abs(f) < enough:
             return made
-        # What stays where it is twice weighs half as much.
+        # A bound that stays twice gets half the weight.
         if near := f * f_a > 0.0:
             a, f_a, found, f_b = h, f, made, f_b * (0.5 if side == near else 1.0)
         else:

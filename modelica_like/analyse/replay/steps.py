@@ -23,17 +23,15 @@ STAGES = 7
 ABSOLUTE = 1e-2
 _ORDERS = 0.75
 _FINEST, _COARSEST = 1e-13, 1e-3
-_DENSE = 60
-"""Largest linear system of a step that is solved as a dense one; beyond it LAPACK would start threads."""
 
 
 @dataclass(frozen=True)
 class Tolerances:
     """How precisely to integrate again: relative to the states, or to a hundredth of their nominal values.
 
-    What a step can estimate is the error of order s that its s stages leave; its end is of order 2 s - 1. The estimate
-    may therefore be larger than the error that is wanted: by the power `_ORDERS`, where the orders alone would allow
-    (s + 1)/(2 s), because for stiff motions the end loses order.
+    A step can estimate the error of order s of its s stages, but its end has the order 2 s - 1. Therefore the estimate
+    may be larger than the wanted error: by the power `_ORDERS`, where the orders alone would allow
+    (s + 1)/(2 s), because the end loses order for stiff motions.
     """
 
     rtol: float = 1e-8
@@ -58,8 +56,8 @@ class StepFunctions:
 
     Args:
         model: the compiled model.
-        quadratures: integrands, an SX column in the model's `arguments`; its name makes it known to the cache.
-        tolerances: how precise the steps are to be.
+        quadratures: integrands, an SX column in the model's `arguments`; its name identifies it in the cache.
+        tolerances: of the steps.
     """
 
     def __init__(self, model: CompiledDae, quadratures: Any, name: str, tolerances: Tolerances) -> None:
@@ -106,14 +104,14 @@ class StepFunctions:
         return ca.sparsify(ca.diag(ca.DM([1.0] * self.nx + [0.0] * self.nz)))
 
     def _collocated(self, values: Any) -> Any:
-        """What (ode, alg) at the stages, or their derivatives, add to the residual."""
+        """Contribution of (ode, alg) at the stages, or of their derivatives, to the residual."""
         count, of_z = len(self.tableau.nodes), ca.sparsify(ca.DM.eye(self.nx + self.nz) - self._of_states)
         integrals = ca.kron(self._symbols[1] * ca.SX(ca.DM(self.tableau.matrix)), ca.SX(self._of_states))
         return ca.mtimes(ca.kron(ca.DM.eye(count), of_z) - integrals, values)
 
     @cached_property
     def _residual(self) -> ca.Function:
-        """Residual of the stages; unless the stages come apart, its Jacobian by W."""
+        """Residual of the stages and, unless the stages decouple, its Jacobian by W."""
         count, (_, _, x, W, *_) = len(self.tableau.nodes), self._symbols
         equations, slopes, *_ = self._at_stages(self._equations)
         states = ca.kron(ca.DM.eye(count), self._of_states)
@@ -256,7 +254,7 @@ class StepFunctions:
     def _solve_stages(self, right: Any, *, transposed: bool = False) -> Any:
         """Solve with the Jacobian of the residual by W, or its transpose.
 
-        Where it is the same at all stages they come apart, by the eigenvalues of the tableau (Hairer, Wanner, IV.8).
+        If it is the same at all stages, they decouple by the eigenvalues of the tableau (Hairer, Wanner, IV.8).
         """
         if not self._constant:
             by_w = self._residual(*self._names)[1]
@@ -312,13 +310,12 @@ class StepFunctions:
 
 
 def _solve(matrix: Any, right: Any, order: list[int], *, transposed: bool = False) -> Any:
-    """Solve a linear system or its transpose: a small one as dense, a large one in an order that keeps it sparse.
+    """Solve a linear system or its transpose in an order that keeps it sparse, with pivots on the diagonal.
 
-    Both use the factors of the matrix itself: where nothing depends on an angle, its column has one entry, and the
-    multiplier of the angle stays exactly zero. Pivoting in the transpose would let rounding in.
+    A pivot in the row of an angle, which may be a billion radians, would let its rounding into slips that modes hold at
+    zero. Both use the factors of the matrix itself: where nothing depends on an angle, its column has one entry, and
+    the multiplier of the angle stays exactly zero.
     """
-    if matrix.size1() <= _DENSE:
-        return ca.Linsol("solver", "lapacklu", matrix.sparsity()).solve(matrix, ca.densify(right), transposed)
     back, ordered = np.argsort(order).tolist(), matrix[order, order]
     linsol = ca.Linsol("solver", "csparse", ordered.sparsity())
     return linsol.solve(ordered, ca.densify(right)[order, :], transposed)[back, :]

@@ -1,4 +1,4 @@
-"""Radau IIA collocation: its coefficients, and how its stages come apart.
+"""Radau IIA collocation: its coefficients, and the decoupling of its stages.
 
 Source: E. Hairer, G. Wanner: Solving Ordinary Differential Equations II, sections IV.5 and IV.8 (RADAU5).
 """
@@ -62,7 +62,7 @@ class Tableau:
 
         Args:
             stages: those of the step, one after the other.
-            begin: where the other one begins, in lengths of this one.
+            begin: start of the other one, in lengths of this one.
             ratio: its length over that of this one.
         """
         values = np.vander(begin + self.nodes * ratio, len(self.nodes), increasing=True) @ self._coefficients

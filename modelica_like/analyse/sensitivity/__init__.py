@@ -1,1 +1,1 @@
-"""Exact derivatives of runs, and runs as differentiable functions."""
+"""Exact derivatives of runs; runs as differentiable functions."""

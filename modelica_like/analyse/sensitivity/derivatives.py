@@ -25,7 +25,7 @@ from modelica_like.solve.solution import Solution
 
 Method = Literal["auto", "forward", "adjoint"]
 _NAMED = 3
-"""Largest number of parameters that an error names."""
+"""Largest number of parameters in an error message."""
 
 
 def sensitivities(
@@ -33,34 +33,34 @@ def sensitivities(
     parameters: Mapping[str, Any] | None = None, method: Method = "auto", start: StartKind | None = None,
     options: Options | None = None, precision: float = 1e-8,
 ) -> Sensitivities:  # fmt: skip
-    """Differentiate what a run gives, by parameters and inputs; exact through mode changes and resets.
+    """Differentiate outputs of a run by parameters and inputs; exact through mode changes and resets.
 
     Args:
         drive: a component, a netlist file, a compiled model, or a run.
         of: final values (`table.s`), `max(shaft.tau)`, `min(…)`, `at(table.s, 0.3 s)`, `integral(…)`, `series(…)`; of
             components `clutch.loss_energy`, `source_energy`, `lock_time`, `unlock_time`; times of mode changes
             `time(clutch.mode: forward -> stuck)`, the second one with `, 2`.
-        to: parameters and inputs; by default all that can change and have a derivative (`left_out` has the others). One
-            with a formula moves on its own, from the formula's value; moved by another one it follows its formula.
+        to: parameters and inputs; by default all that can change and have a derivative (`left_out` has the others).
+            Parameters with a formula are decoupled from it, but still follow it where other parameters change.
         until: end time, as in `simulate`.
         parameters: other values of parameters, as in `simulate`.
-        method: `forward` (cost grows with the parameters), `adjoint` (with the outputs), or what is cheaper.
-        start: kind of start, as in `simulate`; of a run, the kind it had.
+        method: `forward` (cost grows with the parameters), `adjoint` (with the outputs), or `auto` (the cheaper one).
+        start: kind of start, as in `simulate`; for a run, that of the run.
         options: as in `simulate`.
         precision: relative tolerance of the steps of the replay.
 
     Raises:
         NoGradient: a derivative does not exist; the message says at which event, and by what.
         UnknownName: an output, a parameter or the method does not exist.
-        ValueOutOfRange: there is no output, or no such precision.
-        LanguageError: a parameter follows from others, and the drive is compiled already.
+        ValueOutOfRange: there is no output, or the precision is out of range.
+        LanguageError: a parameter follows from others, and the drive is already compiled.
         ModelicaLikeError: the simulation is not possible.
     """
     of, to = listed(of, "output to differentiate"), listed(to, "parameter") if to else []
     if method not in get_args(Method):
         raise UnknownName(
             f"There is no method '{method}'{did_you_mean(method, get_args(Method)) or '.'}",
-            advice="Derivatives are found by forward or adjoint, or by what is cheaper: auto.",
+            advice="The methods are forward, adjoint and auto (the cheaper of both).",
         )
     if isinstance(drive, Solution):
         freed, solution = Freed(drive.model, {}), drive
@@ -94,7 +94,7 @@ def _chosen(model: CompiledDae, names: Sequence[str]) -> list[tuple[int, Quantit
             raise UnknownName(f"{model.name} has no parameter '{name}'{near or '.'}")
         if name in fixed:
             raise LanguageError(
-                f"{name} cannot change after compilation, so nothing can be differentiated by it.",
+                f"{name} cannot change after compilation, so there are no derivatives with respect to it.",
                 advice="Compare runs of models that were built with other values.",
             )
         k = known[name]
@@ -120,7 +120,7 @@ def _differentiate(
         derivatives = chain.adjoint(total)[:, positions]
     else:
         derivatives = chain.forward(total, np.eye(len(chain.model.fixed_position))[:, positions])
-    # By parameters that nobody named the others are answered all the same.
+    # Without `to`, the other parameters still get their derivatives.
     kept, left_out = _by_existence(on_edge, derivatives[len(total) - len(on_edge) :], [one for _, one in chosen], named)
     derivatives, chosen = derivatives[: len(total) - len(on_edge), kept], [chosen[k] for k in kept]
     if freed.slopes:
@@ -142,13 +142,15 @@ def _differentiate(
 def _by_existence(
     on_edge: list[Edge], derivatives: Vector, chosen: list[Quantity], named: bool
 ) -> tuple[list[int], dict[str, str]]:
-    """Positions of the parameters by which there are derivatives, and of the others names and reasons."""
+    """Positions of the parameters with derivatives; names and reasons of the others."""
     weights = [abs(one.value) or 1.0 for one in chosen]
     reasons: dict[str, str] = {}
     for edge, row in zip(on_edge, derivatives, strict=True):
         moving = [chosen[k].name for k in np.flatnonzero(edge.moved_by(np.abs(row) * weights))]
         error = edge.error
-        if moving and (named or len(reasons.keys() | moving) == len(chosen)):
+        if not moving or not edge.matters():
+            continue
+        if named or len(reasons.keys() | moving) == len(chosen):
             raise NoGradient(
                 error.what, where=error.where, why=error.why,
                 advice=f"Leave out {' and '.join(moving[:_NAMED])}, or {error.advice[0].lower()}{error.advice[1:]}",

@@ -1,4 +1,4 @@
-"""Parameters that a drive gives by a formula, as parameters of their own."""
+"""Parameters with a formula, decoupled from it."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from modelica_like.simulation import Model, build
 
 @dataclass(frozen=True)
 class Freed:
-    """A model in which parameters with a formula can move on their own.
+    """A model in which parameters are decoupled from their formulas.
 
     Attributes:
         model: the compiled model.
-        values: values for it by path: those that were given, and what the formulas make of them.
+        values: values for it by path: those given, and the results of the formulas.
         slopes: derivatives of the formulas, by (path of the formula's parameter, path of the independent one).
     """
 
@@ -31,16 +31,16 @@ class Freed:
     slopes: Mapping[tuple[str, str], float] = field(default_factory=dict)
 
     def taken_along(self, names: Sequence[str]) -> Vector:
-        """Return how the parameters `names` follow when one of them moves, shape (names, names)."""
+        """Return the derivatives of the parameters `names` by each other, shape (names, names)."""
         return np.array(
             [[float(row == column) + self.slopes.get((row, column), 0.0) for column in names] for row in names]
         )
 
 
 def free_formulas(drive: Model, names: Sequence[str], values: Mapping[str, Any] | None = None) -> Freed:
-    """Compile a drive so that the parameters `names` can move, also those that follow from others by a formula.
+    """Compile a drive so that the parameters `names` can change, including those with a formula.
 
-    A parameter that is equal to another one stays so, and in a compiled model all formulas stay.
+    A parameter that equals another one is not decoupled, and a compiled model keeps all formulas.
 
     Args:
         drive: a component, a netlist file, or a compiled model.
@@ -78,12 +78,12 @@ def equal_to(model: CompiledDae, name: str) -> str | None:
 
 
 def bound_by_formula(model: CompiledDae, name: str) -> LanguageError:
-    """Return what is told of a parameter that cannot move on its own."""
+    """Return the error about a parameter that cannot be decoupled from its formula."""
     names = ", ".join(model.flat_parameters[k].path for k in _formula(model, name)[1])
     return LanguageError(
         f"{name} follows from other parameters ({names})." if names else f"{name} is given by a formula of numbers.",
-        advice=f"{'Ask for these, or h' if names else 'H'}and over the drive as it was before it was compiled or run: "
-        f"{name} then moves on its own.",
+        advice=f"{'Ask for these, or p' if names else 'P'}ass the drive before it is compiled or run: "
+        f"{name} is then decoupled from its formula.",
     )
 
 

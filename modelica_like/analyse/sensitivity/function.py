@@ -1,4 +1,4 @@
-"""A whole simulation as a differentiable CasADi function, for a user's own optimisation problem."""
+"""A simulation as a differentiable CasADi function, for optimization problems."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ Found = TypeVar("Found")
 
 _TOGETHER = 1e-9
 _PLAIN = ("end", "at", "time")
-"""Outputs that a run gives as precisely as its replay; peaks and integrals of a run are those of its results."""
+"""Outputs that a run gives as precisely as its replay; peaks and integrals of a run come from its results."""
 _FINER = 1e-2
-"""Tolerance of a run in that of its replay, so that both give the same."""
+"""Tolerance of a run relative to that of its replay, so that both agree."""
 
 
 class _Callback(ca.Callback):
@@ -59,8 +59,8 @@ class _Callback(ca.Callback):
 class SimulationFunction(_Callback):
     """y = f(p): simulates with all events; its Jacobian is that of the replay, exact through the events.
 
-    Second derivatives are central differences of the exact Jacobian. The object must live as long as what is built
-    from it. CasADi tells an error of the simulation in its own words; `refusal` has it as it was.
+    Second derivatives are central differences of the exact Jacobian. The object must live as long as anything built
+    from it. CasADi rewrites an error of the simulation; `refusal` has the original.
 
     Attributes:
         inputs: paths of the parameters p.
@@ -116,7 +116,7 @@ class SimulationFunction(_Callback):
         return self._last[1]
 
     def values_at(self, p: Vector | Sequence[float]) -> list[float]:
-        """Return the outputs alone: read off the run, or where that is too coarse off its replay.
+        """Return only the outputs: from the run, or from its replay if the run is too coarse.
 
         Raises:
             NoGradient: as in `at`.
@@ -142,7 +142,7 @@ class SimulationFunction(_Callback):
         return self._simulated[1]
 
     def attempt(self, what: Callable[[Vector], Found], p: Any) -> Found | None:
-        """Simulate for CasADi; what goes wrong is kept in `refusal`, and raised unless nan is wanted."""
+        """Simulate for CasADi; an error is kept in `refusal`, and raised unless nan is wanted."""
         self.refusal = None
         try:
             return what(np.array(p))
@@ -199,14 +199,14 @@ def simulation_function(
         start: kind of start, as in `simulate`.
         options: as in `simulate`.
         precision: as in `sensitivities`.
-        any_sequence: go on where the mode sequence is another one than at the start values. Outputs are then still
-            differentiable almost everywhere, but not at the change.
-        nan_where_refused: where the simulation fails or its mode sequence is another one, return nan instead of
-            raising: an optimiser then tries a shorter step. `refusal` tells why.
+        any_sequence: accept other mode sequences than that of the start values. Outputs are then differentiable
+            almost everywhere, but not at the change of the sequence.
+        nan_where_refused: return nan instead of raising if the simulation fails or has another mode sequence: an
+            optimizer then tries a shorter step. `refusal` has the reason.
 
     Raises:
-        NoGradient: at the start values a derivative does not exist.
-        LanguageError: a series is no output of a function.
+        NoGradient: a derivative does not exist at the start values.
+        LanguageError: an output is a series.
         ValueOutOfRange: there is no input or no output.
         ModelicaLikeError: the model or a name is wrong, or the simulation is not possible.
     """
@@ -238,12 +238,12 @@ def _changed(expected: Sequence[Any], found: Sequence[Any], solution: Solution) 
     pairs = zip_longest(expected, found)
     same, (before, now) = next((k, pair) for k, pair in enumerate(pairs) if pair[0] != pair[1])
     before, now = (f"'{one[0]}: {one[1]} → {one[2]}'" if one else "" for one in (before, now))
-    what = f"{now} happens besides" if now else f"{before} is missing"
+    what = f"{now} happens additionally" if now else f"{before} is missing"
     if now and before:
         what = f"{now} happens instead of {before}"
     return NoGradient(
         f"{solution.model.name} has another mode sequence at these parameter values: "
         f"as mode change {same + 1}, {what}.",
         why="A function with a fixed mode sequence has derivatives only as long as the sequence stays.",
-        advice="Bound the parameters, begin elsewhere, or allow it with any_sequence=True.",
+        advice="Bound the parameters, start elsewhere, or allow it with any_sequence=True.",
     )

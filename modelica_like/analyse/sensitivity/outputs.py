@@ -1,4 +1,4 @@
-"""What sensitivities are asked of: names such as `table.s`, `max(shaft.tau)`, `clutch.lock_time`."""
+"""Names of outputs: `table.s`, `max(shaft.tau)`, `clutch.lock_time`."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ _SECOND, _JOULE, _WATT = parse_unit("s"), parse_unit("J"), parse_unit("W")
 
 @dataclass(frozen=True)
 class Output:
-    """One thing to differentiate.
+    """One output to differentiate.
 
     Attributes:
-        name: as it was asked for.
+        name: as given.
         unit: its unit.
         kind: `end`, `at`, `max`, `min`, `integral`, `series` or `time`.
         path: the variable, or the mode.
@@ -44,13 +44,13 @@ class Output:
     change: tuple[str, str, int] = ("", "", 1)
 
     def is_change(self, event: Event) -> bool:
-        """Tell whether an event is such a mode change."""
+        """Return whether an event is such a mode change."""
         before, after, _ = self.change
         return event.mode == self.path and before in ("", event.before) and after in ("", event.after)
 
 
 def listed(names: str | Sequence[str], what: str) -> list[str]:
-    """Return names that were given as one or as several.
+    """Return one name or several as a list.
 
     Raises:
         ValueOutOfRange: there is none.
@@ -65,7 +65,7 @@ def read_output(model: CompiledDae, name: str) -> Output:
     """Read the name of an output.
 
     Raises:
-        UnknownName: it names nothing of the model.
+        UnknownName: the model has no such output.
     """
     called = _CALL.match(name)
     if called is None:
@@ -126,7 +126,7 @@ def _mode_change(model: CompiledDae, name: str, inside: str) -> Output:
 
 
 def expression_of(model: CompiledDae, path: str) -> tuple[Callable[[], Any], Unit]:
-    """Return what makes the SX of a variable or of an energy term in the model's arguments, and its unit.
+    """Return a function that makes the SX of a variable or energy term in the model's arguments, and the unit.
 
     Raises:
         UnknownName: there is no such variable.
@@ -138,7 +138,7 @@ def expression_of(model: CompiledDae, path: str) -> tuple[Callable[[], Any], Uni
     owner, _, last = path.rpartition(".")
     columns = _POWERS | _ENERGY
     if last in columns and owner in model.components:
-        # The model itself stands for all its components together.
+        # The model itself means all its components together.
         rows = [model.components.index(owner)] if owner else list(range(len(model.components)))
         unit = _JOULE if last in (*_ENERGY, "stored_energy") else _WATT
         return lambda: ca.sum1(model.energy(*arguments)[rows, columns[last]]), unit
@@ -147,7 +147,7 @@ def expression_of(model: CompiledDae, path: str) -> tuple[Callable[[], Any], Uni
         known += [f"{owner}.{word}" for word in (*columns, "lock_time", "unlock_time")]
     raise UnknownName(
         f"{model.name} has no variable '{path}'{did_you_mean(path, known) or '.'}",
-        advice="Besides variables there are max(…), min(…), integral(…), at(…, time), series(…), "
+        advice="Other outputs are max(…), min(…), integral(…), at(…, time), series(…), "
         "time(mode: before -> after), and of components loss_energy, source_energy, lock_time, unlock_time.",
     )
 

@@ -1,4 +1,4 @@
-"""Runs that only numbers are read off: final values, peaks, energies, times of mode changes."""
+"""Numbers read off runs: final values, peaks, energies, times of mode changes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from modelica_like.solve.trajectories import ENERGY_TERMS
 
 
 def read(solution: Solution, output: Output) -> float:
-    """Read one number off a run; peaks and integrals are those of its results.
+    """Read one number off a run; peaks and integrals come from its results.
 
     Raises:
         UnknownName: a mode change does not happen.
@@ -55,7 +55,7 @@ def _time(solution: Solution, output: Output) -> float:
 
 
 def read_all(solution: Solution, outputs: Sequence[Output]) -> list[float]:
-    """Read several numbers; what does not happen is nan."""
+    """Read several numbers; nan for mode changes that do not happen."""
     values: list[float] = []
     for output in outputs:
         try:
@@ -66,14 +66,14 @@ def read_all(solution: Solution, outputs: Sequence[Output]) -> list[float]:
 
 
 def quick_run(model: CompiledDae, **run: Any) -> Solution:
-    """Simulate by the compiled run-time, and by IDAS where that is not there or cannot do it.
+    """Simulate with the compiled run-time, or with IDAS if there is none or it fails.
 
     Args:
         model: the compiled model.
         run: further arguments of `simulate`.
 
     Raises:
-        ModelicaLikeError: IDAS cannot do it either; the error is that of IDAS.
+        ModelicaLikeError: IDAS also fails; this is its error.
     """
     try:
         return simulate(model, **run, solver="native")

@@ -1,4 +1,4 @@
-"""Numbers read off a replay, with what they depend on: values, peaks, integrals, times of mode changes."""
+"""Numbers read off a replay with their derivatives: values, peaks, integrals, times of mode changes."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from modelica_like.analyse.replay.chain import Reading, Replay
 from modelica_like.analyse.replay.jumps import Jump
 from modelica_like.analyse.replay.step import Step, shortened
 from modelica_like.analyse.sensitivity.outputs import Output, expression_of
-from modelica_like.analyse.slopes import Slopes, slopes
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import NoGradient, UnknownName, ValueOutOfRange
 from modelica_like.initialize import Point
+from modelica_like.initialize.slopes import Slopes, slopes
 from modelica_like.solve.solution import Solution
 
 _NEAR = 0.05
@@ -49,7 +49,7 @@ def read_off(solution: Solution, replay: Replay, outputs: Sequence[Output]) -> l
 
 
 def value_at(replay: Replay, path: str, node: Point, jump: Jump | None = None) -> Reading:
-    """Read a variable at a node, or at a jump that carries it along."""
+    """Read a variable at a node, or at a jump that moves with it."""
     part = _slopes(replay, path, node)
     parts = [(node, part.by[0])]
     if jump is not None:
@@ -66,7 +66,7 @@ def _function(model: CompiledDae, path: str) -> ca.Function:
 
 
 def _check_impacts(solution: Solution, outputs: Sequence[Output]) -> None:
-    """Refuse energies of which an impact takes a part at once: an integral knows nothing of it."""
+    """Refuse energies with a part from an impact, which an integral does not contain."""
     for output in outputs:
         owner, _, last = output.path.rpartition(".")
         lost = output.kind == "integral" and last == "loss_energy"
@@ -75,7 +75,7 @@ def _check_impacts(solution: Solution, outputs: Sequence[Output]) -> None:
             raise NoGradient(
                 f"No gradient of {output.name}: {found[0].component} loses {found[0].energy:.6g} J in an impact at "
                 f"t = {found[0].time:.9g} s.",
-                why="Only the loss of power over time is differentiated, not what an impact takes at once.",
+                why="Only losses over time are differentiated, not the energy of an impact.",
                 advice=f"Ask for integral({output.path.removesuffix('energy')}power), which leaves impacts out, or for "
                 "speeds after the impact.",
             )
@@ -108,7 +108,7 @@ def _node_of(replay: Replay, output: Output) -> Point:
 def _peak(replay: Replay, output: Output) -> Reading:
     """Read the largest or smallest value along a replay.
 
-    Candidates are the nodes and the stages in between; near the best of them zeros of the rate are sought.
+    Candidates are the nodes and the stages in between; near the best ones, zeros of the rate are located.
     """
     sign = 1.0 if output.kind == "max" else -1.0
     rate: Callable[[Point], float] = lambda point: sign * float(_slopes(replay, output.path, point).rate[0])  # noqa: E731

@@ -1,4 +1,4 @@
-"""What sensitivities are: derivatives with names, values and units, as numbers, tables and tornado plots."""
+"""Results of sensitivities: derivatives with names, values and units, as numbers, tables and tornado plots."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 SHOWN = 20
 """Largest number of parameters in a table."""
 COLUMNS = ("parameter", "value>", "unit", "derivative>", "relative>")
-"""Of a table; those with an arrow are numbers."""
+"""Columns of a table; those with an arrow are numbers."""
 
 
 @dataclass(frozen=True)
@@ -42,13 +42,13 @@ class Sensitivities:
 
     Attributes:
         model: name of the model.
-        outputs: what was differentiated, with its values.
-        parameters: by what, with their values.
+        outputs: differentiated outputs with their values.
+        parameters: parameters and inputs with their values.
         derivatives: shape (outputs, parameters).
         method: `forward` or `adjoint`.
         time: times of the series in s, both sides of events included; empty without series.
-        series: of each series its derivatives over time, shape (times, parameters).
-        left_out: parameters nobody named, by which there is no derivative, with the reasons.
+        series: derivatives of each series over time, shape (times, parameters).
+        left_out: parameters without a derivative that were not asked for by name, with the reasons.
     """
 
     model: str
@@ -64,7 +64,7 @@ class Sensitivities:
         """Derivative of an output by a parameter.
 
         Raises:
-            UnknownName: it was not asked for.
+            UnknownName: there is no such output or parameter.
         """
         output, parameter = key
         row, column = _position(self.outputs, output, "output"), _position(self.parameters, parameter, "parameter")
@@ -98,7 +98,7 @@ class Sensitivities:
         return [f"{name} is left out. {reason}" for name, reason in self.left_out.items()]
 
     def tornado(self, output: str, *, change: float = 0.1, most: int = 12) -> Figure:
-        """Draw what a relative change of each parameter makes of an output, to first order.
+        """Draw the first-order change of an output for a relative change of each parameter.
 
         Args:
             output: which.

@@ -1,4 +1,4 @@
-"""A file in which a sweep keeps what is done, so that it goes on where it was stopped."""
+"""A file in which a sweep stores finished runs, to resume where it stopped."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from modelica_like.writing import write_text
 class Checkpoint:
     """Results of a sweep as arrays of a Zarr folder, one chunk of the arrays for each chunk of runs.
 
-    A chunk counts as done only once everything else of it is written, so a sweep that is stopped while it writes does
-    that chunk again.
+    A chunk counts as done only when all of it is written, so a sweep that is stopped while writing repeats the
+    chunk.
 
     Args:
-        path: the folder; made if it does not exist.
-        job: what the runs have in common.
+        path: the folder; created if it does not exist.
+        job: the common part of all runs.
         plan: the points.
         size: runs in a chunk.
 
@@ -41,13 +41,13 @@ class Checkpoint:
             self._group = zarr.open_group(self.path, mode="r+")
             if self._group.attrs.get("sweep") != key:
                 raise CheckpointMismatch(
-                    f"{self.path.name} holds another sweep: the model, its values, the points or the outputs differ.",
-                    advice="Give another file, or remove this one to begin anew.",
+                    f"{self.path.name} is from another sweep: the model, its values, the points or the outputs differ.",
+                    advice="Name another file, or delete this one to start again.",
                 )
         elif self.path.exists() and (not self.path.is_dir() or any(self.path.iterdir())):
             raise CheckpointMismatch(f"{self.path.name} exists and is not the checkpoint of a sweep.")
         else:
-            # Whole or not at all, like files.
+            # Complete or not at all, like files.
             with TemporaryDirectory(prefix=".", dir=_made(self.path.absolute().parent)) as draft:
                 _begin(zarr.open_group(f"{draft}/sweep", mode="w"), len(plan), len(job.outputs), size, key)
                 if self.path.exists():
@@ -57,7 +57,7 @@ class Checkpoint:
         self._size = size
 
     def left(self, chunks: list[Chunk]) -> list[Chunk]:
-        """Return the chunks that are not done."""
+        """Return the unfinished chunks."""
         done = self._group["done"][:]
         return [chunk for chunk in chunks if not done[chunk[0] // self._size]]
 
@@ -70,7 +70,7 @@ class Checkpoint:
         self._group["done"][number] = True
 
     def results(self) -> Done:
-        """Return all that is done."""
+        """Return all finished results."""
         found = Done(0, self._group["values"][:])
         for number in np.flatnonzero(self._group["done"][:]):
             told = json.loads((self.path / f"told-{number}.json").read_text(encoding="utf-8"))

@@ -62,7 +62,7 @@ def importance(
     drive: Model, ranges: Mapping[str, tuple[Any, Any]], outputs: Sequence[str], *, method: Kind = "sobol",
     samples: int = 256, seed: int = 0, **settings: Any,
 ) -> Importance:  # fmt: skip
-    """Find which parameters matter, by the variance they cause (Sobol) or by elementary effects (Morris).
+    """Rank parameters by the variance they cause (Sobol) or by elementary effects (Morris).
 
     Args:
         drive: a component, a netlist file or a compiled model.
@@ -76,7 +76,7 @@ def importance(
 
     Raises:
         UnknownName: a name is not known.
-        ValueOutOfRange: runs failed or gave no number, so that the measures mean nothing.
+        ValueOutOfRange: runs failed or gave no number, so the measures are not defined.
         MissingExtra: SALib is not installed.
     """
     sample, analyse = _salib(method)
@@ -99,7 +99,7 @@ def importance(
 def _measures(method: Kind, analyse: Any, problem: dict[str, Any], cube: Any, column: Any, seed: int) -> dict[str, Any]:
     wanted = ("S1", "ST", "S1_conf", "ST_conf") if method == "sobol" else ("mu_star", "sigma", "mu_star_conf")
     if np.ptp(column) <= _CONSTANT * np.abs(column).max():
-        # Nothing depends on anything: what there is to share is rounding.
+        # The output depends on nothing: its variance is rounding.
         return {key: np.zeros(problem["num_vars"]) for key in wanted}
     if method == "sobol":
         found = analyse.analyze(problem, column, calc_second_order=False, seed=seed)

@@ -1,4 +1,4 @@
-"""Runs of a sweep by the compiled run-time: which numbers it reads, and what its parameters are."""
+"""Runs of a sweep by the compiled run-time."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ _ENERGIES = ("loss_energy", "source_energy")
 
 
 class NativeRuns:
-    """Runs of a model that differ in some parameters and inputs; may be used by several threads at once.
+    """Runs of a model that differ in some parameters and inputs; several threads may use it at once.
 
     Args:
         model: the compiled model.
-        names: paths of what differs.
-        outputs: what is read off every run.
+        names: paths of these parameters and inputs.
+        outputs: numbers to read off every run.
         settings: arguments of `simulate` besides parameters.
 
     Raises:
@@ -53,10 +53,10 @@ class NativeRuns:
 
         Args:
             points: values, shape (runs, names).
-            stop: not zero as soon as nobody waits for them any more.
+            stop: becomes nonzero when the results are no longer needed.
 
         Returns:
-            Outputs, shape (runs, outputs), sentences about values that cannot be, by run, and the runs that failed.
+            Outputs, shape (runs, outputs), messages about invalid values by run, and the failed runs.
         """
         fixed = np.tile(np.concatenate([self._model.p, self._model.u]), (len(points), 1))
         fixed[:, self._places] = points
@@ -70,7 +70,7 @@ class NativeRuns:
         return values, refused, kept[failed].tolist()
 
     def _refused(self, points: Any, p: Vector) -> dict[int, str]:
-        """Which values cannot be, and why; only doubtful ones are looked at one by one."""
+        """Invalid values with the reasons; only doubtful ones are checked one by one."""
         model = self._model
         fine = np.all(np.isfinite(points), axis=1)
         for column, place in enumerate(self._places):
@@ -94,7 +94,7 @@ def _within(values: Vector, low: float | None, high: float | None) -> Any:
 
 
 def _with_energies(model: CompiledDae, paths: Sequence[str]) -> CompiledDae:
-    """Return the model with energies and powers of components among its variables, if any are asked for."""
+    """Return the model with energies and powers of components among its variables, if outputs need them."""
     more = tuple(dict.fromkeys(path for path in paths if path not in model.position))
     return model.once(("energies", more), lambda: _with(model, more)) if more else model
 
@@ -113,7 +113,7 @@ def _with(model: CompiledDae, more: tuple[str, ...]) -> CompiledDae:
 
 
 def _readings(model: CompiledDae, output: Output) -> list[Reading]:
-    """Return what makes an output, as a sum."""
+    """Return the parts of an output, which is their sum."""
     owner, _, last = output.path.rpartition(".")
     if output.kind == "time":
         place = model.discrete_position[output.path]

@@ -1,4 +1,4 @@
-"""Which parameter values a sweep tries: full grids, Latin hypercubes, Sobol sequences."""
+"""Parameter values of a sweep: full grids, Latin hypercubes, Sobol sequences."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from modelica_like.analyse.slopes import columns_of
 from modelica_like.analyse.sweeps.ranges import MOST_RUNS, too_many
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import LanguageError, ValueOutOfRange, extra_module
+from modelica_like.initialize.slopes import columns_of
 from modelica_like.units import Unit, to_si
 
 
@@ -52,7 +52,7 @@ class LatinHypercube:
 
     Attributes:
         count: number of runs.
-        seed: of the random numbers, so that a sweep can be repeated.
+        seed: of the random numbers, to repeat a sweep.
     """
 
     count: int
@@ -104,7 +104,7 @@ def make_plan(model: CompiledDae, over: Mapping[str, Iterable[Any]], sampling: S
         UnitError: a value has the wrong unit.
     """
     if not over:
-        raise ValueOutOfRange("A sweep goes over at least one parameter.")
+        raise ValueOutOfRange("A sweep needs at least one parameter.")
     units = {name: _unit(model, name) for name in over}
     values = {name: np.array([to_si(v, units[name], name) for v in given]) for name, given in over.items()}
     names, texts = tuple(values), tuple(str(unit) for unit in units.values())

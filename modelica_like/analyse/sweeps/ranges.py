@@ -1,4 +1,4 @@
-"""Values of a parameter as a command line gives them."""
+"""Values of a parameter on the command line."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def read_range(text: str) -> tuple[str, list[Any]]:
     """Read `load=0:0.25:26 N.m` (first, last, count) or `load=0,0.1,0.2 N.m`; the unit counts for all.
 
     Raises:
-        ValueOutOfRange: it is neither, or there are more values than any sweep has runs.
+        ValueOutOfRange: it is neither, or there are too many values.
     """
     name, values = read_assignment(text)
     numbers, _, unit = values.partition(" ")

@@ -34,14 +34,14 @@ if TYPE_CHECKING:
 _CHUNK = 25, 1000
 """Smallest and largest number of runs in a chunk."""
 _PARTS = 200
-"""Chunks of a sweep, if these are neither too small nor too large."""
+"""Number of chunks of a sweep, within the limits of the chunk size."""
 _TOLD = 3
 _WORTH_PROCESSES = 100
-"""Fewer runs are done before processes have started."""
+"""Fewer runs finish before processes have started."""
 _POINTS = 50
 
 Told = Callable[[int, int], None]
-"""Called with the number of runs that are done and that of all."""
+"""Called with the number of finished runs and of all runs."""
 
 
 def sweep(
@@ -51,38 +51,38 @@ def sweep(
     checkpoint: str | Path | None = None, progress: Told | None = None, chunk: int | None = None,
     solver: Solver = "native", **settings: Any,
 ) -> xarray.Dataset:  # fmt: skip
-    """Simulate a drive over values of its parameters; it is compiled once.
+    """Simulate a drive over values of its parameters, compiled once.
 
     Args:
         drive: a component, a netlist file or a compiled model.
         over: path of every parameter or input with its values, numbers in SI units or quantities: the full grid of
             them. With a `sampling`, the lower and the upper bound of each.
-        outputs: what to read off each run, as `sensitivities` names it: `table.s`, `max(shaft.tau)`,
+        outputs: numbers to read off each run, named as for `sensitivities`: `table.s`, `max(shaft.tau)`,
             `clutch.lock_time`, `clutch.loss_energy`, `at(motor.w, 0.1 s)`.
         sampling: `LatinHypercube(count, seed)` or `Sobol(count, seed)` instead of the grid.
         until: end time.
         parameters: other values, the same for all runs.
-        processes: how many runs go on at once on this machine, native ones in threads; by default one per core (with
-            IDAS only where there are enough runs).
+        processes: number of parallel runs on this machine, native ones in threads; by default one per core (with IDAS
+            only if there are enough runs).
         scheduler: address of a Dask scheduler (`tcp://…`), instead of this machine.
-        checkpoint: a folder (Zarr) that keeps what is done: the same sweep goes on where it was stopped.
+        checkpoint: a folder (Zarr) for finished runs: the same sweep resumes where it stopped.
         progress: called after each chunk of runs.
-        chunk: runs that a worker does at a time; by default as many as make 200 chunks, 25 to 1000.
-        solver: `native`, the compiled run-time, or `idas`. IDAS does what the run-time cannot do. For comparison it
-            does the first run, one in a hundred and those with the smallest and largest outputs once more.
+        chunk: runs that a worker does at a time; by default a 200th of all, from 25 to 1000.
+        solver: `native`, the compiled run-time, or `idas`. IDAS does the runs that fail in the run-time. For
+            comparison it repeats the first run, one in a hundred and those with the smallest and largest outputs.
         settings: further arguments of `simulate`, such as rtol, points or start.
 
     Returns:
         A dataset over the parameters (a grid) or over `sample`: the outputs with their units, and `failure`, the
-        sentence of each run that failed (empty for the others). Its attribute `solver` is what did the runs, `checked`
-        the number of those that IDAS did for comparison, and `notice` says what differs and what IDAS had to do.
+        message of each failed run (empty for the others). Its attribute `solver` names the solver, `checked` is the
+        number of runs repeated by IDAS, and `notice` lists differences and the runs left to IDAS.
 
     Raises:
         UnknownName: a name is not known.
-        ValueOutOfRange: there is nothing to vary, nothing to read, or no positive number of processes.
+        ValueOutOfRange: values, outputs or processes are missing.
         CheckpointMismatch: the checkpoint belongs to another sweep.
-        KeyboardInterrupt: it was interrupted; its note says how much is in the checkpoint.
-        WorkersLost: workers died again and again.
+        KeyboardInterrupt: the sweep was interrupted; the note says how much is in the checkpoint.
+        WorkersLost: workers died repeatedly.
     """
     model = build(drive, free=over).with_parameters(dict(parameters or {}))
     plan = make_plan(model, over, sampling)
@@ -105,7 +105,7 @@ def _chunks(plan: Plan, outputs: Sequence[str], processes: int | None, chunk: in
 
 
 def _solvable(job: Job) -> tuple[Job, str]:
-    """Return a job that IDAS does if the run-time cannot do it, and why."""
+    """Return the job, for IDAS if the run-time cannot do it, and the reason."""
     try:
         if job.settings["solver"] == "native":
             Reference(job).native()
@@ -127,15 +127,14 @@ def _check_extremes(job: Job, plan: Plan, done: Done) -> None:
 
 
 def _notices(done: Done) -> list[str]:
-    """Return what has to be said about native runs."""
+    """Return the notices about native runs."""
     told: list[str] = []
     if done.by_idas:
-        told.append(f"IDAS did {done.by_idas} of {len(done.values)} runs, which the native run-time could not do.")
+        told.append(f"IDAS did {done.by_idas} of {len(done.values)} runs, where the native run-time failed.")
     if done.differences:
         listed = [f"  run {k}: {done.differences[k]}" for k in sorted(done.differences)[:_TOLD]]
         told.append(
-            f"{len(done.differences)} of {done.checked} runs that IDAS did once more are others with it:\n"
-            + "\n".join(listed)
+            f"In {len(done.differences)} of {done.checked} repeated runs IDAS has other results:\n" + "\n".join(listed)
         )
     return told
 
@@ -153,7 +152,7 @@ def _collect(
     job: Job, plan: Plan, chunks: list[Chunk], checkpoint: str | Path | None, progress: Told | None,
     workers: Callable[..., Generator[Done]],
 ) -> Done:  # fmt: skip
-    """Have all chunks done, and keep what they give."""
+    """Do all chunks and store their results."""
     total = len(plan)
     kept = Checkpoint(checkpoint, job, plan, len(chunks[0][1])) if checkpoint is not None else None
     left = kept.left(chunks) if kept is not None else chunks
@@ -170,7 +169,7 @@ def _collect(
                 if progress is not None:
                     progress(count, total)
     except KeyboardInterrupt as error:
-        where = f"in {kept.path}: the same sweep goes on there" if kept is not None else "lost without a checkpoint"
+        where = f"in {kept.path}: the same sweep resumes there" if kept is not None else "lost without a checkpoint"
         error.add_note(f"{count} of {total} runs are {where}.")
         raise
     return kept.results() if kept is not None else found
@@ -178,7 +177,7 @@ def _collect(
 
 def _dataset(model: CompiledDae, plan: Plan, job: Job, done: Done, why: str) -> xarray.Dataset:
     failures, units = done.failures, dict(zip(job.outputs, job.units, strict=True))
-    # Not as long as the longest sentence for each of many runs.
+    # A fixed-width array would be as wide as the longest message.
     told = np.full(len(plan), "", object)
     told[list(failures)] = list(failures.values())
     data: dict[str, Any] = {

@@ -1,4 +1,4 @@
-"""Who does the runs of a sweep: threads of this process, processes of this machine, or a Dask cluster."""
+"""Workers of a sweep: threads of this process, processes of this machine, or a Dask cluster."""
 
 from __future__ import annotations
 
@@ -32,20 +32,20 @@ _PATIENCE = 10.0
 """Seconds to wait for a scheduler."""
 _PLANNED = ("until", "t0", "rtol", "atol", "points", "options")
 _AGREE = 1e3
-"""Difference between solvers, in tolerances of their steps, from which on it is told."""
+"""Difference between solvers that is reported, in tolerances of their steps."""
 ONE_IN = 100
-"""Native runs of which one is compared with IDAS."""
+"""One in so many native runs is compared with IDAS."""
 
 
 @dataclass(frozen=True)
 class Job:
-    """What every run of a sweep has in common.
+    """The common part of all runs of a sweep.
 
     Attributes:
         payload: the compiled model, pickled once.
-        identity: tells models and their values apart.
-        names: what is varied.
-        outputs: what is read off.
+        identity: hash of the model and its values.
+        names: paths of the varied parameters.
+        outputs: names of the outputs.
         units: their coherent SI units.
         settings: arguments of `simulate`.
     """
@@ -75,15 +75,15 @@ Chunk = tuple[int, Any]
 
 @dataclass
 class Done:
-    """What some runs gave.
+    """Results of some runs.
 
     Attributes:
         first: number of the first run.
         values: shape (runs, outputs).
-        failures: what went wrong, by run.
-        by_idas: number of native runs that failed, which IDAS has done again.
-        checked: number of native runs that IDAS has done for comparison.
-        differences: where it came to something else, by run.
+        failures: messages by run.
+        by_idas: number of native runs that failed and were repeated by IDAS.
+        checked: number of native runs repeated by IDAS for comparison.
+        differences: between the solvers, by run.
     """
 
     first: int
@@ -94,7 +94,7 @@ class Done:
     differences: dict[int, str] = field(default_factory=dict)
 
     def add(self, other: Done) -> None:
-        """Add what was told of others; their numbers may be texts, as JSON has them."""
+        """Add records of others; run numbers may be texts, as in JSON."""
         self.failures.update({int(k): text for k, text in other.failures.items()})
         self.differences.update({int(k): text for k, text in other.differences.items()})
         self.by_idas += other.by_idas
@@ -102,7 +102,7 @@ class Done:
 
 
 def run_chunk(job: Job, first: int, points: Any) -> Done:
-    """Do some runs one after the other; one that fails is told, not fatal."""
+    """Do some runs one after the other; a failed run is recorded, not raised."""
     reference, left = Reference(job), 0
     if job.settings["solver"] == "native":
         try:
@@ -117,17 +117,17 @@ def run_chunk(job: Job, first: int, points: Any) -> Done:
 
 
 class Reference:
-    """Runs by IDAS: those of a sweep that asks for it, and what has to be said about native ones.
+    """Runs by IDAS: those of a sweep with this solver, and checks of native runs.
 
     Args:
-        job: what the runs have in common.
+        job: the common part of all runs.
     """
 
     def __init__(self, job: Job) -> None:
         self._job, self._model = job, _model(job.payload)
         self._outputs = [read_output(self._model, name) for name in job.outputs]
         _, options = plan(self._model, **{k: v for k, v in job.settings.items() if k in _PLANNED})
-        # Of the largest value, and what counts as nothing.
+        # Relative to the largest value, and absolute.
         self._relative = _AGREE * options.rtol
         nominal = {one.path: abs(one.nominal) for one in self._model.flat_variables}
         self._absolute = np.array([_AGREE * options.atol * nominal.get(one.path, 1.0) for one in self._outputs])
@@ -138,7 +138,7 @@ class Reference:
         return NativeRuns(self._model, job.names, self._outputs, job.settings)
 
     def run(self, done: Done, k: int, point: Any) -> None:
-        """Do one run, and note what it gives."""
+        """Do one run, and record its results."""
         given = dict(zip(self._job.names, map(float, point), strict=True))
         try:
             run = simulate(self._model, parameters=given, **{**self._job.settings, "solver": "idas"})
@@ -147,7 +147,7 @@ class Reference:
             done.failures[done.first + k] = str(error)
 
     def review(self, points: Any, first: int, values: Any, refused: dict[int, str], failed: list[int]) -> Done:
-        """Do again what failed, and compare one in a hundred."""
+        """Repeat failed runs, and compare one in a hundred."""
         done = Done(first, values, {first + k: text for k, text in refused.items()}, len(failed))
         for k in failed:
             self.run(done, k, points[k])
@@ -156,7 +156,7 @@ class Reference:
         return done
 
     def compare(self, done: Done, points: Any, sample: Sequence[int]) -> None:
-        """Do runs once more by IDAS, and note where they differ."""
+        """Repeat runs with IDAS, and record differences."""
         largest = np.max(np.abs(done.values), axis=0, where=np.isfinite(done.values), initial=0.0)
         for k in sample:
             other = Done(0, np.full_like(done.values, np.nan))
@@ -170,7 +170,7 @@ class Reference:
 
     def _difference(self, native: Any, idas: Any, largest: Any) -> str:
         allowed = self._relative * np.maximum(largest, np.nan_to_num(np.abs(idas))) + self._absolute
-        # Two that do not happen are the same.
+        # Two events that do not happen are equal.
         same = (np.abs(native - idas) <= allowed) | (np.isnan(native) & np.isnan(idas))
         return ", ".join(
             f"{name} = {a:.9g} instead of {b:.9g}"
@@ -192,7 +192,7 @@ def in_this_process(job: Job, chunks: Sequence[Chunk]) -> Generator[Done]:
 
 
 def in_threads(job: Job, chunks: Sequence[Chunk], count: int) -> Generator[Done]:
-    """Do native runs in threads of this process; what IDAS has to do is done here meanwhile."""
+    """Do native runs in threads of this process, and the runs for IDAS in this one meanwhile."""
     reference, stop = Reference(job), ctypes.c_int(0)
     runs, left, waiting = reference.native(), iter(chunks), dict[Future[Any], Chunk]()
     with ThreadPoolExecutor(count) as pool:
@@ -207,15 +207,15 @@ def in_threads(job: Job, chunks: Sequence[Chunk], count: int) -> Generator[Done]
                     first, points = waiting.pop(future)
                     yield reference.review(points, first, *future.result())
         finally:
-            # Nobody waits for what they are at.
+            # Their unfinished results are not needed.
             stop.value = 1
 
 
 def in_processes(job: Job, chunks: Sequence[Chunk], count: int) -> Generator[Done]:
-    """Do the runs in processes of this machine; what a process that dies was at is done again.
+    """Do the runs in processes of this machine; the runs of a process that dies are repeated.
 
     Raises:
-        WorkersLost: processes die again and again.
+        WorkersLost: processes died repeatedly.
     """
     left = dict(chunks)
     others = set(multiprocessing.active_children())
@@ -232,7 +232,7 @@ def in_processes(job: Job, chunks: Sequence[Chunk], count: int) -> Generator[Don
             except BrokenProcessPool:
                 continue
             except (KeyboardInterrupt, GeneratorExit):
-                # Nobody waits for what they are at.
+                # Their unfinished results are not needed.
                 for process in set(multiprocessing.active_children()) - others:
                     process.terminate()
                 raise
@@ -242,14 +242,14 @@ def in_processes(job: Job, chunks: Sequence[Chunk], count: int) -> Generator[Don
         return
     raise _lost(
         left, f"worker processes of this machine died {_RESTARTS} times",
-        'If they died at their start: a script that sweeps keeps its own work behind if __name__ == "__main__":, '
-        "or says processes=1.",
+        'If they died at startup: put the work of a script under if __name__ == "__main__":, '
+        "or set processes=1.",
     )  # fmt: skip
 
 
 @contextmanager
 def _deaf() -> Iterator[None]:
-    """Ignore Ctrl-C for the moment in which processes are started: they inherit it, and are ended by this one."""
+    """Ignore Ctrl-C while processes are started: they inherit this, and this process ends them."""
     here = threading.current_thread() is threading.main_thread()
     before = signal.signal(*_DEAF) if here else None
     try:
@@ -260,18 +260,18 @@ def _deaf() -> Iterator[None]:
 
 
 def on_cluster(job: Job, chunks: Sequence[Chunk], scheduler: str) -> Generator[Done]:
-    """Do the runs on a Dask cluster; Dask itself does again what a lost worker was at.
+    """Do the runs on a Dask cluster; Dask repeats the runs of a lost worker.
 
     Raises:
         MissingExtra: Dask is not installed.
-        WorkersLost: the scheduler is not there, or gave up a part of the runs.
+        WorkersLost: there is no scheduler, or it gave up some of the runs.
     """
     dask = extra_module("distributed", "cluster", "Dask")
     try:
         client = dask.Client(scheduler, set_as_default=False, timeout=_PATIENCE)
     except (OSError, ValueError):
         raise WorkersLost(
-            f"There is no Dask scheduler at {scheduler}.", advice="Its address looks like tcp://host:8786."
+            f"There is no Dask scheduler at {scheduler}.", advice="An address looks like tcp://host:8786."
         ) from None
     with client:
         shared = client.scatter(job, broadcast=True, hash=False)
@@ -292,7 +292,7 @@ def _lost(left: dict[int, Any], why: str, hint: str = "") -> WorkersLost:
     count = sum(len(points) for points in left.values())
     return WorkersLost(
         f"{count} runs of the sweep were not done: {why}.",
-        advice=f"What was done is in the checkpoint, if there is one: start the sweep again with it. {hint}".rstrip(),
+        advice=f"Finished runs are in the checkpoint, if there is one: start the sweep again with it. {hint}".rstrip(),
     )
 
 

@@ -25,7 +25,8 @@ static Result check_knowns(Instance *c, const uint32_t *knowns, size_t n) {
         const Variable *v = known_variable(c, knowns[k], TYPE_FLOAT64);
         if (v == NULL) return RESULT_ERROR;
         if (is_start(c, v) ? v->start < 0 || v->start >= c->model->n_starts : known_slot(c->model, v) < 0)
-            return fail(c, "Derivatives by %s are not available: it is neither %s.", text_of(c->model, v->name),
+            return fail(c, "Derivatives with respect to %s are not available: it is neither %s.",
+                text_of(c->model, v->name),
                 is_start(c, v) ? "a start value, input nor parameter" : "state, input nor parameter");
     }
     return RESULT_OK;

@@ -174,7 +174,7 @@ fmi3Status fmi3ActivateModelPartition(
 /* ---- derivatives ------------------------------------------------------------------------------------------------ */
 
 /* Dependencies stand in the description, which does not announce these (providesPerElementDependencies). */
-#define SEE_DESCRIPTION "What a variable depends on is told by the description of the model."
+#define SEE_DESCRIPTION "The model description lists the dependencies of variables."
 fmi3Status fmi3GetNumberOfVariableDependencies(
     fmi3Instance instance, fmi3ValueReference valueReference, size_t *nDependencies) {
     ENTER(GetNumberOfVariableDependencies, ANY_PHASE);

@@ -315,7 +315,7 @@ Result state_read(Instance *c, const unsigned char *bytes, size_t size, void **c
     memcpy(&h, bytes, sizeof h);
     expected = header_of(c, bytes + sizeof h);
     if (memcmp(&h, &expected, sizeof h) != 0)
-        return fail(c, "These bytes are no state of this model: it is another model's, or they are damaged.");
+        return fail(c, "These bytes are not a state of this model: it is another model's, or they are damaged.");
     *copy = NULL;
     if (room_for_copy(c, copy) != RESULT_OK) return RESULT_ERROR;
     memcpy(*copy, bytes + sizeof h, copy_size(c));

@@ -132,7 +132,7 @@ Result check_step(Instance *c, double point, double size, double *target) {
     double slack = SAME_POINT * fmax(1, fabs(s->t));
     *target = point + size;
     if (!isfinite(point) || fabs(point - s->t) > slack)
-        return fail(c, "The communication point is %.12g s, but the instance stands at %.12g s.", point, s->t);
+        return fail(c, "The communication point is %.12g s, but the instance is at %.12g s.", point, s->t);
     if (!(size > 0) || !isfinite(*target)) return fail(c, "The communication step size %g s is not positive.", size);
     if (check_whole(c, size) != RESULT_OK) return RESULT_ERROR;
     if (!s->stop_time_defined || *target <= s->stop_time) return RESULT_OK;

@@ -62,7 +62,7 @@ uint32_t crc32_of(const unsigned char *bytes, size_t size) {
 static int check_header(const unsigned char *bytes, size_t size, char *message) {
     FileHeader h;
     size_t first = sizeof h + N_TABLES * sizeof(Section);
-    if (size < sizeof h) return damaged(message, "it is cut off");
+    if (size < sizeof h) return damaged(message, "it is truncated");
     memcpy(&h, bytes, sizeof h);
     if (memcmp(h.magic, "MLMODEL", 8) != 0) return damaged(message, "it is another kind of file");
     if (h.version != FORMAT || h.n_sections != N_TABLES) {
@@ -72,7 +72,7 @@ static int check_header(const unsigned char *bytes, size_t size, char *message) 
             h.version, h.n_sections, FORMAT, (int)N_TABLES);
         return 0;
     }
-    if (h.size != size || size < first) return damaged(message, "it is cut off");
+    if (h.size != size || size < first) return damaged(message, "it is truncated");
     if (h.check != crc32_of(bytes + sizeof h, size - sizeof h)) return damaged(message, "its checksum is wrong");
     return (uintptr_t)bytes % sizeof(double) == 0 || damaged(message, "it is not aligned");
 }

@@ -82,7 +82,7 @@ static Model *read_all(FILE *file, Allocate allocate, Release release, char *mes
     }
     if (fread(bytes, 1, (size_t)size, file) == (size_t)size)
         m = model_read(bytes, (size_t)size, allocate, release, message);
-    else snprintf(message, MESSAGE_LENGTH, "The model file cannot be read to its end.");
+    else snprintf(message, MESSAGE_LENGTH, "The model file cannot be read completely.");
     if (m == NULL) release(bytes);
     else m->own = bytes;
     return m;
@@ -94,7 +94,7 @@ Model *model_open(const char *location, Allocate allocate, Release release, char
     Model *m;
     if (location == NULL || *location == 0) {
         snprintf(message, MESSAGE_LENGTH,
-            "The importer does not tell where the FMU's resources are, so its model cannot be read. Export it with the "
+            "The importer does not say where the FMU's resources are, so its model cannot be read. Export it with the "
             "model compiled in (--embed).");
         return NULL;
     }

@@ -86,7 +86,7 @@ static Result check_dependent(Instance *c, const double *values) {
     for (int k = 0; k < m->n_start_dependent; k++) {
         double value = values[m->start_dependent[k].start], actual = c->work.variables[m->start_dependent[k].node];
         if (!(fabs(actual - value) <= CONSISTENT * (1 + fabs(value))))
-            return fail(c, "A start value of %.9g cannot be met: the variable follows to be %.9g.", value, actual);
+            return fail(c, "A start value of %.9g cannot be met: the variable would be %.9g.", value, actual);
     }
     return RESULT_OK;
 }
@@ -225,8 +225,7 @@ Result start_solve(Instance *c) {
         share(c);
     }
     if (round == MODE_ROUNDS)
-        return fail(
-            c, "The modes at the start do not settle: they and the start values change each other in a circle.");
+        return fail(c, "The modes at the start do not settle: they and the start values keep changing each other.");
     rest(c);
     if (solve_now(c, 0) != RESULT_OK || check_singular(c) != RESULT_OK) return RESULT_ERROR;
     if (m->settings->steady && check_modes_hold(c) != RESULT_OK) return RESULT_ERROR;

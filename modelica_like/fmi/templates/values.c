@@ -189,7 +189,7 @@ Result set_value(Instance *c, const Variable *v, double value) {
 Result set_input_rate(Instance *c, uint32_t reference, double rate) {
     const Variable *v = known_variable(c, reference, TYPE_FLOAT64);
     if (v == NULL) return RESULT_ERROR;
-    if (v->kind != KIND_INPUT) return refuse_value(c, v, "it is no input, so it has no input derivative.");
+    if (v->kind != KIND_INPUT) return refuse_value(c, v, "it is not an input, so it has no input derivative.");
     if (!isfinite(rate)) return refuse_value(c, v, "the derivative is not a finite number.");
     if (c->u_rate[v->index] == rate) return RESULT_OK;
     touch_inputs(c);

@@ -19,7 +19,8 @@ from modelica_like.language import Component
 from modelica_like.native.page import HELPERS
 from modelica_like.report.analysis import shares
 from modelica_like.report.page.curves import curves
-from modelica_like.report.run import notices, statistics_line
+from modelica_like.report.plausible import notes as plausible
+from modelica_like.report.run import notices, reasons, statistics_line
 from modelica_like.report.start import start_values
 from modelica_like.solve.energy import EnergyBalance
 from modelica_like.solve.recorder import Event
@@ -28,40 +29,40 @@ from modelica_like.writing import write_text
 
 _MOST_EVENTS = 60
 _SMALL = 1e-6
-"""Part of the energy that moves below which a component is not listed."""
+"""Share of the throughput below which a component is not listed."""
 
 
 def save_report(drive: Component, run: Solution, path: str | Path, *, show: Sequence[str] = ()) -> None:
     """Write the report of a run as a page.
 
     Args:
-        drive: what was run.
+        drive: the drive.
         run: its run.
         path: the file.
         show: patterns of the curves, such as `*.w`; by default speeds, torques and forces of the parts.
 
     Raises:
-        UnknownName: nothing fits a pattern.
+        UnknownName: nothing matches a pattern.
         OSError: the file cannot be written.
     """
     write_text(path, report(drive, run, show=show))
 
 
 def report(drive: Component, run: Solution, *, show: Sequence[str] = ()) -> str:
-    """Return the report of a run as HTML: one file that asks for nothing else.
+    """Return the report of a run as HTML: one file that loads nothing else.
 
     Args:
-        drive: what was run.
+        drive: the drive.
         run: its run.
         show: patterns of the curves; by default speeds, torques and forces of the parts.
 
     Raises:
-        UnknownName: nothing fits a pattern.
+        UnknownName: nothing matches a pattern.
     """
     folder = Path(__file__).parent
     sections = [
-        ("Schematic", f'<div class="wide">{_inline(schematic(drive))}</div>'),
-        ("What happens", _happens(run)),
+        ("Schematic", f'<div class="wide">{schematic(drive, background=False)}</div>'),
+        ("What happens", _happens(drive, run)),
         ("Curves", '<div id="curves"></div><p class="hint">Move over a curve to read it, drag to zoom, double-click to '
                    "see all.</p>"),
         ("Energy", _attempt(lambda: _energy(run.energy()))),
@@ -83,16 +84,11 @@ def report(drive: Component, run: Solution, *, show: Sequence[str] = ()) -> str:
 
 
 def _attempt(make: Callable[[], str]) -> str:
-    """A section that cannot be made says why, and the others stand."""
+    """If a section cannot be made, it shows why; the others are not affected."""
     try:
         return make()
     except ModelicaLikeError as error:
         return f"<p>{escape(str(error))}</p>"
-
-
-def _inline(svg: str) -> str:
-    """A drawing takes its colours from the page."""
-    return re.sub(r'<rect class="paper" width="[^"]*" height="[^"]*" fill="[^"]*"/>', "", svg, count=1)
 
 
 def _table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
@@ -105,31 +101,30 @@ def _table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     return f"<table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table>" if lines else ""
 
 
-def _happens(run: Solution) -> str:
-    """Events in words, those of one instant together, and what the run has to say."""
-    instants: dict[float, dict[str, list[Event]]] = {}
-    for event in run.events:
-        instants.setdefault(event.time, {}).setdefault(event.mode, []).append(event)
+def _happens(drive: Component, run: Solution) -> str:
+    """Events in words, grouped by time, and the notices of the run."""
+    instants: dict[float, dict[str, list[tuple[Event, str]]]] = {}
+    for event, why in zip(run.events, reasons(run), strict=True):
+        instants.setdefault(event.time, {}).setdefault(event.mode, []).append((event, why))
     lines = [
         f"<li><b>{time:.6g} s</b> {'; '.join(escape(_told(run, events)) for events in modes.values())}.</li>"
         for time, modes in list(instants.items())[:_MOST_EVENTS]
     ]
     lines += [f"<li>… {len(instants) - _MOST_EVENTS} more instants</li>"] if len(instants) > _MOST_EVENTS else []
-    said = "".join(f'<p class="notice">{escape(sentence)}</p>' for sentence in notices(run))
+    said = "".join(f'<p class="notice">{escape(sentence)}</p>' for sentence in (*notices(run), *plausible(drive, run)))
     return said + (f"<ul>{''.join(lines)}</ul>" if lines else "<p>No mode changes.</p>")
 
 
-def _told(run: Solution, events: Sequence[Event]) -> str:
-    """Return what becomes of a mode at an instant: `clutch becomes stuck (slip reached zero)`."""
-    component = events[0].mode.rpartition(".")[0] or run.model.name
-    known = run.model.transitions
-    reasons = dict.fromkeys("an impact" if one.transition < 0 else known[one.transition].because for one in events)
-    told = ", ".join(filter(None, reasons))
-    return f"{component} becomes {events[-1].after.replace('_', ' ')}" + (f" ({told})" if told else "")
+def _told(run: Solution, events: Sequence[tuple[Event, str]]) -> str:
+    """Return the change of a mode at an instant: `clutch becomes stuck (slip reached zero)`."""
+    last = events[-1][0]
+    component = last.mode.rpartition(".")[0] or run.model.name
+    told = ", ".join(dict.fromkeys(why for _, why in events))
+    return f"{component} becomes {last.after.replace('_', ' ')} ({told})"
 
 
 def _energy(balance: EnergyBalance) -> str:
-    """Where the energy comes from and where it goes, in J and percent of what comes in."""
+    """Energy of each part, in J and percent of the supply."""
     total = sum(max(row.source, 0.0) + max(-row.stored, 0.0) for row in balance) or 1.0
     rows = [
         (row.component or "the drive", what, value)
@@ -152,7 +147,7 @@ def _energy(balance: EnergyBalance) -> str:
 
 
 def _small_motions(run: Solution) -> str:
-    """Eigenfrequencies in the modes in which the run ends."""
+    """Natural frequencies in the modes in which the run ends."""
     modes = [mode for mode in linearize(run).modes() if mode.oscillates]
     rows = [
         (str(k), f"{mode.frequency:.4g}", f"{mode.damping:.3g}", shares(mode.stored), shares(mode.lost))

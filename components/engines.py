@@ -1,0 +1,109 @@
+"""Combustion engines by their maps."""
+
+from __future__ import annotations
+
+from components import icons
+from components.interfaces import Flange
+from components.rotors import Rotor
+from components.tabulated import Flat, Tabulated
+from modelica_like.language import (
+    Equations,
+    Events,
+    Expr,
+    Input,
+    Mode,
+    Parameter,
+    Variable,
+    absolute,
+    column,
+    cos,
+    der,
+    maximum,
+    minimum,
+    param,
+    rows,
+    signal_in,
+    var,
+)
+
+
+class CombustionEngine(Tabulated, Rotor):
+    """Engine whose torque is a map over speed and pedal, with drag, idle controller and rev limit.
+
+    The torque of combustion is that of the map times 1 + Σ a·cos(order·phi + phase), the sum over the firing orders;
+    the drag acts against it, alone while the fuel is cut. A PI controller presses the pedal to keep the speed above
+    w_idle. Above w_max the fuel is cut until the speed has fallen by w_band, and
+    below w_stall the engine stalls, until it is turned faster than w_start.
+    """
+
+    icon = icons.ENGINE
+    flange = Flange("crankshaft", free=True)
+    pedal: Input = signal_in("1", "pedal, 0 to 1", default=0.0)
+    speeds: Flat = rows(column("speed of a row", scale="w_scale", rising=True), flat=True)
+    pedals: Flat = rows(column("pedal of a column", rising=True), flat=True)
+    torque: tuple[Flat, ...] = rows(column("torque of the combustion", scale="tau_scale", min=0), more=True)
+    drag: tuple[tuple[float, float], ...] = rows(
+        column("speed", scale="w_scale", rising=True), column("drag", scale="tau_scale", min=0), default=((0.0, 0.0),)
+    )
+    orders: tuple[tuple[float, float, float], ...] = rows(
+        column("order"), column("amplitude over mean torque", min=0), column("phase in rad"), default=((1.0, 0.0, 0.0),)
+    )
+    w_scale: Parameter = param("rad/s", "speed that counts as 1 in the tables", default=1.0)
+    tau_scale: Parameter = param("N.m", "torque that counts as 1 in the tables", default=1.0)
+    J: Parameter = param("kg.m2", "moment of inertia of crankshaft and flywheel", min=0)
+    w_0: Parameter = param("rad/s", "speed from which on the drag is the full one", default=1.0, min=1e-12)
+    w_idle: Parameter = param("rad/s", "idle speed; without a value there is no idle controller", default=None, min=0)
+    k_idle: Parameter = param("s/rad", "gain of the idle controller, pedal over speed", default=0.01, min=1e-12)
+    T_idle: Parameter = param("s", "reset time of the idle controller", default=0.5, min=1e-12)
+    w_max: Parameter = param("rad/s", "speed at which the fuel is cut", default=1e6, min=0)
+    w_band: Parameter = param("rad/s", "by which the speed falls until it is given again", default=5.0, min=0)
+    w_stall: Parameter = param("rad/s", "speed below which the engine goes out", default=0.0, min=0)
+    w_start: Parameter = param("rad/s", "speed from which it runs again", default="1.2 * w_stall", min=0)
+    idle: Variable = var("1", "integral of the idle controller", default=0.0)
+    throttle: Variable = var("1", "pedal of driver or idle controller")
+    tau_combustion: Variable = var("N.m", "torque of the combustion")
+    tau_drag: Variable = var("N.m", "drag against forward rotation")
+    fuel = Mode("given", "cut", "out", description="whether there is combustion")
+
+    def idling(self) -> Equations:
+        """Yield the equations of the idle controller."""
+        driver = minimum(maximum(self.pedal, 0), 1)
+        if not self.given("w_idle"):
+            yield self.idle == 0
+            yield self.throttle == driver
+            return
+        missing = self.k_idle * (self.w_idle - self.w)
+        free = missing + self.idle
+        pressed = minimum(maximum(free, 0), 1)
+        yield self.T_idle * der(self.idle) == missing + pressed - free
+        yield self.throttle == maximum(driver, pressed)
+
+    def equations(self) -> Equations:
+        yield from super().equations()
+        yield from self.idling()
+        speed = self.w / self.w_scale
+        mean = self.tau_scale * self.look_up_map(speed, self.speeds, self.throttle, self.pedals, self.torque)
+        firing = sum((a * cos(order * self.phi + phase) for order, a, phase in self.orders), 1.0)
+        yield self.tau_combustion == self.fuel.choose(given=mean * firing, cut=0, out=0)
+        turning = maximum(minimum(self.w / self.w_0, 1), -1)
+        yield self.tau_drag == turning * self.tau_scale * self.look_up(absolute(speed), self.drag)
+        yield from self.turning(self.J, self.tau_combustion - self.tau_drag)
+
+    def events(self) -> Events:
+        fuel, w = self.fuel, self.w
+        yield fuel.initially("out", when=w < self.w_stall)
+        yield fuel.go("given", "cut", when=w > self.w_max, because="the rev limit is reached")
+        yield fuel.go("cut", "given", when=w < self.w_max - self.w_band, because="the speed is below the rev limit")
+        yield fuel.go(("given", "cut"), "out", when=w < self.w_stall, notice="stalls")
+        yield fuel.go("out", "given", when=w > self.w_start, because="the engine is turned fast enough")
+        yield from self.leaving("drag", w / self.w_scale, self.drag)
+        yield from self.leaving("speeds", w / self.w_scale, [(one,) for one in self.speeds])
+
+    def stored_energy(self) -> Expr:
+        return 0.5 * self.J * self.w_rotor**2
+
+    def loss_power(self) -> Expr:
+        return self.tau_drag * self.w
+
+    def source_power(self) -> Expr:
+        return self.tau_combustion * self.w

@@ -1,0 +1,133 @@
+"""Sampled signals for digital controllers, and noise."""
+
+from __future__ import annotations
+
+from math import pi
+
+from components import icons
+from modelica_like.language import (
+    Component,
+    Discrete,
+    Equations,
+    Events,
+    Expr,
+    Input,
+    Mode,
+    Output,
+    Parameter,
+    cos,
+    discrete,
+    floor,
+    log,
+    maximum,
+    param,
+    signal_in,
+    signal_out,
+    sqrt,
+    where,
+)
+
+_MODULUS, _FACTOR = 2147483647.0, 48271.0
+
+
+class Sampled(Component, partial=True):
+    """Signal that changes at sample times only; before the first one it is zero."""
+
+    period: Parameter = param("s", "time between two samples", min=1e-12)
+    start_time: Parameter = param("s", "time of the first sample", default=0.0)
+    y: Output = signal_out("*", "signal")
+    number: Discrete = discrete("1", "number of samples so far")
+    clock = Mode("running", description="each sample is an event")
+
+    def held(self) -> Expr:
+        """Return the value since the last sample."""
+        raise NotImplementedError
+
+    def sample(self) -> dict[Expr, Expr]:
+        """Return the changes at a sample."""
+        raise NotImplementedError
+
+    def equations(self) -> Equations:
+        yield self.y == where(self.number > 0, self.held(), 0)
+
+    def events(self) -> Events:
+        # A run may start late: then all earlier samples count as taken at once.
+        passed = floor((self.time - self.start_time) / self.period) + 1
+        taken = {self.number: maximum(self.number + 1, passed)}
+        following = self.start_time + self.number * self.period
+        yield self.clock.go("running", "running", at=following, reset={**taken, **self.sample()})
+
+
+class ZeroOrderHold(Sampled):
+    """Sample and hold: keeps the value of the signal at the last sample time.
+
+    Modelica Standard Library, Blocks.Discrete.ZeroOrderHold.
+    """
+
+    icon = icons.SCHEDULE
+    u: Input = signal_in("*", "signal")
+    last: Discrete = discrete("*", "signal at the last sample")
+
+    def held(self) -> Expr:
+        return self.last
+
+    def sample(self) -> dict[Expr, Expr]:
+        return {self.last: self.u}
+
+
+class FrequencyMeter(ZeroOrderHold):
+    """Counts per time over the last period, e.g. the speed from the pulses of a `PulseCounter`."""
+
+    icon = icons.SENSOR
+    k: Parameter = param("*", "signal for one count per second, such as an angle per pulse", default=1.0)
+    before: Discrete = discrete("*", "signal at the sample before")
+
+    def held(self) -> Expr:
+        return self.k * (self.last - self.before) / self.period
+
+    def sample(self) -> dict[Expr, Expr]:
+        return {self.last: self.u, self.before: self.last}
+
+
+class Noise(Sampled, partial=True):
+    """Random numbers that are the same in every run with the same seed.
+
+    They come from the generator x = 48271·x mod (2^31 - 1) of S. K. Park, K. W. Miller and P. K. Stockmeyer
+    (Communications of the ACM 36, 1993), `minstd_rand` of C++, which is exact in floating point.
+    """
+
+    icon = icons.NOISE
+    seed: Parameter = param("1", "whole number that begins the sequence", default=1.0, min=1, max=_MODULUS - 1)
+    state: Discrete = discrete("1", "state of the generator", start="seed")
+
+    def next_state(self, state: Expr) -> Expr:
+        """Return the next state of the generator."""
+        product = _FACTOR * state
+        return product - _MODULUS * floor(product / _MODULUS)
+
+
+class UniformNoise(Noise):
+    """Random signal between two limits, each value as probable as the others."""
+
+    y_max: Parameter = param("*", "upper limit", default=1.0)
+    y_min: Parameter = param("*", "lower limit", default=0.0)
+
+    def held(self) -> Expr:
+        return self.y_min + (self.y_max - self.y_min) * self.state / _MODULUS
+
+    def sample(self) -> dict[Expr, Expr]:
+        return {self.state: self.next_state(self.state)}
+
+
+class NormalNoise(Noise):
+    """Random signal of normal distribution, by the transformation of G. E. P. Box and M. E. Muller."""
+
+    sigma: Parameter = param("*", "standard deviation", default=1.0)
+    mu: Parameter = param("*", "mean", default=0.0)
+
+    def held(self) -> Expr:
+        radius = sqrt(-2 * log(self.state / _MODULUS))
+        return self.mu + self.sigma * radius * cos(2 * pi * self.next_state(self.state) / _MODULUS)
+
+    def sample(self) -> dict[Expr, Expr]:
+        return {self.state: self.next_state(self.next_state(self.state))}

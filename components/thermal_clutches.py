@@ -1,0 +1,90 @@
+"""Friction clutches with temperature of the plates, fading friction and wear (VDI 2241)."""
+
+from __future__ import annotations
+
+from components import icons
+from components.friction import Clutch, Rows
+from modelica_like.language import (
+    Equations,
+    Events,
+    Expr,
+    Output,
+    Parameter,
+    Variable,
+    column,
+    der,
+    param,
+    rows,
+    signal_out,
+    var,
+)
+
+_NONE = ((0.0, 1.0),)
+
+
+class ThermalClutch(Clutch):
+    """Friction clutch whose plates store the friction work as heat and release it to the air or the heat port.
+
+    C·der(T) = P - G·(T - T_air). The coefficient of friction of a `Clutch` is multiplied by mu_T over the temperature
+    (fading) and by mu_p over the surface pressure p_max·f_normalized. Wear is in proportion to the friction work:
+    its depth is wear_rate·W/A (VDI 2241: Schaltbare fremdbetätigte Reibkupplungen und -bremsen). The heat in the plates
+    counts as lost unless a heat port is connected. The design check `clutch_heat` gives the limits per engagement and
+    per hour.
+    """
+
+    icon = icons.THERMAL_CLUTCH
+    C: Parameter = param("J/K", "heat capacity of the plates", min=1e-12)
+    G: Parameter = param("W/K", "conductance to the air, or to what is at the heat port", default=0.0, min=0)
+    T_air: Parameter = param("K", "temperature of the air without a heat port", default=293.15, min=0)
+    mu_T: Rows = rows(
+        column("temperature", scale="T_scale", rising=True),
+        column("factor of the coefficient of friction", min=0),
+        default=_NONE,
+    )
+    p_max: Parameter = param("Pa", "surface pressure at f_normalized = 1", default=1e6, min=1e-12)
+    mu_p: Rows = rows(
+        column("surface pressure", scale="p_scale", rising=True), column("factor of the coefficient", min=0),
+        default=_NONE,
+    )  # fmt: skip
+    T_scale: Parameter = param("K", "temperature that counts as 1 in mu_T", default=1.0)
+    p_scale: Parameter = param("Pa", "pressure that counts as 1 in mu_p", default=1.0)
+    A: Parameter = param("m2", "area of all friction surfaces", default=1.0, min=1e-12)
+    wear_rate: Parameter = param("m3/J", "volume that wears off per friction work", default=0.0, min=0)
+    T: Variable = var("K", "temperature of the plates", nominal=300.0, default="T_air", guess=293.15)
+    W: Variable = var("J", "friction work since the start", nominal=1000.0, default=0)
+    wear: Output = signal_out("m", "depth that has worn off all surfaces together")
+
+    @property
+    def pressure(self) -> Expr:
+        """Surface pressure as mu_p counts it."""
+        return self.p_max * self.f_normalized / self.p_scale
+
+    @property
+    def fade(self) -> Expr | float:
+        """Factor of the coefficient of friction."""
+        return self.look_up(self.T / self.T_scale, self.mu_T) * self.look_up(self.pressure, self.mu_p)
+
+    @property
+    def cooling(self) -> Expr:
+        """Heat flow from the plates."""
+        return self.G * (self.T - (self.heat_port.T if self.heat_port.used else self.T_air))
+
+    def sliding_friction(self, speed: Expr | float) -> Expr:
+        return (super().sliding_friction(speed) - self.tau_drag) * self.fade + self.tau_drag
+
+    def heat(self) -> Expr:
+        return self.cooling
+
+    def equations(self) -> Equations:
+        yield from super().equations()
+        yield self.C * der(self.T) == self.dissipation() - self.cooling
+        yield der(self.W) == self.dissipation()
+        yield self.wear == self.wear_rate * self.W / self.A
+
+    def measured(self) -> Events:
+        yield from super().measured()
+        yield from self.leaving("mu_T", self.T / self.T_scale, self.mu_T)
+        yield from self.leaving("mu_p", self.pressure, self.mu_p)
+
+    def stored_energy(self) -> Expr | float:
+        return self.C * (self.T - self.T_air) if self.heat_port.used else 0.0

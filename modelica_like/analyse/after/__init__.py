@@ -1,0 +1,1 @@
+"""What is read off a run afterwards: load spectra, damage, duty, orders, step responses."""

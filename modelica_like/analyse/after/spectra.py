@@ -1,0 +1,202 @@
+"""Load spectra: cycles counted in a trajectory, damage by a Wöhler line, and what each gear has to bear."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from modelica_like.compile.compiled import Vector
+from modelica_like.errors import ValueOutOfRange, extra_module
+from modelica_like.solve.style import COLOURS, picture, with_unit
+from modelica_like.solve.trajectories import Trajectories
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True)
+class WoehlerLine:
+    """Cycles that a part survives, over the amplitude of its load: N = cycles·(amplitude/load)^slope.
+
+    Attributes:
+        amplitude: at the knee, in the SI unit of the load.
+        cycles: at the knee.
+        slope: exponent above the knee.
+        below: what counts below it: the same slope (`elementary`), that of E. Haibach, 2·slope - 1 (`haibach`), or
+            nothing (`original`).
+    """
+
+    amplitude: float
+    cycles: float
+    slope: float
+    below: Literal["elementary", "haibach", "original"] = "elementary"
+
+    def __post_init__(self) -> None:
+        if min(self.amplitude, self.cycles, self.slope) <= 0:
+            raise ValueOutOfRange(f"Amplitude, cycles and slope of a Wöhler line must be above zero, not {self}.")
+
+    def life(self, amplitudes: Any) -> Vector:
+        """Return the cycles that it survives at amplitudes; infinite where they do no damage."""
+        share = np.abs(np.asarray(amplitudes, float)) / self.amplitude
+        slope = {"elementary": self.slope, "haibach": 2 * self.slope - 1, "original": np.inf}[self.below]
+        with np.errstate(divide="ignore", over="ignore"):
+            return self.cycles * np.where(share >= 1, share**-self.slope, share**-slope)
+
+    def damage(self, amplitudes: Any, counts: Any) -> float:
+        """Return the damage sum of A. Palmgren and M. A. Miner; at 1 the part fails."""
+        return float(np.sum(np.asarray(counts) / self.life(amplitudes)))
+
+
+@dataclass(frozen=True, eq=False)
+class LoadSpectrum:
+    """Cycles of a load, the largest first.
+
+    Attributes:
+        name: path of the load.
+        unit: its SI unit.
+        amplitudes: half of the ranges, shape (cycles,).
+        means: shape (cycles,).
+        counts: 1 for a closed cycle, 0.5 for half of one, times the number of repetitions; shape (cycles,).
+    """
+
+    name: str
+    unit: str
+    amplitudes: Vector = field(repr=False)
+    means: Vector = field(repr=False)
+    counts: Vector = field(repr=False)
+
+    def __mul__(self, times: float) -> LoadSpectrum:
+        """Return the spectrum of so many repetitions."""
+        return LoadSpectrum(self.name, self.unit, self.amplitudes, self.means, self.counts * times)
+
+    def damage(self, line: WoehlerLine, mean_sensitivity: float = 0.0) -> float:
+        """Return the damage sum by a Wöhler line for a mean of zero.
+
+        Args:
+            line: amplitudes in the unit of the load.
+            mean_sensitivity: M of W. Schütz: a mean counts as M·mean more amplitude.
+        """
+        return line.damage(np.maximum(self.amplitudes + mean_sensitivity * self.means, 0.0), self.counts)
+
+    def equivalent(self, slope: float, cycles: float) -> float:
+        """Return the amplitude that does the same damage in so many cycles."""
+        return float((np.sum(self.counts * self.amplitudes**slope) / cycles) ** (1 / slope))
+
+    def plot(self) -> Figure:
+        """Draw amplitudes over the number of cycles that exceed them."""
+        with picture(f"Load spectrum of {self.name}", 1, 3.2) as (figure, (axes,)):
+            above = np.concatenate([self.counts[:1] / 2, np.cumsum(self.counts)])
+            axes.step(above, np.concatenate([self.amplitudes[:1], self.amplitudes]), color=COLOURS[0])
+            axes.set(xscale="log", xlabel="cumulative cycles", ylabel=with_unit("amplitude", self.unit), ylim=(0, None))
+        return figure
+
+    def __str__(self) -> str:
+        largest = f", amplitudes up to {self.amplitudes[0]:.5g} {self.unit}" if len(self.amplitudes) else ""
+        return f"Load spectrum of {self.name}: {np.sum(self.counts):g} cycles{largest}"
+
+
+def load_spectrum(run: Trajectories, load: str) -> LoadSpectrum:
+    """Count the cycles of a load by rainflow counting (ASTM E1049-85), with what is left over as half cycles.
+
+    Turning points are those of the results: a run with more `points` finds peaks more sharply.
+
+    Args:
+        run: a run.
+        load: path of a torque, force or stress.
+
+    Raises:
+        MissingExtra: the package rainflow is not installed.
+        UnknownName: there is no such variable.
+    """
+    rainflow = extra_module("rainflow", "analyse")
+    found = sorted(rainflow.extract_cycles(run[load].tolist()), key=lambda cycle: -cycle[0])
+    table = np.array([cycle[:3] for cycle in found], float).reshape(-1, 3)
+    return LoadSpectrum(run.path(load), _unit(run, load), table[:, 0] / 2, table[:, 1], table[:, 2])
+
+
+@dataclass(frozen=True, eq=False)
+class Duty:
+    """How long and how often a shaft turns under which torque, in each gear.
+
+    Attributes:
+        torque: path of the torque.
+        gears: values of the gear, or names of the mode.
+        torques: largest torque of each class in N.m, shape (classes,).
+        times: in s, shape (gears, classes).
+        revolutions: shape (gears, classes).
+        work: in J, shape (gears, classes).
+    """
+
+    torque: str
+    gears: tuple[str, ...]
+    torques: Vector = field(repr=False)
+    times: Vector = field(repr=False)
+    revolutions: Vector = field(repr=False)
+    work: Vector = field(repr=False)
+
+    def damage(self, line: WoehlerLine) -> dict[str, float]:
+        """Return the damage sum of each gear, if each revolution is a cycle of its torque, as for a tooth."""
+        return {gear: line.damage(self.torques, n) for gear, n in zip(self.gears, self.revolutions, strict=True)}
+
+    def equivalent(self, slope: float) -> dict[str, float]:
+        """Return the torque of each gear in N.m that does the same damage in as many revolutions."""
+        total = np.maximum(self.revolutions.sum(axis=1), np.finfo(float).tiny)
+        same = (np.sum(self.revolutions * self.torques**slope, axis=1) / total) ** (1 / slope)
+        return dict(zip(self.gears, same.tolist(), strict=True))
+
+    def __str__(self) -> str:
+        lines = [f"Duty of {self.torque}"]
+        for k, gear in enumerate(self.gears):
+            most = self.torques[np.flatnonzero(self.times[k])].max(initial=0.0)
+            lines.append(
+                f"  {gear}: {self.times[k].sum():.5g} s, {self.revolutions[k].sum():.5g} revolutions, "
+                f"{self.work[k].sum() / 1e3:.5g} kJ, up to {most:.4g} N.m"
+            )
+        return "\n".join(lines)
+
+
+def duty(run: Trajectories, torque: str, speed: str, gear: str = "", classes: int = 16) -> Duty:
+    """Sort a run by gear and torque, as gears are designed by: so many revolutions under so much torque.
+
+    Args:
+        run: a run.
+        torque: path of the torque in a shaft; its size counts.
+        speed: path of the speed of that shaft.
+        gear: path of a mode or of a signal that says which gear is engaged; without one there is one gear.
+        classes: number of classes of torque, of equal width.
+
+    Raises:
+        ValueOutOfRange: there is no class.
+        UnknownName: there is no such variable.
+    """
+    if classes < 1:
+        raise ValueOutOfRange(f"A duty needs at least one class of torque, not {classes}.")
+    widths = np.diff(run.time)
+    size, turning, power = np.abs(run[torque]), np.abs(run[speed]), run[torque] * run[speed]
+    middle = [(values[1:] + values[:-1]) / 2 for values in (size, turning, power)]
+    top = float(middle[0].max(initial=0.0)) or 1.0
+    which = np.minimum((middle[0] / top * classes).astype(int), classes - 1)
+    # Between two results the gear is that of the first one: at an event both sides are in the results.
+    engaged = run[gear][:-1] if gear else np.zeros(len(widths))
+    values, row = np.unique(engaged, return_inverse=True)
+
+    def sorted_by(weights: Vector) -> Vector:
+        made = np.zeros((len(values), classes))
+        np.add.at(made, (row, which), weights * widths)
+        return made
+
+    torques = top * np.arange(1, classes + 1) / classes
+    return Duty(run.path(torque), _gears(run, gear, values), torques, sorted_by(np.ones(len(widths))),
+                sorted_by(middle[1] / (2 * np.pi)), sorted_by(middle[2]))  # fmt: skip
+
+
+def _unit(run: Trajectories, path: str) -> str:
+    named = {one.path: str(one.unit) for one in (*run.model.flat_variables, *run.model.flat_discretes)}
+    return named.get(run.path(path), "1")
+
+
+def _gears(run: Trajectories, gear: str, values: Vector) -> tuple[str, ...]:
+    names = {one.path: one.names for one in run.model.flat_discretes}.get(run.path(gear), ()) if gear else ()
+    return tuple(names[int(value)] if names else f"gear {value:g}" if gear else "all" for value in values)

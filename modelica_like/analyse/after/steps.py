@@ -1,0 +1,95 @@
+"""Step responses in numbers: rise, overshoot, settling."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from modelica_like.errors import ValueOutOfRange
+from modelica_like.solve.trajectories import Trajectories
+
+_ROUNDING = 1e-9
+
+
+@dataclass(frozen=True)
+class StepMetrics:
+    """How a variable gets from one value to another; times count from the step.
+
+    Attributes:
+        name: path of the variable.
+        begin: value at the step.
+        end: value that it settles at.
+        rise_time: from 10 % to 90 % of the way, in s.
+        overshoot: how far it goes beyond its end, over the way.
+        peak_time: when it is farthest on its way, in s.
+        settling_time: after which it keeps within the band around its end, in s.
+        band: half of the band over the way.
+    """
+
+    name: str
+    begin: float
+    end: float
+    rise_time: float
+    overshoot: float
+    peak_time: float
+    settling_time: float
+    band: float
+
+    def __str__(self) -> str:
+        over = f"overshoot {100 * self.overshoot:.3g} % at {self.peak_time:.4g} s" if self.overshoot else "no overshoot"
+        settled = f"within {100 * self.band:g} % after {self.settling_time:.4g} s"
+        return f"{self.name}: {self.begin:.5g} to {self.end:.5g}, rise {self.rise_time:.4g} s, {over}, {settled}"
+
+
+def step_metrics(
+    run: Trajectories, variable: str, *, start: float = 0.0, until: float = np.inf, end: float | None = None,
+    band: float = 0.02,
+) -> StepMetrics:  # fmt: skip
+    """Measure a step response; between results it is a straight line.
+
+    Args:
+        run: a run.
+        variable: path of what responds.
+        start: time of the step in s.
+        until: time after which the run does not count.
+        end: value that it settles at; by default its last one.
+        band: half of the band in which it has settled, over the way from begin to end.
+
+    Raises:
+        ValueOutOfRange: it goes nowhere, does not get there, or does not settle.
+        UnknownName: there is no such variable.
+    """
+    kept = (run.time >= start) & (run.time <= until)
+    time, values = run.time[kept] - start, run[variable][kept]
+    if len(time) < 2:
+        raise ValueOutOfRange(f"The run has no results between {start:g} s and {until:g} s.")
+    begin = float(values[0])
+    way = (float(values[-1]) if end is None else end) - begin
+    if not way:
+        raise ValueOutOfRange(f"{variable} ends where it begins, at {begin:g}: this is no step response.")
+    share = (values - begin) / way
+
+    def reached(level: float) -> float:
+        after = int(np.argmax(share >= level))
+        if share[after] < level:
+            raise ValueOutOfRange(f"{variable} does not get {100 * level:g} % of its way to {begin + way:g}.")
+        return float(_crossing(time, share, after, level)) if after else 0.0
+
+    outside = np.flatnonzero(np.abs(share - 1) > band)
+    last = int(outside[-1]) + 1 if len(outside) else 0
+    if last == len(time):
+        raise ValueOutOfRange(f"{variable} does not settle within {100 * band:g} % of its way.")
+    settled = _crossing(time, np.abs(share - 1), last, band) if last else 0.0
+    peak = int(np.argmax(share))
+    over = float(share[peak]) - 1
+    return StepMetrics(
+        run.path(variable), begin, begin + way, reached(0.9) - reached(0.1), over if over > _ROUNDING else 0.0,
+        float(time[peak]), float(settled), band,
+    )  # fmt: skip
+
+
+def _crossing(time: np.ndarray, values: np.ndarray, after: int, level: float) -> float:
+    """Return when a straight line between two results meets a level."""
+    before = after - 1
+    return time[before] + (level - values[before]) / (values[after] - values[before]) * (time[after] - time[before])

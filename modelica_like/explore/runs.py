@@ -1,0 +1,146 @@
+"""Requests of the page: runs with other values, their sensitivities, and files."""
+
+from __future__ import annotations
+
+import copy
+import threading
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from modelica_like.analyse.sensitivity.derivatives import sensitivities
+from modelica_like.compile.compiled import CompiledDae, Vector
+from modelica_like.errors import ModelicaLikeError
+from modelica_like.fmi.export import export_fmu
+from modelica_like.language import Assembly
+from modelica_like.native.buffers import Buffers
+from modelica_like.native.library import OK
+from modelica_like.native.model import Instance
+from modelica_like.netlist import save
+from modelica_like.report.page import save_report
+from modelica_like.simulation import build, simulate
+from modelica_like.solve.options import Options
+
+_MOST_BARS = 12
+FILES = {"netlist": ".toml", "FMU": ".fmu", "report": ".html"}
+"""What can be saved, with the endings."""
+
+
+class Runs:
+    """Runs of one drive with other values.
+
+    Args:
+        drive: the drive.
+        model: the same, compiled.
+        options: tolerances and number of results.
+    """
+
+    def __init__(self, drive: Assembly, model: CompiledDae, options: Options) -> None:
+        self._drive, self._model, self._options = drive, model, options
+        self._instance = Instance(model)
+        self.references = {name: one.reference for name, one in self._instance.native.variables.items()}
+        self._names = {reference: name for name, reference in self.references.items()}
+        self._newest, self._one_at_a_time = 0, threading.Lock()
+
+    def run(
+        self, turn: int, values: Sequence[tuple[int, float]], references: Sequence[int], until: float
+    ) -> tuple[dict[str, Any], list[Vector]] | None:
+        """Run the drive.
+
+        Args:
+            turn: number of the request; a run that is not the newest one stops.
+            values: value references of parameters and inputs, with what they are, in SI units.
+            references: value references of the requested outputs.
+            until: end time in s.
+
+        Returns:
+            Counts and a message if the run did not finish; times, outputs and events as rows. None: a newer run is
+            requested.
+        """
+        self._newest = max(turn, self._newest)
+        with self._one_at_a_time:
+            if turn < self._newest:
+                return None
+            instance, widths = self._instance, {"times": 1, "outputs": len(references), "events": 7}
+            try:
+                self._begin(values, until)
+            except ModelicaLikeError as error:
+                return self._about(self._said(error, values)), [np.zeros(0)] * 3
+            written = Buffers(instance, until, self._options.points, widths, references)
+            code = written.go(lambda _: turn >= self._newest and written.run.n_events <= self._options.max_events)
+            if turn < self._newest:
+                return None
+            message = instance.library.message(instance.address).decode() if code != OK else ""
+            return self._about(message), [written[name] for name in ("times", "outputs", "events")]
+
+    def _begin(self, values: Sequence[tuple[int, float]], until: float) -> None:
+        instance = self._instance
+        references, numbers = (np.array([one[k] for one in values], kind) for k, kind in ((0, np.uint32), (1, float)))
+        instance.reset(0.0, until, self._options.rtol, self._options.atol)
+        place = references.ctypes.data, numbers.ctypes.data
+        instance.check(instance.library.set(instance.address, len(values), *place))
+        instance.check(instance.library.begin(instance.address))
+
+    def _about(self, message: str) -> dict[str, Any]:
+        return {"message": message, "steps": self._instance.counts()[0]}
+
+    def _said(self, error: ModelicaLikeError, values: Sequence[tuple[int, float]]) -> str:
+        """The message of a netlist with these values is better than that of the run-time."""
+        try:
+            build(self.changed(values))
+        except ModelicaLikeError as told:
+            error = told
+        return f"{error.what} {error.advice}".strip()
+
+    def changed(self, values: Sequence[tuple[int, float]]) -> Assembly:
+        """Return the drive with other values of parameters.
+
+        Raises:
+            ModelicaLikeError: a value is out of range.
+        """
+        drive = copy.deepcopy(self._drive)
+        for reference, value in values:
+            drive.set(self._names[reference], value)
+        return drive
+
+    def ranking(self, values: Sequence[tuple[int, float]], until: float, output: str) -> list[tuple[str, float]]:
+        """Return by what percentage the final value of an output changes with one percent of each parameter.
+
+        Raises:
+            NoGradient, ModelicaLikeError: there are no derivatives.
+        """
+        given = {self._names[reference]: value for reference, value in values}
+        found = sensitivities(self._model, [output], until=until, parameters=given)
+        rows = [(one.name, relative) for one, _, relative in found.ranking(output) if np.isfinite(relative)]
+        return [row for row in rows if row[1]][:_MOST_BARS]
+
+    def save(self, what: str, values: Sequence[tuple[int, float]], until: float, folder: Path) -> Path:
+        """Write the changed drive into a folder, without overwriting files.
+
+        Args:
+            what: one of `FILES`.
+            values: of parameters.
+            until: end time of the report in s.
+            folder: for the file.
+
+        Raises:
+            ModelicaLikeError: the values are wrong, or it cannot be run or exported.
+            OSError: it cannot be written.
+        """
+        drive, ending = self.changed(values), FILES[what]
+        names = (f"{self._model.name}_explored{number or ''}{ending}" for number in range(10_000))
+        path = next(folder / name for name in names if not (folder / name).exists())
+        if what == "netlist":
+            save(drive, path)
+        elif what == "FMU":
+            export_fmu(drive, path)
+        else:
+            save_report(drive, simulate(drive, until), path)
+        return path
+
+
+def pairs(asked: Mapping[str, Any]) -> list[tuple[int, float]]:
+    """Return the values of a request."""
+    return [(int(reference), float(value)) for reference, value in asked["values"]]

@@ -1,0 +1,176 @@
+"""A page on the loopback interface that runs a drive here, in this process."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import secrets
+import webbrowser
+from collections.abc import Mapping, Sequence
+from http import HTTPStatus
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+from typing import Any, ClassVar
+from urllib.parse import parse_qs, urlsplit
+
+import numpy as np
+
+from modelica_like.draw import schematic
+from modelica_like.errors import ModelicaLikeError
+from modelica_like.explore.runs import FILES, Runs, pairs
+from modelica_like.language import Assembly
+from modelica_like.native.page import page, page_content
+from modelica_like.netlist import load
+from modelica_like.simulation import build, seconds, simulate
+from modelica_like.solve.plot import chosen
+
+_LARGEST = 1_000_000
+"""Bytes of a request."""
+
+
+def explore(
+    drive: Assembly | str | Path, until: float | str | None = None, *, show: Sequence[str] = (),
+    folder: str | Path = ".",
+) -> None:  # fmt: skip
+    """Show a drive in the browser, with sliders for its parameters, until Ctrl-C.
+
+    Args:
+        drive: an assembly or a netlist file.
+        until: end time, a number in s or a quantity; by default that of the netlist.
+        show: patterns of the first curves, such as `*.w`; by default speeds, torques and forces of the parts.
+        folder: for netlists, FMUs and reports saved by the page.
+
+    Raises:
+        UnknownName: nothing matches a pattern.
+        ModelicaLikeError: the drive has an error, or cannot be simulated.
+    """
+    with Explorer(drive, until, show=show, folder=folder) as explorer:
+        explorer.show()
+
+
+class Explorer(ThreadingHTTPServer):
+    """Serves the page of one drive to this machine only.
+
+    Args:
+        drive, until, show, folder: as of `explore`.
+
+    Raises:
+        ModelicaLikeError: as `explore`.
+
+    Attributes:
+        address: of the page, with a secret that every request needs.
+    """
+
+    daemon_threads = True
+
+    def __init__(
+        self, drive: Assembly | str | Path, until: float | str | None = None, *, show: Sequence[str] = (),
+        folder: str | Path = ".",
+    ) -> None:  # fmt: skip
+        assembly = drive if isinstance(drive, Assembly) else load(drive)
+        model = build(assembly)
+        end = until if until is not None else model.settings.get("until")
+        run = simulate(model, end)
+        self.runs, self.folder, self.token = Runs(assembly, model, run.options), Path(folder), secrets.token_urlsafe(16)
+        content = page_content(model, chosen(run, show), seconds(end), run.options) | {"token": self.token}
+        self.page = page(
+            model.name, str(assembly.description), content, Path(__file__).parent / "explore.js", connect="'self'",
+            schematic=f'<div id="schematic">{schematic(assembly, background=False)}</div>', more=_BELOW,
+        ).encode()  # fmt: skip
+        super().__init__(("127.0.0.1", 0), _Handler)
+        self.address = f"http://{self.host}/?token={self.token}"
+
+    def show(self, *, browser: bool = True) -> None:
+        """Serve until Ctrl-C, the normal end.
+
+        Args:
+            browser: open the page.
+        """
+        if browser:
+            webbrowser.open(self.address)
+        with contextlib.suppress(KeyboardInterrupt):
+            self.serve_forever()
+
+    @property
+    def host(self) -> str:
+        """Name and port, as a browser names them."""
+        return f"127.0.0.1:{self.server_address[1]}"
+
+
+_BUTTONS = " ".join(f'<button value="{what}">{what}</button>' for what in FILES)
+_BELOW = f"""
+<div id="files">Save as {_BUTTONS} <span id="saved"></span></div>
+<details id="bars"><summary>What decides the final value of <select aria-label="final value of"></select></summary>
+<table></table></details>"""
+
+
+class _Handler(BaseHTTPRequestHandler):
+    server: Explorer  # pyright: ignore[reportIncompatibleVariableOverride]
+    protocol_version = "HTTP/1.1"
+    disable_nagle_algorithm = True
+    _kinds: ClassVar = {"/run": "_run", "/ranking": "_ranking", "/save": "_save"}
+
+    def do_GET(self) -> None:
+        asked = urlsplit(self.path)
+        if not self._known(parse_qs(asked.query).get("token", [""])[0]):
+            return
+        if asked.path == "/":
+            self._answer(HTTPStatus.OK, self.server.page, "text/html; charset=utf-8")
+        else:
+            self._answer(HTTPStatus.NOT_FOUND, b"There is nothing here.")
+
+    def do_POST(self) -> None:
+        size = self.headers.get("Content-Length", "")
+        if not self._known(self.headers.get("X-Token", "")):
+            return
+        if self.path not in self._kinds or not size.isdecimal() or int(size) > _LARGEST:
+            self._answer(HTTPStatus.NOT_FOUND, b"There is nothing here.")
+            return
+        try:
+            getattr(self, self._kinds[self.path])(json.loads(self.rfile.read(int(size))))
+        except (ModelicaLikeError, OSError) as error:
+            self._answer(HTTPStatus.UNPROCESSABLE_ENTITY, str(error).encode())
+        except (KeyError, TypeError, ValueError) as error:
+            self._answer(HTTPStatus.BAD_REQUEST, f"The request is wrong: {error!r}.".encode())
+
+    def _known(self, token: str) -> bool:
+        """Another site can neither name this host nor know the token."""
+        right = secrets.compare_digest(token.encode(), self.server.token.encode())
+        if right and self.headers.get("Host") == self.server.host:
+            return True
+        self.close_connection = True
+        self._answer(HTTPStatus.FORBIDDEN, b"Open the address that the command has printed.")
+        return False
+
+    def _run(self, asked: Mapping[str, Any]) -> None:
+        references = [int(one) for one in asked["references"]]
+        found = self.server.runs.run(int(asked["turn"]), pairs(asked), references, float(asked["until"]))
+        if found is None:
+            self._answer(HTTPStatus.NO_CONTENT, b"")
+            return
+        about, arrays = found
+        head = json.dumps(about | {"sizes": [one.size for one in arrays]}).encode()
+        head += b" " * (-len(head) % 8)
+        parts = [np.array([len(head)], "<i8"), *(np.asarray(one, "<f8") for one in arrays)]
+        self._answer(HTTPStatus.OK, b"".join((parts[0].tobytes(), head, *(one.tobytes() for one in parts[1:]))))
+
+    def _ranking(self, asked: Mapping[str, Any]) -> None:
+        rows = self.server.runs.ranking(pairs(asked), float(asked["until"]), str(asked["output"]))
+        self._answer(HTTPStatus.OK, json.dumps(rows).encode(), "application/json")
+
+    def _save(self, asked: Mapping[str, Any]) -> None:
+        path = self.server.runs.save(str(asked["what"]), pairs(asked), float(asked["until"]), self.server.folder)
+        self._answer(HTTPStatus.OK, str(path).encode())
+
+    def _answer(self, code: HTTPStatus, body: bytes, kind: str = "application/octet-stream") -> None:
+        self.send_response(code)
+        for name, value in (
+            ("Content-Type", kind), ("Content-Length", str(len(body))), ("Cache-Control", "no-store"),
+            ("X-Content-Type-Options", "nosniff"), ("Referrer-Policy", "no-referrer"),
+        ):  # fmt: skip
+            self.send_header(name, value)
+        self.end_headers()
+        self.wfile.write(body)
+
+    def log_message(self, format: str, *args: Any) -> None:
+        """Requests are not worth a line."""

@@ -1,0 +1,178 @@
+"""The page that runs a drive on this machine: what it answers, whom, and how soon."""
+
+import contextlib
+import http.client
+import json
+import statistics
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from modelica_like import load, run_fmu, sensitivities, simulate
+from modelica_like.explore import Explorer
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+DRIVES = {"machine_table_direct": "table_mass", "machine_tool_startup": "J2.J"}
+# Move a slider, and wait until its picture stands there; the time in ms that this took.
+MOVE = """(async (name, place) => {
+  const field = [...document.querySelectorAll('input[type="range"]')].find((one) => one.ariaLabel === name);
+  const status = document.getElementById("status"), before = status.dataset.turn, begin = performance.now();
+  field.value = place;
+  field.dispatchEvent(new Event("input"));
+  while (status.dataset.turn === before) await new Promise(requestAnimationFrame);
+  return performance.now() - begin;
+})"""
+WAIT = """(async (find) => {
+  for (let k = 0; k < 500 && !find(); k++) await new Promise((go) => setTimeout(go, 20));
+  return find();
+})"""
+BARS = """((name) => {
+  const select = document.querySelector("#bars select");
+  select.value = name;
+  select.onchange();
+})"""
+
+
+@contextlib.contextmanager
+def served(name: str, folder: Path) -> Iterator[Explorer]:
+    with Explorer(EXAMPLES / f"{name}.toml", folder=folder) as explorer:
+        thread = threading.Thread(target=explorer.serve_forever, kwargs={"poll_interval": 0.02})
+        thread.start()
+        try:
+            yield explorer
+        finally:
+            explorer.shutdown()
+            thread.join()
+
+
+@pytest.fixture
+def explorer(tmp_path: Path) -> Iterator[Explorer]:
+    with served("machine_tool_startup", tmp_path) as made:
+        yield made
+
+
+def ask(
+    explorer: Explorer, path: str, content: Any = None, *, token: str | None = None, host: str = ""
+) -> tuple[int, bytes]:
+    headers = {"X-Token": explorer.token if token is None else token, "Host": host or explorer.host}
+    with contextlib.closing(http.client.HTTPConnection(explorer.host, timeout=60)) as connection:
+        if content is None:
+            connection.request("GET", path, headers=headers)
+        else:
+            connection.request("POST", path, content if isinstance(content, str) else json.dumps(content), headers)
+        answer = connection.getresponse()
+        return answer.status, answer.read()
+
+
+def request(explorer: Explorer, names: list[str], until: float = 1.0, turn: int = 1, **values: float) -> dict[str, Any]:
+    known = explorer.runs.references
+    return {
+        "turn": turn, "until": until, "references": [known[name] for name in names],
+        "values": [[known[name.replace("__", ".")], value] for name, value in values.items()],
+    }  # fmt: skip
+
+
+def read(body: bytes) -> tuple[dict[str, Any], list[np.ndarray]]:
+    length = int(np.frombuffer(body, "<i8", 1)[0])
+    about = json.loads(body[8 : 8 + length])
+    numbers = np.frombuffer(body, "<f8", offset=8 + length)
+    return about, np.split(numbers, np.cumsum(about["sizes"])[:-1])
+
+
+def test_a_run_is_that_of_simulate(explorer: Explorer) -> None:
+    code, body = ask(explorer, "/run", request(explorer, ["J1.w", "clutch.tau"], J1__J=2.0))
+    assert code == 200
+    about, (times, outputs, events) = read(body)
+    run = simulate(EXAMPLES / "machine_tool_startup.toml", 1.0, parameters={"J1.J": 2.0}, solver="native")
+    assert about["message"] == ""
+    assert times[-1] == 1.0
+    assert outputs.reshape(-1, 2)[-1] == pytest.approx([run["J1.w"][-1], run["clutch.tau"][-1]], rel=1e-6)
+    assert events.reshape(-1, 7)[:, 0] == pytest.approx([one.time for one in run.events], rel=1e-6)
+
+
+def test_only_who_knows_the_address_is_answered(explorer: Explorer) -> None:
+    asked = request(explorer, ["J1.w"])
+    assert ask(explorer, f"/?token={explorer.token}")[0] == 200
+    assert ask(explorer, "/")[0] == 403
+    assert ask(explorer, f"/?token={explorer.token}", host="evil.example")[0] == 403
+    assert ask(explorer, "/run", asked, token="guessed")[0] == 403
+    assert ask(explorer, "/run", asked, host="evil.example:80")[0] == 403
+    assert ask(explorer, f"/../../etc/passwd?token={explorer.token}")[0] == 404
+    assert explorer.server_address[0] == "127.0.0.1"
+
+
+def test_a_wrong_request_gets_a_sentence(explorer: Explorer) -> None:
+    assert ask(explorer, "/run", "no json")[0] == 400
+    assert ask(explorer, "/run", {"turn": 1})[0] == 400
+    assert ask(explorer, "/save", {"what": "passwd", **request(explorer, [])})[0] == 400
+    assert ask(explorer, "/elsewhere", {})[0] == 404
+
+
+def test_a_bad_value_is_told_as_the_command_line_tells_it(explorer: Explorer) -> None:
+    _, body = ask(explorer, "/run", request(explorer, ["J1.w"], J1__J=-1.0))
+    assert read(body)[0]["message"] == "Inertia.J = -1.0 is out of range: it must be at least 0 kg.m2."
+
+
+def test_an_old_request_is_dropped(explorer: Explorer) -> None:
+    assert ask(explorer, "/run", request(explorer, ["J1.w"], turn=7))[0] == 200
+    assert ask(explorer, "/run", request(explorer, ["J1.w"], turn=3))[0] == 204
+
+
+def test_sensitivities_follow_the_values(explorer: Explorer) -> None:
+    code, body = ask(explorer, "/ranking", {"output": "J1.phi", **request(explorer, [], h1=5.0)})
+    assert code == 200
+    found = dict(json.loads(body))
+    changed = load(EXAMPLES / "machine_tool_startup.toml")
+    changed.set("h1", 5.0)
+    expected = sensitivities(changed, ["J1.phi"], until=1.0).ranking("J1.phi")
+    assert found == pytest.approx({one.name: relative for one, _, relative in expected if one.name in found}, rel=1e-6)
+    assert len(found) > 3
+
+
+def test_what_is_saved_is_the_changed_drive(explorer: Explorer, tmp_path: Path) -> None:
+    asked = request(explorer, [], J1__J=2.0)
+    for what, ending in (("netlist", "toml"), ("FMU", "fmu"), ("report", "html"), ("netlist", "toml")):
+        code, body = ask(explorer, "/save", {"what": what, **asked})
+        assert code == 200, body
+        assert Path(body.decode()).parent == tmp_path
+        assert Path(body.decode()).suffix == f".{ending}"
+    assert len(list(tmp_path.glob("*.toml"))) == 2, "nothing is written over"
+    saved = simulate(next(tmp_path.glob("*_explored.toml")), 1.0)
+    expected = simulate(EXAMPLES / "machine_tool_startup.toml", 1.0, parameters={"J1.J": 2.0})
+    assert saved["J2.w"][-1] == pytest.approx(expected["J2.w"][-1], rel=1e-9)
+    fmu = run_fmu(next(tmp_path.glob("*.fmu")), stop=1.0)
+    assert fmu["J2.w"][-1] == pytest.approx(expected["J2.w"][-1], rel=1e-5)
+
+
+@pytest.mark.browser
+@pytest.mark.parametrize(("name", "slider"), DRIVES.items())
+def test_a_slider_moves_the_curves(browser: Any, tmp_path: Path, name: str, slider: str) -> None:
+    with served(name, tmp_path) as explorer:
+        browser.open(explorer.address)
+        before = browser.run("picture.result.outputs.reduce((a, b) => a + b)")
+        took = [browser.run(f"{MOVE}({json.dumps(slider)}, {place})") for place in np.linspace(0.3, 0.7, 21)]
+        assert browser.run("picture.result.outputs.reduce((a, b) => a + b)") != before
+        # What a person feels as at once; the figures stand in docs/explore.md.
+        assert statistics.median(took[3:]) < 100.0
+        assert [one for one in browser.complaints if not one.startswith(explorer.address[:20])] == []
+        for _ in range(6):
+            browser.run("document.getElementById('keep').click()")
+        browser.run(f"{MOVE}({json.dumps(slider)}, 0.55)")
+        assert browser.run("picture.earlier.length") == 6, "five kept runs and the first one"
+
+
+@pytest.mark.browser
+def test_bars_and_files_answer(browser: Any, explorer: Explorer, tmp_path: Path) -> None:
+    browser.open(explorer.address)
+    browser.run("document.querySelector('#bars summary').click()")
+    browser.run(f"{WAIT}(() => document.querySelectorAll('#bars tr').length)")
+    browser.run(f"{BARS}('J3.w')")
+    assert browser.run(f"{WAIT}(() => document.querySelectorAll('#bars tr').length > 3)")
+    browser.run("document.querySelector('#files button').click()")
+    said = browser.run(f"{WAIT}(() => document.getElementById('saved').textContent.replace('…', ''))")
+    assert Path(said) == tmp_path / "machine_tool_startup_explored.toml"
+    assert browser.run("document.querySelectorAll('#schematic svg').length") == 1

@@ -1,0 +1,89 @@
+"""Notes about what looks like a slip: told for drives that have it, and for no others."""
+
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from components import Brake, Clutch, Constant, ConstantTorque, Fixed, Inertia, Ramp, Sine, Spring, Torque
+from modelica_like import simulate
+from modelica_like.cli import app
+from modelica_like.language import Assembly
+from modelica_like.report.plausible import drive_notes, run_notes
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+
+def test_an_inertia_in_the_wrong_unit_is_noticed() -> None:
+    parts = {"motor": Inertia(J="8.5 kg.m2"), "shaft": Spring(c=1e4), "load": Inertia(J="3 kg.cm2")}
+    wires = {"a": ["motor.flange_b", "shaft.flange_a"], "b": ["shaft.flange_b", "load.flange_a"]}
+    assert drive_notes(Assembly("drive", parts=parts, connect=wires)) == [
+        "motor.J is 2.8e+04 times load.J: is the inertia of one of them in the wrong unit (kg.cm2 for kg.m2)?"
+    ]
+    parts["motor"] = Inertia(J="2.9 kg.m2")
+    assert drive_notes(Assembly("drive", parts=parts, connect=wires)) == []
+
+
+def test_only_neighbours_are_compared() -> None:
+    parts = {name: Inertia(J=J) for name, J in (("a", 1.0), ("b", 1e-3), ("c", 1e-6))}
+    wires = {"x": ["a.flange_b", "b.flange_a"], "y": ["b.flange_b", "c.flange_a"]}
+    assert drive_notes(Assembly("drive", parts=parts, connect=wires)) == []
+
+
+def test_a_signal_that_nothing_reads_is_noticed() -> None:
+    parts = {"motor": ConstantTorque(tau_constant=1), "J": Inertia(J=1), "law": Ramp(height=1, duration=1)}
+    wires = {"a": ["motor.flange", "J.flange_a"]}
+    assert drive_notes(Assembly("drive", parts=parts, connect=wires)) == [
+        "Nothing reads law.y: connect it, or leave law out."
+    ]
+
+
+def clutched(force: float | None, kind: type = Clutch) -> Assembly:
+    parts = {"motor": ConstantTorque(tau_constant=1), "J": Inertia(J=1), "it": kind(capacity=10.0)}
+    wires = {"a": ["motor.flange", "J.flange_a"], "b": ["J.flange_b", "it.flange_a"]}
+    if kind is Clutch:
+        parts["wall"] = Fixed()
+        wires["c"] = ["it.flange_b", "wall.flange"]
+    if force is not None:
+        parts["force"] = Constant(k=force)
+        wires["u"] = ["force.y", "it.f_normalized"]
+    return Assembly("drive", parts=parts, connect=wires)
+
+
+@pytest.mark.parametrize(("force", "kind", "expected"), [
+    (0.0, Clutch, ["it never engages: its input is 0 during the whole run."]),
+    (1.0, Clutch, []),
+    (None, Brake, ["it holds during the whole run: nothing drives it.f_normalized, which is 1 by default."]),
+    (1.0, Brake, []),
+])  # fmt: skip
+def test_clutches_and_brakes_that_do_nothing_are_noticed(force: float | None, kind: type, expected: list[str]) -> None:
+    drive = clutched(force, kind)
+    assert run_notes(drive, simulate(drive, 1.0, start="rest")) == expected
+
+
+@pytest.mark.parametrize(("frequency", "notes"), [(5.0, 1), (5.3, 1), (7.0, 0)])
+def test_an_excitation_near_an_eigenfrequency_is_noticed(frequency: float, notes: int) -> None:
+    # f = sqrt(c/J)/2pi = 5 Hz
+    c = (2 * 3.141592653589793 * 5.0) ** 2
+    parts = {
+        "law": Sine(amplitude=1, f=frequency), "motor": Torque(), "J": Inertia(J=1), "shaft": Spring(c=c),
+        "wall": Fixed(),
+    }  # fmt: skip
+    wires = {
+        "u": ["law.y", "motor.tau"], "a": ["motor.flange", "J.flange_a"], "b": ["J.flange_b", "shaft.flange_a"],
+        "c": ["shaft.flange_b", "wall.flange"],
+    }  # fmt: skip
+    drive = Assembly("drive", parts=parts, connect=wires)
+    found = run_notes(drive, simulate(drive, 0.1, start="rest"))
+    assert len(found) == notes
+    assert [one.partition(" is ")[2] for one in found] == [
+        "near the natural frequency 5 Hz, whose damping is 0: expect resonance."
+    ] * notes
+
+
+def test_commands_tell_them_and_go_on() -> None:
+    told = CliRunner().invoke(app, ["simulate", str(EXAMPLES / "ravigneaux.toml")])
+    assert told.exit_code == 0
+    assert "clutch_large, clutch_carrier and brake_carrier never engage: their inputs are 0" in told.stderr
+    told = CliRunner().invoke(app, ["check", str(EXAMPLES / "components" / "position_cascade.toml")])
+    assert "Nothing reads total.y" in told.stderr
