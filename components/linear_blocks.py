@@ -150,5 +150,5 @@ class StateSpace(Component):
             yield one == _product(by_state, x) + _product(by_signal, u)
 
 
-def _product(row: Flat, values: Sequence[Expr]) -> Expr:
-    return sum((a * x for a, x in zip(row, values, strict=True) if not isinstance(a, float) or a), Expr(0))
+def _product(row: Flat, values: Sequence[Expr]) -> Expr | float:
+    return sum((a * x for a, x in zip(row, values, strict=True)), 0.0)
