@@ -3,8 +3,8 @@
 from importlib import import_module
 from typing import Any
 
-# Modules and their public names, each loaded when first used: a netlist needs few of them. For type checkers and
-# editors the same stands in `__init__.pyi`.
+# Modules and their public names, each loaded on first use: a netlist needs few of them. For type checkers and
+# editors, `__init__.pyi` has the same.
 _NAMES = {
     "absorbers": "CentrifugalPendulum TunedAbsorber",
     "actuators": "ElectromagneticActuator HydraulicActuator PneumaticActuator",
@@ -22,6 +22,7 @@ _NAMES = {
     "control": "PI PID ClutchActuator Feedback FirstOrder Gain Integrator Limiter P Sum",
     "couplings": "ArcSpring DualMassFlywheel ElasticCoupling HystereticCoupling OldhamCoupling RuptureCoupling",
     "dc_machines": "PermanentMagnetDCMachine SeparatelyExcitedDCMachine SeriesDCMachine ShuntDCMachine",
+    "drag_losses": "ChurningGear DeepGrooveBearing",
     "drivers": "Driver",
     "eddy_current_brakes": "EddyCurrentForce EddyCurrentTorque",
     "electrical": (
@@ -32,13 +33,17 @@ _NAMES = {
     "fixed": "Disc Fixed TranslationalFixed",
     "flexible_shafts": "FlexibleShaft StribeckBearing",
     "friction": "BearingFriction Brake Clutch DryFriction MultiPlateClutch",
+    "gear_meshes": "GearMesh",
     "gearboxes": "Gearbox",
     "gears": "IdealGear",
+    "hoists": "HoldingBrake Rope WinchDrum",
     "inertias": "Inertia Mass",
     "interfaces": "Compliant CompliantWithRelativeStates Flange LinearFlange",
     "linear_blocks": "Derivative SecondOrder StateSpace TransferFunction",
+    "linkages": "Cam FourBar SliderCrank",
     "loads": "SpeedDependentLoad",
     "lossy_gears": "ConstantEfficiencyGear LossyGear",
+    "machine_loads": "CentrifugalPump Conveyor CuttingLoad DisplacementLoad FormingForce",
     "motions": (
         "InitializeFlange Move RelativeStates TranslationalInitializeFlange TranslationalMove "
         "TranslationalRelativeStates"
@@ -47,7 +52,6 @@ _NAMES = {
     "one_way": "Freewheel OneWayClutch TorqueLimiter",
     "planetary": "Differential IdealPlanetary LossyPlanetarySet PlanetarySet",
     "point_to_point": "KinematicPTP2",
-    "pulse_sensors": "PulseSpeedSensor",
     "sampled": "FrequencyMeter NormalNoise UniformNoise ZeroOrderHold",
     "screw_drives": "BallScrewDrive",
     "sensors": (
@@ -72,6 +76,7 @@ _NAMES = {
         "TranslationalSpringDamper"
     ),
     "stepped_signals": "BooleanPulse BooleanStep BooleanTable StepTable",
+    "switching": "Contactor Diode",
     "synchronous_machines": "MappedDrive PMSynchronousDrive PMSynchronousMachine",
     "synchronisers": "Synchroniser",
     "thermal": (
@@ -91,9 +96,11 @@ _NAMES = {
     "transmissions": "Lepelletier Ravigneaux",
     "tyres": "AxleLoads Tyre",
     "universal_joints": "UniversalJoint",
+    "variable_drives": "ChainDrive VariableGear",
     "vehicles": "RoadLoad RollingResistance Vehicle",
     "waves": "CombiTable Cosine Exponentials ExpSine LogFrequencySweep SawTooth Sinc VariableSine",
     "wheels": "IdealGearR2T IdealRollingWheel",
+    "worms": "WormGear",
 }
 _HOME = {name: module for module, names in _NAMES.items() for name in names.split()}
 

@@ -40,6 +40,8 @@ from components.dc_machines import PermanentMagnetDCMachine as PermanentMagnetDC
 from components.dc_machines import SeparatelyExcitedDCMachine as SeparatelyExcitedDCMachine
 from components.dc_machines import SeriesDCMachine as SeriesDCMachine
 from components.dc_machines import ShuntDCMachine as ShuntDCMachine
+from components.drag_losses import ChurningGear as ChurningGear
+from components.drag_losses import DeepGrooveBearing as DeepGrooveBearing
 from components.drivers import Driver as Driver
 from components.eddy_current_brakes import EddyCurrentForce as EddyCurrentForce
 from components.eddy_current_brakes import EddyCurrentTorque as EddyCurrentTorque
@@ -69,8 +71,12 @@ from components.friction import Brake as Brake
 from components.friction import Clutch as Clutch
 from components.friction import DryFriction as DryFriction
 from components.friction import MultiPlateClutch as MultiPlateClutch
+from components.gear_meshes import GearMesh as GearMesh
 from components.gearboxes import Gearbox as Gearbox
 from components.gears import IdealGear as IdealGear
+from components.hoists import HoldingBrake as HoldingBrake
+from components.hoists import Rope as Rope
+from components.hoists import WinchDrum as WinchDrum
 from components.inertias import Inertia as Inertia
 from components.inertias import Mass as Mass
 from components.interfaces import Compliant as Compliant
@@ -81,9 +87,17 @@ from components.linear_blocks import Derivative as Derivative
 from components.linear_blocks import SecondOrder as SecondOrder
 from components.linear_blocks import StateSpace as StateSpace
 from components.linear_blocks import TransferFunction as TransferFunction
+from components.linkages import Cam as Cam
+from components.linkages import FourBar as FourBar
+from components.linkages import SliderCrank as SliderCrank
 from components.loads import SpeedDependentLoad as SpeedDependentLoad
 from components.lossy_gears import ConstantEfficiencyGear as ConstantEfficiencyGear
 from components.lossy_gears import LossyGear as LossyGear
+from components.machine_loads import CentrifugalPump as CentrifugalPump
+from components.machine_loads import Conveyor as Conveyor
+from components.machine_loads import CuttingLoad as CuttingLoad
+from components.machine_loads import DisplacementLoad as DisplacementLoad
+from components.machine_loads import FormingForce as FormingForce
 from components.motions import InitializeFlange as InitializeFlange
 from components.motions import Move as Move
 from components.motions import RelativeStates as RelativeStates
@@ -104,7 +118,6 @@ from components.planetary import IdealPlanetary as IdealPlanetary
 from components.planetary import LossyPlanetarySet as LossyPlanetarySet
 from components.planetary import PlanetarySet as PlanetarySet
 from components.point_to_point import KinematicPTP2 as KinematicPTP2
-from components.pulse_sensors import PulseSpeedSensor as PulseSpeedSensor
 from components.sampled import FrequencyMeter as FrequencyMeter
 from components.sampled import NormalNoise as NormalNoise
 from components.sampled import UniformNoise as UniformNoise
@@ -174,6 +187,8 @@ from components.stepped_signals import BooleanPulse as BooleanPulse
 from components.stepped_signals import BooleanStep as BooleanStep
 from components.stepped_signals import BooleanTable as BooleanTable
 from components.stepped_signals import StepTable as StepTable
+from components.switching import Contactor as Contactor
+from components.switching import Diode as Diode
 from components.synchronisers import Synchroniser as Synchroniser
 from components.synchronous_machines import MappedDrive as MappedDrive
 from components.synchronous_machines import PMSynchronousDrive as PMSynchronousDrive
@@ -210,6 +225,8 @@ from components.transmissions import Ravigneaux as Ravigneaux
 from components.tyres import AxleLoads as AxleLoads
 from components.tyres import Tyre as Tyre
 from components.universal_joints import UniversalJoint as UniversalJoint
+from components.variable_drives import ChainDrive as ChainDrive
+from components.variable_drives import VariableGear as VariableGear
 from components.vehicles import RoadLoad as RoadLoad
 from components.vehicles import RollingResistance as RollingResistance
 from components.vehicles import Vehicle as Vehicle
@@ -223,3 +240,4 @@ from components.waves import Sinc as Sinc
 from components.waves import VariableSine as VariableSine
 from components.wheels import IdealGearR2T as IdealGearR2T
 from components.wheels import IdealRollingWheel as IdealRollingWheel
+from components.worms import WormGear as WormGear

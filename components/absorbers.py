@@ -38,11 +38,11 @@ class TunedAbsorber(Component):
 
 
 class CentrifugalPendulum(Component):
-    """Pendulum absorber: a mass on a circular path, which swings in the centrifugal field of the shaft.
+    """Pendulum absorber: a mass on a circular path that oscillates in the centrifugal field of the shaft.
 
-    Its frequency grows with the speed: at small swings it is sqrt(R/l) times the speed, the order of which it takes the
-    vibration; at large ones it is lower. Where the mass rolls, as between two pins, l is the diameter of the play and m
-    the mass of all pendulums (J. P. Den Hartog: Mechanical Vibrations, 5.8). Without gravity.
+    Its frequency grows with the speed: at small amplitudes it is sqrt(R/l) times the speed, which is the order of the
+    absorbed vibration; at large ones it is lower. If the mass rolls, as between two pins, l is the diameter of the play
+    and m the mass of all pendulums (J. P. Den Hartog: Mechanical Vibrations, 5.8). Without gravity.
     """
 
     icon = icons.PENDULUM

@@ -1,4 +1,4 @@
-"""Actuators of clutches and brakes: a part between two stops, moved by a magnet, by oil or by air against a spring."""
+"""Actuators of clutches and brakes: a part between two stops, moved by a magnet, oil or air against a spring."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ from modelica_like.language import (
 
 
 class Actuator(Component, partial=True):
-    """Armature or piston between two rigid stops, which a spring pushes back to where it rests.
+    """Armature or piston between two rigid stops; a spring pushes it back to its rest position.
 
-    What it presses on is one of the stops: the far one, to which it is driven (a clutch that closes when switched on),
-    or the one at which it rests (a brake that closes when power is lost). It meets both without bouncing.
+    It presses on the far stop, to which it is driven (a clutch that closes when switched on), or on the stop at which
+    it rests (a brake that closes when power is lost). It meets both without rebound.
 
-    A subclass gives the force that drives it.
+    A subclass defines the driving force.
     """
 
     presses: Literal["driven", "resting"] = "driven"
@@ -62,11 +62,11 @@ class Actuator(Component, partial=True):
     )  # fmt: skip
 
     def at_rest(self) -> tuple[float, None]:
-        """Return what the stop at rest bears: any force against backward motion, none against forward motion."""
+        """Return the capacities of the rest stop: any force against backward motion, none against forward motion."""
         return 0.0, None
 
     def at_end(self) -> tuple[None, float]:
-        """Return what the far stop bears."""
+        """Return the capacities of the far stop."""
         return None, 0.0
 
     def drive(self) -> Expr:
@@ -86,7 +86,7 @@ class Actuator(Component, partial=True):
 
     def events(self) -> Events:
         stop, faint = self.stop, self.faint
-        # It leaves a stop where that is, and at rest: rounding would make it meet the stop again.
+        # It leaves a stop exactly there and at rest: rounding would make it meet the stop again.
         rest, end = {self.s: 0.0, self.v: 0.0}, {self.s: self.travel, self.v: 0.0}
         yield stop.initially("driven", when=all_of(self.s >= self.travel, self.v >= 0))
         yield stop.initially("moving", when=self.s > 0)
@@ -104,10 +104,10 @@ class Actuator(Component, partial=True):
 class ElectromagneticActuator(Actuator):
     """Electromagnet with coil, air gap, armature and return spring, e.g. of a clutch or of a brake.
 
-    With the gap x = travel - s the inductance is L_s + L_m/(1 + x/gap), so the armature is drawn with i²/2 times its
-    slope. For a pot magnet with N turns and two air gaps of the area A, gap is the one that the iron amounts to, and
-    L_m = µ0·N²·A/(2·gap). What iron keeps of its magnetism draws as the current i_rem does: with it an armature may
-    stick after switching off. The iron does not saturate.
+    With the gap x = travel - s the inductance is L_s + L_m/(1 + x/gap), so the force on the armature is i²/2 times
+    its slope. For a pot magnet with N turns and two air gaps of the area A, gap is the one that the iron amounts to,
+    and L_m = µ0·N²·A/(2·gap). Remanence acts like the current i_rem: an armature may then stick after switching
+    off. The iron does not saturate.
     """
 
     icon = icons.MAGNET
@@ -149,7 +149,7 @@ class HydraulicActuator(Actuator):
     """Piston of a clutch or brake, filled with oil through an orifice, with a return spring.
 
     The flow through valve and line grows with the root of the pressure drop, and is laminar below p_laminar; line, oil
-    and seals give way by C per pressure. First the piston travels at the pressure of the spring, then the pressure
+    and seals have the compliance C. First the piston travels at the pressure of the spring, then the pressure
     rises. A supply of zero empties it.
     """
 
@@ -186,8 +186,8 @@ class PneumaticActuator(Actuator):
     """Piston of a clutch or brake, filled with air through a valve, with a return spring.
 
     The valve has the sonic conductance C and the critical pressure ratio b of ISO 6358; where the pressures are nearly
-    equal its flow is proportional to their difference. The air keeps its temperature; what it can do against the
-    surroundings counts as stored energy, p·V·ln(p/p_0) - (p - p_0)·V.
+    equal its flow is proportional to their difference. The air keeps its temperature; its stored energy is its
+    exergy relative to the surroundings, p·V·ln(p/p_0) - (p - p_0)·V.
     """
 
     icon = icons.PISTON

@@ -1,7 +1,7 @@
-"""Adaptors between connectors and signals: where a drive is cut into parts that exchange signals, e.g. FMUs.
+"""Adaptors between connectors and signals, for drives cut into parts that exchange signals, e.g. FMUs.
 
-Which side gives the potential (angle, position, voltage, temperature) and which the flow (torque, force, current, heat
-flow) decides about the states of the parts. In signals, a flow is the one that goes from the other part into this one.
+One side provides the potential (angle, position, voltage, temperature), the other the flow (torque, force, current,
+heat flow); this choice decides the states of the parts. A flow signal is positive from the other part into this one.
 """
 
 from __future__ import annotations
@@ -31,15 +31,15 @@ THERMAL = "org.modelica.thermal.heat_transfer.port"
 
 
 class TorqueToAngleAdaptor(Component):
-    """Shaft end of a part that takes a torque and tells how it moves: it keeps its inertia and its states."""
+    """Shaft end of a part that receives a torque and returns its motion: it keeps its inertia and its states."""
 
     icon = icons.BOUNDARY
     terminal = Terminal(ROTATIONAL, takes="flow")
     flange = Flange("shaft end")
     use_w: bool = True
-    """Tell the speed as well."""
+    """Also output the speed."""
     use_a: bool = True
-    """Tell the acceleration as well."""
+    """Also output the acceleration."""
     tau: Input = signal_in("N.m", "torque on the shaft")
     phi: Output = signal_out("rad", "angle of the shaft")
     w: Output = signal_out("rad/s", "speed of the shaft; 0 unless use_w")
@@ -64,10 +64,10 @@ class TorqueToAngleAdaptor(Component):
 
 
 class AngleToTorqueAdaptor(Component):
-    """Shaft end of a part that is moved, and answers with a torque: it has no states of its own.
+    """Shaft end of a part that receives a motion and returns a torque: the end has no states.
 
-    A spring needs the angle only, a damper the speed too, an inertia the acceleration as well. They have to be
-    derivatives of each other, which is up to the one who gives them.
+    A spring needs only the angle, a damper also the speed, an inertia also the acceleration. The source of the
+    signals must make sure that they are derivatives of each other.
     """
 
     icon = icons.BOUNDARY
@@ -87,15 +87,15 @@ class AngleToTorqueAdaptor(Component):
 
 
 class ForceToPositionAdaptor(Component):
-    """Slide end of a part that takes a force and tells how it moves: it keeps its mass and its states."""
+    """Slide end of a part that receives a force and returns its motion: it keeps its mass and its states."""
 
     icon = icons.BOUNDARY
     terminal = Terminal(TRANSLATIONAL, takes="flow")
     flange = LinearFlange("slide end")
     use_v: bool = True
-    """Tell the velocity as well."""
+    """Also output the velocity."""
     use_a: bool = True
-    """Tell the acceleration as well."""
+    """Also output the acceleration."""
     f: Input = signal_in("N", "force on the slide")
     s: Output = signal_out("m", "position of the slide")
     v: Output = signal_out("m/s", "velocity of the slide; 0 unless use_v")
@@ -120,7 +120,7 @@ class ForceToPositionAdaptor(Component):
 
 
 class PositionToForceAdaptor(Component):
-    """Slide end of a part that is moved, and answers with a force; see `AngleToTorqueAdaptor`."""
+    """Slide end of a part that receives a motion and returns a force; see `AngleToTorqueAdaptor`."""
 
     icon = icons.BOUNDARY
     terminal = Terminal(TRANSLATIONAL, takes="potential", rates=(("s", "v"), ("v", "a")), power=("f", "v"))
@@ -139,7 +139,7 @@ class PositionToForceAdaptor(Component):
 
 
 class CurrentToVoltageAdaptor(Component):
-    """Pin of a circuit that takes a current and tells its potential."""
+    """Pin of a circuit that receives a current and returns its potential."""
 
     icon = icons.BOUNDARY
     terminal = Terminal(ELECTRICAL, takes="flow")
@@ -156,7 +156,7 @@ class CurrentToVoltageAdaptor(Component):
 
 
 class VoltageToCurrentAdaptor(Component):
-    """Pin of a circuit whose potential is given, and that answers with a current."""
+    """Pin of a circuit that receives a potential and returns a current."""
 
     icon = icons.BOUNDARY
     terminal = Terminal(ELECTRICAL, takes="potential", power=("i", "v"))
@@ -173,7 +173,7 @@ class VoltageToCurrentAdaptor(Component):
 
 
 class HeatFlowToTemperatureAdaptor(Component):
-    """Heat port of a part that takes a heat flow and tells its temperature."""
+    """Heat port of a part that receives a heat flow and returns its temperature."""
 
     icon = icons.BOUNDARY
     terminal = Terminal(THERMAL, takes="flow")
@@ -190,7 +190,7 @@ class HeatFlowToTemperatureAdaptor(Component):
 
 
 class TemperatureToHeatFlowAdaptor(Component):
-    """Heat port of a part whose temperature is given, and that answers with a heat flow."""
+    """Heat port of a part that receives a temperature and returns a heat flow."""
 
     icon = icons.BOUNDARY
     terminal = Terminal(THERMAL, takes="potential")
@@ -207,6 +207,6 @@ class TemperatureToHeatFlowAdaptor(Component):
 
 
 def _told(names: tuple[str, str, str, str], *, use_w: bool, use_a: bool) -> tuple[str, ...]:
-    """Leave out the speed and the acceleration where an adaptor does not tell them."""
+    """Leave out the speed and the acceleration if an adaptor does not output them."""
     position, speed, acceleration, effort = names
     return (position, *([speed] if use_w else []), *([acceleration] if use_a else []), effort)

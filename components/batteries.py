@@ -24,8 +24,8 @@ from modelica_like.language import (
 class Battery(Tabulated, Lossy, TwoPins):
     """Cells in series and parallel: open-circuit voltage over the state of charge, behind their internal resistance.
 
-    With R_1 and C_1, part of the resistance works with a delay (one RC element). The current is positive while the
-    battery is charged. What is in the cells counts from the start. Modelica Standard Library, Electrical.Batteries,
+    With R_1 and C_1, part of the resistance acts with a delay (one RC element). The current is positive while the
+    battery is charged. The stored energy is zero at the start. Modelica Standard Library, Electrical.Batteries,
     BatteryStacks.
     """
 
@@ -34,7 +34,7 @@ class Battery(Tabulated, Lossy, TwoPins):
         column("state of charge", rising=True, min=0, max=1),
         column("open-circuit voltage of a cell", scale="v_scale", min=0),
     )
-    v_scale: Parameter = param("V", "what counts as 1 in the voltages", default=1.0)
+    v_scale: Parameter = param("V", "scale of the voltages", default=1.0)
     Q: Parameter = param("A.h", "charge of a full cell", min=1e-12)
     R_i: Parameter = param("Ohm", "internal resistance of a cell that acts at once", default=0.0, min=0)
     R_1: Parameter = param("Ohm", "resistance of a cell that acts with a delay", default=None, min=1e-12)

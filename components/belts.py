@@ -27,11 +27,11 @@ from modelica_like.language import (
 class TimingBelt(Lossy, TwoFlanges):
     """Belt on two pulleys that turn the same way: elastic and damped strands, pre-tension, and slip.
 
-    The strands are stretched by x = r_a·phi_a - r_b·phi_b less what has slipped, so the strand forces are
+    The strands are stretched by x = r_a·phi_a - r_b·phi_b minus the slip, so the strand forces are
     F_0 ± (c·x + d·der(x)), and the force on the circumference is their difference. A strand that would have to push is
-    slack, and the other one carries alone, which the report of a run tells. With mu and wrap_angle given, the belt
+    slack, and the other one carries alone; the report of a run says so. With mu and wrap_angle given, the belt
     slips where the ratio of the strand forces reaches exp(mu·wrap_angle) (L. Euler, J. A. Eytelwein), that is at
-    F = 2·F_0·tanh(mu·wrap_angle/2); then no strand ever gets slack.
+    F = 2·F_0·tanh(mu·wrap_angle/2); then no strand becomes slack.
     """
 
     icon = icons.BELT
@@ -50,7 +50,7 @@ class TimingBelt(Lossy, TwoFlanges):
     F_1: Output = signal_out("N", "force in the strand that is stretched by x")
     F_2: Output = signal_out("N", "force in the other strand")
     grip = Mode("sticking", "forward", "backward", description="slip of the belt")
-    strands = Mode("tight", "slack", description="whether a strand with pre-tension has ever been slack")
+    strands = Mode("tight", "slack", description="whether a pre-tensioned strand has been slack")
 
     @property
     def slip_force(self) -> Expr:
@@ -66,7 +66,7 @@ class TimingBelt(Lossy, TwoFlanges):
 
     @property
     def springs(self) -> tuple[Expr, Expr]:
-        """Elastic parts of them."""
+        """Elastic parts of the forces in both strands."""
         return maximum(self.F_0 + self.c * self.x, 0), maximum(self.F_0 - self.c * self.x, 0)
 
     def equations(self) -> Equations:

@@ -13,10 +13,10 @@ class LuGreFriction(Lossy, ShaftInHousing):
 
     Their mean deflection z follows der(z) = w - sigma_0·|w|/g(w)·z, with the friction of steady sliding
     g(w) = tau_Coulomb + tau_Stribeck·exp(-(w/w_Stribeck)²); the torque is sigma_0·z + sigma_1·der(z) + sigma_2·w. So it
-    shows presliding, a break-away that depends on how fast the torque rises, and stick-slip with one smooth state.
-    The damping sigma_1 fades with exp(-(w/w_damping)²), because it would deliver energy in fast sliding. C. Canudas de
-    Wit, H. Olsson, K. J. Åström, P. Lischinsky: A new model for control of systems with friction, IEEE Trans. Automatic
-    Control 40 (1995).
+    shows presliding, a break-away that depends on the rate of the torque, and stick-slip with one smooth state.
+    The damping sigma_1 decreases with exp(-(w/w_damping)²), because otherwise it would deliver energy in fast sliding.
+    C. Canudas de Wit, H. Olsson, K. J. Åström, P. Lischinsky: A new model for control of systems with friction, IEEE
+    Trans. Automatic Control 40 (1995).
     """
 
     icon = icons.BEARING
@@ -24,7 +24,7 @@ class LuGreFriction(Lossy, ShaftInHousing):
     sigma_1: Parameter = param("N.m.s/rad", "damping of the bristles at standstill", default=0.0, min=0)
     sigma_2: Parameter = param("N.m.s/rad", "viscous friction", default=0.0, min=0)
     tau_Coulomb: Parameter = param("N.m", "dry friction at high speed, without the viscous part", min=1e-12)
-    tau_Stribeck: Parameter = param("N.m", "what friction at rest has in excess", default=0.0, min=0)
+    tau_Stribeck: Parameter = param("N.m", "excess of friction at rest", default=0.0, min=0)
     w_Stribeck: Parameter = param("rad/s", "speed at which the excess has fallen to 1/e", default=1.0, min=1e-12)
     w_damping: Parameter = param(
         "rad/s", "speed at which sigma_1 has fallen to 1/e; without a value it is constant", default=None, min=1e-12

@@ -28,10 +28,10 @@ from modelica_like.language import (
 class HBridge(Lossy):
     """H-bridge that chops the voltage of a supply: its mean over a period is u times the supply voltage.
 
-    What u is at the beginning of a period tells how long the bridge is on in it; these are time events. A bipolar
+    The value of u at the beginning of a period sets the on-time in this period; switching is a time event. A bipolar
     bridge is on with the supply voltage and off with the reversed one. A unipolar one is off without voltage, and u
-    gives the direction: it is a chopper. Without switching there is the mean voltage all the time. The switches have a
-    resistance, and no other loss. Both terminals of the motor lie symmetrically to those of the supply.
+    gives the direction: it is a chopper. Without switching the voltage is the mean voltage. The switches have a
+    resistance and no other loss. Both terminals of the motor are symmetrical to those of the supply.
     """
 
     icon = icons.BRIDGE

@@ -19,7 +19,7 @@ from modelica_like.language import (
 
 
 class CommutatedDCMachine(PermanentMagnetDCMachine):
-    """DC machine with permanent magnets and few loops, which the commutator turns over one after the other.
+    """DC machine with permanent magnets and few loops, which the commutator switches one after the other.
 
     Torque over current and voltage over speed are the crest of a cosine, |x| ≤ pi/(2·loops), once for every half turn
     of every loop; k is their mean value. So both ripple alike, and the power balance holds at every angle (W. Böhm:

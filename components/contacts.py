@@ -1,4 +1,4 @@
-"""Couplings and stops of rigid parts: where they meet with a motion, there is an impact."""
+"""Couplings and stops of rigid parts, which meet in impacts."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ from modelica_like.language import (
 class RigidBacklash(CompliantWithRelativeStates):
     """Backlash between rigid flanks, e.g. of claws; with one end fixed, two stops of a turning part.
 
-    Inside there is no torque. Flanks that meet part again with e times the speed; below w_rest they stay together, and
-    then one pushes the other until it is pulled back. An `ElastoBacklash` has elastic flanks instead.
+    Inside there is no torque. Flanks that meet rebound with e times the speed. Below w_rest they stay together, and one
+    pushes the other until it is pulled back. An `ElastoBacklash` has elastic flanks instead.
     """
 
     icon = icons.PLAY
     b: Parameter = param("rad", "total backlash", min=1e-10)
     phi_rel0: Parameter = param("rad", "relative angle in the middle of the backlash", default=0.0)
     e: Parameter = param("1", "restitution: speed after an impact over that before", default=0.0, min=0, max=1)
-    w_rest: Parameter = param("rad/s", "speed from which on flanks stay together", default=1e-3, min=0)
-    faint: Parameter = param("N.m", "torque up to which what parts them may be rounding", default=1e-9, min=0)
+    w_rest: Parameter = param("rad/s", "impact speed below which flanks stay together", default=1e-3, min=0)
+    faint: Parameter = param("N.m", "separating torque that counts as rounding", default=1e-9, min=0)
     phi_rel: Variable = var("rad", "relative angle, flange_b.phi - flange_a.phi", state="always", default=0)
     w_rel: Variable = var("rad/s", "relative speed", state="always")
     contact = Mode(
@@ -47,15 +47,15 @@ class RigidBacklash(CompliantWithRelativeStates):
     )  # fmt: skip
 
     def forward_limits(self) -> tuple[None, float]:
-        """Return what the forward flanks bear: any torque, but they cannot pull."""
+        """Return the capacities of the forward flanks: any torque, but they cannot pull."""
         return None, 0.0
 
     def backward_limits(self) -> tuple[float, None]:
-        """Return what the backward flanks bear."""
+        """Return the capacities of the backward flanks."""
         return 0.0, None
 
     def restitution(self) -> Expr:
-        """Return what an impact leaves of the speed."""
+        """Return the ratio of the speeds after and before an impact."""
         return where(absolute(self.w_rel) < self.w_rest, 0, self.e)
 
     def equations(self) -> Equations:
@@ -74,17 +74,18 @@ class RigidBacklash(CompliantWithRelativeStates):
 
 
 class DogClutch(CompliantWithRelativeStates):
-    """Dog clutch: its teeth go in while the slip is small enough, and then both shafts turn as one.
+    """Dog clutch: its teeth engage while the slip is small enough, and then both shafts turn as one.
 
-    What is left of the slip ends in an impact. Without play and at any angle; the play is a `RigidBacklash` in series.
+    The remaining slip ends in an impact. It has no play and engages at any angle; for play, put a `RigidBacklash` in
+    series.
     """
 
     icon = icons.DOGS
-    # No torque depends on the angle by which an open clutch has turned.
+    # No torque depends on the angle of an open clutch.
     phi_rel: Variable = var("rad", "relative angle, flange_b.phi - flange_a.phi", state="prefer", default=0)
     w_rel: Variable = var("rad/s", "slip speed", state="always")
-    engage: Input = signal_in("1", "the teeth go in above 0.5, and out below", default=1.0)
-    w_max: Parameter = param("rad/s", "slip from which on the teeth go in", default=1e30, min=0)
+    engage: Input = signal_in("1", "the teeth engage above 0.5 and disengage below", default=1.0)
+    w_max: Parameter = param("rad/s", "largest slip at which the teeth engage", default=1e30, min=0)
     dogs = Mode("out", "in", description="teeth out or in", holds={"in": Hold("w_rel", reaction="tau")})
 
     def equations(self) -> Equations:

@@ -30,7 +30,7 @@ _SETTLED_AFTER = 9
 
 
 def at_limits(limit: BoundMode, free: Expr, low: Expr, high: Expr) -> Events:
-    """Yield the events of a signal, free of limits, that meets and leaves its limits; the run ends where they cross."""
+    """Yield the events at which an unlimited signal reaches and leaves its limits; the run ends where these cross."""
     yield limit.go("*", "free", when=high < low, notice="has its upper limit below its lower one", fails=True)
     yield limit.initially("high", when=free > high)
     yield limit.initially("low", when=free < low)
@@ -220,9 +220,9 @@ class ClutchActuator(Component):
     """Electromagnetic actuator of a clutch or brake: delay, rise and release of the torque (VDI 2241).
 
     After switching on nothing happens for the response delay t11. Then the torque rises linearly to its full value in
-    the time t12; after switching off it falls linearly to zero in the time t2. As an exponential, like the current of a
-    coil, it has 90 % of its full value after t12, and 10 % after t2, as data sheets state these times: its distance
-    from the final value is divided by ten in each of them. Its output goes to `f_normalized`.
+    the time t12; after switching off it falls linearly to zero in the time t2. With `exponential`, like the current of
+    a coil, it reaches 90 % of its full value after t12, and falls to 10 % after t2, as in data sheets: in each of these
+    times its distance from the final value is divided by ten. Its output goes to `f_normalized`.
     """
 
     icon = icons.RISE
@@ -238,18 +238,18 @@ class ClutchActuator(Component):
     coil = Mode("off", "waiting", "rising", "on", "falling", description="state of the coil")
 
     def remaining(self, distance: Expr, time: Expr) -> Expr:
-        """Return how far the torque still is from its final value."""
+        """Return the distance of the torque from its final value."""
         decades = (self.time - self.since) / time
         return distance * exp(-_LN_10 * decades) if self.exponential else distance - decades
 
     def arrival(self, distance: Expr, time: Expr) -> Expr:
-        """Return when it has its final value."""
+        """Return the time at which it has its final value."""
         return self.since + time * (_SETTLED_AFTER if self.exponential else distance)
 
     def equations(self) -> Equations:
         rising = 1 - self.remaining(1 - self.level, self.t12)
         falling = self.remaining(self.level, self.t2)
-        # At rest exactly 0 and 1: a clutch that is closed by 1e-30 of its force would be another mode.
+        # Exactly 0 and 1 at rest: a clutch closed with 1e-30 of its force would be in another mode.
         yield self.y == self.coil.choose(off=0, waiting=0, rising=rising, on=1, falling=falling)
 
     def events(self) -> Events:

@@ -1,4 +1,4 @@
-"""Couplings that give way: stiffness in stages, hysteresis, a breaking point, offset shafts; dual-mass flywheels."""
+"""Compliant couplings: stiffness in stages, hysteresis, a breaking point, offset shafts; dual-mass flywheels."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ Stages = tuple[tuple[float, float], ...]
 class ElasticCoupling(Lossy, CompliantWithRelativeStates):
     """Elastic coupling whose stiffness changes with the twist, with viscous damping; the same in both directions.
 
-    A row of stages says the stiffness from a twist on; the first begins at zero.
+    Each row of stages gives the stiffness above a twist; the first row begins at zero.
     """
 
     icon = icons.ELASTIC_COUPLING
@@ -48,7 +48,7 @@ class ElasticCoupling(Lossy, CompliantWithRelativeStates):
     d: Parameter = param("N.m.s/rad", "damping coefficient", default=0.0, min=0)
 
     def pressed(self, begin: float) -> Expr:
-        """Return how far it is twisted beyond the begin of a stage."""
+        """Return the twist beyond the begin of a stage."""
         return maximum(absolute(self.phi_rel) - begin * self.phi_scale, 0)
 
     def elastic(self) -> tuple[Expr | float, Expr | float]:
@@ -71,7 +71,7 @@ class ElasticCoupling(Lossy, CompliantWithRelativeStates):
         yield self.tau == self.spring() + self.rubbing() + self.d * self.w_rel
 
     def rubbing(self) -> Expr | float:
-        """Return the torque of its hysteresis."""
+        """Return the torque of the hysteresis."""
         return 0.0
 
     def stored_energy(self) -> Expr | float:
@@ -83,7 +83,7 @@ class ElasticCoupling(Lossy, CompliantWithRelativeStates):
 
 
 class HystereticCoupling(ElasticCoupling):
-    """Elastic coupling with hysteresis: its loops cost the same work at every frequency, as those of rubber do.
+    """Elastic coupling with hysteresis: its loops lose the same work at every frequency, like rubber.
 
     Hysteresis is dry friction behind a spring: its elastic twist x follows w - |w|·x·c_h/tau_h, so that its torque
     c_h·x tends to tau_h (P. R. Dahl: Solid friction damping of mechanical vibrations, AIAA Journal 14, 1976). The
@@ -185,10 +185,10 @@ class RuptureCoupling(CompliantWithRelativeStates):
 class OldhamCoupling(Lossy):
     """Oldham coupling between parallel, offset shafts: two crossed slots and a disc that slides in both.
 
-    It turns both shafts alike at every angle; the centre of the disc goes twice per turn round a circle of the diameter
-    of the offset, which counts as the inertia m·offset². In each slot the torque is a couple of two forces on the arm,
-    and these rub with the sliding speeds offset·w·|sin| and offset·w·|cos| (F. Reuleaux: Der Constructeur). Over a turn
-    that takes the share (8/pi)·mu·offset/arm of the power.
+    Both shafts turn at the same angle; the centre of the disc moves twice per turn round a circle with the diameter of
+    the offset, which acts as the inertia m·offset². In each slot the torque is a couple of two forces on the arm,
+    which have friction at the sliding speeds offset·w·|sin| and offset·w·|cos| (F. Reuleaux: Der Constructeur). Over a
+    turn they lose the share (8/pi)·mu·offset/arm of the power.
     """
 
     icon = icons.OLDHAM

@@ -29,11 +29,11 @@ class DCMachine(Conducting, Rotor, partial=True):
     """Linear DC machine: induced voltage k·flux·w, torque k·flux·i, with the flux relative to its nominal value.
 
     Armature: v = R·ia + v_brush + v_core, v_core = La·der(i) + k·flux·w, where ia - i flows through the conductance of
-    the core losses. A machine that is driven above its no-load speed is a generator: the signs do the rest. The
+    the core losses. A machine driven above its no-load speed is a generator, with the same equations. The
     constant k is given, or follows from the nominal operating point. All losses leave through one heat port. Modelica
     Standard Library, Electrical.Machines.BasicMachines.DCMachines.
 
-    A subclass says where the flux comes from.
+    A subclass defines the flux.
     """
 
     icon = icons.MOTOR
@@ -68,7 +68,7 @@ class DCMachine(Conducting, Rotor, partial=True):
     v_induced: Variable = var("V", "induced voltage")
     tau_electrical: Variable = var("N.m", "torque of the air gap on the rotor")
 
-    # -- what makes the types different --------------------------------------------------------------------------------
+    # -- differences of the types --------------------------------------------------------------------------------
 
     def flux(self) -> Expr | float:
         """Return the flux over its nominal value."""
@@ -94,7 +94,8 @@ class DCMachine(Conducting, Rotor, partial=True):
         """Return the energy of the excitation field."""
         return 0.0
 
-    # -- what they share -----------------------------------------------------------------------------------------------
+    # -- common to all types
+    # -----------------------------------------------------------------------------------------------
 
     def resistance(self, cold: Expr | float) -> Expr:
         """Return the resistance of a warm winding."""
@@ -127,7 +128,7 @@ class DCMachine(Conducting, Rotor, partial=True):
         return self.P_friction / self.w_nominal * self._power_law(self.p_friction)
 
     def stray_torque(self) -> Expr:
-        """Return the torque that stands for the stray load losses."""
+        """Return the torque of the stray load losses."""
         load = (self.ia / self.I_nominal) ** 2
         return self.P_stray / self.w_nominal * load * self._power_law(self.p_stray)
 
@@ -198,7 +199,7 @@ class ExcitedDCMachine(DCMachine, partial=True):
 
 
 class SeparatelyExcitedDCMachine(ExcitedDCMachine):
-    """DC machine whose excitation winding has a supply of its own; less excitation makes it faster."""
+    """DC machine whose excitation winding has its own supply; less excitation makes it faster."""
 
     ep = Pin("positive excitation terminal")
     en = Pin("negative excitation terminal")
@@ -212,7 +213,7 @@ class SeparatelyExcitedDCMachine(ExcitedDCMachine):
 
 
 class ShuntDCMachine(ExcitedDCMachine):
-    """DC machine whose excitation winding lies across the armature terminals."""
+    """DC machine whose excitation winding is across the armature terminals."""
 
     def equations(self) -> Equations:
         yield from super().equations()
@@ -223,7 +224,7 @@ class ShuntDCMachine(ExcitedDCMachine):
 class SeriesDCMachine(DCMachine):
     """DC machine whose excitation winding carries the armature current: the torque grows with its square.
 
-    Without load its flux vanishes and it runs away.
+    Without load its flux becomes zero and it runs away.
     """
 
     w_nominal: Parameter = param("rad/s", "nominal speed", default=1410 * _RPM, min=1e-12)

@@ -1,4 +1,4 @@
-"""Drivers who follow a speed profile."""
+"""Driver models that follow a speed profile."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ from modelica_like.language import (
 
 
 class Driver(Component):
-    """Driver who follows a profile of speed over time, such as a driving cycle, with accelerator and brake.
+    """Driver model that follows a profile of speed over time, such as a driving cycle, with accelerator and brake.
 
-    A PI controller with anti-windup; what is positive goes to the accelerator, what is negative to the brake.
+    A PI controller with anti-windup; a positive output goes to the accelerator, a negative one to the brake.
     """
 
     icon = icons.DRIVER
@@ -33,7 +33,7 @@ class Driver(Component):
     profile: tuple[tuple[float, float], ...] = rows(
         column("time", scale="time_scale", rising=True), column("speed", scale="v_scale")
     )
-    time_scale: Parameter = param("s", "time that counts as 1 in the profile", default=1.0)
+    time_scale: Parameter = param("s", "scale of the times in the profile", default=1.0)
     v_scale: Parameter = param("m/s", "speed that counts as 1 in the profile", default=1.0)
     k: Parameter = param("s/m", "gain, pedal over error of the speed", default=0.5, min=1e-12)
     Ti: Parameter = param("s", "reset time", default=5.0, min=1e-12)

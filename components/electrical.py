@@ -177,9 +177,9 @@ class SignalCurrent(ElectricalSource):
 class CurrentSink(ElectricalSource):
     """Electronic load: draws at p, and returns at n, the current of a signal, but drives none itself.
 
-    It cannot have less than its smallest resistance: where the voltage does not suffice for the current, e.g. because a
-    generator comes to rest, that resistance is what is left of it; at a reversed voltage it draws nothing. Where an
-    inductance is in series, whose current cannot jump, it needs a capacitor in parallel, as such loads have one.
+    It has a smallest resistance: if the voltage does not suffice for the current, e.g. because a generator comes to
+    rest, the load is this resistance; at a reversed voltage it draws nothing. In series with an inductance, whose
+    current cannot jump, it needs a capacitor in parallel, like real loads.
     """
 
     icon = icons.CURRENT
@@ -193,7 +193,7 @@ class CurrentSink(ElectricalSource):
         yield self.load.choose(sinking=sinking, empty=empty, reversed=self.i) == 0
 
     def events(self) -> Events:
-        # Where nothing is to be drawn, no voltage is too low.
+        # Without a current to draw, no voltage is too low.
         load, drawn = self.load, self.i_ref > 0
         fails = all_of(drawn, self.v < self.R_min * self.i_ref)
         yield load.initially("reversed", when=all_of(drawn, self.v < 0))

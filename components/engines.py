@@ -31,9 +31,9 @@ class CombustionEngine(Tabulated, Rotor):
     """Engine whose torque is a map over speed and pedal, with drag, idle controller and rev limit.
 
     The torque of combustion is that of the map times 1 + Σ a·cos(order·phi + phase), the sum over the firing orders;
-    against it acts the drag, which is all that is left while the fuel is cut. A PI controller presses the pedal so far
-    that the speed does not fall below w_idle. Above w_max the fuel is cut until the speed has fallen by w_band, and
-    below w_stall the engine goes out, until something turns it faster than w_start.
+    the drag acts against it, alone while the fuel is cut. A PI controller presses the pedal to keep the speed above
+    w_idle. Above w_max the fuel is cut until the speed has fallen by w_band, and
+    below w_stall the engine stalls, until it is turned faster than w_start.
     """
 
     icon = icons.ENGINE

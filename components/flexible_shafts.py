@@ -25,7 +25,7 @@ from modelica_like.language import (
 class FlexibleShaft(Component):
     """Shaft of n equal pieces: each a torsion spring with damping between two halves of its inertia.
 
-    The natural frequencies of the continuous shaft are met the better the more pieces: the k-th of a free shaft,
+    More pieces approximate the natural frequencies of the continuous shaft better: the k-th of a free shaft,
     k·pi·sqrt(c/J), to (k·pi/n)²/24.
     """
 
@@ -63,7 +63,7 @@ class StribeckBearing(ShaftFriction, ShaftInHousing):
     w: Variable = var("rad/s", "speed of the shaft relative to the housing", state="always")
     d: Parameter = param("N.m.s/rad", "viscous friction", default=0.0, min=0)
     tau_Coulomb: Parameter = param("N.m", "dry friction at high speed, without the viscous part", min=0)
-    tau_Stribeck: Parameter = param("N.m", "what friction at rest has in excess", default=0.0, min=0)
+    tau_Stribeck: Parameter = param("N.m", "excess of friction at rest", default=0.0, min=0)
     w_Stribeck: Parameter = param("rad/s", "speed at which the excess has fallen to 1/e", default=1.0, min=1e-12)
 
     @property

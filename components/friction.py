@@ -34,25 +34,25 @@ from modelica_like.language import (
 Rows = tuple[tuple[float, float], ...]
 
 HOLDS = {"stuck": Hold("slip", reaction="friction", capacity="limits")}
-"""What surfaces that stick hold, in whatever unit."""
+"""Declaration of the motion held by stuck surfaces, in any unit."""
 _NOW = 1e-9
-"""What counts as one instant, in creep_time."""
+"""Time that counts as one instant, in creep_time."""
 _FAINT = 1e-10
-"""Part of what surfaces can bear up to which more than that may be rounding: they do not break away in a tie."""
+"""Excess over the capacity that counts as rounding: surfaces do not break away in a tie."""
 
 
 class Sticking(Lossy, partial=True):
-    """What surfaces do that slide, come to rest on each other and break away again.
+    """Surfaces that slide, come to rest on each other and break away again.
 
-    While they stick, friction is no function of the speed but whatever keeps the relative acceleration at zero; so the
-    speed stays a state in every mode (Otter, Elmqvist, Mattsson: Hybrid modeling in Modelica based on the synchronous
-    data flow principle, CACSD 1999). That leaves it undetermined where another friction element holds the same motion;
-    a tiny `creep` (1e-9) decides: the other one holds as long as it can.
+    While they stick, friction is not a function of the speed but keeps the relative acceleration at zero, so the speed
+    is a state in every mode (Otter, Elmqvist, Mattsson: Hybrid modeling in Modelica based on the synchronous
+    data flow principle, CACSD 1999). Friction is then undetermined if another friction element holds the same motion; a
+    tiny `creep` (1e-9) decides: the other one holds as long as it can.
 
-    Where the motion is prescribed there is no freedom to stick: friction acts against the motion, and while the motion
-    rests, friction, which could be anything up to the static one, is zero.
+    Under a prescribed motion the surfaces cannot stick: friction acts against the motion; while the motion is at rest,
+    friction, which could have any value up to the static one, is zero.
 
-    A subclass declares `creep`, `creep_time` and `rest` in its units, and names its slip speed and its friction.
+    A subclass declares `creep`, `creep_time` and `rest` in its units, and defines its slip speed and its friction.
     """
 
     if TYPE_CHECKING:
@@ -74,33 +74,33 @@ class Sticking(Lossy, partial=True):
         raise NotImplementedError
 
     def holds_forward(self) -> Expr:
-        """Return the friction that surfaces which stick can bear against forward sliding."""
+        """Return the largest friction of stuck surfaces against forward sliding."""
         raise NotImplementedError
 
     def holds_backward(self) -> Expr:
-        """Return the friction, a negative one, that they can bear against backward sliding."""
+        """Return the largest friction of stuck surfaces against backward sliding; it is negative."""
         return -self.holds_forward()
 
     def limits(self) -> tuple[Expr | None, Expr | None]:
-        """Return the largest friction that they can bear against forward and against backward sliding."""
+        """Return the capacities of stuck surfaces against forward and against backward sliding."""
         return self.holds_forward(), -self.holds_backward()
 
     def carried(self) -> Expr | bool:
-        """Return the condition on which a prescribed motion carries the surfaces along, so that they cannot stick."""
+        """Return the condition under which a prescribed motion moves the surfaces, so that they cannot stick."""
         return False if self.given("creep") else prescribed(self.slip) > 0
 
     def sticking(self) -> Expr:
-        """Return what is zero while the surfaces stick."""
+        """Return the expression that is zero while the surfaces stick."""
         creeping = self.creep * self.friction - self.slip / self.creep_time if self.given("creep") else 0.0
         return where(self.carried(), self.friction, der(self.slip) - creeping)
 
     def breaks_forward(self) -> Expr:
-        """Return the condition on which surfaces that stick begin to slide forward."""
+        """Return the condition under which stuck surfaces begin to slide forward."""
         bearable = self.holds_forward()
         return where(self.carried(), self._soon() - self.rest, self.friction - bearable - _FAINT * bearable) > 0
 
     def breaks_backward(self) -> Expr:
-        """Return the condition on which surfaces that stick begin to slide backward."""
+        """Return the condition under which stuck surfaces begin to slide backward."""
         bearable = self.holds_backward()
         return where(self.carried(), self._soon() + self.rest, self.friction - bearable - _FAINT * bearable) < 0
 
@@ -108,8 +108,8 @@ class Sticking(Lossy, partial=True):
         return self.slip + self.creep_time * der(self.slip)
 
     def stops(self, direction: int) -> Expr:
-        """Return the condition on which surfaces that slide in a direction come to rest."""
-        # A prescribed motion may end in standstill without ever passing it; then nothing brakes it any more.
+        """Return the condition under which sliding surfaces come to rest."""
+        # A prescribed motion may end at standstill without passing it; then nothing brakes it.
         still = 0.5 * self.rest - direction * self.creep_time * der(self.slip)
         return direction * self.slip < where(self.carried(), _NOW * still, 0)
 
@@ -131,18 +131,18 @@ class Sticking(Lossy, partial=True):
 class ShaftSticking(Sticking, partial=True):
     """Turning surfaces that slide or stick."""
 
-    creep: Parameter = param("1/(kg.m2)", "acceleration while it sticks over its torque", default=None, min=0)
-    creep_time: Parameter = param("s", "time after which it creeps no faster", default=1e-3, min=0)
+    creep: Parameter = param("1/(kg.m2)", "acceleration per torque while stuck", default=None, min=0)
+    creep_time: Parameter = param("s", "time after which the creep speed stays constant", default=1e-3, min=0)
     rest: Parameter = param("rad/s", "speed that a prescribed motion must exceed to break away", default=1e-12, min=0)
 
 
 class DryFriction(Sticking, partial=True):
     """Two surfaces that stick until the static friction is exceeded, and then slide against the sliding friction.
 
-    A surface that breaks away holds the sliding friction of standstill until it moves. Surfaces without static friction
-    are free: nothing holds them, and their friction, if there is any at speed, goes through zero smoothly.
+    A surface that breaks away keeps the sliding friction of standstill until it moves. Surfaces without static friction
+    are free: nothing holds them, and any friction at speed goes through zero smoothly.
 
-    A subclass gives the laws of sliding and static friction.
+    A subclass defines the laws of sliding and static friction.
     """
 
     peak: Parameter = param("1", "static friction over sliding friction at standstill", default=1.0, min=1)
@@ -156,26 +156,26 @@ class DryFriction(Sticking, partial=True):
         raise NotImplementedError
 
     def static_friction(self) -> Expr:
-        """Return the largest friction of surfaces that stick."""
+        """Return the largest friction of stuck surfaces."""
         return self.peak * self.sliding_friction(0)
 
     def holds_forward(self) -> Expr:
         return self.static_friction()
 
     def pressed(self) -> Expr:
-        """Return the condition on which the surfaces touch."""
+        """Return the condition under which the surfaces touch."""
         return self.static_friction() > 0
 
     def idle_friction(self) -> Expr:
-        """Return the friction of free surfaces: none, where nothing presses them together."""
-        # At rest it is zero also where an event is just being overrun, so that it never jumps with the direction.
+        """Return the friction of free surfaces: none if nothing presses them together."""
+        # Zero at rest even while an event is being passed, so that it never jumps with the direction.
         against = maximum(self.sliding_friction(absolute(self.slip)), 0) - maximum(self.sliding_friction(0), 0)
         return where(self.slip < 0, -against, against)
 
     def equations(self) -> Equations:
         yield from super().equations()
         at_rest = self.sliding_friction(0)
-        # On the way to an event the speed may run a little past zero, where the laws of friction mean nothing.
+        # On the way to an event the speed may go slightly past zero, where the friction laws are not valid.
         forward = self.sliding_friction(maximum(self.slip, 0))
         backward = self.sliding_friction(maximum(-self.slip, 0))
         yield self.mode.choose(
@@ -207,8 +207,8 @@ class PressedFriction(Tabulated, ShaftFriction, partial=True):
     """Friction surfaces pressed together by a normal force.
 
     Friction torque cgeo·mu(slip)·fn with the normal force fn = fn_max·f_normalized. For N surfaces with the radii r_i
-    and r_o, cgeo = N·(r_i + r_o)/2 (uniform wear). Where only the torque of the closed surfaces is known, it is given
-    as `capacity` instead. A residual drag torque acts whenever the surfaces slide.
+    and r_o, cgeo = N·(r_i + r_o)/2 (uniform wear). If only the torque of the closed surfaces is known, give it as
+    `capacity` instead. A residual drag torque acts whenever the surfaces slide.
     """
 
     f_normalized: Input = signal_in("1", "normal force over fn_max; the surfaces are free at 0", default=1.0)
@@ -239,7 +239,7 @@ class PressedFriction(Tabulated, ShaftFriction, partial=True):
         yield from self.measured()
 
     def measured(self) -> Events:
-        """Yield the event that tells that the slip leaves mu_pos while the surfaces are pressed together."""
+        """Yield the event at which the slip leaves mu_pos while the surfaces are pressed together."""
         if not self.given("capacity"):
             speed = absolute(self.slip) / self.w_scale
             yield from self.leaving("mu_pos", speed, self.mu_pos, self.f_normalized > 0)
@@ -249,7 +249,7 @@ class Clutch(PressedFriction, CompliantWithRelativeStates):
     """Friction clutch between two shafts."""
 
     icon = icons.CLUTCH
-    # No torque depends on the angle by which a clutch has slipped.
+    # No torque depends on the slip angle of a clutch.
     phi_rel: Variable = var("rad", "relative angle, flange_b.phi - flange_a.phi", state="prefer", default=0)
     w_rel: Variable = var("rad/s", "slip speed", state="always")
 
@@ -304,7 +304,7 @@ class Brake(PressedFriction, ShaftInHousing):
 
 
 class BearingFriction(Tabulated, ShaftFriction, ShaftInHousing):
-    """Friction of a bearing: a torque against the rotation that depends on the speed, with stiction."""
+    """Friction of a bearing: a speed-dependent torque against the rotation, with stiction."""
 
     icon = icons.BEARING
     w: Variable = var("rad/s", "speed of the shaft relative to the housing", state="always")

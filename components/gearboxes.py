@@ -36,7 +36,7 @@ class Gearbox(Component):
     )  # fmt: skip
     """As in a `LossyGear`: rows of speed |w_a| in rad/s, eta_mf1, eta_mf2, and |tau_bf1|, |tau_bf2| in N.m."""
     extrapolate: Literal["hold", "linear", "error"] = "hold"
-    """Beyond the rows: `hold` the last values, let the last slopes go on (`linear`), or end the run (`error`)."""
+    """Beyond the rows: `hold` the last values, continue the last slopes (`linear`), or end the run (`error`)."""
     has_backlash: bool = True
     """The flanks have backlash."""
     ratio: Parameter = param("1", "transmission ratio, speed of flange_a over speed of flange_b")

@@ -10,7 +10,7 @@ from modelica_like.language import Equations, Parameter, param
 class IdealGear(TwoFlanges):
     """Gear without inertia, loss, elasticity and backlash.
 
-    All angles count from the housing, which carries the difference of the torques.
+    All angles are relative to the housing, which carries the difference of the torques.
     """
 
     icon = icons.GEAR

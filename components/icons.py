@@ -1,4 +1,4 @@
-"""Symbols of the machine elements, as kinematic diagrams and circuit diagrams have them."""
+"""Symbols of the machine elements, as in kinematic diagrams and circuit diagrams."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def _rect(half_x: float, half_y: float, x: float = 0.0, y: float = 0.0) -> str:
 
 
 def _hatch(x: float, y: float, width: float, down: int = 1) -> str:
-    """A fixed edge with its strokes, drawn away from what it holds."""
+    """A fixed edge with its hatching."""
     strokes = " ".join(f"M{x + k:g} {y:g} l-4 {5 * down}" for k in range(4, int(width) + 1, 5))
     return f"M{x:g} {y:g} h{width:g} {strokes}"
 
@@ -83,10 +83,17 @@ PENDULUM = Icon(44, 52, paper=_circle(0, 6, 18), lines="M-22 6 h22 M0 6 v-16 l6 
 _PAIR, _HUBS = f"{_circle(-11, 0, 9)} {_circle(9, 0, 11)}", f"{_circle(-11, 0, 2.5)} {_circle(9, 0, 2.5)}"
 GEAR = Icon(48, 38, paper=_PAIR, solid=_HUBS, lines="M-24 0 h4 M20 0 h4", key=("ratio",))
 WORM = replace(GEAR, lines="M-24 0 h4 M20 0 h4 M-17 -5 l4 10 M-12 -7 l4 12 M-7 -6 l3 8")
+GEAR_MESH = replace(GEAR, lines="M-24 0 h4 M20 0 h4 M-6 -16 l2 4 l2 -8 l2 8 l2 -4", key=("c",))
+CHURNING = replace(BEARING, paper=_circle(0, 0, 14), lines=f"M-22 0 h44 {_hatch(-16, 8, 32)}", heavy="", key=("R",))
 GEARBOX = Icon(56, 46, paper=f"{_rect(28, 23)} {_PAIR}", solid=_HUBS, key=("ratio",))
 BELT = Icon(60, 34, paper=f"{_circle(-18, 0, 9)} {_circle(13, 0, 14)}",
             solid=f"{_circle(-18, 0, 2)} {_circle(13, 0, 2)}",
             lines="M-19.5 -9 L11 -14 M-19.5 9 L11 14 M-30 0 h3 M27 0 h3", key=("ratio",))  # fmt: skip
+VARIABLE_GEAR = Icon(
+    56, 40, paper="M-22 -14 l8 8 v12 l-8 8 Z M22 -14 l-8 8 v12 l8 8 Z", key=("efficiency",), ports={"u": "N"},
+    lines="M-28 0 h6 M22 0 h6 M-14 -6 L14 -6 M-14 6 L14 6 M-6 16 L8 -16 l-5 2 M8 -16 l1 5",
+)  # fmt: skip
+CHAIN = replace(BELT, lines=BELT.lines + " M-8 -13 v3 M-2 -14 v3 M4 -15 v3 M-8 10 v3 M-2 11 v3 M4 12 v3", key=("z_a",))
 _SET = f"{_circle(0, 0, 26)} {_circle(0, 0, 22)}"
 _WHEELS = f"{_circle(0, 0, 8)} {_circle(0, -15, 7)} {_circle(-13, 7.5, 7)} {_circle(13, 7.5, 7)}"
 PLANETARY = Icon(54, 54, paper=_SET, solid=_WHEELS, lines="M0 -15 L-13 7.5 L13 7.5 Z",
@@ -110,8 +117,20 @@ BALL_SCREW = Icon(60, 34, solid=_rect(12, 15), lines="M-30 0 h60 M-26 -5 l6 10 M
 RACK = Icon(48, 44, paper=_circle(0, -4, 15), solid=_circle(0, -4, 2.5),
             lines="M-24 13" + " l4 -4 l4 4" * 6, key=("r", "radius", "ratio"),
             ports={"flange_t": "E", "support_r": "S", "support_t": ("S", 10)})  # fmt: skip
+SLIDER_CRANK = Icon(56, 40, paper=_circle(-14, 0, 13), lines="M-14 0 L-6 -10 L18 0", solid=_rect(7, 6, 21, 0),
+                    heavy="M10 9 h18", key=("r",))  # fmt: skip
+CAM = Icon(48, 44, paper="M-22 6 a14 14 0 1 0 28 0 q0 -10 -8 -18 q-6 -6 -12 0 q-8 8 -8 18 Z", key=("h",),
+           lines="M10 -10 h14 M10 -16 v12", solid=_circle(-8, 6, 3))  # fmt: skip
+FOUR_BAR = Icon(56, 40, lines="M-22 12 L-14 -4 L14 -14 L22 12 M-28 14 h12 M16 14 h12",
+                solid=f"{_circle(-22, 12, 3)} {_circle(22, 12, 3)}", key=("crank",))  # fmt: skip
 WHEEL = replace(RACK, lines=_hatch(-22, 12, 44), heavy="M-22 12 h44", solid=_circle(0, -4, 4))
 TYRE = replace(WHEEL, ports={"flange_t": "E", "F_z": "N"}, key=("mu",))
+
+DRUM = replace(
+    RACK, paper=_circle(-4, -4, 15), lines="M11 -4 v24 M11 20 h13", solid=_circle(-4, -4, 2.5), key=("radius",)
+)
+HOLDING_BRAKE = replace(BRAKE, lines=f"{BRAKE.lines} M-5 -19 l10 -6 M-5 25 l10 -6", key=("capacity",),
+                        ports={"p": ("N", -8), "n": ("N", 8)})  # fmt: skip
 
 # -- slides ----------------------------------------------------------------------------------------------------------
 
@@ -127,6 +146,8 @@ VEHICLE = Icon(64, 36, paper="M-31 6 v-8 l8 -3 l8 -10 h22 l9 10 l14 3 v8 Z",
 AXLES = Icon(64, 30, paper="M-31 2 v-8 l8 -3 l8 -6 h22 l9 6 l14 3 v8 Z",
              lines="M-17 15 v-10 l-3 4 m3 -4 l3 4 M17 15 v-10 l-3 4 m3 -4 l3 4",
              ports={"flange": "W", "inclination": "N", "F_rear": ("E", -7), "F_front": ("E", 7)})  # fmt: skip
+
+ROPE = Icon(50, 14, lines="M-25 0 h4 q4 -6 8 0 q4 6 8 0 q4 -6 8 0 q4 6 8 0 q4 -6 8 0 h6", key=("c",))
 
 # -- actuators -------------------------------------------------------------------------------------------------------
 
@@ -153,6 +174,11 @@ LOAD = Icon(42, 42, paper=_rect(21, 21), lines="M-14 14 h28 M-14 14 v-28 M-14 12
             key=("tau_nominal", "f_nominal", "tau_0"))  # fmt: skip
 EDDY = replace(LOAD, lines="M-14 14 h28 M-14 14 v-28 M-14 12 q8 -30 14 -18 q5 8 14 10",
                ports={"flange": "W", "excitation": "N"})  # fmt: skip
+CUTTING = replace(LOAD, lines="M-14 6 h20 M10 14 l-6 -8 h14 l-2 8 Z M-14 -4 q10 -8 22 4", key=("k_c11",),
+                  ports={"flange": "W", "depth": "N"})  # fmt: skip
+PUMP = Icon(42, 42, paper=_circle(0, 0, 20), solid="M-10 -12 L14 0 L-10 12 Z", ports={"flange": "W"}, key=("H_0",))
+CONVEYOR = Icon(60, 30, paper=f"{_circle(-20, 4, 8)} {_circle(20, 4, 8)}", ports={"flange": "W"}, key=("L",),
+                lines="M-20 -4 h40 M-20 12 h40 M-8 -4 v-8 h14 v8")  # fmt: skip
 START = Icon(30, 30, paper=_circle(0, 0, 14), text="0", ports={"flange": "W"})
 STATES = Icon(44, 20, lines="M-22 0 h6 M16 0 h6 M-16 -6 h32 M-16 6 h32 M-16 -6 v12 M16 -6 v12")
 BOUNDARY = Icon(36, 30, paper="M-18 -15 h24 l12 15 l-12 15 h-24 Z")
@@ -184,6 +210,12 @@ CURRENT = Icon(44, 44, paper=_circle(0, 0, 18), lines="M22 -16 h-22 v-2 M22 16 h
                ports={"p": ("E", -16), "n": ("E", 16), "i_ref": "N"}, key=("I",))  # fmt: skip
 SWITCH = Icon(48, 24, lines="M-24 0 h12 L10 -11 M12 0 h12", solid=f"{_circle(-12, 0, 2.5)} {_circle(12, 0, 2.5)}",
               ports={"closed": "N"})  # fmt: skip
+DIODE = Icon(40, 22, lines="M-20 0 h12 M8 0 h12", solid="M-8 -9 L8 0 L-8 9 Z", heavy="M8 -10 v20")
+CONTACTOR = Icon(
+    52, 44, paper=_rect(14, 8, 0, -11), lines="M-26 12 h14 L8 2 M12 12 h14 M-2 6 v-8",
+    solid=f"{_circle(-12, 12, 2.5)} {_circle(12, 12, 2.5)}",
+    ports={"p": ("W", 12), "n": ("E", 12), "cp": ("W", -11), "cn": ("E", -11)},
+)  # fmt: skip
 BRIDGE = Icon(56, 52, paper=_rect(28, 26), lines="M-10 -14 v28 M10 -14 v28 M-10 0 h20 M-14 -14 h8 M6 -14 h8 M-14 14 h8 "
               "M6 14 h8", ports={
     "p": ("W", -15), "n": ("W", 15), "p_out": ("E", -15), "n_out": ("E", 15), "u": "N",

@@ -36,7 +36,7 @@ class OnSlope(Component, partial=True):
 
     m: Parameter = param("kg", "mass", min=0)
     angle: Parameter = param(
-        "rad", "rise of the way, 90° is upwards: m·g·sin(angle) acts against it; without a value there is no weight",
+        "rad", "slope of the path, 90° is upwards: m·g·sin(angle) acts against motion; no value: no weight",
         default=None,
     )  # fmt: skip
     g: Parameter = param("m/s2", "gravity", default=9.80665)

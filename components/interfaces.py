@@ -1,4 +1,4 @@
-"""Connectors of mechanical components, and what machine elements have in common.
+"""Connectors of mechanical components, and common bases of machine elements.
 
 Signs as in the Modelica Standard Library: a cut torque or force is positive into the component, relative quantities are
 those of `flange_b` minus those of `flange_a`, and the torque or force of a component between two flanges is the one at
@@ -87,7 +87,7 @@ class LinearCompliantWithRelativeStates(LinearCompliant, partial=True):
 
 
 class Supported(Component, partial=True):
-    """Element with a housing, which stands still unless something is connected to it."""
+    """Element with a housing, which is at rest unless something is connected to it."""
 
     support = Flange("housing", optional=True)
 
@@ -102,7 +102,7 @@ class Supported(Component, partial=True):
         return der(self.support.phi) if self.support.used else 0.0
 
     def support_torque(self, shaft_torque: Expr) -> Equations:
-        """Yield the balance of the housing: it carries what the shafts bring in."""
+        """Yield the balance of the housing: it carries the torques of the shafts."""
         if self.support.used:
             yield self.support.tau == -shaft_torque
 
@@ -147,7 +147,7 @@ class ShaftInHousing(Supported, partial=True):
 
 
 class LinearSupported(Component, partial=True):
-    """Element with a housing, which stands still unless something is connected to it."""
+    """Element with a housing, which is at rest unless something is connected to it."""
 
     support = LinearFlange("housing", optional=True)
 
@@ -157,7 +157,7 @@ class LinearSupported(Component, partial=True):
         return self.support.s if self.support.used else 0.0
 
     def support_force(self, slide_force: Expr) -> Equations:
-        """Yield the balance of the housing: it carries what the slides bring in."""
+        """Yield the balance of the housing: it carries the forces of the slides."""
         if self.support.used:
             yield self.support.f == -slide_force
 

@@ -63,7 +63,7 @@ class Chained(Component):
 
     icon = icons.INTEGRATOR
     u: Input = signal_in("*", "rate")
-    T: Parameter = param("s", "time that counts as 1", default=1.0, min=1e-12)
+    T: Parameter = param("s", "scale of the time", default=1.0, min=1e-12)
     x: Variable = var("*", "state", default=0.0)
     y: Output = signal_out("*", "state")
 
@@ -73,10 +73,10 @@ class Chained(Component):
 
 
 class TransferFunction(Component):
-    """Transfer function y/u = k·num(s)/den(s); coefficients belong to falling powers of s·time_scale.
+    """Transfer function y/u = k·num(s)/den(s); coefficients are in falling powers of s·time_scale.
 
-    Its states are those of a chain of integrators (controllable canonical form); at the start they are zero if nothing
-    is said. Modelica Standard Library, Blocks.Continuous.TransferFunction.
+    Its states are those of a chain of integrators (controllable canonical form); at the start they are zero by
+    default. Modelica Standard Library, Blocks.Continuous.TransferFunction.
     """
 
     icon = icons.TRANSFER
@@ -84,7 +84,7 @@ class TransferFunction(Component):
     num: Flat = rows(column("coefficient of the numerator"), flat=True, default=(1.0,))
     den: Flat = rows(column("coefficient of the denominator"), flat=True)
     k: Parameter = param("*", "factor", default=1.0)
-    time_scale: Parameter = param("s", "time that counts as 1", default=1.0, min=1e-12)
+    time_scale: Parameter = param("s", "scale of the time", default=1.0, min=1e-12)
     first: Output = signal_out("*", "input of the chain of integrators")
     y: Output = signal_out("*", "output")
 
@@ -151,4 +151,4 @@ class StateSpace(Component):
 
 
 def _product(row: Flat, values: Sequence[Expr]) -> Expr | float:
-    return sum((a * x for a, x in zip(row, values, strict=True)), 0.0)
+    return sum(a * x for a, x in zip(row, values, strict=True) if not isinstance(a, float) or a)

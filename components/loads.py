@@ -1,4 +1,4 @@
-"""Loads: torques that the work puts on a shaft."""
+"""Loads: torques of a process on a shaft."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class SpeedDependentLoad(ShaftFriction, OneFlange):
         return self.tau
 
     def sliding_friction(self, speed: Expr | float) -> Expr:
-        # For p < 1 the slope at standstill is infinite; below a tiny speed a straight line leads there.
+        # For p < 1 the slope at standstill is infinite; below a tiny speed the law is linear.
         relative = speed / self.w_ref
         near = where(self.p > 0, relative / _STANDSTILL * _STANDSTILL**self.p, 1)
         return self.a + self.b * where(relative > _STANDSTILL, maximum(relative, _STANDSTILL) ** self.p, near)

@@ -32,16 +32,16 @@ LossRows = tuple[tuple[float, float, float, float, float], ...]
 
 
 class MeshWithFriction(ShaftSticking, TwoFlanges, partial=True):
-    """Gear whose teeth and bearings rub, and stick where the torques are too small to turn them.
+    """Gear with friction in teeth and bearings, which stick if the torques are too small to turn them.
 
-    With the torque x = -flange_b.tau/ratio that the mesh passes on, counted at flange_a, the lost torque is a line in x
-    while flange_a drives, and another one while flange_b drives; in forward rotation the larger one holds, in backward
-    rotation the smaller one. At standstill it is whatever keeps the gear at rest, between these limits (C. Pelchen,
+    The mesh transmits the torque x = -flange_b.tau/ratio, referred to flange_a. The lost torque is a line in x while
+    flange_a drives, and another line while flange_b drives; in forward rotation the larger value applies, in backward
+    rotation the smaller one. At standstill it keeps the gear at rest, between these limits (C. Pelchen,
     C. Schweiger, M. Otter: Modeling and simulating the efficiency of gearboxes, 2nd Modelica Conference 2002; the
-    driving side after C. Bertsch, 2009). The heavier the inertia on the load side, the more the efficiency against the
-    drive matters: where it is negative, the motion is only unique if the inertia of the drive is large enough.
+    driving side after C. Bertsch, 2009). The efficiency against the drive matters more with a larger inertia on the
+    load side: if it is negative, the motion is unique only if the inertia of the drive is large enough.
 
-    A subclass gives the efficiencies and the friction of the bearings at a speed.
+    A subclass defines the efficiencies and the friction of the bearings at a speed.
     """
 
     icon = icons.GEAR
@@ -107,7 +107,7 @@ class MeshWithFriction(ShaftSticking, TwoFlanges, partial=True):
         ) == 0  # fmt: skip
 
     def rubs(self) -> bool:
-        """Tell whether there can be friction; without any the gear is free at all times, and has no events."""
+        """Return whether there can be friction; without any, the gear is always free and has no events."""
         return True
 
     def events(self) -> Events:
@@ -144,7 +144,7 @@ class LossyGear(Tabulated, MeshWithFriction):
         return self._column(speed, 1), self._column(speed, 2)
 
     def bearing_losses(self, speed: Expr | float) -> tuple[Expr | float, Expr | float]:
-        # The table's torques are counted behind the mesh as seen from the driving side.
+        # The table's torques are those behind the mesh, seen from the driving side.
         eta_a, eta_b = self.efficiencies(speed)
         tau_a, tau_b = (self.tau_scale * absolute(self._column(speed, k)) for k in (3, 4))
         return tau_a / eta_a, tau_b * eta_b
@@ -159,7 +159,7 @@ class ConstantEfficiencyGear(MeshWithFriction):
     """Gear with one efficiency in each direction of power.
 
     Without a value, the efficiency against the drive is 2 - 1/efficiency: the same friction in the teeth (G. Niemann,
-    H. Winter: Maschinenelemente III, worm gears). Where it is not above zero the gear is self-locking: no torque at
+    H. Winter: Maschinenelemente III, worm gears). If it is not above zero, the gear is self-locking: no torque at
     flange_b can turn it, only a drive at flange_a.
     """
 

@@ -1,4 +1,4 @@
-"""Motions: prescribed with their derivatives, begun from signals, and relative ones as states."""
+"""Motions: prescribed with their derivatives, started from signals, and relative motions as states."""
 
 from __future__ import annotations
 
@@ -34,15 +34,15 @@ from modelica_like.language import (
 class Move(ShaftMotionSource):
     """Motion of a shaft given by signals of angle, speed and acceleration, which are derivatives of each other.
 
-    None of the signals is differentiated: the shaft starts with the angle and the speed, follows the acceleration, and
-    what deviates from angle and speed dies out critically damped, at f_crit.
+    No signal is differentiated: the shaft starts with the angle and the speed and follows the acceleration; deviations
+    from angle and speed decay critically damped, with f_crit.
     """
 
     icon = icons.ANGLE
     phi_ref: Input = signal_in("rad", "angle")
     w_ref: Input = signal_in("rad/s", "speed")
     a_ref: Input = signal_in("rad/s2", "angular acceleration")
-    f_crit: Parameter = param("Hz", "how fast a deviation dies out", default=5.0, min=0)
+    f_crit: Parameter = param("Hz", "critical frequency of the decay of deviations", default=5.0, min=0)
     phi: Variable = var("rad", "angle of the shaft relative to the housing", state="always", default=0)
     w: Variable = var("rad/s", "speed of the shaft relative to the housing", state="always", default=0)
     stage = Mode("before", "moving", description="before or after the start")
@@ -66,7 +66,7 @@ class TranslationalMove(MotionSource):
     s_ref: Input = signal_in("m", "position")
     v_ref: Input = signal_in("m/s", "velocity")
     a_ref: Input = signal_in("m/s2", "acceleration")
-    f_crit: Parameter = param("Hz", "how fast a deviation dies out", default=5.0, min=0)
+    f_crit: Parameter = param("Hz", "critical frequency of the decay of deviations", default=5.0, min=0)
     s: Variable = var("m", "position of the slide relative to the housing", state="always", default=0)
     v: Variable = var("m/s", "velocity of the slide relative to the housing", state="always", default=0)
     stage = Mode("before", "moving", description="before or after the start")
@@ -86,8 +86,8 @@ class TranslationalMove(MotionSource):
 class InitializeFlange(Component):
     """Start of a shaft from signals: at the start of a run it gets their angle and speed; later it is free.
 
-    The acceleration is that of the torques; it can be given as the start value of `a`, from which then, e.g., the twist
-    of a spring follows. In the Modelica Standard Library it is a signal, too.
+    The acceleration follows from the torques; it can be given as the start value of `a`, which then determines, e.g.,
+    the twist of a spring. In the Modelica Standard Library it is also a signal.
     """
 
     icon = icons.START
@@ -150,7 +150,7 @@ class TranslationalInitializeFlange(Component):
 class RelativeStates(CompliantWithRelativeStates):
     """Makes the relative angle and speed of two shafts the states of the model; it carries no torque.
 
-    Then the states stay small where both shafts turn on and on.
+    Then the states stay small while both shafts keep turning.
     """
 
     icon = icons.STATES

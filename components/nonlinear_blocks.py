@@ -26,7 +26,7 @@ from modelica_like.language import (
 
 
 class VariableLimiter(Component):
-    """Signal that keeps between two others. Modelica Standard Library, Blocks.Nonlinear.VariableLimiter."""
+    """Signal limited by two others. Modelica Standard Library, Blocks.Nonlinear.VariableLimiter."""
 
     icon = icons.LIMITER
     u: Input = signal_in("*", "signal")
@@ -74,7 +74,7 @@ class SlewRateLimiter(Component):
 
 
 class DeadZone(Component):
-    """Signal that is zero within a zone, and beyond it what exceeds it. Modelica Standard Library, Blocks.Nonlinear."""
+    """Signal that is zero within a zone, and the excess beyond it. Modelica Standard Library, Blocks.Nonlinear."""
 
     icon = icons.DEAD_ZONE
     u: Input = signal_in("*", "signal")
@@ -120,7 +120,7 @@ class Hysteresis(Component):
 
 
 class Quantizer(Component):
-    """Signal rounded to a multiple of q, as a converter or an encoder gives it."""
+    """Signal rounded to a multiple of q, as from a converter or an encoder."""
 
     icon = icons.SCHEDULE
     u: Input = signal_in("*", "signal")
@@ -135,7 +135,7 @@ class Quantizer(Component):
     def events(self) -> Events:
         steps, level, go = self.u / self.q, self.level, self.rounding.go
         nearest = floor(steps + 0.5)
-        # A jump passes many levels at once; at the edge of a level rounding may find the old one.
+        # A jump passes many levels at once; at the edge of a level rounding may give the old one.
         up, down = {level: maximum(nearest, level + 1)}, {level: minimum(nearest, level - 1)}
         yield go("kept", "kept", when=steps > level + 0.5, reset=up)
         yield go("kept", "kept", when=steps < level - 0.5, reset=down)

@@ -25,24 +25,24 @@ from modelica_like.language import (
 class Freewheel(CompliantWithRelativeStates):
     """Ideal freewheel: flange_b may overrun flange_a, but not fall behind.
 
-    Either the shafts turn together and flange_a drives flange_b, or flange_b is faster and there is no torque: of the
-    overrunning speed and the driving torque at most one is not zero, and none is negative.
+    Either the shafts turn together and flange_a drives flange_b, or flange_b is faster and there is no torque:
+    overrunning speed and driving torque are never negative, and at least one of them is zero.
     """
 
     icon = icons.FREEWHEEL
-    # No torque depends on the angle by which a freewheel has overrun.
+    # No torque depends on the angle of overrun.
     phi_rel: Variable = var("rad", "relative angle, flange_b.phi - flange_a.phi", state="prefer", default=0)
     w_rel: Variable = var("rad/s", "overrunning speed", state="always")
-    slow: Parameter = param("rad/s", "speed up to which falling behind may be rounding", default=1e-9, min=0)
-    soon: Parameter = param("s", "time in which it must reach that speed to count as falling", default=1.0, min=0)
-    faint: Parameter = param("N.m", "torque up to which what releases it may be rounding", default=1e-9, min=0)
+    slow: Parameter = param("rad/s", "speed of falling behind that counts as rounding", default=1e-9, min=0)
+    soon: Parameter = param("s", "time limit for reaching that speed", default=1.0, min=0)
+    faint: Parameter = param("N.m", "releasing torque that counts as rounding", default=1e-9, min=0)
     mode = Mode(
         "overrunning", "locked", description="state of the freewheel",
         holds={"locked": Hold("w_rel", reaction="tau", capacity="limits")},
     )  # fmt: skip
 
     def limits(self) -> tuple[float, None]:
-        """Return the largest torque against overrunning, none, and against falling behind, any."""
+        """Return the capacities: none against overrunning, unlimited against falling behind."""
         return 0.0, None
 
     def equations(self) -> Equations:
@@ -52,15 +52,15 @@ class Freewheel(CompliantWithRelativeStates):
     def events(self) -> Events:
         yield self.mode.initially("locked", when=all_of(self.w_rel <= 0, self.w_rel >= 0))
         yield self.mode.go("locked", "overrunning", when=self.tau > self.faint, because="the torque would reverse")
-        # Just after the release the speed is zero but for rounding; whether it falls decides.
+        # Just after the release the speed is zero within rounding; its rate decides.
         falling = all_of(self.w_rel < 0, any_of(self.soon * der(self.w_rel) < -self.slow, self.w_rel < -self.slow))
         yield self.mode.go("overrunning", "locked", when=falling, because="overrunning speed reached zero")
 
 
 class OneWayClutch(Clutch):
-    """Friction clutch and freewheel side by side: flange_b may overrun flange_a, against the friction of the clutch.
+    """Friction clutch and freewheel in parallel: flange_b may overrun flange_a, against the friction of the clutch.
 
-    One element, because the torque would not be unique between a freewheel and a clutch that both hold. Modelica
+    They are one element, because the torque of a freewheel and a clutch that both hold would not be unique. Modelica
     Standard Library, Rotational.OneWayClutch.
     """
 
@@ -73,7 +73,7 @@ class OneWayClutch(Clutch):
         return self.holds_forward(), None
 
     def carried(self) -> Expr | bool:
-        # It holds against falling behind, whatever prescribes that.
+        # It holds against falling behind, even if that motion is prescribed.
         return False
 
     def equations(self) -> Equations:

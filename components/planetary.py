@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from components import icons
-from components.interfaces import Flange
+from components.interfaces import Flange, Supported
 from components.thermal import Lossy
 from modelica_like.language import (
     Component,
@@ -44,10 +44,10 @@ class IdealPlanetary(Component):
 class PlanetarySet(Component):
     """Planetary gear set of sun, ring and carrier after R. Willis (Principles of Mechanism, 1841), without inertia.
 
-    w_sun - w_carrier = i0·(w_ring - w_carrier). The fixed-carrier ratio i0 is -z_ring/z_sun where each planet is in
-    mesh with sun and ring (minus set), +z_ring/z_sun where planets in pairs are between them (plus set). The rolling
-    power tau_sun·(w_sun - w_carrier) is what the teeth pass on, from the sun to the ring where it is positive; the rest
-    of the power passes with the carrier, as in a coupling.
+    w_sun - w_carrier = i0·(w_ring - w_carrier). The fixed-carrier ratio i0 is -z_ring/z_sun if each planet is in
+    mesh with sun and ring (minus set), +z_ring/z_sun with planets in pairs between them (plus set). The teeth
+    transmit the rolling power tau_sun·(w_sun - w_carrier), from the sun to the ring if it is positive; the rest of the
+    power passes with the carrier, as in a coupling.
     """
 
     icon = icons.PLANETARY
@@ -75,11 +75,11 @@ class PlanetarySet(Component):
 
 
 class LossyPlanetarySet(Lossy, PlanetarySet):
-    """Planetary gear set whose teeth take a share of the rolling power, whichever way it goes.
+    """Planetary gear set whose teeth lose a share of the rolling power, in either direction.
 
-    Where rolling power enters at the sun, tau_ring = -i0·efficiency·tau_sun; where it enters at the ring, tau_ring =
-    -i0·tau_sun/efficiency (VDI 2157). A set that turns as one block loses nothing. Below a few w_smooth the
-    friction of the teeth goes through zero smoothly: the set does not stick.
+    If rolling power enters at the sun, tau_ring = -i0·efficiency·tau_sun; if it enters at the ring, tau_ring =
+    -i0·tau_sun/efficiency (VDI 2157). A set that turns as one block has no loss. Below a few w_smooth the friction of
+    the teeth goes through zero smoothly: the set does not stick.
     """
 
     efficiency: Parameter = param(
@@ -102,10 +102,11 @@ class LossyPlanetarySet(Lossy, PlanetarySet):
         return self.tau_loss * self.w_rel
 
 
-class Differential(Component):
+class Differential(Supported):
     """Bevel gear differential: both wheels get half the torque, the cage turns with the mean of their speeds.
 
-    An `IdealPlanetary` with equal torque arms, behind the final drive of the given ratio.
+    An `IdealPlanetary` with equal torque arms, behind the final drive of the given ratio. All angles count from the
+    housing, which carries what the final drive changes of the torque.
     """
 
     icon = icons.DIFFERENTIAL
@@ -117,6 +118,8 @@ class Differential(Component):
 
     def equations(self) -> Equations:
         drive, left, right = self.flange, self.left, self.right
-        yield 2 * drive.phi == self.ratio * (left.phi + right.phi)
+        housing = self.phi_support
+        yield 2 * (drive.phi - housing) == self.ratio * (left.phi + right.phi - 2 * housing)
         yield left.tau == right.tau
         yield 2 * left.tau == -self.ratio * drive.tau
+        yield from self.support_torque(drive.tau + left.tau + right.tau)

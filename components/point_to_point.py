@@ -23,9 +23,9 @@ from modelica_like.language import (
 
 
 class KinematicPTP2(Component):
-    """Position, speed and acceleration on the fastest way from q_begin to q_end within limits of the latter two.
+    """Position, speed and acceleration of the fastest motion from q_begin to q_end within limits of the latter two.
 
-    It accelerates, keeps the largest speed, and brakes; on a short way it brakes before it has reached that speed.
+    It accelerates, keeps the largest speed, and brakes; over a short distance it brakes before it reaches that speed.
     Modelica Standard Library, Blocks.Sources.KinematicPTP2; its KinematicPTP is the output qdd.
     """
 
@@ -42,7 +42,7 @@ class KinematicPTP2(Component):
 
     @property
     def way(self) -> Expr:
-        """Way to go, with its sign."""
+        """Distance, with its sign."""
         return self.q_end - self.q_begin
 
     @property

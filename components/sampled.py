@@ -1,4 +1,4 @@
-"""Sampled signals: what a digital controller sees, and noise."""
+"""Sampled signals for digital controllers, and noise."""
 
 from __future__ import annotations
 
@@ -44,14 +44,14 @@ class Sampled(Component, partial=True):
         raise NotImplementedError
 
     def sample(self) -> dict[Expr, Expr]:
-        """Return what changes at a sample."""
+        """Return the changes at a sample."""
         raise NotImplementedError
 
     def equations(self) -> Equations:
         yield self.y == where(self.number > 0, self.held(), 0)
 
     def events(self) -> Events:
-        # A run may start late: then all samples before count as taken at once.
+        # A run may start late: then all earlier samples count as taken at once.
         passed = floor((self.time - self.start_time) / self.period) + 1
         taken = {self.number: maximum(self.number + 1, passed)}
         following = self.start_time + self.number * self.period
@@ -59,7 +59,7 @@ class Sampled(Component, partial=True):
 
 
 class ZeroOrderHold(Sampled):
-    """Sample and hold: keeps what the signal was at the last sample time.
+    """Sample and hold: keeps the value of the signal at the last sample time.
 
     Modelica Standard Library, Blocks.Discrete.ZeroOrderHold.
     """

@@ -23,7 +23,7 @@ class BallScrewDrive(Component):
     flange_t = LinearFlange("nut")
     inlet, outlet = "flange_r", "flange_t"
     has_backlash: bool = False
-    """The nut has backlash; it is then given."""
+    """Whether the nut has backlash, which is then required."""
     lead: Parameter = param("m", "travel per turn")
     J: Parameter = param("kg.m2", "moment of inertia of the spindle", min=0)
     efficiency: Parameter = param("1", "efficiency while the spindle drives", default=0.9, min=1e-3, max=1)

@@ -1,4 +1,4 @@
-"""Ideal sensors: they measure, watch and load nothing."""
+"""Ideal sensors, without effect on the drive."""
 
 from __future__ import annotations
 
@@ -43,15 +43,15 @@ class SpeedSensor(Component):
 
 
 class SpeedLimit(SpeedSensor):
-    """Watches a shaft: when it turns faster than its limit, in either direction, the report of the run says so.
+    """Speed monitor: the report of the run says when a shaft exceeds its limit in either direction.
 
-    It stops nothing. What has been exceeded once stays exceeded, like a centrifugal switch that has tripped.
+    It does not stop the shaft. Once exceeded, it stays so, like a tripped centrifugal switch.
     """
 
     w_max: Parameter = param("rad/s", "largest permitted speed", min=0)
     reason: str = ""
-    """What the report adds, e.g. `a series machine runs away without load`."""
-    limit = Mode("kept", "exceeded", description="speed within its limit, or once above")
+    """Text added in the report, e.g. `a series machine runs away without load`."""
+    limit = Mode("kept", "exceeded", description="speed within its limit, or exceeded")
 
     def events(self) -> Events:
         notice = "exceeds {w_max} rad/s" + (f": {self.reason}" if self.reason else "")
@@ -59,7 +59,7 @@ class SpeedLimit(SpeedSensor):
 
 
 class RelativeSensor(Component, partial=True):
-    """Sensor between two shaft ends that are not joined by it."""
+    """Sensor between two shaft ends, without joining them."""
 
     icon = icons.BETWEEN_SENSOR
     flange_a = Flange("reference shaft end")

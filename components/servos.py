@@ -20,13 +20,13 @@ from modelica_like.language import (
 
 
 class Servo(Component, partial=True):
-    """Motor whose drive controls its current and its speed, in a cascade.
+    """Motor with cascaded control of current and speed.
 
     The current controller compensates the time constant of the winding and the induced voltage, so that the current
     follows with the time constant T_current until the voltage V_max is reached. The speed controller is set by the
-    symmetrical optimum for the inertia J_total; it asks for no more than the current I_max. A motor of three phases
-    counts with the values that have the same torque over current and voltage over speed (the machine is one of direct
-    current, PermanentMagnetDCMachine); its drive has no loss.
+    symmetrical optimum for the inertia J_total; it demands at most the current I_max. For a three-phase motor
+    use values with the same torque over current and voltage over speed (the machine is a
+    PermanentMagnetDCMachine); its drive has no loss.
     """
 
     icon = icons.SERVO

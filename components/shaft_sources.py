@@ -19,7 +19,7 @@ class Torque2(Component):
     """Torque between two shafts, given by a signal: it drives flange_b in positive, flange_a in negative direction."""
 
     icon = icons.BETWEEN_TORQUE
-    flange_a = Flange("shaft end that is pushed back")
+    flange_a = Flange("shaft end with the reaction")
     flange_b = Flange("shaft end that is driven")
     tau: Input = signal_in("N.m", "torque on flange_b")
 
@@ -38,7 +38,7 @@ class SpeedDependentTorque(TorqueSource, partial=True):
     tau_nominal: Parameter = param("N.m", "torque on the connected part at w_nominal; negative for a load")
     w_nominal: Parameter = param("rad/s", "nominal speed", min=1e-12)
     reverses: bool = True
-    """The torque changes its direction with the speed, as friction does."""
+    """The torque changes its direction with the speed, like friction."""
     w: Variable = var("rad/s", "speed of the shaft relative to the housing")
 
     def equations(self) -> Equations:
@@ -78,7 +78,7 @@ class SignTorque(TorqueSource):
 
     icon = icons.LOAD
     tau_nominal: Parameter = param("N.m", "torque on the connected part in forward rotation; negative for a load")
-    w0: Parameter = param("rad/s", "speed from which on the sign is the full one", default=0.1, min=1e-12)
+    w0: Parameter = param("rad/s", "speed above which the sign is ±1", default=0.1, min=1e-12)
     reg: Literal["exp", "sine", "linear", "cosine"] = "exp"
     """Between -w0 and w0: tanh(50·w/w0) (`exp`), a quarter of a sine, a straight line, or one minus a cosine."""
     w: Variable = var("rad/s", "speed of the shaft relative to the housing")
@@ -108,7 +108,7 @@ class Position(ShaftMotionSource):
     """Angle given by a signal: exactly, or through a Bessel filter of second order.
 
     The filter makes speed and acceleration of any signal finite. In the Modelica Standard Library, Rotational.Position,
-    `exact` is false if nothing is said.
+    `exact` is false by default.
     """
 
     icon = icons.ANGLE

@@ -18,7 +18,7 @@ _SLIDING = [k for k, name in enumerate(DryFriction.mode.names) if name not in ("
 
 
 class Run(Protocol):
-    """Trajectories by path, values at a time, and energies of a part, as a `Solution` has them."""
+    """Trajectories by path, values at a time, and energies over a time span, like a `Solution`."""
 
     def __getitem__(self, key: str, /) -> Any:
         """Return a trajectory."""
@@ -34,7 +34,7 @@ class Run(Protocol):
 
 
 class ElementShift(Result):
-    """What a clutch or brake does in a shift."""
+    """A clutch or brake in a shift."""
 
     gear: str = line("gear that is engaged")
     begin: Time = line("begin of the shift")
@@ -54,9 +54,9 @@ class ShiftReport(Result):
 def shift_report(
     run: Run, selector: str = "selector", box: str = "box", elements: tuple[str, ...] = _ELEMENTS
 ) -> ShiftReport:
-    """Work out what every clutch and brake does in every shift.
+    """Compute slip, torque and friction work of every clutch and brake in every shift.
 
-    A shift lasts until the next one begins. An element slips while its mode says so: from event to event. The friction
+    A shift lasts until the next one begins. An element slips from event to event, according to its mode. The friction
     work is as precise as the run.
 
     Args:
@@ -69,7 +69,7 @@ def shift_report(
     begins = [int(np.argmax(count == k)) for k in np.unique(count) if k > 0]
     rows: list[ElementShift] = []
     for first, last in pairwise([*begins, len(time)]):
-        # The results have both sides of the instant at which the next shift begins.
+        # The results have both sides of the beginning of the next shift.
         begin, end = float(time[first]), float(time[last - 1])
         if end <= begin:
             continue
@@ -84,9 +84,9 @@ def shift_report(
 
 
 def _slip(run: Run, path: str, window: slice) -> tuple[float, float]:
-    """Return for how long an element slips under load, and its largest torque meanwhile; 0 if it does not."""
+    """Return the slip time of an element under load and its largest torque meanwhile; 0 if it does not slip."""
     time, torque = run["time"][window], np.abs(run[f"{path}.tau"])
-    # What just touches carries a torque of rounding errors.
+    # A barely touching element has a torque of rounding errors.
     loaded = torque[window] > _ROUNDING * np.max(torque)
     slips = np.isin(run[f"{path}.mode"][window], _SLIDING) & loaded
     if not slips.any():
@@ -94,7 +94,7 @@ def _slip(run: Run, path: str, window: slice) -> tuple[float, float]:
     inside = np.where(slips, torque[window], 0.0)
     k = int(np.argmax(inside))
     largest = float(inside[k])
-    # Between events it may be largest between two results: at the vertex of the parabola through three of them.
+    # The maximum may be between two results: at the vertex of the parabola through three of them.
     if 0 < k < len(inside) - 1 and slips[k - 1] and slips[k + 1] and time[k - 1] < time[k] < time[k + 1]:
         bend, slope, _ = np.polyfit(time[k - 1 : k + 2] - time[k], inside[k - 1 : k + 2] - largest, 2)
         if bend < 0:

@@ -35,9 +35,9 @@ _DIGITS = "0123456789"
 class ShiftSchedule(Component):
     """Pressures of five shift elements, gear after gear at fixed times.
 
-    In a shift the pressures of the elements that are closed next rise, and those of the elements that are opened fall,
-    along straight lines during the same time: so the torque is handed over while both slip, without a gap and without
-    two gears being locked at once. Elements that stay closed keep their pressure.
+    In a shift the pressures of closing elements rise linearly while those of opening elements fall: the torque passes
+    over while both slip, without a gap and without two gears locked at once. Elements that stay closed keep their
+    pressure.
     """
 
     icon = icons.SCHEDULE
@@ -49,7 +49,7 @@ class ShiftSchedule(Component):
     pattern: tuple[tuple[str, str], ...] = rows(
         column("gear", text=True), column("closed elements", text=True), default=_GEARS
     )
-    """Gears and the elements closed in them; as it stands, that of a `Lepelletier` gearbox."""
+    """Gears and their closed elements; the default is that of a `Lepelletier` gearbox."""
     time_scale: Parameter = param("s", "scale of the times", default=1.0)
     a: Output = signal_out("1", "pressure of element a")
     b: Output = signal_out("1", "pressure of element b")
@@ -82,7 +82,7 @@ class ShiftSchedule(Component):
                 )
 
     def in_row(self, value: Callable[[int], float], ahead: int = 0) -> Expr | float:
-        """Return what belongs to the present row, or to one some rows ahead."""
+        """Return the value of the present row, or of one some rows ahead."""
         last = len(self.shifts) - 1
         chosen: Expr | float = value(last)
         for k in reversed(range(last)):

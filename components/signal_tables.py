@@ -23,7 +23,7 @@ from modelica_like.language import (
 class Table1D(Tabulated):
     """Characteristic curve: y from a table over a signal.
 
-    Modelica Standard Library, Blocks.Tables.CombiTable1Ds; beyond the rows that goes on along the last slope.
+    Modelica Standard Library, Blocks.Tables.CombiTable1Ds; which continues the last slope beyond the rows.
     """
 
     icon = icons.TABLE_BLOCK
@@ -46,7 +46,7 @@ class Table2D(Tabulated):
     """Map: y from a table over two signals, e.g. the torque of an engine over its speed and throttle.
 
     Row by row along u2, and then across the rows along u1. Modelica Standard Library, Blocks.Tables.CombiTable2Ds,
-    whose first row and column are here `second` and `first`; beyond the rows that goes on along the last slope.
+    whose first row and column are here `second` and `first`; which continues the last slope beyond the rows.
     """
 
     icon = icons.TABLE_BLOCK

@@ -1,6 +1,6 @@
 """Signals: functions of time that drive sources, clutches and brakes.
 
-Where a signal jumps or has a kink there is a time event, so that the solver never steps across it.
+Jumps and kinks of a signal are time events, so that the solver never steps across them.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ class Started(Component, partial=True):
     stage = Mode("waiting", "running", description="before or after the start")
 
     def running(self, elapsed: Expr) -> Expr:
-        """Return what is added to the offset after the start."""
+        """Return the part added to the offset after the start."""
         raise NotImplementedError
 
     def equations(self) -> Equations:
@@ -112,8 +112,8 @@ class Sine(Started):
 class CoilForce(Started):
     """Force of an electromagnet whose coil is switched on, and off again.
 
-    The current rises as 1 - exp(-t/T) with the time constant T of the coil, the force as its square. A coil that was
-    not without current rises from there, and the force of a polarised magnet is proportional to the current. After
+    The current rises as 1 - exp(-t/T) with the time constant T of the coil, the force as its square. A coil with an
+    initial current rises from it, and the force of a polarized magnet is proportional to the current. After
     switching off the current falls as exp(-t/T_off) from what it has reached; after nine decades there is none.
     """
 
@@ -161,7 +161,7 @@ class CoilForce(Started):
 class TimeFormula(Component):
     """Signal given as a formula of time, e.g. `72.5*(1 - exp(-time/0.07))`.
 
-    In the formula, `time` is the time in units of time_scale; its value counts in units of scale.
+    In the formula, `time` is the time divided by time_scale; the value is multiplied by scale.
     """
 
     icon = icons.FORMULA
@@ -175,7 +175,7 @@ class TimeFormula(Component):
         yield self.y == self.scale * parse_formula(self.formula).evaluate(self.lookup)
 
     def lookup(self, name: str) -> Expr:
-        """Return what a name in the formula stands for."""
+        """Return the meaning of a name in the formula."""
         if name != "time":
             raise LanguageError(
                 f"The formula '{self.formula}' of {self.label} uses '{name}', but it can use only `time`.",
@@ -208,7 +208,7 @@ class Ramp(Component):
 
 
 class Periodic(Component, partial=True):
-    """Signal that repeats a shape: at low value in between."""
+    """Signal that repeats a shape, with the low value in between."""
 
     amplitude: Parameter = param("*", "height of the shape", default=1.0)
     period: Parameter = param("s", "time of one period", min=1e-12)
@@ -219,14 +219,14 @@ class Periodic(Component, partial=True):
     done: Discrete = discrete("1", "number of completed shapes")
 
     def begin(self) -> Expr:
-        """Return when the next shape begins."""
+        """Return the time at which the next shape begins."""
         goes_on = any_of(self.periods < 0, self.done < self.periods)
         return self.start_time + self.period * where(goes_on, self.done, _NEVER)
 
     def completed(self, end: Expr) -> Expr:
-        """Return the number of completed shapes once one ends, that long after its beginning.
+        """Return the number of completed shapes at the end of one, which is this long after its beginning.
 
-        A run may start late: then all shapes before count as completed at once.
+        A run may start late: then all earlier shapes count as completed at once.
         """
         passed = floor((self.time - self.start_time - end) / self.period) + 1
         return maximum(self.done + 1, where(self.periods < 0, passed, minimum(passed, self.periods)))
@@ -294,7 +294,7 @@ class Rowwise(Component, partial=True):
         for k, moment in reversed(list(enumerate(self.moments()))):
             following = where(self.row < k, moment, following)
             passed = passed + where(now < moment, 0, 1)
-        # A run may start late: then all rows before count as passed at once.
+        # A run may start late: then all earlier rows count as passed at once.
         ahead = {self.row: maximum(self.row + 1, passed)}
         yield self.kinks.go("ahead", "ahead", at=following * self.time_scale, reset=ahead)
 
@@ -308,7 +308,7 @@ class Table(Rowwise):
     smooth: bool = False
     """Interpolate with a continuous slope instead of straight lines."""
     extrapolate: Literal["linear", "hold", "error"] = "linear"
-    """Beyond the ends let the last slope go on (`linear`), `hold` the last value, or end the run (`error`)."""
+    """Beyond the ends continue the last slope (`linear`), `hold` the last value, or end the run (`error`)."""
     end = Mode("ahead", "passed", description="whether the table has ended")
     scale: Parameter = param("*", "scale of the values", default=1.0)
 
@@ -325,7 +325,7 @@ class Table(Rowwise):
         if not self.smooth:
             yield from super().events()
         if self.extrapolate == "error":
-            # A run may end where the table does.
+            # A run may end with the table.
             begin, end = self.table[0][0], self.table[-1][0]
             over = self.time / self.time_scale > end + _ROUNDING * (end - begin)
             yield self.end.go("ahead", "passed", when=over, notice="has no more rows", fails=True)

@@ -49,11 +49,11 @@ class Rod(Component):
 
 
 class ElastoGap(Lossy, LinearCompliantWithRelativeStates):
-    """Contact of two bodies that may part: spring and damper act while the distance is below s_rel0.
+    """Contact of two bodies that can separate: spring and damper act while the distance is below s_rel0.
 
     The spring force is c·s_ref·(penetration/s_ref)^n: n = 1 between plates, 1.5 between spheres (H. Hertz, 1881). The
-    damper force is limited to the spring force, so that the force rises from zero on contact and never pulls; where a
-    fast separation leaves the surface behind, the energy of its deformation is counted as lost. Modelica Standard
+    damper force is limited to the spring force, so that the force rises from zero on contact and never pulls; if a
+    fast separation leaves the surface behind, the energy of its deformation is lost. Modelica Standard
     Library, Translational.ElastoGap.
     """
 
@@ -64,11 +64,11 @@ class ElastoGap(Lossy, LinearCompliantWithRelativeStates):
     n: Parameter = param("1", "exponent of the spring force; without a value the spring is linear", default=None, min=1)
     s_ref: Parameter = param("m", "penetration at which the force is c·s_ref", default=1.0, min=1e-12)
     contact = Mode("gap", "touching", description="whether the bodies touch")
-    surfaces = Mode("pressed", "meeting", "leaving", description="spring and damper, damper limited, left behind")
+    surfaces = Mode("pressed", "meeting", "leaving", description="spring and damper, limited damper, separating")
 
     @property
     def penetration(self) -> Expr:
-        """How far the bodies are pressed into each other."""
+        """Penetration of the bodies."""
         return self.s_rel0 - self.s_rel
 
     @property
@@ -114,8 +114,8 @@ class ElastoGap(Lossy, LinearCompliantWithRelativeStates):
 class SlideSticking(Sticking, partial=True):
     """Surfaces of a slide that slide or stick."""
 
-    creep: Parameter = param("1/kg", "acceleration while it sticks over its force", default=None, min=0)
-    creep_time: Parameter = param("s", "time after which it creeps no faster", default=1e-3, min=0)
+    creep: Parameter = param("1/kg", "acceleration per force while stuck", default=None, min=0)
+    creep_time: Parameter = param("s", "time after which the creep speed stays constant", default=1e-3, min=0)
     rest: Parameter = param("m/s", "velocity that a prescribed motion must exceed to break away", default=1e-12, min=0)
 
 
@@ -135,7 +135,7 @@ class SlideFriction(SlideSticking, DryFriction, SlideInHousing, partial=True):
 
 
 class SupportFriction(Tabulated, SlideFriction):
-    """Friction of a slideway: a force against the motion that depends on the velocity, with stiction."""
+    """Friction of a slideway: a velocity-dependent force against the motion, with stiction."""
 
     f_pos: Rows = rows(
         column("velocity", scale="v_scale", rising=True), column("friction force", scale="f_scale", min=0),
@@ -160,7 +160,7 @@ class StribeckFriction(SlideFriction):
 
     F_prop: Parameter = param("N.s/m", "viscous friction", default=0.0, min=0)
     F_Coulomb: Parameter = param("N", "dry friction at high velocity, without the viscous part", min=0)
-    F_Stribeck: Parameter = param("N", "what friction at rest has in excess", default=0.0, min=0)
+    F_Stribeck: Parameter = param("N", "excess of friction at rest", default=0.0, min=0)
     fexp: Parameter = param("s/m", "inverse of the velocity at which the excess has fallen to 1/e", default=1.0, min=0)
 
     def sliding_friction(self, speed: Expr | float) -> Expr:
@@ -193,8 +193,8 @@ class TranslationalBrake(Tabulated, SlideFriction):
 class MassWithStopAndFriction(SlideSticking, DryFriction, OnSlope):
     """Sliding mass between hard stops, with the friction of R. Stribeck.
 
-    A mass that meets a stop leaves it with the part e of its speed; with e = 0 it comes to rest there at once, and its
-    kinetic energy is lost. The stop holds whatever presses the mass against it. Modelica Standard Library,
+    A mass that meets a stop rebounds with e times its speed; with e = 0 it comes to rest there at once, and its kinetic
+    energy is lost. The stop bears any force that presses the mass against it. Modelica Standard Library,
     Translational.MassWithStopAndFriction, where e is 0.
     """
 
@@ -206,11 +206,11 @@ class MassWithStopAndFriction(SlideSticking, DryFriction, OnSlope):
     smax: Parameter = param("m", "position of the right stop, where flange_b meets it", default=25.0)
     F_prop: Parameter = param("N.s/m", "viscous friction", default=0.0, min=0)
     F_Coulomb: Parameter = param("N", "dry friction at high velocity, without the viscous part", default=0.0, min=0)
-    F_Stribeck: Parameter = param("N", "what friction at rest has in excess", default=0.0, min=0)
+    F_Stribeck: Parameter = param("N", "excess of friction at rest", default=0.0, min=0)
     fexp: Parameter = param("s/m", "inverse of the velocity at which the excess has fallen to 1/e", default=1.0, min=0)
     peak: Parameter = param("1", "static friction over sliding friction at standstill", default=1.001, min=1)
     e: Parameter = param("1", "restitution of the stops: speed after over before an impact", default=0.0, min=0, max=1)
-    v_rest: Parameter = param("m/s", "velocity from which on it comes to rest at a stop", default=1e-3, min=0)
+    v_rest: Parameter = param("m/s", "impact velocity below which it rests at a stop", default=1e-3, min=0)
     s: Variable = var("m", "position of the centre of mass", state="always")
     v: Variable = var("m/s", "velocity", state="always")
     f: Variable = var("N", "force of the housing against forward motion")
@@ -238,7 +238,7 @@ class MassWithStopAndFriction(SlideSticking, DryFriction, OnSlope):
         return any_of(super().pressed(), negate(self.stop.is_("none")))
 
     def restitution(self) -> Expr:
-        """Return the restitution of the stop; surfaces that come to rest on each other have none."""
+        """Return the restitution of the stop; friction surfaces have none."""
         return where(any_of(self.stop.is_("none"), absolute(self.v) < self.v_rest), 0, self.e)
 
     def limits(self) -> tuple[Expr, Expr]:
@@ -265,7 +265,7 @@ class MassWithStopAndFriction(SlideSticking, DryFriction, OnSlope):
     def events(self) -> Events:
         mode, stop = self.mode, self.stop
         for side, end in (("left", self.smin + 0.5 * self.L), ("right", self.smax - 0.5 * self.L)):
-            # Where it leaves, it may still be a rounding beyond.
+            # When it leaves the stop, its position may be beyond it by rounding.
             beyond = all_of(self.s < end, self.v < 0) if side == "left" else all_of(self.s > end, self.v > 0)
             there = all_of(self.s <= end, self.v <= 0) if side == "left" else all_of(self.s >= end, self.v >= 0)
             yield mode.initially("stuck", when=there)
@@ -273,7 +273,7 @@ class MassWithStopAndFriction(SlideSticking, DryFriction, OnSlope):
             moving = ("free", "start_forward", "start_backward", "forward", "backward")
             yield mode.go(moving, "stuck", when=beyond, reset={self.s: end}, because="end stop reached")
             yield stop.go("none", side, when=beyond, because="end stop reached")
-        # While it is held, its velocity is nothing but rounding.
+        # While it is held, its velocity is only rounding.
         yield stop.go(
             "left", "none", when=all_of(negate(mode.is_("stuck")), self.v > 0), because="moves away from the stop"
         )

@@ -92,7 +92,7 @@ class SpeedSource(OneFlange, partial=True):
         raise NotImplementedError
 
     def follows(self) -> Equations:
-        """Yield what makes the shaft turn with it."""
+        """Yield the equations that make the shaft turn with this speed."""
         yield self.w == self.speed()
 
     def equations(self) -> Equations:
@@ -108,7 +108,7 @@ class Speed(SpeedSource):
     """Speed given by a signal: exactly, or through a filter of first order, which starts with the signal.
 
     The filter makes the acceleration finite where the signal jumps. In the Modelica Standard Library, Rotational.Speed,
-    `exact` is false if nothing is said.
+    `exact` is false by default.
     """
 
     w_ref: Input = signal_in("rad/s", "speed")

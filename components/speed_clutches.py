@@ -10,7 +10,7 @@ from modelica_like.language import Equations, Expr, Input, Parameter, der, exp, 
 
 
 class CentrifugalClutch(SlippingCoupling):
-    """Centrifugal clutch: shoes on flange_a, which their springs hold back until it is fast enough, press on a drum.
+    """Centrifugal clutch: shoes on flange_a press on a drum above the speed at which they overcome their springs.
 
     n shoes of the mass m, whose centre of gravity turns on the radius r_m, give the sliding torque
     n·mu·R·(m·r_m·w² - f_spring).
@@ -30,10 +30,10 @@ class CentrifugalClutch(SlippingCoupling):
 
 
 class ViscousClutch(Lossy, CompliantWithRelativeStates):
-    """Viscous clutch: plates in silicone oil, which gets thinner by shear and by heat.
+    """Viscous clutch: plates in silicone oil, whose viscosity falls with shear and heat.
 
     The torque is tau_nominal·fill·(|w|/w_nominal)^p against the slip w, with p below 1 for oil that is thinned by
-    shear, and falls by exp(-beta·(T - T_nominal)) with the temperature. Below w_smooth it is a straight line.
+    shear, and falls by exp(-beta·(T - T_nominal)) with the temperature. Below w_smooth it is linear.
     """
 
     icon = icons.VISCOUS

@@ -1,4 +1,4 @@
-"""How torques and forces of loads depend on the relative speed x = speed / nominal speed."""
+"""Laws of torques and forces of loads over the relative speed x = speed / nominal speed."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def inverse_law(x: Expr, x0: Expr, reverses: bool) -> Expr:
 
 
 Regularization = Literal["exp", "sine", "linear", "cosine"]
-"""How a sign passes through zero; those of the Modelica Standard Library, Blocks.Types.Regularization."""
+"""Regularization of a sign at zero, as in the Modelica Standard Library, Blocks.Types.Regularization."""
 
 
 def sign_law(x: Expr, reg: Regularization) -> Expr:

@@ -9,24 +9,24 @@ from components.friction import DryFriction
 from components.inertias import OnSlope
 from components.interfaces import Flange, LinearFlange
 from components.slides import SlideSticking
-from modelica_like.language import Component, Equations, Expr, Parameter, Variable, der, param, var
+from components.wheels import RotationToTranslation
+from modelica_like.language import Equations, Expr, Parameter, Variable, der, param, var
 
 
-class BallScrew(Component):
+class BallScrew(RotationToTranslation):
     """Ball screw without loss, elasticity and backlash: one turn moves the nut by the lead.
 
-    A positive torque on the spindle pushes the nut in positive direction.
+    A positive torque on the spindle pushes the nut in positive direction. Where a housing is given, its bearing takes
+    the torque and its guide the force.
     """
 
     icon = icons.BALL_SCREW
     flange_r = Flange("spindle")
     flange_t = LinearFlange("nut")
-    inlet, outlet = "flange_r", "flange_t"
     lead: Parameter = param("m", "travel per turn")
 
-    def equations(self) -> Equations:
-        yield 2 * pi * self.flange_t.s == self.lead * self.flange_r.phi
-        yield 2 * pi * self.flange_r.tau == -self.lead * self.flange_t.f
+    def travel(self) -> Expr:
+        return self.lead / (2 * pi)
 
 
 class MachineTable(SlideSticking, DryFriction, OnSlope):

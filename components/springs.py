@@ -43,7 +43,7 @@ class Damper(Lossy, CompliantWithRelativeStates):
 
 
 class SpringDamper(Lossy, CompliantWithRelativeStates):
-    """Torsion spring and viscous damper side by side, e.g. an elastic coupling."""
+    """Torsion spring and viscous damper in parallel, e.g. an elastic coupling."""
 
     icon = icons.SPRING_DAMPER
     c: Parameter = param("N.m/rad", "stiffness", min=0)
@@ -62,11 +62,11 @@ class SpringDamper(Lossy, CompliantWithRelativeStates):
 
 
 class Backlash(Lossy, CompliantWithRelativeStates, partial=True):
-    """Backlash in series with a spring and a damper side by side, e.g. a pair of gear flanks or a claw coupling.
+    """Backlash in series with a parallel spring and damper, e.g. a pair of gear flanks or a claw coupling.
 
-    Inside the backlash there is no torque, and flanks that touch never pull: where a fast separation leaves the flank
-    behind, the energy of its deformation is counted as lost. A subclass says how hard pressed flanks press. Without
-    backlash take a `SpringDamper`.
+    Inside the backlash there is no torque, and flanks that touch never pull: if a fast separation leaves the flank
+    behind, the energy of its deformation is lost. A subclass defines the torque of flanks in contact.
+    Without backlash use a `SpringDamper`.
     """
 
     icon = icons.BACKLASH
@@ -124,7 +124,7 @@ class ElastoBacklash(Backlash):
     Modelica Standard Library, Rotational.ElastoBacklash.
     """
 
-    flanks = Mode("pressed", "meeting", "leaving", description="spring and damper, damper limited, left behind")
+    flanks = Mode("pressed", "meeting", "leaving", description="spring and damper, limited damper, separating")
 
     def pressure(self) -> Expr:
         return self.flanks.choose(pressed=self.spring + self.damper, meeting=2 * self.spring, leaving=0)
@@ -144,7 +144,7 @@ class ElastoBacklash2(Backlash):
     Modelica Standard Library, Rotational.ElastoBacklash2.
     """
 
-    flanks = Mode("pressed", "leaving", description="spring and damper, left behind")
+    flanks = Mode("pressed", "leaving", description="spring and damper, separating")
 
     def pressure(self) -> Expr:
         return self.flanks.choose(pressed=self.spring + self.damper, leaving=0)
@@ -185,7 +185,7 @@ class TranslationalDamper(Lossy, LinearCompliantWithRelativeStates):
 
 
 class TranslationalSpringDamper(Lossy, LinearCompliantWithRelativeStates):
-    """Spring and viscous damper side by side."""
+    """Spring and viscous damper in parallel."""
 
     icon = icons.SPRING_DAMPER
     c: Parameter = param("N/m", "stiffness", min=0)

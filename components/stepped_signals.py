@@ -21,7 +21,7 @@ from modelica_like.language import (
 
 
 class StepTable(Rowwise):
-    """Signal that keeps the value of a row until the next one; before the first row it has the value of that."""
+    """Signal that keeps the value of a row until the next one; before the first row it has the first value."""
 
     table: tuple[tuple[float, float], ...] = rows(
         column("time", scale="time_scale", rising=True), column("value", scale="scale")

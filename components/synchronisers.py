@@ -1,4 +1,4 @@
-"""Synchronisers of gearboxes: cone friction, blocking, and teeth that go in."""
+"""Synchronisers of gearboxes: cone friction, blocking, and engagement of the teeth."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ from modelica_like.language import (
 
 
 class Synchroniser(Clutch):
-    """Synchroniser with blocking ring: friction cones make both sides turn alike before the teeth go in.
+    """Synchroniser with blocking ring: friction cones equalise both speeds before the teeth engage.
 
     The sleeve force fn_max·f_normalized presses the cones; for n cones of the radius r and the angle alpha, cgeo is
     n·r/sin(alpha). As long as they slip, the ring blocks the sleeve, if the cones' torque is larger than the one with
     which the chamfered teeth turn the ring away, F·r_t·(cos(beta) - mu_t·sin(beta))/(sin(beta) + mu_t·cos(beta));
-    otherwise the sleeve passes it, and the teeth go in with an impact. A negative force pulls them out (H. Naunheimer,
+    otherwise the sleeve passes it, and the teeth engage with an impact. A negative force pulls them out (H. Naunheimer,
     B. Bertsche, J. Ryborz, W. Novak: Fahrzeuggetriebe, 9.2).
     """
 

@@ -1,4 +1,4 @@
-"""Laws that are measured tables, and what happens beyond their rows."""
+"""Laws given as measured tables, and their extrapolation."""
 
 from __future__ import annotations
 
@@ -12,19 +12,20 @@ _ROUNDING = 1e-10
 
 
 class Tabulated(Component, partial=True):
-    """Element with tables that were measured in a range.
+    """Element with measured tables.
 
-    Beyond it the last value is a guess, which the report of a run tells; who asks for the last slope means a law.
+    Beyond the measured range the last value is a guess, and the report of a run says so; the last slope is used only if
+    requested.
     """
 
     smooth: bool = False
     """Interpolate in tables with a continuous slope."""
     extrapolate: Literal["hold", "linear", "error"] = "hold"
-    """Beyond a table's rows: `hold` its last value, let its last slope go on (`linear`), or end the run (`error`)."""
-    range = Mode("kept", "left", description="whether it was always inside the rows of its tables")
+    """Beyond a table's rows: `hold` its last value, continue its last slope (`linear`), or end the run (`error`)."""
+    range = Mode("kept", "left", description="whether it was always within the rows of its tables")
 
     def look_up(self, x: Expr | float, table: Sequence[Sequence[float]], column: int = 1) -> Expr:
-        """Return a value of a table at x, which counts like its first column."""
+        """Return a value of a table at x, in the scale of its first column."""
         return interpolate(x, [r[0] for r in table], [r[column] for r in table], self.smooth, self.extrapolate)
 
     def look_up_map(self, x: Expr | float, first: Flat, y: Expr | float, second: Flat, table: Sequence[Flat]) -> Expr:
@@ -46,20 +47,20 @@ class Tabulated(Component, partial=True):
     def leaving(
         self, name: str, x: Expr, table: Sequence[Sequence[float]], *conditions: Expr, least: float = 0.0
     ) -> Events:
-        """Yield the event that tells that x leaves a table.
+        """Yield the event at which x leaves a table.
 
         Args:
             name: of the table.
-            x: counts like its first column.
+            x: in the scale of its first column.
             table: rows.
-            conditions: on which it matters.
-            least: what x is never below.
+            conditions: under which it matters.
+            least: smallest possible x.
         """
         if len(table) > 1 and self.extrapolate != "linear":
             told = ": its last value holds" if self.extrapolate == "hold" else ""
             first, last = table[0][0], table[-1][0]
             above = isinstance(first, float | int) and first <= least
-            # Who reaches the end of a table has not left it.
+            # Reaching the end of a table does not leave it.
             slack = _ROUNDING * (last - first)
             outside = x > last + slack if above else any_of(x > last + slack, x < first - slack)
             yield self.range.go(

@@ -25,7 +25,7 @@ _ROOM = 293.15
 
 
 class HeatPort(Connector):
-    """Where heat enters: temperature, and the heat flow into the component."""
+    """Heat port: temperature, and the heat flow into the component."""
 
     domain = Domain("heat flow", "temperature", "a thermal conductor")
     stroke = icons.HEAT
@@ -39,8 +39,8 @@ class HeatPort(Connector):
 class Lossy(Component, partial=True):
     """Element that turns work into heat.
 
-    With its heat port connected the loss flows out there, into the thermal part of the model; otherwise it leaves the
-    model. A subclass says how much it is.
+    If its heat port is connected, the loss flows out there into the thermal part of the model; otherwise it leaves the
+    model. A subclass defines the loss.
     """
 
     heat_port = HeatPort("where the loss goes as heat", optional=True)
@@ -63,7 +63,7 @@ class Lossy(Component, partial=True):
 
 
 class Conducting(Lossy, partial=True):
-    """Element whose conductors get warmer, and their resistance with them: by alpha20 of its value at 20 °C per kelvin.
+    """Element with conductors whose resistance rises with temperature: by alpha20 of its value at 20 °C per kelvin.
 
     Copper: 3.92e-3/K.
     """
@@ -87,7 +87,7 @@ class Conducting(Lossy, partial=True):
 class ThermalMass(Component):
     """Body of one temperature that stores heat, e.g. the lining of a clutch: C·der(T) is the heat flow into it.
 
-    Its stored energy counts from 20 °C.
+    Its stored energy is zero at 20 °C.
     """
 
     icon = icons.THERMAL_MASS

@@ -1,4 +1,4 @@
-"""Friction clutches that get hot: temperature of the plates, fading friction, wear (VDI 2241)."""
+"""Friction clutches with temperature of the plates, fading friction and wear (VDI 2241)."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ _NONE = ((0.0, 1.0),)
 
 
 class ThermalClutch(Clutch):
-    """Friction clutch whose plates store the friction work as heat and give it to the air, or to its heat port.
+    """Friction clutch whose plates store the friction work as heat and release it to the air or the heat port.
 
     C·der(T) = P - G·(T - T_air). The coefficient of friction of a `Clutch` is multiplied by mu_T over the temperature
     (fading) and by mu_p over the surface pressure p_max·f_normalized. Wear is in proportion to the friction work:
     its depth is wear_rate·W/A (VDI 2241: Schaltbare fremdbetätigte Reibkupplungen und -bremsen). The heat in the plates
-    counts as lost, as long as no heat port takes it further. What a clutch may take per engagement and per hour says
-    the design check `clutch_heat`.
+    counts as lost unless a heat port is connected. The design check `clutch_heat` gives the limits per engagement and
+    per hour.
     """
 
     icon = icons.THERMAL_CLUTCH

@@ -35,9 +35,9 @@ class TorqueConverter(Tabulated, Lossy, TwoFlanges):
     """Hydrodynamic torque converter: flange_a drives the pump, the turbine flange_b, the housing holds the stator.
 
     The pump takes the torque C(x)·w_pump·|w_pump|, the turbine gives t(x) times as much, where x is the speed of the
-    turbine over that of the pump. Where the turbine is the faster one, it drives the pump as in a coupling: t = 1, with
-    the capacity at 1/x; while they turn against each other, t goes over to that of x = -1 in a straight line, so that
-    no torque jumps. What does not come out is lost in the fluid; so no t may exceed 1/x: it would deliver energy. With
+    turbine over that of the pump. If the turbine is faster, it drives the pump as in a coupling: t = 1, with the
+    capacity at 1/x. If they turn against each other, t is linear up to its value at x = -1, so that no torque jumps.
+    The rest of the power is lost in the fluid, so t must not exceed 1/x, or it would deliver energy. With
     the torque ratio 1 throughout it is a hydrodynamic coupling. VDI 2153.
     """
 
@@ -57,7 +57,7 @@ class TorqueConverter(Tabulated, Lossy, TwoFlanges):
 
     @property
     def overrun(self) -> Expr:
-        """Condition that the turbine is the faster one."""
+        """Condition: the turbine is faster."""
         return absolute(self.w_turbine) > absolute(self.w_pump)
 
     @property
@@ -89,9 +89,9 @@ class TorqueConverter(Tabulated, Lossy, TwoFlanges):
             yield from self.leaving(name, where(self.overrun, table[0][0], self.x), table, least=-1.0)
 
     def _check(self) -> None:
-        """Check that no torque ratio exceeds 1/x, also between two rows, where t·x has its top."""
+        """Check that no torque ratio exceeds 1/x, also at the maximum of t·x between two rows."""
         if not all(isinstance(cell, float | int) for row in self.torque_ratio for cell in row):
-            return  # symbols for rows that were checked as numbers
+            return  # symbols for rows already checked as numbers
         end: Any = self.look_up(1.0, self.torque_ratio)
         table = {x: t for x, t in self.torque_ratio if x < 1} | {1.0: float(end)}
         for (x, t), (x_next, t_next) in pairwise(sorted(table.items())):
@@ -107,7 +107,7 @@ class TorqueConverter(Tabulated, Lossy, TwoFlanges):
             )
 
     def dissipation(self) -> Expr:
-        """Return torque times slip: of the faster one, the part of the speed ratio that does not come out as power."""
+        """Return torque times slip: the share of the faster side's power that is not transmitted."""
         useful = where(self.overrun, self.x, self.gain * self.x)
         taken = where(self.overrun, self.gain, 1.0)
         return self.tau_leading * self.leading * (taken - useful)

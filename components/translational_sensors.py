@@ -1,4 +1,4 @@
-"""Ideal sensors of slides: they measure and load nothing."""
+"""Ideal sensors of slides, without effect on the drive."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class LinearAccelerationSensor(SlideSensor):
 
 
 class RelativeSlideSensor(Component, partial=True):
-    """Sensor between two slide ends that are not joined by it."""
+    """Sensor between two slide ends, without joining them."""
 
     icon = icons.BETWEEN_SENSOR
     flange_a = LinearFlange("reference slide end")

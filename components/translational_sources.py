@@ -34,7 +34,7 @@ class Force2(Component):
     """Force between two slides, given by a signal: it drives flange_b in positive, flange_a in negative direction."""
 
     icon = icons.BETWEEN_FORCE
-    flange_a = LinearFlange("slide end that is pushed back")
+    flange_a = LinearFlange("slide end with the reaction")
     flange_b = LinearFlange("slide end that is driven")
     f: Input = signal_in("N", "force on flange_b")
 
@@ -69,7 +69,7 @@ class SpeedDependentForce(ForceSource, partial=True):
     f_nominal: Parameter = param("N", "force on the connected part at v_nominal; negative for a load")
     v_nominal: Parameter = param("m/s", "nominal velocity", min=1e-12)
     reverses: bool = True
-    """The force changes its direction with the velocity, as friction does."""
+    """The force changes its direction with the velocity, like friction."""
     v: Variable = var("m/s", "velocity of the slide relative to the housing")
 
     def equations(self) -> Equations:
@@ -106,7 +106,7 @@ class SignForce(ForceSource):
 
     icon = icons.LOAD
     f_nominal: Parameter = param("N", "force on the connected part in forward motion; negative for a load")
-    v0: Parameter = param("m/s", "velocity from which on the sign is the full one", default=0.1, min=1e-12)
+    v0: Parameter = param("m/s", "velocity above which the sign is ±1", default=0.1, min=1e-12)
     reg: Literal["exp", "sine", "linear", "cosine"] = "exp"
     """Between -v0 and v0: tanh(50·v/v0) (`exp`), a quarter of a sine, a straight line, or one minus a cosine."""
     v: Variable = var("m/s", "velocity of the slide relative to the housing")

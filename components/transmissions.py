@@ -37,8 +37,8 @@ class Ravigneaux(WithPlanetarySets):
     """Ravigneaux set: two suns, long and short planets on one carrier, one ring.
 
     The small sun drives the long planets through the short ones, the large sun directly; the long planets mesh with the
-    ring. So it is a plus set and a minus set that share carrier and ring (document 001, after HEXAGON: two Willis
-    equations). Here the meshes of each sun end at the long planets, seen as a ring of their own; the mesh of long
+    ring. So it consists of a plus set and a minus set that share carrier and ring (document 001, after HEXAGON: two
+    Willis equations). Here the meshes of each sun end at the long planets, treated as a separate ring; the mesh of long
     planet and ring is a third set with i0 = 1, because it transmits only the sum of both rolling powers.
     """
 
@@ -69,11 +69,11 @@ class Ravigneaux(WithPlanetarySets):
 class Lepelletier(WithPlanetarySets):
     """Six-speed automatic gearbox after P. Lepelletier, as the ZF 6HP26: a planetary set before a Ravigneaux set.
 
-    The input drives the ring of the front set, whose sun is fixed; its carrier turns slower. Clutch A joins that
+    The input drives the ring of the front set, whose sun is fixed; its carrier turns more slowly. Clutch A joins that
     carrier with the small sun of the Ravigneaux set, clutch B with the large sun; clutch E joins the input with the
-    common carrier. Brake C holds the large sun, brake D the common carrier. The ring is the output. Two of the five
-    closed make a gear: 1 AD, 2 AC, 3 AB, 4 AE, 5 BE, 6 CE, R BD (document 001). Torques of brakes and clutches follow
-    `pressure`: 0 open, 1 capacity.
+    common carrier. Brake C holds the large sun, brake D the common carrier. The ring is the output. Each gear has
+    two of the five closed: 1 AD, 2 AC, 3 AB, 4 AE, 5 BE, 6 CE, R BD (document 001). Torques of brakes and clutches
+    follow `pressure`: 0 open, 1 capacity.
     """
 
     flange_a = Flange("input shaft")

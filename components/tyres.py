@@ -36,8 +36,8 @@ class Tyre(Lossy):
 
     `pacejka`: F = mu·F_z·sin(C·atan(x - E·(x - atan(x)))), x = B·slip, the magic formula of E. Bakker, L. Nyborg and
     H. B. Pacejka (SAE 870421). `linear`: F = mu·F_z·slip/slip_max, and no more than mu·F_z. Below v_min the slip
-    counts as if the vehicle moved with v_min. With a relaxation length sigma the slip comes with a delay, as
-    sigma·der(slip) = R·w - v - |v|·slip: the tyre is a spring at standstill. What it stores counts from the start.
+    is computed with v_min. With a relaxation length sigma the slip is delayed, sigma·der(slip) = R·w - v -
+    |v|·slip: the tyre is a spring at standstill. Its stored energy is zero at the start.
     """
 
     icon = icons.TYRE
@@ -63,7 +63,7 @@ class Tyre(Lossy):
 
     @property
     def reference(self) -> Expr:
-        """Velocity that the slip is related to."""
+        """Reference velocity of the slip."""
         return maximum(absolute(self.v), self.v_min)
 
     def friction(self) -> Expr:
@@ -96,10 +96,10 @@ class Tyre(Lossy):
 
 
 class AxleLoads(Component):
-    """Normal loads of both axles of a vehicle, which acceleration and slope shift to the rear.
+    """Normal loads of both axles of a vehicle, shifted to the rear by acceleration and slope.
 
-    The vehicle does not pitch: the loads follow from the balance of moments, or after it with the time constant T where
-    one is given. An axle that lifts off carries nothing, and the other one all.
+    The vehicle does not pitch: the loads follow from the balance of moments, with the time constant T if given. An axle
+    that lifts off carries nothing, and the other one everything.
     """
 
     icon = icons.AXLES

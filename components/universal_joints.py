@@ -10,10 +10,10 @@ from modelica_like.language import Equations, Expr, Parameter, atan2, cos, param
 class UniversalJoint(TwoFlanges):
     """Universal joint (Cardan, Hooke): tan(phi_b) = tan(phi_a)/cos(beta).
 
-    At a constant speed of flange_a that of flange_b fluctuates twice per turn between cos(beta) and 1/cos(beta) of it.
-    It is the fastest where phi_a is zero: there the fork of flange_a stands in the plane of both shafts. A second joint
-    of the same angle, with flange_a and flange_b exchanged, takes the fluctuation away again: the forks of the shaft
-    between them stand in one plane. The housing carries the difference of the torques. Without inertia and friction.
+    At a constant speed of flange_a, the speed of flange_b fluctuates twice per turn between cos(beta) and 1/cos(beta)
+    times that speed. It is largest at phi_a = 0, where the fork of flange_a is in the plane of both shafts. A second
+    joint of the same angle, with flange_a and flange_b exchanged, cancels the fluctuation: the forks of the shaft
+    between them are in one plane. The housing carries the difference of the torques. Without inertia and friction.
     VDI 2722.
     """
 
@@ -21,7 +21,7 @@ class UniversalJoint(TwoFlanges):
     beta: Parameter = param("rad", "angle between the shafts", min=0, max=1.5)
 
     def lead(self, phi: Expr) -> Expr:
-        """Return how far flange_b is ahead of flange_a."""
+        """Return the lead of flange_b over flange_a."""
         bent = cos(self.beta)
         return atan2((1 - bent) * sin(phi) * cos(phi), bent * cos(phi) ** 2 + sin(phi) ** 2)
 

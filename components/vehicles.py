@@ -1,15 +1,14 @@
-"""Vehicles in one dimension, and what resists them."""
+"""Vehicles in one dimension, and their resistances."""
 
 from __future__ import annotations
 
 from typing import Literal
 
 from components import icons
-from components.interfaces import Flange, LinearFlange, LinearOneFlange
+from components.interfaces import Flange, LinearFlange, LinearOneFlange, Supported
 from components.speed_laws import sign_law
 from components.thermal import Lossy
 from modelica_like.language import (
-    Component,
     Equations,
     Expr,
     Input,
@@ -34,7 +33,7 @@ class RollingResistance(Lossy, LinearOneFlange):
     weight: Parameter = param("N", "weight on the wheels", min=0)
     Cr: Input = signal_in("1", "rolling resistance coefficient", default=0.015)
     inclination: Input = signal_in("1", "rise of the road over its run", default=0.0)
-    v0: Parameter = param("m/s", "velocity from which on the sign is the full one", default=0.1, min=1e-12)
+    v0: Parameter = param("m/s", "velocity above which the sign is ±1", default=0.1, min=1e-12)
     reg: Literal["exp", "sine", "linear", "cosine"] = "exp"
     """Between -v0 and v0: tanh(50·v/v0) (`exp`), a quarter of a sine, a straight line, or one minus a cosine."""
     v: Variable = var("m/s", "velocity of the wheels")
@@ -57,7 +56,7 @@ class RoadLoad(Lossy, LinearOneFlange):
     F_0: Parameter = param("N", "resistance at standstill", min=0)
     F_1: Parameter = param("N.s/m", "part that grows with the velocity", default=0.0, min=0)
     F_2: Parameter = param("N.s2/m2", "part that grows with its square", default=0.0, min=0)
-    v0: Parameter = param("m/s", "velocity from which on the sign is the full one", default=0.1, min=1e-12)
+    v0: Parameter = param("m/s", "velocity above which the sign is ±1", default=0.1, min=1e-12)
     reg: Literal["exp", "sine", "linear", "cosine"] = "exp"
     """Between -v0 and v0: tanh(50·v/v0) (`exp`), a quarter of a sine, a straight line, or one minus a cosine."""
     v: Variable = var("m/s", "velocity")
@@ -74,12 +73,12 @@ class RoadLoad(Lossy, LinearOneFlange):
         return self.f * self.v
 
 
-class Vehicle(Component):
+class Vehicle(Supported):
     """Vehicle with drag, rolling resistance and slope, driven by a wheel, and coupled to others at flange_t.
 
     Against the motion act the drag Cd·A·rho·u·|u|/2, with the velocity u relative to the wind, the weight on the slope,
-    m·g·sin(slope), and the rolling resistance Cr·m·g·cos(slope), which does not hold at standstill. Modelica Standard
-    Library, Translational.Vehicle.
+    m·g·sin(slope), and the rolling resistance Cr·m·g·cos(slope), which does not hold at standstill. The torque that
+    drives it is carried by the housing of the drive. Modelica Standard Library, Translational.Vehicle.
     """
 
     icon = icons.VEHICLE
@@ -93,7 +92,7 @@ class Vehicle(Component):
     Cd: Parameter = param("1", "drag coefficient", default=0.5, min=0)
     rho: Parameter = param("kg/m3", "density of the air", default=1.2, min=0)
     g: Parameter = param("m/s2", "gravity", default=9.80665)
-    v0: Parameter = param("m/s", "velocity from which on it rolls with the full resistance", default=1e-3, min=1e-12)
+    v0: Parameter = param("m/s", "velocity above which the rolling resistance is full", default=1e-3, min=1e-12)
     Cr: Input = signal_in("1", "rolling resistance coefficient", default=0.015)
     inclination: Input = signal_in("1", "rise of the road over its run", default=0.0)
     v_wind: Input = signal_in("m/s", "velocity of the wind, positive from behind", default=0.0)
@@ -108,16 +107,23 @@ class Vehicle(Component):
     def equations(self) -> Equations:
         wind, slant = self.v - self.v_wind, sqrt(1 + self.inclination**2)
         yield self.flange_t.s == self.s
-        yield self.R * self.flange_r.phi == self.s
+        yield self.R * (self.flange_r.phi - self.phi_support) == self.s
         yield der(self.s) == self.v
         yield self.f_drag == 0.5 * self.Cd * self.A * self.rho * wind * absolute(wind)
         yield self.f_roll == self.Cr * self.m * self.g / slant * sign_law(self.v / self.v0, self.reg)
         yield self.f_slope == self.m * self.g * self.inclination / slant
-        drive = self.flange_r.tau / self.R + self.flange_t.f
-        yield (self.m + self.J / self.R**2) * der(self.v) == drive - self.f_drag - self.f_roll - self.f_slope
+        drive = self.flange_r.tau - self.J * der(self.spin)
+        against = self.f_drag + self.f_roll + self.f_slope
+        yield self.m * der(self.v) == drive / self.R + self.flange_t.f - against
+        yield from self.support_torque(drive)
+
+    @property
+    def spin(self) -> Expr:
+        """Speed of the wheels, which a housing that turns carries along."""
+        return der(self.flange_r.phi) if self.support.used else self.v / self.R
 
     def stored_energy(self) -> Expr:
-        return 0.5 * (self.m + self.J / self.R**2) * self.v**2
+        return 0.5 * (self.m * self.v**2 + self.J * self.spin**2)
 
     def loss_power(self) -> Expr:
         return self.f_drag * (self.v - self.v_wind) + self.f_roll * self.v

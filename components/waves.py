@@ -45,7 +45,7 @@ class Cosine(Started):
 
 
 class ExpSine(Started):
-    """Sine signal that fades exponentially, as a hit oscillator does."""
+    """Sine signal that decays exponentially, like an oscillator after a hit."""
 
     icon = icons.DECAY
     amplitude: Parameter = param("*", "amplitude at the start", default=1.0)
@@ -74,7 +74,7 @@ class Exponentials(Component):
     """Signal that rises exponentially towards a value for a time, and then falls exponentially."""
 
     icon = icons.RISE
-    height: Parameter = param("*", "value that the rise tends to", default=1.0)
+    height: Parameter = param("*", "final value of the rise", default=1.0)
     rise_time: Parameter = param("s", "duration of the rise", min=1e-12)
     T_rise: Parameter = param("s", "time constant of the rise", min=1e-12)
     T_fall: Parameter = param("s", "time constant of the fall", min=1e-12)
@@ -87,7 +87,7 @@ class Exponentials(Component):
         elapsed = self.time - self.start_time
         rise = 1 - exp(-elapsed / self.T_rise)
         top = 1 - exp(-self.rise_time / self.T_rise)
-        # Long before its time the fall would be too large a number.
+        # Long before its time the fall would overflow.
         fall = top * exp(-maximum(elapsed - self.rise_time, 0) / self.T_fall)
         yield self.y == self.offset + self.height * self.stage.choose(before=0, rising=rise, falling=fall)
 
@@ -164,7 +164,7 @@ class CombiTable(Component):
     smooth: bool = False
     """Interpolate with a continuous slope instead of straight lines."""
     extrapolate: Literal["linear", "hold", "error"] = "linear"
-    """Beyond the ends let the last slopes go on (`linear`), `hold` the last values, or end the run (`error`)."""
+    """Beyond the ends continue the last slopes (`linear`), `hold` the last values, or end the run (`error`)."""
     time_scale: Parameter = param("s", "scale of the times", default=1.0)
 
     def build(self) -> None:

@@ -10,7 +10,7 @@ from modelica_like.language import Component, Equations, Expr, Parameter, param
 class RotationToTranslation(Component, partial=True):
     """Element that turns the angle of a shaft into the travel of a slide: s = travel·phi, without loss.
 
-    Angle and position count from the housings of the shaft and of the slide; these stand still unless something is
+    Angle and position count from the housings of the shaft and of the slide; which are at rest unless something is
     connected to them.
     """
 
@@ -24,12 +24,16 @@ class RotationToTranslation(Component, partial=True):
         """Return the travel per angle in m/rad."""
         raise NotImplementedError
 
+    def pull(self) -> Expr:
+        """Return the force that its slide end takes from the shaft, against forward motion if negative."""
+        return self.flange_t.f
+
     def equations(self) -> Equations:
         shaft, slide = self.flange_r, self.flange_t
         phi = shaft.phi - self.support_r.phi if self.support_r.used else shaft.phi
         s = slide.s - self.support_t.s if self.support_t.used else slide.s
         yield s == self.travel() * phi
-        yield shaft.tau == -self.travel() * slide.f
+        yield shaft.tau == -self.travel() * self.pull()
         if self.support_r.used:
             yield self.support_r.tau == -shaft.tau
         if self.support_t.used:

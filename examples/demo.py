@@ -41,7 +41,7 @@ class Runs:
 
     @cached_property
     def settled(self) -> Solution:
-        """A run so long that all oscillations have died away."""
+        """A run long enough for all oscillations to decay."""
         return simulate(self.model, "5 s")
 
 
@@ -66,7 +66,7 @@ class Number:
 
 @dataclass(frozen=True)
 class Case:
-    """A netlist with values to set, and what is known about its run.
+    """A netlist with values to set, and known results of its run.
 
     Attributes:
         netlist: file in the folder of examples.

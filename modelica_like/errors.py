@@ -12,7 +12,7 @@ from typing import Any
 
 _SHOWN = 160
 _ENDLESS = re.compile(r"\S{500,}")
-"""What somebody wrote without a space, at such a length, is not repeated."""
+"""A word of this length is not repeated in a message."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +71,7 @@ def _rebuild(
 
 
 class LanguageError(ModelicaLikeError):
-    """A component class is declared in a way that means nothing."""
+    """A component class has an invalid declaration."""
 
 
 class ComponentUnbalanced(LanguageError):
@@ -107,7 +107,7 @@ class NetlistError(ModelicaLikeError):
 
 
 class CyclicAssembly(NetlistError):
-    """A netlist contains itself, or parameters depend on each other in a circle."""
+    """A netlist contains itself, or parameters depend on each other cyclically."""
 
 
 class WrongConnection(ModelicaLikeError):
@@ -119,7 +119,7 @@ class FreeFlange(ModelicaLikeError):
 
 
 class WiringErrors(ModelicaLikeError):
-    """Several errors of the wiring, told together."""
+    """Several errors of the wiring, reported together."""
 
     def __init__(
         self, what: str, *, errors: Sequence[ModelicaLikeError] = (), where: Iterable[Source] = (),
@@ -136,7 +136,7 @@ class WiringErrors(ModelicaLikeError):
 
 
 def raise_together_or_one(errors: Sequence[ModelicaLikeError]) -> ModelicaLikeError:
-    """Return the only error as it is, several as one `WiringErrors`."""
+    """Return a single error unchanged, several as one `WiringErrors`."""
     if len(errors) == 1:
         return errors[0]
     return WiringErrors(f"{len(errors)} errors", errors=errors)
@@ -167,10 +167,11 @@ class ContradictingStart(InitializationError):
 
 
 class SolveError(ModelicaLikeError):
-    """The simulation cannot go on.
+    """The simulation cannot continue.
 
     Attributes:
-        run: the `Solution` up to there, if there is any. The `KeyboardInterrupt` that ends a simulation has it, too.
+        run: the `Solution` up to the error, if there is one. The `KeyboardInterrupt` that ends a simulation also has
+            it.
     """
 
     run: Any = None
@@ -185,7 +186,7 @@ class Chattering(SolveError):
 
 
 class LimitPassed(SolveError):
-    """Something happened that a component says must end the run."""
+    """A component has ended the run, because a limit was passed."""
 
 
 class StepFailed(SolveError):
@@ -193,7 +194,7 @@ class StepFailed(SolveError):
 
 
 class NoGradient(SolveError):
-    """A derivative does not exist: an event only grazes, two coincide, or the mode sequence changes."""
+    """A derivative does not exist: an event grazes zero, two events coincide, or the mode sequence changes."""
 
 
 class ExportError(ModelicaLikeError):
@@ -201,15 +202,15 @@ class ExportError(ModelicaLikeError):
 
 
 class FmuRefused(ModelicaLikeError):
-    """An FMU, or a file that should be one, is not fit to be run."""
+    """An FMU, or a file that should be one, cannot be run."""
 
 
 class FmuFailed(SolveError):
-    """An FMU told an error while it ran."""
+    """An FMU reported an error during its run."""
 
 
 class FmuCrashed(FmuFailed):
-    """An FMU brought down the process in which it ran."""
+    """An FMU crashed its process."""
 
 
 class FmuTimeout(FmuFailed):
@@ -217,11 +218,11 @@ class FmuTimeout(FmuFailed):
 
 
 class CalibrationFailed(SolveError):
-    """A model could not be computed with any parameters that a calibration tried."""
+    """A model could not be solved for any parameters that a calibration tried."""
 
 
 class WorkersLost(ModelicaLikeError):
-    """Processes or machines that did the runs of a sweep are gone."""
+    """Processes or machines with runs of a sweep were lost."""
 
 
 class CheckpointMismatch(ModelicaLikeError):
@@ -233,7 +234,7 @@ class MissingExtra(ModelicaLikeError):
 
 
 def missing_extra(package: str, extra: str) -> MissingExtra:
-    """Return the error about a package that an extra installs."""
+    """Return the error about a missing package of an extra."""
     return MissingExtra(f"{package} is not installed.", advice=f'Install it with: pip install "modelica-like[{extra}]"')
 
 
@@ -250,7 +251,7 @@ def extra_module(module: str, extra: str, package: str = "") -> Any:
 
 
 def did_you_mean(name: object, known: Iterable[str]) -> str:
-    """Return `; did you mean 'sun'?` for the known name nearest to `name`, or an empty string; a file has any value."""
+    """Return `; did you mean 'sun'?` for the known name nearest to `name` (of any type), or an empty string."""
     name, names = str(name), list(known)
     near = difflib.get_close_matches(name, names, n=1, cutoff=0.58)
     near = near or [one for one in names if one in name.split("_")]

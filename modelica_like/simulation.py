@@ -1,4 +1,4 @@
-"""The whole chain as one call."""
+"""The whole chain in one call."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ Model = Component | CompiledDae | str | Path
 
 
 def build(drive: Model, free: Iterable[str] = (), *, tables: Iterable[str] = ()) -> CompiledDae:
-    """Compile a component tree or a netlist file; a compiled model is returned as it is.
+    """Compile a component tree or a netlist file; a compiled model is returned unchanged.
 
     Args:
         drive: the model.
@@ -55,8 +55,8 @@ def build(drive: Model, free: Iterable[str] = (), *, tables: Iterable[str] = ())
             `with_tunable_tables`. Not possible in a compiled model.
 
     Raises:
-        LanguageError: tables of a compiled model are asked for.
-        ModelicaLikeError: something is wrong with the model; the message says what, where and what to do.
+        LanguageError: `tables` is given for a compiled model.
+        ModelicaLikeError: the model has an error; the message says what, where and what to do.
     """
     if isinstance(drive, CompiledDae):
         if tables:
@@ -83,7 +83,7 @@ def build(drive: Model, free: Iterable[str] = (), *, tables: Iterable[str] = ())
 
 @contextmanager
 def without_garbage_search() -> Iterator[None]:
-    """Put off Python's search for cycles: much is made inside, and little of it is in cycles."""
+    """Suspend Python's search for cycles: many objects are created here, and few of them are in cycles."""
     collects = gc.isenabled()
     gc.disable()
     try:
@@ -108,21 +108,21 @@ def simulate(
 
     Args:
         drive: a component, a netlist file, or a compiled model.
-        until: end time, a number in s or a quantity; by default what the netlist says.
-        parameters: other values of parameters and inputs by path; nothing is compiled again.
-        start: `given`, `rest` (what has no start value stands still) or `steady`.
+        until: end time, a number in s or a quantity; by default that of the netlist.
+        parameters: other values of parameters and inputs by path, without compiling again.
+        start: `given`, `rest` (variables without a start value are at rest) or `steady`.
         t0: start time in s.
         rtol: relative tolerance.
         atol: absolute tolerance, in nominal values.
         points: number of equal intervals of the results.
-        options: all options together; the arguments before win.
+        options: all options together; the arguments above override them.
         progress: called with the time reached.
-        solver: `idas`, the reference, or `native`: the compiled run-time of FMUs, several times as fast. By default it
-            is IDAS, and the run-time where IDAS gives up, if there is one and it succeeds; a notice tells so.
+        solver: `idas`, the reference, or `native`: the compiled run-time of FMUs, several times as fast. By default
+            IDAS; if IDAS gives up, the run-time if there is one and it succeeds, with a notice.
 
     Raises:
-        ModelicaLikeError: the model or a value is wrong, or the simulation cannot go on.
-        KeyboardInterrupt: it was interrupted. `run` of this and of a `SolveError` is the solution up to there.
+        ModelicaLikeError: the model or a value is wrong, or the simulation cannot continue.
+        KeyboardInterrupt: the run was interrupted. `run` of this and of a `SolveError` is the solution up to then.
     """
     model = build(drive)
     if parameters:
@@ -137,7 +137,7 @@ def simulate(
     except (SolveError, KeyboardInterrupt) as error:
         vars(error)["run"] = _solution(loop, begin) if loop.record.segments else None
         if solver is None and isinstance(error, StepFailed):
-            # Where there is no run-time, or it fails, too, what IDAS says stands.
+            # Without a run-time, or if it also fails, the error of IDAS is raised.
             with suppress(SolveError, ExportError, LanguageError, MissingExtra):
                 run = simulate(model, end, start=start, t0=t0, options=chosen, progress=progress, solver="native")
                 told = f"{error.what} The whole run was done by the compiled run-time instead (solver native)."
@@ -165,7 +165,7 @@ def plan(
 
 
 def _loop(solver: str) -> Any:
-    """Return what runs a model."""
+    """Return the loop that runs a model."""
     if solver == "idas":
         return EventLoop
     if solver == "native":
@@ -177,7 +177,7 @@ def _loop(solver: str) -> Any:
 
 
 def _solution(loop: Any, begin: float) -> Solution:
-    """Return what a loop has computed since it began."""
+    """Return the results of a loop so far."""
     record, elapsed = loop.record, time.perf_counter() - begin
     steps, evaluations, integrations = loop.counts
     statistics = Statistics(steps, evaluations, integrations, len(record.events), elapsed)
@@ -188,7 +188,7 @@ def _solution(loop: Any, begin: float) -> Solution:
 
 
 def seconds(until: float | str | None, name: str = "until") -> float:
-    """Return an end time or a step, a number in s or a quantity, in s; `name` is what messages call it."""
+    """Return an end time or a step, a number in s or a quantity, in s; `name` is for messages."""
     if until is None:
         raise ValueOutOfRange(
             "There is no end time.",

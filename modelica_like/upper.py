@@ -1,4 +1,4 @@
-"""What lower layers offer of upper ones: the face of the package, which stands above all, puts it here."""
+"""Functions of upper layers for lower ones, registered here by the top-level package."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ _makers: dict[str, Callable[[str], Any]] = {}
 
 
 def provide(names: tuple[str, ...], load: Callable[[str], Any]) -> None:
-    """Say how things of upper layers are loaded by their names, on first use."""
+    """Register loaders of upper layers' functions by name, for first use."""
     _makers.update(dict.fromkeys(names, load))
 
 
 def upper(name: str) -> Any:
-    """Return something of an upper layer."""
+    """Return a function of an upper layer."""
     return _makers[name](name)

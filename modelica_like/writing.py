@@ -1,4 +1,4 @@
-"""Files are written beside their place and put there when they are whole."""
+"""Files are written under a temporary name and renamed when they are complete."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from pathlib import Path
 
 @contextmanager
 def replacing(path: str | Path) -> Iterator[Path]:
-    """Yield a file to write that takes the place of `path` at the end: a full disk or an interrupt leaves that whole.
+    """Yield a file to write that replaces `path` at the end; a full disk or an interrupt leaves the old file intact.
 
     Args:
-        path: the file; its folder is made if it does not exist. Pipes and devices are written as they are.
+        path: the file; its folder is created if it does not exist. Pipes and devices are written directly.
 
     Raises:
         OSError: it cannot be written; its `filename` is the path.
     """
     check_writable(path)
-    # A link goes on pointing where it points.
+    # A link keeps its target.
     target = Path(os.path.realpath(path))
     beside = target.is_file() or not target.exists()
     draft = target.with_name(f".{secrets.token_hex(4)}{target.suffix}") if beside else target
@@ -44,7 +44,7 @@ def replacing(path: str | Path) -> Iterator[Path]:
 
 
 def write_bytes(path: str | Path, content: bytes) -> None:
-    """Write a file whole or not at all.
+    """Write a file completely or not at all.
 
     Raises:
         OSError: it cannot be written.
@@ -54,7 +54,7 @@ def write_bytes(path: str | Path, content: bytes) -> None:
 
 
 def write_text(path: str | Path, text: str) -> None:
-    """Write a text file as UTF-8, whole or not at all.
+    """Write a text file as UTF-8, completely or not at all.
 
     Raises:
         OSError: it cannot be written.
@@ -63,7 +63,7 @@ def write_text(path: str | Path, text: str) -> None:
 
 
 def check_writable(path: str | Path) -> None:
-    """Tell before any work is done why a file cannot be written, as far as that can be known.
+    """Raise an error before any work is done if a file cannot be written, as far as can be known.
 
     Raises:
         OSError: it is a folder, its folder is a file, or nothing can be written there.

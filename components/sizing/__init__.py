@@ -1,6 +1,6 @@
-"""Static design checks of machine elements: plain functions on floats, numpy arrays or CasADi expressions, in SI.
+"""Static design checks of machine elements: plain functions of floats, NumPy arrays or CasADi expressions, in SI units.
 
-A function that returns a `Result` can be named by a sizing file (`modelica-like size`).
+Sizing files (`modelica-like size`) can use every function that returns a `Result`.
 """
 
 from components.sizing.belts import BeltForces as BeltForces

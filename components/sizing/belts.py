@@ -29,7 +29,7 @@ def pitch_diameter(teeth: Teeth, pitch: Length) -> Length:
 
 
 def centre_distance(belt_length: Length, small: Length, large: Length) -> Length:
-    """Return the centre distance in m of an open belt by the rule of the books.
+    """Return the centre distance in m of an open belt by the approximate rule.
 
     e = a + sqrt(a² - (d2 - d1)²/8) with a = L/4 - pi/8·(d1 + d2) (Roloff/Matek; document 002, equation 18).
 
@@ -72,8 +72,8 @@ class BeltGeometry(Result):
     ratio: Ratio = line("speed of the small pulley over speed of the large one")
     small_diameter: Length = line("pitch diameter of the small pulley")
     large_diameter: Length = line("pitch diameter of the large pulley")
-    centre_distance: Length = line("centre distance by the rule of the books")
-    exact_distance: Length = line("centre distance at which the belt fits exactly")
+    centre_distance: Length = line("centre distance by the approximate rule")
+    exact_distance: Length = line("exact centre distance")
     take_up: Length = line("travel for tensioning, 0.5 % of the belt's length")
     wrap_angle: Angle = line("wrap angle of the small pulley")
     engaged: Teeth = line("teeth in mesh before rounding down")
@@ -123,7 +123,7 @@ class BeltForces(Result):
     shaft_load: Force = line("load of the shaft: vector sum of both strands")
     along_centres: Force = line("its component along the line of centres")
     across_centres: Force = line("its component across the line of centres")
-    doubled_load: Force = line("load if the effective pull is added once more: counted twice in document 002")
+    doubled_load: Force = line("load with the effective pull counted twice, as in document 002")
     centrifugal_force: Force = line("tension by centrifugal force, A·rho·v²")
     load_at_rest: Force = line("load of the shaft at rest by Roloff/Matek, F_w + F_z")
     relief: Force = line("relief of the shaft in motion, 2·F_z·sin(wrap angle/2)")
@@ -135,8 +135,8 @@ def belt_forces(
     """Work out strand forces and shaft load (Eytelwein, Roloff/Matek; document 002, equations 23 to 28).
 
     F1 = F_t·m/(m - 1) and F2 = F_t/(m - 1) with m = exp(mu·beta). For a timing belt, which cannot slip, Eytelwein's
-    ratio is a habit of sizing. The shaft load already is the sum of both strands; document 002 adds the effective pull
-    to it at a right angle, which counts it twice (`doubled_load`).
+    ratio is a convention of sizing. The shaft load is already the sum of both strands; document 002 adds the effective
+    pull to it at a right angle, which counts it twice (`doubled_load`).
 
     Args:
         pull: effective pull in N.

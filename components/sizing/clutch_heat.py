@@ -18,7 +18,7 @@ from modelica_like.language.results import Result, line
 
 
 class ClutchHeat(Result):
-    """What a clutch gets hot and wears by, and what it may take."""
+    """Heat and wear of a clutch, with their limits."""
 
     work: Energy = line("friction work of one engagement", at_most="permissible_work")
     permissible_work: Energy = line("permissible friction work of one engagement at this frequency")
@@ -36,9 +36,9 @@ def clutch_heat(
     heat_capacity: HeatCapacity, conductance: Conductance, air: Temperature = 293.15, hottest: Temperature = math.inf,
     wear_work: Energy = math.inf,
 ) -> ClutchHeat:  # fmt: skip
-    """Work out heat and wear of a clutch that engages again and again (VDI 2241).
+    """Compute heat and wear of a clutch with repeated engagements (VDI 2241).
 
-    Permissible are Q = Q_E·(1 - exp(-S_hü/S_h)) per engagement, and so S_h = S_hü/ln(Q_E/(Q_E - W)) per hour. With
+    The limits are Q = Q_E·(1 - exp(-S_hü/S_h)) per engagement, and so S_h = S_hü/ln(Q_E/(Q_E - W)) per hour. With
     equal engagements the temperature after each is T_air + rise/(1 - exp(-G/(C·S_h))) with the rise W/C: one body of
     the heat capacity C, which gives its heat to the air through G.
 
@@ -51,10 +51,10 @@ def clutch_heat(
         conductance: G to the air in W/K.
         air: temperature of the air in K.
         hottest: permissible temperature in K.
-        wear_work: friction work in J that wears the linings off, of the catalogue.
+        wear_work: friction work in J that wears the linings down, from the catalogue.
 
     Raises:
-        ValueError: one engagement has more work than a single one may have.
+        ValueError: one engagement exceeds the limit of a single engagement.
     """
     require(
         "The friction work of one engagement is not below single_limit: no frequency permits it.", work < single_limit

@@ -24,7 +24,7 @@ _RULE = 9550.0
 
 
 def referred_mass(mass: Mass, velocity: Velocity, speed: Speed) -> Inertia:
-    """Return the inertia in kg.m2 that stands for a mass in kg: J = m·(v/w)², v in m/s, w in rad/s (document 000)."""
+    """Return the equivalent inertia in kg.m2 of a mass in kg: J = m·(v/w)², v in m/s, w in rad/s (document 000)."""
     return mass * (velocity / speed) ** 2
 
 
@@ -80,7 +80,7 @@ def machine_table_clutch(
     """Size the clutch between a running motor and a machine table at rest, or already moving (document 000).
 
     J_T = m·(u/w)², J_red = J_K + J_in + (J_out + J_S)/i² + J_T, M_B = J_red·(w - w_L0)/t, M_K = M_B + M_L/i,
-    phi = (w - w_L0)·t/2, W = M_K·phi. The hub lies wholly on the driven side of the friction surfaces; the screw has no
+    phi = (w - w_L0)·t/2, W = M_K·phi. The hub is entirely on the driven side of the friction surfaces; the screw has no
     loss.
 
     Args:

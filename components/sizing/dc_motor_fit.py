@@ -19,14 +19,14 @@ class LineConsistency(Result):
     torque_constant: MotorConstant = line("torque constant from the line of the current")
     friction: Torque = line("friction torque from the line of the current")
     back_emf_constant: MotorConstant = line("back-EMF constant from the line of the speed and the no-load current")
-    resistance: Resistance = line("resistance that goes with both")
+    resistance: Resistance = line("resistance from both lines")
     largest_constant: MotorConstant = line("back-EMF constant if the armature had no resistance")
     constants: Ratio = line("torque constant over back-EMF constant", at_most="conserving")
-    conserving: Ratio = line("what conserves energy; above it the machine would create energy")
+    conserving: Ratio = line("value that conserves energy; above it the machine would create energy")
 
 
 def line_consistency(lines: MotorLines) -> LineConsistency:
-    """Compare torque constant and back-EMF constant, which are one number in a machine with constant flux.
+    """Compare torque constant and back-EMF constant, which are equal in a machine with constant flux.
 
     The line of the current gives k_t = 1/a and M_f = I0/a. The line of the speed gives R = s·k_e·k_t and
     U = k_e·w0 + R·I0. The lines of document 002, section 6.1, contradict each other by 7 %.
@@ -84,7 +84,7 @@ def fit_least_squares(
 ) -> MotorFit:  # fmt: skip
     """Identify a motor by least squares of both lines (sets C and D of document 002), by Gauss and Newton's method.
 
-    The deviations of speed and current at evenly spaced torques count in parts of the scales.
+    The deviations of speed and current at evenly spaced torques are divided by the scales.
 
     Args:
         lines: measured lines.
@@ -109,7 +109,7 @@ def fit_least_squares(
 def _gauss_newton(
     motor: DcMotor, lines: MotorLines, torques: Sequence[Torque], free: Sequence[str], scales: tuple[Speed, Current]
 ) -> DcMotor:
-    """Return the motor after one step; the free parameters count relative to their values."""
+    """Return the motor after one step; the free parameters are relative to their values."""
     own = motor_lines(motor, lines.voltage)
     matrix: list[list[Number]] = [[0.0] * len(free) for _ in free]
     right: list[Number] = [0.0] * len(free)
@@ -142,7 +142,7 @@ def _rates(
 
 
 def _compared(motor: DcMotor, lines: MotorLines, largest_torque: Torque) -> MotorFit:
-    """All curves are straight, so the deviations are largest at the ends."""
+    """Compare at the ends: all curves are straight, so the deviations are largest there."""
     own = motor_lines(motor, lines.voltage)
     ends = [(motor_on_lines(lines, torque), motor_on_lines(own, torque)) for torque in (0.0, largest_torque)]
     speed, current = (

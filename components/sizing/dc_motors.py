@@ -48,7 +48,7 @@ def measured_lines(
     voltage: Voltage, no_load_speed: Speed, speed_drop: Compliance, no_load_current: Current,
     current_rise: CurrentSlope,
 ) -> MotorLines:  # fmt: skip
-    """Name the straight lines through measured points: w = w0 - s·M, I = I0 + a·M.
+    """Return the straight lines through measured points: w = w0 - s·M, I = I0 + a·M.
 
     Args:
         voltage: in V.
@@ -130,7 +130,7 @@ def torque_at_speed(lines: MotorLines, speed: Speed) -> Torque:
 
 
 class MotorSummary(Result):
-    """What the characteristic curves of a motor tell."""
+    """Key values of the characteristic curves of a motor."""
 
     no_load_speed: Speed = line("speed without load")
     no_load_current: Current = line("current without load")

@@ -79,8 +79,8 @@ class CommutationRipple(Result):
 def commutation_ripple(loops: Ratio, pole_pairs: Ratio = 1.0) -> CommutationRipple:
     """Work out torque ripple and voltage ripple of loops that a commutator turns over (document 002, 2.1.2 and 2.2).
 
-    The loops lie pi/N apart and each has a sine. Whether only the best one is connected (figure 3 of the document) or
-    all are in series, what remains is the crest of a cosine: |x| ≤ pi/(2·N), of which mean and smallest value follow.
+    The loops are pi/N apart and each has a sine. With only the best one connected (figure 3 of the document) or all in
+    series, the result is the crest of a cosine, |x| ≤ pi/(2·N), with its mean and smallest value.
 
     Args:
         loops: number of loops N; the document's rotor has two.

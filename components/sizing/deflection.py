@@ -46,7 +46,7 @@ class Deflection(Result):
 def deflection(mass: Mass, span: Length, side: Length, modulus: Stress = STEEL) -> Deflection:
     """Work out the sag of a square shaft: m·g·l³/(4·E·s⁴) (document 002, equation 47).
 
-    The span is the distance of the bearings, 175 mm; the document takes the length of the square piece, 105 mm.
+    The span is the distance of the bearings, 175 mm; the document uses the length of the square piece, 105 mm.
 
     Args:
         mass: in kg.

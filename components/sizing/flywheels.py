@@ -33,9 +33,9 @@ class Flywheel(Result):
     inertia: SmallInertia = line("moment of inertia")
     radius: Length = line("radius")
     width: Length = line("width", at_most="width_limit")
-    width_limit: Length = line("room for it")
+    width_limit: Length = line("available width")
     mass: Mass = line("mass")
-    switching_time: Time = line("time in which the torque brings it to speed")
+    switching_time: Time = line("time to reach the speed")
 
 
 def flywheel_for_time(
@@ -44,7 +44,7 @@ def flywheel_for_time(
     """Size a flywheel that takes a given time to come to speed (document 002, equations 40 to 44).
 
     J = M·t/w, b = 2·J/(pi·rho·r⁴). Table 2 of the document has widths computed with r = 50 mm, and inertias computed
-    from these widths with r = 45 mm: (45/50)⁴ = 0.656 of what the times ask for.
+    from these widths with r = 45 mm: (45/50)⁴ = 0.656 of the inertia required by the times.
 
     Args:
         time: switching time in s.
@@ -52,7 +52,7 @@ def flywheel_for_time(
         speed: at the end in rad/s.
         density: in kg/m3.
         radius: in m.
-        width_limit: room for the flywheel in m.
+        width_limit: available width in m.
     """
     inertia = torque * time / speed
     width = 2 * inertia / (math.pi * density * radius**4)
@@ -62,7 +62,7 @@ def flywheel_for_time(
 def flywheel(
     width: Length, radius: Length, density: Density, torque: Torque, speed: Speed, width_limit: Length = math.inf
 ) -> Flywheel:
-    """Work out what a flywheel of given size does; the inverse of `flywheel_for_time`.
+    """Compute the switching time of a flywheel of given size; the inverse of `flywheel_for_time`.
 
     Args:
         width: in m.
@@ -70,7 +70,7 @@ def flywheel(
         density: in kg/m3.
         torque: of the clutch in N.m.
         speed: at the end in rad/s.
-        width_limit: room for the flywheel in m.
+        width_limit: available width in m.
     """
     mass = cylinder_mass(density, radius, width)
     inertia = cylinder_inertia(mass, radius)

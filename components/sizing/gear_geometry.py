@@ -109,7 +109,7 @@ def _atan(tangent: Number) -> Angle:
 def tooth_form(pair: GearPair, teeth: Teeth, shift: Ratio) -> tuple[Ratio, Ratio]:
     """Return form factor Y_Fa and stress correction factor Y_Sa of a gear, for a load at its tip (DIN 3990-3, C).
 
-    The root is cut where its tangents stand at 30° to the middle of the tooth.
+    The root section is where its tangents are at 30° to the middle of the tooth.
 
     Args:
         pair: its geometry.

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from components.sizing.gear_strength import GearStrength
-from components.sizing.maths import exp, log, maximum, minimum, where
+from components.sizing.maths import exp, log, maximum, minimum, require, where
 from modelica_like.language.quantities import Ratio
 from modelica_like.language.results import Result, line
 
@@ -82,7 +82,7 @@ class LoadStage:
 
 
 class StageDamage(Result):
-    """What a step of a load spectrum takes of the life."""
+    """Share of the life used by a step of a load spectrum."""
 
     load: Ratio = line("torque over nominal torque")
     cycles: Ratio = line("load cycles of a tooth of the pinion")
@@ -119,7 +119,12 @@ def gear_life(
         flank: life curve of the flanks.
         root: life curve of the roots.
         allowed_damage: 1, or less for spectra that are not certain.
+
+    Raises:
+        ValueError: a step of the spectrum has no load or no cycles.
     """
+    require("Every step of a load spectrum needs a load and cycles above zero.",
+            *(value > 0 for stage in spectrum for value in (stage.load, stage.cycles)))  # fmt: skip
     stages = tuple(_damage(strength, stage, wheel_cycles, flank, root) for stage in spectrum)
     total = sum(stage.cycles for stage in spectrum)
 

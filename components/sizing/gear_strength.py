@@ -8,9 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from components.sizing.gear_geometry import INTERNAL_CORRECTION, INTERNAL_FORM, GearPair, tooth_form
-from components.sizing.maths import Number, cos, is_symbolic, maximum, minimum, sqrt, tan, where
+from components.sizing.maths import Number, cos, is_symbolic, maximum, minimum, require, sqrt, tan, where
 from modelica_like.language.quantities import Angle, Force, Ratio, Stress, Torque
 from modelica_like.language.results import Result, line
+
+_INCOMPLETE = "A gear pair needs a torque, a module, a width and a pinion with teeth; only the wheel's may be negative."
 
 
 @dataclass(frozen=True)
@@ -82,8 +84,9 @@ def gear_strength(
         required_root_safety: smallest S_F.
 
     Raises:
-        ValueError: the teeth cannot be so.
+        ValueError: the geometry of the teeth is impossible, or there is no torque.
     """
+    require(_INCOMPLETE, abs(torque) > 0, pair.module > 0, pair.face_width > 0, pair.pinion_teeth > 0)
     diameter, factors = pair.pitch_diameter(pair.pinion_teeth), application * dynamic * face_load * transverse_load
     force = 2 * abs(torque) / diameter
     zone, sharing, single = contact_factors(pair)
@@ -124,7 +127,7 @@ def single_contact(pair: GearPair, ratio: Ratio, overlap: Ratio) -> Number:
     Args:
         pair: geometry.
         ratio: transverse contact ratio.
-        overlap: overlap ratio up to 1, from where on it has no influence; internal gears have none either.
+        overlap: overlap ratio, at most 1; no influence above it, or for internal gears.
     """
     tips = [
         pair.tip_over_base(pair.pinion_teeth, pair.pinion_shift),

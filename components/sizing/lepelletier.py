@@ -27,7 +27,7 @@ from modelica_like.language.results import Result, line
 
 @dataclass(frozen=True)
 class ShiftPattern:
-    """What is connected to what in one gear.
+    """Connections in one gear.
 
     Attributes:
         front: shafts of the Ravigneaux set that the front set drives.
@@ -56,8 +56,8 @@ GEARS = {
 }
 """Shift pattern of the six-speed gearbox of document 001 (ZF 6HP26).
 
-The document's third gear has the carrier at the speed of the front set, to which nothing can connect it; both suns are
-driven, which makes the same speeds."""
+The document's third gear has the carrier at the speed of the front set, but no element can connect the two; driving
+both suns gives the same speeds."""
 
 
 class LepelletierGear(Result):

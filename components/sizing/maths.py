@@ -1,4 +1,4 @@
-"""Functions that work alike on floats, numpy arrays and CasADi expressions."""
+"""Functions for floats, NumPy arrays and CasADi expressions."""
 
 from __future__ import annotations
 
@@ -82,14 +82,14 @@ def solve(rows: Sequence[Sequence[Number]], right: Sequence[Number]) -> list[Num
 
 
 def settled(value: Number, scale: Number) -> Number:
-    """Return a value, or zero for what rounding left of a difference of values of the size of `scale`."""
+    """Return a value, or zero if it is rounding in a difference of values of the size of `scale`."""
     if is_symbolic(value, scale):
         return value
     return where(np.abs(value) > _ROUNDING * np.abs(scale), value, 0.0 * np.abs(value))
 
 
 def require(message: str, *conditions: Number) -> None:
-    """Refuse numbers that mean nothing; a symbolic condition cannot be decided, so it passes.
+    """Refuse invalid numbers; a symbolic condition cannot be decided, so it passes.
 
     Raises:
         ValueError: with the message.

@@ -183,7 +183,7 @@ def ravigneaux_meshes(
 
 
 class RavigneauxAssembly(Result):
-    """Whether a Ravigneaux set can be put together."""
+    """Whether a Ravigneaux set can be assembled."""
 
     outer_step: Ratio = line("(z_ring + z_large_sun)/planets, a whole number")
     outer_fits: bool = line("long planets can be spaced evenly", required=True)
@@ -198,7 +198,7 @@ def ravigneaux_assembly(teeth: RavigneauxTeeth) -> RavigneauxAssembly:
     """Check the conditions of assembly of a Ravigneaux set with evenly spaced planets (Willis; VDI 2157).
 
     (z_h + z_se)/q and (z_h - z_si)/q are whole numbers. The centre distances of the long planet's two meshes differ by
-    (z_h - z_se - 2·z_pe)/2 modules, which profile shift has to bridge.
+    (z_h - z_se - 2·z_pe)/2 modules, to be bridged by profile shift.
 
     Args:
         teeth: numbers of teeth.

@@ -116,13 +116,13 @@ def rolling_powers(speeds: ShaftSpeeds, torques: ShaftTorques) -> tuple[Power, P
 def lossy_ratios(small: Ratio, large: Ratio, rolling: tuple[Power, Power], mesh: Ratio) -> tuple[Ratio, Ratio]:
     """Return the ratios of the torques with losses in the meshes.
 
-    Rolling power passes two meshes from the small sun to the long planet, one from the large sun, and what they
-    carry together one more to the ring; each takes 1 - eta of what enters it.
+    Rolling power passes two meshes from the small sun to the long planet and one from the large sun; their sum
+    passes one more to the ring. Each mesh loses 1 - eta of the power that enters it.
 
     Args:
         small: fixed-carrier ratio of the small sun.
         large: fixed-carrier ratio of the large sun.
-        rolling: rolling powers of both suns without losses, which tell the directions.
+        rolling: rolling powers of both suns without losses, for their directions.
         mesh: efficiency of a mesh.
     """
     total = sign_of(rolling[0] + rolling[1], absolute(rolling[0]) + absolute(rolling[1]))
@@ -136,5 +136,5 @@ def rolling_in_meshes(rolling: tuple[Power, Power]) -> Power:
 
 
 def sign_of(value: Number, scale: Number) -> Number:
-    """Return the sign of a value; what is left of a difference by rounding, 1e-9 of the scale, has none."""
+    """Return the sign of a value; 0 for rounding in a difference, 1e-9 of the scale."""
     return where(absolute(value) > 1e-9 * absolute(scale), sign(value), 0.0)

@@ -27,7 +27,7 @@ def bearing_life(
 ) -> BearingLife:  # fmt: skip
     """Work out static safety and life (ISO 281, Roloff/Matek; document 002, equations 37 to 39).
 
-    S0 = C0/P, L10 = 1e6·(C/P)^p revolutions, L10h = L10/n. The static equivalent load is taken as P, too.
+    S0 = C0/P, L10 = 1e6·(C/P)^p revolutions, L10h = L10/n. P is also the static equivalent load.
 
     Args:
         radial_load: in N.

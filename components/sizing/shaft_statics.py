@@ -14,7 +14,7 @@ Positions = tuple[Length, ...]
 
 @dataclass(frozen=True)
 class Load:
-    """What acts on a shaft at one place.
+    """The load on a shaft at one place.
 
     Attributes:
         at: position along the shaft in m.
@@ -46,7 +46,7 @@ class SectionForces(Result):
     """Section forces on one side of a cut."""
 
     at: Length = line("position")
-    side: str = line("left or right of what acts there")
+    side: str = line("left or right of the load")
     shear_y: Force = line("shear force in y")
     shear_z: Force = line("shear force in z")
     bending_y: SmallTorque = line("bending moment in the x-y plane")
@@ -62,7 +62,7 @@ class ShaftStatics(Result):
     diagram: tuple[SectionForces, ...] = line("section forces")
     largest_radial: Force = line("largest radial load of a bearing")
     largest_bending: SmallTorque = line("largest resultant bending moment")
-    place: Length = line("where it is")
+    place: Length = line("its position")
     largest_torque: SmallTorque = line("largest torsional moment")
     unbalanced_torque: SmallTorque = line("sum of all torques, zero in steady state")
 
@@ -75,7 +75,7 @@ def bearing_reactions(
     Sum of forces, sum of moments about the first bearing, and no bending moment in each hinge.
 
     Args:
-        loads: what acts on the shaft.
+        loads: on the shaft.
         bearings: positions of the bearings in m, two more than hinges.
         hinges: positions in m of joints that transmit shear forces and no bending moment.
 
@@ -113,13 +113,13 @@ def shaft_statics(
 ) -> ShaftStatics:
     """Work out bearing reactions and section forces (Roloff/Matek; document 002, section 5.4).
 
-    The moments are linear between the places where something acts, so the largest resultant is at one of these.
+    The moments are linear between the places of loads and bearings, so the largest resultant is at such a place.
 
     Args:
-        loads: what acts on the shaft.
+        loads: on the shaft.
         bearings: positions in m.
         hinges: positions in m of joints without bending moment.
-        at: further positions in m for which the section forces are wanted.
+        at: further positions in m for section forces.
 
     Raises:
         ValueError: the shaft is not statically determinate.
@@ -150,7 +150,7 @@ def section_forces(loads: Sequence[Load], place: Length) -> tuple[SectionForces,
     the left makes a positive moment.
 
     Args:
-        loads: everything that acts on the shaft, the bearings' forces included.
+        loads: on the shaft, including the forces of the bearings.
         place: position in m.
     """
     return _cut(loads, place, False), _cut(loads, place, True)
@@ -171,7 +171,7 @@ def _bending(place: Length, loads: Sequence[Load], force: str, couple: str, righ
 
 
 def _sum(terms: Sequence[Number]) -> Number:
-    """Add up what can cancel: nothing, rather than a rounding error, is left where it does."""
+    """Add terms that may cancel: exactly zero instead of a rounding error."""
     return settled(sum(terms), sum(abs(term) for term in terms))
 
 

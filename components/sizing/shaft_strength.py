@@ -73,7 +73,7 @@ class ShaftDiameter(Result):
 
     bending: SmallTorque = line("resultant bending moment")
     allowable_stress: Stress = line("strength over required safety")
-    smallest_diameter: Length = line("smallest diameter that stands the bending moment", at_most="diameter")
+    smallest_diameter: Length = line("smallest diameter for the bending moment", at_most="diameter")
     diameter: Length = line("diameter of the shaft")
 
 
@@ -82,7 +82,7 @@ def shaft_diameter(bending: Torque, strength: Stress, safety: Ratio, diameter: L
 
     Args:
         bending: resultant bending moment in N.m.
-        strength: fatigue strength in Pa; document 002 takes the yield strength.
+        strength: fatigue strength in Pa; document 002 uses the yield strength.
         safety: required safety.
         diameter: smallest diameter of the shaft in m.
     """
@@ -137,7 +137,7 @@ def shaft_stress(
 
 @dataclass(frozen=True)
 class Section:
-    """A cylindrical piece of a shaft.
+    """A cylindrical section of a shaft.
 
     Attributes:
         end: position of its end in m; it begins where the one before ends.
@@ -151,14 +151,14 @@ class Section:
 
 
 class SteppedShaft(Result):
-    """Safety of a stepped shaft at every place that matters."""
+    """Safety of a stepped shaft at every relevant place."""
 
     reactions: tuple[Result, ...] = line("bearings")
     stresses: tuple[ShaftStress, ...] = line("stresses at bearings, loads and shoulders")
     largest_bending: SmallTorque = line("largest resultant bending moment")
     largest_stress: Stress = line("largest equivalent stress (von Mises)")
     safety: Ratio = line("smallest safety against yielding", at_least="required_safety")
-    place: Length = line("where it is")
+    place: Length = line("its position")
     required_safety: Ratio = line("required safety")
 
 
@@ -171,7 +171,7 @@ def stepped_shaft(
     Positions and diameters are plain numbers; forces and torques may be arrays or expressions.
 
     Args:
-        loads: what acts on the shaft.
+        loads: on the shaft.
         bearings: positions in m.
         sections: pieces of the shaft from its left end on.
         yield_strength: in Pa.
@@ -203,7 +203,7 @@ def stepped_shaft(
 
 
 def _worst(stresses: list[ShaftStress]) -> list[ShaftStress]:
-    """Of both sides of one cut only the worse one is told, where it can be decided."""
+    """Of both sides of one cut only the worse one is kept, if it can be decided."""
     if is_symbolic(*(stress.safety for stress in stresses)) or any(np.ndim(stress.safety) for stress in stresses):
         return stresses
     return [min(stresses, key=lambda stress: stress.safety)]

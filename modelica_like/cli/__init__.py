@@ -1,4 +1,4 @@
-"""The command line: `modelica-like check drive.toml` and the others."""
+"""The command line: `modelica-like check drive.toml` and the other commands."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def main() -> None:
 
 
 def _ran(words: list[str]) -> bool:
-    """Run an ordinary call of a command; anything else is left to the complete application, which starts slower."""
+    """Run an ordinary call of a command; leave anything else to the complete application, which starts slower."""
     from modelica_like.cli.declare import WrongUse
     from modelica_like.cli.quick import read
 

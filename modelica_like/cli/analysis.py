@@ -1,4 +1,4 @@
-"""Commands on what a drive does: small motions, operating points, sweeps, exact derivatives."""
+"""Commands that analyse drives: small motions, operating points, sweeps, exact derivatives."""
 
 from __future__ import annotations
 

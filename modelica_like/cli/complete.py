@@ -1,4 +1,4 @@
-"""The complete command line: help and mistakes are told by Typer, from the commands' own declarations."""
+"""The complete command line: Typer shows help and errors from the declarations of the commands."""
 
 from __future__ import annotations
 

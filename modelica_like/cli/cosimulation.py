@@ -9,9 +9,9 @@ from modelica_like.cli.declare import Argument, Option, WrongUse
 from modelica_like.cli.shared import Assignments, Debug, Netlist, load_netlist, say, told
 
 Master = Literal["jacobi", "gauss-seidel"]
-"""In which order FMUs step."""
+"""Order in which FMUs step."""
 Inputs = Literal["linear", "hold"]
-"""How inputs move between communication points."""
+"""Inputs between communication points."""
 
 
 def split(

@@ -1,6 +1,6 @@
 """How commands declare their arguments and options, as metadata of `Annotated`.
 
-Typer shows help and tells mistakes, but it loads a validation framework for that; an ordinary call is read without it.
+Typer shows help and errors, but it loads a validation framework; an ordinary call is read without it.
 """
 
 from __future__ import annotations
@@ -11,8 +11,8 @@ class Argument:
 
     Args:
         names: of an option, with their dashes; by default that of the parameter.
-        metavar: how the help names the value.
-        help: what it is.
+        metavar: name of the value in the help.
+        help: description.
         show_default: whether the help shows its default.
     """
 
@@ -30,7 +30,7 @@ class Option(Argument):
 
 
 class WrongUse(Exception):
-    """An option has a value that cannot be understood; told with the command's usage."""
+    """An option has an invalid value; shown with the command's usage."""
 
     def __init__(self, text: str, option: str) -> None:
         super().__init__(text)

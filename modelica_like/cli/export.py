@@ -10,9 +10,9 @@ from modelica_like.cli.declare import Option
 from modelica_like.cli.shared import Assignments, Debug, Netlist, load_netlist, say, told
 
 Takes = Literal["flow", "potential"]
-"""What open ends take from outside."""
+"""Quantity that open ends take from outside."""
 Modes = Literal["output", "local", "integer"]
-"""What modes are in an FMU."""
+"""Variables of modes in an FMU."""
 
 
 def export(

@@ -9,9 +9,9 @@ from modelica_like.cli.declare import Option
 from modelica_like.cli.shared import Assignments, Debug, Netlist, assigned, load_netlist, note, out, told
 
 Start = Literal["given", "rest", "steady"]
-"""What stands for start values that are not given."""
+"""Replacement of missing start values."""
 Solver = Literal["idas", "native"]
-"""What integrates."""
+"""Integrator."""
 
 
 def check(
@@ -53,7 +53,7 @@ def simulate(
 ) -> None:  # fmt: skip
     """Simulate a netlist: events, energy balance, results as table and picture."""
     with told(debug, tables=[csv], pictures=[plot, sankey]):
-        # What is wrong in the file is told before the solver is loaded.
+        # Errors in the file are reported before the solver is loaded.
         assembly = load_netlist(netlist, assignments)
         from modelica_like.cli.outcome import Outcome
         from modelica_like.report.plausible import notes

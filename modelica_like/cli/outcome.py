@@ -1,4 +1,4 @@
-"""What commands make of a run, whole or not: report, table, pictures."""
+"""Output of commands from a complete or partial run: report, table, pictures."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ Picture = tuple[Path | None, "Callable[[Trajectories], Figure]"]
 
 
 class Outcome:
-    """Makes one thing after the other of a run; one that cannot be made is a warning, as the run is right all the same.
+    """Makes the outputs of a run one by one; a failing output is a warning, because the run is still valid.
 
     Args:
-        run: runs.
+        run: starts the run.
         debug: raise instead of warning.
     """
 
@@ -38,7 +38,7 @@ class Outcome:
             self.stopped, self.solution = error, vars(error)["run"]
 
     def attempt(self, what: str, make: Callable[[], object], file: Path | None = None) -> bool:
-        """Make something, and a file of it; False if it could not be made."""
+        """Make one output, and its file; False if it failed."""
         try:
             make()
         except OSError as error:
@@ -55,11 +55,11 @@ class Outcome:
     def write(
         self, table: Path | None, *, units: bool, pictures: Sequence[Picture], display: Mapping[str, str] | None = None
     ) -> None:
-        """Write the files that were asked for.
+        """Write the requested files.
 
         Raises:
-            SolveError, KeyboardInterrupt: the run has stopped; a note says what was kept.
-            OSError: a file could not be written; the others are.
+            SolveError, KeyboardInterrupt: the run has stopped; a note lists the files.
+            OSError: a file could not be written; the others were.
         """
         if table:
             from modelica_like.report.files import write_solution
@@ -82,7 +82,7 @@ class Outcome:
         save_plot(draw(self.solution), file)
 
     def tell(self, report: Callable[[Any], Any], table: Path | None) -> None:
-        """Print a report; a table on standard output is alone there."""
+        """Print a report, unless the table goes to standard output."""
         from modelica_like.report.files import STDOUT
 
         self.attempt("The report", lambda: out(stderr=table == STDOUT).print(report(self.solution)))

@@ -12,16 +12,24 @@ from modelica_like.cli.shared import Assignments, Debug, Netlist, load_netlist, 
 def draw(
     netlist: Netlist, assignments: Assignments = None, *,
     output: Annotated[Path | None, Option("--output", "-o", metavar="FILE", help="A .svg, .png or .pdf file.")] = None,
-    depth: Annotated[int, Option(metavar="N", help="Levels of assemblies to open.")] = 1,
+    depth: Annotated[int, Option(metavar="N", help="How many levels of assemblies are open.")] = 1,
+    at: Annotated[str | None, Option(metavar="TIME", help="Run the drive; show modes and powers at a time.")] = None,
+    flow: Annotated[bool, Option("--flow", help="Run the drive; show mean powers as line widths.")] = False,
+    animate: Annotated[bool, Option("--animate", help="Run the drive; show its modes one by one.")] = False,
+    until: Annotated[str | None, Option(metavar="TIME", help="End of the run; else the netlist's.")] = None,
     debug: Debug = False,
 ) -> None:  # fmt: skip
     """Draw the schematic of a netlist: power from left to right."""
     with told(debug):
         from modelica_like.draw import check_format, save_schematic
+        from modelica_like.simulation import seconds, simulate
 
         path = output or Path(f"{netlist.stem}.svg")
-        check_format(path)
-        save_schematic(load_netlist(netlist, assignments), path, depth=depth)
+        check_format(path, moving=animate)
+        drive = load_netlist(netlist, assignments)
+        run = simulate(drive, until or (at if not (flow or animate) else None)) if at or flow or animate else None
+        moment = seconds(at, "at") if at else None
+        save_schematic(drive, path, depth=depth, run=run, at=moment, flow=flow or bool(at), moving=animate)
         say(str(path))
 
 
@@ -51,8 +59,8 @@ def report(
 
 def explore(
     netlist: Netlist, assignments: Assignments = None, *,
-    until: Annotated[str | None, Option(metavar="TIME", help="End time, e.g. 2s; else the netlist's.")] = None,
-    show: Annotated[list[str] | None, Option(metavar="PATTERN", help="What to draw, e.g. '*.w'.")] = None,
+    until: Annotated[str | None, Option(metavar="TIME", help="End time, e.g. 2s; default: the netlist's.")] = None,
+    show: Annotated[list[str] | None, Option(metavar="PATTERN", help="Variables to draw, e.g. '*.w'.")] = None,
     output: Annotated[Path, Option("--output", "-o", metavar="FOLDER", help="Where the page saves files.")] = Path(),
     browser: Annotated[bool, Option(help="Open the browser.")] = True,
     debug: Debug = False,

@@ -1,4 +1,4 @@
-"""Reads the words of an ordinary call from a command's declarations."""
+"""Reads the words of an ordinary call by a command's declarations."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _NUMBER = re.compile(r"[0-9]{1,30}(\.[0-9]{0,30})?([eE][+-]?[0-9]{1,3})?")
 
 
 class _Unusual(Exception):
-    """Something that only the complete reader can judge."""
+    """Words that only the complete reader can read."""
 
 
 class _Parameter:
@@ -59,7 +59,7 @@ def read(command: Callable[..., None], words: Sequence[str]) -> dict[str, Any] |
         words: of the command line, behind the command's name.
 
     Returns:
-        None where the words ask for help, are wrong, or are written in a way that is not known here.
+        None if the words ask for help, are wrong, or have an unusual form.
     """
     defaults = {name: one.default for name, one in inspect.signature(command).parameters.items()}
     hints = get_type_hints(command, include_extras=True)
@@ -72,7 +72,7 @@ def read(command: Callable[..., None], words: Sequence[str]) -> dict[str, Any] |
 
 def _values(parameters: list[_Parameter], words: Sequence[str]) -> dict[str, Any]:
     if os.name == "nt" and any(set(word) & set("*?[~$%") for word in words):
-        raise _Unusual  # patterns and variables that the shell leaves to the program
+        raise _Unusual  # patterns and variables that the shell does not expand
     options = [one for one in parameters if isinstance(one.declared, Option)]
     known = {word: (one, flag) for one in options for word, flag in one.words().items()}
     found: dict[str, list[Any]] = {}

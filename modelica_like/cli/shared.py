@@ -1,4 +1,4 @@
-"""What all commands share: their common options, and how results and errors are told."""
+"""Shared by all commands: common options, output of results and errors."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ SOLVE_FAILED = 1
 
 INTERRUPTED = 130
 
-# What only a defect of this package raises; everything foreseen is a ModelicaLikeError.
+# Raised only by a defect of this package; every expected error is a ModelicaLikeError.
 DEFECTS = (
     ArithmeticError, AssertionError, AttributeError, EOFError, LookupError, MemoryError, RuntimeError, StopIteration,
     SyntaxError, TypeError, ValueError,
@@ -39,11 +39,11 @@ def told(
     debug: bool, *, tables: Iterable[Path | None] = (), pictures: Iterable[Path | None] = (),
     files: Iterable[Path | None] = (),
 ) -> Iterator[None]:  # fmt: skip
-    """Turn errors into one block of sentences on stderr, and into the exit code.
+    """Turn errors into one block of text on stderr and an exit code.
 
     Args:
         debug: raise them instead.
-        tables: to be written; whether they can be is told before anything is done.
+        tables: to be written; checked before the run.
         pictures: to be written.
         files: of any kind, to be written.
     """
@@ -51,7 +51,7 @@ def told(
         _check(filter(None, tables), filter(None, pictures), filter(None, files))
         yield
     except BrokenPipeError:
-        # Who reads the results has seen enough.
+        # The reader of the results has closed the pipe.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         raise SystemExit(SOLVE_FAILED) from None
     except (KeyboardInterrupt, ModelicaLikeError, OSError, *DEFECTS) as error:
@@ -63,7 +63,7 @@ def told(
 
 
 def _explained(error: BaseException) -> tuple[str, int]:
-    """Return what an error says, and the exit code."""
+    """Return the text of an error and the exit code."""
     notes: list[str] = getattr(error, "__notes__", [])
     if isinstance(error, KeyboardInterrupt):
         return " ".join(["Interrupted.", *(notes or ["Unfinished results are not written."])]), INTERRUPTED
@@ -89,13 +89,13 @@ def _check(tables: Iterable[Path], pictures: Iterable[Path], files: Iterable[Pat
 
 
 def exit_code(error: ModelicaLikeError) -> int:
-    """Return 1 where the model is right but cannot be solved, 2 where it is wrong."""
+    """Return 1 if the model is valid but cannot be solved, 2 if the input is wrong."""
     unsolved = isinstance(error, SolveError) or type(error) is InitializationError
     return SOLVE_FAILED if unsolved else BAD_INPUT
 
 
 def warn(message: str, colour: str = "yellow") -> None:
-    """Tell a block of sentences on stderr."""
+    """Print a block of text on stderr."""
     from rich.console import Console
     from rich.markup import escape
 
@@ -115,7 +115,7 @@ def out(*, stderr: bool = False) -> Console:
 
 
 def say(text: str) -> None:
-    """Print a text as it is, with all brackets, on lines of any length."""
+    """Print a text without markup, on lines of any length."""
     from rich.markup import escape
 
     out().print(escape(text), soft_wrap=True)
@@ -128,7 +128,7 @@ def note(*sentences: str) -> None:
 
 
 def assigned(assignments: list[str] | None, option: str) -> dict[str, str]:
-    """Read what stands before and behind the signs of equality."""
+    """Split assignments at the equals sign."""
     pairs = [one.partition("=") for one in assignments or ()]
     for before, equals, _ in pairs:
         if not equals:

@@ -11,7 +11,7 @@ from modelica_like.errors import NetlistError
 
 _HOMES = (Path(__file__).parents[1], Path(__file__).parents[2])
 DEMO = next((home / "examples/demo.py" for home in _HOMES if (home / "examples").is_dir()), Path("examples/demo.py"))
-"""Lies beside its netlists: in the package, or in a copy of the source next to it."""
+"""In the folder of its netlists: in the package, or in a copy of the source."""
 
 
 def size(

@@ -41,16 +41,16 @@ class BufferedFunction:
         return self.latest()
 
     def latest(self) -> list[Vector]:
-        """Return what the last call has computed, even if it failed."""
+        """Return the results of the last call, even if it failed."""
         return [array.copy() for array in self._results]
 
     def forget(self) -> None:
-        """Let all results be nan, so that those that are never computed are known."""
+        """Set all results to nan, to mark those that are never computed."""
         for array in self._results:
             array.fill(np.nan)
 
     def along(self, points: list[Vector], p: Vector, u: Vector) -> list[Vector]:
-        """Evaluate a mapped function at as many points as there are; what lies behind is left over.
+        """Evaluate a mapped function at all given points; the rest of the buffer is unused.
 
         Args:
             points: t, x, z and d of all points, each flat.
@@ -70,14 +70,14 @@ class BufferedFunction:
         return self._results
 
     def statistics(self) -> dict[str, Any]:
-        """Return the statistics of the last call, of a function that keeps some."""
+        """Return the statistics of the last call, if the function has them."""
         return dict(self._buffer.stats())
 
 
 _BLOCKS = 4096, 512, 64
-"""Points that are evaluated in one call: many, about as many as a run has results, and the rest."""
+"""Points per call: many, about as many as a run has results, and the rest."""
 _GROUP, _SMALL = 8, 2000
-"""Points whose operations are written out one after the other, and operations of one point up to which that is done."""
+"""Points whose operations are unrolled, and largest number of operations of one point for this."""
 
 
 class Along:
@@ -102,7 +102,7 @@ class Along:
         return results
 
     def into(self, results: list[Vector], times: Vector, x: Vector, z: Vector, p: Vector, u: Vector, d: Vector) -> None:
-        """Evaluate as a call does, into given arrays of shape (rows, n).
+        """Evaluate like a call, into given arrays of shape (rows, n).
 
         Args:
             results: one array per result.

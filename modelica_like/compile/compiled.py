@@ -18,6 +18,7 @@ from modelica_like.flatten.model import FlatDiscrete, FlatParameter, FlatVariabl
 from modelica_like.flatten.template import TransitionForm
 from modelica_like.structure.holds import Circuit as Circuit
 from modelica_like.structure.holds import HeldMotion as HeldMotion
+from modelica_like.structure.motion import Motion
 from modelica_like.units import Unit, to_si
 from modelica_like.upper import upper
 
@@ -41,7 +42,7 @@ CompiledTransition = TransitionForm[int, Reset]
 
 @dataclass(frozen=True)
 class StartEntry:
-    """A start value: node, the state it is (if it is one), strength, position in the start values."""
+    """A start value: node, state (if it is one), strength, position in the start values."""
 
     node: int
     state: tuple[int, float] | None
@@ -65,27 +66,27 @@ class CompiledDae:
         ode: derivatives of x.
         alg: residuals for z.
         variables: all flat variables, in the order of `names`.
-        guards: one per state event, positive where it wants to fire.
+        guards: one per state event, positive where it can fire.
         guard_rates: their time derivatives along the solution.
-        guards_soon: guards as they will be one time resolution later.
+        guards_soon: guards one time resolution later.
         moments: times of the time events.
         resets: new values at events.
-        reset_nodes: variables that are reset but are neither states nor discrete.
+        reset_nodes: variables with a reset that are neither states nor discrete.
         start_conditions: one per choice of a start mode.
         hold_terms: gain (zero where nothing is held), capacities forward and backward, and restitution of every held
             motion, one row each, row by row.
         start_values: as many as `starts`.
-        discrete_starts: start of d: modes and discrete values, then what `holds` and `circuits` need.
+        discrete_starts: start of d: modes and discrete values, then the entries of `holds` and `circuits`.
         derived: parameters that follow from others, of p only.
         determinants: relative determinants; zero where a block is singular.
         p: parameter values.
         components: paths of the components of the energy balance.
-        places: where the parts of netlists stand, by path.
+        places: source places of the parts of netlists, by path.
         terminals: open ends with an adaptor.
         singular: names and origins of the blocks of `determinants`.
         implicit_blocks: names and origins of the blocks of `alg`.
         holds: motions that modes hold.
-        circuits: those that depend on each other.
+        circuits: held motions that depend on each other.
         motion_sources: paths of the components that prescribe a motion, whatever torque or force it takes.
     """
 
@@ -197,7 +198,7 @@ class CompiledDae:
 
     @cached_property
     def rest_system(self) -> StartSystem:
-        """The same with what may come to rest."""
+        """The same with variables that may be at rest."""
         return self._start_system(rest=True)
 
     def _start_system(self, rest: bool) -> StartSystem:
@@ -210,13 +211,20 @@ class CompiledDae:
         """Fresh symbols for the arguments of the functions."""
         return {name: ca.SX.sym(name, self.ode.size1_in(k)) for k, name in enumerate(self.ode.name_in())}
 
+    @property
+    def motion(self) -> Motion:
+        """How expressions of `arguments` change along the solution."""
+        given = self.arguments
+        ode, alg = (function(*given.values()) for function in (self.ode, self.alg))
+        return Motion(given["t"], given["x"], given["z"], ode, alg)
+
     @cached_property
     def rising(self) -> tuple[tuple[int, int], ...]:
         """Positions of pairs of parameters of which the second must exceed the first: columns of tables that rise."""
         return tuple((k - one.above, k) for k, one in enumerate(self.flat_parameters) if one.above)
 
     def with_parameters(self, values: dict[str, Any]) -> CompiledDae:
-        """Return the same model with other parameter values; nothing is compiled again.
+        """Return the same model with other parameter values, without compiling it again.
 
         Args:
             values: by path, numbers in SI units or quantities with a unit.
@@ -224,7 +232,7 @@ class CompiledDae:
         Raises:
             UnknownName: there is no such parameter.
             LanguageError: it follows from others, or is not tunable.
-            UnitError, ValueOutOfRange: the value does not fit.
+            UnitError, ValueOutOfRange: the value has the wrong unit or is out of range.
         """
         p, u = self.p.copy(), self.u.copy()
         inputs = {self.flat_variables[k].path: n for n, k in enumerate(self.inputs)}
@@ -254,13 +262,13 @@ class CompiledDae:
         return self.twin(p=p, u=u)
 
     def twin(self, **changes: Any) -> CompiledDae:
-        """Return the same model with other attributes, and with what has been made of it so far."""
+        """Return the same model with other attributes and the same cache."""
         twin = replace(self, **changes)
         twin.__dict__.update({k: v for k, v in self.__dict__.items() if k not in twin.__dict__})
         return twin
 
     def once(self, key: Any, make: Callable[[], Made]) -> Made:
-        """Return what `make` gives: made on first use, and kept with the model and its twins."""
+        """Return the result of `make`: computed on first use, cached with the model and its twins."""
         if key not in self._cache:
             self._cache[key] = make()
         return self._cache[key]
@@ -268,14 +276,20 @@ class CompiledDae:
     def fast(
         self, key: Any, make: Callable[[], ca.Function], results: tuple[int, ...] | None = None
     ) -> BufferedFunction:
-        """Return this thread's buffered function (with some of its results) for a key, made on first use, and kept."""
+        """Return this thread's buffered function for a key, from the cache.
+
+        Args:
+            key: in the cache.
+            make: makes the function on first use.
+            results: which results to compute; all by default.
+        """
         own = "buffer", get_ident(), key
         if own not in self._cache:
             self._cache[own] = BufferedFunction(make(), results)
         return self._cache[own]
 
     def along(self, key: Any, make: Callable[[], ca.Function]) -> Along:
-        """Return this thread's function at many points for a key, made on first use, and kept."""
+        """Return this thread's function at many points for a key, from the cache."""
         return self.once(("along", get_ident(), key), lambda: Along(make()))
 
     def function(self, inputs: Sequence[str], outputs: Sequence[str], **run: Any) -> ca.Function:
@@ -284,7 +298,7 @@ class CompiledDae:
         Args:
             inputs: parameters and inputs.
             outputs: numbers read off the run.
-            run: further arguments of `modelica_like.simulation_function`, which says more.
+            run: further arguments of `modelica_like.simulation_function`.
         """
         return upper("simulation_function")(self, inputs, outputs, **run)
 
@@ -294,7 +308,7 @@ class CompiledDae:
         Args:
             inputs: inputs and tunable parameters that its steps set.
             outputs: variables and modes that its steps read.
-            how: further arguments of `modelica_like.Native`, which says more.
+            how: further arguments of `modelica_like.Native`.
         """
         return upper("Native")(self, inputs, outputs, **how)
 

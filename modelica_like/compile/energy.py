@@ -14,7 +14,7 @@ def energy_terms(reduced: ReducedDae) -> Any:
 
     Returns:
         One row per component: stored energy, loss, source power, power in, rate of the stored energy, and the sum of
-        the magnitudes of the powers through its connectors, beside which a power in is rounding or is not.
+        the magnitudes of the powers through its connectors, the scale of rounding of the power in.
     """
     flat = reduced.flat
     variable = {one.path: k for k, one in enumerate(flat.variables)}

@@ -26,9 +26,9 @@ from modelica_like.structure.holds import hold_terms
 from modelica_like.structure.reduce import ReducedDae
 
 ROUNDING = 1e-10
-"""Size of a held motion, relative to the largest one of the same unit, that is nothing but rounding."""
+"""Size of a held motion that counts as rounding, relative to the largest one of the same unit."""
 _SMALLEST = 1e-20
-"""What the solution of a start leaves of zeros is far below it; a drive at rest has nothing larger to compare with."""
+"""Absolute limit of rounding, for drives at rest; the solution of a start has zeros far below it."""
 _SOURCE_POWER = 2
 _EFFORTS = ("N", "N.m")
 StartModes = tuple[tuple[int, int, Source], ...]
@@ -86,13 +86,13 @@ def _discrete_starts(flat: FlatModel) -> Any:
 
 
 def _places(flat: FlatModel) -> dict[str, Source]:
-    """Where the parts of netlists stand."""
+    """Source places of the parts of netlists."""
     found = {path: one.place_of() for path, one in flat.components.items()}
     return {path: source for path, source in found.items() if source.file}
 
 
 def _terminals(flat: FlatModel) -> tuple[CompiledTerminal, ...]:
-    """Adaptors that nothing inside drives, with the variables that form their terminals."""
+    """Adaptors that are not driven inside, with the variables of their terminals."""
     inputs = {flat.variables[k].path for k in flat.inputs}
     found: list[CompiledTerminal] = []
     for path, one in flat.components.items():
@@ -104,21 +104,20 @@ def _terminals(flat: FlatModel) -> tuple[CompiledTerminal, ...]:
 
 
 def _motion_sources(flat: FlatModel) -> tuple[str, ...]:
-    """Components whose power from outside depends on the torque or force that their connectors happen to carry."""
+    """Components whose power from outside depends on the torque or force at their connectors."""
     kinds = {one.path: one for one in flat.variables}
     found: list[str] = []
     for instance in flat.instances:
         prefix = f"{instance.path}." if instance.path else ""
         slots = [kinds[prefix + slot.path] for slot in instance.template.energy_slots]
-        power = instance.template.energy.sparsity_jac(0, 0) if slots else ca.Sparsity(3, 0)
-        rows = zip(*power.get_triplet(), strict=True)
+        rows = zip(*instance.template.energy.sparsity_jac(0, 0).get_triplet(), strict=True) if slots else ()
         if any(row == _SOURCE_POWER and slots[k].kind == "flow" and str(slots[k].unit) in _EFFORTS for row, k in rows):
             found.append(instance.path)
     return tuple(found)
 
 
 def _plain(discrete: FlatDiscrete) -> FlatDiscrete:
-    """Drop a symbolic start: the function `discrete_starts` has it."""
+    """Drop a symbolic start, which the function `discrete_starts` contains."""
     return discrete if isinstance(discrete.start, int | float) else replace(discrete, start=0.0)
 
 
@@ -141,7 +140,7 @@ class _Builder:
         return ca.Function(name, self.arguments, [result], ["t", "x", "z", "p", "u", "d"], [name])
 
     def functions(self) -> tuple[dict[str, ca.Function], tuple[CompiledTransition, ...], list[int], StartModes]:
-        """Return the functions of (t, x, z, p, u, d) by name, and the tables that go with those of events."""
+        """Return the functions of (t, x, z, p, u, d) by name, and the tables of events."""
         reduced, flat = self.reduced, self.reduced.flat
         guards, moments, transitions, resets, targets = self.transitions()
         conditions, start_modes = self.start_modes()
@@ -209,10 +208,10 @@ class _Builder:
         return ca.vertcat(*conditions), tuple(modes)
 
     def _without_rounding(self) -> Any:
-        """Values of all nodes, with held motions that are zero but for rounding at zero.
+        """Values of all nodes, with held motions below rounding set to zero.
 
-        What the largest speed of the drive leaves of a slip when it is rounded says nothing about a direction; nor does
-        rounding in a drive where everything stands still.
+        A slip within rounding of the largest speed of the drive has no direction; neither has rounding in a drive at
+        rest.
         """
         flat, values = self.reduced.flat, ca.SX(self.reduced.values)
         largest: dict[str, Any] = {}

@@ -12,16 +12,21 @@ from modelica_like.structure.reduce import ReducedDae
 TIME_RESOLUTION = 1e-10
 """Time resolution of events relative to max(1 s, |t|).
 
-Guards are judged that much later, so that one that just left zero counts by its direction.
+Guards are evaluated this much later, so that for a guard that just left zero the direction decides.
 """
 
 _JOINS: dict[int, Callable[[Any, Any], Any]] = {ca.OP_FMIN: ca.fmin, ca.OP_FMAX: ca.fmax}
 
 
+def time_resolution(t: float) -> float:
+    """Return the time resolution of events at a time, in s."""
+    return TIME_RESOLUTION * max(1.0, abs(t))
+
+
 def guards_soon(reduced: ReducedDae, guards: Any) -> Any:
     """Follow guards for one time resolution.
 
-    Relations that are joined go each their own way: one that stays at zero never counts as true.
+    Joined relations are followed one by one: a relation that stays at zero never counts as true.
     """
     if not guards.numel():
         return guards
@@ -34,7 +39,7 @@ def guards_soon(reduced: ReducedDae, guards: Any) -> Any:
 
 
 def _joined(guards: Any, relation: Callable[[Any], Any]) -> Any:
-    """Rebuild guards with something else in the place of every relation."""
+    """Rebuild guards with another expression for every relation."""
 
     def rebuilt(guard: Any) -> Any:
         join = _JOINS.get(guard.op())

@@ -21,7 +21,7 @@ class StartSystem:
         function: of (t, x, y, z, p, u, d) with y the variables that start values need: y itself, the Jacobian of the
             values by (x, y, z), and the values of [y - expression, alg, variables of `nodes`].
         nodes: variables (nodes) at its end.
-        rest: what comes to rest where nothing is given, the first first: node, and the state if it is one.
+        rest: variables at rest if not given, in order of priority: node, and the state if it is one.
     """
 
     function: ca.Function
@@ -38,7 +38,7 @@ def start_system(reduced: ReducedDae, rest: bool = False) -> StartSystem:
 
     Args:
         reduced: the reduced system.
-        rest: take in what may come to rest, too.
+        rest: include variables that may be at rest.
     """
     flat, system = reduced.flat, reduced.system
     order = tuple((node, _state(reduced, node)) for node in rest_order(reduced)) if rest else ()
@@ -58,11 +58,11 @@ def start_system(reduced: ReducedDae, rest: bool = False) -> StartSystem:
 
 
 def rest_order(reduced: ReducedDae) -> list[int]:
-    """Variables (nodes) that are zero at rest as long as they are open, in an order that no order of lines changes.
+    """Undetermined variables (nodes) that are zero at rest, in an order that does not depend on the order of lines.
 
-    What a component stores energy in comes to rest first: speeds of inertias and masses before currents, pressures and
-    twists of springs. Relative speeds follow, then positions. Variables that are equal are one; of those that have the
-    same rank the first by name counts.
+    Variables that store energy come first: speeds of inertias and masses before currents, pressures and twists of
+    springs. Relative speeds follow, then positions. Equal variables count as one; among equal ranks the first
+    by name counts.
     """
     system = reduced.system
     stores = {placed[0] for node in _storing(reduced) if (placed := system.node_level[node]) is not None}
@@ -102,7 +102,7 @@ def _state(reduced: ReducedDae, node: int) -> int | None:
 
 
 def _needed(reduced: ReducedDae, nodes: Iterable[int]) -> list[tuple[int, Any]]:
-    """The explicit unknowns that the start nodes need, directly or by others."""
+    """The explicit unknowns that the start nodes need, directly or indirectly."""
     system = reduced.system
     pending = {placed[0] for node in nodes if (placed := system.node_level[node]) is not None}
     position = {level: k for k, (level, _) in enumerate(reduced.explicit)}

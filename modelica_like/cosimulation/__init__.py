@@ -1,1 +1,1 @@
-"""Co-simulation: systems of FMUs that exchange signals at communication points; drives cut into such systems."""
+"""Co-simulation: systems of FMUs that exchange signals at communication points, and drives cut into such systems."""

@@ -1,7 +1,7 @@
-"""Runs a system of FMUs in a process of its own: python child.py FOLDER.
+"""Runs a system of FMUs in a separate process: python child.py FOLDER.
 
-What comes out is left in the folder as it comes: before the first step `columns.json`, which becomes `meta.json` at the
-end; `rows`, doubles of the time, the columns, the energies and the counts.
+Results are written to the folder as they are computed: before the first step `columns.json`, renamed to `meta.json` at
+the end; `rows`, doubles of the time, the columns, the energies and the counts.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from modelica_like.fmi.inside import Job, Messages, Refused, about
 
 
 class Recorder:
-    """Writes rows of all variables, of the energies at the bonds and of the counts, so that no failure loses them."""
+    """Writes rows of all variables, energies at the bonds and counts at once, so that a failure keeps them."""
 
     def __init__(
         self, slaves: list[Slave], outputs: list[list[str]], master: Master, interval: float, job: Job, file: Path
@@ -28,7 +28,7 @@ class Recorder:
         self._file = file.open("wb", buffering=0)
 
     def look(self, time: float) -> list[float]:
-        """Read a row; nothing but the time where the one before is nearer than the interval."""
+        """Read a row; only the time if the row before is nearer than the interval."""
         if time - self._last < self._interval * (1 - 1e-6):
             return [time]
         row = [time]
@@ -46,7 +46,7 @@ class Recorder:
             self._file.write(array("d", [*row, *vars(self._master.counts).values()]))
 
     def close(self, time: float) -> None:
-        """Keep the end, however near it is to the row before."""
+        """Keep the end, even if it is near the row before."""
         if self._last != time:
             self._interval = 0.0
             self.keep(self.look(time))
@@ -94,7 +94,7 @@ def choose(slaves: list[Slave], patterns: list[str] | None, *, own_names: bool) 
 
 
 def fits(name: str, pattern: str) -> bool:
-    """Tell whether a name is meant."""
+    """Return whether a name matches."""
     return name == pattern or fnmatchcase(name, pattern)
 
 
@@ -145,7 +145,7 @@ def run(job: Job) -> None:
 
 
 def columns_of(slaves: list[Slave], outputs: list[list[str]]) -> list[dict[str, Any]]:
-    """Return what is to be known about the columns and parameters of each FMU."""
+    """Return the columns and parameters of each FMU."""
     return [
         {"columns": [about(slave.all[name]) for name in names], "constants": constants(slave)}
         for slave, names in zip(slaves, outputs, strict=True)
@@ -153,7 +153,7 @@ def columns_of(slaves: list[Slave], outputs: list[list[str]]) -> list[dict[str, 
 
 
 def open_inputs(slaves: list[Slave], job: dict[str, Any]) -> list[dict[str, Any]]:
-    """Return the inputs to which nothing is connected, and no value was given."""
+    """Return the unconnected inputs without a value."""
     driven = {(n, name) for link in job["links"] for n, name in link["ends"][1:]}
     found: list[dict[str, Any]] = []
     for n, (slave, unit) in enumerate(zip(slaves, job["units"], strict=True)):

@@ -1,4 +1,4 @@
-"""Where a netlist is cut: connections are taken apart, and the parts fall into groups."""
+"""Cut a netlist: separate connections, and divide the parts into groups."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Wire:
 
 @dataclass(frozen=True)
 class Cut:
-    """A wire taken apart: the end that was named, or the output of a signal, and all others."""
+    """A separated connection: the named end, or the output of a signal, and all other ends."""
 
     name: str
     near: str
@@ -55,7 +55,7 @@ def cut_netlist(assembly: Assembly, at: Sequence[str]) -> CutNetlist:
 
     Raises:
         UnknownName: there is no such shaft.
-        NetlistError: the place cannot be cut, or the netlist does not fall apart there.
+        NetlistError: the place cannot be cut, or the cut does not separate the netlist.
     """
     if not at:
         raise NetlistError(f"{assembly.label}: there is nothing to cut.", advice="Name a shaft, e.g. --at shaft.")
@@ -170,7 +170,7 @@ def _nowhere(assembly: Assembly, name: str, connected: Sequence[str]) -> Excepti
 
 
 def _check_can_open(assembly: Assembly, ends: Sequence[str]) -> None:
-    """Refuse inputs that have a value where nothing is connected: they would not become inputs of an FMU."""
+    """Refuse inputs with a default value: they would not become inputs of an FMU."""
     for end in ends:
         owner, _, name = end.rpartition(".")
         if assembly.find(owner).value(name) is not None:

@@ -1,4 +1,4 @@
-"""What an FMU says about itself, without running it: variables, units, kinds."""
+"""The description of an FMU, read without running it: variables, units, kinds."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class UnitDefinition:
     offset: float = 0.0
 
     def same_scale(self, other: UnitDefinition) -> bool:
-        """Tell whether one number means the same in both."""
+        """Return whether a number means the same in both."""
         return (self.factor, self.offset) == (other.factor, other.offset)
 
     def convert(self, value: float, to: UnitDefinition) -> float:
@@ -51,7 +51,7 @@ class FmuVariable:
 
     @property
     def varies(self) -> bool:
-        """It is a number, and no parameter."""
+        """Whether it is a number and not a parameter."""
         number = self.kind not in ("String", "Binary", "Clock")
         return number and "arameter" not in self.causality and self.causality != "independent"
 

@@ -1,4 +1,4 @@
-"""System files: TOML in and out; systems from whatever describes them."""
+"""System files: reading and writing TOML; systems from files of any kind."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _OWN_NAMES = "results keep the names that variables have in their FMUs"
 
 
 def load_system(path: Path, work: Path) -> System:
-    """Read a system: a TOML file, an SSP, or a netlist with FMUs; what is unpacked or exported goes to `work`."""
+    """Read a system: a TOML file, an SSP, or a netlist with FMUs; unpacked or exported files go to `work`."""
     if path.suffix.lower() == ".ssp":
         from modelica_like.cosimulation.ssp import load_ssp
 
@@ -39,7 +39,7 @@ def load_system(path: Path, work: Path) -> System:
 
 
 def describes_system(path: Path) -> bool:
-    """Return whether a file describes FMUs that run together, and not a netlist that is simulated."""
+    """Return whether a file describes FMUs that run together rather than a netlist to simulate."""
     if path.suffix.lower() == ".ssp":
         return True
     data, _ = _read_toml(path)
@@ -50,7 +50,7 @@ def describes_system(path: Path) -> bool:
 
 @contextmanager
 def opened(path: Path) -> Iterator[System]:
-    """Open a system, and keep what had to be unpacked for it as long as it is needed; see `load_system`."""
+    """Open a system, and keep its unpacked files as long as needed; see `load_system`."""
     with tempfile.TemporaryDirectory(prefix="modelica_like_", ignore_cleanup_errors=True) as work:
         yield load_system(path, Path(work))
 

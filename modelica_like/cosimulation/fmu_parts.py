@@ -1,4 +1,4 @@
-"""Netlists with FMUs as parts: all other parts become one more FMU, and they run together."""
+"""Netlists with FMUs as parts: all other parts become another FMU, and all FMUs run together."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ _ONLY_SIGNALS = "An FMU has only signals: connect its inputs and outputs in [con
 
 
 def system_of_netlist(path: Path, work: Path) -> System:
-    """Make a system of a netlist that has FMUs among its parts; several errors come together.
+    """Make a system from a netlist with FMUs as parts; all errors are reported together.
 
-    The FMUs, whose files are named relative to the netlist, are units of their own; all other parts are exported into a
-    folder as one FMU with the netlist's name.
+    Each FMU is a unit, with its file name relative to the netlist; all other parts are exported into a folder as one
+    FMU with the netlist's name.
     """
     document = parse(read_text(path), str(path))
     fmus = {name: entry for name, entry in document.parts.items() if _is_fmu(entry)}
@@ -55,7 +55,7 @@ class _End:
 
 
 class _Joiner:
-    """Tells the FMUs of a netlist from its other parts, and collects what is wrong."""
+    """Separates the FMUs of a netlist from its other parts, and collects errors."""
 
     def __init__(self, document: Document, fmus: Mapping[str, Any], path: Path) -> None:
         self.document, self.fmus, self.path = document, fmus, path
@@ -159,7 +159,7 @@ class _Joiner:
         return {name: ends for name, ends in wires if not any(_part(end) in self.fmus for end in ends)}
 
     def _rest(self) -> tuple[Assembly | None, dict[str, list[str]]]:
-        """Return the other parts, joined as far as no FMU stands between, and the connections that cross."""
+        """Return the other parts with the connections among them, and the connections to FMUs."""
         plain = self._plain()
         crossing = {name: ends for name, ends in self.document.connect.items() if name not in plain}
         self.given = {end: name for name, ends in plain.items() for end in ends}

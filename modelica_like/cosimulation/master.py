@@ -1,4 +1,4 @@
-"""Masters: when which FMU steps, on which inputs, and how long the steps are."""
+"""Masters: order, inputs and lengths of the steps of FMUs."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _SMALL = 1e-3
 
 
 class Observer(Protocol):
-    """Who records a run: a row is looked at when FMUs are at its time, and kept when the step is."""
+    """Recorder of a run: it looks at a row when FMUs are at its time, and keeps the row when the step is accepted."""
 
     def look(self, time: float) -> Row:
         """Read a row."""
@@ -39,12 +39,12 @@ class Signal:
     """One connection while it runs.
 
     Attributes:
-        source: number of the FMU that gives the value, and the variable's name.
-        targets: the same of those that take it.
+        source: number of the FMU with the output, and the variable's name.
+        targets: the same for the inputs.
         value: at the last communication point.
-        slope: as far as the last step tells.
-        used: value at the beginning of the step and slope, as the targets were given them.
-        reached: value at the end of the step, before outputs have seen the new inputs.
+        slope: of the last step.
+        used: value at the beginning of the step and slope, as given to the targets.
+        reached: value at the end of the step, before outputs follow the new inputs.
         nominal: magnitude below which the value does not matter.
     """
 
@@ -85,7 +85,7 @@ class Balance(Energies):
 
 @dataclass
 class Counts:
-    """What a run took: communication steps, rejected steps, the shortest and the longest."""
+    """Counts of a run: communication steps, rejected steps, the shortest and the longest."""
 
     steps: int = 0
     rejected: int = 0
@@ -107,7 +107,7 @@ class Master:
         signals: the connections.
         balances: energies at the bonds.
         sequential: Gauss-Seidel instead of Jacobi.
-        linear: inputs move on straight lines where FMUs can take that.
+        linear: inputs are interpolated linearly if FMUs support it.
     """
 
     slaves: Sequence[Slave]
@@ -138,7 +138,7 @@ class Master:
         self.settle(time)
 
     def settle(self, time: float) -> None:
-        """Pass outputs on to inputs until they do not change any more: some follow inputs at once."""
+        """Pass outputs to inputs until they settle: some outputs depend directly on inputs."""
         moved: list[Signal] = []
         for _ in range(_ROUNDS):
             for slave, taken in zip(self.slaves, self._taken, strict=True):
@@ -195,7 +195,7 @@ class Master:
             slave.give_slopes(*zip(*moving, strict=True))
 
     def _tell_later(self, n: int, before: Sequence[float], size: float) -> None:
-        """Let those that step after an FMU take what it has come to."""
+        """Pass the results of an FMU to those that step after it."""
         for k in self._given[n]:
             signal = self.signals[k]
             if any(unit > n for unit, _ in signal.targets):
@@ -252,7 +252,7 @@ class Master:
     def _once_and_halved(
         self, time: float, size: float, tolerance: float, states: Sequence[Any], begin: Memory, observer: Observer
     ) -> tuple[float, Row]:
-        """Take a step, go back, and take it in halves; return how much they differ, and the row in the middle."""
+        """Take a step, go back, and take it in halves; return the difference, and the row in the middle."""
         try:
             self.step(time, size)
             once = [signal.value for signal in self.signals]
@@ -263,7 +263,7 @@ class Master:
         except Refused as refusal:
             if refusal.detail["kind"] != _NOT_FINITE:
                 raise
-            return inf, None  # a shorter step may do
+            return inf, None  # a shorter step may succeed
         return self._error(once, tolerance), middle
 
     def _error(self, once: Sequence[float], tolerance: float) -> float:

@@ -1,4 +1,4 @@
-"""The groups into which a drive is cut: which side of a cut is told the motion and which the torque, their netlists."""
+"""The groups of a cut drive: which side of a cut receives the motion and which the torque, and their netlists."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _MOST = 8
 
 @dataclass(frozen=True)
 class End:
-    """An open end of a group: the adaptor that is added for it, its path, and what comes from the other side."""
+    """An open end of a group: its adaptor, its path, and the quantity received from the other side."""
 
     adaptor: str
     path: str
@@ -41,7 +41,7 @@ def ends_of(cut: Cut, near_takes: Takes) -> tuple[End, End]:
 
 
 class Maker:
-    """Makes the netlists of the groups into which a whole netlist is cut."""
+    """Makes the netlists of the groups of a cut netlist."""
 
     def __init__(self, assembly: Assembly, found: CutNetlist) -> None:
         self.assembly, self.found = assembly, found
@@ -53,7 +53,7 @@ class Maker:
         return [end for end in ends if self.found.group_of(end.path) == group]
 
     def objection(self, group: int, chosen: Mapping[Cut, Takes]) -> str:
-        """Return why a group cannot have its ends so, or an empty text; every case is tried once."""
+        """Return why a group cannot have these ends, or an empty text; every case is tried once."""
         case = group, tuple(self.open_ends(group, chosen))
         if case not in self._tried:
             self._tried[case] = self._tell(*case)
@@ -68,7 +68,7 @@ class Maker:
         return next(filter(None, (_bad_end(model, assembly, end) for end in ends)), "")
 
     def bare(self, group: int, ends: Sequence[End]) -> Assembly:
-        """Return a group with adaptors at its open ends, with the start values that its parts were given."""
+        """Return a group with adaptors at its open ends, and the given start values of its parts."""
         names = self.found.groups[group]
         parts: dict[str, Any] = {name: self.assembly._parts[name] for name in names}
         wires = {wire.name: wire.ends for wire in self.found.wires if part_of(wire.ends[0]) in names}
@@ -80,12 +80,12 @@ class Maker:
         made = Assembly(
             f"{self.assembly.label}_{names[0]}", parts=parts, connect=wires, free=free, parameters=parameters
         )
-        # The part starts with numbers, whatever the whole starts from.
+        # The part starts with numbers, whatever the kind of start of the drive.
         made.__dict__["_simulate"] = {**self.assembly.__dict__["_simulate"], "start": "given"}
         return made
 
     def adaptor(self, end: End) -> tuple[Component, str]:
-        """Return an adaptor for an end, which tells no acceleration, and the name of its connector."""
+        """Return an adaptor for an end, without acceleration, and the name of its connector."""
         kind, inner = adaptor_for(connector_at(self.assembly, end.path), end.takes)
         return kind(**({"use_a": False} if "use_a" in kind._structural else {})), inner
 
@@ -96,12 +96,12 @@ class Maker:
         return (*flow, *(name for name in motion if name not in second and name != "a"))
 
     def not_passed_on(self, ends: Sequence[End]) -> dict[str, float]:
-        """Return the inputs of ends that no signal drives: no torque depends on an acceleration."""
+        """Return the undriven inputs of ends: no torque depends on an acceleration."""
         takers = [end for end in ends if end.takes == "potential"]
         return {f"{end.adaptor}.{name}": 0.0 for end in takers for name in signals_of(self.adaptor(end)[0])[2]}
 
     def started(self, group: int, ends: Sequence[End], values: Mapping[str, float]) -> Assembly:
-        """Return a group that starts where the whole drive does; `values` are those of the drive, in SI units."""
+        """Return a group that starts like the whole drive; `values` are those of the drive, in SI units."""
         made = self.bare(group, ends)
         model = compile(reduce(flatten(made, open_inputs=True)))
         given: set[int] = set()
@@ -111,7 +111,7 @@ class Maker:
             owner, _, name = model.flat_variables[entry.node].path.rpartition(".")
             if entry.state is not None and entry.state[0] not in given:
                 given.add(entry.state[0])
-            else:  # what is no state follows, and two start values of one motion could contradict each other
+            else:  # other variables follow, and two start values of one motion could contradict each other
                 made.find(owner)._starts.pop(name, None)
         for place, path in enumerate(model.states):
             if place not in given and path in values:
@@ -157,14 +157,14 @@ def signals_of(adaptor: Component) -> tuple[list[str], list[str], list[str]]:
     return [name for name, field in adaptor.fields.items() if isinstance(field, Output)], inputs, second
 
 
-# -- which side takes what ---------------------------------------------------------------------------------------------
+# -- causality of the ends ---------------------------------------------------------------------------------------------
 
 
 def orient(maker: Maker) -> dict[Cut, Takes]:
-    """Decide for each cut shaft what its near side takes, or raise a NetlistError that says why there is no choice.
+    """Decide what the near side of each cut shaft receives, or raise a NetlistError that says why neither works.
 
-    The side with a spring or damper at the cut is told angle and speed, and gives a torque that depends on no
-    acceleration; the side with an inertia is told the torque, and its angle and speed are states.
+    The side with a spring or damper at the cut receives angle and speed and returns a torque that depends on
+    no acceleration. The side with an inertia receives the torque; its angle and speed are states.
     """
     cuts = [cut for cut in maker.found.cuts if not cut.signal]
     if len(cuts) > _MOST:
@@ -182,7 +182,7 @@ def _choices(cuts: Sequence[Cut]) -> Iterator[dict[Cut, Takes]]:
 
 
 def _bad_end(model: CompiledDae, assembly: Assembly, end: End) -> str:
-    """Return what the answer of an end must not depend on, but does."""
+    """Return a forbidden dependence of an end's output."""
     outputs, inputs, second = signals_of(assembly.parts[end.adaptor])
     wrong = second if end.takes == "potential" else inputs
     depends = Following(model)
@@ -198,7 +198,7 @@ def _bad_end(model: CompiledDae, assembly: Assembly, end: End) -> str:
 
 
 def _impossible(maker: Maker, cuts: Sequence[Cut]) -> ModelicaLikeError:
-    """Tell for the first cut that cannot be made in either way why."""
+    """Return the error for the first cut that is impossible in both directions."""
     for cut in cuts:
         sides = [maker.found.group_of(cut.near), maker.found.group_of(cut.far[0])]
         others = [one for one in cuts if one is not cut]

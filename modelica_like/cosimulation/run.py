@@ -1,4 +1,4 @@
-"""Run a system of FMUs, in a process of its own, and look at it as at any other solution."""
+"""Run a system of FMUs in a separate process, and read it like any other solution."""
 
 from __future__ import annotations
 
@@ -50,17 +50,17 @@ def cosim(
     outputs: Sequence[str] | None = None, interval: float = 0.0, timeout: float = TIMEOUT,
     progress: Progress | None = None,
 ) -> CosimSolution:  # fmt: skip
-    """Run a system of FMUs, all together in one process that is not this one.
+    """Run a system of FMUs, all in one separate process.
 
-    Mode changes are known to a communication step.
+    The times of mode changes are known to one communication step.
 
     Args:
         system: a system, its TOML file, an SSP, or a netlist with FMUs as parts.
-        until: end time, a number in s or a quantity; by default what the system says.
-        step: communication step, likewise; by default what the system says, or a thousandth of the run.
+        until: end time, a number in s or a quantity; by default that of the system.
+        step: communication step, likewise; by default that of the system, or a thousandth of the run.
         master: `jacobi` or `gauss-seidel`.
-        inputs: `linear` (FMUs are told the slopes of their inputs, where they can take them) or `hold`.
-        tolerance: relative tolerance of the signals between FMUs; with it the step varies.
+        inputs: `linear` (FMUs get the slopes of their inputs if they support it) or `hold`.
+        tolerance: relative tolerance of the signals between FMUs, for a variable step.
         parameters: start values and parameters, by the FMU's name and the variable's: `motor.J1.J`.
         fmu_tolerance: relative tolerance inside the FMUs; by default their own, or a tenth of `tolerance`.
         outputs: names or patterns (`load.*`) of variables to record; by default all that are not parameters.
@@ -71,8 +71,8 @@ def cosim(
     Raises:
         NetlistError, UnknownName, ValueOutOfRange: the system or a value is wrong.
         FmuRefused: an FMU cannot be run this way.
-        FmuFailed: an FMU told an error; FmuCrashed: it took the process down; FmuTimeout: the run did not end.
-        KeyboardInterrupt: it was interrupted. `run` of this and of a `SolveError` is the solution up to there.
+        FmuFailed: an FMU reported an error; FmuCrashed: it crashed the process; FmuTimeout: the run did not finish.
+        KeyboardInterrupt: the run was interrupted. `run` of this and of a `SolveError` is the solution up to then.
         OSError: a file cannot be read.
     """
     if not isinstance(system, System):
@@ -104,7 +104,7 @@ def _solution(system: System, job: dict[str, Any], timeout: float, progress: Pro
 
 
 def _so_far(system: System, folder: Path, begin: float) -> CosimSolution | None:
-    """Return what an unfinished run has computed, if it has made a step."""
+    """Return the results of an unfinished run, if it has made a step."""
     if not (folder / "columns.json").exists():
         return None
     columns, table = _left(folder, "columns.json")
@@ -112,7 +112,7 @@ def _so_far(system: System, folder: Path, begin: float) -> CosimSolution | None:
 
 
 def _left(folder: Path, columns: str) -> tuple[dict[str, Any], Any]:
-    """Return what the process has left: columns, and the rows that are whole."""
+    """Return the columns and the complete rows written by the process."""
     about, numbers = json.loads((folder / columns).read_text()), np.fromfile(folder / "rows")
     width = about["width"]
     return about, numbers[: len(numbers) // width * width].reshape(-1, width)
@@ -178,7 +178,7 @@ def _run(system: System, folder: Path, timeout: float, progress: Progress | None
 
 
 def _watch(folder: Path, done: threading.Event, progress: Progress | None) -> None:
-    """Tell the time reached, now and then."""
+    """Report the time reached at intervals."""
     while progress is not None and not done.wait(_WATCH):
         time, _ = _place(folder)
         if not np.isnan(time):
@@ -203,7 +203,7 @@ def tell_loss(system: System, calling: int, error: FmuCrashed | FmuTimeout) -> M
 
 
 def tell_error(system: System, folder: Path) -> None:
-    """Raise what the process has left to tell."""
+    """Raise the error that the process has reported."""
     units = {unit.name: f"{unit.name} ({unit.file.name})" for unit in system.units}
     shorter = "If the exchanged values grow without bounds, choose a shorter step."
     failures.tell_error(folder, units, _FAILURES, system=system.name, shorter=shorter)

@@ -1,4 +1,4 @@
-"""FMUs as a master sees them: FMPy's Co-Simulation slaves of FMI 2.0 and 3.0 with one face."""
+"""FMUs for a master: FMPy's Co-Simulation slaves of FMI 2.0 and 3.0 with one interface."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ _STORED = {name: name for name in (*REAL, *DISCRETE)} | {"Enumeration": "Integer
 
 
 class Slave:
-    """One FMU, which keeps what it says in `messages`; `notice` is called before it is.
+    """One FMU, with its messages in `messages`; `notice` is called before each call of the FMU.
 
     Attributes:
         variables: FMPy's descriptions of the scalar variables by name, without parameters.
-        slopes: it takes the slopes of its inputs.
-        can_save: its state can be saved and restored (`save`, `load`, `free`), and its steps may vary.
+        slopes: whether it takes the slopes of its inputs.
+        can_save: whether its state can be saved and restored (`save`, `load`, `free`) and its steps may vary.
     """
 
     def __init__(self, name: str, folder: Path, messages: Messages, notice: Callable[[], None]) -> None:
@@ -65,7 +65,7 @@ class Slave:
 
     def _stored(self, name: str) -> str:
         kind = _STORED[self.all[name].type]
-        # Only enumerations are left to be called so in FMI 3.0, which reads them as 64 bits.
+        # In FMI 3.0 only enumerations have this type; they are read as 64 bits.
         return "Int64" if kind == "Integer" and self.description.fmiVersion != "2.0" else kind
 
     def set(self, name: str, value: float) -> None:
@@ -96,7 +96,7 @@ class Slave:
         return read
 
     def give_slopes(self, names: Sequence[str], slopes: Sequence[float]) -> None:
-        """Tell how inputs move during the next step."""
+        """Give the slopes of inputs for the next step."""
         self.notice()
         references = [self.all[name].valueReference for name in names]
         self._fmu.setRealInputDerivatives(references, [1] * len(names), list(slopes))

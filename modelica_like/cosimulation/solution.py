@@ -1,4 +1,4 @@
-"""What a co-simulation gives: trajectories, and the energy that each coupling has made or lost."""
+"""Results of a co-simulation: trajectories, and the energy that each coupling has created or lost."""
 
 from __future__ import annotations
 
@@ -35,12 +35,12 @@ class Coupling(Energies):
 class CosimSolution(RecordedSolution):
     """Trajectories of a system of FMUs.
 
-    Each bond has two variables of its own: `….power` in W and `….residual_energy` in J. Modes have changed somewhere in
-    the communication step before the time at which they are seen.
+    Each bond has two variables: `….power` in W and `….residual_energy` in J. Modes change at some time in the
+    communication step before their recorded time.
 
     Args:
-        system: what was run.
-        left: columns and parameters of each FMU, and the inputs to which nothing is connected.
+        system: the system.
+        left: columns and parameters of each FMU, and the unconnected inputs.
         table: shape (times, columns): the time in s, the variables, the energies of each bond, the counts.
         seconds: wall time.
 
@@ -50,7 +50,7 @@ class CosimSolution(RecordedSolution):
         rejected: number of rejected steps.
         shortest: shortest communication step in s.
         longest: longest communication step in s.
-        notices: what should be known about the run: inputs to which nothing is connected.
+        notices: messages about the run: unconnected inputs.
     """
 
     def __init__(self, system: System, left: Mapping[str, Any], table: Vector, seconds: float) -> None:
@@ -79,7 +79,7 @@ class CosimSolution(RecordedSolution):
 
 
 def described_model(system: System) -> RecordedModel:
-    """Return the names of what a run will give, as far as the FMUs say them without being run."""
+    """Return the names of the results of a run, as far as the descriptions of the FMUs give them."""
     fmus = [described(unit.file).variables.values() for unit in system.units]
     columns = _columns(system, [[{"path": one.name} for one in fmu if one.varies] for fmu in fmus])
     return RecordedModel(system.name, (*columns, *_bond_columns(system)), (), {})

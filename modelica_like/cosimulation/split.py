@@ -36,7 +36,7 @@ class Split:
         system: the FMUs and their connections.
         path: its TOML file.
         ends: what each end of a cut takes from the other side: `flow` (torque) or `potential` (angle and speed).
-        notes: what the runs of the FMUs against IDAS have told.
+        notes: results of the comparisons with IDAS.
     """
 
     system: System
@@ -60,20 +60,20 @@ def split(
 ) -> Split:  # fmt: skip
     """Cut a drive at shafts into FMUs, and write the system that `cosim` runs.
 
-    The start values are those of the whole drive: a state keeps the start value that it was given, others are given the
-    number that the drive starts with.
+    The start values are those of the whole drive: a state keeps its given start value, other variables start with the
+    number from the start of the drive.
 
     Args:
-        drive: a netlist file, or a component that has only parts and wires.
-        at: names of parts (the cut is behind them), of their ends (`shaft.flange_a`), or of entries of `[connect]`; a
-            signal can be cut, too.
-        folder: where to write; it is made if it does not exist.
-        names: of the FMUs, in the order of the netlist; by default that of the first part of each.
-        version: FMI version; inputs can move on straight lines in 2.0 only.
+        drive: a netlist file, or a component that has only parts and connections.
+        at: names of parts (the cut is behind them), of their ends (`shaft.flange_a`), or of entries of `[connect]`;
+            signals can also be cut.
+        folder: for the files; it is created if it does not exist.
+        names: of the FMUs, in the order of the netlist; by default the name of the first part of each.
+        version: FMI version; only 2.0 interpolates inputs linearly.
         step: communication step to write into the system, in s.
         master: `jacobi` or `gauss-seidel`, to write into the system.
-        check: whether to run each FMU against IDAS.
-        report: called with what is being done.
+        check: whether to compare each FMU with IDAS.
+        report: called with the present activity.
 
     Raises:
         UnknownName, NetlistError: there is no such shaft, or the drive cannot be cut there.
@@ -112,7 +112,7 @@ def split_to_ssp(
     """Cut a drive at shafts, and write the parts as an SSP.
 
     Args:
-        drive: a netlist file, or a component that has only parts and wires.
+        drive: a netlist file, or a component that has only parts and connections.
         at: where to cut; see `split`.
         path: the file to write, `….ssp`.
         ssp_version: of the SSP standard.
@@ -128,7 +128,7 @@ def split_to_ssp(
 
 
 def _export(part: Assembly, title: str, file: Path, version: str, *, check: bool) -> str:
-    """Write a part as a netlist and as an FMU, and return what its check has told."""
+    """Write a part as a netlist and as an FMU, and return the result of its check."""
     part.__dict__["_name"] = title
     save(part, file.with_suffix(".toml"))
     return export_fmu(part, file, version, {"cs"}, check=check).check.sentence

@@ -16,22 +16,22 @@ from modelica_like.fmi.unpack import SSP, printable, unpack
 def write_ssp(system: System, path: str | Path, version: Version | str = "1.0") -> Path:
     """Write a system and its FMUs as an SSP.
 
-    The same system gives the same bytes. What the standard has no words for (master, step, tolerance, bonds) is kept
-    in an annotation, which other tools leave alone.
+    The same system gives the same bytes. Settings outside the standard (master, step, tolerance, bonds) are in an
+    annotation, which other tools ignore.
 
     Args:
         system: the system.
         path: the file to write, `….ssp`; it is replaced.
-        version: of the SSP standard, `1.0` or `2.0`, which knows the types of FMI 3.0.
+        version: of the SSP standard, `1.0` or `2.0` (with the types of FMI 3.0).
 
     Returns:
         The file.
 
     Raises:
-        UnknownName: there is no such version, or an FMU has not a variable of the system.
+        UnknownName: there is no such version, or an FMU lacks a variable of the system.
         ExportError: the file has another ending, or its folder does not exist.
-        NetlistError: the system is not sound.
-        FmuRefused: a file is no FMU.
+        NetlistError: the system is not valid.
+        FmuRefused: a file is not an FMU.
         OSError: a file cannot be read or written.
     """
     target, chosen = target_file(path, ".ssp", "An SSP"), known_version(version, Version, "SSP")
@@ -63,12 +63,12 @@ def _check_variables(system: System, fmus: dict[str, DescribedFmu]) -> None:
 def load_ssp(path: Path, work: Path) -> System:
     """Read an SSP: the system of its SystemStructure.ssd, flat.
 
-    Systems inside of the system are taken apart; the names of their FMUs are joined with `_`. The SSP is unpacked into
-    an empty folder, where the FMUs of the system lie.
+    Nested systems are flattened; the names of their FMUs are joined with `_`. The SSP is unpacked into an empty folder,
+    which contains the FMUs of the system.
 
     Raises:
-        FmuRefused: the file is no SSP, or is unsafe to unpack.
-        NetlistError, UnknownName: it says something that cannot be run, or contradicts itself.
+        FmuRefused: the file is not an SSP, or is unsafe to unpack.
+        NetlistError, UnknownName: the system cannot be run, or contradicts itself.
         OSError: the file cannot be read.
     """
     return read_structure(path.name, unpack(path, work, kind=SSP))

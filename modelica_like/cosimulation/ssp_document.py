@@ -1,6 +1,6 @@
 """Systems as SystemStructure.ssd: the XML of the SSP standard, 1.0 and 2.0.
 
-Both versions have the same namespaces; 2.0 knows the types of FMI 3.0.
+Both versions have the same namespaces; 2.0 has the types of FMI 3.0.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ NAMES = {
     "ml": "urn:modelica_like",
 }
 COSIMULATION = "modelica_like.cosimulation"
-"""Type of the annotation that keeps what the standard has no words for."""
+"""Type of the annotation for settings outside the standard."""
 PARAMETER_SET = "initialValues"
-"""Name of all parameter sets: some importers ask by which name values are to be applied."""
+"""Name of all parameter sets: some importers apply values by this name."""
 FMU_TYPE = "application/x-fmu-sharedlibrary"
 _REAL = ("Real", "Float64", "Float32")
 
@@ -131,7 +131,7 @@ def _units(top: Element, used: list[tuple[DescribedFmu, str]]) -> None:
 
 
 def _annotation(top: Element, system: System) -> None:
-    """Write how the system is run, and where power flows."""
+    """Write the settings of the run and the bonds."""
     settings = system.settings
     note = element(element(top, "ssd:Annotations"), "ssc:Annotation", type=COSIMULATION)
     inner = element(

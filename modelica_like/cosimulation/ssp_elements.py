@@ -1,4 +1,4 @@
-"""The elements of a SystemStructure.ssd as they stand there: systems, components, connectors, and their values."""
+"""The elements of a SystemStructure.ssd: systems, components, connectors, and their values."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _NO_NUMBERS = ("String", "Enumeration", "Binary", "Dimension")
 
 
 class Connector(NamedTuple):
-    """A connector of an element: `kind` says in which direction, `unit` is a name or empty."""
+    """A connector of an element: `kind` is the direction, `unit` is a name or empty."""
 
     kind: str
     unit: str
@@ -53,7 +53,7 @@ class Element:
 
     @property
     def label(self) -> str:
-        """What messages call it."""
+        """Name for messages."""
         return ".".join(self.path) or self.xml.get("name") or "The system"
 
     def walk(self) -> Iterator[Element]:
@@ -87,7 +87,7 @@ class Files:
             ) from None
 
     def find(self, uri: str, place: Source) -> Path:
-        """Return the file of the archive that a URI means."""
+        """Return the file of the archive behind a URI."""
         parts = urlsplit(uri)
         inside = (self.folder / unquote(parts.path)).resolve()
         if parts.scheme or parts.netloc or parts.fragment or not inside.is_relative_to(self.folder.resolve()):
@@ -101,7 +101,7 @@ class Files:
 
 
 def place(xml: Any) -> Source:
-    """Return where an element of the XML stands."""
+    """Return the place of an element of the XML."""
     text = " ".join([local(xml), *(f'{name}="{value}"' for name, value in xml.attrib.items())])
     return Source(Path(xml.getroottree().docinfo.URL or "SystemStructure.ssd").name, xml.sourceline or 0, f"<{text}>")
 
@@ -112,7 +112,7 @@ def local(xml: Any) -> str:
 
 
 def needed(xml: Any, attribute: str) -> str:
-    """Return an attribute that has to be there."""
+    """Return a required attribute."""
     value = xml.get(attribute)
     if not value:
         raise NetlistError(f"An element {local(xml)} lacks its {attribute}.", where=place(xml))
@@ -146,7 +146,7 @@ def unit_definitions(top: Any) -> dict[str, UnitDefinition]:
 
 
 def read_element(xml: Any, path: ElementPath, files: Files) -> Element:
-    """Read a system or a component with all that is inside; refuse what cannot be run, and names that stand twice."""
+    """Read a system or a component with its contents; refuse unsupported elements and duplicate names."""
     kind = local(xml)
     if kind == "SignalDictionaryReference":
         raise NetlistError(
@@ -189,9 +189,9 @@ def _fmu(xml: Any, files: Files) -> Path:
 
 
 def bound_values(root: Element, files: Files, units: Units) -> dict[Target, Bound]:
-    """Return what the bindings of a system and of all inside, in it or in .ssv files, give to variables.
+    """Return the values from the bindings of a system and its contents, inline or in .ssv files.
 
-    Of two bindings of an element, the later one counts; of two elements, the outer one.
+    Within one element the later binding wins; between two elements the outer one wins.
     """
     found: dict[Target, Bound] = {}
     for element in sorted(root.walk(), key=lambda one: -len(one.path)):
@@ -203,7 +203,7 @@ def bound_values(root: Element, files: Files, units: Units) -> dict[Target, Boun
 
 
 def _targets(element: Element, name: str) -> Iterator[Target]:
-    """Yield what a hierarchical name means: names of elements may contain dots, so there can be several."""
+    """Yield the targets of a hierarchical name: names of elements may contain dots, so there can be several."""
     if element.file is not None or name in element.connectors:
         yield element.path, name
     for inner, child in element.children.items():

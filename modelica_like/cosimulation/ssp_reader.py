@@ -22,7 +22,7 @@ _GIVES = {
     True: ("output", "calculatedParameter", "constant", "local"),
     False: ("input", "parameter", "structuralParameter"),
 }
-"""Kinds of connectors that give a value to a connection: of an element inside, of the system itself."""
+"""Kinds of connectors that provide a value: of an element inside, of the system itself."""
 _NAMED = ("input", "output", "parameter", "structuralParameter", "calculatedParameter", "constant", "local")
 
 
@@ -53,7 +53,7 @@ def read_structure(name: str, folder: Path) -> System:
 
 
 class _Reader:
-    """Flattens a tree of elements; `drives` says what drives a connector."""
+    """Flattens a tree of elements; `drives` maps each connector to its source."""
 
     def __init__(self, top: Any, root: Element, files: Files) -> None:
         self.top, self.root, self.files = top, root, files
@@ -94,7 +94,7 @@ class _Reader:
                 )  # fmt: skip
         ends = [self._end(system, xml, which) for which in ("start", "end")]
         gives = [self._gives(system, end) for end in ends]
-        if gives == [False, True]:  # which end is the start says nothing about the direction
+        if gives == [False, True]:  # the start of a connection does not define its direction
             ends.reverse()
         elif gives[0] == gives[1] and None not in gives:
             what = "two connectors that provide a value" if gives[0] else "two connectors that receive a value"
@@ -118,12 +118,12 @@ class _Reader:
         return element.path, connector
 
     def _gives(self, system: Element, end: Target) -> bool | None:
-        """Tell whether an end gives a value inside of a system, or None where it may do both."""
+        """Return whether an end provides a value inside a system, or None if it may do both."""
         kind = self.elements[end[0]].connectors[end[1]].kind
         return kind in _GIVES[end[0] != system.path] if kind in _NAMED else None
 
     def _origin(self, target: Target) -> list[_Drive]:
-        """Return the connections on the way from a component's input back to where its value comes from."""
+        """Return the connections from a component's input back to the source of its value."""
         way = [self.drives[target]]
         while way[-1].source in self.drives:
             if way[-1].source in [drive.source for drive in way[:-1]]:
@@ -149,7 +149,7 @@ class _Reader:
         return Port(self.names[target[0]], target[1])
 
     def _check_units(self, target: Target, way: list[_Drive]) -> None:
-        """Refuse connections on which a unit would have to be converted."""
+        """Refuse connections that would need a unit conversion."""
         ends = [target, *(drive.source for drive in way)]
         first, *others = [unit for end in ends for unit in self._units_of(end)] or [UnitDefinition("1")]
         other = next((unit for unit in others if not first.same_scale(unit)), None)
@@ -168,14 +168,14 @@ class _Reader:
     # -- values ------------------------------------------------------------------------------------------------------
 
     def _parameters(self, outer: Mapping[Target, Target]) -> dict[ElementPath, dict[str, float]]:
-        """Return the values of each component: those bound to it, and those bound to what drives it from outside."""
+        """Return the values of each component: those bound to it, and those bound to its sources outside."""
         bound = ssp.bound_values(self.root, self.files, self.units)
         found: dict[ElementPath, dict[str, float]] = {path: {} for path in self.fmus}
         for target in {**bound, **outer}:
             source = outer[target] if outer.get(target) in bound else target
             (path, name), fmu = target, self.fmus.get(target[0])
             if source not in bound or fmu is None or name not in fmu.variables:
-                continue  # the standard lets values go that nothing takes
+                continue  # the standard ignores values without a receiver
             given, own = bound[source], fmu.unit_of(name)
             # A value that was given for a connector of a system is in the connector's unit if it has none.
             unit = given.unit if source == target else given.unit or self._unit_of(source)
@@ -218,7 +218,7 @@ def _unused(name: str, links: Sequence[Link]) -> str:
 
 
 def _flat_names(components: list[Element]) -> dict[ElementPath, str]:
-    """Return names of components that no dot, blank or sign disturbs."""
+    """Return names of components without dots, blanks and special characters."""
     names: dict[ElementPath, str] = {}
     for one in components:
         name = _word("_".join(one.path))

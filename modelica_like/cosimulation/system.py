@@ -14,7 +14,7 @@ Inputs = Literal["hold", "linear"]
 
 
 def powers() -> tuple[tuple[str, str], ...]:
-    """Return names of a flow and of the rate or potential that make a power together, as adaptors declare them."""
+    """Return the names of flow and rate (or potential) whose product is a power, as declared by adaptors."""
     from modelica_like.netlist.registry import library_types  # the process of the FMUs needs no library
 
     terminals = (kind.terminal for kind in library_types().values())
@@ -68,9 +68,9 @@ class Bond(NamedTuple):
 class Energies:
     """Energy at a bond.
 
-    What the first FMU delivers is the integral of the flow that it tells times the rate that it was told; what the
-    second receives is the flow that it was told times the rate that it tells. They would be equal if the FMUs were one:
-    the difference is energy that only the coupling has made.
+    The first FMU delivers the integral of the flow it sends times the rate it receives; the second one receives the
+    integral of the flow it receives times the rate it sends. In one model both are equal: the difference is energy
+    created by the coupling.
 
     Attributes:
         delivered: by the FMU that gives the torque, force or current, in J.
@@ -86,7 +86,7 @@ class Energies:
 
     @property
     def residual(self) -> float:
-        """Energy that the coupling has made, in J; negative if it has lost some."""
+        """Energy created by the coupling, in J; negative if energy was lost."""
         return self.received - self.delivered
 
 
@@ -96,14 +96,14 @@ class Settings:
 
     Attributes:
         until: end time in s.
-        step: communication step in s; the first one where `tolerance` is given.
-        master: `jacobi` (all FMUs step at once, on what was known before) or `gauss-seidel` (one after the other, each
-            on what those before have told).
-        inputs: `linear` (inputs move on straight lines where an FMU can take that) or `hold`.
-        tolerance: relative tolerance of the coupling: the step varies.
+        step: communication step in s; the first one if `tolerance` is given.
+        master: `jacobi` (all FMUs step at once) or `gauss-seidel` (one after the other, each with the results of those
+            before).
+        inputs: `linear` (linear interpolation if an FMU supports it) or `hold`.
+        tolerance: relative tolerance of the coupling, for a variable step.
 
     Raises:
-        UnknownName: there is no such master, or no such way to give inputs.
+        UnknownName: there is no such master, or no such kind of inputs.
     """
 
     until: float | None = None
@@ -129,7 +129,7 @@ class System:
 
     Attributes:
         units: in the order in which a Gauss-Seidel master steps them.
-        own_names: results keep the names that variables have in their FMUs, without the FMU's name before it.
+        own_names: results have the names of the variables in their FMUs, without the FMU's name before it.
     """
 
     name: str
@@ -145,7 +145,7 @@ class System:
 
 
 def check_system(system: System) -> None:
-    """Check that names are known, and that no input is driven twice; several errors come together."""
+    """Check that names are known, and that no input is driven twice; all errors are reported together."""
     errors: list[ModelicaLikeError] = []
     if not system.units:
         errors.append(NetlistError(f"{system.name} has no FMU.", advice="Declare them in [fmus]."))

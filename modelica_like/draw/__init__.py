@@ -1,4 +1,4 @@
-"""Schematics: drives draw themselves.
+"""Schematics of drives.
 
 A layered drawing, with power from west to east: columns by a linear programme, orders by crossings, heights by another
 linear programme, and lines along both. Symbols are declared by the components.
@@ -11,10 +11,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
 from modelica_like.draw.diagram import diagram
+from modelica_like.draw.running import running
 from modelica_like.draw.sheet import Sheet, sheet
 from modelica_like.draw.svg import svg
 from modelica_like.errors import NetlistError, missing_extra
 from modelica_like.language.component import Component
+from modelica_like.solve.trajectories import Trajectories
 from modelica_like.writing import check_writable, write_bytes
 
 if TYPE_CHECKING:
@@ -31,55 +33,81 @@ def layout(component: Component, *, depth: int = 1) -> Sheet:
 
     Args:
         component: the drive.
-        depth: how many levels of assemblies are open.
+        depth: number of levels of open assemblies.
     """
     return sheet(diagram(component, depth))
 
 
-def schematic(component: Component, *, depth: int = 1, background: bool = True) -> str:
-    """Draw a drive as SVG: power from west to east, a symbol for each machine element.
+def schematic(
+    component: Component, *, depth: int = 1, background: bool = True, run: Trajectories | None = None,
+    at: float | None = None, flow: bool = False, moving: bool = False,
+) -> str:  # fmt: skip
+    """Draw a drive as SVG: power from left to right, a symbol for each machine element.
 
     Args:
         component: the drive.
-        depth: how many levels of assemblies are open.
+        depth: number of levels of open assemblies.
         background: fill the paper; a page has one already.
-    """
-    return svg(layout(component, depth=depth), component.label, background=background)
-
-
-def check_format(path: Path) -> None:
-    """Tell why a schematic cannot be written there.
+        run: a run of the drive, whose modes are shown by colours: held, sliding, open.
+        at: time in s whose modes and powers are shown; by default modes at the end and mean powers.
+        flow: show power as the width of lines, and in numbers.
+        moving: animate the modes of the whole run.
 
     Raises:
-        NetlistError: the ending is none of `FORMATS`.
+        ValueOutOfRange: the run has no such time.
+    """
+    drawn = layout(component, depth=depth)
+    added = running(drawn, run, at=at, flow=flow, moving=moving) if run is not None else None
+    return svg(drawn, component.label, background=background, run=added)
+
+
+def check_format(path: Path, *, moving: bool = False) -> None:
+    """Tell why a schematic cannot be written there.
+
+    Args:
+        path: the file.
+        moving: it is animated.
+
+    Raises:
+        NetlistError: the ending is none of `FORMATS`, or the format does not move.
         MissingExtra: the format needs a package that is not installed.
         OSError: it cannot be written there.
     """
     ending = path.suffix.lower()
     if ending not in FORMATS:
         raise NetlistError(f"'{path.name}': a schematic can be {', '.join(one[1:] for one in FORMATS)}.")
+    if moving and ending != ".svg":
+        raise NetlistError(f"'{path.name}': only SVG moves.", advice="Write a file that ends with .svg.")
     package = _PACKAGES.get(ending)
     if package and find_spec(package) is None:
         raise missing_extra(package, "pictures")
     check_writable(path)
 
 
-def save_schematic(component: Component, path: str | Path, *, depth: int = 1) -> None:
+def save_schematic(
+    component: Component, path: str | Path, *, depth: int = 1, run: Trajectories | None = None,
+    at: float | None = None, flow: bool = False, moving: bool = False,
+) -> None:  # fmt: skip
     """Write the schematic of a drive as SVG, PNG or PDF, by the ending of the file.
 
     Args:
         component: the drive.
         path: the file.
         depth: how many levels of assemblies are open.
+        run: a run of the drive, as of `schematic`.
+        at: time in s, as of `schematic`.
+        flow: show power.
+        moving: animate the modes; SVG only.
 
     Raises:
-        NetlistError: the ending is none of these.
+        NetlistError: the ending is none of these, or the format does not move.
+        ValueOutOfRange: the run has no such time.
         MissingExtra: PNG and PDF need the extra `pictures`.
         OSError: the file cannot be written.
     """
     path = Path(path)
-    check_format(path)
-    text = schematic(component, depth=depth)
+    check_format(path, moving=moving)
+    text = schematic(component, depth=depth, run=run, at=at, flow=flow, moving=moving)
     convert = {".svg": str.encode, ".png": _png, ".pdf": _pdf}[path.suffix.lower()]
     write_bytes(path, convert(text))
 

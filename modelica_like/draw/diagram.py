@@ -1,4 +1,4 @@
-"""What a schematic shows: parts with their ports, and the nets between them."""
+"""Content of a schematic: parts with their ports, and the nets between them."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ _USUAL: dict[str, Side] = {
     "flange_b": "E", "n": "E", "port_b": "E", "flange_t": "E", "support": "S", "heat_port": "S",
 }  # fmt: skip
 _BESIDE = 9.0
-"""Between ports at one place of a symbol, in 1/96 inch."""
+"""Distance of ports at one place of a symbol, in 1/96 inch."""
 _OPPOSITE: dict[Side, Side] = {"W": "E", "E": "W", "N": "N", "S": "S"}
 
 
 @dataclass(eq=False)
 class Port:
-    """A connector or signal of a node that something is joined to.
+    """A connected connector or signal of a node.
 
     Attributes:
         name: path inside the node.
         node: whose it is.
-        side: where it leaves the symbol.
+        side: of the symbol.
         along: place along the side, from its middle.
         stroke: how its connections are drawn.
         signal: 1 for an output, -1 for an input, 0 for a connector.
@@ -46,7 +46,7 @@ class Port:
 
     @property
     def way(self) -> Side:
-        """Where its line leaves the node: signals come from the west, and what is in the south goes east."""
+        """Where its line leaves the node: signals enter from the west, ports in the south leave to the east."""
         if self.side in ("W", "E"):
             return self.side
         return "W" if self.signal < 0 or (self.side == "N" and not self.signal) else "E"
@@ -60,10 +60,10 @@ class Node:
         name: its name.
         component: the part.
         icon: its symbol; none for a box.
-        inside: what an open assembly consists of.
-        ports: what something is joined to, by name.
-        border: for an outer connector the side of the box at which it lies.
-        turned: west and east are exchanged.
+        inside: content of an open assembly.
+        ports: connected ports, by name.
+        border: for an outer connector, its side of the box.
+        turned: whether west and east are exchanged.
     """
 
     name: str
@@ -75,7 +75,7 @@ class Node:
     turned: bool = False
 
     def turn(self) -> None:
-        """Exchange west and east; signals stay, as they are read from left to right."""
+        """Exchange west and east; signals stay, because they are read from left to right."""
         if self.inside:
             return
         for port in self.ports.values():
@@ -107,11 +107,11 @@ class Diagram:
 
 
 def diagram(component: Component, depth: int) -> Diagram:
-    """Collect what the schematic of a component shows.
+    """Collect the content of a component's schematic.
 
     Args:
         component: a drive, or a part of one.
-        depth: how many levels of assemblies are open.
+        depth: number of levels of open assemblies.
     """
     nodes = {
         name: Node(name, part, part.icon, diagram(part, depth - 1) if _opens(part, depth) else None)
@@ -140,7 +140,7 @@ def _opens(part: Component, depth: int) -> bool:
 
 
 def _joined(component: Component) -> Iterator[list[Connector | Symbol]]:
-    """Yield what is joined, each set once."""
+    """Yield each set of joined ports once."""
     sets: list[dict[tuple[int, str], Connector | Symbol]] = []
     for statement in component.equations():
         if isinstance(statement, Connection):
@@ -210,7 +210,7 @@ def _box(node: Node) -> None:
 
 
 def _spread(node: Node) -> None:
-    """Ports at one place of a symbol are drawn side by side."""
+    """Draw ports at one place of a symbol side by side."""
     places: dict[tuple[Side, float], list[Port]] = {}
     for port in node.ports.values():
         places.setdefault((port.side, port.along), []).append(port)
@@ -220,7 +220,7 @@ def _spread(node: Node) -> None:
 
 
 def _orient(made: Diagram) -> None:
-    """Turn nodes so that power goes from west to east: from the first part on, each net is entered from the west."""
+    """Turn nodes so that power flows from west to east: from the first part on, nets are entered from the west."""
     nets_of: dict[Node, list[Net]] = {node: [] for node in made.nodes}
     for net in made.nets:
         for port in net.ports:
@@ -247,7 +247,7 @@ def _orient(made: Diagram) -> None:
 
 
 def _rank(node: Node) -> int:
-    """Outside comes first, then sources: all their connectors are in the east."""
+    """Outer connectors come first, then sources: all their connectors are in the east."""
     if node.component is None:
         return 0
     sides = {_place(node.icon, name, 0)[0] for name in node.component.connectors} - {"N", "S"}

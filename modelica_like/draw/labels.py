@@ -1,4 +1,4 @@
-"""What is written beside symbols."""
+"""Texts at symbols."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ _LONGEST = 24
 
 @dataclass(frozen=True, slots=True)
 class Text:
-    """Something written.
+    """A text on the sheet.
 
     Attributes:
         text: what.
         at: where its anchor and its base line are.
         size: of the letters.
-        anchor: what of it is there.
+        anchor: start, middle or end.
     """
 
     text: str
@@ -31,19 +31,19 @@ class Text:
 
     @property
     def box(self) -> tuple[float, float, float, float]:
-        """West, north, east and south of its room."""
+        """West, north, east and south of its box."""
         wide = text_width(self.text, self.size)
         west = self.at[0] - wide * {"start": 0.0, "middle": 0.5, "end": 1.0}[self.anchor]
         return west, self.at[1] - self.size, west + wide, self.at[1] + 2.0
 
 
 def text_width(text: str, size: float) -> float:
-    """Width of a text in a sans-serif font, rather too wide than too narrow."""
+    """Width of a text in a sans-serif font, slightly overestimated."""
     return size * sum(0.36 if letter in _NARROW else 0.92 if letter in _WIDE else 0.6 for letter in text)
 
 
 def labels(node: Node) -> list[tuple[str, float]]:
-    """Return what is written below a symbol: its name, and one value."""
+    """Return the texts below a symbol: its name and one value."""
     written = [(_shortened(node.name), NAME)]
     if node.icon and node.component:
         for key in node.icon.key:

@@ -12,7 +12,7 @@ from modelica_like.draw.diagram import Diagram, Net, Node, Port
 from modelica_like.language.icon import SIGNAL
 
 _ROUNDS = 12
-"""How often all columns are ordered anew, from west to east and back in turn."""
+"""Number of sweeps that order all columns, from west to east and back in turn."""
 
 
 @dataclass(eq=False)
@@ -30,7 +30,7 @@ class Slot:
 
 @dataclass(frozen=True, eq=False)
 class End:
-    """Where a net meets a channel, the room between two layers.
+    """Where a net meets a channel, the space between two layers.
 
     Attributes:
         slot: the node or passing net it comes from.
@@ -43,7 +43,7 @@ class End:
 
 @dataclass(eq=False)
 class Channel:
-    """The room between two layers.
+    """The space between two layers.
 
     Attributes:
         nets: the nets in it, with their ends in the layer before and in the layer after.
@@ -87,7 +87,7 @@ def layered(diagram: Diagram) -> Layers:
 
 
 def _columns(diagram: Diagram) -> dict[Node, int]:
-    """Shortest connections in all by a linear programme; what would close a cycle, signals first, may run back."""
+    """Shortest total length by a linear programme; lines that would close a cycle, signals first, may run backwards."""
     nodes = diagram.nodes
     place = {node: k for k, node in enumerate(nodes)}
     if not nodes:
@@ -122,12 +122,12 @@ def _columns(diagram: Diagram) -> dict[Node, int]:
 
 
 def solve_lp(x: ca.SX, cost: ca.SX, least: list[tuple[ca.SX, float | ca.DM]]) -> list[float]:
-    """Minimise a linear cost of x ≥ 0.
+    """Minimize a linear cost of x ≥ 0.
 
     Args:
         x: the unknowns.
-        cost: what to minimise.
-        least: linear expressions and the values they reach at least.
+        cost: the cost.
+        least: linear expressions and their lower bounds.
     """
     g = ca.vertcat(*[expression for expression, _ in least])
     low = ca.vertcat(*[ca.DM.ones(expression.shape[0]) * bound for expression, bound in least])
@@ -150,7 +150,7 @@ def _reaches(after: dict[Node, set[Node]], start: Node, goal: Node) -> bool:
 
 
 def _order(layers: Layers) -> None:
-    """Order each column by the mean place of what it is joined to, back and forth; keep the best order."""
+    """Order each column by the mean place of its neighbours, back and forth; keep the best order."""
     found: list[tuple[float, list[list[Slot]]]] = []
     given = [list(column) for column in layers.columns]
     for begin in (given, [sorted(column, key=_signals_first) for column in given]):
@@ -224,12 +224,12 @@ def _crossings_in(channel: Channel, places: dict[Slot, float]) -> float:
         for c, d, other in lines[k + 1 :]:
             if net is not other and (a - c) * (b - d) < 0:
                 count += 1.0 + 0.1 * min(net.stroke.weight, other.stroke.weight)
-    # Nets with both ends on one side enclose what lies between.
+    # Nets with both ends on one side enclose the slots between.
     return count + sum(0.05 * abs(a - b) for a, b, _ in lines)
 
 
 def _swap(layers: Layers) -> None:
-    """Exchange neighbours as long as it helps."""
+    """Exchange neighbours as long as crossings decrease."""
     for n, column in enumerate(layers.columns):
         near = (layers.channels[n], layers.channels[n + 1])
         places = _places(layers)

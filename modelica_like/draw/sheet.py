@@ -18,26 +18,26 @@ Box = tuple[float, float, float, float]
 """West, north, east, south."""
 
 _GAP, _PASSING, _TRACK, _CHANNEL = 20.0, 9.0, 11.0, 26.0
-"""Between parts, around lines that pass, between vertical lines, and beside them."""
+"""Distances between parts, around passing lines, between vertical lines, and beside them."""
 _ELBOW, _MARK = 13.0, 18.0
-"""Room of a line around a corner of a symbol, and of a ground."""
+"""Space of a line around a corner of a symbol, and of a ground."""
 FRAME, TITLE = 14.0, 24.0
-"""Room inside the frame of an open assembly, and of its title."""
+"""Space inside the frame of an open assembly, and of its title."""
 _FEW = 6
-"""Vertical lines of which all orders are tried."""
+"""Largest number of vertical lines of which all orders are tried."""
 
 
 @dataclass(eq=False)
 class Placed:
-    """A node with its room around the middle of its symbol.
+    """A node with the space around the middle of its symbol.
 
     Attributes:
-        node: which.
+        node: the node.
         half: half the size of the symbol.
         room: west, north, east and south of the middle.
         exits: height at which the line of a port leaves.
         sheet: the inside of an open assembly.
-        above: what is written stands above the symbol, as a line leaves below.
+        above: whether texts are above the symbol, because a line leaves below.
         at: place of the middle.
     """
 
@@ -60,6 +60,7 @@ class Line:
         dots: where three or more meet.
         arrows: tips at inputs, and the direction they point to.
         ports: what it joins.
+        tips: where it meets the symbols.
     """
 
     stroke: Stroke
@@ -67,6 +68,7 @@ class Line:
     dots: list[Point] = field(default_factory=list)
     arrows: list[tuple[Point, str]] = field(default_factory=list)
     ports: list[Port] = field(default_factory=list)
+    tips: dict[Port, Point] = field(default_factory=dict)
 
 
 @dataclass(eq=False)
@@ -74,8 +76,8 @@ class Sheet:
     """A drawing.
 
     Attributes:
-        parts: what lies where.
-        lines: what joins it.
+        parts: placed parts.
+        lines: of the nets.
         width: from west to east.
         height: from north to south.
     """
@@ -101,7 +103,7 @@ def inner_origin(part: Placed) -> Point:
 
 
 def texts(part: Placed) -> Iterator[Text]:
-    """Yield what is written around the middle of a part: names of ports, its own name, and a value."""
+    """Yield the texts around the middle of a part: names of ports, its own name, and a value."""
     node, (half_x, half_y) = part.node, part.half
     if part.sheet or node.border:
         return
@@ -120,7 +122,7 @@ def texts(part: Placed) -> Iterator[Text]:
 
 
 def sheet(diagram: Diagram) -> Sheet:
-    """Place what a diagram consists of."""
+    """Place the parts and nets of a diagram."""
     layers = layered(diagram)
     placed = {node: _measure(node) for node in diagram.nodes}
     heights = _heights(layers, placed)
@@ -158,13 +160,14 @@ def _fitted(made: Sheet) -> Sheet:
     for line in made.lines:
         line.paths = [[(x, y - top) for x, y in path] for path in line.paths]
         line.dots = [(x, y - top) for x, y in line.dots]
+        line.tips = {port: (x, y - top) for port, (x, y) in line.tips.items()}
         line.arrows = [((x, y - top), way) for (x, y), way in line.arrows]
     made.height = max(bottoms, default=0.0) - top
     return made
 
 
 def _measure(node: Node) -> Placed:
-    """Find the room that a node needs, and where the lines of its ports leave."""
+    """Find the space that a node needs, and the exits of its ports."""
     if node.border:
         (port,) = node.ports.values()
         return Placed(node, (0.0, 0.0), (0.0, -4.0, 0.0, 4.0), {port: 0.0})
@@ -217,7 +220,7 @@ def _box_size(node: Node) -> Point:
 
 
 def _heights(layers: Layers, placed: dict[Node, Placed]) -> dict[Slot, float]:
-    """Shortest vertical lines in all, by a linear programme."""
+    """Shortest total length of vertical lines, by a linear programme."""
     slots = [slot for column in layers.columns for slot in column]
     if not slots:
         return {}
@@ -237,7 +240,7 @@ def _heights(layers: Layers, placed: dict[Node, Placed]) -> dict[Slot, float]:
             # Kinks go to parts with several shafts on a side.
             chain = 1 + all(_single(end) for end in (*before, *after))
             spans.append((ends, net.stroke.weight * (1 + passing) * chain))
-            # Of several branches the one that goes on stays straight.
+            # Of several branches, the one that continues stays straight.
             through = [one for one, end in zip(ends, (*before, *after), strict=True) if _goes_on(end)]
             if 1 < len(through) < len(ends):
                 spans.append((through, net.stroke.weight))
@@ -250,7 +253,7 @@ def _heights(layers: Layers, placed: dict[Node, Placed]) -> dict[Slot, float]:
         cost += weight * (high[k] - low[k])
         least += [(end - low[k], 0.0) for end in ends] + [(high[k] - end, 0.0) for end in ends]
     least += [(off - (y - middle), 0.0), (off - (middle - y), 0.0)]
-    # All unknowns are positive: room for what lies above.
+    # All unknowns are positive: add the space above.
     base = 1e4
     found = solve_lp(ca.vertcat(y, middle, low, high, off), cost, [*least, (y - base, 0.0)])
     return {slot: round(value, 3) for slot, value in zip(slots, found[: len(slots)], strict=True)}
@@ -315,7 +318,7 @@ def _tracks(channel: Channel, heights: dict[Slot, float], placed: dict[Node, Pla
 
 
 def _cost(order: Sequence[Net], ends: dict[Net, tuple[list[float], ...]]) -> float:
-    """Crossings, and a hundred for each pair of lines that would lie on each other."""
+    """Number of crossings, plus a hundred for each pair of overlapping lines."""
     total = 0.0
     for k, net in enumerate(order):
         before, after = ends[net]
@@ -364,5 +367,6 @@ def _lead(part: Placed, room: tuple[float, float], lines: dict[Port, Line]) -> N
             px = x + port.along
             path = [(edge, exit_y), (px, exit_y), (px, y + (half_y if port.side == "S" else -half_y))]
         line.paths.append(path)
+        line.tips[port] = path[-1]
         if port.signal < 0 and not part.sheet and not part.node.border:
             line.arrows.append((path[-1], {"W": "E", "E": "W", "N": "S", "S": "N"}[port.side]))

@@ -1,35 +1,41 @@
-"""A schematic as SVG: plain attributes for every renderer, and dark colours where a browser asks for them."""
+"""A schematic as SVG: plain attributes for every renderer, and dark colours for browsers in dark mode."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from xml.sax.saxutils import escape
 
 from modelica_like.draw.labels import NAME, VALUE, Text
+from modelica_like.draw.running import HELD, OPEN, SLIDES, Running
 from modelica_like.draw.sheet import TITLE, Line, Placed, Point, Sheet, texts
 from modelica_like.language.icon import Icon, Stroke
 
 _INK, _PAPER, _STEEL, _GREY, _FRAME = "#1f2937", "#ffffff", "#cbd5e1", "#6b7280", "#f5f7fa"
 _DARK = {"ink": "#d7dde6", "paper": "#151a21", "steel": "#475569", "grey": "#9aa5b4", "frame": "#1d232c"}
+_LOOKS = {HELD: ("#15803d", "#4ade80"), OPEN: ("#94a3b8", "#64748b"), SLIDES: ("#c2410c", "#fb923c")}
+"""Colours of modes: in light, in dark."""
+_CYCLE = 'dur="8s" repeatCount="indefinite"'
 _MARGIN = 16.0
 _FONT = "Helvetica, Arial, 'Liberation Sans', sans-serif"
 
 
-def svg(drawn: Sheet, title: str, *, background: bool = True) -> str:
+def svg(drawn: Sheet, title: str, *, background: bool = True, run: Running | None = None) -> str:
     """Return a sheet as SVG text; the same sheet gives the same bytes.
 
     Args:
         drawn: what to draw.
         title: for readers who do not see it.
         background: fill the paper.
+        run: what a run adds.
     """
+    run = run or Running()
     width, height = drawn.width + 2 * _MARGIN, drawn.height + 2 * _MARGIN
     strokes = {item.stroke.name: item.stroke for _, item in drawn.everything() if isinstance(item, Line)}
     parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{_n(width)}" height="{_n(height)}" '
         f'viewBox="0 0 {_n(width)} {_n(height)}" font-family="{_FONT}">',
         f"<title>{escape(title)}</title>",
-        _dark(strokes),
+        _dark(strokes, looks=bool(run.modes)),
     ]
     if background:
         parts.append(f'<rect class="paper" width="{_n(width)}" height="{_n(height)}" fill="{_PAPER}"/>')
@@ -37,10 +43,11 @@ def svg(drawn: Sheet, title: str, *, background: bool = True) -> str:
     parts += [_frame(at, item) for at, item in everything if isinstance(item, Placed) and item.sheet]
     for at, item in everything:
         if isinstance(item, Line):
-            parts += _line(at, item)
+            parts += _line(at, item, run)
     for at, item in everything:
         if isinstance(item, Placed) and not item.node.border:
-            parts += _part(at, item)
+            parts += _part(at, item, run)
+    parts += _clock(width, height, run) if run.moving else []
     return "\n".join([*parts, "</svg>", ""])
 
 
@@ -48,8 +55,9 @@ def _n(value: float) -> str:
     return f"{round(value, 2) + 0.0:g}"
 
 
-def _dark(strokes: dict[str, Stroke]) -> str:
-    rules = [f".{key}{{fill:{colour}}}.{key}-line{{stroke:{colour}}}" for key, colour in _DARK.items()]
+def _dark(strokes: dict[str, Stroke], *, looks: bool) -> str:
+    dark = _DARK | {name: colour for name, (_, colour) in _LOOKS.items() if looks}
+    rules = [f".{key}{{fill:{colour}}}.{key}-line{{stroke:{colour}}}" for key, colour in dark.items()]
     rules += [f".{_css(one)}{{stroke:{one.dark}}}.{_css(one)}-dot{{fill:{one.dark}}}" for one in strokes.values()]
     return f"<style>@media (prefers-color-scheme: dark){{{''.join(rules)}}}</style>"
 
@@ -68,7 +76,7 @@ def _frame(at: Point, part: Placed) -> str:
     )
 
 
-def _line(at: Point, line: Line) -> Iterator[str]:
+def _line(at: Point, line: Line, run: Running) -> Iterator[str]:
     stroke = line.stroke
     data = " ".join(
         "M" + " L".join(f"{_n(at[0] + x)} {_n(at[1] + y)}" for x, y in path) for path in line.paths if len({*path}) > 1
@@ -79,11 +87,19 @@ def _line(at: Point, line: Line) -> Iterator[str]:
         f'stroke-width="{_n(stroke.width)}" stroke-linecap="{"butt" if stroke.dashed else "round"}" '
         f'stroke-linejoin="round"{dashes}/>'
     )
+    for (x1, y1), (x2, y2), power in run.powers.get(line, ()):
+        yield (
+            f'<path class="{_css(stroke)}" d="M{_n(at[0] + x1)} {_n(at[1] + y1)} L{_n(at[0] + x2)} {_n(at[1] + y2)}" '
+            f'stroke="{stroke.colour}" stroke-width="{_n(run.width(line, power))}" stroke-linecap="round"/>'
+        )
     for x, y in line.dots:
         yield (
             f'<circle class="{_css(stroke)}-dot" cx="{_n(at[0] + x)}" cy="{_n(at[1] + y)}" '
             f'r="{_n(stroke.width + 1.0)}" fill="{stroke.colour}"/>'
         )
+    if said := run.said(line):
+        (x, y), text = said
+        yield _text(Text(text, (at[0] + x, at[1] + y + 16.0), VALUE))
     for (x, y), way in line.arrows:
         turn = {"E": 0, "S": 90, "W": 180, "N": 270}[way]
         yield (
@@ -92,12 +108,14 @@ def _line(at: Point, line: Line) -> Iterator[str]:
         )
 
 
-def _part(at: Point, part: Placed) -> Iterator[str]:
+def _part(at: Point, part: Placed, run: Running) -> Iterator[str]:
     node, (x, y), (half_x, half_y) = part.node, (at[0] + part.at[0], at[1] + part.at[1]), part.half
     yield f'<g transform="translate({_n(x)} {_n(y)})">'
     kind = type(node.component).__name__
     yield f"<title>{escape(f'{node.name}: {kind}')}</title>"
-    if node.icon:
+    if node.icon and (looks := run.modes.get(node)):
+        yield from _looks(node.icon, looks, run, half_y, turned=node.turned)
+    elif node.icon:
         yield from icon_shapes(node.icon, turned=node.turned)
     elif not part.sheet:
         yield (
@@ -112,11 +130,12 @@ def _part(at: Point, part: Placed) -> Iterator[str]:
     yield "</g>"
 
 
-def _text(one: Text) -> str:
-    fill = _GREY if one.size == VALUE else _INK
+def _text(one: Text, look: str = "") -> str:
+    kind = look or ("grey" if one.size == VALUE else "ink")
+    fill = _LOOKS[look][0] if look else _GREY if one.size == VALUE else _INK
     bold = "" if one.size == VALUE else ' font-weight="bold"'
     return (
-        f'<text class="{"grey" if one.size == VALUE else "ink"}" x="{_n(one.at[0])}" y="{_n(one.at[1])}" fill="{fill}" '
+        f'<text class="{kind}" x="{_n(one.at[0])}" y="{_n(one.at[1])}" fill="{fill}" '
         f'font-size="{_n(one.size)}" text-anchor="{one.anchor}"{bold}>{escape(one.text)}</text>'
     )
 
@@ -136,18 +155,52 @@ def _mark(part: Placed, side: str, along: float, icon: Icon, stroke: Stroke) -> 
     yield "</g>"
 
 
-def icon_shapes(icon: Icon, *, turned: bool = False) -> Iterator[str]:
-    """Yield the shapes of an icon around (0, 0)."""
+def _looks(
+    icon: Icon, looks: Sequence[tuple[float, str, str]], run: Running, half: float, *, turned: bool
+) -> Iterator[str]:
+    """A symbol in the colour of its mode, with the mode's name; of a whole run one after the other."""
+    for look, name in dict.fromkeys((look, name) for _, look, name in looks):
+        if run.moving:
+            times = [0.0, *(min(time / run.end, 1.0) for time, *_ in looks[1:])]
+            shown = ["visible" if one[1:] == (look, name) else "hidden" for one in looks]
+            yield (
+                f'<g visibility="{shown[0]}"><animate attributeName="visibility" calcMode="discrete" '
+                f'values="{";".join(shown)}" keyTimes="{";".join(_n(time) for time in times)}" {_CYCLE}/>'
+            )
+        yield from icon_shapes(icon, turned=turned, ink=look)
+        yield _text(Text(name, (9.0, -half - 4.0), VALUE, "start"), look)
+        yield "</g>" if run.moving else ""
+
+
+def _clock(width: float, height: float, run: Running) -> Iterator[str]:
+    """A bar that grows with time."""
+    y, long = height - 6.0, width - 2 * _MARGIN - 70.0
+    yield (
+        f'<rect class="grey" x="{_n(_MARGIN)}" y="{_n(y - 4.0)}" width="0" height="3" fill="{_GREY}">'
+        f'<animate attributeName="width" from="0" to="{_n(long)}" {_CYCLE}/></rect>'
+    )
+    yield _text(Text(f"{run.end:.4g} s", (width - _MARGIN, y), VALUE, "end"))
+
+
+def icon_shapes(icon: Icon, *, turned: bool = False, ink: str = "ink") -> Iterator[str]:
+    """Yield the shapes of an icon around (0, 0).
+
+    Args:
+        icon: the icon.
+        turned: west and east are exchanged.
+        ink: `ink`, or how a mode looks.
+    """
+    colour = _LOOKS.get(ink, (_INK, ""))[0]
     turn = ' transform="scale(-1 1)"' if turned else ""
     for data, classes, fill, width in (
-        (icon.paper, "paper ink-line", _PAPER, 1.75),
-        (icon.solid, "steel ink-line", _STEEL, 1.75),
-        (icon.lines, "ink-line", "none", 1.75),
-        (icon.heavy, "ink-line", "none", 3.5),
+        (icon.paper, f"paper {ink}-line", _PAPER, 1.75),
+        (icon.solid, f"steel {ink}-line", _STEEL, 1.75),
+        (icon.lines, f"{ink}-line", "none", 1.75),
+        (icon.heavy, f"{ink}-line", "none", 3.5),
     ):
         if data:
             yield (
-                f'<path class="{classes}" d="{data}" fill="{fill}" stroke="{_INK}" stroke-width="{width}" '
+                f'<path class="{classes}" d="{data}" fill="{fill}" stroke="{colour}" stroke-width="{width}" '
                 f'stroke-linecap="round" stroke-linejoin="round"{turn}/>'
             )
     if icon.text:

@@ -1,4 +1,4 @@
-"""What the page asks for: runs with other values, what they depend on, and files."""
+"""Requests of the page: runs with other values, their sensitivities, and files."""
 
 from __future__ import annotations
 
@@ -52,12 +52,12 @@ class Runs:
         Args:
             turn: number of the request; a run that is not the newest one stops.
             values: value references of parameters and inputs, with what they are, in SI units.
-            references: value references of what is wanted.
+            references: value references of the requested outputs.
             until: end time in s.
 
         Returns:
-            Counts and a message where the run did not reach the end; times, outputs and events as rows. None: a newer
-            run is wanted.
+            Counts and a message if the run did not finish; times, outputs and events as rows. None: a newer run is
+            requested.
         """
         self._newest = max(turn, self._newest)
         with self._one_at_a_time:
@@ -87,7 +87,7 @@ class Runs:
         return {"message": message, "steps": self._instance.counts()[0]}
 
     def _said(self, error: ModelicaLikeError, values: Sequence[tuple[int, float]]) -> str:
-        """What a netlist with these values is told says more than the run-time does."""
+        """The message of a netlist with these values is better than that of the run-time."""
         try:
             build(self.changed(values))
         except ModelicaLikeError as told:
@@ -117,13 +117,13 @@ class Runs:
         return [row for row in rows if row[1]][:_MOST_BARS]
 
     def save(self, what: str, values: Sequence[tuple[int, float]], until: float, folder: Path) -> Path:
-        """Write the changed drive into a folder, over nothing that is there.
+        """Write the changed drive into a folder, without overwriting files.
 
         Args:
             what: one of `FILES`.
             values: of parameters.
             until: end time of the report in s.
-            folder: where.
+            folder: for the file.
 
         Raises:
             ModelicaLikeError: the values are wrong, or it cannot be run or exported.

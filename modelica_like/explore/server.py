@@ -36,13 +36,13 @@ def explore(
 
     Args:
         drive: an assembly or a netlist file.
-        until: end time, a number in s or a quantity; by default what the netlist says.
-        show: patterns of what is drawn at first, such as `*.w`; by default speeds, torques and forces of the parts.
-        folder: where the page may save netlists, FMUs and reports.
+        until: end time, a number in s or a quantity; by default that of the netlist.
+        show: patterns of the first curves, such as `*.w`; by default speeds, torques and forces of the parts.
+        folder: for netlists, FMUs and reports saved by the page.
 
     Raises:
-        UnknownName: nothing fits a pattern.
-        ModelicaLikeError: something is wrong with the drive, or it cannot be simulated.
+        UnknownName: nothing matches a pattern.
+        ModelicaLikeError: the drive has an error, or cannot be simulated.
     """
     with Explorer(drive, until, show=show, folder=folder) as explorer:
         explorer.show()
@@ -58,7 +58,7 @@ class Explorer(ThreadingHTTPServer):
         ModelicaLikeError: as `explore`.
 
     Attributes:
-        address: where the page is; it has a secret without which nothing is answered.
+        address: of the page, with a secret that every request needs.
     """
 
     daemon_threads = True
@@ -81,7 +81,7 @@ class Explorer(ThreadingHTTPServer):
         self.address = f"http://{self.host}/?token={self.token}"
 
     def show(self, *, browser: bool = True) -> None:
-        """Answer until Ctrl-C, which is the ordinary end.
+        """Serve until Ctrl-C, the normal end.
 
         Args:
             browser: open the page.

@@ -1,4 +1,4 @@
-"""Checks of one component class: as many equations as unknowns, and dimensions that fit."""
+"""Checks of one component class: number of equations, and dimensions."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def check_balance(component: Component, equations: list[Equation], joined: set[s
     """Check that a component has as many equations as unknowns of its own.
 
     Args:
-        component: of the class that is checked.
+        component: of the class to check.
         equations: its own.
         joined: own signals in its connections; an output there has its equation.
 
@@ -73,7 +73,7 @@ def check_balance(component: Component, equations: list[Equation], joined: set[s
 
 
 def _driven_input(component: Component, equations: list[Equation]) -> str:
-    """Return an input of a part that stands in an equation, relative to the component; nothing if there is none."""
+    """Return an input of a part that occurs in an equation, relative to the component, or an empty text."""
     leaves = (symbol for e in equations for side in (e.left, e.right) for symbol in symbols_in(side))
     foreign = (one for one in leaves if one is not TIME and one.owner is not component)
     own = component.path
@@ -85,12 +85,12 @@ def check_units(component: Component, equations: list[Equation], events: list[An
     """Check every equation; return the units that `*` outputs take from their equations.
 
     Args:
-        component: of the class that is checked.
+        component: of the class to check.
         equations: its own.
         events: its transitions and start modes.
 
     Raises:
-        UnitMismatch, LanguageError: everything that does not fit, told together.
+        UnitMismatch, LanguageError: all errors, reported together.
     """
     inferred: dict[str, Unit] = {}
 

@@ -9,16 +9,16 @@ import casadi as ca
 from modelica_like.errors import LanguageError, Source
 
 JUST_TRUE = 1e-300
-"""Guard of a relation that includes equality, where both sides are equal."""
+"""Guard of a relation with equality, where both sides are equal."""
 
 
 def guard_of(condition: Any, source: Source, *, negated: bool = False) -> Any:
-    """Turn a condition into an expression that is positive where it holds, so that an event can be located.
+    """Turn a condition into an expression that is positive where the condition holds, to locate an event.
 
     Args:
         condition: a relation, or several that are joined.
         source: the transition's place, for messages.
-        negated: turn its opposite instead; a negation moves inwards, so that equality ends up on the right side.
+        negated: turn the opposite; a negation moves inwards, so that equality stays correct.
 
     Raises:
         LanguageError: the condition is not made of relations.
@@ -35,7 +35,7 @@ def guard_of(condition: Any, source: Source, *, negated: bool = False) -> Any:
         difference = condition.dep(1) - condition.dep(0) if not negated else condition.dep(0) - condition.dep(1)
         if (operation == ca.OP_LT) != negated:
             return difference
-        # A sum, so that its rate is that of the difference: a relation that ceases to hold right now does not count.
+        # A sum, so that its rate is that of the difference: a relation that stops being true now does not count.
         return difference + ca.if_else(difference == 0, JUST_TRUE, 0)
     if operation in (ca.OP_EQ, ca.OP_NE):
         # Between events a mode is constant: its conditions are plainly on or off.

@@ -25,7 +25,7 @@ _POWERS = {ca.OP_SQ: Fraction(2), ca.OP_SQRT: Fraction(1, 2), ca.OP_INV: Fractio
 
 
 _MIXED = Unit((("different units in different modes", 1),))
-"""Sum of a mode's branches that differ in unit: only good for an equation with zero."""
+"""Sum of a mode's branches with different units: valid only in an equation with zero."""
 
 
 class _Clash(Exception):
@@ -37,11 +37,11 @@ class _Clash(Exception):
 
 
 class _NotANumber(Exception):
-    """A number in an expression is nan: nothing can follow from it."""
+    """A number in an expression is nan."""
 
 
 class Dimensions:
-    """Units of expressions; what was looked at once is remembered.
+    """Units of expressions, with a cache.
 
     Args:
         unit_of: gives the unit of a leaf.
@@ -52,7 +52,7 @@ class Dimensions:
         self._known: dict[int, tuple[Any, Unit]] = {}
 
     def unit(self, expression: Expr | float) -> Unit:
-        """Return the unit of an expression; zero and what cannot be known fit everything."""
+        """Return the unit of an expression; zero and unknown units fit everything."""
         root: Any = expression if isinstance(expression, ca.SX) else ca.SX(cast(Any, expression))
         pending = [root]
         while pending:
@@ -67,13 +67,13 @@ class Dimensions:
                 pending.extend(open_operands)
                 continue
             units = [self._known[dep.element_hash()][1] for dep in operands]
-            # The node itself is kept too, so that its identity cannot be taken over by another one.
+            # The node itself is kept too, so that no other node can get its identity.
             self._known[key] = (node, self._of_node(node, operands, units))
             pending.pop()
         return self._known[root.element_hash()][1]
 
     def unit_or_any(self, expression: Expr | float) -> Unit:
-        """Return the unit of an expression, or `ANY` if its terms clash (the equation's own check tells that)."""
+        """Return the unit of an expression, or `ANY` if its terms clash (the check of the equation reports that)."""
         try:
             return self.unit(expression)
         except (_Clash, _NotANumber):
@@ -150,10 +150,10 @@ def check_equation(left: Expr, right: Expr, dimensions: Dimensions, component: s
         right: the other.
         dimensions: knows the units of the leaves.
         component: name of the class, for messages.
-        source: where the equation stands.
+        source: place of the equation.
 
     Raises:
-        UnitMismatch: they differ, or a side is a sum of different things.
+        UnitMismatch: they differ, or a side is a sum of different dimensions.
         LanguageError: a number is nan.
     """
     place = f"{component}, {source}" if source.file else component
@@ -173,11 +173,11 @@ def check_expression(
     """Check that an expression has the expected dimension.
 
     Args:
-        expression: what is checked.
+        expression: the expression.
         expected: its unit, or one of the same dimension.
         dimensions: knows the units of the leaves.
-        label: what messages call it.
-        source: where it stands.
+        label: name for messages.
+        source: its place.
 
     Raises:
         UnitMismatch: it has another one.
@@ -192,7 +192,7 @@ def check_expression(
 
 @contextmanager
 def _told(label: str, where: tuple[Source, ...], owner: str, source: Source | None) -> Generator[None]:
-    """Tell in sentences why an expression has no unit: terms clash, or a number of the owner is nan."""
+    """Return the error of an expression without a unit: terms clash, or a number of the owner is nan."""
     try:
         yield
     except _Clash as clash:

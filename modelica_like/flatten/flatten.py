@@ -35,12 +35,12 @@ def flatten(root: Component, *, open_inputs: bool = False) -> FlatModel:
 
     Args:
         root: the model; its own inputs become inputs of the flat model.
-        open_inputs: whether unconnected inputs of adaptors, and of parts that give them no value, do so as well.
+        open_inputs: whether unconnected inputs of adaptors, and of parts without a value for them, also become inputs.
 
     Raises:
-        WiringErrors, WrongConnection, FreeFlange, MissingValue: everything wrong with the wiring, told together.
+        WiringErrors, WrongConnection, FreeFlange, MissingValue: all errors of the wiring, reported together.
         LanguageError, UnitMismatch: a component class is declared wrongly.
-        CyclicAssembly: parameters depend on each other in a circle.
+        CyclicAssembly: parameters depend on each other cyclically.
     """
     return _Flattener(root, open_inputs).run()
 
@@ -93,7 +93,7 @@ class _Flattener:
         )  # fmt: skip
 
     def _elaborate(self) -> list[tuple[Component, Template]]:
-        """Find all templates, owners first: what an owner connects decides which optional connectors its parts have."""
+        """Find all templates, owners first: an owner's connections decide which optional connectors its parts have."""
         found: list[tuple[Component, Template]] = []
         for component in self.root.walk():
             for part in component.parts.values():
@@ -120,7 +120,7 @@ class _Flattener:
                 self._declare_discrete(component, name, prefix + name, field)
             elif isinstance(field, Parameter):
                 self.parameters.declare(component, name, prefix + name)
-        # What nothing asks for and nothing changes, as where a table has one row only, is no part of the model.
+        # Parameters that are never used or changed (a table with one row) are not part of the model.
         for name, mode in ((n, m) for n, m in component.modes.items() if (id(component), n) in used):
             self.discrete_of[id(component), name] = len(self.discretes)
             start = mode.number(component.start_mode(name))
@@ -234,7 +234,7 @@ class _Flattener:
                 self.errors.append(MissingValue(what, where=component.place_of(), advice=advice))
 
     def _relate_inputs(self, component: Component) -> None:
-        """Say which open inputs of an adaptor are derivatives of each other."""
+        """Declare which open inputs of an adaptor are derivatives of each other."""
         if component.terminal is None:
             return
         for name, rate in component.terminal.rates:

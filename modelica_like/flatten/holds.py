@@ -26,11 +26,11 @@ class HoldForm:
     Attributes:
         mode: name of the mode.
         number: number of the mode that holds.
-        loose: number of one that does not, or -1.
-        motion: path of the variable that is held.
-        reaction: path of the reaction, or nothing.
+        loose: number of a mode that does not hold it, or -1.
+        motion: path of the held variable.
+        reaction: path of the reaction, or an empty text.
         row: position of the equation that holds it.
-        rigid: the equation says nothing but that the derivative of the motion is zero; a creep says more.
+        rigid: whether the equation only sets the derivative of the motion to zero; a creep has more terms.
     """
 
     mode: str
@@ -93,7 +93,7 @@ def _capacities(component: Component, hold: Hold) -> tuple[Any, Any]:
 def _equation(
     component: Component, mode: Mode, name: str, motion: Symbol, residuals: list[Any]
 ) -> tuple[int, Any, bool]:
-    """Return the position of the equation that holds a motion, its slope, and whether it says nothing else."""
+    """Return the position of the equation that holds a motion, its slope, and whether it has no other terms."""
     rate, symbol = symbol_of(component, motion.name, 1), symbol_of(component, mode.name)
     number = mode.number(name)
     for row, residual in enumerate(residuals):
@@ -101,7 +101,7 @@ def _equation(
             continue
         slope = ca.jacobian(residual, rate)
         if _number(ca.substitute(slope, symbol, ca.SX(number))) != 0.0:
-            # What another mode does with the derivative of the motion holds nothing.
+            # The derivative of the motion in another mode does not hold it.
             gain = ca.if_else(ca.SX(symbol) == number, slope, 0)
             return row, gain, _only(ca.substitute(residual, symbol, ca.SX(number)), rate)
     raise LanguageError(
@@ -111,7 +111,7 @@ def _equation(
 
 
 def _only(residual: Any, rate: Symbol) -> bool:
-    """Whether an equation contains no variable but one, where no motion is prescribed."""
+    """Whether an equation contains only one variable, if no motion is prescribed."""
     others = [s for s in symbols_in(residual) if s is not rate and _is_variable(s)]
     return all(_number(ca.jacobian(residual, other)) == 0.0 for other in others)
 
@@ -121,7 +121,7 @@ def _is_variable(symbol: Symbol) -> bool:
 
 
 def _number(expression: Any) -> float:
-    """Value of an expression at a point that is not special; no motion is prescribed there."""
+    """Value of an expression at a generic point, without prescribed motions."""
     symbols = symbols_in(expression)
     if not symbols:
         return float(ca.SX(expression))

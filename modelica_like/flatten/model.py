@@ -31,7 +31,7 @@ class FlatVariable:
 
 @dataclass(frozen=True, slots=True)
 class FlatParameter:
-    """A parameter with its value in SI units; it must exceed the one that stands `above` places before it, if any.
+    """A parameter with its value in SI units; it must exceed the one `above` places before it, if any.
 
     `written` is the unit in which its value was given, where no unit is declared.
     """
@@ -82,7 +82,7 @@ class Origin:
 class Coefficient:
     """A coefficient that parameters determine.
 
-    `FlatModel.coefficient` works out its expression, which is rarely needed.
+    `FlatModel.coefficient` builds its expression, which is rarely needed.
 
     Attributes:
         instance: number of the instance.
@@ -146,10 +146,10 @@ class FlatModel:
         d: symbols of modes and discrete values.
         linear: connection equations, bindings and the components' own linear equations.
         general: (instance, row) of the remaining equations.
-        inputs: variables that come from outside.
-        components: the tree the model was made from.
-        flags: symbols in q that say whether the motion of a variable is prescribed, with that variable; once the
-            structure is known there are none.
+        inputs: variables given from outside.
+        components: the tree of the model.
+        flags: symbols in q for "the motion is prescribed", with the variable; none once the structure is
+            known.
     """
 
     name: str

@@ -22,7 +22,7 @@ from modelica_like.units import ONE, Unit, coherent, read_quantity
 class Parameters:
     """Collects parameters while the tree is flattened.
 
-    Every declared parameter has a position in the vector q; those with a value of their own also one in p.
+    Every declared parameter has a position in the vector q; independent ones also have one in p.
     """
 
     def __init__(self, root: Component) -> None:
@@ -42,7 +42,7 @@ class Parameters:
         """Give a parameter its place in q; None if it has no value.
 
         Args:
-            component: that declares it.
+            component: the component that declares it.
             name: of the parameter or input.
             path: its dotted name.
         """
@@ -85,7 +85,7 @@ class Parameters:
                 f"Parameters depend on each other in a circle: {circle}.", advice="Give one of them a number."
             )
         self._open.append(path)
-        # A value given in an assembly speaks the assembly's names, a default those of the component itself.
+        # A value given in an assembly uses the assembly's names, a default those of the component itself.
         scope = component._owner if name in component._values and isinstance(component._owner, Component) else component
         expression = self.evaluate(value, scope, path)
         self._open.pop()
@@ -100,14 +100,14 @@ class Parameters:
 
         Args:
             value: what was given.
-            scope: the component whose names a formula speaks.
-            label: what messages call it.
+            scope: the component whose names a formula uses.
+            label: name for messages.
 
         Raises:
             UnknownName: the formula uses a parameter that does not exist.
-            UnitMismatch: the formula has another dimension than it should.
-            CyclicAssembly: the formula needs itself.
-            ValueOutOfRange: its numbers give no finite one.
+            UnitMismatch: the formula has the wrong dimension.
+            CyclicAssembly: the formula depends on itself.
+            ValueOutOfRange: the result is not finite.
         """
         if value.formula is None:
             return value.number
@@ -148,9 +148,9 @@ class Parameters:
         """Return the position of a parameter in q.
 
         Args:
-            component: that declares it.
+            component: the component that declares it.
             name: of the parameter or input.
-            path: its dotted name, if that is known already.
+            path: its dotted name, if already known.
 
         Raises:
             MissingValue: it has no value.

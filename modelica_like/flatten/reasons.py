@@ -1,4 +1,4 @@
-"""Why a transition happens, in words: as its class declares it, or read off the condition."""
+"""Reasons of transitions in words: as declared in the class, or from the condition."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def reason(transition: Transition, path: Callable[[Symbol], str]) -> str:
         path: names a symbol as the component would.
 
     Returns:
-        A few words; names of parameters in braces stand for name and value.
+        A few words; names of parameters in braces are replaced by name and value.
     """
     if transition.because or transition.when is None:
         return transition.because or "its time is reached"

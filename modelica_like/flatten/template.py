@@ -1,4 +1,4 @@
-"""Templates: the equations of a component class, written out once and used for all its instances."""
+"""Templates: the equations of a component class, made once for all its instances."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class TransitionForm(Generic[ModeT, ResetT]):
         timed: whether it is a time event.
         index: position in the guards, or in the moments.
         resets: what else changes; in a template pairs of what is reset (slot path) and the position in the resets.
-        notice: what the user is told when it happens.
+        notice: message for the user.
         because: why it happens, in words; names of parameters in braces stand for name and value.
         fails: whether the run ends there, with an error.
     """
@@ -125,7 +125,7 @@ class Names:
         self.discretes: dict[str, Symbol] = {}
 
     def add(self, expressions: Iterable[Any]) -> None:
-        """Take in the symbols of some expressions."""
+        """Add the symbols of expressions."""
         for expression in expressions:
             if not is_expression(expression):
                 continue
@@ -247,7 +247,7 @@ def _build(component: Component) -> Template:
 
 
 class _Changes:
-    """What the events of a component change, and when."""
+    """Events of a component: conditions and changes."""
 
     def __init__(self, component: Component, events: list[EventStatement]) -> None:
         self.component = component
@@ -300,7 +300,7 @@ class _Changes:
 
 
 def _energy_terms(component: Component, wiring: Iterable[Connection | FreeEnd]) -> list[Any]:
-    """Stored energy, loss, source power, then the power into each connector; what passes on to parts is theirs."""
+    """Stored energy, loss, source power, then the power into each connector, without those of parts."""
     passed_on = {id(end) for one in wiring if isinstance(one, Connection) for end in one.ends}
     terms: list[Any] = [component.stored_energy(), component.loss_power(), component.source_power()]
     own = [c for c in component.connectors.values() if c.used and id(c) not in passed_on]

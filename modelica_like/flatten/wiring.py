@@ -1,4 +1,4 @@
-"""Connection sets: who is joined to whom, and which equations follow."""
+"""Connection sets and their equations."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Wiring:
     inferred: dict[tuple[int, str], Unit] = field(default_factory=dict)
 
     def add(self, scope: Component, statement: Connection | FreeEnd) -> None:
-        """Take in what a component says about the connectors of its parts and its own."""
+        """Add the connections declared by a component."""
         ends = (statement.connector,) if isinstance(statement, FreeEnd) else statement.ends
         foreign = [end for end in ends if not _is_within(end, scope)]
         if foreign:
@@ -52,7 +52,7 @@ class Wiring:
         for end in ends:
             if type(end) is not type(ends[0]):
                 self.errors.append(_different_kinds(ends[0], end, source))
-                # That they are not connected now is a consequence, not another mistake.
+                # Their missing connection is a consequence, not another error.
                 self.freed.update(id(one) for one in ends)
                 return
         keys = [self._key(scope, end, source) for end in ends]
@@ -84,7 +84,7 @@ class Wiring:
         yield from groups.values()
 
     def is_connected(self, connector: Connector) -> bool:
-        """Tell whether something is connected to it from outside its component."""
+        """Return whether it is connected from outside its component."""
         return (id(connector), True) in self.parent
 
     def _add_signals(self, scope: Component, statement: Connection) -> None:

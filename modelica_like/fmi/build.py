@@ -1,4 +1,4 @@
-"""Compile the C sources of an FMU: by this machine's compiler, or by zig for any platform."""
+"""Compile the C sources of an FMU with this machine's compiler, or with zig for any platform."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ _FLAGS = (
     "-std=c99", "-O2", "-ffp-contract=off", "-fvisibility=hidden", "-s", "-Wall", "-Wextra", "-DOLD_GLIBC",
 )  # fmt: skip
 _LINKING = {
-    # The caller's buffers lie in the module's memory. It needs nothing from outside.
+    # The caller's buffers are in the module's memory; it imports nothing.
     ".wasm": ("-mexec-model=reactor", "-Wl,--export-dynamic,--export=realloc"),
     ".dll": ("-shared",),  # Windows has the mathematical functions in its C runtime
 }
@@ -88,7 +88,7 @@ def native_platform() -> str:
 
 
 def chosen_platforms(platforms: Sequence[str] | str, there: Iterable[str] = PLATFORMS) -> tuple[str, ...]:
-    """Return the names of platforms, out of those that are there, that are asked for by names, `native` or `all`.
+    """Return the requested platforms among the available ones: names, `native` or `all`.
 
     Raises:
         UnknownName: there is no such platform.
@@ -110,8 +110,8 @@ def _check_known(platform: str, known: Collection[str]) -> None:
 def build(sources: Mapping[str, str], platform: str, output_dir: Path, identifier: str = "model") -> Path:
     """Compile sources to a shared library, which is returned and exports the FMI functions only.
 
-    This machine's platform is compiled by `$CC`, cc, gcc or clang, or by zig where none of these is found; all others
-    by zig.
+    `$CC`, cc, gcc or clang compiles for this machine, or zig if none of these is found; zig compiles for all other
+    platforms.
 
     Args:
         sources: file name to text, as `generate` returns them.
@@ -143,7 +143,7 @@ def build(sources: Mapping[str, str], platform: str, output_dir: Path, identifie
 
 
 def _wholes(names: Iterable[str]) -> dict[str, str]:
-    """Join C files, as what all of them include is then read once; those of FMI 2 and 3 stay apart."""
+    """Join C files, so that common headers are read once; those of FMI 2 and 3 stay separate."""
     wholes: dict[str, str] = {}
     for name in names:
         group = name[:4] if name.startswith(("fmi2", "fmi3")) else ""
@@ -175,7 +175,7 @@ def compiler_command(platform: str) -> list[str]:
 
 
 def _run(command: list[str], folder: str, platform: str) -> None:
-    # What is compiled on a Mac runs on older ones, too, as its wheel says.
+    # A library compiled on a Mac also runs on older ones, as its wheel says.
     environment = {**os.environ, "MACOSX_DEPLOYMENT_TARGET": "11.0"}
     result = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
     if result.returncode != 0:

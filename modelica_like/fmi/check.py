@@ -1,4 +1,4 @@
-"""What is checked before an FMU is handed over: its description by the schemas, its run against IDAS."""
+"""Checks of an exported FMU: its description against the schemas, its run against IDAS."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def problems(path: str | Path) -> list[str]:
     """Check an FMU without running it: schemas, names, units, structure, terminals, files.
 
     Returns:
-        What is wrong, in the words of the validators; empty if nothing is.
+        The messages of the validators; empty without errors.
     """
     found = description_problems(path)
     with zipfile.ZipFile(path) as archive:
@@ -86,13 +86,13 @@ def _terminal_problems(content: bytes, description: bytes, names: set[str]) -> l
 
 @dataclass(frozen=True)
 class Check:
-    """What the run of an FMU against IDAS has shown.
+    """Result of the comparison of an FMU with IDAS.
 
     Attributes:
-        sentence: what is to be told; empty where they agree.
-        curves: both runs, where both came to their end; the states by their deviation.
-        differs: they are further apart than solvers at the FMU's tolerance are, or the FMU failed.
-        picture: where the curves that differ are drawn.
+        sentence: message; empty if they agree.
+        curves: both runs, if both finished; states sorted by deviation.
+        differs: whether they differ by more than solvers at the FMU's tolerance do, or the FMU failed.
+        picture: file with the curves that differ.
     """
 
     sentence: str = ""
@@ -104,14 +104,14 @@ class Check:
 def compare_with_idas(path: Path, model: CompiledDae, kind: Literal["me", "cs"], fixed_step: float = 0.0) -> Check:
     """Run the first tenth of an FMU's time, or with fixed steps the whole, and compare its states with IDAS.
 
-    Their difference is judged by what tolerances do, as fast oscillations drift in phase: where it is more than 1e-4 of
-    a state's range, it may be ten times that between IDAS at the FMU's tolerance and IDAS at a fine one. The error of
-    fixed steps is told by variable.
+    The limit takes tolerances into account, because fast oscillations drift in phase: above 1e-4 of a state's range,
+    ten times the difference between IDAS at the FMU's tolerance and IDAS at a fine one is allowed. The error of fixed
+    steps is reported by variable.
 
     Args:
         path: the FMU.
         model: the model in it.
-        kind: which part of it runs.
+        kind: `me` or `cs`.
         fixed_step: size of its fixed steps in s.
     """
     until, rtol = seconds(model.settings.get("until", "1 s")), float(model.settings.get("rtol", Options.rtol))
@@ -124,7 +124,7 @@ def compare_with_idas(path: Path, model: CompiledDae, kind: Literal["me", "cs"],
     fails, unknown = f"The FMU fails in the first {end:g} s of its run.", "The FMU runs, but nothing was compared"
     if fixed_step:
         fails, unknown = (f"{text} of {fixed_step:g} s {rest}" for text, rest in _FIXED)
-    modes = (one.path for one in model.flat_discretes if one.names)  # by whose changes curves are matched
+    modes = (one.path for one in model.flat_discretes if one.names)  # modes, whose changes match the curves
     try:
         run = run_fmu(path, stop=end, kind=kind, step=step, outputs=[*nominals, *modes])
         truth = _idas(model, end, points, _TRUTH, rtol)
@@ -150,12 +150,12 @@ def compare_with_idas(path: Path, model: CompiledDae, kind: Literal["me", "cs"],
 
 
 def communication_step(end: float, step: float, points: int) -> float:
-    """Return a whole number of fixed steps, about `points` of which make a run."""
+    """Return a whole number of fixed steps, such that a run has about `points` of them."""
     return step * max(1, round(end / points / step))
 
 
 def _idas(model: CompiledDae, end: float, points: int, *tolerances: float) -> Solution:
-    """Run with the first of the tolerances that leads to the end."""
+    """Run with the first tolerance that succeeds."""
     first, *rest = tolerances
     try:
         return simulate(model, end, points=points, rtol=first, atol=first / 100, solver="idas")

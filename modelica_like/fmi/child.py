@@ -1,4 +1,4 @@
-"""Runs one FMU with FMPy, in a process of its own: python child.py FOLDER."""
+"""Runs one FMU with FMPy in a separate process: python child.py FOLDER."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from modelica_like.fmi.inside import DISCRETE, REAL, Job, Messages, Refused, abo
 Side = Literal["left", "right"]
 KINDS = {"me": "ModelExchange", "cs": "CoSimulation"}
 POINTS = 500
-"""Number of equal intervals where nobody says anything, as in simulations."""
+"""Default number of equal intervals, as in simulations."""
 _TIME_RESOLUTION = 1e-12
 
 
@@ -47,7 +47,7 @@ class EventLocator:
         self._state, self._from = self._save(), time
 
     def free(self) -> None:
-        """Give the saved state back."""
+        """Free the saved state."""
         if self._state is not None:
             self._free(self._state)
             self._state = None
@@ -67,7 +67,7 @@ class EventLocator:
         return self._sample(self._from + step)
 
     def _step_through(self, end: float) -> None:
-        """Go to the end again, with both sides of every mode change on the way."""
+        """Repeat the step to its end, with both sides of every mode change."""
         while self._from < end:
             before = self._modes(self._probe(0.0))
             if self._modes(row := self._probe(end - self._from)) == before:
@@ -102,7 +102,7 @@ def check_names(job: dict[str, Any], causality: dict[str, str]) -> None:
     """Refuse parameters, inputs and outputs that the FMU does not have.
 
     Args:
-        job: what was asked for.
+        job: the request.
         causality: of every variable.
     """
     for name in [*job["parameters"], *(job["outputs"] or ()), *job["inputs"]]:
@@ -115,7 +115,7 @@ def check_names(job: dict[str, Any], causality: dict[str, str]) -> None:
 
 
 def interpolate(series: Any, times: Any, side: Side) -> Any:
-    """Return a series of (time, value) at times: straight lines; where it jumps, its `left` or `right` value."""
+    """Interpolate a series of (time, value) linearly; at jumps take its `left` or `right` value."""
     known, values = np.transpose(series)
     if len(known) == 1:
         return np.full(np.shape(times), values[0])
@@ -126,7 +126,7 @@ def interpolate(series: Any, times: Any, side: Side) -> Any:
 
 
 def input_table(inputs: dict[str, Any]) -> Any:
-    """Return inputs as FMPy wants them: a row for every instant, two where one of them jumps."""
+    """Return inputs in FMPy's form: a row for every time, two where an input jumps."""
     if not inputs:
         return None
     times = np.unique(np.concatenate([s[:, 0] for s in inputs.values()]))
@@ -140,10 +140,11 @@ def input_table(inputs: dict[str, Any]) -> Any:
 
 
 class Ramps:
-    """Gives an FMU inputs that move.
+    """Gives an FMU time-varying inputs.
 
-    A slave gets their slopes where it takes them, else their means over short steps; FMPy would hold them for a step.
-    In Model Exchange they follow every time that is set; FMPy's solver would keep those of its last look at indicators.
+    A slave gets their slopes if it supports them, otherwise their means over short steps; FMPy would hold them for a
+    step. In Model Exchange they are set at every time; FMPy's solver would keep those of its last evaluation of
+    indicators.
     """
 
     def __init__(self, fmu: Any, description: Any, inputs: dict[str, Any], kind: str, start: float) -> None:
@@ -165,21 +166,21 @@ class Ramps:
             self._resume, fmu.enterContinuousTimeMode = fmu.enterContinuousTimeMode, self.resume
 
     def set_time(self, time: float) -> None:
-        """Set the time, and the inputs of this time; behind a jump those before it hold until its event."""
+        """Set the time and its inputs; the inputs before a jump hold until its event."""
         self._set_time(time)
         self._now = time
         place = min(max(time, self._begin), self._end)
         self._set(self._values(place, "left" if place > self._begin else "right"))
 
     def resume(self) -> None:
-        """Go on after an event."""
+        """Continue after an event."""
         self._resume()
         self._begin = self._now
         jumps = (t for s in self._series for t in s[1:, 0][np.diff(s[:, 0]) == 0] if t > self._begin)
         self._end = min(jumps, default=math.inf)
 
     def step(self, currentCommunicationPoint: float, communicationStepSize: float, **rest: Any) -> Any:
-        """Do a step in pieces: in each, inputs are straight and, without slopes, move little."""
+        """Divide a step into pieces: in each, inputs are linear and, without slopes, change little."""
         done: Any = None
         end = currentCommunicationPoint + communicationStepSize
         grid = self._grid(currentCommunicationPoint, end)
@@ -217,7 +218,7 @@ class Ramps:
 
 
 def output_step(job: dict[str, Any], stop: float, suggested: Any) -> float | None:
-    """Return the communication step; None is what the FMU suggests."""
+    """Return the communication step; None means that suggested by the FMU."""
     if job["step"] is not None and not job["points"]:
         return job["step"]
     if suggested is not None and not job["points"]:
@@ -235,7 +236,7 @@ def can_locate(description: Any, kind: str) -> bool:
 
 
 def watcher(job: Job, description: Any, kind: str) -> Callable[[float, Recorder], bool]:
-    """Return what is to be done after every step: tell the time, locate mode changes."""
+    """Return the callback after every step: report the time, locate mode changes."""
     locators: list[EventLocator] = []
 
     def after_step(time: float, recorder: Recorder) -> bool:

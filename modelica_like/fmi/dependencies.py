@@ -1,4 +1,4 @@
-"""What depends on what: the true sparsity, through implicit equations and through the initialization."""
+"""Dependencies of variables: the true sparsity, through implicit equations and the initialization."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ Rows = list[set[Known]]
 
 @dataclass(frozen=True)
 class Following:
-    """What follows what at once, through the implicit equations of a model."""
+    """Direct dependencies through the implicit equations of a model."""
 
     model: CompiledDae
 
     def inputs_of(self, position: int) -> set[int]:
-        """Numbers of the inputs that a variable follows at once."""
+        """Numbers of the inputs on which a variable depends directly."""
         return {k for name, k in self._through_implicit(self._row("variables", position)) if name == "u"}
 
     @cached_property
@@ -41,7 +41,7 @@ class Following:
 
     @cached_property
     def _implicit(self) -> Rows:
-        """What each implicit unknown depends on, by its own block and those before."""
+        """Dependencies of each implicit unknown, by its own block and those before."""
         rows = sparsity_rows(self.model.alg)
         own = [{k for name, k in row if name == "z"} for row in rows]
         return solved_rows(own, [{one for one in row if one[0] != "z"} for row in rows], len(rows))
@@ -53,12 +53,12 @@ class Following:
 
 @dataclass(frozen=True)
 class Dependencies(Following):
-    """Dependencies of a model's unknowns on what an importer sets, by value references."""
+    """Dependencies of a model's unknowns on the variables set by an importer, by value references."""
 
     interface: Interface
 
     def continuous(self, unknown: FmuVariable) -> list[int]:
-        """Time, states and inputs on which a derivative, output or event indicator depends while the model runs."""
+        """Time, states and inputs on which a derivative, output or event indicator depends during a run."""
         found = self._through_implicit(self._own(unknown))
         return self._references(found, ("t", "x", "u"))
 
@@ -83,7 +83,7 @@ class Dependencies(Following):
     # -- initialization ----------------------------------------------------------------------------------------------
 
     def _at_start(self, row: Iterable[Known]) -> set[Known]:
-        """Replace states, implicit unknowns and modes by what determines them at the start."""
+        """Replace states, implicit unknowns and modes by their dependencies at the start."""
         found: set[Known] = set()
         for name, k in self._through_implicit(set(row)):
             if name == "x":
@@ -96,7 +96,7 @@ class Dependencies(Following):
 
     @cached_property
     def _initial_modes(self) -> Rows:
-        """Modes by their start conditions, discrete values by their start; shares by all that decides modes."""
+        """Modes depend on their start conditions, discrete values on their start, shares on all that decides modes."""
         rows: Rows = [set() for _ in range(self.model.discrete_size)]
         for circuit in self.model.circuits:
             count = len(circuit.members)
@@ -112,7 +112,7 @@ class Dependencies(Following):
         return rows
 
     def _start_value(self, position: int) -> set[Known]:
-        """A start value: what an importer sets, or the formula behind it."""
+        """A start value: set by an importer, or its formula."""
         return {("start", position)} | {one for one in self._row("start_values", position) if one[0] in "tpu"}
 
     @cached_property
@@ -131,13 +131,13 @@ class Dependencies(Following):
         return rows
 
     def _solved_starts(self, tables: StartTables, direct: Rows) -> Rows:
-        """What the unknowns of the start system depend on, by its block triangular form."""
+        """Dependencies of the unknowns of the start system, by its block triangular form."""
         place = {column: k for k, column in enumerate(tables.columns)}
         nx = len(self.model.states)
         ny = tables.system.size1_out(0)
         offsets = {"x": 0, "y": nx, "z": nx + ny}
         given = {row: position for position, _, row in tables.rows if position != AT_REST}
-        # Reactions that modes leave open stay at their guesses.
+        # Undetermined reactions keep their guesses.
         guessed = {nx + ny + z: self._start_value(position) for z, position, _ in tables.z_guesses}
         every = sparsity_rows(tables.system, output=2) if tables.columns else []
         own: list[set[int]] = []
@@ -181,7 +181,7 @@ def sparsity_rows(function: Any, output: int = 0) -> Rows:
 
 
 def solved_rows(own: Sequence[set[int]], outer: Rows, unknowns: int) -> Rows:
-    """What each unknown of a square system depends on.
+    """Dependencies of each unknown of a square system.
 
     Args:
         own: unknowns in each equation.

@@ -50,7 +50,7 @@ class Export:
         kinds: `me`, `cs` or both.
         platforms: names of the platforms it has binaries for.
         size: of the file in bytes.
-        seconds: how long it took.
+        seconds: wall time.
         check: how it compares with IDAS.
     """
 
@@ -89,24 +89,24 @@ def export_fmu(
         version: FMI version, `2.0` or `3.0`.
         kind: `me` (Model Exchange), `cs` (Co-Simulation) or both.
         platforms: `native`, `all`, names such as `x86_64-windows`, or none for sources only.
-        outputs: patterns of further variables that are to be outputs, such as `*.w`.
-        ends: free connectors of parts that are to be open, such as `load.flange_b`.
+        outputs: patterns of additional outputs, such as `*.w`.
+        ends: free connectors of parts to open, such as `load.flange_b`.
         takes: what open ends take from outside: the `flow` (torque, force, current, heat flow) or the `potential`.
-        embed: compile the model into the binaries, for importers that do not tell where resources are.
-        modes: `output` (enumerations), `local` (enumerations that are no outputs), or `integer` (outputs).
+        embed: compile the model into the binaries, for importers that do not pass the location of resources.
+        modes: `output` (enumerations), `local` (enumerations without output), or `integer` (outputs).
         fixed_step: step size of Co-Simulation in s, or such as "1 ms", for hardware in the loop: the work of a step is
             bounded, and a communication step is a whole number of them. By default accuracy chooses the steps.
-        tables: patterns of tables whose numbers are to be tunable parameters, such as `clutch.mu_pos`: an array each in
-            FMI 3, scalars `clutch.mu_pos[2,1]` in FMI 2.
+        tables: patterns of tables whose numbers become tunable parameters, such as `clutch.mu_pos`: arrays in FMI 3,
+            scalars `clutch.mu_pos[2,1]` in FMI 2.
         check: run the FMU, if it has a binary for this machine, against IDAS; a picture shows where they differ.
         strict: do not write an FMU that differs from IDAS.
-        report: called with what is being done.
+        report: called with the present activity.
 
     Raises:
-        ExportError: it cannot be exported or compiled, or has a fault; nothing is written then.
-        UnknownName: there is no such version, kind, platform, connector, variable or way of modes.
+        ExportError: it cannot be exported or compiled, or fails a check; nothing is written then.
+        UnknownName: there is no such version, kind, platform, connector, variable or `modes`.
         MissingExtra: binaries for other platforms need zig.
-        ModelicaLikeError: something is wrong with the model.
+        ModelicaLikeError: the model has an error.
     """
     begin, tell, target = time.perf_counter(), report or silent, target_file(path, ".fmu", "An FMU")
     chosen, kinds, names = known_version(version, Version, "FMI"), _kinds(kind), chosen_platforms(platforms)
@@ -212,7 +212,7 @@ def tool() -> str:
 def _contents(
     model: CompiledDae, variables: Interface, about: About, equations: Listing, embed: bool
 ) -> dict[str, bytes]:
-    """Return all files but the binaries, under a token that follows from their content."""
+    """Return all files except the binaries, with a token from their content."""
     texts = {"modelDescription.xml": model_description(model, variables, about)}
     texts |= {f"sources/{name}": text for name, text in runtime_sources((about.version,)).items()}
     texts["documentation/index.html"] = index_page(variables, about.description, about.tool, equations)
@@ -236,7 +236,7 @@ def _contents(
 
 
 def _token(texts: dict[str, str], data: bytes) -> str:
-    """A GUID that follows from the content: the same model has the same."""
+    """A GUID that is a hash of the content."""
     total = hashlib.sha256(data)
     for name in sorted(texts):
         total.update(f"{name}\0{texts[name]}\0".encode())
@@ -247,7 +247,7 @@ def _token(texts: dict[str, str], data: bytes) -> str:
 def _binaries(
     files: dict[str, bytes], name: str, version: Version, platforms: tuple[str, ...], embed: bool, tell: Report
 ) -> dict[str, bytes]:
-    """Return the run-time for each platform, or one with the model compiled in, by its place."""
+    """Return the run-time for each platform, or one with the model compiled in, by path in the FMU."""
     home = "sources/"
     sources = {place.removeprefix(home): text.decode() for place, text in files.items() if place.startswith(home)}
     own = {file: text for file, text in sources.items() if file.endswith((".c", ".h"))}
@@ -265,7 +265,7 @@ def _binaries(
 def _written(
     files: dict[str, bytes], target: Path, model: CompiledDae, about: About, run: bool, strict: bool
 ) -> Check:  # fmt: skip
-    """Write an FMU whose parts have no fault, after a run against IDAS; draw curves that differ next to it."""
+    """Write an FMU that passes its checks, after a comparison with IDAS; draw curves that differ next to it."""
     with replacing(target) as draft:
         write_archive(draft, files)
         found = problems(draft)

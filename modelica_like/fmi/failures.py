@@ -1,4 +1,4 @@
-"""What a process that runs FMUs has left to tell, in sentences."""
+"""Messages for errors reported by processes that run FMUs."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from modelica_like.errors import FmuFailed, FmuRefused, ModelicaLikeError, Unkno
 from modelica_like.fmi.unpack import printable
 
 Failures = dict[str, tuple[type[ModelicaLikeError], str, str, str]]
-"""What it is, and the sentences what, why and what to do, by the kind of failure."""
+"""Error class and the sentences what, why and advice, by the kind of failure."""
 
 FAILURES: Failures = {
     "unknown": (UnknownName, "{unit} has no variable '{name}'{hint}", "", ""),
@@ -27,13 +27,13 @@ FAILURES: Failures = {
 
 
 def tell_error(folder: Path, units: Mapping[str, str], failures: Failures = FAILURES, **words: str) -> None:
-    """Raise what the process has left to tell.
+    """Raise the error that the process has reported.
 
     Args:
-        folder: its workplace.
-        units: what to call the FMUs, by their names in the job.
-        failures: what can go wrong.
-        words: further words of the sentences.
+        folder: of the process.
+        units: names of the FMUs for messages, by their names in the job.
+        failures: known kinds of failure.
+        words: more values for the sentences.
     """
     if not (folder / "error.json").exists():
         return

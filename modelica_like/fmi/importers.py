@@ -1,6 +1,6 @@
-"""Runs one Co-Simulation FMU with somebody else's importer: python importers.py FOLDER.
+"""Runs one Co-Simulation FMU with another importer: python importers.py FOLDER.
 
-The folder is as `inside.py` says; the values at the end are left in `meta.json`.
+The folder has the layout of `inside.py`; the values at the end are written to `meta.json`.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ _NANOSECONDS = 1e9
 
 
 class ImporterFailed(Exception):
-    """An importer told that it could not do what it was asked for."""
+    """An importer reported that it could not do a request."""
 
 
 def installed(importer: str) -> bool:

@@ -1,8 +1,8 @@
-"""What processes that run foreign FMUs have in common, seen from inside.
+"""Common code inside the processes that run foreign FMUs.
 
-A folder holds `job.json` and unpacked FMUs. What came out is left there: `result.npy` and `meta.json`, or `error.json`;
-`progress` holds the time reached and the number of the FMU that was called last. The process starts fast: nothing else
-of the package is imported here.
+A folder contains `job.json` and unpacked FMUs. Results are written there: `result.npy` and `meta.json`, or
+`error.json`; `progress` holds the time reached and the number of the FMU that was called last. The process starts fast:
+nothing else of the package is imported here.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _MESSAGES = 20
 
 
 class Refused(Exception):
-    """What was asked for cannot be done; `detail` says why, for the process that asked."""
+    """A request cannot be done; `detail` is the reason, for the process that asked."""
 
     def __init__(self, **detail: Any) -> None:
         super().__init__(str(detail))
@@ -32,7 +32,7 @@ class Refused(Exception):
 
 
 class Messages(list[str]):
-    """The last messages of an FMU; called by it."""
+    """The last messages of an FMU, which calls this object."""
 
     def __call__(self, *arguments: Any) -> None:
         """Keep a message, the last of the arguments."""
@@ -42,10 +42,10 @@ class Messages(list[str]):
 
 
 class Job:
-    """What is to be done in a folder, and who is at work.
+    """The job of a folder, and the FMU that is running.
 
     Attributes:
-        asked: what `job.json` says.
+        asked: content of `job.json`.
         messages: of each FMU by its name.
         unit: name of the FMU that was called last.
     """
@@ -60,16 +60,16 @@ class Job:
             self._place = mmap.mmap(file.fileno(), PLACE.size)
 
     def reach(self, time: float) -> None:
-        """Tell the time reached."""
+        """Write the time reached."""
         self._place[:8] = struct.pack("d", time)
 
     def call(self, number: int, unit: str) -> None:
-        """Tell which FMU is called now."""
+        """Write which FMU is called now."""
         self.unit = unit
         self._place[8:] = struct.pack("q", number)
 
     def leave(self, meta: dict[str, Any], name: str = "meta.json") -> Path:
-        """Leave what is to be known, whole or not at all; `meta.json` is the end of the work."""
+        """Write a result, completely or not at all; `meta.json` ends the job."""
         (self.folder / "draft").write_text(json.dumps(meta))
         return (self.folder / "draft").rename(self.folder / name)
 
@@ -81,14 +81,14 @@ class Job:
 
 
 def savings(fmu: Any, version: str) -> tuple[Any, Any, Any]:
-    """Return the functions of an FMU that save a state, go back to it, and give it back."""
+    """Return the functions of an FMU that save, restore and free a state."""
     name = "FMUstate" if version == "2.0" else "FMUState"
     save, load, free = (getattr(fmu, f"{verb}{name}") for verb in ("get", "set", "free"))
     return save, load, free
 
 
 def about(variable: Any) -> dict[str, Any]:
-    """Return what is to be known about a variable, by the names of `RecordedVariable`."""
+    """Return the attributes of a variable, by the names of `RecordedVariable`."""
     declared = variable.declaredType
     return {
         "path": variable.name,

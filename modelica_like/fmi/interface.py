@@ -1,4 +1,4 @@
-"""The FMI variables of a compiled model: what an importer sees, and where each value lives."""
+"""The FMI variables of a compiled model, and the place of each value."""
 
 from __future__ import annotations
 
@@ -32,15 +32,15 @@ class FmuVariable(NamedTuple):
 
     Attributes:
         reference: value reference; the position among all variables.
-        initial: None where FMI knows only one choice (inputs, parameters, time).
-        slot: where the value lives, and its position there. Only the name of a state itself has the slot `state`; other
+        initial: None where FMI allows only one choice (inputs, parameters, time).
+        slot: storage of the value, and its position there. Only the name of a state itself has the slot `state`; other
             names of the same motion are variables.
         unit: unit of `start`, `min`, `max` and `nominal`; it is coherent, or `1` or `*`.
-        start: start value, where it has one.
+        start: start value, if it has one.
         start_entry: position in the model's `starts` of the start value that an importer replaces when it sets this.
         derivative_of: value reference of the variable whose time derivative this is.
         modes: names of a mode's values, from zero.
-        elements: of an array: value references of its numbers, which follow each other, row by row.
+        elements: of an array: consecutive value references of its numbers, row by row.
         dimensions: of an array: number of rows, and of columns.
     """
 
@@ -73,9 +73,9 @@ class Interface:
         states, derivatives: value references in the order of x.
         outputs: value references of continuous and discrete outputs.
         indicators: value references of the event indicators, in the order of the guards.
-        start: what start values determine.
-        reach: what the variables depend on at once.
-        arrays: tables whose numbers are parameters, as FMI 3 knows them; their references follow those of variables.
+        start: start tables.
+        reach: direct dependencies of the variables.
+        arrays: tables whose numbers are parameters, as arrays of FMI 3; their references follow those of variables.
     """
 
     name: str
@@ -102,17 +102,17 @@ class Interface:
 
 
 def interface(model: CompiledDae, outputs: Sequence[str] = (), modes: ModesAs = "output") -> Interface:
-    """List the FMI variables of a model, by the names they have in Python.
+    """List the FMI variables of a model, with the same names as in Python.
 
     Signal outputs of components and modes are outputs, inputs of the model are inputs, everything else is local.
 
     Args:
         model: the compiled model.
-        outputs: patterns of further variables that are to be outputs, such as `load.w` or `*.tau`.
-        modes: whether modes are outputs of an enumeration type, local variables of one, or integer outputs.
+        outputs: patterns of additional outputs, such as `load.w` or `*.tau`.
+        modes: `output` (enumerations), `local` (enumerations without output), or `integer` (outputs).
 
     Raises:
-        UnknownName: no variable has a name of such a pattern.
+        UnknownName: no variable matches a pattern.
         MissingStart, ContradictingStart: the start values do not determine all states.
     """
     build = _Builder(model, outputs)
@@ -175,12 +175,12 @@ class _Builder:
             elif one.path in states:
                 slot, start = ("state", states[one.path]), self.starts.of_variable(k)
                 self.states[slot[1]] = self.add(one.path, slot, causality, **start, **about)
-            elif one.path not in taken:  # the value of an input that a parameter gives is that parameter
+            elif one.path not in taken:  # an input with a value from a parameter is that parameter
                 start, variability = self.starts.of_variable(k), self.depends[k]
                 if start["initial"] != "calculated":
                     variability = "continuous"
                 elif causality == "output" and variability == "tunable":
-                    variability = "discrete"  # an output cannot be less
+                    variability = "discrete"  # an output cannot become local
                 self.add(one.path, ("variable", k), causality, variability, **start, **about)
 
     def rates(self) -> None:
@@ -246,7 +246,7 @@ def _table_text(numbers: Sequence[FmuVariable], dimensions: tuple[int, ...]) -> 
 
 
 def fmi_name(name: str) -> str:
-    """Write nested derivatives as FMI's structured names want them: `der(der(a.b))` becomes `der(a.b,2)`."""
+    """Write nested derivatives as structured names of FMI: `der(der(a.b))` becomes `der(a.b,2)`."""
     depth = name.count("der(") if name.startswith("der(") else 0
     return name if depth < 2 else f"der({name[4 * depth : -depth]},{depth})"
 
@@ -297,7 +297,7 @@ class _Starts:
         self._of_variable = {entry.node: k for k, entry in reversed([*enumerate(model.starts)]) if k in used}
 
     def of_variable(self, k: int) -> dict[str, Any]:
-        """Start value of a flat variable: the one that was given for this very name."""
+        """Start value of a flat variable, given for exactly this name."""
         number = self._of_variable.get(k)
         if number is None:
             return {"initial": "calculated"}

@@ -1,4 +1,4 @@
-"""The file that the compiled run-time reads a model from: tables and tapes as they lie in memory.
+"""The model file of the compiled run-time: tables and tapes in the layout of the memory.
 
 A header (magic, format, number of sections, CRC-32 of the rest, size), one entry per section (number, size of a record,
 offset, count), then the sections, each aligned to 8 bytes. All is little-endian; texts are offsets in the section
@@ -28,7 +28,7 @@ ABSOLUTE_TO_RELATIVE = 1e-2
 
 DEFAULT_TOLERANCE = 1e-7
 MODEL = "resources/model.bin"
-"""Where the file stands in an FMU."""
+"""Path of the file in an FMU."""
 FORMAT = 2
 _MAGIC = b"MLMODEL\0"
 _HEADER = struct.Struct("<8siiII")
@@ -104,11 +104,11 @@ def model_file(
     """Write the file of a model.
 
     Args:
-        tables: everything about the model.
+        tables: of the model.
         variables: its FMI variables.
         token: GUID (2.0) or instantiation token (3.0) of the description.
-        tolerance: relative tolerance of Co-Simulation where the importer gives none.
-        fixed_step: step size of Co-Simulation in s, 0 for one that accuracy asks for.
+        tolerance: relative tolerance of Co-Simulation if the importer gives none.
+        fixed_step: step size of Co-Simulation in s, 0 for adaptive steps.
     """
     text = _Text()
     contents = _contents(tables, variables, tolerance, fixed_step, text)
@@ -153,7 +153,7 @@ def generate(
 
 
 class _Text:
-    """Texts one after the other; each is told by where it begins."""
+    """Texts one after the other; each is identified by its offset."""
 
     def __init__(self) -> None:
         self.places = {"": 0}
@@ -222,7 +222,7 @@ def _events(model: CompiledDae, text: _Text) -> dict[str, Any]:
 
 
 def _counted(counts: Iterable[int]) -> list[tuple[int, int]]:
-    """Pairs of the first one and the number."""
+    """Pairs of first entry and count."""
     found: list[tuple[int, int]] = []
     for count in counts:
         found.append((sum(found[-1]) if found else 0, count))
@@ -249,7 +249,7 @@ def _holds(model: CompiledDae, text: _Text) -> dict[str, Any]:
 
 
 def _moved_from_outside(model: CompiledDae) -> set[int]:
-    """Variables that something but states moves, such as a source of motion."""
+    """Variables that are not determined by states alone, such as those of a source of motion."""
     if not model.circuits:
         return set()
     moving = (model.variables.name_in().index(name) for name in ("t", "u", "d"))
@@ -257,7 +257,7 @@ def _moved_from_outside(model: CompiledDae) -> set[int]:
 
 
 def _notice(path: str, notice: str) -> str:
-    """Put the component's name before what is told, and parameters' names where their values would be."""
+    """Put the component's name before a notice, and names of parameters in place of their values."""
     told = re.sub(r"\{(.*?)\}", r"\1", notice)
     return f"{path.rpartition('.')[0]} {told}".strip() if notice else ""
 

@@ -1,4 +1,4 @@
-"""FMU files and other archives: what they may be called, and the same bytes for the same content."""
+"""FMU files and other archives: valid names, and the same bytes for the same content."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _LIBRARY = 0o755 << 16
 
 
 def write_archive(path: Path, files: Mapping[str, bytes]) -> None:
-    """Write files to a zip archive, the description first, the others by name; no clock, no user goes in.
+    """Write files to a zip archive, the description first, the others by name, without time and user.
 
     Args:
         path: the archive; it is replaced.
@@ -37,8 +37,8 @@ def target_file(path: str | Path, ending: str, what: str) -> Path:
 
     Args:
         path: the file.
-        ending: what its name must end with.
-        what: what it is to be, such as `An FMU`.
+        ending: required ending of its name.
+        what: kind of file, such as `An FMU`.
 
     Raises:
         ExportError: it has another ending, or there is no such folder.
@@ -54,7 +54,7 @@ def target_file(path: str | Path, ending: str, what: str) -> Path:
 
 
 def known_version(asked: str, versions: Any, standard: str) -> Any:
-    """Return the version of a standard that is asked for, one of a `Literal`.
+    """Return the requested version of a standard, a member of a `Literal`.
 
     Raises:
         UnknownName: there is no such version.

@@ -1,4 +1,4 @@
-"""Foreign code in a process of its own: what it does there, it does not do to us."""
+"""Foreign code in a separate process, which protects this one."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ _PACKAGES = Path(__file__).parents[2]
 
 @contextlib.contextmanager
 def workplace(job: Mapping[str, Any], fmus: Sequence[Path] = ()) -> Iterator[Path]:
-    """Yield a folder with a job and unpacked FMUs (`0`, `1`, …), as `inside.py` wants it.
+    """Yield a folder with a job and unpacked FMUs (`0`, `1`, …), for `inside.py`.
 
     Raises:
-        FmuRefused: a file is no FMU, or is unsafe to unpack.
+        FmuRefused: a file is not an FMU, or is unsafe to unpack.
         OSError: a file cannot be read.
     """
     with tempfile.TemporaryDirectory(prefix="modelica_like_", ignore_cleanup_errors=True) as work:
@@ -44,7 +44,7 @@ def run_child(name: str, script: Path, folder: Path, timeout: float, environment
     """Run a Python script on a workplace and wait for its end.
 
     Args:
-        name: what to call the FMU in messages.
+        name: of the FMU for messages.
         script: the script.
         folder: its argument and working directory.
         timeout: time limit in s.
@@ -55,7 +55,7 @@ def run_child(name: str, script: Path, folder: Path, timeout: float, environment
         FmuTimeout: the time limit was reached; the process is ended.
     """
     paths = os.pathsep.join(filter(None, (str(_PACKAGES), os.environ.get("PYTHONPATH", ""))))
-    # -P: the script's own folder is no place to import from.
+    # -P: do not import from the script's folder.
     command = [sys.executable, "-P", str(script), str(folder)]
     code = _wait(command, folder, timeout, {**os.environ, "PYTHONPATH": paths, **(environment or {})})
     if code is None:
@@ -68,7 +68,7 @@ def run_child(name: str, script: Path, folder: Path, timeout: float, environment
 
 
 def _wait(command: Sequence[str], folder: Path, timeout: float, environment: dict[str, str]) -> int | None:
-    """Return the exit code, or None at the time limit. What the FMU prints is not ours."""
+    """Return the exit code, or None at the time limit. Output of the FMU is discarded."""
     quiet = subprocess.DEVNULL
     with subprocess.Popen(
         command, cwd=folder, stdin=quiet, stdout=quiet, stderr=quiet, env=environment, start_new_session=True
@@ -83,7 +83,7 @@ def _wait(command: Sequence[str], folder: Path, timeout: float, environment: dic
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:
-    """End the process and whatever it has started."""
+    """End the process and its children."""
     with contextlib.suppress(ProcessLookupError, PermissionError):
         if os.name == "posix":
             os.killpg(process.pid, signal.SIGKILL)

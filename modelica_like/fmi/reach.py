@@ -1,4 +1,4 @@
-"""On which arguments the results of a function depend: exact, in a time that is linear in the size of the function.
+"""Arguments on which the results of a function depend: exact, in a time linear in the size of the function.
 
 CasADi's `jac_sparsity` gives the same, but takes quadratic time for a long chain of components.
 """
@@ -19,7 +19,7 @@ class Reach:
         output: number of the result, a column.
 
     Attributes:
-        rows: for every element of the result a number; its bits are the elements of all arguments, one after the other.
+        rows: a number for every element of the result; its bits are the elements of all arguments, one after the other.
     """
 
     def __init__(self, function: Any, output: int = 0) -> None:

@@ -1,4 +1,4 @@
-"""Run any FMU, safely, and look at it as at any other solution."""
+"""Run any FMU safely, and read it like any other solution."""
 
 from __future__ import annotations
 
@@ -28,32 +28,33 @@ def run_fmu(
     step: float | None = None, points: int | None = None, outputs: Sequence[str] | None = None,
     timeout: float = TIMEOUT, solver: Solver = "CVode",
 ) -> RecordedSolution:  # fmt: skip
-    """Run an FMU of FMI 1.0, 2.0 or 3.0 with FMPy, in a process of its own.
+    """Run an FMU of FMI 1.0, 2.0 or 3.0 with FMPy, in a separate process.
 
-    Mode changes of a Co-Simulation are located inside its communication steps, by event mode (FMI 3.0) or by stepping
-    again from a saved state, unless a mode comes and goes within one step; where an FMU can do neither, they are known
-    to a communication step.
+    Mode changes of a Co-Simulation are located inside its communication steps, by event mode (FMI 3.0) or by repeating
+    a step from a saved state, unless a mode comes and goes within one step. If an FMU supports neither, they are known
+    to one communication step.
 
     Args:
         path: the FMU.
         inputs: a number, or pairs (time in s, value), by name; linear in between, with jumps where a time is repeated.
-            A Co-Simulation gets their slopes where it takes them (FMI 2.0, `canInterpolateInputs`), else their means
-            over steps in which none moves by more than a five-hundredth of its range, or over its own fixed steps.
+            A Co-Simulation gets their slopes if it supports them (FMI 2.0, `canInterpolateInputs`), otherwise their
+            means over steps in which no input changes by more than a five-hundredth of its range, or over its own fixed
+            steps.
         parameters: start values of parameters and variables by name, in the FMU's units.
         start: start time in s.
         stop: end time in s; by default that of the FMU.
         kind: `me` (Model Exchange) or `cs` (Co-Simulation); by default `cs` if the FMU has it.
         tolerance: relative tolerance.
-        step: communication step, or interval of the results, in s; by default what the FMU suggests,
-            or a five-hundredth of the run.
+        step: communication step, or interval of the results, in s; by default that suggested by the
+            FMU, or a five-hundredth of the run.
         points: number of equal steps instead.
         outputs: variables to record; by default all that are not parameters.
         timeout: time limit in s.
         solver: of Model Exchange.
 
     Raises:
-        FmuRefused: the file is no FMU, is unsafe to unpack, or has not what was asked for.
-        FmuFailed: the FMU told an error; FmuCrashed: it took its process down; FmuTimeout: it did not end.
+        FmuRefused: the file is not an FMU, is unsafe to unpack, or lacks what was requested.
+        FmuFailed: the FMU reported an error; FmuCrashed: it crashed its process; FmuTimeout: it did not finish.
         UnknownName: it has no such variable.
         OSError: the file cannot be read.
     """

@@ -1,6 +1,6 @@
-"""The compiled run-time, the same for all models: shipped with the package, or built once and kept.
+"""The compiled run-time, the same for all models: shipped with the package, or built once and stored.
 
-This module needs the standard library only, so that building a wheel can import it.
+This module needs only the standard library, so that a wheel build can import it.
 """
 
 from __future__ import annotations
@@ -27,18 +27,18 @@ def _faces(platform: str) -> tuple[Face, ...]:
 def runtime_library(platform: str, report: Callable[[str], None] = lambda _: None) -> Path:
     """Return the compiled run-time for a platform, which reads its model.
 
-    It has the functions of FMI 2.0 and 3.0 and those of native.c; for a browser the latter only.
+    It has the functions of FMI 2.0 and 3.0 and those of native.c; for a browser only the latter.
 
-    A library belongs to its sources by a checksum in its name. The package's own one is taken, or one that was built
-    before; else it is built and kept in the user's cache.
+    The name of a library has a checksum of its sources. The package's own library is used, or one built before;
+    otherwise it is built and stored in the user's cache.
 
     Args:
         platform: a key of `RUNTIMES`.
-        report: called with what is being done, where it takes time.
+        report: called with the present activity, if it takes time.
 
     Raises:
         UnknownName: there is no such platform.
-        MissingExtra, ExportError: it must be built, and there is no compiler, or the compiler failed.
+        MissingExtra, ExportError: it must be built, but there is no compiler, or the compiler failed.
     """
     found = found_runtime(platform)
     if found is not None:
@@ -49,13 +49,13 @@ def runtime_library(platform: str, report: Callable[[str], None] = lambda _: Non
 
 
 def found_runtime(platform: str) -> Path | None:
-    """Return the library for a platform that belongs to the sources, if there is one."""
+    """Return the library for a platform and the present sources, if there is one."""
     homes = (folder / platform / _library_name(platform) for folder in (SHIPPED, cache_folder()))
     return next((home for home in homes if home.is_file()), None)
 
 
 def build_runtime(platform: str, folder: Path) -> Path:
-    """Compile the run-time for a platform into a folder, unless it is there; others may be reading in that folder."""
+    """Compile the run-time for a platform into a folder, unless it exists; others may read there at the same time."""
     library = folder / _library_name(platform)
     if library.is_file():
         return library
@@ -70,7 +70,7 @@ def _library_name(platform: str) -> str:
 
 
 def cache_folder() -> Path:
-    """Return where libraries are kept: `$MODELICA_LIKE_CACHE`, or a folder of the user."""
+    """Return the folder of libraries: `$MODELICA_LIKE_CACHE`, or a folder of the user."""
     given = os.environ.get("MODELICA_LIKE_CACHE")
     if given:
         return Path(given)

@@ -1,6 +1,6 @@
 """The C sources of the run-time: the same for all models.
 
-This module needs the standard library only, so that building a wheel can import it.
+This module needs only the standard library, so that a wheel build can import it.
 """
 
 from __future__ import annotations
@@ -48,10 +48,10 @@ def source_files(version: Version) -> tuple[str, ...]:
 
 
 def runtime_sources(faces: Iterable[Face]) -> dict[str, str]:
-    """Read the C sources of the run-time, with the functions by which it is called; no model is compiled in.
+    """Read the C sources of the run-time with its interfaces, without a model.
 
     Returns:
-        File name to text; besides C files the headers that they include.
+        File name to text: C files and their headers.
 
     Raises:
         ExportError: FMPy, which has the headers of the standard, is not installed.

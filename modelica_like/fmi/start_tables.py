@@ -1,6 +1,6 @@
-"""Which start values determine what, as tables.
+"""Effects of start values, as tables.
 
-The choice depends on the structure only, so it is made once, by the same code that starts a simulation.
+The choice depends only on the structure, so it is made once, by the code that starts a simulation.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ AT_REST = -1
 
 @dataclass(frozen=True)
 class StartTables:
-    """Start values by position, and what they determine.
+    """Start values by position, and their effects.
 
     Attributes:
         direct: (state, start value, factor) of states that are given.
@@ -32,7 +32,7 @@ class StartTables:
             implicit ones, and of variables at rest, the start value is `AT_REST`.
         dependent: the same for start values that must follow from the others.
         system: the start system.
-        zero: states that begin at zero because nothing else is said.
+        zero: states that start at zero because nothing else is given.
         columns: unknowns of the start system among (x, y, z).
         wanted: its rows.
         steady: states whose derivatives are zero in the steady start; None for another start.
@@ -52,10 +52,10 @@ class StartTables:
 
 
 def start_tables(model: CompiledDae) -> StartTables:
-    """Choose from the start values of a model as a simulation does.
+    """Choose from the start values of a model like a simulation.
 
     Raises:
-        MissingStart, ContradictingStart: they do not determine all states.
+        MissingStart, ContradictingStart: the start values do not determine all states.
     """
     point = Point(0.0, model.guesses.copy(), model.z_guesses.copy(), np.zeros(model.discrete_size))
     point.d = call(model, model.discrete_starts, point)
@@ -91,5 +91,5 @@ def start_tables(model: CompiledDae) -> StartTables:
 
 
 def _is_near(entry: StartEntry) -> bool:
-    """Whether an implicit unknown begins there: where it is guessed, or given."""
+    """Whether a start value is the first guess of an implicit unknown."""
     return entry.strength != "default" and entry.state is None

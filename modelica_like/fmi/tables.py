@@ -1,4 +1,4 @@
-"""Everything about a model that C code needs, as numbers: tapes, sparsity patterns, start values."""
+"""The data of a model for C code: tapes, sparsity patterns, start values."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from modelica_like.fmi.start_tables import StartTables, start_tables
 from modelica_like.fmi.tape import ARGUMENTS, Slots, Tape, write_tapes
 
 Pattern = dict[str, tuple[int, ...]]
-"""A square matrix by columns, with orderings and patterns of a QR factorisation, by their names in model.h.
+"""A square matrix by columns, with orderings and patterns of a QR factorization, by their names in model.h.
 
 `colind`, `row`: its columns; `v_colind`, `v_row`: columns of the Householder vectors, in permuted rows; `r_colind`,
 `r_row`: columns of R, the diagonal last; `row_place`: permuted position of every row; `column_order`: the matrix's
@@ -22,11 +22,11 @@ column at each permuted position.
 
 @dataclass(frozen=True)
 class Tables:
-    """Everything that model.c holds.
+    """The data of model.c.
 
     Attributes:
         step: pattern of M/(h gamma) - J.
-        to_step: position in it of every nonzero of the Jacobian, and `diagonal` of the diagonal of every state.
+        to_step: its positions of the nonzeros of the Jacobian; `diagonal`: of the diagonal of every state.
     """
 
     model: CompiledDae
@@ -54,7 +54,7 @@ def make_tables(model: CompiledDae, start: StartTables | None = None) -> Tables:
 
     Args:
         model: the compiled model.
-        start: its start tables, where they are known.
+        start: its start tables, if known.
 
     Raises:
         MissingStart, ContradictingStart: the start values do not determine all states.

@@ -15,7 +15,7 @@ import casadi as ca
 from modelica_like.errors import LanguageError
 
 ARGUMENTS = ("t", "x", "z", "p", "u", "d", "y")
-"""What tapes read: time, states, implicit unknowns, parameters, inputs, modes, and variables of the start system."""
+"""Arguments of tapes: time, states, implicit unknowns, parameters, inputs, modes, and variables of the start system."""
 
 OPERATIONS = (
     "ADD", "SUB", "MUL", "DIV", "NEG", "EXP", "LOG", "POW", "CONSTPOW", "SQRT", "SQ", "TWICE", "SIN", "COS", "TAN",
@@ -34,7 +34,7 @@ class Tape:
     """A function as operations on slots.
 
     Slots are [t, x, z, p, u, d, y, constants, results]; operation k writes result k. Equal operations follow each other
-    as far as their operands allow, so that C chooses what to do once per run of them.
+    as far as their operands allow, so that C dispatches once per group of them.
 
     Attributes:
         name: name of the function.
@@ -48,7 +48,7 @@ class Tape:
 
     @property
     def runs(self) -> tuple[tuple[str, int], ...]:
-        """Equal operations that follow each other: operation and their number."""
+        """Groups of equal operations: operation and count."""
         return tuple((name, len(list(group))) for name, group in groupby(name for name, _, _ in self.operations))
 
     def __repr__(self) -> str:
@@ -57,7 +57,7 @@ class Tape:
 
 @dataclass(frozen=True)
 class Slots:
-    """Where arguments and constants lie.
+    """Slots of arguments and constants.
 
     Attributes:
         sizes: number of values of every argument.
@@ -89,7 +89,7 @@ def write_tapes(functions: dict[str, Any], sizes: dict[str, int]) -> tuple[Slots
 
 
 def _read(name: str, function: Any, first: dict[str, int], base: int, constants: dict[float, int]) -> Tape:
-    """Read a function as it stands: results follow the arguments, and constants have numbers below zero."""
+    """Read a function unchanged: results follow the arguments, and constants have numbers below zero."""
     starts = [first[argument] for argument in function.name_in()]
     held: dict[int, int] = {}
     operations: list[tuple[str, int, int]] = []
@@ -120,7 +120,7 @@ def _read(name: str, function: Any, first: dict[str, int], base: int, constants:
 
 
 def _sorted(tape: Tape, places: dict[int, int], base: int) -> Tape:
-    """Reorder operations to long runs of equal ones: always those of which most are ready.
+    """Reorder operations into long groups of equal ones: always the kind of which most are ready.
 
     Args:
         tape: as `_read` returns it.
@@ -140,7 +140,7 @@ def _sorted(tape: Tape, places: dict[int, int], base: int) -> Tape:
     order: list[int] = []
     while any(ready.values()):
         chosen = ready[max(ready, key=lambda name: len(ready[name]))]
-        for k in chosen:  # grows while it is read: what becomes ready may join
+        for k in chosen:  # grows while it is read: operations that become ready can join
             order.append(k)
             for user in users[k]:
                 missing[user] -= 1

@@ -24,13 +24,13 @@ def with_open_ends(drive: Component, ends: Sequence[str] = (), takes: Takes = "f
     """Return a drive whose open ends have adaptors.
 
     Open ends are the connectors that the drive itself has (a netlist's `expose`), and free connectors of parts that are
-    named here. The adaptor of `gear.shaft` is the part `gear_shaft`, that of an own connector `shaft` is `shaft_end`. A
-    single component becomes a drive that has no other part, and all its connectors are open.
+    named in `ends`. The adaptor of `gear.shaft` is the part `gear_shaft`, that of an own connector `shaft` is
+    `shaft_end`. A single component becomes a drive with one part, and all its connectors are open.
 
     Args:
-        drive: the drive; it stays as it is.
+        drive: the drive, which is not changed.
         ends: paths of free connectors.
-        takes: what comes from outside: the `flow` (torque, force, current, heat flow) or the `potential`.
+        takes: quantity from outside: the `flow` (torque, force, current, heat flow) or the `potential`.
 
     Raises:
         UnknownName: there is no such connector.
@@ -63,7 +63,7 @@ def _opened(kind: type[Component]) -> type[Component]:
         def equations(self) -> Equations:
             ends = {id(connector_at(self, path)): path for path in self.__dict__["_ends"]}
             for statement in super().equations():
-                # What was declared to stay free is not free any more.
+                # Ends that were declared free are no longer free.
                 if not (isinstance(statement, FreeEnd) and id(statement.connector) in ends):
                     yield statement
             for path, (part, end) in self.__dict__["_ends"].items():

@@ -1,4 +1,4 @@
-"""FMUs of others: archives are looked through before anything is unpacked."""
+"""FMUs of others: archives are checked before anything is unpacked."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from modelica_like.errors import FmuRefused
 
 _ENCRYPTED = 0x1
 _LONGEST, _LONGEST_PART = 500, 255
-"""Characters of a path inside, bytes of a name: what lies 1,500 folders deep can be neither made nor removed."""
+"""Characters of a path inside, bytes of a name: files 1,500 folders deep can be neither created nor removed."""
 
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of archive: what it is called, and the description it must have."""
+    """A kind of archive: its name, and its required description."""
 
     name: str
     description: str
@@ -32,7 +32,7 @@ SSP = Kind("SSP", "SystemStructure.ssd")
 
 @dataclass(frozen=True)
 class Limits:
-    """What an archive may hold at most.
+    """Limits of an archive.
 
     Attributes:
         members: number of files and folders.
@@ -56,14 +56,14 @@ def unpack(path: Path, target: Path, limits: Limits = LIMITS, kind: Kind = FMU) 
     Args:
         path: the archive.
         target: an existing, empty folder.
-        limits: what the archive may hold at most.
-        kind: what it should be.
+        limits: of the archive.
+        kind: expected kind.
 
     Returns:
         The folder.
 
     Raises:
-        FmuRefused: the file is no archive, is damaged, holds paths outside, links or a bomb, or is not of its kind.
+        FmuRefused: the file is not an archive, is damaged, has paths outside, links or a bomb, or is not of this kind.
         OSError: the file cannot be read.
     """
     try:
@@ -86,11 +86,11 @@ def refuse_document_type(name: str, file: Path) -> None:
     Raises:
         FmuRefused: it does.
     """
-    # In UTF-16 or UTF-7 no search for bytes would find it.
+    # A search for bytes would not find it in UTF-16 or UTF-7.
     parser, content = etree.XMLParser(resolve_entities=False, no_network=True), file.read_bytes()
     try:
         declared = etree.fromstring(content, parser).getroottree().docinfo.internalDTD is not None
-    except etree.XMLSyntaxError:  # who reads it will tell
+    except etree.XMLSyntaxError:  # its reader reports the error
         declared = b"<!DOCTYPE" in content
     if declared:
         raise FmuRefused(
@@ -123,7 +123,7 @@ def _look_through(name: str, members: Sequence[zipfile.ZipInfo], limits: Limits,
 
 
 def _objection(member: zipfile.ZipInfo, seen: set[str]) -> str:
-    """Return what speaks against a member, or an empty string."""
+    """Return the objection against a member, or an empty string."""
     inside, kind = member.orig_filename, stat.S_IFMT(member.external_attr >> 16)
     if inside.startswith(("/", "\\")) or ":" in inside or "\0" in inside:
         return "is an absolute path"

@@ -1,4 +1,4 @@
-"""Is an FMU what the standard says, and do other people's importers run it?"""
+"""Check that an FMU conforms to the standard and runs in other importers."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ _EULER_STEPS = 2000
 _EULER_STEP = 1e-5
 """Largest explicit step in s: it must be stable for the stiffest shaft."""
 _EULER_FRACTION = 0.01
-"""Largest part of a run that is done in explicit steps."""
+"""Largest part of a run with explicit steps."""
 _SAME = 1e-2
 """Largest deviation between two ways to run an FMU at its own tolerance, relative to a signal's range."""
 _NEAR = 0.1
 """The same for explicit steps, which are of first order."""
 _LEAST_RANGE = 1e-2
-"""Of the largest value among the signals of a unit."""
+"""Relative to the largest value among the signals of a unit."""
 _OBSERVED = 50
 _ROUNDING = 1e-9
 _SCHEMAS = {
@@ -54,9 +54,9 @@ class Check:
     """One check of an FMU.
 
     Attributes:
-        name: what was checked.
-        verdict: `passed`, `failed`, or `–` where there is nothing to check.
-        sentence: what was found.
+        name: of the check.
+        verdict: `passed`, `failed`, or `–` if there is nothing to check.
+        sentence: the finding.
     """
 
     name: str
@@ -73,7 +73,7 @@ class Validation:
 
     @property
     def passed(self) -> bool:
-        """Nothing failed."""
+        """Whether no check failed."""
         return all(check.verdict != FAILED for check in self.checks)
 
     def __getitem__(self, name: str) -> Check:
@@ -106,7 +106,7 @@ class _Subject:
 
     @property
     def euler_stop(self) -> float:
-        """How far the explicit steps go: to a result of the other runs, where there is one so early."""
+        """End of the explicit steps: a result of the other runs, if there is one so early."""
         most = min(_EULER_FRACTION * self.stop, _EULER_STEPS * _EULER_STEP)
         return math.floor(most / self.step * (1 + _ROUNDING)) * self.step or most
 
@@ -124,7 +124,7 @@ class _Subject:
         )
 
     def at(self, time: float, known: RecordedSolution) -> Values:
-        """Return the values at a time from a run, or from one to that time where it is before the first result."""
+        """Return the values at a time from a run, or from a run to that time if it is before the first result."""
         return known.at(min(time, known.final.time)) if time >= self.step else self.run("me", time, time).final
 
 
@@ -132,8 +132,8 @@ def validate_fmu(path: str | Path, *, timeout: float = TIMEOUT) -> Validation:
     """Check an FMU against the standard, and run it with several importers.
 
     The XML against its schemas; FMPy's own checks; FMPy as Model Exchange (CVode and explicit Euler) and Co-Simulation;
-    ecos (FMI 2.0 and 3.0) and libcosim (FMI 2.0) as Co-Simulation, where they are installed. Every run has a process of
-    its own, and what it ends with must agree with the others.
+    ecos (FMI 2.0 and 3.0) and libcosim (FMI 2.0) as Co-Simulation, where they are installed. Every run has its own
+    process, and the final values of all runs must agree.
 
     Args:
         path: the FMU.
@@ -183,7 +183,7 @@ def _schema_check(name: str, file: Path, version: str, schema: str) -> Check:
     name = f"schema of {name}"
     if not file.exists():
         return Check(name, ABSENT, "It has none.")
-    # Terminals and build descriptions are those of FMI 3.0 in FMUs of FMI 2.0, too.
+    # Terminals and build descriptions follow FMI 3.0 even in FMUs of FMI 2.0.
     kind = version if schema == "ModelDescription" else "3"
     try:
         document = etree.parse(file)
@@ -200,7 +200,7 @@ def _schema_check(name: str, file: Path, version: str, schema: str) -> Check:
 
 
 def _run_check(name: str, subject: _Subject, kind: Kind, solver: Solver, runs: dict[str, RecordedSolution]) -> Check:
-    """Run with FMPy; what is run must agree with what was run before."""
+    """Run with FMPy; the results must agree with those before."""
     part = subject.description.modelExchange if kind == "me" else subject.description.coSimulation
     if part is None:
         return Check(name, ABSENT, f"It has no {'Model Exchange' if kind == 'me' else 'Co-Simulation'}.")
@@ -220,7 +220,7 @@ def _run_check(name: str, subject: _Subject, kind: Kind, solver: Solver, runs: d
 
 
 def _importer_check(name: str, importer: str, subject: _Subject, known: RecordedSolution | None) -> Check:
-    """Run with another importer; what it ends with must be what FMPy ends with."""
+    """Run with another importer; the final values must agree with those of FMPy."""
     if subject.description.coSimulation is None:
         return Check(name, ABSENT, "It has no Co-Simulation.")
     if not importers.installed(importer):

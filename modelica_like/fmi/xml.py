@@ -1,4 +1,4 @@
-"""XML texts that people and validators can read: one variable per line, always the same bytes."""
+"""XML texts for people and validators: one variable per line, always the same bytes."""
 
 from __future__ import annotations
 
@@ -8,20 +8,20 @@ from functools import cache
 from modelica_like.units import ANY, ONE, Unit
 
 INLINE = ("ScalarVariable", "Float64", "Unit")
-"""Elements that stand in one line with all that is in them."""
+"""Elements that are written on one line with their content."""
 _ESCAPED = {"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;"}
 _PLAIN = re.compile(r"[ !#-%'-;=?-~]*")
 
 
 class Element:
-    """An element: its tag with attributes as text, and what is in it."""
+    """An element: its tag with attributes as text, and its content."""
 
     __slots__ = ("head", "inner", "tag")
 
     def __init__(self, tag: str, attributes: dict[str, object]) -> None:
         texts = [f' {name}="{_text(value)}"' for name, value in attributes.items() if value is not None]
         self.tag, self.head = tag, f"<{tag}{''.join(texts)}"
-        self.inner: list[Element] | None = None  # most have nothing in them: no list to look after
+        self.inner: list[Element] | None = None  # most are empty: no list needed
 
 
 def element(parent: Element, tag: str, /, **attributes: object) -> Element:
@@ -34,7 +34,7 @@ def element(parent: Element, tag: str, /, **attributes: object) -> Element:
 
 
 def document(top: Element) -> str:
-    """Write a document, with one line per element; variables and units stand in one line."""
+    """Write a document, with one line per element; variables and units are on one line each."""
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + "".join(_lines(top, "", "\n"))
 
 
@@ -57,7 +57,7 @@ def _text(value: object) -> str:
 
 
 def _character(one: str) -> str:
-    """Control characters are no XML."""
+    """Control characters are not valid in XML."""
     return _ESCAPED.get(one, one) if one.isprintable() else " "
 
 

@@ -24,7 +24,7 @@ from modelica_like.initialize.point import implicit_at as implicit_at
 from modelica_like.initialize.point import is_linear as is_linear
 from modelica_like.initialize.point import newton_at as newton_at
 from modelica_like.initialize.point import solve_implicit as solve_implicit
-from modelica_like.initialize.point import variable_slopes as variable_slopes
+from modelica_like.initialize.slopes import variable_slopes as variable_slopes
 from modelica_like.initialize.start import StartProblem
 from modelica_like.initialize.steady import check_modes_hold, modes_between, solve_steady
 
@@ -37,12 +37,12 @@ def initialize(model: CompiledDae, t0: float = 0.0, start: StartKind = "given") 
     Args:
         model: the compiled model.
         t0: start time in s.
-        start: `given`: the start values of the model determine everything; `rest`: what has no start value stands
-            still, absolute speeds before relative ones; `steady`: all derivatives are zero, except of states that
-            nothing depends on.
+        start: `given`: the start values of the model determine everything; `rest`: variables without a start value
+            are at rest, absolute speeds before relative ones; `steady`: all derivatives are zero, except those of
+            states on which nothing depends.
 
     Returns:
-        The start; events at t0 have not happened yet.
+        The start, before events at t0.
 
     Raises:
         MissingStart: start values are missing.
@@ -74,7 +74,7 @@ def initialize(model: CompiledDae, t0: float = 0.0, start: StartKind = "given") 
 
 
 def _settle(model: CompiledDae, point: Point, problem: StartProblem, start: StartKind) -> None:
-    """Find states and modes: the modes depend on the states, in the steady state the states also on the modes."""
+    """Find states and modes: modes depend on states, and in the steady state, states depend on modes."""
     for _ in range(_MODE_ROUNDS):
         if start == "steady":
             problem.apply(point)
@@ -102,7 +102,7 @@ def _unsettled(model: CompiledDae, point: Point) -> InitializationError:
 
 
 def chosen_modes(model: CompiledDae, point: Point) -> Vector:
-    """Choose modes by their start conditions: the first that holds wins."""
+    """Choose modes by their start conditions: the first true one wins."""
     d = point.d.copy()
     decided: set[int] = set()
     for holds, (mode, target, _) in zip(call(model, model.start_conditions, point), model.start_modes, strict=True):

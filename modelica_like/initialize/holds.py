@@ -1,4 +1,4 @@
-"""Motions that the present modes hold: which they are, how elements share what they hold together, and impacts."""
+"""Motions that the present modes hold: detection, sharing among elements, and impacts."""
 
 from __future__ import annotations
 
@@ -10,25 +10,26 @@ import numpy as np
 
 from modelica_like.compile.compiled import Circuit, CompiledDae, Vector
 from modelica_like.compile.functions import ROUNDING
-from modelica_like.compile.soon import TIME_RESOLUTION
+from modelica_like.compile.soon import time_resolution
 from modelica_like.flatten.holds import TERMS
-from modelica_like.initialize.point import Point, call, solve_implicit, variable_slopes
+from modelica_like.initialize.point import Point, call, solve_implicit
+from modelica_like.initialize.slopes import variable_slopes
 from modelica_like.language.hold import UNLIMITED
 
 _DEPENDENT = 1e-9
 _INSTANT = 1e-9
-"""Duration of an impact in s over which the approach is asked for; finite forces cancel whatever it is."""
+"""Duration of an impact in s, of the approach; finite forces cancel for any value."""
 _STIFF = 1e5
-"""Reaction with which a motion that contradicts its being held counts, over the inertia that is held."""
+"""Reaction per motion that contradicts its being held, over the held inertia."""
 _LARGE, _SMALL = 1e3, 1e-3
 _BEARABLE = 0.99
-"""Part of its capacity that an element may bear in a split: just below, lest rounding lets it go."""
+"""Part of its capacity that an element may bear in a split: slightly less than 1, against rounding."""
 _SPLITS, _TURNED = 20, 100.0
-"""Trials to find a split that all can bear, and by how much the weights may change in all of them."""
+"""Number of trials to find a split that all can bear, and total change of the weights."""
 _SAYS_NOTHING = 1e-12
 _TRIALS = 50
 _FELT = 1e-9
-"""Change of a motion, relative to the largest one in an impact, from which on it is no rounding."""
+"""Smallest change of a motion that is not rounding, relative to the largest one in an impact."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +53,7 @@ def terms(model: CompiledDae, point: Point) -> Any:
 
 
 def rest(model: CompiledDae, point: Point) -> None:
-    """Put held motions that are zero but for rounding at zero, where they are states."""
+    """Set held motions within rounding of zero to zero, if they are states."""
     held = [model.holds[k] for k in holding(model, point)]
     states = [one for one in held if one.state is not None]
     if not states:
@@ -70,7 +71,7 @@ def _largest(model: CompiledDae, sizes: Vector, motion: int) -> float:
 
 
 def holding(model: CompiledDae, point: Point) -> list[int]:
-    """Positions of the motions that are held at a point."""
+    """Positions of the held motions at a point."""
     asked = [k for k, one in enumerate(model.holds) if point.d[one.mode] == one.number]
     if not asked:
         return []
@@ -84,9 +85,9 @@ def holding(model: CompiledDae, point: Point) -> list[int]:
 def share(model: CompiledDae, point: Point) -> None:
     """Let elements that hold the same motion share its reaction in proportion to their capacities.
 
-    Which reactions have the least norm, weighted by the inverse of the capacities, is decided anew for the present
-    modes; everything but the split follows from the other equations. Where that asks more of one than it can bear,
-    the others take more, as far as they can.
+    The reactions have the least norm, weighted by the inverse of the capacities, for the present modes; everything
+    but the split follows from the other equations. If one element exceeds its capacity, the others take more, as far as
+    they can.
     """
     if not model.circuits:
         return
@@ -110,7 +111,7 @@ def share(model: CompiledDae, point: Point) -> None:
 
 
 def _share_circuits(model: CompiledDae, point: Point, active: set[int], weights: Vector) -> bool:
-    """Write switches and shares of all circuits; tell whether anything is shared."""
+    """Write switches and shares of all circuits; return whether anything is shared."""
     shared = False
     for circuit in model.circuits:
         count = len(circuit.members)
@@ -143,7 +144,7 @@ def _share(
 
 
 def _use(model: CompiledDae, point: Point, limits: Any) -> Vector:
-    """Reactions over what can be borne in their direction, of the elements that share; zero where nothing limits."""
+    """Reactions of sharing elements over their capacities in that direction; zero for unlimited ones."""
     trial = point.copy()
     solve_implicit(model, trial)
     variables, use = call(model, model.variables, trial), np.zeros(len(model.holds))
@@ -158,7 +159,7 @@ def _use(model: CompiledDae, point: Point, limits: Any) -> Vector:
 
 
 def _may_contradict(model: CompiledDae, members: list[int]) -> bool:
-    """Whether something but states, such as a source of motion, moves what is held."""
+    """Whether a held motion depends on more than states, such as a source of motion."""
     at = [model.variables.name_in().index(name) for name in ("t", "u", "d")]
     rows = model.once("moved", lambda: {row for k in at for row in model.variables.jac_sparsity(0, k).row()})
     return not rows.isdisjoint(model.holds[k].motion for k in members)
@@ -167,9 +168,9 @@ def _may_contradict(model: CompiledDae, members: list[int]) -> bool:
 def _yield_to_contradiction(
     model: CompiledDae, point: Point, circuit: Circuit, switches: Vector, shares: Vector
 ) -> None:
-    """Let a motion that cannot be held by all, because it is prescribed, raise the reactions until one gives way.
+    """Let a prescribed motion that cannot be held raise the reactions until one breaks away.
 
-    A switched equation says sum(share·reaction) = stiff·inertia·der(motion). Where all hold, the right side is zero.
+    A switched equation says sum(share·reaction) = stiff·inertia·der(motion). If all hold, the right side is zero.
     """
     trial = point.copy()
     trial.d[circuit.entries] = np.concatenate([switches, shares.ravel()])
@@ -188,7 +189,7 @@ def _yield_to_contradiction(
 
 
 def _capacities(limits: Any) -> Vector:
-    """Capacities that decide the split: what nothing limits takes nearly all, what bears nothing nearly nothing."""
+    """Capacities for the split: an unlimited element takes nearly all, one without capacity nearly nothing."""
     given = np.nan_to_num(limits.max(axis=1))
     limited = given[(given < UNLIMITED) & (given > 0.0)]
     largest = float(limited.max(initial=0.0)) or 1.0
@@ -196,7 +197,7 @@ def _capacities(limits: Any) -> Vector:
 
 
 def _eliminate(silent: Any, weighted: Any) -> list[int]:
-    """Bring dependences to the form of an identity in one column each, the largest one left; return these columns."""
+    """Reduce dependences to an identity in one column each, the largest one left; return these columns."""
     pivots: list[int] = []
     for row in range(len(silent)):
         pivot = int(np.argmax(np.abs(silent[row])))
@@ -210,7 +211,7 @@ def _eliminate(silent: Any, weighted: Any) -> list[int]:
 
 
 def sharing(model: CompiledDae, point: Point) -> list[tuple[str, ...]]:
-    """Components that share what they hold together at a point, circuit by circuit."""
+    """Components that share a held motion at a point, circuit by circuit."""
     found: list[tuple[str, ...]] = []
     for circuit in model.circuits:
         shares = circuit.shares(point.d)
@@ -224,14 +225,14 @@ def sharing(model: CompiledDae, point: Point) -> list[tuple[str, ...]]:
 
 
 class Strike:
-    """Stops motions that modes have begun to hold, by an impulse that all other components pass on.
+    """Stops newly held motions by an impulse that all other components transmit.
 
-    In the new modes the held motions are asked once for der(motion) = -(1 + e)·motion/τ, once for der(motion) = 0. The
-    difference of the accelerations times τ is the jump of the speeds; finite forces are the same in both. What bears
-    a limited reaction passes no impulse on, and is knocked loose.
+    In the new modes the equations are solved with der(motion) = -(1 + e)·motion/τ and with der(motion) = 0. The
+    difference of the accelerations times τ is the jump of the speeds; finite forces are the same in both. An element
+    with a limited reaction transmits no impulse and breaks away.
 
-    Several impacts at one instant are solved together, from the speeds before the first one: what has been hit may be
-    hit again, and let go.
+    Several impacts at one instant are solved together, from the speeds before the first one: a contact can be hit
+    again, and be released.
 
     Args:
         model: the compiled model.
@@ -246,7 +247,7 @@ class Strike:
         self.impacts: list[Impact] = []
         self.loose: list[int] = []
         before = self._motions()
-        # Friction stops nothing at once; where an importer lets it overrun standstill, that is no impact.
+        # Friction never stops a motion at once; if an importer lets it overrun standstill, that is not an impact.
         limits = terms(model, point)[:, 1:3].max(axis=1)
         moving = [k for k in self.entering if before[k] != 0.0 and limits[k] >= UNLIMITED]
         self.hard = self._stops(before, moving)
@@ -255,7 +256,7 @@ class Strike:
     def run(self) -> None:
         """Carry out the impact.
 
-        `loose` then tells what was knocked loose, bounces, or was moved in passing; `impacts` what was lost.
+        Then `loose` has the motions that break away, bounce, or were changed, and `impacts` the losses.
         """
         model, point = self.model, self.point
         before = self._motions()
@@ -280,12 +281,12 @@ class Strike:
             self._book(before, impulses, approaches)
 
     def _stops(self, before: Vector, moving: list[int]) -> bool:
-        """Whether more is stopped than what rounding and the location of events leave."""
+        """Whether the stopped motion exceeds rounding and the error of event location."""
         model, sizes = self.model, np.abs(call(self.model, self.model.variables, self.point))
         return any(abs(before[k]) > ROUNDING * _largest(model, sizes, model.holds[k].motion) for k in moving)
 
     def _book(self, before: Vector, impulses: dict[int, float], approaches: dict[int, float]) -> None:
-        """Note what was lost, and what has got another motion."""
+        """Record losses and changed motions."""
         after = self._motions()
         for k, impulse in impulses.items():
             energy = 0.5 * (before[k] + after[k]) * impulse
@@ -301,7 +302,7 @@ class Strike:
         return call(self.model, self.model.variables, self.point)[[one.motion for one in self.model.holds]]
 
     def _response(self, approaches: dict[int, float]) -> tuple[Vector, dict[int, float], dict[int, float]]:
-        """Jump of the states, impulses and finite reactions of all that holds, with `loose` let go."""
+        """Jump of the states, impulses and finite reactions of all held motions, with `loose` released."""
         model, trial = self.model, self.point.copy()
         for k in self.loose:
             trial.d[model.holds[k].mode] = model.holds[k].loose
@@ -319,15 +320,15 @@ class Strike:
         return _INSTANT * (rates - rest), impulses, dict(zip(held, finite, strict=True))
 
     def _unbearable(self, table: Any, impulses: dict[int, float], reactions: dict[int, float]) -> list[int]:
-        """The motions whose reactions exceed what their elements can bear for an instant."""
-        instant = 10.0 * TIME_RESOLUTION * max(1.0, abs(self.point.t))
+        """The motions whose reactions exceed the impulsive capacity of their elements."""
+        instant = 10.0 * time_resolution(self.point.t)
         scale = max((abs(one) for one in impulses.values()), default=0.0)
         found: list[int] = []
         for k, impulse in impulses.items():
             own = self.model.holds[k]
             forward, backward = table[k, 1:3]
             capacity, sign = (forward, 1.0) if impulse > 0.0 else (backward, -1.0)
-            if capacity >= UNLIMITED or own.loose < 0:
+            if own.loose < 0:
                 continue
             margin = max(capacity - sign * reactions[k], 0.0) * instant
             if abs(impulse) > margin + _SAYS_NOTHING * scale:
@@ -335,7 +336,7 @@ class Strike:
         return found
 
     def _approaching(self, table: Any, jump: Vector) -> list[int]:
-        """What was let go and would now move on against what nothing limits."""
+        """Released motions that would now move against an unlimited stop."""
         if not self.loose:
             return []
         after = replace(self.point, x=self.point.x + jump)
@@ -350,7 +351,7 @@ class Strike:
         return found
 
     def _stop(self, before: Vector, restitution: Vector) -> None:
-        """Put states that are held exactly to where the impact left them."""
+        """Set held states exactly to their values after the impact."""
         for k in sorted(self.entering - set(self.loose)):
             one = self.model.holds[k]
             if one.state is not None:

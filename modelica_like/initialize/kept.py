@@ -1,4 +1,4 @@
-"""What equilibrium leaves open and the motion keeps: the slip of a clutch that sticks, the momentum of a free shaft."""
+"""Quantities that equilibrium leaves open and motion conserves: slip of a stuck clutch, momentum of a free shaft."""
 
 from __future__ import annotations
 
@@ -9,22 +9,23 @@ import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.initialize.holds import holding
-from modelica_like.initialize.point import Point, call, variable_slopes
+from modelica_like.initialize.point import Point, call
+from modelica_like.initialize.slopes import variable_slopes
 
 Matrix = np.ndarray[Any, np.dtype[np.float64]]
 RANK = 1e-12
-"""Relative size below which a combination of equations says nothing."""
+"""Relative size below which a combination of equations is zero."""
 _SAME = 1e-9
 
 
 @dataclass(frozen=True)
 class Kept:
-    """Equations that take the place of those that say nothing: combinations of rates that are zero by themselves.
+    """Equations that replace redundant ones: combinations of rates that are always zero.
 
     Attributes:
-        held: variables (nodes) that the present modes hold, such as the slip of a clutch that sticks.
-        missing: what each of them still has to change.
-        rows: slopes of these variables, and then of everything else that is conserved, by the states looked at; shape
+        held: variables (nodes) that the present modes hold, such as the slip of a stuck clutch.
+        missing: remaining change of each of them.
+        rows: slopes of these variables, then of other conserved quantities, by the given states; shape
             (held + conserved, states).
     """
 
@@ -34,15 +35,15 @@ class Kept:
 
 
 def find_kept(model: CompiledDae, point: Point, states: list[int], jacobian: Matrix) -> Kept:
-    """Return what the motion keeps near a point.
+    """Return the conserved quantities near a point.
 
     Args:
         model: the compiled model.
-        point: a point, with the modes that count.
+        point: a point with the present modes.
         states: positions of the states that may change.
         jacobian: slopes of their rates, and of the implicit equations, by these states and the implicit unknowns.
     """
-    left, sizes, _ = np.linalg.svd(jacobian) if jacobian.size else (np.eye(0), np.zeros(0), None)
+    left, sizes, _ = np.linalg.svd(jacobian)
     silent = left[:, sizes <= RANK * sizes.max(initial=0.0)].T[:, : len(states)]
     conserved = _orthonormal(silent)
     held: list[int] = []
@@ -59,19 +60,19 @@ def find_kept(model: CompiledDae, point: Point, states: list[int], jacobian: Mat
 
 
 def _lies_in(basis: Matrix, row: Vector) -> bool:
-    """Tell whether a row is a combination of orthonormal ones; a row of zeros says nothing, and is none."""
+    """Return whether a row is a combination of orthonormal ones; false for a row of zeros."""
     size = float(np.linalg.norm(row))
     return size > 0.0 and bool(np.linalg.norm(row - basis.T @ (basis @ row)) <= _SAME * size)
 
 
 def solve_kept(kept: Kept, jacobian: Matrix, right: Matrix, of_held: Matrix) -> Any:
-    """Solve linear equations that leave something open, together with what is kept.
+    """Solve underdetermined linear equations together with conserved quantities.
 
     Args:
-        kept: what is kept.
+        kept: the conserved quantities.
         jacobian: the equations; their first unknowns are the states.
         right: right sides, shape (equations,) or (equations, columns).
-        of_held: right sides for the held variables; what else is conserved has zeros.
+        of_held: right sides for the held variables; zero for all other conserved quantities.
     """
     states, size = kept.rows.shape[1], float(np.abs(jacobian).max(initial=0.0)) or 1.0
     rows = np.zeros((len(kept.rows), jacobian.shape[1]))

@@ -1,4 +1,4 @@
-"""Which start values determine what: chosen once, for simulation, export and derivatives."""
+"""The use of start values: chosen once, for simulation, export and derivatives."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ _WELL_CONDITIONED = 1e9
 
 @dataclass(frozen=True)
 class StartPlan:
-    """Which start values determine what.
+    """The use of start values.
 
     Attributes:
-        kind: what stands for start values that are not given.
+        kind: kind of start, which replaces missing start values.
         system: the start system.
-        direct: (state, start value) of states that are given; the first of several counts.
+        direct: (state, start value) of given states; the first of several counts.
         rows: start values that are equations for the other states.
         dependent: fixed start values that must follow from the others.
-        resting: variables (nodes) that are zero because nothing else is said.
-        zero: states that are.
-        columns: unknowns of the start system among (x, y, z); none where nothing is to be solved.
+        resting: variables (nodes) that are zero because nothing else is given.
+        zero: states that are zero for the same reason.
+        columns: unknowns of the start system among (x, y, z); none if there is nothing to solve.
         wanted: its rows: those of y and z, of `rows`, of `resting`.
     """
 
@@ -52,16 +52,16 @@ class StartPlan:
 
     @cached_property
     def _part(self) -> tuple[ca.Sparsity, Any]:
-        """Pattern of the wanted rows and columns, and where its entries are among those of the system's Jacobian."""
+        """Pattern of the wanted rows and columns, and positions of its entries in the system's Jacobian."""
         pattern, places = self.system.function.sparsity_out(1).sub(list(self.wanted), list(self.columns))
         return pattern, np.array(places, int)
 
     def entries(self, jacobian: Vector) -> Vector:
-        """Return the nonzeros of the matrix that is solved with, from those of the whole Jacobian."""
+        """Return the nonzeros of the plan's matrix, from those of the whole Jacobian."""
         return jacobian[self._part[1]]
 
     def matrix(self, entries: Vector) -> ca.DM:
-        """Return the matrix that is solved with, sparse."""
+        """Return the plan's matrix, sparse."""
         return ca.DM(self._part[0], entries)
 
     def targets(self, values: Vector) -> Vector:
@@ -76,15 +76,15 @@ class StartPlan:
 
 
 def start_plan(model: CompiledDae, kind: StartKind, point: Point) -> StartPlan:
-    """Choose from the start values of a model.
+    """Choose the use of the start values of a model.
 
-    Structure decides. Where numbers say that rows chosen by structure depend on each other (several clutches between
-    the same shafts), numbers decide: defaults and zeros that say nothing new are left out, start values that are given
-    must follow.
+    The structure decides. If the chosen rows are numerically dependent (several clutches between the same shafts),
+    numbers decide: redundant defaults and zeros are left out, redundant given start values must be
+    consistent.
 
     Args:
         model: the compiled model.
-        kind: what stands for start values that are not given.
+        kind: kind of start, which replaces missing start values.
         point: a point with the modes that count.
 
     Raises:
@@ -99,7 +99,7 @@ def start_plan(model: CompiledDae, kind: StartKind, point: Point) -> StartPlan:
 
 
 def _is_regular(model: CompiledDae, plan: StartPlan, point: Point) -> bool:
-    """Tell whether the plan's matrix is far from singular; one that was found to be is not looked at again."""
+    """Return whether the plan's matrix is far from singular; a positive answer is cached."""
     function = plan.system.function
     fast = model.fast(("start matrix", plan.kind), lambda: function, (1,))
     y = np.zeros(function.size1_out(0))
@@ -128,7 +128,7 @@ def matrix_and_values(model: CompiledDae, system: StartSystem, point: Point, y: 
 
 
 def _regular(matrix: Any, entries: Vector) -> bool:
-    """Tell whether a square matrix with these entries is far from singular."""
+    """Return whether a square matrix with these entries is far from singular."""
     if not np.all(np.isfinite(entries)):
         return False
     sizes, rows = np.zeros(matrix.size1()), np.array(matrix.sparsity().row(), int)
@@ -145,7 +145,7 @@ def _regular(matrix: Any, entries: Vector) -> bool:
 
 
 def _generic_matrix(model: CompiledDae, system: StartSystem, point: Point) -> Any:
-    """Jacobian of the start system near a point where nothing vanishes by chance; None where it is not finite."""
+    """Jacobian of the start system at a generic point nearby; None if it is not finite."""
     chance = np.random.default_rng(1)
     moved = point.copy()
     for part in (moved.x, moved.z):
@@ -165,7 +165,7 @@ def direct_starts(model: CompiledDae) -> dict[int, int]:
 
 
 class _Choice:
-    """Start values are taken as long as they say something new: fixed ones, defaults, zeros."""
+    """Start values are taken as long as they add information: fixed ones, defaults, zeros."""
 
     def __init__(self, model: CompiledDae, kind: StartKind) -> None:
         self.model = model
@@ -185,7 +185,7 @@ class _Choice:
         general = [k for k, e in enumerate(self.model.starts) if e.strength == "fixed" and e.state is None]
         if self.kind == "steady" or not (self.free or general):
             return StartPlan(self.kind, self.system, direct)
-        # Where modes leave reactions open, implicit equations that say nothing new and as many reactions stay out.
+        # Where modes do not determine reactions, redundant implicit equations and as many reactions are left out.
         own = self._begin(matrix)
         kept = self._keep(len(own) < self.own)
         rows = [k for k in general if self._accept(self.model.starts[k].node)]
@@ -203,7 +203,7 @@ class _Choice:
         return StartPlan(self.kind, self.system, direct, *map(tuple, lists))
 
     def _begin(self, matrix: Any) -> list[int]:
-        """Begin with the explicit equations, which determine y, and the implicit ones, which determine z."""
+        """Start with the explicit equations, which determine y, and the implicit ones, which determine z."""
         pattern = self.system.function.sparsity_out(1)
         numbers = [1.0] * pattern.nnz() if matrix is None else matrix.nonzeros()
         self.entries: list[dict[int, float]] = [{} for _ in range(pattern.size1())]
@@ -211,14 +211,14 @@ class _Choice:
             if column in self.place:
                 self.entries[row][self.place[column]] = number
         self.choice: Matching | Elimination = (Matching if matrix is None else Elimination)(len(self.columns))
-        if matrix is None:  # every one has an unknown of its own, by whatever structure solves it
+        if matrix is None:  # each has its own unknown, whatever structure solves it
             for row in range(self.own):
                 self.entries[row][len(self.free) + row] = 1.0
         added = [self.choice.add(self.entries[row]) for row in range(self.own)]
         return [row for row, new in enumerate(added) if new or matrix is None]
 
     def _keep(self, some: bool) -> list[int]:
-        """Implicit unknowns that stay as they are."""
+        """Implicit unknowns that keep their values."""
         implicit = self.columns[len(self.columns) - len(self.model.implicit) :] if some else []
         return [column for column in implicit if self.choice.add({self.place[column]: 1.0})]
 
@@ -226,12 +226,12 @@ class _Choice:
         return self.choice.add(self.entries[self.row_of[node]])
 
     def _defaults(self) -> list[int]:
-        """Defaults in an order that no order of lines changes."""
+        """Defaults in an order that does not depend on the order of lines."""
         chosen = [k for k, e in enumerate(self.model.starts) if e.strength == "default"]
         return sorted(chosen, key=lambda k: start_name(self.model, self.model.starts[k]))
 
     def _rest(self) -> tuple[list[int], list[int]]:
-        """Variables and states that come to rest."""
+        """Variables and states at rest."""
         resting: list[int] = []
         zero: list[int] = []
         for node, state in self.system.rest:

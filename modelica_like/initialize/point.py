@@ -18,9 +18,9 @@ from modelica_like.initialize.singular import VANISHES, implicit_singular, is_re
 _MAX_NEWTON = 50
 _ROUNDING = 1e-14
 _FEW = 3
-"""Implicit unknowns up to which a step of Newton's method is written out."""
+"""Largest number of implicit unknowns for which a step of Newton's method is unrolled."""
 _WELL_CONDITIONED = 1e10
-"""Bound of the condition of a matrix that is regular whatever its units are."""
+"""Bound of the condition number below which a matrix is regular in any units."""
 
 
 @dataclass
@@ -41,14 +41,14 @@ def call(model: CompiledDae, function: Any, point: Point) -> Vector:
     """Evaluate a function at a point.
 
     Args:
-        model: gives parameters and inputs.
+        model: with parameters and inputs.
         function: of (t, x, z, p, u, d), with one result.
-        point: gives the rest.
+        point: with the other arguments.
 
     Returns:
         The result, flat: columns one after the other.
     """
-    # By identity: asking a CasADi function for its name costs as much as evaluating a small one.
+    # By identity: reading the name of a CasADi function costs as much as evaluating a small one.
     fast = model.fast(id(function), lambda: function)
     return fast(point.t, point.x, point.z, model.p, model.u, point.d)[0]
 
@@ -72,7 +72,7 @@ def solve_implicit(model: CompiledDae, point: Point) -> None:
             _check_regular(model, point)
         change = float((sizes / (1.0 + np.abs(new))).max())
         point.z = new
-        # What the largest unknown leaves of a small one when it is rounded does not get smaller.
+        # The residual of a small unknown cannot fall below the rounding of the largest one.
         if change < 1e-13 or largest <= _ROUNDING * np.abs(new).max():
             return
     if not change <= 1e-9:
@@ -90,9 +90,9 @@ def implicit_at(model: CompiledDae) -> ca.Function:
 
 
 def newton_at(model: CompiledDae, *, look: bool) -> ca.Function:
-    """Return z after one step of Newton's method and, to `look` at it, a bound of the condition of the Jacobian.
+    """Return z after one step of Newton's method and, with `look`, a bound of the condition of the Jacobian.
 
-    The inverse, which comes along then, shows that most matrices are far from singular.
+    The inverse, computed for the step, shows that most matrices are far from singular.
     """
     size = len(model.implicit)
     arguments = list(model.arguments.values()) if size <= _FEW else implicit_at(model).mx_in()
@@ -112,7 +112,7 @@ def is_linear(model: CompiledDae) -> bool:
 
 
 def _check_regular(model: CompiledDae, point: Point) -> None:
-    """Look closely at a Jacobian that may be singular, whatever its units are.
+    """Check a Jacobian that may be singular, independent of its units.
 
     Raises:
         SingularAtStart: it is.
@@ -128,7 +128,7 @@ def check_singular(model: CompiledDae, point: Point) -> None:
     """Check that every block has a unique solution.
 
     Raises:
-        SingularAtStart: one does not have one.
+        SingularAtStart: one has no unique solution.
     """
     fast = model.fast("regular", lambda: _regular(model))
     if not fast(point.t, point.x, point.z, model.p, model.u, point.d)[0][0]:
@@ -145,45 +145,8 @@ def check_singular(model: CompiledDae, point: Point) -> None:
 
 
 def _regular(model: CompiledDae) -> ca.Function:
-    """Return the number of determinants that vanish and of derivatives that are not finite."""
+    """Return the numbers of zero determinants and of derivatives that are not finite."""
     arguments = list(model.arguments.values())
     sizes, rates = ca.fabs(model.determinants(*arguments)), ca.fabs(model.ode(*arguments))
     wrong = ca.vertcat(0, ca.logic_not(ca.logic_and(sizes >= VANISHES, sizes < np.inf)), ca.logic_not(rates < np.inf))
     return ca.Function("regular", arguments, [ca.cse(ca.densify(ca.sum1(wrong)))])
-
-
-def variable_slopes(model: CompiledDae, point: Point, nodes: list[int]) -> Vector:
-    """Return the total derivative of variables by the states at a point, z following the states.
-
-    Args:
-        model: the compiled model.
-        point: where.
-        nodes: positions of the variables.
-
-    Returns:
-        Shape (nodes, states).
-
-    Raises:
-        SingularAtStart: a slope is not finite.
-    """
-    fast = model.fast(("slopes", tuple(nodes)), lambda: _slopes(model, nodes))
-    results = fast(point.t, point.x, point.z, model.p, model.u, point.d)
-    if not all(np.isfinite(part).all() for part in results):
-        names = ", ".join(model.flat_variables[node].path for node in nodes)
-        raise SingularAtStart(
-            f"The slopes of {names} are not finite at t = {point.t:.9g} s.",
-            advice="Look for a mass, inertia or ratio of zero, or a function outside its domain.",
-        )
-    shapes = [(rows, columns) for rows in (len(nodes), len(point.z)) for columns in (len(point.x), len(point.z))]
-    by_x, by_z, alg_x, alg_z = (v.reshape(shape, order="F") for v, shape in zip(results, shapes, strict=True))
-    # Reactions whose split is undetermined make the equations for z singular; what depends on them is left out.
-    return by_x - by_z @ np.linalg.lstsq(alg_z, alg_x, rcond=None)[0] if by_z.any() else by_x
-
-
-def _slopes(model: CompiledDae, nodes: list[int]) -> ca.Function:
-    """Partial derivatives of variables, and of the implicit equations, by the states and by z; all dense."""
-    arguments = list(model.arguments.values())
-    x, z = model.arguments["x"], model.arguments["z"]
-    variables, alg = model.variables(*arguments)[nodes], model.alg(*arguments)
-    parts = [ca.jacobian(variables, x), ca.jacobian(variables, z), ca.jacobian(alg, x), ca.jacobian(alg, z)]
-    return ca.Function("slopes", arguments, ca.cse([ca.densify(part) for part in parts]))

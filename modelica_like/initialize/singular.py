@@ -1,4 +1,4 @@
-"""Why a block of equations has no unique solution, in sentences."""
+"""Messages about blocks of equations without a unique solution."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _ANOTHER = 0.7
 
 
 class Place(Protocol):
-    """Where a block is singular: time, states, implicit unknowns, modes and discrete values."""
+    """Point where a block is singular: time, states, implicit unknowns, modes and discrete values."""
 
     t: float
     x: Vector
@@ -63,7 +63,7 @@ def _singular(
     model: CompiledDae, point: Place, number: int, block: tuple[tuple[str, ...], tuple[Origin, ...]],
     regular: Callable[[Vector], bool],
 ) -> SingularAtStart:  # fmt: skip
-    """Return the error for a block of unknowns and origins; `regular` tells whether it is for other parameters."""
+    """Return the error for a block of unknowns and origins; `regular` checks it for other parameters."""
     names, origins = block
     owners = dict.fromkeys(origin.path for origin in origins)
     holding = [path for path in owners if _holds(model, point.d, path)]
@@ -83,7 +83,7 @@ def _singular(
 
 
 def _zeros(model: CompiledDae, owners: Container[str], regular: Callable[[Vector], bool]) -> list[str]:
-    """Parameters of some components that are zero where any other number makes the block regular."""
+    """Parameters of the components that are zero, if another value makes the block regular."""
     found: list[str] = []
     for k, one in enumerate(model.flat_parameters):
         if model.p[k] == 0.0 and one.path.rpartition(".")[0] in owners:
@@ -94,12 +94,14 @@ def _zeros(model: CompiledDae, owners: Container[str], regular: Callable[[Vector
 
 
 def is_regular(matrix: Any) -> bool:
-    """Tell whether a square matrix is finite and regular, whatever the units of its rows and columns are."""
+    """Return whether a square matrix is finite and regular, in any units of its rows and columns."""
     if not np.isfinite(matrix).all():
         return False
     for axis in (1, 0):
         sizes = np.abs(matrix).max(axis=axis, keepdims=True, initial=0.0)
-        matrix = matrix / np.where(sizes > 0.0, sizes, 1.0)
+        if not sizes.all():
+            return False
+        matrix = matrix / sizes
     return int(np.linalg.matrix_rank(matrix)) == len(matrix)
 
 

@@ -1,4 +1,4 @@
-"""Start values: from what is given to all states."""
+"""Start values: from given values to all states."""
 
 from __future__ import annotations
 
@@ -21,24 +21,24 @@ _EPS = float(np.finfo(float).eps)
 
 
 class _Places:
-    """Start values, and where they go: (number, position, factor) of each."""
+    """Start values and their targets: (number, position, factor) of each."""
 
     def __init__(self, places: Iterable[tuple[int, int, float]]) -> None:
         self._numbers, self._positions, self._factors = np.array([*places], float).reshape(-1, 3).T
         self._numbers, self._positions = self._numbers.astype(int), self._positions.astype(int)
 
     def put(self, unknowns: Vector, given: Vector) -> None:
-        """Write them into the states, or implicit unknowns; of several for one the last counts."""
+        """Write them into the states or implicit unknowns; of several for one target, the last counts."""
         unknowns[self._positions] = given[self._numbers] / self._factors
 
 
 class _Sorted:
-    """Start values of a model, sorted by what they do.
+    """Start values of a model, sorted by their use.
 
     Attributes:
-        fixed, guesses, defaults: of states; of several fixed ones of one state the first.
-        again: the others, each with the first.
-        implicit: guesses and fixed ones of implicit unknowns, which begin where they are to be.
+        fixed, guesses, defaults: of states; only the first of several fixed ones of a state.
+        again: the other fixed ones, each with the first.
+        implicit: guesses and fixed ones of implicit unknowns, used as first guesses.
     """
 
     def __init__(self, model: CompiledDae) -> None:
@@ -57,7 +57,7 @@ class _Sorted:
 class StartProblem:
     """From start values to states.
 
-    Those of states are taken as they are; those of other variables are equations for the states that are left.
+    Start values of states are taken as given; those of other variables are equations for the remaining states.
     The equations are solved together with the explicit equations between states and those variables (as sparse as the
     model itself), and with the implicit ones.
 
@@ -139,7 +139,7 @@ class StartProblem:
         point.x, point.z = state[:nx], state[nx + ny :]
 
     def _not_found(self, plan: StartPlan, point: Point) -> InitializationError:
-        # Where the equations are singular, that is the reason.
+        # If the equations are singular, that is the reason.
         solve_implicit(self.model, point)
         check_singular(self.model, point)
         given = [start_name(self.model, self.model.starts[k]) for k in plan.rows]
@@ -168,7 +168,7 @@ class StartProblem:
         )
 
     def _coupled(self, first: StartEntry, second: StartEntry) -> bool:
-        """Tell whether two variables depend on a common state."""
+        """Return whether two variables depend on a common state."""
         by_variable = self.model.variables.jac_sparsity(0, 1).T
         starts, states = by_variable.colind(), by_variable.row()
         columns = [set(states[starts[e.node] : starts[e.node + 1]]) for e in (first, second)]
@@ -196,14 +196,14 @@ def _is_free_of_modes(model: CompiledDae, plan: StartPlan) -> bool:
 
 
 def _dense_values(system: ca.Function) -> ca.Function:
-    """The start system with all of its values, also those that are always zero."""
+    """The start system with all of its values, including structural zeros."""
     arguments = system.mx_in()
     own, jacobian, values = system(*arguments)
     return ca.Function("start", arguments, [own, jacobian, ca.densify(values)])
 
 
 def _sizes(matrix: Any, state: Vector) -> Vector:
-    """Sizes of the terms of every row: what rounding is measured by."""
+    """Sizes of the terms of every row: the scale of rounding."""
     if isinstance(matrix, ca.DM):
         return np.array(ca.mtimes(ca.fabs(matrix), ca.DM(np.abs(state)))).ravel()
     return np.asarray(np.abs(matrix) @ np.abs(state))
@@ -216,7 +216,7 @@ def _solve(matrix: Any, right: Vector) -> Vector:
     if isinstance(matrix, ca.DM):
         try:
             return np.array(ca.solve(matrix, ca.DM(right), "csparse")).ravel()
-        except RuntimeError:  # so CSparse says that it is singular
+        except RuntimeError:  # the answer of CSparse for a singular matrix
             return np.full(right.shape, np.nan)
     try:
         return np.linalg.solve(matrix, right)

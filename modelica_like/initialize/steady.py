@@ -1,4 +1,4 @@
-"""Steady state: all derivatives zero, except of states that nothing depends on."""
+"""Steady state: all derivatives are zero, except those of states on which nothing depends."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import InitializationError
 from modelica_like.initialize.kept import RANK, Matrix, find_kept, solve_kept
 from modelica_like.initialize.point import Point, call
+from modelica_like.initialize.slopes import slopes
 
 _MAX_NEWTON = 50
 _STEADY = 1e-6
@@ -23,12 +24,12 @@ _NEAR = (
 def solve_steady(model: CompiledDae, point: Point) -> None:
     """Find states with zero derivatives near `point`.
 
-    States that nothing depends on (absolute angles) keep their value, and so does everything that the motion keeps:
-    the slip of a clutch that sticks, the momentum of a shaft without load.
+    States on which nothing depends (absolute angles) keep their values, and so do conserved quantities: the slip of
+    a stuck clutch, the momentum of a shaft without load.
 
     Args:
         model: the compiled model.
-        point: where to begin; it becomes the steady state.
+        point: the first guess; it becomes the steady state.
 
     Raises:
         InitializationError: there is no steady state near it.
@@ -67,7 +68,7 @@ def _arguments(model: CompiledDae, point: Point) -> tuple[Any, ...]:
 
 
 def _steady_function(model: CompiledDae) -> ca.Function:
-    """Return a function of what a point has: rates of the moving states and residuals, and their Jacobian."""
+    """Return a function of a point: rates of the moving states, residuals, and their Jacobian."""
 
     def make() -> ca.Function:
         arguments, moving = list(model.arguments.values()), moving_states(model)
@@ -85,19 +86,19 @@ def _equations(model: CompiledDae) -> Any:
 
 
 def moving_states(model: CompiledDae) -> list[int]:
-    """Positions of the states that something depends on; the others, absolute angles, never settle."""
+    """Positions of the states on which something depends; the others, absolute angles, never settle."""
     return model.once(
         "moving", lambda: np.flatnonzero(ca.which_depends(_equations(model), model.arguments["x"], 1, False)).tolist()
     )
 
 
 def modes_between(model: CompiledDae, before: Point, point: Point, modes: Vector) -> Vector:
-    """Hold what slides one way where it began the other way: equilibrium lies in between, where it stands still.
+    """Hold a motion that starts sliding one way and ends sliding the other way: it rests at the equilibrium between.
 
     Args:
         model: the compiled model.
-        before: where the search began.
-        point: where it ended with the modes of `before`.
+        before: start of the search.
+        point: its end with the modes of `before`.
         modes: modes chosen for `point`.
     """
     chosen = modes.copy()
@@ -110,7 +111,7 @@ def modes_between(model: CompiledDae, before: Point, point: Point, modes: Vector
 
 
 def check_modes_hold(model: CompiledDae, point: Point) -> None:
-    """Check that no mode changes at once: surfaces that stick against too large a torque are not in equilibrium.
+    """Check that no mode changes immediately: surfaces stuck under too large a torque are not in equilibrium.
 
     Raises:
         InitializationError: one does.
@@ -124,3 +125,23 @@ def check_modes_hold(model: CompiledDae, point: Point) -> None:
                 where=one.source,
                 advice=_NEAR,
             )
+
+
+def steady_change(model: CompiledDae, point: Point, theta: Vector, guess: Vector | None = None) -> Vector:
+    """Return how the states of a steady state change: the implicit function theorem.
+
+    Args:
+        model: the compiled model.
+        point: the steady state.
+        theta: changes of (p, u, d), shape (ntheta, columns).
+        guess: changes of the states that equilibrium does not determine, shape (nx, columns); none by default.
+    """
+    moving, rates = moving_states(model), slopes(model, point, "ode")
+    change = np.zeros((len(rates.x), theta.shape[1])) if guess is None else guess.copy()
+    inner = rates.x[np.ix_(moving, moving)]
+    kept = find_kept(model, point, moving, inner)
+    held = slopes(model, point, "variables", kept.held)
+    right = rates.theta[moving] @ theta + inner @ change[moving]
+    of_held = held.theta @ theta + held.x[:, moving] @ change[moving]
+    change[moving] += solve_kept(kept, inner, -right, -of_held)
+    return change

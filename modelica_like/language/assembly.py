@@ -1,4 +1,4 @@
-"""Components put together without a class of their own: what a netlist becomes."""
+"""Assemblies of components without a class, as read from netlists."""
 
 from __future__ import annotations
 
@@ -20,7 +20,16 @@ from modelica_like.language.places import NOWHERE, caller
 class Assembly(Component):
     """Parts and their connections, named at run time.
 
-    Wires are kept as text (`"clutch.flange_a"`), as in a netlist; they are resolved when the model is used.
+    Connections are stored as text (`"clutch.flange_a"`), as in a netlist, and resolved when the model is used.
+
+    Args:
+        name: of the model.
+        parts: components, or lists of them, by name.
+        connect: paths of the ends of each connection, by its name.
+        series: names of the parts of each chain, by its name.
+        free: paths of connectors that stay unconnected on purpose.
+        parameters: values by name.
+        description: one phrase.
     """
 
     _own_connectors: tuple[tuple[str, str], ...]
@@ -72,11 +81,11 @@ class Assembly(Component):
         self._own_connectors = (*self._own_connectors, (name, end))
 
     def place(self, key: str, source: Source) -> None:
-        """Remember where in the netlist a wire, series or part stands."""
+        """Store the place of a connection, series or part in the netlist."""
         self._places[key] = source
 
     def source_of(self, key: str) -> Source:
-        """Return where in the netlist a wire, series or part stands; of a drive built in Python, where a part is."""
+        """Return the place of a connection, series or part in the netlist, or of a part in Python."""
         if not self._places and key.startswith("parts."):
             return replace(self._made, text=key)
         return self._places.get(key, NOWHERE)
@@ -104,7 +113,7 @@ class Assembly(Component):
     def __getattr__(self, name: str) -> Expr:
         if name in self.__dict__.get("_own_fields", {}):
             return symbol_of(self, name)
-        if name in ("description", "simulate", "display", "origin"):  # unless a part is called so
+        if name in ("description", "simulate", "display", "origin"):  # unless a part has this name
             return self.__dict__[f"_{name}"]
         raise AttributeError(f"{type(self).__name__} '{self.__dict__.get('_name', '')}' has no '{name}'")
 
@@ -115,7 +124,7 @@ class Assembly(Component):
             super().__setattr__(name, value)
 
     def equations(self) -> Equations:
-        """Yield the connections; what is wrong with them is told together."""
+        """Yield the connections; all their errors are reported together."""
         errors: list[ModelicaLikeError] = []
         for key, make in self._wiring():
             source = self.source_of(key)
@@ -130,7 +139,7 @@ class Assembly(Component):
             raise raise_together_or_one(errors)
 
     def _told(self, key: str) -> Source:
-        """Return where to look for an entry: its line in a netlist, or the call that made the assembly."""
+        """Return the place of an entry: its line in a netlist, or the call that created the assembly."""
         if self._places:
             return self.source_of(key)
         kind, _, name = key.partition(".")
@@ -138,7 +147,7 @@ class Assembly(Component):
         return replace(self._made, text=key if given is None else f"{key} = {list(given)}")
 
     def _wiring(self) -> Iterator[tuple[str, Callable[[], list[Any]]]]:
-        """Yield every entry of the netlist with what makes its statements."""
+        """Yield every entry of the netlist with the function that makes its statements."""
         for key, ends in self._wires.items():
             yield f"connect.{key}", lambda ends=ends: [connect(*map(self._resolve, ends))]
         for key, names in self._chains.items():

@@ -25,8 +25,8 @@ from modelica_like.upper import upper
 class Component(Declared):
     """A machine element: declared fields, connectors and parts, with equations between them.
 
-    Keywords of the constructor give parameters and inputs their values, variables their start values, structural fields
-    and replaceable parts something else than their default.
+    Args:
+        values: of parameters and inputs, start values of variables, structural fields and replaceable parts, by name.
     """
 
     inlet: ClassVar[str] = "flange_a flange"
@@ -49,7 +49,7 @@ class Component(Declared):
         own = {name: value for name, value in vars(cls).items() if not name.startswith("_")}
         hints = {name: str(text) for name, text in _annotated(cls).items() if not name.startswith("_")}
         annotations = [name for name, text in hints.items() if not text.startswith(("ClassVar", "typing.ClassVar"))]
-        # A class may extend several bases, as in Modelica: everything is collected along the whole line of ancestors.
+        # A class may extend several bases, as in Modelica: declarations are collected along all ancestors.
         ancestors = [base for base in reversed(cls.__mro__[1:]) if issubclass(base, Component)]
         cls._class_connectors = _of_kind(cls, Connector)
         cls._class_modes = _of_kind(cls, Mode)
@@ -119,7 +119,7 @@ class Component(Declared):
         return TIME
 
     def given(self, name: str) -> bool:
-        """Tell whether a parameter or input has a value (its own or a default)."""
+        """Return whether a parameter or input has a value (its own or a default)."""
         return name in self._values or self.fields[name].default is not None
 
     # -- values ------------------------------------------------------------------------------------------------------
@@ -129,7 +129,7 @@ class Component(Declared):
 
         Raises:
             UnknownName: there is no such declaration.
-            UnitError, ValueOutOfRange, NetlistError: the value does not fit.
+            UnitError, ValueOutOfRange, NetlistError: the value is invalid.
         """
         if name in self.fields:
             self.set_value(self.fields[name], value)
@@ -174,7 +174,7 @@ class Component(Declared):
         if name in cls._tables:
             cls._tables[name].read(f"{cls.__name__}.{name}", cls._class_fields, frozen_rows(value))
             return
-        if type(value) is int and abs(value) > _MOST:  # it may be a number of parts, which would be made
+        if type(value) is int and abs(value) > _MOST:  # it may be a number of parts to create
             raise NetlistError(f"{cls.__name__}.{name} is larger than {_MOST}; no drive has that many parts.")
         hint = next(str(_annotated(base)[name]) for base in cls.__mro__ if name in _annotated(base))
         if hint.startswith("Literal[") and value not in (choices := hint[9:-2].split("', '")):
@@ -266,22 +266,22 @@ class Component(Declared):
         self.find(owner).give(name, value)
 
     def source_of(self, key: str) -> Source:
-        """Return where an entry stands in the netlist that this component was read from; an `Assembly` knows."""
+        """Return the place of an entry in the netlist of this component; an `Assembly` has it."""
         return NOWHERE
 
     def place_of(self, name: str = "") -> Source:
-        """Return where this part of a netlist stands, one of the netlist's own parameters, or a value given later."""
+        """Return the place of this part in a netlist, of a parameter of the netlist, or of a value given later."""
         root, path = self.root, f"{self.path}.{name}".lstrip(".")
         own = root.source_of(f"set.{path}") if isinstance(root, Component) else NOWHERE
         own = own if own.file else self.source_of(f"parameters.{name}")
         if own.file or not isinstance(self._owner, Component):
             return own
-        # All elements of an array stand in one line.
+        # All elements of an array are in one line.
         return self._owner.source_of(f"parts.{self._name.partition('[')[0]}")
 
     @contextmanager
     def at_its_place(self, name: str = "") -> Generator[None]:
-        """Give an error that does not know its place that of this part, or of a parameter."""
+        """Add the place of this part, or of a parameter, to an error without a place."""
         try:
             yield
         except ModelicaLikeError as error:
@@ -322,7 +322,7 @@ class Component(Declared):
         elif name.startswith("_") or isinstance(getattr(type(self), name, None), Field | Mode):
             super().__setattr__(name, value)
         elif isinstance(value, list) and not value and name not in self.fields:
-            self._adopt(name, [])  # an array whose structural field says none
+            self._adopt(name, [])  # an array with zero elements
         else:
             self.give(name, value)
 

@@ -14,7 +14,7 @@ from modelica_like.language.icon import Stroke
 
 
 class Declared:
-    """Something with declared fields that has an owner and a name in it."""
+    """An object with declared fields, an owner and a name there."""
 
     _class_fields: ClassVar[dict[str, Field]] = {}
     _own_fields: Mapping[str, Field] = {}
@@ -50,7 +50,7 @@ class Declared:
         return [symbol_of(self, key) for key in self._own_fields if key.startswith(f"{name}[")]
 
     def is_constant(self, name: str) -> bool:
-        """Tell whether a field keeps its value between events."""
+        """Return whether a field keeps its value between events."""
         from modelica_like.language.fields import Variable
 
         return not isinstance(self.fields.get(name), Variable)
@@ -79,7 +79,7 @@ class Declared:
         return self.path or self._name or type(self).__name__
 
     def __getstate__(self) -> dict[str, Any]:
-        # Symbols are identities of one process, and the parts by name follow from the parts.
+        # Symbols are valid in one process only, and the parts by name follow from the parts.
         return {key: value for key, value in self.__dict__.items() if key not in ("_symbols", "_named")}
 
     def _detached_copy(self) -> Self:
@@ -91,14 +91,14 @@ class Declared:
 
 @dataclass(frozen=True)
 class Domain:
-    """Words of a physical domain, by which messages speak about connectors of one kind.
+    """Words of a physical domain, for messages about its connectors.
 
     Attributes:
-        flow: what connectors carry, such as `torque`.
-        potential: what is equal where they are joined, such as `voltage`.
-        separator: what goes between two parts that fix the same potential.
+        flow: quantity that connectors carry, such as `torque`.
+        potential: quantity that is equal in a connection, such as `voltage`.
+        separator: part to put between two parts that fix the same potential.
         reference: component type that every network of such connectors needs, such as `Ground`.
-        converters: by the name of another kind of connector, what goes between the two.
+        converters: part that connects to another connector type, by the name of that type.
     """
 
     flow: str = "flow"
@@ -111,17 +111,17 @@ class Domain:
 class Connector(Declared):
     """Where components are joined: potentials (`var`) become equal, flows (`flow`) sum to zero.
 
-    A kind of connector says to which `domain` it belongs.
+    A connector type declares its `domain`.
 
     Args:
-        description: which end of the component this is.
-        free: it may stay unconnected (its flows are then zero).
-        optional: it exists only where something is connected to it.
+        description: end of the component.
+        free: whether it may stay unconnected (its flows are then zero).
+        optional: whether it exists only if something is connected to it.
     """
 
     domain: ClassVar[Domain] = Domain()
     stroke: ClassVar[Stroke | None] = None
-    """How its connections are drawn."""
+    """Line style of its connections."""
 
     def __init__(self, description: str = "", *, free: bool = False, optional: bool = False) -> None:
         self.description = description
@@ -146,8 +146,8 @@ def unknown(kind: str, label: str, name: str, known: Iterable[str]) -> UnknownNa
     """Return the error about a name that does not exist.
 
     Args:
-        kind: what it should name, such as `part`.
-        label: what has no such thing.
+        kind: kind of name, such as `part`.
+        label: owner of the names.
         name: the name.
         known: the names that exist.
     """

@@ -1,4 +1,4 @@
-"""What `equations()` yields: equations, connections, free ends."""
+"""Items that `equations()` yields: equations, connections, free ends."""
 
 from __future__ import annotations
 
@@ -43,11 +43,15 @@ class Equation:
 
 Statement = Equation | Connection | FreeEnd
 Equations = Iterator["Expr | Connection | FreeEnd"]
-"""What `equations()` returns."""
+"""Return type of `equations()`."""
 
 
 def connect(first: Connector | Expr, *others: Connector | Expr) -> Connection:
     """Join connectors of one kind, or one output with inputs.
+
+    Args:
+        first: a connector or signal.
+        others: at least one more.
 
     Raises:
         LanguageError: fewer than two ends, or an end that is neither a connector nor a signal.
@@ -77,13 +81,20 @@ class InLine(Protocol):
 
 
 def series(*parts: InLine) -> Equations:
-    """Connect the outlet of each part with the inlet of the next."""
+    """Connect the outlet of each part with the inlet of the next.
+
+    Args:
+        parts: at least two components, in order.
+    """
     for left, right in pairwise(parts):
         yield connect(left.outlet_connector(), right.inlet_connector())
 
 
 def free(connector: Any) -> FreeEnd:
-    """Say that a connector stays unconnected on purpose.
+    """Declare that a connector stays unconnected on purpose.
+
+    Args:
+        connector: of this component or of a part.
 
     Raises:
         LanguageError: it is not a connector.
@@ -97,11 +108,11 @@ def free(connector: Any) -> FreeEnd:
 
 
 def as_equation(item: Any, source: Source, component: str) -> Equation:
-    """Take `left == right` apart.
+    """Split `left == right`.
 
     Args:
-        item: what `equations()` yielded.
-        source: where.
+        item: yielded by `equations()`.
+        source: its place.
         component: name of the class, for messages.
 
     Raises:
@@ -128,9 +139,9 @@ def as_equation(item: Any, source: Source, component: str) -> Equation:
 
 
 def _is_turned(left: Any, right: Any, text: str) -> bool:
-    """Tell whether Python exchanged the sides.
+    """Return whether Python exchanged the sides.
 
-    It asks a symbol on the right side first, as the class of symbols is derived from that of expressions.
+    Python asks a symbol on the right side first, because the class of symbols is derived from that of expressions.
     """
     written = [side.strip() for side in text.removeprefix("yield").split("==")]
     plain = [re.fullmatch(r"[\w.\[\]]+", side) is not None for side in written]
@@ -138,7 +149,7 @@ def _is_turned(left: Any, right: Any, text: str) -> bool:
 
 
 def as_statement(item: Any, source: Source, component: str) -> Statement:
-    """Read what `equations()` yielded; the arguments are those of `as_equation`."""
+    """Read an item yielded by `equations()`; the arguments are those of `as_equation`."""
     if isinstance(item, Connection | FreeEnd):
         return item if item.source is not NOWHERE else replace(item, source=source)
     return as_equation(item, source, component)

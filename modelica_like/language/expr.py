@@ -1,4 +1,4 @@
-"""Expressions and symbols: a typed face of `casadi.SX`."""
+"""Expressions and symbols: a typed interface to `casadi.SX`."""
 
 from __future__ import annotations
 
@@ -41,12 +41,12 @@ else:
 
 
 class Symbol(Expr):
-    """A named leaf of expressions that knows which field of which component it stands for.
+    """A named leaf of expressions for a field of a component.
 
     Attributes:
         owner: the component or connector that declares the field; None for time.
         name: name of the field.
-        order: how often it is differentiated in time (0: the variable itself).
+        order: order of the time derivative (0: the variable itself).
     """
 
     owner: Any
@@ -82,7 +82,7 @@ def symbol_of(owner: Any, name: str, order: int = 0) -> Symbol:
     Args:
         owner: the component or connector.
         name: of the field.
-        order: how often it is differentiated in time.
+        order: order of the time derivative.
     """
     cache: dict[tuple[str, int], Symbol] = owner.__dict__.setdefault("_symbols", {})
     if (name, order) not in cache:
@@ -100,12 +100,12 @@ _FLAG = re.compile(r"prescribed\((\w+)\)")
 
 
 def flag_name(name: str) -> str:
-    """Return the name of the symbol that says whether a motion is prescribed."""
+    """Return the name of the symbol for "the motion is prescribed"."""
     return f"prescribed({name})"
 
 
 def flagged_motion(name: str) -> str:
-    """Return the name of the motion of such a symbol, or nothing if it is another symbol."""
+    """Return the name of the motion of such a symbol, or an empty text for other symbols."""
     found = _FLAG.fullmatch(name)
     return found.group(1) if found else ""
 
@@ -115,5 +115,5 @@ TIME = Symbol(None, "time")
 
 
 def is_expression(value: object) -> bool:
-    """Tell whether `value` is symbolic rather than a number."""
+    """Return whether `value` is symbolic rather than a number."""
     return isinstance(value, ca.SX)

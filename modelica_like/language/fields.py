@@ -13,7 +13,7 @@ from modelica_like.language.formula import Arithmetic, Formula, as_formula, pars
 from modelica_like.units import ANY, Unit, parse_unit, read_quantity, to_si
 
 _CALCULATES = re.compile(r"\s[-+*/]\s")
-"""What follows a number is no unit, but goes on as a formula."""
+"""A number continues as a formula instead of a unit."""
 
 StatePreference = Literal["always", "prefer", "default", "avoid"]
 
@@ -26,18 +26,22 @@ class Guess:
 
 
 def guess(value: Quantity) -> Any:
-    """Mark a start value as a guess: where the solver begins, not what it must find."""
+    """Mark a start value as a guess, which the solver may change.
+
+    Args:
+        value: a number in the declared unit, or a quantity.
+    """
     return Guess(value)
 
 
 @dataclass(frozen=True, slots=True)
 class Value:
-    """What a parameter, input or start value was given.
+    """The given value of a parameter, input or start value.
 
     Attributes:
-        given: as the user wrote it.
+        given: as written by the user.
         number: value in SI units, or None if it follows from a formula.
-        formula: how it follows from parameters of the owner's assembly, or None.
+        formula: of parameters of the owner's assembly, or None.
         unit: declared unit; for a declared unit `*` the unit of the given quantity.
         fixed: False for a guessed start value.
     """
@@ -82,7 +86,7 @@ class Field:
         return f"{self.owner}.{self.name}"
 
     def read(self, given: Any) -> Value:
-        """Understand a value: a number, a quantity with a unit, or a formula.
+        """Read a value: a number, a quantity with a unit, or a formula.
 
         Raises:
             UnitError: the quantity has another dimension.
@@ -114,14 +118,14 @@ class Field:
 
 
 def in_range(number: float, given: object, label: str, unit: str, bounds: tuple[float | None, float | None]) -> float:
-    """Return a number that is finite and not outside its bounds.
+    """Return a number after checking that it is finite and within its bounds.
 
     Args:
         number: in SI units.
-        given: how it was written, for messages.
-        label: what messages call it.
+        given: as written, for messages.
+        label: name for messages.
         unit: of the bounds, likewise.
-        bounds: smallest and largest value, in SI units; None where there is none.
+        bounds: smallest and largest value, in SI units, or None.
 
     Raises:
         ValueOutOfRange: it is not.
@@ -164,7 +168,7 @@ class Parameter(_Symbolic, Arithmetic):
 
     Attributes:
         tunable: whether it can change after compilation.
-        above: it must exceed the parameter that stands so many places before it; 0: none.
+        above: the parameter must exceed the one this many places before it; 0: none.
     """
 
     tunable = True
@@ -174,10 +178,13 @@ class Parameter(_Symbolic, Arithmetic):
 class Variable(_Symbolic):
     """Unknown that changes continuously; potential or flow in a connector.
 
-    Attributes:
-        state: how much it wants to be a state.
-        guess: where the solver begins to look for its start value (SI).
+    Args:
+        unit: in Modelica notation.
+        description: one phrase.
+        state: preference as a state: `always`, `prefer`, `default` or `avoid`.
+        guess: first guess of its start value (SI).
         is_flow: whether it sums to zero in a connection.
+        bounds: as of `var`.
     """
 
     def __init__(
@@ -191,7 +198,7 @@ class Variable(_Symbolic):
 
 
 class Input(Variable):
-    """Causal signal that comes from outside the component."""
+    """Causal signal from outside the component."""
 
 
 class Output(Variable):
@@ -211,12 +218,12 @@ def param(
     Args:
         unit: in Modelica notation, e.g. `kg.m2`; `1` for none; `*` takes the unit of the value.
         description: one phrase.
-        default: number in that unit, quantity or formula; without it the parameter must be given, unless the class
-            asks `given()`.
+        default: number in that unit, quantity or formula; without it the parameter is required, unless the class
+            checks `given()`.
         min: smallest allowed value, SI.
         max: largest allowed value, SI.
         nominal: order of magnitude, SI.
-        tunable: False: it cannot change after compilation.
+        tunable: whether it can change after compilation.
     """
     parameter = Parameter(unit, description, default=default, min=min, max=max, nominal=nominal)
     parameter.tunable = tunable
@@ -232,9 +239,9 @@ def var(
     Args:
         unit: in Modelica notation.
         description: one phrase.
-        state: how much it wants to be a state.
-        guess: where the solver begins to look for its start value, SI.
-        default: start value where nothing else determines it, e.g. 0 for the angle of a prescribed speed.
+        state: preference as a state: `always`, `prefer`, `default` or `avoid`.
+        guess: first guess of its start value, SI.
+        default: start value if nothing else determines it, e.g. 0 for the angle of a prescribed speed.
         min: smallest sensible value, SI.
         max: largest sensible value, SI.
         nominal: order of magnitude, SI.
@@ -259,9 +266,9 @@ def signal_in(
     """Declare a causal input.
 
     Args:
-        unit: in Modelica notation; `*` takes the unit of what is connected.
+        unit: in Modelica notation; `*` takes the unit of the connected output.
         description: one phrase.
-        default: its value where nothing is connected; without it one must be given.
+        default: value if unconnected; without it, a connection or a value is required.
         min: smallest allowed value, SI.
         max: largest allowed value, SI.
     """

@@ -72,7 +72,7 @@ class Formula(Arithmetic):
     operands: tuple[Any, ...]
 
     def names(self) -> Iterator[str]:
-        """Yield the dotted paths of the parameters it needs."""
+        """Yield the dotted paths of its parameters."""
         if self.operation == "name":
             yield self._name()
         for operand in self.operands:
@@ -83,14 +83,14 @@ class Formula(Arithmetic):
         """Compute the value.
 
         Args:
-            lookup: gives the value (a number or an expression) of a path.
-            quantity: gives the value of a number with a unit.
+            lookup: returns the value (a number or an expression) of a path.
+            quantity: returns the value of a number with a unit.
 
         Raises:
-            NetlistError: there is a unit where only numbers count.
+            NetlistError: a number has a unit in a formula of plain numbers.
         """
         if self.operation == "number":
-            # In CasADi's arithmetic 1/0 and (-1)**0.5 are values that a check finds, in Python's they are exceptions.
+            # 1/0 and (-1)**0.5 are values in CasADi's arithmetic, which a check finds; in Python they are exceptions.
             return ca.SX(self.operands[0])
         if self.operation == "quantity":
             if quantity is None:
@@ -101,7 +101,7 @@ class Formula(Arithmetic):
         return _OPERATIONS[self.operation](*(operand.evaluate(lookup, quantity) for operand in self.operands))
 
     def _name(self) -> str:
-        # In a class body a parameter is used before the class, and so its name, exists: it is asked for late.
+        # In a class body a parameter is used before its class and name exist: resolve it later.
         named = self.operands[0]
         return named if isinstance(named, str) else named.name
 
@@ -139,12 +139,13 @@ def as_formula(value: Any) -> Formula:
 
 
 def parse_formula(text: str) -> Formula:
-    """Read a formula from text; arithmetic, names, quantities, `pi` and a few functions are understood.
+    """Read a formula from text: arithmetic, names, quantities, `pi` and a few functions.
 
-    A quantity in it is a number, a blank and a unit: `2*J + 1182.6 kg.mm2`.
+    Args:
+        text: the formula; a quantity in it is a number, a blank and a unit: `2*J + 1182.6 kg.mm2`.
 
     Raises:
-        NetlistError: the text is not such a formula.
+        NetlistError: the text is not a formula.
     """
     if len(text) > _MAX_LENGTH:
         raise NetlistError(f"A formula of {len(text)} characters is too long (at most {_MAX_LENGTH}).")
@@ -161,7 +162,7 @@ def parse_formula(text: str) -> Formula:
 
 
 def _without_quantities(text: str) -> tuple[str, dict[str, str]]:
-    """Put names in the place of numbers with a unit; also return what each stands for."""
+    """Replace numbers with a unit by names; also return the quantity of each name."""
     quantities: dict[str, str] = {}
 
     def name(match: re.Match[str]) -> str:

@@ -27,7 +27,11 @@ def _sx(value: Scalar) -> Any:
 
 
 def der(expression: Expr) -> Expr:
-    """Return the time derivative of a variable, or of an expression of variables (by the chain rule)."""
+    """Return the time derivative (by the chain rule).
+
+    Args:
+        expression: a variable, or an expression of variables.
+    """
     if isinstance(expression, Symbol) and expression is not TIME:
         return expression.derivative()
     total: Any = 0.0
@@ -38,12 +42,12 @@ def der(expression: Expr) -> Expr:
 
 
 def prescribed(motion: Expr) -> Expr:
-    """Return 1 where the model prescribes a motion, whatever torque or force it takes, and 0 where these move it.
+    """Return 1 if the model prescribes a motion, whatever torque or force it takes, and 0 if these determine it.
 
-    That follows from the structure of the whole model; it never changes during a run.
+    This follows from the structure of the whole model and never changes during a run.
 
     Args:
-        motion: a speed of the component, whose derivative stands in the same equation.
+        motion: a speed of the component, whose derivative is in the same equation.
 
     Raises:
         LanguageError: it is not a variable.
@@ -64,7 +68,7 @@ def _elementary(function: Callable[[Any], Any], doc: str) -> Callable[[Scalar], 
     def of(x: Scalar) -> Expr:
         return function(_sx(x))
 
-    of.__name__, of.__doc__ = function.__name__, doc
+    of.__name__, of.__doc__ = function.__name__, f"{doc}\n\nArgs:\n    x: an expression or a number.\n"
     return of
 
 
@@ -83,17 +87,32 @@ floor = _elementary(
 
 
 def atan2(y: Scalar, x: Scalar) -> Expr:
-    """Angle in rad of the point (x, y)."""
+    """Return the angle of a point in rad.
+
+    Args:
+        y: its ordinate.
+        x: its abscissa.
+    """
     return ca.atan2(_sx(y), _sx(x))
 
 
 def minimum(x: Scalar, y: Scalar) -> Expr:
-    """Return the smaller of two values, without an event."""
+    """Return the smaller of two values, without an event.
+
+    Args:
+        x: an expression or a number.
+        y: another one.
+    """
     return ca.fmin(_sx(x), _sx(y))
 
 
 def maximum(x: Scalar, y: Scalar) -> Expr:
-    """Return the larger of two values, without an event."""
+    """Return the larger of two values, without an event.
+
+    Args:
+        x: an expression or a number.
+        y: another one.
+    """
     return ca.fmax(_sx(x), _sx(y))
 
 
@@ -102,29 +121,41 @@ def where(condition: Expr | bool, then: Scalar, otherwise: Scalar) -> Expr:
 
     Args:
         condition: a relation, or several joined with `all_of` and the like.
-        then: value where it holds.
-        otherwise: value where it does not.
+        then: value if it is true.
+        otherwise: value if it is false.
     """
     return ca.if_else(condition, _sx(then), _sx(otherwise))
 
 
 def all_of(*conditions: Expr) -> Expr:
-    """All conditions hold."""
+    """Return a condition that is true where all conditions are.
+
+    Args:
+        conditions: relations, or combinations of them.
+    """
     return functools.reduce(ca.logic_and, conditions)
 
 
 def any_of(*conditions: Expr) -> Expr:
-    """At least one condition holds."""
+    """Return a condition that is true where at least one condition is.
+
+    Args:
+        conditions: relations, or combinations of them.
+    """
     return functools.reduce(ca.logic_or, conditions)
 
 
 def negate(condition: Expr) -> Expr:
-    """The condition does not hold."""
+    """Return the opposite of a condition.
+
+    Args:
+        condition: a relation, or a combination of several.
+    """
     return ca.logic_not(condition)
 
 
 BEYOND = ("hold", "linear", "error")
-"""What may be beyond the ends of a table."""
+"""Extrapolation of a table."""
 
 
 def interpolate(
@@ -133,16 +164,16 @@ def interpolate(
     """Interpolate in a table.
 
     Args:
-        x: where to look up.
+        x: abscissa of the value.
         xs: abscissae, strictly increasing, at least one.
         ys: values at the abscissae.
         smooth: False: piecewise linear. True: continuous slope (cubic Hermite with Fritsch-Carlson slopes, no
             overshoot).
-        extrapolate: beyond the ends `hold`: the last value; `linear`: the last slope goes on; `error`: the last value,
-            too: that a run must end there, an event of the component says.
+        extrapolate: beyond the ends `hold`: the last value; `linear`: the last slope; `error`: also the last value,
+            while an event of the component ends the run.
 
     Raises:
-        LanguageError: lengths differ, `xs` does not increase, or `extrapolate` is none of the three.
+        LanguageError: lengths differ, `xs` does not increase, or `extrapolate` is unknown.
     """
     known = not any(is_expression(x) for x in xs)
     if extrapolate not in BEYOND:

@@ -1,4 +1,4 @@
-"""How components and connections appear in a schematic."""
+"""Symbols of components and lines of connections in schematics."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 Side = Literal["W", "E", "N", "S"]
-"""West, where power usually comes from; east, where it goes; north; south."""
+"""West (power in), east (power out), north, south."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,11 +23,11 @@ class Icon:
         heavy: of thick lines.
         text: letters in the middle.
         ports: sides of connectors and signals, `"W"`, or side and place along it, `("W", -14)`. Without an entry,
-            inputs and what is called flange_a, p or port_a are in the west, outputs and the second ends in the east,
+            inputs and connectors named flange_a, p or port_a are in the west, outputs and the second ends in the east,
             supports and heat ports in the south.
-        key: parameters of which the first given one is written below the name.
-        named: the names of the ports are written beside them.
-        at_ports: the symbol is drawn at each connector it is joined to, as a ground is, instead of as a part.
+        key: parameters; the first given one is written below the name.
+        named: whether names are written at the ports.
+        at_ports: whether the symbol is drawn at each connected connector, like a ground, instead of as a part.
     """
 
     width: float
@@ -45,15 +45,15 @@ class Icon:
 
 @dataclass(frozen=True, slots=True)
 class Stroke:
-    """How the connections of a kind of connector are drawn.
+    """Line style of the connections of a connector type.
 
     Attributes:
-        name: what is carried, a word for legends.
+        name: carried quantity, for legends.
         colour: on light paper, `#rrggbb`.
         dark: on dark paper.
         width: in 1/96 inch.
-        dashed: broken line.
-        weight: how much it matters that it is short and straight.
+        dashed: whether the line is dashed.
+        weight: priority of short and straight lines.
     """
 
     name: str

@@ -15,15 +15,15 @@ from modelica_like.language.places import NOWHERE
 
 
 class Mode:
-    """A discrete state that is one of a few names.
+    """A discrete state with named values.
 
     Args:
         names: the modes; their position is their number.
         start: the mode at the start, unless `initially` chooses another.
         description: one phrase.
-        holds: what each mode that holds a motion holds; the name of the motion is short for `Hold(motion)`. In such a
-            mode the component's equations say that the derivative of the motion is zero. That the motion itself is
-            zero follows: who enters the mode with a motion stops it by an impact.
+        holds: motion that a mode holds, by the name of the mode; a name is short for `Hold(motion)`. In such a mode
+            the component's equations set the derivative of the motion to zero. The motion itself is zero, too: a
+            component that enters the mode with a motion stops by an impact.
     """
 
     name: str = ""
@@ -46,11 +46,11 @@ class Mode:
         self.name = name
 
     def check(self) -> None:
-        """Check the declaration; not in `__set_name__`, from which Python 3.11 lets no exception out as it is.
+        """Check the declaration; not in `__set_name__`, because Python 3.11 wraps exceptions there.
 
         Raises:
-            LanguageError: no names, or one twice.
-            UnknownName: the start, or a mode that holds something, is none of them.
+            LanguageError: no names, or a duplicate name.
+            UnknownName: the start, or a mode in `holds`, does not exist.
         """
         if len(set(self.names)) != len(self.names) or not self.names:
             raise LanguageError(f"{self.label} needs distinct names, not {self.names}.")
@@ -91,14 +91,23 @@ class Mode:
 
 
 class BoundMode:
-    """The mode of one component, as `equations()` and `events()` use it."""
+    """The mode of one component in `equations()` and `events()`.
+
+    Args:
+        mode: its declaration.
+        symbol: its symbol in expressions, the number of the mode.
+    """
 
     def __init__(self, mode: Mode, symbol: Symbol) -> None:
         self.mode = mode
         self.symbol = symbol
 
     def is_(self, *names: str) -> Expr:
-        """Condition: the mode is one of `names`."""
+        """Return a condition that is true in some modes.
+
+        Args:
+            names: of these modes.
+        """
         condition: Any = None
         for name in names:
             this: Any = self.symbol == self.mode.number(name)
@@ -109,7 +118,7 @@ class BoundMode:
         """Return the expression of the active mode; the others may be undefined.
 
         Args:
-            otherwise: expression of all modes that are not named.
+            otherwise: expression of all other modes.
             expressions: one expression per mode.
 
         Raises:
@@ -135,16 +144,16 @@ class BoundMode:
         """Declare a transition: a state event (`when`) or a time event (`at`).
 
         Args:
-            source: the mode that it leaves, several of them, or `*` for all.
-            target: the mode that it enters.
-            when: it happens as soon as this condition holds.
-            at: it happens at this time in s, which parameters and discrete values determine.
+            source: the mode to leave, a tuple of modes, or `*` for all.
+            target: the mode to enter.
+            when: condition of a state event.
+            at: time of a time event in s, which depends on parameters and discrete values.
             reset: new values of variables and discrete values, in SI units.
-            notice: what the report of a run says, such as "exceeds {w_max} rad/s": the name of the component comes
-                first, and values of its parameters stand for their names.
+            notice: message in the report of a run, such as "exceeds {w_max} rad/s"; the name of the component comes
+                first, and names in braces become values of its parameters.
             because: why it happens, in a few words, such as "slip reached zero" or "is beyond {limit}" (the report
                 adds the value of the parameter); without it the report puts the condition into words.
-            fails: the run ends there, with the notice as an error.
+            fails: whether the run ends there, with the notice as an error.
 
         Raises:
             UnknownName: a mode does not exist.
@@ -159,7 +168,12 @@ class BoundMode:
         return Transition(self, sources, target, when, moment, dict(reset or {}), NOWHERE, notice, because, fails)
 
     def initially(self, target: str, *, when: Expr) -> StartMode:
-        """Declare the mode at the start, if the condition holds there."""
+        """Declare the mode at the start.
+
+        Args:
+            target: name of the mode.
+            when: condition under which it is chosen, unless an earlier choice was.
+        """
         self.mode.number(target)
         return StartMode(self, target, when)
 
@@ -170,14 +184,14 @@ class Transition:
 
     Attributes:
         mode: the mode that changes.
-        sources: names of the modes it may leave.
-        target: name of the mode it enters.
+        sources: names of the modes to leave.
+        target: name of the mode to enter.
         when: condition of a state event, or None.
         at: time of a time event in s, or None.
         reset: new values of states and discrete values.
-        notice: what the user is told when it happens, without the name of the component.
-        because: why it happens, in a few words.
-        fails: the run ends there, with an error.
+        notice: message for the user, without the name of the component.
+        because: reason in a few words.
+        fails: whether the run ends there, with an error.
     """
 
     mode: BoundMode

@@ -1,4 +1,4 @@
-"""Places in source files: where a `yield` stands, where a component was made."""
+"""Places in source files: of a `yield`, of the creation of a component."""
 
 from __future__ import annotations
 
@@ -35,14 +35,14 @@ def caller() -> Source:
 
 
 def located(generator: Any, label: str = "equations()") -> Iterator[tuple[Any, Source]]:
-    """Run a generator and pair what it yields with the place of the `yield` in the user's file.
+    """Run a generator and pair its items with the place of the `yield` in the user's file.
 
     Args:
-        generator: what `equations()` or `events()` returned.
+        generator: returned by `equations()` or `events()`.
         label: name of that method, for messages.
 
     Raises:
-        LanguageError: it is not iterable, or it asks for what a partial base leaves open.
+        LanguageError: it is not iterable, or needs a member that a partial base does not define.
     """
     if not isinstance(generator, Iterable) or isinstance(generator, ca.SX):
         raise LanguageError(
@@ -61,7 +61,7 @@ def located(generator: Any, label: str = "equations()") -> Iterator[tuple[Any, S
 
 
 def _undecided(error: RuntimeError, label: str) -> LanguageError | None:
-    """Tell what CasADi says when Python asks a symbolic relation whether it is true."""
+    """Explain the error of CasADi if Python asks for the truth value of a symbolic relation."""
     if "truth value" not in str(error):
         return None
     place, frame = NOWHERE, error.__traceback__
@@ -77,11 +77,11 @@ def _undecided(error: RuntimeError, label: str) -> LanguageError | None:
 
 
 def _left_open(error: RuntimeError) -> LanguageError | None:
-    """Tell what a partial base wants a component to define."""
+    """Explain the member that a partial base needs."""
     frame = error.__traceback__
     while frame is not None and frame.tb_next is not None:
         frame = frame.tb_next
-    # CasADi raises it, too, with a text.
+    # CasADi also raises it, with a text.
     if not isinstance(error, NotImplementedError) or error.args or frame is None:
         return None
     owner: object = frame.tb_frame.f_locals.get("self")
@@ -100,13 +100,13 @@ def _left_open(error: RuntimeError) -> LanguageError | None:
 def _class_source(kind: type) -> Source:
     try:
         lines, first = inspect.getsourcelines(kind)
-    except (OSError, TypeError):  # made at a prompt
+    except (OSError, TypeError):  # created at a prompt
         return NOWHERE
     return Source(inspect.getfile(kind), first, lines[0].strip())
 
 
 def _place(items: object) -> Source:
-    """Return where a generator stands now: its own line, or that of the generator it delegates to."""
+    """Return the present place of a generator: its own line, or that of the generator it delegates to."""
     frame = None
     while isinstance(items, GeneratorType) and not items.gi_code.co_filename.startswith(_LANGUAGE):
         frame = items.gi_frame

@@ -1,4 +1,4 @@
-"""Units of the arguments and results of design checks: all numbers are in SI, tables show the units of the workshop."""
+"""Units of the arguments and results of design checks: all numbers are in SI units, tables show practical units."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from typing import Annotated, Any
 import casadi as ca
 
 Number = Any
-"""A float, a numpy array (all arrays of one call fit each other by broadcasting) or a CasADi SX, MX or DM."""
+"""A float, a NumPy array (all arrays of one call broadcast) or a CasADi SX, MX or DM."""
 
 
 def is_symbolic(*values: Number) -> bool:
-    """Tell whether any of the values belongs to CasADi."""
+    """Return whether any of the values is a CasADi type."""
     return any(isinstance(value, ca.SX | ca.MX | ca.DM) for value in values)
 
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """What a number measures.
+    """Unit of a number.
 
     Attributes:
         unit: unit of the number, coherent SI.

@@ -1,4 +1,4 @@
-"""Results of design checks: frozen dataclasses that print as tables, with a verdict where a line has a limit."""
+"""Results of design checks: frozen dataclasses that print as tables, with a verdict for lines with a limit."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from modelica_like.language.quantities import Number, Quantity, is_symbolic
 _ROUNDING = 1e-9
 _WIDE = 9
 Limits = Mapping[str, tuple[Number | None, Number | None]]
-"""Smallest and largest value, by name of the line; None where there is no such limit."""
+"""Smallest and largest value by name of the line, or None."""
 
 
 def line(description: str, *, at_most: str = "", at_least: str = "", required: bool = False) -> Any:
     """Declare a line of a result; its unit is that of the annotation.
 
     Args:
-        description: what it is, in the terms of the field.
+        description: one phrase.
         at_most: name of another line that this one must not exceed.
         at_least: name of another line that this one must reach.
-        required: this line, a truth value, has to be true.
+        required: whether this line, a truth value, must be true.
     """
     limits = {"at_most": at_most, "at_least": at_least, "required": required}
     return dataclasses.field(metadata={"description": description, **limits})
@@ -38,10 +38,10 @@ class Line:
     Attributes:
         name: name of the field.
         value: the value as text, in the unit.
-        unit: the unit it is shown in.
-        description: what it is.
-        verdict: `ok`, by how much a limit is missed, or empty where there is no limit.
-        exceeded: a limit is missed.
+        unit: its unit.
+        description: one phrase.
+        verdict: `ok`, the distance from a violated limit, or empty without a limit.
+        exceeded: whether a limit is violated.
     """
 
     name: str
@@ -63,7 +63,7 @@ class Result:
         """Return the lines of the table.
 
         Args:
-            limits: smallest and largest values in SI by name of the line, beside those of the check itself.
+            limits: smallest and largest values in SI units by name of the line, in addition to those of the check.
         """
         chosen = (field for field in _fields(type(self)) if not is_rows(getattr(self, field.name)))
         return tuple(self._line(field, (limits or {}).get(field.name, (None, None))) for field in chosen)
@@ -93,7 +93,7 @@ class Result:
 
 
 def is_rows(value: object) -> bool:
-    """Tell whether a value is a tuple of results."""
+    """Return whether a value is a tuple of results."""
     return isinstance(value, tuple) and isinstance(next(iter(cast("tuple[Any, ...]", value)), None), Result)
 
 
@@ -103,17 +103,17 @@ def _fields(kind: Any) -> tuple[dataclasses.Field[Any], ...]:
 
 @lru_cache(maxsize=512)
 def hints(kind: Any) -> dict[str, Any]:
-    """Return the annotations of a function or a dataclass, with what they are annotated with."""
+    """Return the annotations of a function or a dataclass, with their metadata."""
     return get_type_hints(kind, include_extras=True)
 
 
 def quantity(hint: Any) -> Quantity | None:
-    """Return what a number of an annotation measures, None if it says nothing."""
+    """Return the quantity of an annotation, or None."""
     return next((extra for extra in getattr(hint, "__metadata__", ()) if isinstance(extra, Quantity)), None)
 
 
 def quantity_of(kind: type, name: str) -> Quantity:
-    """Return what a field of a dataclass measures; a text or a truth value is a plain number here."""
+    """Return the quantity of a field of a dataclass; texts and truth values are plain numbers here."""
     return quantity(hints(kind).get(name)) or Quantity("1", "")
 
 
@@ -135,7 +135,7 @@ def titled(line: Line) -> str:
 
 
 def _grid(rows: tuple[Result, ...]) -> str:
-    """Return results of one kind as rows; of many lines each is a row instead."""
+    """Return results of one kind as rows, or transposed if they have many lines."""
     lines = [row.lines() for row in rows]
     heading = tuple(map(titled, lines[0]))
     table = [heading, *(tuple(line.value for line in each) for each in lines)]
@@ -177,7 +177,7 @@ def _is_number(text: str) -> bool:
 
 
 def comparison(**results: Result) -> str:
-    """Return results of one kind side by side, one column each.
+    """Return results of one kind as columns of a table.
 
     Args:
         results: results of the same check, by heading.
@@ -186,6 +186,6 @@ def comparison(**results: Result) -> str:
 
 
 def beside(columns: Iterable[Sequence[Line]]) -> list[tuple[str, ...]]:
-    """Return lines of results of one kind side by side: their name, the values, the unit and the description."""
+    """Return lines of results of one kind: name, values, unit and description."""
     rows = zip(*columns, strict=True)
     return [(one[0].name, *(line.value for line in one), one[0].unit, one[0].description) for one in rows]

@@ -15,7 +15,7 @@ from modelica_like.language.places import caller
 from modelica_like.units import ANY, Unit, parse_unit, to_si
 
 REQUIRED = object()
-"""Stands for the default of a structural field that must be given."""
+"""Default of a required structural field."""
 _SHOWN = 60
 
 
@@ -36,7 +36,7 @@ class Column:
         return fields[self.scale].unit if self.scale else parse_unit(self.unit)
 
     def described(self, fields: Mapping[str, Field]) -> str:
-        """Return what it is and its unit: `slip speed in rad/s`."""
+        """Return its description and unit: `slip speed in rad/s`."""
         unit = str(self.unit_in(fields))
         return f"{self.what} (a text)" if self.text else f"{self.what} in {unit}" if unit not in "1*" else self.what
 
@@ -52,17 +52,17 @@ class Rows:
 
     @property
     def description(self) -> str:
-        """What the rows are: `Rows of slip speed in w_scale and friction coefficient.`."""
+        """Description of the rows: `Rows of slip speed in w_scale and friction coefficient.`."""
         parts = [f"{one.what} in {one.scale or one.unit}" if one.scale or one.unit != "1" else one.what
                  for one in self.columns]  # fmt: skip
         listed = ", ".join(parts[:-1]) + " and " + parts[-1] if len(parts) > 1 else parts[0]
         return f"{'List' if self.flat else 'Rows'} of {listed}{' and so on' if self.more else ''}."
 
     def read(self, label: str, fields: Mapping[str, Field], given: Any) -> tuple[tuple[Any, ...], frozenset[str]]:
-        """Understand a table.
+        """Read a table.
 
         Args:
-            label: how messages call it, such as `Clutch.mu_pos`.
+            label: name for messages, such as `Clutch.mu_pos`.
             fields: of the component.
             given: tuple of rows, tuples; cells are numbers in the column's unit, quantities, or texts.
 
@@ -96,7 +96,7 @@ class Rows:
         return tuple(one[0] for one in table) if self.flat else tuple(table), frozenset(measured)
 
     def store(self, owner: Any, name: str, given: Any) -> tuple[Any, ...]:
-        """Understand a table for a component, which keeps it as it was given, and the scales it then must not have.
+        """Read a table for a component, which stores it as given, and the scales that must then have no value.
 
         Args:
             owner: the component.
@@ -129,7 +129,7 @@ class Rows:
 
 
 def _cell(label: str, column: Column, fields: Mapping[str, Field], given: Any) -> Any:
-    """Return a cell in SI units; symbols stay what they are."""
+    """Return a cell in SI units; symbols are not changed."""
     if isinstance(given, Expr) or (column.text and isinstance(given, str)):
         return given
     unit = column.unit_in(fields)
@@ -163,7 +163,7 @@ def frozen_rows(value: Any) -> Any:
 
 
 def both_given(label: str, scale: str) -> ModelicaLikeError:
-    """Return the error about a table with quantities whose unit is given, too."""
+    """Return the error about a table with quantities and a scale."""
     return NetlistError(
         f"{label} has quantities, but {scale} scales plain numbers.",
         advice=f"Write numbers and {scale}, or quantities without {scale}.",
@@ -180,8 +180,8 @@ def column(
         what: one phrase.
         unit: in Modelica notation.
         scale: parameter with a unit that multiplies plain numbers; quantities need none.
-        rising: every value is above the one before.
-        text: it holds texts, not numbers.
+        rising: whether every value must exceed the one before.
+        text: whether it contains texts instead of numbers.
         min: smallest permitted value, in units of the scale or in SI units.
         max: largest permitted value.
     """
@@ -192,9 +192,9 @@ def rows(*columns: Column, default: Any = REQUIRED, flat: bool = False, more: bo
     """Declare a structural field that is a table: in equations a tuple of rows, in SI units or in units of a scale.
 
     Args:
-        columns: what stands in a row.
-        default: rows; without it they must be given.
-        flat: the rows are single values instead of lists.
-        more: there may be more columns like the last.
+        columns: of the table.
+        default: rows; without it they are required.
+        flat: whether the rows are single values instead of lists.
+        more: whether there may be more columns like the last.
     """
     return Rows(columns, default, flat, more)

@@ -1,4 +1,4 @@
-"""Terminals: what belongs together at an open end of a drive that is exported."""
+"""Terminals: signals that belong together at an open end of an exported drive."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from typing import Literal
 
 @dataclass(frozen=True, slots=True)
 class Terminal:
-    """How an adaptor appears outside: its signals together form one terminal.
+    """The terminal formed by the signals of an adaptor.
 
     Attributes:
-        kind: kind of the terminal; ends of one kind fit together.
-        takes: what comes from outside: the `flow` (torque, force, current, heat flow) or the `potential` (angle,
+        kind: kind of the terminal; ends of one kind can be connected.
+        takes: quantity from outside: the `flow` (torque, force, current, heat flow) or the `potential` (angle,
             position, voltage, temperature).
         rates: pairs of an input and the input that is its time derivative.
         power: the flow and the signal whose product is the power through it, such as torque and speed.

@@ -18,15 +18,15 @@ NAME_IN_NOTICE = re.compile(r"\{([\w.]+)\}")
 
 EventStatement = Transition | StartMode
 Events = Iterator[EventStatement]
-"""What `events()` returns."""
+"""Return type of `events()`."""
 
 
 def as_event(item: Any, source: Source, component: str) -> EventStatement:
-    """Read what `events()` yielded.
+    """Read an item yielded by `events()`.
 
     Args:
-        item: what it yielded.
-        source: where.
+        item: the item.
+        source: its place.
         component: name of the class, for messages.
 
     Raises:
@@ -44,7 +44,7 @@ def as_event(item: Any, source: Source, component: str) -> EventStatement:
 
 
 def _check_transition(transition: Transition, source: Source, component: str) -> None:
-    """Check that the time of a time event is known ahead, and that only variables and discrete values are reset."""
+    """Check that a time event is known in advance, and that only variables and discrete values are reset."""
     asked = () if transition.at is None else symbols_in(transition.at)
     moving = [s for s in asked if s is TIME or isinstance(_field(s), Variable)]
     if moving:

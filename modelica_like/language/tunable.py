@@ -1,4 +1,4 @@
-"""Tables whose numbers are parameters: they can be changed without compiling again."""
+"""Tables whose numbers are parameters, which can change without a new compilation."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ def with_tunable_tables(root: _Root, patterns: Iterable[str]) -> _Root:
 
     Args:
         root: a component tree.
-        patterns: paths of tables, such as `clutch.mu_pos` or `*.loss_table`. The number of rows stays as it is. Tables
-            with texts, and those that are passed on to parts, stay what they are where a pattern with `*` meets them.
+        patterns: paths of tables, such as `clutch.mu_pos` or `*.loss_table`. The number of rows is fixed. A pattern
+            with `*` skips tables with texts and tables that are passed on to parts.
 
     Raises:
         UnknownName: no table has such a path.
-        LanguageError: a table that is named has texts, or is passed on to parts.
+        LanguageError: a named table has texts, or is passed on to parts.
     """
     root = copy.deepcopy(root)
     found = [(part, name, rows) for part in cast("Iterable[Any]", root.walk()) for name, rows in part._tables.items()]

@@ -1,4 +1,4 @@
-"""Many runs of one model that leave numbers only, at the speed of C: what sweeps are made of."""
+"""Many runs of one model in C that return only numbers, for sweeps."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ _RECORD = np.dtype(
 
 @dataclass(frozen=True)
 class Reading:
-    """A number that is read off a run.
+    """A number to read off a run.
 
     Attributes:
         kind: value at the end or at a moment, largest and smallest result, integral over the results (`area`) or over
-            the integrator's steps (`work`), time of a mode change, energy in J that impacts take.
-        place: position of the variable, of the mode, or of the motion that is held.
+            the integrator's steps (`work`), time of a mode change, energy in J lost in impacts.
+        place: position of the variable, of the mode, or of the held motion.
         change: numbers of the modes before and after (-1: any), and which of several such changes.
         moment: in s.
     """
@@ -41,14 +41,14 @@ class Reading:
 
 
 class Batch:
-    """Runs of a model that differ in parameters and inputs; may be used by several threads at once.
+    """Runs of a model that differ in parameters and inputs; several threads may use it at once.
 
     Args:
         model: the compiled model.
-        readings: what is read off every run.
+        readings: numbers to read off every run.
         options: tolerances, number of results and largest number of events.
         span: start and end time in s.
-        start: kind of start; by default as the netlist says.
+        start: kind of start; by default that of the netlist.
 
     Raises:
         MissingStart, ContradictingStart: the start values do not determine all states.
@@ -66,7 +66,7 @@ class Batch:
         self._readings = np.array(rows, _RECORD)
 
     def run(self, parameters: Vector, inputs: Vector, stop: ctypes.c_int | None = None) -> tuple[Vector, Any]:
-        """Do runs one after the other, without holding up other threads.
+        """Do runs one after the other, without blocking other threads.
 
         Args:
             parameters: in the order of `model.p`, unchecked, shape (runs, parameters).
@@ -74,7 +74,7 @@ class Batch:
             stop: becomes nonzero when the results are no longer needed.
 
         Returns:
-            Numbers, shape (runs, readings), and which runs failed, shape (runs,). What does not happen is nan.
+            Numbers, shape (runs, readings), nan for changes that do not happen, and which runs failed, shape (runs,).
         """
         runs, options = len(parameters), self._options
         values, failed = np.empty((runs, len(self._readings))), np.ones(runs, np.uint8)

@@ -18,17 +18,17 @@ _COUNTED = {
 }  # fmt: skip
 _LEAST = 32
 _BREATH = 5000
-"""Steps between two looks at whether the user wants to go on."""
+"""Number of steps between two checks for an interrupt."""
 
 
 class Buffers:
-    """A run of an instance, and what it has written.
+    """A run of an instance, and its results.
 
     Args:
-        instance: one that has begun.
+        instance: a started one.
         end: end time in s.
         points: number of equal intervals of the results.
-        widths: what is to be written (arrays of `NativeRun` in native.c), with the number of columns.
+        widths: arrays to write (of `NativeRun` in native.c), with the number of columns.
         outputs: value references of the outputs.
     """
 
@@ -46,7 +46,7 @@ class Buffers:
         """Run to the end, and return the last code.
 
         Args:
-            reached: called now and then with the time reached; tells whether to go on.
+            reached: called at intervals with the time reached; returns whether to continue.
         """
         while True:
             arguments = self.instance.address, self.end, self.points, ctypes.byref(self.run)
@@ -57,7 +57,7 @@ class Buffers:
                 self._make_room(counted, names, 2 * getattr(self.run, f"room_{counted}"))
 
     def __getitem__(self, name: str) -> Vector:
-        """What was written, shape (rows, columns)."""
+        """Written rows, shape (rows, columns)."""
         counted = next(counted for counted, names in _COUNTED.items() if name in names)
         return self._arrays[name][: getattr(self.run, f"n_{counted}")]
 

@@ -1,4 +1,4 @@
-"""A handle for control loops and learning: set, step, read and go back, at the speed of C."""
+"""A handle for control loops and learning: set, step, read and restore, at the speed of C."""
 
 from __future__ import annotations
 
@@ -29,24 +29,24 @@ class Native:
         drive.step(drive.time + 1e-3)
     ```
 
-    Values are in SI units. A handle belongs to one thread at a time; handles of one model run side by side.
+    Values are in SI units. Only one thread at a time may use a handle; handles of one model run in parallel.
 
     Args:
         model: the compiled model.
         inputs: inputs and tunable parameters that steps set.
-        outputs: variables, modes (as numbers) and whatever else an FMU of the model has, that steps read.
-        start: `given`, `rest` or `steady`; by default as the netlist says.
+        outputs: variables, modes (as numbers) and other quantities of the model's FMU, read by steps.
+        start: `given`, `rest` or `steady`; by default that of the netlist.
         rtol: relative tolerance.
         atol: absolute tolerance, in nominal values.
-        fixed_step: step size in s, or a time such as "1 ms", for a bound on the work of every step; steps and the
-            distances of a run's results are whole numbers of it. By default steps are as long as accuracy lets them be.
+        fixed_step: step size in s, or a time such as "1 ms", for bounded work per step; steps and output intervals
+            are whole numbers of it. By default the step size is adaptive.
 
     Raises:
         ValueOutOfRange: the fixed step is not a positive time.
 
     Attributes:
-        inputs: what the next step sets, shape (inputs,); to be written into.
-        outputs: what the last step has read, shape (outputs,); written over by the next one.
+        inputs: set by the next step, shape (inputs,); write into it.
+        outputs: read by the last step, shape (outputs,); the next step overwrites it.
     """
 
     def __init__(
@@ -68,12 +68,12 @@ class Native:
         self.reset()
 
     def reset(self, values: Mapping[str, float] | None = None, *, t0: float = 0.0, until: float = math.inf) -> None:
-        """Begin anew.
+        """Start again.
 
         Args:
             values: other values of parameters, inputs and start values by path.
             t0: start time in s.
-            until: end of the run, if it is known.
+            until: end of the run, if known.
 
         Raises:
             UnknownName, ValueOutOfRange: a value cannot be set.
@@ -87,7 +87,7 @@ class Native:
         self._read(self._references[1], self.outputs)
 
     def set(self, values: Mapping[str, float]) -> None:
-        """Set inputs and tunable parameters by path; they hold from now on."""
+        """Set inputs and tunable parameters by path, from now on."""
         references, numbers = self._instance.native.references(values), np.array([*values.values()], float)
         self._instance.check(
             self._library.set(self._address, len(numbers), references.ctypes.data, numbers.ctypes.data)
@@ -98,11 +98,11 @@ class Native:
         return self._read(self._instance.native.references(names), np.zeros(len(names)))
 
     def step(self, time: float) -> Vector:
-        """Set `inputs`, go on to a time in s through all events, and read `outputs`, which is returned.
+        """Set `inputs`, step to a time in s through all events, and return `outputs`, shape (outputs,).
 
         Raises:
-            SolveError: the run cannot go on; `restore` or `reset` helps.
-            ValueOutOfRange: an input cannot be set, or the time is no whole number of fixed steps away.
+            SolveError: the run cannot continue; use `restore` or `reset`.
+            ValueOutOfRange: an input cannot be set, or the time is not a whole number of fixed steps away.
         """
         code = self._library.step(self._address, time, *self._step)
         if code:
@@ -111,20 +111,20 @@ class Native:
 
     @property
     def time(self) -> float:
-        """Where it stands, in s."""
+        """Present time in s."""
         return self._library.time(self._address)
 
     def copy(self) -> Copy:
-        """Return a copy of the state, to come back to as often as is wanted."""
+        """Return a copy of the state, to restore any number of times."""
         return Copy(self._instance)
 
     def restore(self, copy: Copy) -> None:
-        """Go back to a copy of this handle or of another one of the same model; `outputs` follow."""
+        """Restore a copy of this handle or of another one of the same model; `outputs` follow."""
         copy.into(self._instance)
         self._read(self._references[1], self.outputs)
 
     def run(self, until: float, points: int = 500) -> tuple[Vector, Vector]:
-        """Go on to a time, with results at equal distances and on both sides of every event.
+        """Run to a time, with results at equal intervals and on both sides of every event.
 
         Returns:
             Times, shape (n,), and outputs, shape (n, outputs).

@@ -1,4 +1,4 @@
-"""The compiled run-time as functions: what native.c and batch.c export, by ctypes, which lets other threads run."""
+"""The functions of native.c and batch.c by ctypes, which lets other threads run."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from modelica_like.fmi.build import native_platform
 from modelica_like.fmi.runtime import runtime_library
 
 OK, FAILED, MORE, PAUSED = range(4)
-"""What functions return; runs also that a buffer is full, or that so many steps are done."""
+"""Return codes; runs also report a full buffer, or the end of the allowed steps."""
 MESSAGE_LENGTH = 512
 
 _POINTER, _COUNT, _NUMBER, _CODE = c.c_void_p, c.c_int64, c.c_double, c.c_int
@@ -72,7 +72,7 @@ def library() -> Any:
     """Load the run-time of this machine; its functions have the names of these files without the prefix.
 
     Raises:
-        ExportError: it must be compiled, and there is no compiler, or the compiler failed.
+        ExportError: it must be compiled, but there is no compiler, or the compiler failed.
     """
     return declared(c.CDLL(str(runtime_library(native_platform()))))
 

@@ -1,4 +1,4 @@
-"""Compiled models as the run-time reads them, and instances of them."""
+"""Compiled models for the run-time, and their instances."""
 
 from __future__ import annotations
 
@@ -36,23 +36,23 @@ _ERRORS: tuple[tuple[str, type[ModelicaLikeError]], ...] = (
     ("Two start values|A start value of", ContradictingStart),
     ("The equations for|No start|No steady|The modes at the start", InitializationError),
 )
-"""Which error a message of the run-time is; all others are wrong values."""
+"""Error class of a message of the run-time; all others are wrong values."""
 
 
 def failure(message: str) -> ModelicaLikeError:
-    """Return a message of the run-time as the error that Python raises for the same: what, then what to do."""
+    """Return a message of the run-time as the corresponding Python error, with message and advice."""
     kind = next((kind for pattern, kind in _ERRORS if re.match(pattern, message)), ValueOutOfRange)
     what, _, advice = message.partition(". ")
     return kind(f"{what.removesuffix('.')}.", advice=advice)
 
 
 class NativeModel:
-    """A model that the run-time has read; instances in all threads share it.
+    """A model in the run-time; instances in all threads share it.
 
     Args:
         model: the compiled model.
-        start: what its instances begin from when they find the start themselves; by default as the netlist says.
-        fixed_step: of its instances in s, 0 for steps as long as accuracy lets them be.
+        start: kind of start, if instances compute it themselves; by default that of the netlist.
+        fixed_step: of its instances in s, 0 for adaptive steps.
 
     Raises:
         MissingStart, ContradictingStart: the start values do not determine all states.
@@ -75,7 +75,7 @@ class NativeModel:
 
     @staticmethod
     def of(model: CompiledDae, start: StartKind | None = None, fixed_step: float = 0.0) -> NativeModel:
-        """Return the one that was made before of the same model, whatever its parameters were."""
+        """Return the cached one of the same model, for any parameter values."""
         key = "native", start or model.settings.get("start", "given"), fixed_step
         return model.once(key, lambda: NativeModel(model, *key[1:]))
 
@@ -94,7 +94,7 @@ class NativeModel:
 
 
 class Instance:
-    """An instance of a model: memory, a state, functions of the run-time whose failures are raised.
+    """An instance of a model: memory, state, and functions that raise errors of the run-time.
 
     Args:
         model: the compiled model; its parameters and inputs are those of the instance.
@@ -111,17 +111,17 @@ class Instance:
         weakref.finalize(self, _free, self.library, self.address, self.native)
 
     def check(self, code: int) -> None:
-        """Raise what a call has failed with."""
+        """Raise the error of a failed call."""
         if code != OK:
             raise failure(self.library.message(self.address).decode())
 
     def reset(self, t0: float, end: float, rtol: float, atol: float) -> None:
-        """Begin anew at a time in s, with the model's parameters and inputs; `end` may be infinite."""
+        """Start again at a time in s, with the model's parameters and inputs; `end` may be infinite."""
         self.check(self.library.reset(self.address, t0, end, rtol, atol))
         self.library.set_all(self.address, _at(self.model.p), _at(self.model.u))
 
     def begin_at(self, point: Point) -> None:
-        """Begin at a consistent start; its events have not happened yet."""
+        """Start at a consistent point, before its events."""
         arrays = [np.ascontiguousarray(part, dtype=float) for part in (point.x, point.z, point.d)]
         self.check(self.library.begin_at(self.address, *(_at(one) for one in arrays)))
 

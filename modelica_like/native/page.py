@@ -33,23 +33,23 @@ from modelica_like.units import ANY, ONE, Unit, coherent, parse_unit
 from modelica_like.writing import write_bytes
 
 _SPREAD = 5.0
-"""Sliders without bounds go from the value over this to the value times this."""
+"""Sliders without bounds span from the value divided by this to the value times this."""
 HELPERS = Path(__file__).parent / "helpers.js"
-"""What scripts of pages share."""
+"""Common code of the scripts of pages."""
 _POINTER_SIZE = 4
 _HIGH = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 @dataclass(frozen=True)
 class Page:
-    """What was written.
+    """A written page.
 
     Attributes:
         path: the page.
-        sliders: how many parameters and inputs can be changed, besides the end time.
-        curves: how many curves are shown at first.
+        sliders: number of adjustable parameters and inputs, without the end time.
+        curves: number of curves shown at first.
         size: of the file in bytes.
-        seconds: how long it took.
+        seconds: wall time.
     """
 
     path: Path
@@ -68,24 +68,24 @@ def export_html(
     drive: Model, path: str | Path, until: float | str | None = None, *, show: Sequence[str] = (),
     report: Report = silent,
 ) -> Page:  # fmt: skip
-    """Write a drive as a page that simulates it in a browser: one file that asks for nothing else.
+    """Write a drive as a page that simulates it in a browser: one file that loads nothing else.
 
     It has a slider for every tunable parameter and for every input without a value, and curves over time by unit, with
-    modes and events. Sliders go from min to max where both are declared, else from a fifth of the value to five times
-    it. The drive is run once by IDAS first, which chooses the curves.
+    modes and events. Sliders go from min to max if both are declared, otherwise from a fifth of the value to five
+    times the value. IDAS runs the drive once first, to choose the curves.
 
     Args:
         drive: a component, a netlist file, or a compiled model.
         path: the page to write, with the ending .html.
-        until: end time, a number in s or a quantity; by default what the netlist says.
-        show: patterns of what is drawn at first, such as `*.w`; by default speeds, torques and forces of the parts.
-        report: called with what is being done.
+        until: end time, a number in s or a quantity; by default that of the netlist.
+        show: patterns of the first curves, such as `*.w`; by default speeds, torques and forces of the parts.
+        report: called with the present activity.
 
     Raises:
         ExportError: it cannot be exported, or the run-time cannot be compiled.
         MissingExtra: the run-time must be compiled, and zig is not installed.
-        UnknownName: nothing fits a pattern.
-        ModelicaLikeError: something is wrong with the model, or it has no end time, or it cannot be simulated.
+        UnknownName: nothing matches a pattern.
+        ModelicaLikeError: the model has an error or no end time, or cannot be simulated.
     """
     begin = time.perf_counter()
     target = target_file(path, ".html", "A page")
@@ -124,7 +124,7 @@ def page(
         connect: where the page may ask, as its policy says it.
     """
     folder = Path(__file__).parent
-    # No text inside may end the script.
+    # No text may contain the end of the script.
     data = json.dumps(content, ensure_ascii=False, separators=(",", ":")).replace("<", "\\u003c")
     scripts = (HELPERS, runner, folder / "page.js")
     parts = {
@@ -172,7 +172,7 @@ def _text(data: bytes) -> str:
 
 
 def _layout() -> dict[str, int]:
-    """Places of the fields of `NativeRun` where pointers have four bytes."""
+    """Offsets of the fields of `NativeRun` with pointers of four bytes."""
     places: dict[str, int] = {}
     place = 0
     for field in Run._fields_:
@@ -200,7 +200,7 @@ class _Units:
 
 
 def _spelled(unit: Unit) -> str:
-    """Write a unit as it is printed: `kg·m²`."""
+    """Write a unit in print form: `kg·m²`."""
     if unit in (ONE, ANY):
         return ""
     text = "°" if str(unit) == "deg" else str(unit).replace(".", "·")
@@ -219,7 +219,7 @@ def _variables(
 
 
 def _sliders(model: CompiledDae, known: dict[str, FmuVariable], display: Display) -> Iterator[dict[str, Any]]:
-    """Values that the page changes, in the shown unit, from which SI values follow by factor and offset."""
+    """Adjustable values in the shown unit, with factor and offset to SI units."""
     inputs = (model.flat_variables[k] for k in model.inputs)
     for one in (*model.flat_parameters, *inputs):
         if isinstance(one, FlatParameter) and not one.tunable:
@@ -238,7 +238,7 @@ def _sliders(model: CompiledDae, known: dict[str, FmuVariable], display: Display
 
 
 def _span(value: float, low: float | None, high: float | None) -> tuple[float, float, bool]:
-    """Return where a slider begins and ends, and whether in equal ratios."""
+    """Return the range of a slider, and whether its scale is logarithmic."""
     if low is not None and high is not None:
         return low, high, False
     first, last = sorted((value / _SPREAD, value * _SPREAD)) if value else (-1.0, 1.0)

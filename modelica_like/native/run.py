@@ -1,4 +1,4 @@
-"""A whole run by the compiled run-time, recorded as IDAS's runs are."""
+"""A whole run by the compiled run-time, recorded like those of IDAS."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from modelica_like.solve.recorder import Recorder, Segment
 
 
 class NativeLoop:
-    """Runs a model from a start point to the end; stands in for `EventLoop`.
+    """Runs a model from a start point to the end; replaces `EventLoop`.
 
     Args:
         model: the compiled model.
@@ -44,7 +44,7 @@ class NativeLoop:
 
     @property
     def counts(self) -> tuple[int, int, int]:
-        """Steps, evaluations of the equations, and steps that were tried, so far."""
+        """Steps, evaluations of the equations, and tried steps so far."""
         steps, rejected, evaluations, _ = self._instance.counts()
         return steps, evaluations, steps + rejected
 
@@ -52,7 +52,7 @@ class NativeLoop:
         """Simulate.
 
         Raises:
-            Chattering, StepFailed, SingularAtStart: the run cannot go on; `record` is what came before.
+            Chattering, StepFailed, SingularAtStart: the run cannot continue; `record` has the run up to then.
         """
         try:
             code = self._buffers.go(self._reached)
@@ -78,7 +78,7 @@ class NativeLoop:
         return not self._crowded
 
     def _read(self) -> None:
-        """Put what was written into the record."""
+        """Copy the written results into the record."""
         record, model, written = self.record, self.model, self._buffers
         times, states = written["times"][:, 0], np.ascontiguousarray(written["states"].T)
         firsts, events = written["firsts"][:, 0].astype(int), written["events"]
@@ -93,7 +93,7 @@ class NativeLoop:
             record.impacts.append(Impact(time, model.holds[int(held)].component, energy))
 
     def _note(self, events: Vector, segment: int) -> None:
-        """Note the events before a segment."""
+        """Record the events before a segment."""
         for row in events[events[:, -1] == segment].tolist():
             transition, mode, before, after, number = (int(one) for one in row[1:6])
             self.record.note(self.model, row[0], mode, (before, after), transition, number)

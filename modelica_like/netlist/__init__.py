@@ -1,4 +1,4 @@
-"""Netlists: TOML files that hold the same tree of components as Python classes do."""
+"""Netlists: TOML files with the same tree of components as Python classes."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ __all__ = ["dumps", "find_type", "library_types", "load", "loads", "save", "sche
 
 def dumps(component: Component, *, folder: str | Path = ".") -> str:
     """Write a component as the text of a netlist; see `write.dumps`."""
-    from modelica_like.netlist import write  # tomlkit takes its time, and most runs only read
+    from modelica_like.netlist import write  # tomlkit loads slowly, and most runs only read
 
     return write.dumps(component, folder=folder)
 

@@ -12,7 +12,7 @@ from modelica_like.language.places import located
 
 
 def as_assembly(component: Component) -> Assembly:
-    """Return an assembly with the parts, wires and parameters of a component.
+    """Return an assembly with the parts, connections and parameters of a component.
 
     Args:
         component: an instance of a class whose `equations()` yield only `connect`, `series` and `free`.
@@ -47,7 +47,7 @@ def as_assembly(component: Component) -> Assembly:
 
 
 def _expose(connection: Connection, root: Component, exposed: dict[str, str]) -> list[str]:
-    """Return the ends of a wire; the first inner end joined to an outer connector is the one it stands for."""
+    """Return the ends of a connection; an outer connector represents the first inner end joined to it."""
     inner = [_path(end) for end in connection.ends if _owner(end) is not root]
     ends = list(inner)
     for end in connection.ends:
@@ -68,10 +68,10 @@ def _path(end: Any) -> str:
 
 
 def value_text(component: Component, name: str) -> Any:
-    """Return the value of a parameter as a netlist declares it.
+    """Return the value of a parameter for a netlist.
 
     Raises:
-        NetlistError: it has none.
+        NetlistError: there is none.
     """
     value = component.value(name)
     if value is None:

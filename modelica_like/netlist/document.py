@@ -1,4 +1,4 @@
-"""The plain data of one netlist file: read from TOML and checked for its form, before any component exists."""
+"""The plain data of one netlist file, read from TOML and checked for its form before components are created."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from modelica_like.units import parse_unit, to_si
 _ENDLESS = re.compile(r"[0-9]{4301}")
 MAX_BYTES = 2_000_000
 StartKind = Literal["given", "rest", "steady"]
-"""What stands for start values that are not given."""
+"""Replacement of missing start values."""
 Check = Callable[[str, Any], Any]
 """Returns an entry with the key `section.name`, if it has the right form."""
 Reader = Callable[[str, Any, Lines, list[ModelicaLikeError]], Any]
@@ -37,7 +37,7 @@ class Document:
     """One netlist file.
 
     Attributes:
-        lines: where its keys stand.
+        lines: of its keys.
         parts: tables with `is`, or lists of such tables, by name.
         start: fixed start values by path.
         guess: guessed start values by path.
@@ -65,7 +65,7 @@ def read_text(path: Path) -> str:
     """Return the text of a netlist file.
 
     Raises:
-        NetlistError: the file is missing, is not text, or is too large.
+        NetlistError: the file is missing, not text, or too large.
     """
     try:
         if not path.is_file():
@@ -177,10 +177,10 @@ def read_sections(
 
     Args:
         data: the file's content.
-        what: what messages call it, such as `A netlist`.
+        what: name for messages, such as `A netlist`.
         readers: by the name of the section.
-        lines: where its keys stand.
-        errors: takes what is wrong, with its place.
+        lines: of its keys.
+        errors: list for errors, with their places.
     """
     read: dict[str, Any] = {}
     for key, value in data.items():
@@ -200,7 +200,7 @@ def _placed(error: ModelicaLikeError, source: Source) -> ModelicaLikeError:
 
 
 def whole(check: Check) -> Reader:
-    """Make the reader of a section that is one entry."""
+    """Return the reader of a section that is one entry."""
     return lambda key, value, lines, errors: check(key, value)
 
 
@@ -211,7 +211,7 @@ def _table(key: str, value: Any) -> dict[str, Any]:
 
 
 def each(check: Check, flat: bool = False) -> Reader:
-    """Make the reader of a table whose entries have one form; `flat` joins dotted keys to paths."""
+    """Return the reader of a table whose entries have one form; `flat` joins dotted keys to paths."""
 
     def read(key: str, value: Any, lines: Lines, errors: list[ModelicaLikeError]) -> dict[str, Any]:
         result: dict[str, Any] = {}
@@ -244,7 +244,7 @@ def as_text(key: str, value: Any) -> str:
     """Return an entry that is a text.
 
     Raises:
-        NetlistError: it is none.
+        NetlistError: it is not.
     """
     if not isinstance(value, str):
         raise NetlistError(f"{key} must be a text.")
@@ -272,7 +272,7 @@ def check_part(key: str, value: Any) -> Any:
     """Return the table of a part, or of several, if it has the form of one.
 
     Raises:
-        NetlistError: it does not.
+        NetlistError: it has another form.
     """
     tables = value if isinstance(value, list) and value else [value]
     for table in tables:
@@ -285,7 +285,7 @@ def check_part(key: str, value: Any) -> Any:
 
 
 def options(checks: Mapping[str, Check]) -> Reader:
-    """Make the reader of [simulate], each of whose entries has a form of its own."""
+    """Return the reader of [simulate], whose entries differ in form."""
 
     def check(key: str, value: Any) -> Any:
         name = key.rpartition(".")[2]
@@ -298,10 +298,10 @@ def options(checks: Mapping[str, Check]) -> Reader:
 
 
 def duration(key: str, value: Any) -> Any:
-    """Return a time as it is written, if it is one.
+    """Return a time as written, after checking it.
 
     Raises:
-        UnitError, ValueOutOfRange, NetlistError: it is none, or not positive.
+        UnitError, ValueOutOfRange, NetlistError: it is not a time, or not positive.
     """
     seconds = to_si(value, parse_unit("s"), key)
     if seconds <= 0:
@@ -322,7 +322,7 @@ def _rtol(key: str, value: Any) -> float:
 
 
 def _whole(most: int) -> Check:
-    """Make the check of a number of things."""
+    """Return the check of a count."""
 
     def check(key: str, value: Any) -> int:
         if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= most:

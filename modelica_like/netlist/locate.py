@@ -1,4 +1,4 @@
-"""Lines of the keys of a TOML text, which the TOML reader of the standard library does not tell."""
+"""Lines of the keys of a TOML text, which the TOML reader of the standard library does not return."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _MAX_DEPTH = 20
 _MAX_TEXT = 120
 Path = tuple[str, ...]
 
-# No possessive quantifier (`*+`) of a group: those of Python before 3.11.5 do not match as they should.
+# No possessive quantifier (`*+`) of a group: it is broken in Python before 3.11.5.
 _STRING = r"""(?P<string>\"{3}(?:[^"\\]++|\\.|"(?!""))*(?:\"{3,5}|\Z) | '{3}(?:[^']++|'(?!''))*(?:'{3,5}|\Z)
         |"(?:[^"\\\n]++|\\.)*"? | '[^'\n]*+'?)"""
 _COMMON = rf"""(?P<comment>\#[^\n]*+) | {_STRING} | (?P<open>[\[{{]) | (?P<close>[\]}}]) | (?P<newline>\n)"""
@@ -26,7 +26,7 @@ _VALUE = re.compile(rf"""{_COMMON} | (?P<other>[^"'\#\[\]{{}}\n]++)""", re.VERBO
 
 @dataclass
 class Lines:
-    """Where each key of a TOML text stands.
+    """Places of the keys of a TOML text.
 
     Attributes:
         file: path of the file, for messages.
@@ -54,14 +54,14 @@ class Lines:
         return Source(self.file, number, _shortened(self.text[number - 1].strip()) if known else "")
 
     def add(self, path: Path, number: int, *, table: bool = False) -> None:
-        """Remember a key.
+        """Store a key.
 
         Args:
             path: its names.
             number: of the line.
-            table: whether it may be mentioned again, as part of the names of its keys.
+            table: whether it may occur again, as part of the names of its keys.
         """
-        if not path:  # no TOML: it has no key
+        if not path:  # not TOML: it has no key
             return
         if path in self.numbers and not table:
             self.repeated.append((path, self.numbers[path], number))
@@ -76,14 +76,14 @@ def _shortened(text: str) -> str:
 
 
 def locate(text: str, file: str) -> Lines:
-    """Find the lines of all keys; the text need not be right TOML.
+    """Find the lines of all keys; the text need not be valid TOML.
 
     Raises:
-        NetlistError: brackets or keys are nested deeper than any netlist is.
+        NetlistError: brackets or keys are nested too deeply.
     """
     lines = Lines(file, text.split("\n"))
     table: Path = ()
-    closed: set[Path] = set()  # tables that may not be opened again: headers, and keys with a value
+    closed: set[Path] = set()  # tables that cannot be opened again: headers, and keys with a value
     for number, tokens in _statements(text, lines):
         kinds = [kind for kind, _ in tokens]
         if kinds[:1] == ["open"]:

@@ -23,7 +23,7 @@ from modelica_like.netlist.registry import find_type
 
 _MAX_PARTS = 200_000
 FMU_PART = "FMU"
-"""What a part `is` that comes as an FMU."""
+"""Type `is` of parts that are FMUs."""
 
 
 def load(path: str | Path) -> Assembly:
@@ -45,13 +45,13 @@ def loads(text: str, file: str = "netlist.toml") -> Assembly:
 
     Args:
         text: TOML.
-        file: what to call it in messages; netlists used as parts are looked for beside it.
+        file: path for messages; netlists used as parts are searched in its folder.
     """
     return _Loader().build(parse(text, file), (Path(file).resolve(),))
 
 
 def assemble(document: Document, file: Path) -> Assembly:
-    """Make the assembly of a netlist that has been read already; see `load`."""
+    """Build the assembly of an already read netlist; see `load`."""
     return _Loader().build(document, (file.resolve(),))
 
 
@@ -72,7 +72,7 @@ class _Loader:
         return self.assemblies[key]
 
     def build(self, document: Document, chain: tuple[Path, ...]) -> Assembly:
-        """Make the assembly of one file; all its errors are raised together."""
+        """Build the assembly of one file; all its errors are raised together."""
         assembly = Assembly(
             document.name, connect=document.connect, series=document.series, free=document.free,
             description=document.description,
@@ -102,7 +102,7 @@ class _Task:
         self.errors: list[ModelicaLikeError] = []
 
     def run(self) -> None:
-        """Go through the sections, so that each finds what it refers to."""
+        """Go through the sections, in an order in which each finds its references."""
         self._each("parameters", self.document.parameters, partial(Assembly.add_parameter, self.assembly))
         self._each("parts", self.document.parts, self._add_part)
         if not self.errors:
@@ -129,7 +129,7 @@ class _Task:
         if isinstance(error, WiringErrors):
             self.errors.extend(error.errors)
             return
-        # An error from a netlist inside keeps its own place; the place on Python's stack says nothing here.
+        # An error from an inner netlist keeps its place; the place on Python's stack is of no use here.
         if not any(place.file.endswith(".toml") for place in error.where):
             error.where = (source,)
         self.errors.append(error)
@@ -191,7 +191,7 @@ def _among_equations(name: str) -> NetlistError:
 
 
 def new_component(kind: type[Component], values: dict[str, Any]) -> Component:
-    """Make a component; its structural fields must be known at once, because they decide which parts it has."""
+    """Create a component; its structural fields must be known now, because they decide its parts."""
     structural = {key: values.pop(key) for key in kind._structural if key in values}
     for key, value in structural.items():
         kind.check_structural(key, value)

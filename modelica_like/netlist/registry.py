@@ -16,11 +16,11 @@ from modelica_like.errors import NetlistError, UnknownName, did_you_mean
 from modelica_like.language import Component
 
 GROUP = "modelica_like.libraries"
-"""Entry-point group by which libraries make themselves known; each entry is a module with `__all__`."""
+"""Entry-point group of libraries; each entry is a module with `__all__`."""
 _HOME = str(Path(__file__).parents[2])
-"""Where this package lies, and beside it the library that comes with it."""
+"""Folder of this package, with the library that comes with it."""
 _FAILURES = (ImportError, SyntaxError, NameError, AttributeError, TypeError, ValueError, LookupError, ArithmeticError)
-"""What the lines of a module may raise while it is imported."""
+"""Exceptions from the import of a module."""
 
 
 @lru_cache(maxsize=1)
@@ -28,7 +28,7 @@ def library_types() -> Mapping[str, type[Component]]:
     """Return the component types of all installed libraries by name, sorted; partial classes are left out.
 
     Raises:
-        NetlistError: a library cannot be imported, or two libraries have a type of one name.
+        NetlistError: a library cannot be imported, or two libraries have a type with the same name.
     """
     found = {name: kind for name in _libraries() if (kind := _library_type(name)) is not None}
     return MappingProxyType(dict(sorted(found.items())))
@@ -36,7 +36,7 @@ def library_types() -> Mapping[str, type[Component]]:
 
 @lru_cache(maxsize=1)
 def _libraries() -> Mapping[str, Mapping[str, ModuleType]]:
-    """Return the libraries of each public name; a library need not import what nobody asks for."""
+    """Return the libraries of each public name, without importing them."""
     libraries: dict[str, dict[str, ModuleType]] = {}
     for entry in sorted(entry_points(group=GROUP), key=lambda entry: entry.name):
         module = library_module(entry)
@@ -49,10 +49,10 @@ def _libraries() -> Mapping[str, Mapping[str, ModuleType]]:
 
 
 def library_module(entry: EntryPoint) -> ModuleType:
-    """Import an installed library, whatever modules of the same name lie in a user's folder.
+    """Import an installed library, even if a user's folder has a module of the same name.
 
     Raises:
-        NetlistError: it cannot be imported, or a user's program has taken its name.
+        NetlistError: it cannot be imported, or a user's module has the same name.
     """
     distribution = getattr(entry, "dist", None)
     homes = [*([str(distribution.locate_file(""))] if distribution else []), _HOME]
@@ -87,7 +87,7 @@ def _type_in(name: str, modules: Mapping[str, ModuleType]) -> type[Component] | 
     if len(kinds) > 1:
         raise NetlistError(
             f"Two libraries have a component '{name}': {kinds[0].__module__} and {kinds[1].__module__}.",
-            advice=f'Write which one: "{kinds[1].__module__}:{name}".',
+            advice=f'Write the full name: "{kinds[1].__module__}:{name}".',
         )
     return kinds[0] if kinds else None
 
@@ -97,8 +97,8 @@ def imported(module: str, what: str, folders: Sequence[str] = ()) -> ModuleType:
 
     Args:
         module: its full name.
-        what: how to call it in a message.
-        folders: where to look first.
+        what: name for messages.
+        folders: to search first.
 
     Raises:
         NetlistError: it cannot be imported.
@@ -127,11 +127,11 @@ def _place(module: ModuleType) -> str:
 
 
 def find_type(name: str, folder: Path | None = None) -> type[Component]:
-    """Return the component type that a netlist means by `is`.
+    """Return the component type of an `is` in a netlist.
 
     Args:
         name: a type of an installed library (`Clutch`), or a class of a module (`my_parts:Coupling`).
-        folder: of the netlist; modules are looked for there, in the current directory, and among what is installed.
+        folder: of the netlist; modules are searched there, in the current directory, and among installed packages.
 
     Raises:
         UnknownName: there is no such type.
@@ -165,7 +165,7 @@ def _class_of_module(name: str, folder: Path) -> type[Component]:
 
 
 def _own_module(name: str, folders: list[str]) -> ModuleType:
-    """Import a module that may lie beside the netlist; one that is loaded from elsewhere is not taken for it."""
+    """Import a module that may be in the netlist's folder; a module loaded from elsewhere is refused."""
     _libraries()  # loaded first, they cannot be hidden
     importlib.invalidate_caches()
     top = name.partition(".")[0]
@@ -181,7 +181,7 @@ def _own_module(name: str, folders: list[str]) -> ModuleType:
         )
     module = imported(name, f"The module '{name}'", [home])
     if home not in sys.path:
-        sys.path.append(home)  # other processes, which are given the path, find it, too
+        sys.path.append(home)  # other processes get the path and also find it
     return module
 
 

@@ -27,14 +27,14 @@ def save(component: Component, path: str | Path) -> None:
 
 
 def dumps(component: Component, *, folder: str | Path = ".") -> str:
-    """Write a component as the text of a netlist; what reads it back is the same tree.
+    """Write a component as the text of a netlist; reading it gives the same tree.
 
     Args:
-        component: an assembly, or a component that has only parts and wires.
-        folder: where the text will lie; netlists used as parts are named relative to it.
+        component: an assembly, or a component that has only parts and connections.
+        folder: of the text; netlists used as parts are named relative to it.
 
     Raises:
-        NetlistError: the component has what no netlist can hold, such as equations of its own.
+        NetlistError: the component has something a netlist cannot contain, such as equations of its own.
     """
     assembly = component if isinstance(component, Assembly) else as_assembly(component)
     return tomlkit.dumps(_Writer(Path(folder)).document(assembly))
@@ -84,7 +84,7 @@ class _Writer:
         return {"is": entries[0].pop("is"), "count": len(entries), **entries[0]} if same else entries
 
     def entry(self, path: str, part: Component) -> dict[str, Any]:
-        """Return the table of one part: its type, and what differs from a new one of that type."""
+        """Return the table of one part: its type, and the differences from a new one of that type."""
         if isinstance(part, Assembly):
             return {"is": self.file_of(part), **self.changes(path, part, load(part.__dict__["_origin"]))}
         structural = {key: plain(part._given_tables.get(key, part.__dict__[key])) for key in part._structural}
@@ -131,10 +131,10 @@ def _given(component: Component, name: str) -> Value:
 
 
 def plain(value: Any) -> Any:
-    """Return a value as TOML has it; numbers and texts stay as the user wrote them.
+    """Return a value for TOML; numbers and texts stay as written.
 
     Raises:
-        NetlistError: TOML has nothing for it.
+        NetlistError: TOML has no such value.
     """
     if isinstance(value, bool | int | float | str):
         return value

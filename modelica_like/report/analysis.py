@@ -1,4 +1,4 @@
-"""What analyses have found, as tables: operating points, modes, sensitivities and sweeps."""
+"""Results of analyses as tables: operating points, modes, sensitivities and sweeps."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 _FAILURES_TOLD = 3
 _SMALL = 1e-9
-"""Share of the largest power below which one is rounding."""
+"""Share of the largest power that counts as rounding."""
 _LEAST_SHARE = 0.005
 _SHARES_SHOWN = 4
 
@@ -63,7 +63,7 @@ def curves_report(curves: Curves, names: Sequence[str] = ()) -> Table:
 
 
 def modes_report(modes: Modes) -> RenderableType:
-    """Return eigenvalues, damping, and the components that hold and lose the energy of each mode."""
+    """Return eigenvalues, damping, and the components that store and lose the energy of each mode."""
     linear = modes.linear
     head = f"[bold]{escape(linear.model.name)}[/]  {len(linear.states)} states at t = {linear.time:g} s"
     made = table(
@@ -106,7 +106,7 @@ def sensitivity_report(result: Sensitivities) -> RenderableType:
 
 
 def sweep_report(found: xarray.Dataset) -> RenderableType:
-    """Return smallest and largest value of every output with the parameters there, what failed, and what differs."""
+    """Return smallest and largest value of every output with the parameters there, failures and differences."""
     names = [str(name) for name in found.data_vars if name != "failure"]
     told = found["failure"].to_numpy().ravel()
     failed = int(np.sum(told != ""))

@@ -1,4 +1,4 @@
-"""How far two trajectories of one system are apart."""
+"""Deviations between two trajectories of one system."""
 
 from __future__ import annotations
 
@@ -31,19 +31,19 @@ def compare(
 ) -> Comparison:  # fmt: skip
     """Compare two trajectories of one system by the names of their signals.
 
-    Around events only the smooth pieces are compared: between the times at which the two change a mode, each is right
-    in its own way, and the difference of the times is told instead.
+    Around events only the smooth pieces are compared: between the two times of a mode change nothing is compared, and
+    the difference of the times is reported instead.
 
     Args:
         a: a netlist, an FMU, a system of FMUs (TOML or SSP), a CSV file, or a solution.
-        b: the other.
+        b: the same, to compare with.
         signals: names or patterns (`*.w`); by default all continuous variables that both have.
-        until: end time in s of what is still to be run; by default that of `a`.
-        points: number of equal intervals of what is still to be run.
-        tolerance: relative tolerance of what is still to be run.
+        until: end time of simulations in s; by default that of `a`.
+        points: number of equal intervals of simulations.
+        tolerance: relative tolerance of simulations.
 
     Raises:
-        UnknownName: nothing fits a pattern, or they have no signal in common.
+        UnknownName: nothing matches a pattern, or they have no signal in common.
         ValueOutOfRange: they have no time in common.
         ModelicaLikeError: a run fails.
     """

@@ -1,4 +1,4 @@
-"""What a component type declares, as tables of text: for pages in Markdown, and for a terminal."""
+"""Declarations of a component type as tables of text, for pages in Markdown and for a terminal."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ class Listing(NamedTuple):
 
 
 class Notation(NamedTuple):
-    """How the cells of listings are written.
+    """Formats of the cells of listings.
 
     Attributes:
-        code: a name or a value as it stands in netlists.
+        code: a name or a value as in netlists.
         text: a text.
         symbol: a variable as mathematics, by its path.
         flow: a variable of a connector, by its path, with its unit.
-        missing: the default of a parameter or input that has none.
+        missing: in place of a missing default.
     """
 
     code: Callable[[str], str]
@@ -43,14 +43,14 @@ class Notation(NamedTuple):
 
 
 def filled(title: str, head: Sequence[str], rows: Iterable[Sequence[str]]) -> Listing:
-    """Return a listing without the columns that are empty."""
+    """Return a listing without empty columns."""
     rows = list(rows)
     kept = [k for k in range(len(head)) if any(row[k] for row in rows)]
     return Listing(title, [head[k] for k in kept], [[row[k] for k in kept] for row in rows])
 
 
 def declared(kind: type[Component], notation: Notation) -> list[Listing]:
-    """Return listings of connectors, fields, structural fields and modes; those without rows are left out."""
+    """Return listings of connectors, fields, structural fields and modes, without empty ones."""
     code, text = notation.code, notation.text
     made = [
         filled(
@@ -78,7 +78,7 @@ def declared(kind: type[Component], notation: Notation) -> list[Listing]:
 
 
 def has_default(default: Any) -> bool:
-    """Tell whether a structural field has a default."""
+    """Return whether a structural field has a default."""
     return isinstance(default, bool | int | float | str | tuple | None)
 
 
@@ -118,7 +118,7 @@ def _structure_descriptions(kind: type[Component]) -> dict[str, str]:
 
 
 def _text_of(statement: ast.stmt) -> str:
-    """Return the text that a statement consists of, or nothing."""
+    """Return the text of a statement that is a text."""
     value = statement.value if isinstance(statement, ast.Expr) else None
     words = value.value if isinstance(value, ast.Constant) else ""
     return inspect.cleandoc(words) if isinstance(words, str) else ""

@@ -1,4 +1,4 @@
-"""Results as files: tables by the ending of their name."""
+"""Results as files; the ending of the name chooses the format."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ if TYPE_CHECKING:
 STDOUT = Path("-")
 """The name of standard output."""
 _NEEDED = {".csv": (), ".parquet": (("pyarrow", "parquet"),), ".nc": (("scipy", "analyse"), ("xarray", "data"))}
-"""Endings of tables, with the packages that write them and the extras that install those."""
+"""Endings of tables, with the packages that write them and their extras."""
 
 
 def check_table(path: Path) -> None:
-    """Tell before a run why a table cannot be written.
+    """Raise an error before a run if a table cannot be written.
 
     Raises:
         NetlistError: no table has this ending.
@@ -49,17 +49,17 @@ def check_table(path: Path) -> None:
 def write_solution(
     solution: Trajectories, path: Path, *, units: bool = False, display: Mapping[str, str] | None = None
 ) -> None:
-    """Write all trajectories as a table; its ending chooses the format.
+    """Write all trajectories as a table; the ending chooses the format.
 
-    A repeated time is an event's left and right value.
+    A repeated time gives the values before and after an event.
 
     Args:
         solution: the run.
-        path: `.csv` (first column `time`, then one column per variable, modes as numbers, with as many digits as
-            reading them back needs), `.parquet` or `.nc` (netCDF); `-` is standard output.
+        path: `.csv` (first column `time`, then one column per variable, modes as numbers, with enough digits to
+            read back the same numbers), `.parquet` or `.nc` (netCDF); `-` is standard output.
         units: write a second header line with the units into a .csv; its values are then in the units of the
-            netlist's [display]. A netCDF always tells its units, and is always in SI units.
-        display: units by path, pattern or quantity, beside those of the netlist, such as {"speed": "rpm"}.
+            netlist's [display]. A netCDF file always has units, and is always in SI units.
+        display: units by path, pattern or quantity, in addition to those of the netlist, such as {"speed": "rpm"}.
 
     Raises:
         NetlistError: no table has this ending.

@@ -1,4 +1,4 @@
-"""What is not wrong, but looks like a slip: notes, never errors."""
+"""Notes about probable mistakes, never errors."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ _HERTZ, _RADIANS = parse_unit("Hz"), parse_unit("rad/s")
 
 
 def drive_notes(drive: Component) -> list[str]:
-    """Return what looks like a slip in a drive that has not been run.
+    """Return notes about probable mistakes in a drive, before a run.
 
-    Neighbours whose inertias, masses or stiffnesses are four decades apart, and signals that nothing reads.
+    Neighbours whose inertias, masses or stiffnesses are four decades apart, and unused signals.
 
     Args:
         drive: the drive.
@@ -41,12 +41,12 @@ def drive_notes(drive: Component) -> list[str]:
 
 
 def run_notes(drive: Component, run: Solution) -> list[str]:
-    """Return what looks like a slip in a run.
+    """Return notes about probable mistakes in a run.
 
-    Clutches that never engage, brakes that nothing opens, and excitations near an eigenfrequency.
+    Clutches that never engage, brakes that are never opened, and excitations near a natural frequency.
 
     Args:
-        drive: what was run.
+        drive: the drive.
         run: its run.
     """
     idle = [*dict.fromkeys(hold.component for hold in run.model.holds if _idle(drive, run, hold))]
@@ -77,7 +77,7 @@ def _neighbours(drawn: Diagram) -> Iterator[str]:
                 for other in joined[pending.popleft()] - reached:
                     reached.add(other)
                     if other not in sized:
-                        # What is behind a gear or inside an assembly is seen through a ratio.
+                        # Parts behind a gear or inside an assembly are seen through a ratio.
                         if other.component and not other.component.parts and "ratio" not in other.component.fields:
                             pending.append(other)
                         continue
@@ -161,6 +161,6 @@ def _resonances(run: Solution) -> Iterator[str]:
         if near and abs(near.frequency / frequency - 1.0) < _NEAR:
             damping = f"{abs(near.damping):.2g}"
             yield (
-                f"{path} = {frequency:.4g} Hz is near the eigenfrequency {near.frequency:.4g} Hz, whose damping is "
+                f"{path} = {frequency:.4g} Hz is near the natural frequency {near.frequency:.4g} Hz, whose damping is "
                 f"{damping}: expect resonance."
             )

@@ -1,4 +1,4 @@
-"""A progress bar that appears only when a run takes long."""
+"""A progress bar that appears only for long runs."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ _INTERVAL = 0.1
 
 
 class Bar:
-    """A bar on a terminal that appears when its patience is over; to be used as the `progress` of a run or a sweep.
+    """A bar on a terminal that appears after a delay, for the argument `progress` of a run or a sweep.
 
     Args:
-        until: end time, a number in s or a quantity; what cannot be read is left to the simulation to tell. None where
-            the end is told with the progress.
-        console: where to show it, by default stderr; a console that is no terminal gets nothing.
-        title: what is shown before it.
+        until: end time, a number in s or a quantity; the simulation reports an invalid one. None if the end comes with
+            the progress.
+        console: by default stderr; nothing is shown if it is not a terminal.
+        title: text before it.
     """
 
     def __init__(
@@ -44,7 +44,7 @@ class Bar:
         return self
 
     def __call__(self, reached: float, end: float | None = None) -> None:
-        """Note the time in s, or the number of runs, that is reached."""
+        """Show the time in s, or the number of runs, that is reached."""
         end = self._end if end is None else end
         now = time.perf_counter()
         if now < self._next or end <= 0 or not self._console.is_terminal:

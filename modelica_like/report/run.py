@@ -1,4 +1,4 @@
-"""What a run was: events, energies and statistics as tables; of a co-simulation, also its couplings and steps."""
+"""A run as text: events, energies and statistics as tables; for a co-simulation also couplings and steps."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ def run_report(
 
     Args:
         solution: the run.
-        energy: False: leave out the energy balance.
-        debug: name the line of every event's transition.
-        display: units by quantity, beside those of the netlist, such as {"energy": "kJ"}.
+        energy: whether to show the energy balance.
+        debug: whether to show the source line of every event's transition.
+        display: units by quantity, in addition to those of the netlist, such as {"energy": "kJ"}.
     """
     parts = _head(solution, notices(solution), debug=debug)
     if energy:
@@ -48,7 +48,7 @@ def _head(solution: Trajectories, notices: Iterable[str], *, debug: bool = False
 
 
 def events_table(solution: Trajectories, *, debug: bool = False) -> Table:
-    """Return the mode changes; of many only the first and the last. `debug` names the lines of their transitions."""
+    """Return the mode changes; of many only the first and the last. `debug` shows the lines of their transitions."""
     columns = 6 if debug else 5
     told = reasons(solution)
     rows = [
@@ -62,7 +62,7 @@ def events_table(solution: Trajectories, *, debug: bool = False) -> Table:
 
 
 def reasons(solution: Trajectories) -> list[str]:
-    """Return in words why each of the events happened, parameters with their values."""
+    """Return in words why each of the events happened, parameters with their values; nothing where nobody knows."""
     known: dict[tuple[str, int], str] = {}
 
     def valued(path: str) -> str:
@@ -72,13 +72,14 @@ def reasons(solution: Trajectories) -> list[str]:
     for event in solution.events:
         key, (component, dot, _) = (event.mode, event.transition), event.mode.rpartition(".")
         if key not in known:
-            because = "an impact" if event.transition < 0 else solution.model.transitions[event.transition].because
+            by_itself = "an impact" if event.source.file else ""  # FMUs do not tell why
+            because = by_itself if event.transition < 0 else solution.model.transitions[event.transition].because
             known[key] = NAME_IN_NOTICE.sub(lambda name, owner=component + dot: valued(owner + name[1]), because)
     return [known[event.mode, event.transition] for event in solution.events]
 
 
 def notices(solution: Trajectories) -> list[str]:
-    """Return what a run and its events have to say: one sentence for each kind of event, with the time of the first."""
+    """Return the notices of a run and its events: one sentence for each kind of event, with the time of the first."""
     told: dict[tuple[str, str], str] = {}
     for event in (one for one in solution.events if one.transition >= 0):
         notice, (component, dot, _) = solution.model.transitions[event.transition].notice, event.mode.rpartition(".")
@@ -89,9 +90,9 @@ def notices(solution: Trajectories) -> list[str]:
 
 
 def energy_table(solution: Trajectories, display: Mapping[str, str] | None = None) -> Table:
-    """Return the energy balance; of many components only those that exchanged most."""
+    """Return the energy balance; of many components only those with the largest exchange."""
     balance = solution.energy()
-    # Where nothing collides there is no column for it.
+    # Without impacts there is no column for them.
     collides = any(row.impact for row in balance)
     columns = ["component", "in>", "from outside>", "stored>", "lost>", *["of it in impacts>"][: int(collides)]]
     unit = Display(solution.model, display).of_quantity("J")
@@ -147,7 +148,7 @@ def cosimulation_report(solution: CosimSolution) -> RenderableType:
 
 
 def couplings_table(solution: CosimSolution) -> Table:
-    """Return the energies at the couplings: what one FMU has sent and the other has not got, the coupling has lost."""
+    """Return the energies at the couplings; the difference of sent and received energy is lost in the coupling."""
     rows = [
         (one.name, f"{one.throughput:.6g}", f"{one.residual:.3g}",
          f"{one.residual / one.throughput:.1e}" if one.throughput else "", f"{one.mismatch:.3g}")
@@ -157,7 +158,7 @@ def couplings_table(solution: CosimSolution) -> Table:
 
 
 def steps_line(solution: CosimSolution) -> str:
-    """Return how many communication steps it took."""
+    """Return the numbers of communication steps."""
     sizes = f"{solution.shortest:.3g} s"
     if solution.longest > solution.shortest * (1 + 1e-6):
         sizes += f" to {solution.longest:.3g} s"

@@ -1,4 +1,4 @@
-"""Trajectories from wherever they are: a netlist is simulated, FMUs are run, a table is read."""
+"""Trajectories from any source: simulate a netlist, run FMUs, read a table."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ _POINTS = 500
 def trajectories(
     source: str | Path | Trajectories, until: float | None = None, points: int = _POINTS, tolerance: float | None = None
 ) -> Trajectories:
-    """Return the trajectories of a netlist, an FMU, a system of FMUs or a CSV file; a solution is returned as it is.
+    """Return the trajectories of a netlist, an FMU, a system of FMUs or a CSV file; a solution is returned unchanged.
 
     Args:
         source: a file that ends in `.toml`, `.fmu`, `.ssp` or `.csv`.
-        until: end time in s of what is run; by default its own.
+        until: end time of the run in s; by default that of the source.
         points: number of equal intervals of its results; a system has results at its communication points.
         tolerance: relative tolerance of its run; for a system, of its FMUs.
 
@@ -53,9 +53,9 @@ def trajectories(
 
 
 def read_csv(path: Path) -> RecordedSolution:
-    """Read a table whose first column is `time` in s; a second header line with units may follow the names.
+    """Read a table with the first column `time` in s; a second header line with units may follow the names.
 
-    A repeated time is an event's left and right value.
+    A repeated time gives the values before and after an event.
 
     Raises:
         NetlistError: the file is not such a table.

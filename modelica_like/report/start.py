@@ -1,4 +1,4 @@
-"""What `check --start` tells: the start values, and where each comes from."""
+"""Output of `check --start`: the start values with their origin."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _SHOWN = 4
 
 @dataclass(frozen=True)
 class StartValueRow:
-    """A start value in SI units, and where it comes from: `given in FILE:LINE`, `default`, `rest`, `follows from …`."""
+    """A start value in SI units, and its origin: `given in FILE:LINE`, `default`, `rest`, `follows from …`."""
 
     path: str
     value: float
@@ -39,7 +39,7 @@ def start_report(drive: Component, model: CompiledDae) -> RenderableType:
 
 
 def start_values(drive: Component, model: CompiledDae, kind: StartKind = "given") -> list[StartValueRow]:
-    """Return what is given, what is assumed and what follows for the states, in this order, for a kind of start."""
+    """Return given, assumed and computed start values of the states, in this order, for a kind of start."""
     point = initialize(model, start=kind)
     plan = start_plan(model, kind, point)
     variables = call(model, model.variables, point)
@@ -71,7 +71,7 @@ def _value(model: CompiledDae, point: Point, variables: np.ndarray, path: str) -
 
 
 def _given(drive: Component, path: str) -> str:
-    """Tell where a value stands: in the outermost netlist that gives it."""
+    """Return the place of a value, in the outermost netlist that gives it."""
     component, rest = drive, path
     while rest:
         first, _, inner = rest.partition(".")
@@ -86,7 +86,7 @@ def _given(drive: Component, path: str) -> str:
 
 
 def _follows(model: CompiledDae, plan: StartPlan, point: Point, states: list[int]) -> Iterator[str]:
-    """Tell from which variables states follow."""
+    """Return the variables from which states follow."""
     if not plan.columns:
         yield from ("steady state" for _ in states)
         return

@@ -1,4 +1,4 @@
-"""What `check` tells about a model: sizes, states, index, blocks and energy terms."""
+"""Output of `check`: sizes, states, index, blocks and energy terms."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _SHOWN = 12
 
 
 def structure_report(component: Component) -> RenderableType:
-    """Flatten and reduce a model and tell what came out."""
+    """Flatten and reduce a model and report the result."""
     flat = flatten(component)
     reduced = reduce(flat)
     parts: list[RenderableType] = [_sizes(flat, reduced), "", _energy(flat)]
@@ -52,7 +52,7 @@ def _sizes(flat: FlatModel, reduced: ReducedDae) -> Table:
 
 
 def listed(names: Iterable[str]) -> str:
-    """Return the first names, and how many more there are."""
+    """Return the first names and the number of others."""
     known = list(names)
     more = f", … {len(known) - _SHOWN} more" if len(known) > _SHOWN else ""
     return ", ".join(known[:_SHOWN]) + more

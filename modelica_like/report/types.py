@@ -1,4 +1,4 @@
-"""What component types are: tables generated from their declarations, so that they cannot drift from the code."""
+"""Descriptions of component types: tables generated from their declarations."""
 
 from __future__ import annotations
 
@@ -33,10 +33,10 @@ def table(
 
     Args:
         title: above it.
-        columns: headings; `>` behind one: numbers, at the right; `*`: bold.
-        rows: cells, in which no text is markup; there may be fewer than columns.
-        most: how many rows are shown; a last one then tells how many more there are.
-        rest: what that adds.
+        columns: headings; a trailing `>` marks numbers (right-aligned), `*` bold text.
+        rows: cells without markup; there may be fewer than columns.
+        most: largest number of rows; a last one then gives the number of others.
+        rest: text after this number.
     """
     made = Table(
         title=escape(title), title_justify="left", title_style="bold", box=None, pad_edge=False, header_style="dim"
@@ -106,5 +106,5 @@ def _plain(text: str) -> str:
     text = text.removeprefix("yield from ").removeprefix("yield ").replace("self.", "")
     if text.startswith("( ") and text.endswith(" )"):
         text = text[2:-2]
-    # What was broken into lines.
+    # Join broken lines.
     return re.sub(r",? \)", ")", text.replace("( ", "("))

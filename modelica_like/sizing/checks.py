@@ -26,7 +26,7 @@ def design_checks() -> Mapping[str, Check]:
     A library `gears` has its checks in the package `gears.sizing`: the functions of `__all__` that return a `Result`.
 
     Raises:
-        NetlistError: a library cannot be imported, or two libraries have a check of one name.
+        NetlistError: a library cannot be imported, or two libraries have a check with the same name.
     """
     checks: dict[str, Check] = {}
     for entry in sorted(entry_points(group=GROUP), key=lambda entry: entry.name):
@@ -49,7 +49,7 @@ def _checks_of(entry: EntryPoint) -> Iterator[tuple[str, Check]]:
 
 
 def find_check(name: str) -> Check:
-    """Return the design check that a sizing file means by `is`."""
+    """Return the design check of an `is` in a sizing file."""
     known = design_checks()
     if name not in known:
         hint = did_you_mean(name, known) or "."
@@ -85,18 +85,18 @@ def _required(field: dataclasses.Field[Any]) -> bool:
 
 
 def is_result(kind: Any) -> bool:
-    """Tell whether an annotation is a type of results."""
+    """Return whether an annotation is a type of results."""
     return isinstance(kind, type) and issubclass(kind, Result)
 
 
 def unit_of_kind(kind: Any) -> Unit | None:
-    """Return the unit of a number's annotation, or None if it is none."""
+    """Return the unit of a number's annotation, or None for other annotations."""
     found = quantity(kind)
     return None if found is None else parse_unit(found.unit)
 
 
 def unit_of_line(result: Any, name: str) -> Unit:
-    """Return the unit of a line of a result, that of a plain number if it has none."""
+    """Return the unit of a line of a result, or that of a plain number."""
     return parse_unit(quantity_of(type(result), name).unit)
 
 

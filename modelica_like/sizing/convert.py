@@ -28,7 +28,7 @@ _TEXTS: dict[Any, type] = {str: str, bool: bool, int: int}
 
 @dataclasses.dataclass(frozen=True)
 class Converter:
-    """Turns values into arguments; asks for names in formulas, loads of simulations, and results of other checks."""
+    """Turns values into arguments, with names in formulas, loads from simulations, and results of other checks."""
 
     lookup: Lookup
     simulated: SimulatedLoad
@@ -43,7 +43,7 @@ class Converter:
             target: the check or dataclass.
             table: values by name.
             where: path of the table, for messages.
-            place: gives the place of an argument in the file.
+            place: returns the place of an argument in the file.
         """
         known = arguments_of(target)
         for name in table:
@@ -77,7 +77,7 @@ class Converter:
         return value
 
     def _structure(self, kind: type, value: Any, where: str) -> Any:
-        """Return a dataclass from a table of its fields, or from the name of a check that has it as result."""
+        """Return a dataclass from a table of its fields, or from the name of a check with this result."""
         if isinstance(value, dict):
             return kind(**self.arguments(kind, value, where))
         result = self.result(value) if isinstance(value, str) else None
@@ -89,7 +89,7 @@ class Converter:
         return result
 
     def quantity(self, unit: Unit, value: Any, where: str) -> Any:
-        """Return a number, or an array from a list, in SI."""
+        """Return a number, or an array from a list, in SI units."""
         if isinstance(value, list):
             if not value or any(isinstance(item, list) for item in value):
                 raise NetlistError(f"{where} must be a list of numbers, neither empty nor of lists.")
@@ -102,7 +102,7 @@ class Converter:
 
 
 def _fitting(value: Value, unit: Unit, where: str) -> Any:
-    """Return a number that is in SI already, if its unit fits."""
+    """Return a number that is already in SI units, after checking its unit."""
     if not same_dimension(value.unit, unit):
         raise UnitError(f"{where} is {coherent(value.unit)}; {unit} is expected.")
     return value.number

@@ -14,7 +14,7 @@ from modelica_like.netlist.locate import Lines, locate
 
 @dataclass
 class SizingDocument:
-    """One sizing file: parameters, tables of checks, and names of checks that stand side by side, by heading."""
+    """One sizing file: parameters, tables of checks, and names of checks to compare, by heading."""
 
     lines: Lines
     name: str
@@ -61,7 +61,7 @@ _READERS: Mapping[str, Reader] = {
 
 
 def placed(error: ModelicaLikeError, source: Source) -> ModelicaLikeError:
-    """Return an error with a place in the sizing file, if it does not know one there."""
+    """Return an error with a place in the sizing file, if it has none there."""
     if all(known.file != source.file for known in error.where):
         error.where = (*error.where, source)
     return error

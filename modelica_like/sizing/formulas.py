@@ -1,4 +1,4 @@
-"""Formulas of sizing files, with the units of what they refer to."""
+"""Formulas of sizing files, with units."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ Lookup = Callable[[str], Value]
 
 
 def read_value(text: str, lookup: Lookup) -> Value:
-    """Read a quantity or a formula: `8.5 kg.cm2`, `2*torque`, `belt.shaft_load`; `lookup` gives values of names."""
+    """Read a quantity or a formula: `8.5 kg.cm2`, `2*torque`, `belt.shaft_load`; `lookup` returns values of names."""
     quantity = read_quantity(text)
     if quantity is not None:
         number, unit = quantity

@@ -29,7 +29,7 @@ _WIDE = 9
 
 
 def sizing_report(sizing: Sizing) -> RenderableType:
-    """Return all results with verdicts, the comparisons, and one sentence about the whole."""
+    """Return all results with verdicts, the comparisons, and a summary."""
     parts: list[RenderableType] = [f"[bold]{escape(sizing.name)}[/]  {escape(sizing.description)}"]
     for check in sizing.checks:
         parts += ["", *_check_tables(check)]
@@ -67,7 +67,7 @@ def _as_shown(result: Any, line: str, value: float) -> str:
 
 
 def _rows(title: str, rows: tuple[Any, ...]) -> Table:
-    """Return results of one kind as rows; many lines stand below each other instead, one column per result."""
+    """Return results of one kind as rows, or as columns if they have many lines."""
     lines = [row.lines() for row in rows]
     if len(lines[0]) > _WIDE and len(rows) <= _WIDE:
         return _side_by_side(title, titled(lines[0][0]), {each[0].value: each[1:] for each in lines})

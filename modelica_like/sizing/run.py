@@ -44,18 +44,18 @@ class CheckedResult:
 
     @property
     def exceeded(self) -> int:
-        """Number of lines that miss a limit."""
+        """Number of lines that violate a limit."""
         return sum(line.exceeded for line in self.result.lines(self.limits))
 
     def deviation(self, line: str) -> float:
-        """Return how much the result differs from the published value, relative to that."""
+        """Return the deviation from the published value, relative to it."""
         value = float(np.ravel(getattr(self.result, line))[0])
         return (value - self.published[line]) / self.published[line] if self.published[line] else value
 
 
 @dataclass(frozen=True)
 class Sizing:
-    """All design checks of a file in their order, and names of those that stand side by side, by heading."""
+    """All design checks of a file in their order, and names of checks to compare, by heading."""
 
     name: str
     description: str
@@ -64,7 +64,7 @@ class Sizing:
 
     @property
     def exceeded(self) -> int:
-        """Number of lines that miss a limit."""
+        """Number of lines that violate a limit."""
         return sum(check.exceeded for check in self.checks)
 
     def __getitem__(self, name: str) -> Any:
@@ -86,7 +86,7 @@ def size(path: str | Path) -> Sizing:
         path: TOML file.
 
     Raises:
-        ModelicaLikeError: something in the file is wrong; the message says what, where and what to do.
+        ModelicaLikeError: the file has an error; the message says what, where and what to do.
     """
     document = read_document(Path(path))
     run = _Run(document, Path(path).parent)
@@ -107,7 +107,7 @@ def _comparable(heading: str, names: list[str], run: _Run, document: SizingDocum
 
 
 class _Run:
-    """Works out checks and parameters when they are asked for, each once."""
+    """Computes checks and parameters on demand, each once."""
 
     def __init__(self, document: SizingDocument, folder: Path) -> None:
         self.document = document
@@ -181,7 +181,7 @@ class _Run:
             reason = (
                 str(error) if isinstance(error, ValueError) else "it divides by zero or leaves the range of numbers."
             )
-            raise NetlistError(f"{where} cannot be computed:  {reason}") from None
+            raise NetlistError(f"{where} cannot be computed: {reason}") from None
         limits = self._each(name, "limits", lambda line, value: self._limit(result, line, value, where))
         published = self._each(
             name, "published", lambda line, value: self._on_line(result, line, value, f"{where}.published")
@@ -190,7 +190,7 @@ class _Run:
         return CheckedResult(name, table["is"], result, limits, published, str(note))
 
     def _each(self, name: str, key: str, read: Callable[[str, Any], Any]) -> dict[str, Any]:
-        """Read a table of a check that has an entry for some lines of its result."""
+        """Read a table of a check with entries for some lines of its result."""
         table, made = self.document.checks[name].get(key, {}), {}
         try:
             if not isinstance(table, dict):
@@ -216,7 +216,7 @@ class _Run:
         return smallest, largest
 
     def _on_line(self, result: Any, name: str, value: Any, where: str) -> Any:
-        """Return a value in SI that is compared with a line of a result."""
+        """Return a value in SI units to compare with a line of a result."""
         known = [line.name for line in result.lines()]
         if name not in known:
             raise UnknownName(f"{where}: the result has no line '{name}'{did_you_mean(name, known) or '.'}")

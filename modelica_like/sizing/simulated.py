@@ -38,7 +38,7 @@ READERS: dict[str, _Reader] = {
     "rms": lambda times, values: _mean(times, values**2) ** 0.5,
     "integral": _integral,
 }
-"""What can be taken from a trajectory: `peak` is the largest absolute value."""
+"""Readings of a trajectory: `peak` is the largest absolute value."""
 
 
 _KEYS = ("from", "until", "set", *READERS)
@@ -54,7 +54,7 @@ def load_of(run: Trajectories, key: Any, what: str = "peak") -> float:
         what: `peak` (largest absolute value), `largest`, `smallest`, `final`, `mean`, `rms` or `integral` over time.
 
     Raises:
-        UnknownName: there is no such variable, or it cannot be read in this way.
+        UnknownName: there is no such variable or reading.
     """
     if what not in READERS:
         raise UnknownName(f"A load cannot be the '{what}' of a trajectory{did_you_mean(what, READERS) or '.'} "
@@ -63,14 +63,14 @@ def load_of(run: Trajectories, key: Any, what: str = "peak") -> float:
 
 
 class Simulations:
-    """Runs of netlists, whose paths begin at a folder; every run is made once."""
+    """Runs of netlists with paths relative to a folder; every run is made once."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.runs: dict[str, Solution] = {}
 
     def load(self, table: Mapping[str, Any], where: str) -> Value:
-        """Return the load that a table asks for: `from`, what to read (`peak = "clutch.tau"`), `until` and `set`."""
+        """Return the load of a table with `from`, a reading (`peak = "clutch.tau"`), `until` and `set`."""
         for key in table:
             if key not in _KEYS:
                 hint = did_you_mean(key, _KEYS) or "."

@@ -1,4 +1,4 @@
-"""Results between looks: interpolated for many panels at once, as precisely as IDAS computed the looks."""
+"""Results between looks, interpolated for many panels at once with the precision of IDAS."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Piece:
     Attributes:
         looks: the panel.
         times: shape (n,), in s.
-        last: the last look that means something, because of an event before the next.
+        last: the last valid look, because of an event before the next.
         x: states, shape (nx, n), to be filled in.
         z: implicit unknowns, shape (nz, n).
     """
@@ -37,11 +37,11 @@ class Piece:
 
 
 class Between:
-    """Collects results that are wanted, and fills them in later.
+    """Collects requested results, and fills them in later.
 
     Args:
-        integrator: tells tolerances, and solves for implicit unknowns.
-        closer: looks into an interval of some looks, where interpolation is not precise.
+        integrator: for tolerances and implicit unknowns.
+        closer: integrates an interval with closer looks, where interpolation is not precise.
     """
 
     def __init__(self, integrator: Integrator, closer: Callable[[Looks, int], Looks]) -> None:
@@ -50,17 +50,17 @@ class Between:
 
     @property
     def many(self) -> bool:
-        """Whether results should be filled in before more come."""
+        """Whether to fill in results before requesting more."""
         return len(self._pieces) >= _TOGETHER
 
     def ask(self, looks: Looks, times: Vector, last: int) -> Piece:
-        """Return arrays for results at times between looks, which `fill` fills in."""
+        """Return arrays for results at times between looks, for `fill` to fill in."""
         x, z = (np.empty((len(part), len(times))) for part in (looks.x, looks.z))
         self._pieces.append(Piece(looks, times, last, x, z))
         return self._pieces[-1]
 
     def fill(self, *, precisely: bool = True) -> None:
-        """Fill in all results; not `precisely`, those that IDAS does not reach a second time become nan.
+        """Fill in all results; without `precisely`, those that IDAS does not reach a second time become nan.
 
         Raises:
             StepFailed: where interpolation is not precise, IDAS gave up.
@@ -91,7 +91,7 @@ class Between:
 
 
 def interpolate(integrator: Integrator, pieces: list[Piece]) -> list[tuple[int, int]]:
-    """Fill in results; return where they are not precise, as numbers of pieces and intervals."""
+    """Fill in results; return pieces and intervals where they are not precise."""
     looks, lengths = [one.looks for one in pieces], [len(one.times) for one in pieces]
     counts = np.array([one.count for one in looks])
     owner = np.repeat(np.arange(len(pieces)), lengths)
@@ -115,10 +115,10 @@ def interpolate(integrator: Integrator, pieces: list[Piece]) -> list[tuple[int, 
 
 
 def _cells(integrator: Integrator, pieces: list[Piece], x: Vector, owner: Any, k: Any) -> tuple[Vector, Any]:
-    """Return polynomials for the changes of states since the beginnings of intervals, and which are not precise.
+    """Return polynomials for the changes of states within intervals, and which ones are not precise.
 
     Args:
-        integrator: tells the tolerances.
+        integrator: for the tolerances.
         pieces: all of them.
         x: states at all looks of all pieces, shape (nx, looks).
         owner: pieces of the intervals, shape (intervals,).

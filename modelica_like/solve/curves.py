@@ -1,4 +1,4 @@
-"""How far two solutions of one system are apart, signal by signal and event by event."""
+"""Deviations between two solutions of one system, signal by signal and event by event."""
 
 from __future__ import annotations
 
@@ -24,19 +24,19 @@ _Marks = np.ndarray[Any, np.dtype[np.bool_]]
 _MOST_CURVES = 4
 _SAME_TIME = 1e-9
 _SAME_INSTANT = 1e-8
-"""Time within which a mode that is left again counts as passed through."""
+"""Time within which a mode that is left again counts as transient."""
 
 
 @dataclass(frozen=True)
 class Deviation:
-    """How far one signal is apart.
+    """Deviation of one signal.
 
     Attributes:
         signal: name.
         unit: of `largest`.
         largest: largest difference.
         relative: the same over the signal's range in the first of the two.
-        time: when, in s.
+        time: of the largest difference, in s.
     """
 
     signal: str
@@ -52,8 +52,8 @@ class EventDifference:
 
     Attributes:
         mode: path of the mode.
-        after: name of the mode that was entered last at that instant.
-        first: its time in the first of the two, in s; None if it is not there.
+        after: name of the last mode entered at that instant.
+        first: its time in the first of the two, in s, or None.
         second: the same for the second.
     """
 
@@ -77,8 +77,8 @@ class Curves:
         second: the other.
         deviations: largest first.
         events: by time.
-        labels: what to call the two: their files, or the names of their models.
-        interpolated: the results lie at different times; the second is interpolated in between, which costs precision.
+        labels: names of the two: their files, or their models.
+        interpolated: whether the result times differ and the second is interpolated, which costs precision.
     """
 
     first: Trajectories
@@ -95,14 +95,14 @@ class Curves:
 
     @property
     def largest_event_difference(self) -> float:
-        """Largest difference of the times of an event, in s; infinite if one of them misses an event."""
+        """Largest difference of the times of an event, in s; infinite if an event is missing in one of them."""
         return max((abs(e.difference) if e.difference is not None else np.inf for e in self.events), default=0.0)
 
     def __getitem__(self, signal: str) -> Deviation:
         return next(deviation for deviation in self.deviations if deviation.signal == signal)
 
     def difference(self, signal: str) -> tuple[Vector, Vector]:
-        """Return times at which the two are compared, and second minus first there."""
+        """Return the common times, and second minus first there."""
         grid = _Grid.of(self.first, self.second, self.events)
         return grid.times, _difference(self.first, self.second, signal, grid)
 
@@ -113,7 +113,7 @@ class Curves:
             patterns: of the signals; by default those that deviate most.
 
         Raises:
-            UnknownName: nothing fits a pattern.
+            UnknownName: nothing matches a pattern.
         """
         names = [row.signal for row in self.deviations]
         names = fitting(names, patterns, "Neither has a signal") if patterns else names[:_MOST_CURVES]
@@ -138,18 +138,18 @@ def compare_solutions(
 ) -> Curves:
     """Compare two solutions by the names of their signals.
 
-    Around events only the smooth pieces are compared: between the times at which the two change a mode, each is right
-    in its own way, and the difference of the times is told instead.
+    Around events only the smooth pieces are compared: between the two times of a mode change nothing is compared, and
+    the difference of the times is reported instead.
 
     Args:
         first: one of them.
         second: the other.
-        signals: names or patterns (`*.w`); none for all continuous variables that both have.
-        labels: what to call the two.
-        least: the least range of a signal, over the largest value of its unit; see `ranges`.
+        signals: names or patterns (`*.w`); empty: all continuous variables that both have.
+        labels: names of the two.
+        least: smallest range of a signal, over the largest value of its unit; see `ranges`.
 
     Raises:
-        UnknownName: nothing fits a pattern, or they have no signal in common.
+        UnknownName: nothing matches a pattern, or they have no signal in common.
         ValueOutOfRange: they have no time in common.
     """
     if min(first.time[-1], second.time[-1]) <= max(first.time[0], second.time[0]):
@@ -207,13 +207,13 @@ def _match_events(first: Trajectories, second: Trajectories) -> list[EventDiffer
 
 @dataclass(frozen=True)
 class _Grid:
-    """Where two solutions are compared: rows of the first, and the times and rows of the second.
+    """Rows for the comparison of two solutions.
 
     Attributes:
         rows: of the first.
         times: of these rows.
-        partners: rows of the second at the same times; not used where it is interpolated.
-        interpolated: the second has no results at these times.
+        partners: rows of the second at the same times; unused if it is interpolated.
+        interpolated: whether the second has no results at these times.
     """
 
     rows: _Rows
@@ -223,7 +223,7 @@ class _Grid:
 
     @classmethod
     def of(cls, first: Trajectories, second: Trajectories, events: Sequence[EventDifference]) -> _Grid:
-        """Take the times that both have, or those of the first where they have few in common."""
+        """Take the common times, or those of the first if there are few."""
         time, other = first.time, second.time
         once = np.flatnonzero(_single(time) & (time >= other[0]) & (time <= other[-1]))
         near = np.clip(np.searchsorted(other, time[once] - _SAME_TIME), 0, len(other) - 1)
@@ -236,13 +236,13 @@ class _Grid:
 
 
 def _single(time: Vector) -> _Marks:
-    """Return where a time stands alone: at an event it is there twice."""
+    """Return which times are single; a time of an event occurs twice."""
     apart = np.diff(time) > _SAME_TIME
     return np.append(apart, True) & np.insert(apart, 0, True)
 
 
 def _between(times: Vector, events: Sequence[EventDifference]) -> _Marks:
-    """Return which times lie between the times at which the two change a mode."""
+    """Return which times are between the two times of a mode change."""
     inside = np.zeros(len(times), dtype=bool)
     for event in events:
         if event.first is not None and event.second is not None:

@@ -14,21 +14,21 @@ QUANTITIES = {
     "rad/s": "speed", "N.m": "torque", "m/s": "velocity", "N": "force", "rad": "angle", "m": "position", "W": "power",
     "J": "energy", "rad/s2": "acceleration", "A": "current", "V": "voltage", "K": "temperature", "Pa": "pressure",
 }  # fmt: skip
-"""What is measured in a coherent unit."""
+"""Quantities by coherent unit."""
 
 
 class Display:
-    """Units in which the values of a model are shown: SI, unless its netlist or the user says otherwise.
+    """Units in which the values of a model are shown: SI, unless the netlist or the user chooses others.
 
-    A path wins over a pattern, a pattern over a quantity.
+    A path overrides a pattern, a pattern overrides a quantity.
 
     Args:
         model: names, units and settings.
-        chosen: units by path, pattern (`*.w`), quantity (`speed`) or SI unit (`rad/s`), beside those of [display].
+        chosen: units by path, pattern (`*.w`), quantity (`speed`) or SI unit (`rad/s`), in addition to [display].
 
     Raises:
         UnknownName: a key is none of these.
-        UnitError: a text is no unit, or one of another dimension.
+        UnitError: a text is not a unit, or has another dimension.
     """
 
     def __init__(self, model: Any, chosen: Mapping[str, str] | None = None) -> None:
@@ -59,11 +59,11 @@ class Display:
         return self._paths.get(path) or self.of_quantity(self._own[path])
 
     def of_quantity(self, unit: str) -> str:
-        """Return the unit in which what has a coherent unit is shown."""
+        """Return the unit in which a coherent unit is shown."""
         return self._quantities.get(unit, unit)
 
     def values(self, path: str, values: Vector) -> Vector:
-        """Return values of a variable, as results have them, in the unit in which it is shown."""
+        """Convert values of a variable from SI units to its shown unit."""
         return self.converted(values, self._own[path], self.of(path))
 
     def converted(self, values: Any, own: str, shown: str) -> Any:
@@ -74,14 +74,14 @@ class Display:
         return (values * here.factor + here.offset - there.offset) / there.factor
 
     def quantity(self, path: str) -> str:
-        """Return what a variable is: `speed`, or `value` if there is no name for it."""
+        """Return the quantity of a variable: `speed`, or `value` if it has no name."""
         return QUANTITIES.get(self._own[path], "value")
 
 
 def _fits(own: str, unit: Unit) -> bool:
     try:
         return same_dimension(parse_unit(own), unit) and own not in ("1", "*")
-    except UnitError:  # what an FMU of others calls a unit
+    except UnitError:  # unit names of other FMUs
         return False
 
 

@@ -1,15 +1,15 @@
-"""Where the energy went: power in = change of stored energy + losses, for every component."""
+"""Energy balance: power in = change of stored energy + losses, for every component."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, Vector
-from modelica_like.initialize import Impact
+from modelica_like.initialize import Impact, Point, call, solve_implicit
 from modelica_like.solve.options import Options
 from modelica_like.solve.powers import POWERS, Powers, Results, results
 from modelica_like.solve.recorder import Event, Segment
@@ -19,12 +19,16 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _ROUNDING = 1e-9
-"""Part of a component's largest power below which a difference of powers is rounding."""
+"""Part of a component's largest power that counts as rounding in a difference of powers."""
 _NOTHING = 1e-12
 """Part of the model's largest power below which a power is rounding."""
+_LAST_DIGITS = 1e-14
+"""By what part numbers are changed to see what is rounding, ..."""
+_CHANGES = 6
+"""... and how often: that rounding has the same sign and size each time would be a rare accident."""
 _SAME_TIME = 1e-12
 _ADDED_UP = 10.0
-"""Drift, in relative tolerances of the run, from which it is told."""
+"""Smallest reported drift, in relative tolerances of the run."""
 
 
 @dataclass(frozen=True)
@@ -34,19 +38,19 @@ class EnergyRow:
     Attributes:
         component: path; empty for the model itself.
         inflow: through its connectors.
-        source: brought in from outside the model.
+        source: supplied from outside the model.
         stored: change of its stored energy.
         lost: dissipated.
-        at_events: part of `stored` that changed at once, in resets at events.
+        at_events: part of `stored` that changed by resets at events.
         residual: integral of power in + source power - loss - rate of the stored energy; zero if the component's
             equations keep the balance, whatever the precision of the integration.
-        drift: what the stored energy changed in excess of the integral of its rate: the integration error.
-        impact: part of `lost` that was lost at once, in impacts.
+        drift: change of the stored energy minus the integral of its rate: the integration error.
+        impact: part of `lost` that was lost in impacts.
         imbalance: largest |power in + source power - loss - rate of the stored energy| at any result, both sides of
             events included, as a fraction of the component's largest power; zero if it is rounding.
-        imbalance_time: when that was, in s.
-        gain: largest power that a negative loss gave, in W; zero if it is rounding.
-        gain_time: when that was, in s.
+        imbalance_time: its time, in s.
+        gain: largest power of a negative loss, in W; zero if it is rounding.
+        gain_time: its time, in s.
     """
 
     component: str
@@ -70,9 +74,9 @@ class EnergyBalance:
 
     Attributes:
         rows: one per component.
-        throughput: largest of: energy exchanged, brought in, dissipated, stored.
-        at_events: largest change of all stored energies together at an event, in J, that neither an impact nor a reset
-            explains.
+        throughput: largest of the energies exchanged, supplied, dissipated and stored.
+        at_events: largest change of all stored energies together at an event, in J, without an impact or a
+            reset.
         tolerance: relative tolerance of the run; 0 if it has none.
     """
 
@@ -89,7 +93,7 @@ class EnergyBalance:
 
     @property
     def source(self) -> float:
-        """Energy brought in from outside, J."""
+        """Energy supplied from outside, J."""
         return sum(row.source for row in self.rows)
 
     @property
@@ -109,12 +113,12 @@ class EnergyBalance:
 
     @property
     def efficiency(self) -> float:
-        """Energy that loads took away over that which sources and stores gave; nan where nothing gave any."""
+        """Energy that loads took away over energy from sources and stores; nan without any."""
         given = sum(max(row.source, 0.0) for row in self.rows) + max(-self.stored, 0.0)
         return self.delivered / given if given else float("nan")
 
     def sankey(self, title: str = "") -> Figure:
-        """Draw where the energy came from and where it went."""
+        """Draw an energy flow diagram."""
         return upper("sankey")(self, title)
 
     @property
@@ -131,7 +135,7 @@ class EnergyBalance:
 
     @property
     def notices(self) -> tuple[str, ...]:
-        """What is wrong, as sentences: powers that do not balance, negative losses, energies that drift."""
+        """Messages about errors: powers that do not balance, negative losses, energies that drift."""
         told: list[str] = []
         for row in self.rows:
             name = row.component or "The model itself"
@@ -172,7 +176,7 @@ class EnergyBalance:
 
     @property
     def impacts(self) -> tuple[str, ...]:
-        """What was lost in impacts, as sentences."""
+        """Messages about losses in impacts."""
         return tuple(
             f"{row.component or 'The model itself'} lost {row.impact:.6g} J in impacts."
             for row in self.rows
@@ -189,15 +193,15 @@ def energy_balance(
 ) -> EnergyBalance:
     """Integrate the energy terms of every component along a run.
 
-    It is a quadrature over the results of the run; where they are too coarse, IDAS integrates powers and states once
-    more from there. Where this fails, the coarser value stands: there is always a balance.
+    It is a quadrature over the results of the run; where they are too coarse, IDAS integrates powers and states
+    again. If this fails, the coarser value is kept: there is always a balance.
 
     Args:
         model: the compiled model.
         segments: smooth pieces of the run.
         options: of the run; the integrals are as precise as its relative tolerance.
-        events: mode changes; what their resets do to stored energies needs no explanation.
-        impacts: what components lost at once, at events.
+        events: mode changes; their resets may change stored energies.
+        impacts: losses of components at events.
     """
     count = len(model.components)
     audit, totals = _Audit(count), np.zeros((POWERS, count))
@@ -215,7 +219,7 @@ def energy_balance(
     change, at_once = ends[:, -1] - starts[:, 0], np.sum(jumps, axis=1)
     columns = (
         inflow, source, change, lost + impact, at_once, inflow + source - lost - rate, change - at_once - rate, impact,
-        *audit.found(),
+        *audit.found(model),
     )  # fmt: skip
     rows = tuple(EnergyRow(path, *map(float, values)) for path, *values in zip(model.components, *columns, strict=True))
     throughput = max([powers.stored, *(float(np.sum(np.abs(part))) for part in (inflow, source, lost + impact))])
@@ -228,7 +232,7 @@ def energy_balance(
 class _Audit:
     """The largest imbalance of each component and its largest negative loss, with their times.
 
-    Besides, stored energies at both ends of smooth pieces, and when these begin.
+    It also has the stored energies at both ends of smooth pieces, and their start times.
     """
 
     def __init__(self, count: int) -> None:
@@ -238,9 +242,10 @@ class _Audit:
         self._largest = np.zeros(count)
         self._worst = np.zeros((2, count))
         self._when = np.zeros((2, count))
+        self._points: dict[int, Point] = {}
 
     def see(self, some: Results) -> None:
-        """Look at some results of the run."""
+        """Audit some results of the run."""
         stored, lost, source, inflow, rate, _ = some.terms
         starts = np.unique(some.first)
         self.times.append(some.times[starts])
@@ -252,17 +257,47 @@ class _Audit:
             later = worst > self._worst[k]
             self._when[k, later] = some.times[np.argmax(values[later], axis=1)]
             self._worst[k, later] = worst[later]
+            if k == 0:
+                places = np.argmax(values, axis=1)
+                self._points |= {int(n): some.point(int(places[n])) for n in np.flatnonzero(later & self._counts()[0])}
 
-    def found(self) -> tuple[Vector, Vector, Vector, Vector]:
-        """Return imbalances, as fractions of the largest powers, and negative losses, without what is rounding."""
+    def _counts(self) -> Any:
+        """Return which imbalances and negative losses are no rounding of the component's own powers."""
         floor = _NOTHING * np.max(self._largest, initial=0.0)
-        real = self._worst > np.maximum(_ROUNDING * self._largest, floor)
+        return self._worst > np.maximum(_ROUNDING * self._largest, floor)
+
+    def found(self, model: CompiledDae) -> tuple[Vector, Vector, Vector, Vector]:
+        """Return imbalances, as fractions of the largest powers, and negative losses, without what is rounding."""
+        real = self._counts()
+        for component in map(int, np.flatnonzero(real[0])):
+            real[0, component] = not _is_rounding(model, self._points[component], component)
         (imbalance, gain), (when, then) = np.where(real, self._worst, 0.0), np.where(real, self._when, 0.0)
         return imbalance / np.maximum(self._largest, 1e-300), when, gain, then
 
 
+def _is_rounding(model: CompiledDae, point: Point, component: int) -> bool:
+    """Tell whether an imbalance is rounding, which grows where torques are small differences of large ones.
+
+    It is where it changes as much as it is large when the last digits of all numbers change; what a wrong law leaves
+    hardly changes.
+    """
+    digits, found = np.random.default_rng(0), list[float]()
+
+    def moved(numbers: Vector) -> Vector:
+        return numbers * (1.0 + _LAST_DIGITS * digits.uniform(-1.0, 1.0, len(numbers)))
+
+    for _ in range(_CHANGES):
+        twin, near = model.twin(p=moved(model.p)), Point(point.t, moved(point.x), point.z.copy(), point.d)
+        solve_implicit(twin, near)
+        _, lost, source, inflow, rate, _ = call(twin, twin.energy, near).reshape(-1, len(model.components))[
+            :, component
+        ]
+        found.append(float(inflow + source - lost - rate))
+    return bool(np.ptp(found) > 0.5 * np.max(np.abs(found)))
+
+
 def _unexplained(times: Vector, jumps: Vector, reset: Sequence[float], impacts: Sequence[Impact]) -> float:
-    """Return the largest change of all stored energies together at an instant that nothing explains, in J."""
+    """Return the largest unexplained change of all stored energies together at an instant, in J."""
     instants, place = np.unique(times, return_inverse=True)
     if not len(instants):
         return 0.0

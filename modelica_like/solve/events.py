@@ -7,22 +7,22 @@ from collections.abc import Callable
 import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, CompiledTransition, Vector
-from modelica_like.compile.soon import TIME_RESOLUTION
+from modelica_like.compile.soon import time_resolution
 from modelica_like.errors import StepFailed
 from modelica_like.initialize import Point
 from modelica_like.solve.between import Between
 from modelica_like.solve.guards import Candidate, Ends, Guards, Located, candidates, locate
 from modelica_like.solve.idas import Integrator
-from modelica_like.solve.instants import SAME_TIME, Instants, just_after, note_sharing
+from modelica_like.solve.instants import Instants, just_after, note_sharing
 from modelica_like.solve.looks import Cell, Looks
 from modelica_like.solve.options import Options
 from modelica_like.solve.pace import Pace
 from modelica_like.solve.recorder import Recorder
 
 _NEVER = 1e-12
-"""Rates, relative to the value and per second, below which a guard does not rise."""
+"""Rates, relative to the value and per second, that do not count as rising."""
 _CLOSER = 8
-"""Looks into an interval between two looks."""
+"""Number of closer looks into an interval between two looks."""
 _DEEPEST = 10
 _MAX_FAILURES = 40
 _FEW_FAILURES = 6
@@ -69,13 +69,13 @@ class EventLoop:
         """Simulate.
 
         Raises:
-            Chattering, StepFailed, SingularAtStart: the run cannot go on; `record` is what came before.
+            Chattering, StepFailed, SingularAtStart: the run cannot continue; `record` has the run up to then.
         """
         with self.integrator.interrupts.watched():
             try:
                 self._go()
             finally:
-                # What an error or an interrupt leaves; otherwise nothing is left.
+                # Remaining results after an error or an interrupt; otherwise there are none.
                 self.record.end(self.now.d)
                 self._write(precisely=False)
         return self.record
@@ -94,7 +94,7 @@ class EventLoop:
         self._write()
 
     def _write(self, *, precisely: bool = True) -> None:
-        """Interpolate results, and put together the segments that have ended."""
+        """Interpolate results, and build the finished segments."""
         self.between.fill(precisely=precisely)
         self.record.build()
 
@@ -122,13 +122,12 @@ class EventLoop:
             self._failures = 0
 
     def _keep(self, looks: Looks, end: float, last: int) -> None:
-        """Record the results up to a time; `last` is the last look that means something."""
+        """Record the results up to a time; `last` is the last valid look."""
         times = self.pace.results(float(looks.times[0]), end)
         if not len(times):
             return
-        numbers = np.minimum(np.rint((times - looks.times[0]) / looks.width).astype(int), looks.count)
-        same = SAME_TIME * np.maximum(1.0, np.abs(times))
-        if self.pace.on_grid and np.all(np.abs(times - looks.times[numbers]) <= same):
+        if self.pace.on_grid:
+            numbers = np.rint((times - looks.times[0]) / looks.width).astype(int)
             self.record.add(times, looks.x[:, numbers], looks.z[:, numbers])
         else:
             piece = self.between.ask(looks, times, last)
@@ -137,21 +136,22 @@ class EventLoop:
     def _closer(self, looks: Looks, k: int) -> Looks:
         """Look into an interval between two looks.
 
-        Beginning there anew is more precise, too: a guard may live on values that are small compared with tolerances.
+        A new start there is also more precise: a guard may depend on values that are small compared with tolerances.
         """
         return self._integrate(looks.point(k), float(looks.times[k + 1] - looks.times[k]), _CLOSER).every(1)
 
     def _integrate(self, start: Point, span: float, looks: int, *, patient: bool = True) -> Looks:
         x, z = self.integrator.run(start, span, looks, patient=patient, polish=False)
         times = start.t + span * np.arange(x.shape[1] + 1) / looks
-        # Row by row, as IDAS writes them.
+        # Row by row, in the order of IDAS.
         x, z = np.concatenate([start.x[None], x.T]).T, np.concatenate([start.z[None], z.T]).T
         return Looks(self.integrator, self.guards, times, x, z, start.d)
 
     def _panel(self, stop: float) -> Looks:
         """Integrate one panel.
 
-        It may run past an event, where the equations of the old mode mean nothing and may blow up; then it ends before.
+        It may run past an event, where the equations of the old mode are not valid and may diverge; then it ends
+        before.
         """
         while True:
             span, count = self.pace.panel(self.now.t, stop)
@@ -176,22 +176,22 @@ class EventLoop:
             else:
                 looks = looks.every(1)
                 self.pace.snap(looks.times[1:])
-            if self.now.t + span >= stop - SAME_TIME * max(1.0, abs(stop)):
+            if just_after(self.now.t + span) >= stop:
                 looks.times[-1] = stop
             return looks
 
     def _in_sight(self, looks: Looks) -> float:
         """Time until all looks are passed, or the first event in sight.
 
-        Behind an event the old mode's equations mean nothing, so what they cost tells nothing about looks at guards.
+        Behind an event the old mode's equations are not valid, so their cost says nothing about looks at guards.
         """
         risen = (looks.seen[0][self.guards.active(looks.d), 1:] > 0).any(axis=0)
         return looks.width * (int(np.argmax(risen)) + 1 if risen.any() else looks.count)
 
     def _go_on(self, end: float) -> bool:
-        """Count failures on the way to one place: behind it is an event, or nothing; True if another try makes sense.
+        """Count failures on the way to one place; True if another try makes sense (an event may be behind it).
 
-        Shorter panels begin anew nearer to it. The last resort is a relaxed tolerance.
+        Shorter panels start closer to it. The last resort is a relaxed tolerance.
         """
         self._failures += 1
         self._failed_before = max(self._failed_before, end)
@@ -210,16 +210,16 @@ class EventLoop:
     # -- events ------------------------------------------------------------------------------------------------------
 
     def _search(self, looks: Looks, depth: int = 0, *, begins: bool = True) -> bool:
-        """Look for guards that become positive; if one does, go there and handle the event.
+        """Search for guards that become positive; if one does, go there and handle the event.
 
         Args:
-            looks: what was integrated.
-            depth: how often the looks became closer already.
-            begins: whether it begins where the last event, or the search before, has ended.
+            looks: integrated points.
+            depth: number of refinements so far.
+            begins: whether it begins at the end of the last event or of the search before.
         """
         values, rates, _ = looks.seen
         if begins:
-            # What the last event left positive did not want to fire: it is on its way down.
+            # A guard that the last event left positive did not fire: it is falling.
             values[:, 0] = np.minimum(values[:, 0], 0.0)
         active = self.guards.active(looks.d)
         for group in candidates(values, rates, active, looks.width):
@@ -233,7 +233,7 @@ class EventLoop:
                 wanting = [self.guards.state_events[g] for g in located.guards if located.soon[g] > 0]
                 late = [one.guard for one in group if not one.inside]
                 if wanting or late:
-                    # Positive for less than the time resolution: what the last event left is on its way down.
+                    # Positive for less than the time resolution: a guard left by the last event is falling.
                     self._reach(looks, k, located.point, wanting or self._look_behind(looks, cell, located, late))
                     return True
                 over = located.guards or [one.guard for one in group]
@@ -262,7 +262,7 @@ class EventLoop:
         return cell, locate(trial, width, ends, group, cell.t)
 
     def _search_closer(self, looks: Looks, k: int, depth: int, *, begins: bool) -> bool:
-        """Search between two looks again, with closer ones; whatever is found, the run goes on from there."""
+        """Search between two looks again, with closer ones; the run continues from there in any case."""
         self._keep(looks, float(looks.times[k]), k + 1)
         closer = self._closer(looks, k)
         closer.times[-1] = looks.times[k + 1]
@@ -272,7 +272,7 @@ class EventLoop:
         return True
 
     def _reach(self, looks: Looks, k: int, point: Point, wanting: list[CompiledTransition]) -> None:
-        """Go to a point between look k and the next and fire what wants to."""
+        """Go to a point between look k and the next and fire its transitions."""
         self._keep(looks, self.pace.before(point.t), k + 1)
         self.now = point
         if wanting:
@@ -280,8 +280,8 @@ class EventLoop:
             self._event([*wanting, *self.instants.due(point)])
 
     def _look_behind(self, looks: Looks, cell: Cell, located: Located, late: list[int]) -> list[CompiledTransition]:
-        """Go on by the time resolution; what is still positive there wants to fire, else the search begins anew."""
-        behind = located.point.t + TIME_RESOLUTION * max(1.0, abs(located.point.t))
+        """Go on by the time resolution; guards that are still positive fire, otherwise the search starts again."""
+        behind = located.point.t + time_resolution(located.point.t)
         located.point, guards = looks.at(min(behind, cell.t + cell.width), cell)
         return [self.guards.state_events[g] for g in late if guards[0][g] > 0]
 
@@ -300,6 +300,6 @@ class EventLoop:
 
 
 def _foreseen(values: Vector, rates: Vector) -> float:
-    """Time until the first guard rises, as far as straight lines tell."""
+    """Time until the first guard rises, by linear extrapolation."""
     rising = (values < 0) & (rates > -_NEVER * values)
     return float(np.min(-values[rising] / rates[rising], initial=np.inf))

@@ -1,8 +1,9 @@
-"""Guards along a segment: where does a transition want to fire?"""
+"""Guards along a segment: the times at which transitions fire."""
 
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -17,16 +18,16 @@ from modelica_like.solve.idas import along
 
 _LOCATED = 1e-13
 _NOISE = 1e-30
-"""A decaying signal ends by swinging around zero with such values; that is no event."""
+"""Values with which a decaying signal oscillates around zero; this is not an event."""
 _LARGE = 1e300
 _MAX_TRIALS = 60
 _GUESSING, _GUESSED = 12, 1e-6
 _NEAR = 0.1
-"""A top between two results is looked at if it is this near zero, relative to the values at both ends."""
+"""A maximum between two results is checked if it is this close to zero, relative to the values at both ends."""
 
 
 class Guards:
-    """Evaluates guards and their rates, and knows which are active in which mode."""
+    """Evaluates guards and their rates, with the active ones of each mode."""
 
     def __init__(self, model: CompiledDae) -> None:
         self.model = model
@@ -37,7 +38,7 @@ class Guards:
         self._active: dict[bytes, Any] = {}
 
     def active(self, d: Vector) -> Any:
-        """Return the numbers of the guards that may fire, by the modes."""
+        """Return the numbers of the guards that are active in the modes."""
         key = d[: len(self.model.flat_discretes)].tobytes()
         if key not in self._active:
             may = [k for k, one in enumerate(self.state_events) if int(d[one.mode]) in one.sources]
@@ -45,11 +46,11 @@ class Guards:
         return self._active[key]
 
     def at(self, point: Point) -> list[Vector]:
-        """Return guards, their rates, and guards one time resolution later; those that may not fire are -1."""
+        """Return guards, their rates, and guards one time resolution later; inactive ones are -1."""
         return self._at(point.t, point.x, point.z, self.model.p, self.model.u, point.d)
 
     def follow(self, point: Point) -> list[Vector]:
-        """Let the implicit unknowns follow the states by one or two steps of Newton's method; guards as by `at`.
+        """Solve for the implicit unknowns by one or two steps of Newton's method; guards as by `at`.
 
         Returns:
             Guards, their rates, guards soon, and the implicit unknowns before the last step.
@@ -66,7 +67,7 @@ class Guards:
         return near(t, x.ravel(), z, model.p, model.u, d)[0].reshape(len(x), -1)
 
     def wanting(self, point: Point) -> list[CompiledTransition]:
-        """State events that want to fire now: positive, or about to be within the time resolution."""
+        """State events that fire now: positive, or positive within the time resolution."""
         if not self.count:
             return []
         return [self.state_events[k] for k in (self.at(point)[2] > 0).nonzero()[0]]
@@ -84,7 +85,7 @@ class Guards:
 
 
 def _seen(model: CompiledDae) -> ca.Function:
-    """Guards, their rates and the states' in one function: they share most of what they compute."""
+    """Guards, their rates and those of the states in one function, because they share most operations."""
     arguments = list(model.arguments.values())
     rates = model.guard_rates(*arguments)
     rates = ca.densify(ca.if_else(ca.fabs(rates) <= _LARGE, rates, 0))
@@ -93,7 +94,7 @@ def _seen(model: CompiledDae) -> ca.Function:
 
 
 def _clean(model: CompiledDae, events: list[CompiledTransition]) -> ca.Function:
-    """Guards, rates and guards a moment later, with what the modes say."""
+    """Guards, rates and guards a moment later, with inactive ones set by the modes."""
     arguments, d = list(model.arguments.values()), model.arguments["d"]
     values, rates, _ = _seen(model)(*arguments)
     soon = _numbers(model.guards_soon(*arguments))
@@ -121,7 +122,7 @@ def _following(model: CompiledDae, at: ca.Function) -> ca.Function:
 
 
 def _numbers(guards: Any) -> Any:
-    """Let a guard that is not a number be false, and what is nothing but rounding zero."""
+    """Set a guard that is not a number to false, and rounding to zero."""
     sizes = ca.fabs(guards)
     rounding = ca.logic_and(sizes < _NOISE, sizes > JUST_TRUE)
     numbers = ca.if_else(guards > _LARGE, _LARGE, ca.if_else(guards >= -_LARGE, guards, -1))
@@ -138,12 +139,12 @@ class Candidate:
 
 
 def candidates(values: Vector, rates: Vector, active: Any, step: float) -> Iterator[list[Candidate]]:
-    """Give the intervals, one after the other, in which active guards may become positive.
+    """Yield the intervals in which active guards may become positive.
 
     Args:
         values: guards at successive times, shape (guards, times).
         rates: their time derivatives.
-        active: numbers of those that count.
+        active: numbers of the active ones.
         step: longest distance of two times in s.
     """
     values, rates = values[active], rates[active]
@@ -163,9 +164,8 @@ def candidates(values: Vector, rates: Vector, active: Any, step: float) -> Itera
 
 
 def _nearly(g0: float, g1: float, r0: float, r1: float) -> bool:
-    """Whether the cubic through both ends with the given slopes comes near zero, by a bound, and then by samples."""
-    low = -_NEAR * (abs(g0) + abs(g1))
-    return r1 < -_NOISE and max(g0 + r0 / 3, g1 - r1 / 3) > low and float(np.max(_CUBIC @ [g0, r0, g1, r1])) > low
+    """Whether the cubic through both ends with the given slopes comes near zero, by samples."""
+    return r1 < -_NOISE and float(np.max(_CUBIC @ [g0, r0, g1, r1])) > -_NEAR * (abs(g0) + abs(g1))
 
 
 def _hermite(s: Vector) -> Vector:
@@ -176,14 +176,14 @@ def _hermite(s: Vector) -> Vector:
 _CUBIC = _hermite(np.linspace(0.05, 0.95, 19))
 
 Trial = Callable[[float], tuple[Point, list[Vector]]]
-"""Goes from the beginning of an interval by a time, and gives the point there with guards, rates, and guards soon."""
+"""Steps from the beginning of an interval by a time; returns the point with guards, rates, and guards soon."""
 Ends = dict[int, tuple[float, float, float, float]]
 """By guard: values at both ends of an interval, and changes over it by the rates at both ends."""
 
 
 @dataclass
 class Located:
-    """An event: where, which guards are at zero there, and all guards a moment later."""
+    """An event: its point, the guards that are zero there, and all guards a moment later."""
 
     point: Point
     guards: list[int]
@@ -194,7 +194,7 @@ def locate(trial: Trial, span: float, ends: Ends, group: list[Candidate], t: flo
     """Find the earliest time in (0, span] at which a guard of the group becomes positive.
 
     Args:
-        trial: goes into the interval.
+        trial: steps into the interval.
         span: length of the interval in s.
         ends: guards at its ends.
         group: the guards that become positive in the interval.
@@ -231,7 +231,7 @@ def locate(trial: Trial, span: float, ends: Ends, group: list[Candidate], t: flo
 
 
 def _positive_top(trial: Trial, span: float, ends: Ends, group: list[Candidate]) -> float | None:
-    """Look for a time at which a guard that rises and falls again is positive; None if it stays below zero."""
+    """Search for a time at which a guard that rises and falls again is positive; None if it stays below zero."""
     for one in group:
         g, low, high = one.guard, 0.0, span
         rising, falling = ends[g][2] / span, ends[g][3] / span
@@ -245,7 +245,7 @@ def _positive_top(trial: Trial, span: float, ends: Ends, group: list[Candidate])
                 low, rising = guess, rate
             else:
                 high, falling = guess, rate
-            # What is left of the rise cannot reach zero any more.
+            # The remaining rise cannot reach zero.
             if value + abs(rate) * (high - low) < 0 or high - low < 1e-12:
                 break
             straight = low + (high - low) * rising / (rising - falling) if falling < 0 < rising else low
@@ -260,22 +260,19 @@ def _event(point: Point, guards: list[Vector], watched: Ends, tolerance: float) 
 
 
 def _newton(watched: list[tuple[float, float]]) -> float | None:
-    """Newton step to the earliest zero of the rising guards; None where one has risen before, and falls again."""
+    """Newton step to the earliest zero of the rising guards; None if one has risen before, and falls again."""
     if any(value > 0 and rate <= 0 for value, rate in watched):
         return None
     return min((-value / rate for value, rate in watched if rate > 0), default=None)
 
 
 def _cubic(g0: float, g1: float, r0: float, r1: float, inside: bool) -> float:
-    """Rising zero (or, if `inside`, the first top) of the cubic Hermite interpolant in (0, 1)."""
+    """Rising zero (or, if `inside`, the top) of the cubic Hermite interpolant in (0, 1)."""
     a, b, c = 2 * g0 - 2 * g1 + r0 + r1, -3 * g0 + 3 * g1 - 2 * r0 - r1, r0
     if inside:
-        tops = [
-            s.real
-            for s in np.roots([3 * a, 2 * b, c])
-            if abs(s.imag) < 1e-12 and 0 < s.real < 1 and 6 * a * s.real + 2 * b < 0
-        ]
-        return min(tops, default=0.5)
+        # The slope falls from r0 > 0 to r1 < 0: one zero, in a form that also holds for a = 0.
+        down = math.sqrt(max(b * b - 3 * a * c, 0.0)) - b
+        return c / down if 0 < c < down else 0.5
     if g0 == 0 and c >= 0:
         return 0.0
     if not g0 <= 0 < g1:

@@ -32,28 +32,29 @@ _FLAGS = {
 }
 
 _FIRST_STEP = 1e-5
-"""In scaled time. The first steps have a low order: longer ones leave errors of some tolerances at every event."""
+"""In scaled time. The first steps have a low order: longer ones cause errors of several tolerances at every event."""
 _SHORTENED = 1e-6
-"""IDAS shortens its first step at most so much before it gives up."""
+"""Largest factor by which IDAS shortens its first step before it gives up."""
 _SPARSE_FROM = 50
-"""Unknowns from which CSparse is quicker."""
+"""Number of unknowns from which CSparse is faster."""
 _POLISHING = 8
 POLISHED = 1e-8
 _RELAXATION = 10.0
 _PANEL_STEPS = 300
-"""Steps between two results of a panel; a panel that needs more has probably run past an event, and ends there."""
+"""Largest number of steps between two results of a panel; with more, it has probably passed an event, and ends."""
 
 
 def scaled_problem(model: CompiledDae, *, gentle: bool = False, scaled: bool = True) -> dict[str, Any]:
     """Return the equations in scaled time s in [0, 1], with parameters (t0, span, p, u, d).
 
-    Besides what `casadi.integrator` takes: `inner`, the arguments of the model's functions, and `span`, dt/ds.
+    In addition to the entries for `casadi.integrator`: `inner`, the arguments of the model's functions, and `span`,
+    dt/ds.
 
     Args:
         model: the compiled model.
-        gentle: t = t0 + s²·span instead of t = t0 + s·span. Time then begins to pass with a speed of zero, so slopes
-            of zero at s = 0 are exact, and first steps are short whatever the span is.
-        scaled: without, t = t0 + s: rates need no factor, which is an eighth of the work of some models.
+        gentle: t = t0 + s²·span instead of t = t0 + s·span. Then dt/ds is zero at s = 0, so slopes of zero are exact
+            there, and first steps are short for any span.
+        scaled: if false, t = t0 + s: rates need no factor, which saves an eighth of the work in some models.
     """
     return model.once(("scaled", gentle, scaled), lambda: _scaled_problem(model, gentle, scaled))
 
@@ -69,9 +70,9 @@ def _scaled_problem(model: CompiledDae, gentle: bool, scaled: bool) -> dict[str,
 
 
 def linear_solver(unknowns: int) -> str:
-    """Return what factorises the Jacobian of a step.
+    """Return the linear solver for the Jacobian of a step.
 
-    CasADi's QR is compact and quick for few unknowns; the LU of CSparse keeps sparse what is sparse.
+    CasADi's QR is fast for few unknowns; the LU of CSparse preserves sparsity.
     """
     return "csparse" if unknowns >= _SPARSE_FROM else "qr"
 
@@ -79,12 +80,12 @@ def linear_solver(unknowns: int) -> str:
 class Integrator:
     """Integrates a model over one interval with fixed modes; its IDAS instances are kept with the model.
 
-    Time is scaled, so that one instance serves intervals of any place and length.
+    Time is scaled, so that one instance serves all intervals.
 
     Args:
         model: the compiled model.
         options: tolerances.
-        whole: whether intervals are whole runs: then large models get an instance for each length, which is quicker.
+        whole: whether intervals are whole runs: then large models get an instance for each length, which is faster.
     """
 
     def __init__(self, model: CompiledDae, options: Options, *, whole: bool = False) -> None:
@@ -103,11 +104,11 @@ class Integrator:
 
     @property
     def rtol(self) -> float:
-        """Relative tolerance now."""
+        """Present relative tolerance."""
         return self.options.rtol * self._relaxed
 
     def weights(self, x: Vector) -> Vector:
-        """What errors of states are measured by, relative and absolute tolerance; shape as x, (nx,) or (nx, n)."""
+        """Error weights of states from relative and absolute tolerance; shape as x, (nx,) or (nx, n)."""
         absolute = self.options.atol * self._relaxed * self.model.nominals
         return self.rtol * np.abs(x) + (absolute if x.ndim == 1 else absolute[:, None])
 
@@ -122,9 +123,9 @@ class Integrator:
         return self.model.fast(key, lambda: self._make(outputs, steps, gentle, first), results=(0, 1))
 
     def _first_step(self, start: Point, span: float) -> float:
-        """Return a first step in scaled time that may move states by their tolerances, as IDAS can find it from there.
+        """Return a first step in scaled time that moves states by about their tolerances.
 
-        Gently, a step s moves them by s² times rates times the span.
+        With `gentle`, a step s moves them by s² times rates times the span.
         """
         rates = np.abs(call(self.model, self.model.ode, start)) * span
         fastest = float(np.max(rates / self.weights(start.x)))
@@ -135,7 +136,7 @@ class Integrator:
 
     def _make(self, outputs: int, steps: int, gentle: bool, first: float) -> ca.Function:
         length = 1.0 if gentle or self._seconds is None else self._seconds
-        problem = dict(scaled_problem(self.model, gentle=gentle, scaled=gentle or self._seconds is None))
+        problem = dict(scaled_problem(self.model, gentle=gentle, scaled=self._seconds is None))
         del problem["inner"], problem["span"]
         grid = np.arange(1, outputs + 1) / outputs
         grid = (np.sqrt(grid) if gentle else grid * length).tolist()
@@ -147,11 +148,11 @@ class Integrator:
             "reltol": self.rtol,
             "abstol": self.options.atol * self._relaxed * (float(np.min(nominal)) if nominal.size else 1.0),
             "max_num_steps": steps,
-            # The implicit unknowns follow from the states and are polished; their part of the error test only costs
+            # The implicit unknowns follow from the states and are polished; their part of the error test costs
             # steps, and fails at tight tolerances.
             "suppress_algebraic": True,
-            # Left alone, IDAS begins with a step of 1e-10 and takes thirty more to reach its stride, at every event
-            # anew.
+            # By default, IDAS starts with a step of 1e-10 and needs thirty more to reach its usual step, after every
+            # event.
             "step0": first,
             "calc_ic": not gentle,
             "linear_solver": linear_solver(len(self.model.states) + len(self.model.implicit)),
@@ -166,9 +167,9 @@ class Integrator:
             start: consistent start.
             span: length of the interval in s.
             outputs: number of equidistant results.
-            patient: allow all steps between two results, not only as many as usual. Without, fewer results are an
-                answer, too: those before IDAS gave up.
-            polish: whether the implicit unknowns are solved for precisely.
+            patient: allow all steps between two results, not only the usual number. If false, fewer results are
+                valid, too: those before IDAS gave up.
+            polish: whether to solve for the implicit unknowns precisely.
 
         Returns:
             States and implicit unknowns at `outputs` equidistant times, the last at the end; shapes (nx, outputs),
@@ -186,7 +187,7 @@ class Integrator:
         self._seconds = span if self._whole else None
         x, z, why = self._call(start, p, outputs, steps, gentle)
         if why and not gentle and _at_the_start(why):
-            # IDAS looks for consistent slopes at the start, and may not find them; gently there is nothing to find.
+            # IDAS searches for consistent slopes at the start, and may not find them; with `gentle` they are known.
             self._gentle_from = min(span, self._gentle_from)
             gentle = True
             x, z, why = self._call(start, p, outputs, steps, gentle)
@@ -203,10 +204,10 @@ class Integrator:
         return x, z
 
     def _call(self, start: Point, p: Vector, outputs: int, steps: int, gentle: bool) -> tuple[Vector, Vector, str]:
-        """Return what IDAS computes, and what it says where it gives up: that is for the error, not for the screen.
+        """Return the results of IDAS and its output if it gives up, which goes into the error and not to the screen.
 
         Raises:
-            KeyboardInterrupt: it was interrupted; IDAS takes that for an error in the equations.
+            KeyboardInterrupt: the run was interrupted; IDAS treats this as an error in the equations.
         """
         first = self._first_step(start, p[1]) if gentle else _FIRST_STEP
         instance = self._instance(outputs, steps, gentle, first)
@@ -226,15 +227,15 @@ class Integrator:
         return x.reshape(outputs, -1).T, z.reshape(outputs, -1).T, why
 
     def polished(self, times: Vector, x: Vector, z: Vector, d: Vector) -> Vector:
-        """Solve for the implicit unknowns by Newton's method: IDAS gives them within its tolerance only.
+        """Solve for the implicit unknowns by Newton's method: IDAS returns them only within its tolerance.
 
-        Guards on them would be located no better, and constraints would be met no better.
+        Otherwise guards and constraints on them would be no more precise.
 
         Args:
             times: shape (n,), in s.
             x: states, shape (nx, n).
             z: guesses, shape (nz, n).
-            d: modes and discrete values, shape (nd,), or (nd, n) if they are not the same everywhere.
+            d: modes and discrete values, shape (nd,), or (nd, n) if they vary.
         """
         if not self.model.implicit:
             return z
@@ -244,7 +245,7 @@ class Integrator:
             if not np.isfinite(step).all():
                 return z
             z = new
-            # What is left after a step of Newton's method is about its square.
+            # The error after a step of Newton's method is about the square of the step.
             if is_linear(self.model) or not np.max(np.abs(step) - POLISHED * np.abs(z)) > POLISHED:
                 break
         return z
@@ -262,7 +263,7 @@ class Integrator:
         self.evaluations += int(statistics["nfevals"])
 
     def _algebraic(self, start: Point, span: float, outputs: int) -> tuple[Vector, Vector]:
-        """Only implicit equations and time: solve them at each output."""
+        """Without states: solve the implicit equations at each output."""
         from modelica_like.initialize import solve_implicit
 
         columns: list[Vector] = []
@@ -280,7 +281,7 @@ class Integrator:
         reached = _reached(text) ** 2 if gentle else _reached(text) / (self._seconds or 1.0)
         moment = start.t + span * reached
         speed = np.abs(call(self.model, self.model.ode, start)) / self.weights(start.x)
-        worst = self.model.states[int(np.nanargmax(speed))] if np.any(np.isfinite(speed)) else self.model.states[0]
+        worst = self.model.states[int(np.argmax(np.nan_to_num(speed)))]
         return StepFailed(
             f"IDAS gave up at about t = {moment:.6g} s: {reason}{f' ({flag})' if flag else ''}.",
             why=f"{worst} changes fastest relative to its tolerance.",
@@ -289,7 +290,7 @@ class Integrator:
 
 
 def _reached(text: str) -> float:
-    """Scaled time at which IDAS gave up, by what it said."""
+    """Scaled time at which IDAS gave up, from its output."""
     at = re.search(r"At t = ([0-9.]+(?:[eE][+-]?[0-9]+)?)", text)
     return float(at.group(1)) if at else 0.0
 

@@ -1,4 +1,4 @@
-"""What happens at one instant: which transitions want to fire, and firing them until nothing does."""
+"""Transitions at one instant: fire them until none is left."""
 
 from __future__ import annotations
 
@@ -24,32 +24,32 @@ from modelica_like.initialize import (
 from modelica_like.language.transition import NAME_IN_NOTICE
 from modelica_like.solve.guards import Guards
 from modelica_like.solve.options import Options
-from modelica_like.solve.recorder import Event, Recorder
+from modelica_like.solve.recorder import IMPACT, Event, Recorder
 
 _CHATTER_EVENTS = 50
 _CHATTER_INSTANTS = 25
 _TOGETHER = 6
-"""Rounds at one instant in which all fire that want to."""
+"""Rounds at one instant in which all transitions fire together."""
 _ALONE = 6
-"""Further rounds per motion that may be held, in which only one fires."""
+"""Further rounds per holdable motion, in which only one fires."""
 _CHATTER_WINDOW = 1e-6
 SAME_TIME = 1e-12
-"""Relative distance of two times that are the same."""
+"""Relative distance of two equal times."""
 
 
 def just_after(t: float) -> float:
-    """Return the latest time that is still the same."""
+    """Return the latest time that counts as equal."""
     return t + SAME_TIME * max(1.0, abs(t))
 
 
 class Instants:
-    """Fires the transitions of a run and notes them as events.
+    """Fires the transitions of a run and records them as events.
 
     Args:
         model: the compiled model.
-        options: how many rounds and events are allowed.
+        options: with the limits of rounds and events.
         guards: the state events.
-        record: where events are noted.
+        record: of the events.
         span: length of the run in s.
     """
 
@@ -77,21 +77,21 @@ class Instants:
         return float(min(ahead, default=np.inf))
 
     def due(self, now: Point) -> list[CompiledTransition]:
-        """Time events whose time has come."""
+        """Time events whose time is reached."""
         if not self._timed:
             return []
         moments = call(self.model, self.model.moments, now)
         return [t for t in self._timed if _is_source(now, t) and moments[t.index] <= just_after(now.t)]
 
     def settle(self, now: Point, wanting: list[CompiledTransition]) -> None:
-        """Fire transitions until none wants to fire any more; `now` becomes the point after.
+        """Fire transitions until none is left; `now` becomes the point after.
 
-        All that want to fire do so together. Surfaces that hold each other may go round in a circle then; so after some
-        rounds only the first one does (K. G. Murty's rule of the least index, which ends where the answer is unique).
+        All of them fire together. Surfaces that hold each other may then cycle, so after some rounds only the first one
+        fires (K. G. Murty's least-index rule, which ends if the solution is unique).
 
         Raises:
-            Chattering: there is no end of it, or events follow each other ever faster.
-            LimitPassed: what fires ends the run.
+            Chattering: transitions do not end, or events follow each other ever faster.
+            LimitPassed: a transition ends the run.
             SingularAtStart: the equations have no unique solution after it.
         """
         if not wanting:
@@ -122,8 +122,8 @@ class Instants:
             raise self._chattering(f"There were more than {self.options.max_events} events")
 
     def _share_anew(self, now: Point, wanting: list[CompiledTransition]) -> list[CompiledTransition]:
-        """Before one of several that hold a motion gives way, let the others take more; what still wants to fire."""
-        if not any(now.d[one.first : one.first + len(one.members)].any() for one in self.model.circuits):
+        """Let others take more before one of several holding elements breaks away; return the remaining transitions."""
+        if not any(now.d[one.entries].any() for one in self.model.circuits):
             return wanting
         share(self.model, now)
         solve_implicit(self.model, now)
@@ -132,7 +132,7 @@ class Instants:
         return [one for one in wanting if one.timed or soon[positions[id(one)]] > 0]
 
     def _fire(self, now: Point, wanting: list[CompiledTransition]) -> None:
-        """Carry out transitions together; of one mode only the one declared first."""
+        """Fire transitions together; of one mode only the one declared first."""
         chosen: dict[int, CompiledTransition] = {}
         for transition in sorted(wanting, key=self._number):
             if _is_source(now, transition):
@@ -161,7 +161,7 @@ class Instants:
             self._project(now, targets)
 
     def _stop_motions(self, now: Point, before: Vector) -> None:
-        """Stop what modes have begun to hold; what the impact knocks loose takes the mode that its start would take."""
+        """Stop newly held motions; friction that breaks away in the impact takes the mode of a start."""
         holds = self.model.holds
         begun = {k for k, one in enumerate(holds) if now.d[one.mode] == one.number != before[one.mode]}
         entering = [k for k in holding(self.model, now) if k in begun] if begun else []
@@ -169,7 +169,7 @@ class Instants:
             return
         strike = Strike(self.model, now, entering)
         if strike.hard:
-            # All impacts at this instant are one, from the speeds before the first.
+            # All impacts at this instant are solved together, from the speeds before the first.
             self._entered.update(entering)
             if self._struck is None:
                 self._struck, self._impacts = now.x.copy(), len(self.record.impacts)
@@ -184,11 +184,11 @@ class Instants:
             self._choose_again(now, list(dict.fromkeys(holds[k].mode for k in strike.loose)))
 
     def _hold_again(self, now: Point) -> None:
-        """Close what finite forces have opened since the first impact at this instant: they come after it."""
+        """Hold again what finite forces have released since the first impact at this instant: they act after it."""
         for k in sorted(self._entered):
             one = self.model.holds[k]
             if now.d[one.mode] != one.number:
-                self._note(now, one.mode, one.number, -1)
+                self._note(now, one.mode, one.number, IMPACT)
                 now.d[one.mode] = one.number
         share(self.model, now)
         solve_implicit(self.model, now)
@@ -199,14 +199,14 @@ class Instants:
         chosen.d = chosen_modes(self.model, chosen)
         for mode in modes:
             if chosen.d[mode] != now.d[mode]:
-                self._note(now, mode, int(chosen.d[mode]), -1)
+                self._note(now, mode, int(chosen.d[mode]), IMPACT)
                 now.d[mode] = chosen.d[mode]
         share(self.model, now)
         solve_implicit(self.model, now)
         check_singular(self.model, now)
 
     def _project(self, now: Point, targets: list[tuple[int, float]]) -> None:
-        """Move the states as little as possible, so that variables that follow from them take new values."""
+        """Change the states as little as possible, so that dependent variables take new values."""
         nodes = [self.model.reset_nodes[k] for k, _ in targets]
         present = call(self.model, self.model.variables, now)[nodes]
         slopes = variable_slopes(self.model, now, nodes)
@@ -240,7 +240,7 @@ def chattering(events: Sequence[Event], why: str) -> Chattering:
 
 
 def note_sharing(record: Recorder, model: CompiledDae, now: Point) -> None:
-    """Tell once who shares what the balance leaves undetermined."""
+    """Add one notice about elements that share an undetermined reaction."""
     for parts in sharing(model, now):
         text = (
             f"{', '.join(parts[:-1])} and {parts[-1]} hold the same motion: they share the reaction in proportion "

@@ -11,10 +11,10 @@ from typing import Any
 
 
 class Interrupts:
-    """Lets what a handler of SIGINT raises inside foreign code be raised behind it.
+    """Raises exceptions of a SIGINT handler after foreign code instead of inside it.
 
-    CasADi looks for signals while it integrates, but takes the exception for a failure of the equations. In other
-    threads than the main one there are no signals.
+    CasADi checks signals while it integrates, but treats the exception as a failure of the equations. There are
+    signals only in the main thread.
     """
 
     def __init__(self) -> None:
@@ -24,7 +24,7 @@ class Interrupts:
 
     @contextmanager
     def watched(self) -> Iterator[None]:
-        """Stand in for the program's handler; once for many calls, for that costs as much as a short call."""
+        """Replace the program's handler; once for many calls, because it costs as much as a short call."""
         alone = self._previous is None and threading.current_thread() is threading.main_thread()
         previous = signal.getsignal(signal.SIGINT) if alone else None
         if callable(previous):
@@ -42,7 +42,7 @@ class Interrupts:
         """Run foreign code.
 
         Raises:
-            KeyboardInterrupt: or what else the program's own handler raises.
+            KeyboardInterrupt: or another exception of the program's handler.
         """
         self._foreign = True
         try:

@@ -1,4 +1,4 @@
-"""Between the looks of one IDAS call: states by interpolation, as precise as the call itself."""
+"""Interpolation of states between the looks of one IDAS call, as precise as the call itself."""
 
 from __future__ import annotations
 
@@ -14,23 +14,23 @@ from modelica_like.solve.guards import Ends, Guards
 from modelica_like.solve.idas import POLISHED, Integrator
 
 PRECISE = 1.0
-"""Difference of two degrees, in tolerances, up to which a polynomial counts as the solution."""
+"""Difference of two degrees, in tolerances, below which a polynomial counts as the solution."""
 _SHARP = 1e-4
-"""Difference of a guard by two degrees, relative to its values at both looks, up to which it is located."""
+"""Difference of a guard by two degrees, relative to its values at both looks, below which it is located."""
 _TERMS = 8
 _ROUNDING = 1e-12
 _FEWEST = 4
-"""Looks between two others that are worth using."""
+"""Smallest useful number of looks between two others."""
 EXPONENTS = np.arange(float(_TERMS))
 
 
 class Scheme:
-    """A polynomial of degree seven through looks around an interval, and one of degree five that tells its precision.
+    """A polynomial of degree seven through looks around an interval, and one of degree five to estimate its precision.
 
     Args:
         nodes: number of looks.
-        slopes: whether it takes slopes there, too. They make it much more precise, unless the equations are stiff:
-            then slopes are what errors of the states make of them.
+        slopes: whether it also uses slopes. They make it much more precise, unless the equations are stiff: then
+            slopes amplify errors of the states.
     """
 
     def __init__(self, nodes: int, *, slopes: bool) -> None:
@@ -40,11 +40,11 @@ class Scheme:
         starts = [min(max(cell - (fewer - 1) // 2, 0), nodes - fewer) for cell in cells]
         self.precise = np.array([self._basis(0, nodes, cell) for cell in cells])
         self.coarse = np.array([self._basis(start, fewer, cell) for start, cell in zip(starts, cells, strict=True)])
-        # The middle tells for the whole interval: near a look both agree with it, however wrong its slope is.
+        # The middle is representative of the interval: near a look both agree with it, even with a wrong slope.
         self.doubt = 0.5**EXPONENTS @ (self.precise - self.coarse)
 
     def _basis(self, first: int, count: int, cell: int) -> Vector:
-        """Coefficients, in powers of the share of a cell that has passed, of what each datum adds; (powers, data).
+        """Coefficients of each datum, in powers of the passed share of a cell; (powers, data).
 
         In these powers, states near the beginning of the cell are as precise as their slopes there.
         """
@@ -70,7 +70,7 @@ class Cell:
     """The interval between two looks.
 
     Args:
-        scheme: how it is interpolated.
+        scheme: of the interpolation.
         t: time of its beginning in s.
         width: its length in s.
         k: its number among the looks.
@@ -97,16 +97,16 @@ class Cell:
 
 
 class Looks:
-    """What one IDAS call computed: equidistant points of a smooth piece.
+    """Results of one IDAS call: equidistant points of a smooth piece.
 
     Args:
-        integrator: what computed them.
+        integrator: of these points.
         guards: evaluates guards, their rates and slopes of states there.
         times: shape (n + 1,) in s, beginning included.
         x: states, shape (nx, n + 1).
         z: implicit unknowns, shape (nz, n + 1).
         d: modes and discrete values.
-        all: looks of which these are every so many-th.
+        all: complete looks, of which these are a regular part.
     """
 
     def __init__(
@@ -120,13 +120,13 @@ class Looks:
         self._all = all
 
     def every(self, stride: int) -> Looks:
-        """Return looks with so many times the distance; their implicit unknowns are polished."""
+        """Return looks with a multiple of the distance and polished implicit unknowns."""
         if stride == 1 and not len(self.z):
             return self
         return self._some(slice(None, None, stride), self if stride >= _FEWEST else None)
 
     def within(self, k: int) -> Looks | None:
-        """Return the looks between look k and the next that were left out, if they are enough."""
+        """Return the skipped looks between look k and the next, if there are enough."""
         if self._all is None:
             return None
         stride = self._all.count // self.count
@@ -148,15 +148,15 @@ class Looks:
         return Point(float(self.times[k]), self.x[:, k].copy(), self.z[:, k].copy(), self.d)
 
     def intervals(self, times: Vector) -> Any:
-        """Return the numbers of the intervals in which times lie."""
+        """Return the numbers of the intervals of times."""
         return np.minimum(((times - self.times[0]) / self.width).astype(int), self.count - 1)
 
     def cells(self, k: int, last: int) -> Iterator[Cell]:
-        """Give the interval from look k to the next, interpolated in several ways; nothing if there are too few looks.
+        """Yield the interval from look k to the next, interpolated in several ways; none if there are too few looks.
 
         Args:
             k: number.
-            last: the last look that means something, because of an event before the next.
+            last: the last valid look, because of an event before the next.
         """
         base = self.x[:, k].copy()
         for scheme in SCHEMES:
@@ -186,10 +186,10 @@ class Looks:
         return begin + (t - cell.t) / cell.width * (end - begin) if len(begin) else begin
 
     def is_sharp(self, cell: Cell, ends: Ends, *, fresh: bool) -> bool:
-        """Whether interpolated states are precise, and precise enough for guards with these values, in the middle.
+        """Whether interpolated states in the middle are precise, and precise enough for guards with these values.
 
-        A state may be small compared with its tolerance, and a guard live on such values all the same: it is trusted
-        only where the integrator has begun just before (`fresh`).
+        A guard may depend on states that are small compared with their tolerances: it is trusted only if the
+        integrator has just started (`fresh`).
         """
         t = cell.t + 0.5 * cell.width
         precise, coarse = cell.both(t)

@@ -9,7 +9,7 @@ from modelica_like.errors import ValueOutOfRange
 
 @dataclass(frozen=True)
 class Options:
-    """How precisely, and how finely, to simulate.
+    """Tolerances and limits of a simulation.
 
     Attributes:
         rtol: relative tolerance of the integrator, per step.

@@ -1,4 +1,4 @@
-"""How far IDAS goes in one call, and where results lie."""
+"""Length of the calls of IDAS, and times of results."""
 
 from __future__ import annotations
 
@@ -7,26 +7,26 @@ import math
 import numpy as np
 
 from modelica_like.compile.compiled import Vector
-from modelica_like.solve.instants import SAME_TIME
+from modelica_like.solve.instants import SAME_TIME, just_after
 from modelica_like.solve.options import Options
 
 _SIZES = tuple(2**k for k in range(3, 12))
-"""Looks of one call: few different numbers, for each is an instance of IDAS."""
+"""Looks of one call: few different numbers, because each needs an instance of IDAS."""
 _LARGEST = 4096
-"""Results of one call without events: memory, not time, bounds them."""
+"""Results of one call without events, limited by memory."""
 _ROOM = 1.5
 _FIRST = 32
-"""Results that the first panel spans."""
+"""Number of results in the first panel."""
 _FEWEST = 0.25
-"""Looks at guards per result at least: what oscillates so that results show it is not missed."""
+"""Smallest number of looks at guards per result: oscillations visible in the results are not missed."""
 _SPARE = 2.0
-"""Looks of a panel per look at guards that is expected: nobody knows before how many steps there will be."""
+"""Looks of a panel per expected look at guards: the number of steps is not known before."""
 _STEPS_PER_LOOK = 2.0
 _DENSE = 3.0
-"""Steps between two looks from which on something may be missed between them."""
+"""Number of steps between two looks from which on events may be missed."""
 _STEPS_TO_START = 30
 _COST = 100.0
-"""What a panel costs besides its steps, in steps."""
+"""Overhead of a panel, in steps."""
 _GROWTH = 8
 _ON_GRID = 1e-7
 
@@ -58,7 +58,7 @@ class Pace:
         """Return length in s and number of looks of the next panel."""
         if not self.on_grid:
             density = max(_SPARE * self._density, 1 / self.step)
-            # Most of a panel may lie behind an event; a beginning costs some steps, too.
+            # Most of a panel may lie behind an event; a start also costs some steps.
             span = min(self._span, _SIZES[-1] / density)
             if self._density:
                 span = min(span, max(math.sqrt(_COST * self._span / self._density), _COST / self._density))
@@ -67,14 +67,14 @@ class Pace:
             return span, next((size for size in _SIZES if size >= span * density), _SIZES[-1])
         whole = math.floor(float(t - self.begin) / self.step + _ON_GRID)
         span = self.begin + (whole + self._even) * self.step - t
-        if t + span < stop - SAME_TIME * max(1.0, abs(stop)):
+        if just_after(t + span) < stop:
             return span, self._even
         return stop - t, max(math.ceil(float(stop - t) / self.step - _ON_GRID), 1)
 
     def snap(self, times: Vector) -> None:
         """Put times exactly on the regular grid, so that they do not collect rounding errors."""
         grid = self._at(np.rint((times - self.begin) / self.step))
-        # Times that are the same, and surely no others on the grid.
+        # Equal times, but no others on the grid.
         same = np.minimum(_ON_GRID * self.step, SAME_TIME * np.maximum(1.0, np.abs(grid)))
         on_grid = np.abs(times - grid) <= same
         times[on_grid] = grid[on_grid]
@@ -83,18 +83,18 @@ class Pace:
         return self.begin + (self.end - self.begin) * (numbers / self.points)
 
     def results(self, first: float, last: float) -> Vector:
-        """Return the times of results after `first` up to `last`, both with a little room."""
+        """Return the times of results after `first` up to `last`, with a tolerance."""
         same = min(_ON_GRID * self.step, SAME_TIME * max(1.0, abs(first), abs(last)))
         low = math.floor((first + same - self.begin) / self.step) + 1
         high = math.floor((last + same - self.begin) / self.step)
         return self._at(np.arange(low, high + 1, dtype=float))
 
     def before(self, t: float) -> float:
-        """Return the latest time of results that lie before an event."""
+        """Return the latest time of results before an event."""
         return t - 2 * _ON_GRID * self.step
 
     def stride(self, steps: int, looks: int, width: float) -> int:
-        """Choose, by the integrator's steps in a panel, how many looks a look at guards goes on.
+        """Choose the number of looks per look at guards, by the integrator's steps in a panel.
 
         Zero if there are too few looks; the next panel has more.
         """
@@ -112,7 +112,7 @@ class Pace:
         return stride
 
     def shorter(self, span: float, *, denser: bool = False) -> None:
-        """Let the next panel be not longer than so many s; with `denser`, looks come closer as it becomes shorter."""
+        """Limit the length of the next panel, in s; with `denser`, a shorter panel has closer looks."""
         if denser:
             self.on_grid = False
             span /= _GROWTH
@@ -120,14 +120,14 @@ class Pace:
         self._span = span
 
     def longer(self, span: float, ahead: float) -> None:
-        """Let the next panel be longer than one of so many s, but not much longer than what is ahead, in s."""
+        """Make the next panel longer than one of this length in s, but not much longer than the time ahead."""
         if span > 0.9 * self._span:
             self._span = min(_GROWTH * self._span, max(_ROOM * ahead, self._shortest()))
 
     def anew(self, before: Vector, lasted: float, after: Vector) -> None:
         """Begin a segment.
 
-        It is expected to last as long as the last one with the same modes, or as the one before.
+        Its expected length is that of the last one with the same modes, or of the one before.
 
         Args:
             before: modes and discrete values of the segment before.
@@ -140,5 +140,5 @@ class Pace:
             self._span = max(_ROOM * expected, self._shortest())
 
     def _shortest(self) -> float:
-        """A panel that costs little more than its beginning."""
+        """Length of a panel that costs little more than its start."""
         return _STEPS_TO_START / max(self._density, 1 / self.step)

@@ -32,12 +32,12 @@ def plot(
 
     Args:
         solution: the run.
-        patterns: names or patterns (`*.w`) of what to draw; by default speeds, torques and forces of the parts.
+        patterns: names or patterns (`*.w`) of the curves; by default speeds, torques and forces of the parts.
         title: heading; by default the name of the model.
-        display: units by path, pattern or quantity, beside those of the netlist, such as {"speed": "rpm"}.
+        display: units by path, pattern or quantity, in addition to those of the netlist, such as {"speed": "rpm"}.
 
     Raises:
-        UnknownName: nothing fits a pattern.
+        UnknownName: nothing matches a pattern.
         UnitError: a variable cannot be shown in a unit.
     """
     shown = Display(solution.model, display)
@@ -55,10 +55,10 @@ def plot(
 
 
 def check_picture(path: Path) -> None:
-    """Tell before a run why a picture cannot be written.
+    """Raise an error before a run if a picture cannot be written.
 
     Raises:
-        NetlistError: matplotlib does not know the format.
+        NetlistError: matplotlib does not support the format.
         OSError: it cannot be written there.
     """
     from matplotlib.backend_bases import FigureCanvasBase
@@ -78,27 +78,27 @@ def save_plot(figure: Figure, path: Path, **options: Any) -> None:
         options: of matplotlib's `savefig`.
 
     Raises:
-        NetlistError: matplotlib does not know the format.
+        NetlistError: matplotlib does not support the format.
         OSError: the file cannot be written.
     """
     check_picture(path)
-    # In memory first: not every format tells that a disk is full.
+    # In memory first: not every format reports a full disk.
     content = io.BytesIO()
     figure.savefig(content, format=path.suffix[1:].lower(), **options)
     write_bytes(path, content.getvalue())
 
 
 def chosen(solution: Trajectories, patterns: Sequence[str]) -> list[str]:
-    """Return the names that fit the patterns, or a sensible choice if there are none.
+    """Return the names that match the patterns, or a default choice without patterns.
 
     Raises:
-        UnknownName: nothing fits a pattern.
+        UnknownName: nothing matches a pattern.
     """
     return matching(solution.model, patterns) if patterns else _usual(solution)
 
 
 def _usual(solution: Trajectories) -> list[str]:
-    """Choose speeds, torques and forces of parts; curves that coincide are drawn once, and those at rest not at all."""
+    """Choose speeds, torques and forces of parts, without curves at rest; coinciding curves are drawn once."""
     names: list[str] = []
     for unit in _USUAL:
         curves: dict[bytes, str] = {}
@@ -112,7 +112,7 @@ def _usual(solution: Trajectories) -> list[str]:
 
 
 def quantity(unit: str) -> str:
-    """Return what is measured in a unit, for titles."""
+    """Return the quantity of a unit, for titles."""
     return QUANTITIES.get(unit, "value")
 
 
@@ -139,7 +139,7 @@ def _mark_events(panels: Sequence[Axes], events: Sequence[Event]) -> None:
 
 
 def _spaced(events: Sequence[Event], gap: float) -> list[Event]:
-    """Return the last event of each instant, as far as there is room for a label between them."""
+    """Return the last event of each instant, if there is space for a label."""
     shown: list[Event] = []
     for event in {event.time: event for event in events}.values():
         if not shown or event.time - shown[-1].time > gap:

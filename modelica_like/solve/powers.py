@@ -1,4 +1,4 @@
-"""Integrals of the powers along a run: by a rule over its own results and, where these are too coarse, finer ones."""
+"""Integrals of the powers along a run: by a rule over its results and, where these are too coarse, over finer ones."""
 
 from __future__ import annotations
 
@@ -21,28 +21,28 @@ from modelica_like.solve.recorder import Segment
 POWERS = 4
 """Powers of a component that are integrated: loss, source, inflow, rate of the stored energy."""
 _PIECE, _LARGEST = 20_000, 10_000_000
-"""Results that are looked at together, and numbers in their energy terms at most."""
+"""Number of results processed together, and largest count of numbers in their energy terms."""
 _SHARE, _ALL = 0.1, 50.0
-"""Errors of one interval and of all, in relative tolerances of the energy that moves, that are left as they are."""
+"""Accepted errors of one interval and of all, in relative tolerances of the exchanged energy."""
 _ASTRAY = 3.0
-"""The same of one interval where stored energies change otherwise than their rates say, however smooth these look."""
+"""The same for one interval where stored energies do not follow their rates."""
 _FINER = 0.1
 _FINEST = 1e-12
-"""What is integrated again is so much more precise than the run, but no more than this."""
+"""Factor of precision of a repeated integration over the run, and its limit."""
 _NEAR = 8
-"""Intervals that are integrated again as well rather than to start once more behind them."""
+"""Intervals that are also integrated again, because a new start would cost more."""
 _MORE, _LEAST, _DEEPEST = 4, 4, 6
-"""Finer results per interval, intervals for which there are so many at least, and how often that is done."""
+"""Finer results per interval, the smallest number of intervals for this, and the number of repetitions."""
 _FAILURES = 20
-"""Failures of IDAS in a piece of a run from which the results have to do."""
+"""Failures of IDAS in a piece of a run after which the given results must suffice."""
 _FEW = 4
-"""Intervals of a smooth piece up to which slopes of the powers are taken."""
+"""Largest number of intervals of a smooth piece for which slopes of the powers are used."""
 _BESIDE = np.array([[1 / 2, 1 / 2], [2 / 3, 1 / 3], [1 / 2, 1 / 2]])
-"""Weights of the powers at both ends of an interval, beside slopes at both and at the first, and without any."""
+"""Weights of the powers at both ends of an interval: with slopes at both, at the first, and without slopes."""
 _NOTHING = 1e-15
-"""Energy, in J, below which nothing moves: what is left at rest is rounding, and no rule follows it."""
+"""Energy, in J, that counts as rest: it is rounding."""
 _CLOSE = 0.1
-"""Distance of two results, as part of the next one, up to which one of them is left out."""
+"""Distance of two results, relative to the next one, below which one of them is left out."""
 
 
 @dataclass
@@ -73,7 +73,7 @@ class Results:
 
 
 def results(model: CompiledDae, segments: Sequence[Segment]) -> Iterator[Results]:
-    """Go through a run in pieces of bounded size; a long segment is cut into some that share a result."""
+    """Yield a run in pieces of bounded size; pieces of a long segment share a result."""
     held: list[Segment] = []
     count, most = 0, min(_PIECE, max(_LARGEST // (6 * max(len(model.components), 1)), 100))
     for segment in segments:
@@ -114,8 +114,8 @@ class Powers:
 
     Attributes:
         stored: the largest energy that all components stored at one time so far, in J.
-        moved: that, or the largest energy that one exchanged. What an integral is precise to is a part of it, not of
-            what is left over: an oscillation exchanges its energy again and again.
+        moved: that, or the largest energy that one component exchanged. The precision of an integral is relative to
+            it: an oscillation exchanges its energy repeatedly.
     """
 
     def __init__(self, model: CompiledDae, options: Options, count: int) -> None:
@@ -128,7 +128,7 @@ class Powers:
     def integrals(self, every: Results, depth: int = 0) -> Vector:
         """Integrate all powers over some results; shape (4, components), in J.
 
-        Where these are too coarse, there are finer ones between them, which may be too coarse again.
+        Where these are too coarse, finer ones are computed between them, if needed repeatedly.
         """
         kept = _apart(every)
         first, last = (np.searchsorted(kept, ends[kept]) for ends in (every.first, every.last))
@@ -154,9 +154,9 @@ class Powers:
         return sum(parts, total.reshape(POWERS, -1))
 
     def _again(self, every: Results, ends: Places, stretches: list[Places]) -> tuple[Places, list[Segment]]:
-        """Return which intervals have finer results, and these; a stretch lies within one smooth piece.
+        """Return the intervals with finer results, and these; a stretch lies within one smooth piece.
 
-        Where IDAS gives up, stretches are divided; in the end there are none for some.
+        If IDAS gives up, stretches are divided; some may remain without finer results.
         """
         again, finer, failures = np.zeros(ends.shape[1], bool), list[Segment](), 0
         while stretches and failures < _FAILURES:
@@ -183,16 +183,16 @@ class Powers:
         return Segment(times, states, implicit, start.d)
 
     def _move(self, stored: Vector, powers: Vector, steps: Vector) -> None:
-        """See what energies some results store and exchange."""
+        """Update the energies that results store and exchange."""
         self.stored = max(self.stored, float(np.max(np.sum(np.abs(stored), axis=0))))
-        # Behind a sudden start, the power of a single result would fill an interval in which it is over at once.
+        # After a sudden start, the power of a single result would fill an interval in which it decays at once.
         sizes = np.abs(powers)
         least = np.max(np.minimum(sizes[:, :-1], sizes[:, 1:]) @ steps, initial=0.0)
         most = 0.0 if least else np.max(sizes[:, 1:] @ steps, initial=0.0)
         self.moved = max(self.moved, self.stored, float(least), float(most))
 
     def _bends(self, every: Results, ends: Places) -> Vector:
-        """Return what slopes of powers add to the integrals of the first two rules; shape (2, 4 components, m)."""
+        """Return the part of slopes of powers in the integrals of the first two rules; shape (2, 4 components, m)."""
         model = self.model
         function = model.along("slopes of powers", lambda: _slopes(model))
         x, z, d = (part[:, ends.ravel()] for part in (every.x, every.z, every.d))
@@ -203,14 +203,15 @@ class Powers:
     def _coarse(
         self, terms: Vector, intervals: Places, places: Places, weights: Vector, bent: Places, bends: Vector, depth: int
     ) -> Places:
-        """Tell over which intervals the powers are integrated too coarsely.
+        """Return the intervals in which the powers are integrated too coarsely.
 
-        The difference of two rules is the error of the lower one; a difference more tells what an order gains. How
-        stored energies change is known, so that there the error itself is. It tells what an order gains, too, unless
-        it is the error of the states. All are looked at in two sums with different weights, lest they cancel.
+        The difference of two rules is the error of the lower one; another difference gives the gain of an order.
+        Changes of stored energies are known, so their error is known directly; it also gives the gain of an order,
+        unless it is the error of the states. All are checked in two sums with different weights, so that they do not
+        cancel.
         """
         if not self.model.states and not depth:
-            # Nothing tells what happens between the results.
+            # There is no information between the results.
             return np.ones(len(intervals), bool)
         mixed, stored = _mixed(terms[1 : 1 + POWERS]), _mixing(terms[0].shape[0]) @ terms[0]
         best, lower, lowest = np.matmul(weights, mixed.T[places]).transpose(1, 2, 0).copy()
@@ -228,17 +229,15 @@ class Powers:
 
 def _slopes(model: CompiledDae) -> ca.Function:
     """Return how fast powers change, as a function."""
-    arguments = model.arguments
-    powers = ca.vec(model.energy(*arguments.values())[:, 1 : 1 + POWERS])
-    ode = model.ode(*arguments.values())
-    slopes = ca.jtimes(powers, arguments["x"], ode) + ca.jtimes(powers, arguments["t"], ca.SX(1))
-    return ca.Function("slopes", list(arguments.values()), [ca.densify(slopes)], {"cse": True})
+    arguments = list(model.arguments.values())
+    slopes = model.motion.held(ca.vec(model.energy(*arguments)[:, 1 : 1 + POWERS]))
+    return ca.Function("slopes", arguments, [ca.densify(slopes)], {"cse": True})
 
 
 def _apart(every: Results) -> Places:
-    """Return the ends of segments, and what lies between them well apart from its neighbours.
+    """Return the ends of segments, and results between them with enough distance from their neighbours.
 
-    The results beside an event may be as near to it as they like; a polynomial through both would follow their errors.
+    Results may be arbitrarily close to an event; a polynomial through both would follow their errors.
     """
     gaps = np.diff(every.times)
     before, after = np.append(0.0, gaps), np.append(gaps, 0.0)
@@ -248,7 +247,7 @@ def _apart(every: Results) -> Places:
 
 
 def _stretches(coarse: Places, piece: Places) -> list[Places]:
-    """Return runs of coarse intervals of one smooth piece, with what lies between two that are near."""
+    """Return groups of coarse intervals of one smooth piece, joined if they are near each other."""
     chosen = np.flatnonzero(coarse)
     if not len(chosen):
         return []

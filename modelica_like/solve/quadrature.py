@@ -10,16 +10,16 @@ import numpy as np
 from modelica_like.compile.compiled import Vector
 
 Places = np.ndarray[Any, np.dtype[Any]]
-"""Positions of results or intervals, or which of them are meant."""
+"""Positions of results or intervals, or a mask."""
 _WIDTH = 8
 """Results of the widest rule; its order."""
 _ORDERS = np.array([0, 2, 4])
-"""By how much the orders of the rules are lower."""
+"""Reductions of the orders of the rules."""
 _UNIFORM, _ROUNDING = 1e-9, 1e-15
 
 
 def rules(times: Vector, first: Places, last: Places) -> tuple[Places, Places, Vector]:
-    """Return three rules of falling order for each interval that takes time.
+    """Return three rules of decreasing order for each interval of nonzero length.
 
     Args:
         times: of results, in smooth pieces, shape (n,).
@@ -27,8 +27,8 @@ def rules(times: Vector, first: Places, last: Places) -> tuple[Places, Places, V
         last: its last result, shape (n,).
 
     Returns:
-        The m intervals by the result before; the results that count for each, shape (m, 8); their weights, in s, shape
-        (m, 3, 8).
+        The m intervals by the result before; the results for each, shape (m, 8); their weights, in s, shape (m, 3,
+        8).
     """
     steps = np.diff(times, append=times[-1])
     k = np.flatnonzero((np.arange(len(times)) < last) & (steps > 0))
@@ -38,7 +38,7 @@ def rules(times: Vector, first: Places, last: Places) -> tuple[Places, Places, V
     places = np.minimum(starts[:, None] + np.arange(_WIDTH), last[:, None])
     offsets = k - starts
     weights = _equidistant()[sizes, offsets]
-    # Times are rounded themselves.
+    # Times have rounding errors.
     uneven = np.abs(np.diff(steps)) > _UNIFORM * steps[:-1] + _ROUNDING * np.abs(times[:-1])
     before = np.append(0, np.cumsum(uneven))
     odd = np.flatnonzero(before[np.maximum(starts + sizes - 2, starts)] != before[starts])

@@ -1,4 +1,4 @@
-"""How large signals are: what deviations are measured by."""
+"""Ranges of signals, as the scale of deviations."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ _NOISE = 1e-6
 def ranges(solution: Trajectories, names: Iterable[str], least: float = _NOISE) -> dict[str, float]:
     """Return the range of each signal, largest minus smallest value.
 
-    The slip of a clutch that sticks is rounding noise and has no range of its own. So what moves less than a share of
-    the largest value among the signals of its unit is taken to have that range.
+    The slip of a stuck clutch is rounding noise without a range. So the range is at least a share of the largest value
+    among the signals of its unit.
 
     Args:
         solution: the run.

@@ -12,7 +12,7 @@ from modelica_like.errors import UnknownName, did_you_mean
 
 
 def differentiated(path: str) -> str:
-    """Return the variable in `der(variable)`, or nothing if the path is another one."""
+    """Return the variable in `der(variable)`, or an empty text for other paths."""
     return path[4:-1].strip() if path.startswith("der(") and path.endswith(")") else ""
 
 
@@ -31,31 +31,22 @@ def rate_along(model: CompiledDae, name: str, times: Any, x: Vector, z: Vector, 
         Shape (n,), in the variable's unit per second.
 
     Raises:
-        UnknownName: there is no such variable, or it changes at events only.
+        UnknownName: there is no such variable, or it changes only at events.
     """
     if name not in model.position:
         near = did_you_mean(name, list(model.position)) or "."
         raise UnknownName(f"{model.name} has no continuous variable '{name}'{near}")
-    rate = model.once(("rate", name), lambda: _rate(model, model.position[name]))
-    count = len(times)
-    parts = rate(np.reshape(times, (1, -1)), x, z, model.p, model.u, d)
+    row, arguments = model.position[name], list(model.arguments.values())
+
+    def make() -> ca.Function:
+        parts = model.motion.parts(model.variables(*arguments)[row])
+        return ca.Function("rate", arguments, [ca.densify(one) for one in parts])
+
+    parts = model.once(("rate", name), make)(np.reshape(times, (1, -1)), x, z, model.p, model.u, d)
     direct, by_z, drift, jacobian = (np.asarray(part.full()) for part in parts)
     if not model.implicit:
         return direct.ravel()
-    size = len(model.implicit)
+    count, size = len(times), len(model.implicit)
     slopes = jacobian.reshape(size, count, size).transpose(1, 0, 2)
     z_rates = -np.linalg.solve(slopes, drift.T[:, :, None])[:, :, 0]
     return direct.ravel() + np.sum(by_z.reshape(count, size) * z_rates, axis=1)
-
-
-def _rate(model: CompiledDae, row: int) -> ca.Function:
-    """Derivative with z held, slope by z, and what moves z: the drift of its equations and their Jacobian."""
-    arguments = list(model.arguments.values())
-    t, x, z = (model.arguments[name] for name in ("t", "x", "z"))
-    value, ode, alg = model.variables(*arguments)[row], model.ode(*arguments), model.alg(*arguments)
-
-    def along(expression: Any) -> Any:
-        return ca.jtimes(expression, x, ode) + ca.jtimes(expression, t, ca.SX(1))
-
-    outputs = [along(value), ca.jacobian(value, z), along(alg), ca.jacobian(alg, z)]
-    return ca.Function("rate", arguments, [ca.densify(one) for one in outputs])

@@ -1,4 +1,4 @@
-"""Reads variables along a run: only what is asked for, in blocks of bounded size."""
+"""Reads requested variables along a run, in blocks of bounded size."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from modelica_like.solve.recorder import Segment
 _BLOCK = 65_536
 """Results in a block."""
 TOGETHER = 2**20
-"""Numbers up to which all variables of a run are read together."""
+"""Largest count of numbers for which all variables of a run are read together."""
 
 Block = tuple[Vector, Vector, Vector, Vector]
 """Times (n,), states (nx, n), implicit unknowns (nz, n), modes and discrete values (nd, n)."""
 
 
 def blocks(segments: Sequence[Segment]) -> Iterator[Block]:
-    """Go through the results of a run."""
+    """Yield the results of a run in blocks."""
     held: list[tuple[Segment, slice]] = []
     count = 0
     for segment in segments:
@@ -57,7 +57,7 @@ def variables(model: CompiledDae, segments: Sequence[Segment], rows: Sequence[in
     Args:
         model: the compiled model.
         segments: of a run.
-        rows: which variables; all if None.
+        rows: positions of the variables; all if None.
     """
     if rows is None:
         function = model.along("variables", lambda: model.variables)
@@ -73,7 +73,7 @@ def energy_term(model: CompiledDae, segments: Sequence[Segment], component: int,
 
 
 class _Expressions:
-    """Some results of a function of the model, as a function of nothing but what they need."""
+    """Some results of a function of the model, as a function of their arguments only."""
 
     def __init__(self, model: CompiledDae, results: Any) -> None:
         symbols = {one.element_hash() for one in ca.symvar(results)}

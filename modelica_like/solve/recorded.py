@@ -1,4 +1,4 @@
-"""Trajectories that come from elsewhere - an FMU, a table - in the shape of a solution."""
+"""Trajectories from other sources (an FMU, a table), read like a solution."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ class RecordedVariable:
 
     Attributes:
         path: name.
-        unit: as its source spells it.
-        description: what its source says about it.
+        unit: as spelled in its source.
+        description: from its source.
         kind: `output`, `local`, `input`, `discrete`.
         names: of the values of a mode; empty otherwise.
     """
@@ -37,7 +37,7 @@ class RecordedVariable:
 
 @dataclass(frozen=True)
 class RecordedModel:
-    """What is known about a model whose equations are not: its name, columns and parameters."""
+    """A model without known equations: its name, columns and parameters."""
 
     name: str
     flat_variables: tuple[RecordedVariable, ...]
@@ -64,13 +64,13 @@ class RecordedModel:
 class RecordedSolution(Trajectories):
     """Trajectories of an FMU or of a table.
 
-    Whatever needs no equations works as for a `Solution`: `[...]`, `plot`, `at`, `final`, `events`, `to_pandas`. The
-    energy balance is the integral of the columns `….loss_power`, `….stored_energy` and `….source_power`, where there
-    are such.
+    All functions without equations work as for a `Solution`: `[...]`, `plot`, `at`, `final`, `events`, `to_pandas`.
+    The energy balance is the integral of the columns `….loss_power`, `….stored_energy` and `….source_power`, if there
+    are any.
 
     Args:
         model: names and units.
-        time: shape (n,), in s; a repeated time is an event's left and right value.
+        time: shape (n,), in s; a repeated time gives the values before and after an event.
         values: continuous variables, shape (variables, n).
         discretes: modes and discrete values, shape (discretes, n).
         seconds: wall time of the run.
@@ -105,7 +105,7 @@ class RecordedSolution(Trajectories):
         return any(path in known for known in (model.position, model.discrete_position, model.parameters))
 
     def at(self, t: float) -> Values:
-        """Return all variables at a time, interpolated between the results (right side of an event).
+        """Return all variables at a time, interpolated between the results (after an event at that time).
 
         Raises:
             ValueOutOfRange: the time is not within the run.
@@ -127,9 +127,9 @@ class RecordedSolution(Trajectories):
         return Values(RecordedSolution(self.model, np.array([t]), column[:, None], self._discretes[:, k, None], 0.0))
 
     def energy(self) -> EnergyBalance:
-        """Return the energy balance, as far as the columns tell it.
+        """Return the energy balance from the columns.
 
-        What flows in through connectors is not known; it is what closes each component's balance. So only the sum of
+        The power through connectors is not known; it is computed from each component's balance. So only the sum of
         all components is a check.
 
         Raises:

@@ -1,4 +1,4 @@
-"""What a run leaves behind: smooth segments and the events between them."""
+"""The record of a run: smooth segments and the events between them."""
 
 from __future__ import annotations
 
@@ -10,6 +10,9 @@ from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import Source
 from modelica_like.initialize import Impact, Point
 
+IMPACT = -1
+"""Stands in the place of a transition where an impact has changed a mode."""
+
 
 @dataclass(frozen=True)
 class Event:
@@ -18,12 +21,12 @@ class Event:
     Attributes:
         time: in s.
         mode: path of the mode, e.g. `clutch.mode`.
-        before: name of the mode that was left.
-        after: name of the mode that was entered.
+        before: name of the mode before.
+        after: name of the mode after.
         source: the transition's place in its component.
-        transition: position in the model's transitions; -1 if an impact knocked it loose.
+        transition: position in the model's transitions, or `IMPACT`.
         segment: position of the segment that follows.
-        round: number of the round at its instant; a round sees what the one before has changed.
+        round: number of the round at its instant; a round uses the changes of the one before.
     """
 
     time: float
@@ -31,7 +34,7 @@ class Event:
     before: str
     after: str
     source: Source
-    transition: int = -1
+    transition: int = IMPACT
     segment: int = 0
     round: int = 0
 
@@ -70,7 +73,7 @@ Points = tuple[Vector, Vector, Vector]
 
 @dataclass
 class Recorder:
-    """Collects points into segments, events, and what impacts dissipate; `notices` are sentences for the report."""
+    """Collects points into segments, events and losses in impacts; `notices` are messages for the report."""
 
     segments: list[Segment] = field(default_factory=list)
     events: list[Event] = field(default_factory=list)
@@ -85,7 +88,7 @@ class Recorder:
         self.add(np.array([point.t]), point.x[:, None], point.z[:, None])
 
     def add(self, times: Vector, x: Vector, z: Vector) -> None:
-        """Append at least one point; shapes (n,), (nx, n), (nz, n). They may be filled in later, up to `build`."""
+        """Append at least one point; shapes (n,), (nx, n), (nz, n). The arrays may be filled in until `build`."""
         # At once: an interrupt comes before or after it.
         self._open.append((times, x, z))
 
@@ -97,10 +100,10 @@ class Recorder:
     def note(
         self, model: CompiledDae, time: float, number: int, change: tuple[int, int], transition: int, round: int
     ) -> None:
-        """Note that a mode changes from one number to another, by a transition or (-1) by an impact."""
+        """Record the change of a mode from one number to another, by a transition or (-1) by an impact."""
         mode = model.flat_discretes[number]
         before, after = (mode.names[k] for k in change)
-        # Who is knocked loose goes without a transition; the first one of the mode tells where it stands.
+        # Break-away in an impact has no transition; the first one of the mode gives its place.
         known = transition
         if known < 0:
             known = next(k for k, one in enumerate(model.transitions) if one.mode == number)
@@ -114,7 +117,7 @@ class Recorder:
             self._open = []
 
     def build(self) -> None:
-        """Put together the segments that have ended, of points that are known."""
+        """Build the finished segments of known points."""
         for parts, d in self._closed:
             times, x, z = (np.concatenate(part, axis=-1) for part in zip(*parts, strict=True))
             known = ~np.isnan(x).any(axis=0)

@@ -1,4 +1,4 @@
-"""Where the energy of a run comes from and where it goes, as a Sankey diagram."""
+"""The energy flow of a run as a Sankey diagram."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ if TYPE_CHECKING:
 _BROUGHT, _STORED, _HEAT, _TAKEN = "#0072b2", "#009e73", "#d55e00", "#56b4e9"
 _GAP = 0.035
 _SMALL = 0.004
-"""Share of the whole below which streams are drawn together as `others`."""
+"""Share of the total below which streams are drawn together as `others`."""
 _LEFT, _MIDDLE, _RIGHT, _WIDTH = 0.0, 0.5, 1.0, 0.02
 
 
 @dataclass(frozen=True)
 class Stream:
-    """An amount of energy in J, with what it is."""
+    """An amount of energy in J, with its kind."""
 
     name: str
     amount: float
@@ -30,7 +30,7 @@ class Stream:
 
 
 def streams(balance: EnergyBalance) -> tuple[list[Stream], list[Stream]]:
-    """Return what brought energy in (sources, what was stored before), and where it went (loads, stores, heat)."""
+    """Return the streams in (sources, stored before) and out (loads, stores, heat)."""
     brought = [Stream(r.component, r.source, _BROUGHT) for r in balance if r.source > 0]
     brought += [Stream(f"{r.component} (stored)", -r.stored, _STORED) for r in balance if r.stored < 0]
     went = [Stream(r.component, -r.source, _TAKEN) for r in balance if r.source < 0]
@@ -40,7 +40,7 @@ def streams(balance: EnergyBalance) -> tuple[list[Stream], list[Stream]]:
 
 
 def sankey(balance: EnergyBalance, title: str = "") -> Figure:
-    """Draw sources on the left, and on the right what loads took, what is stored now, and what became heat.
+    """Draw sources on the left, and loads, stores and heat on the right.
 
     Args:
         balance: of a run.
@@ -59,7 +59,7 @@ def sankey(balance: EnergyBalance, title: str = "") -> Figure:
 
 
 def _together(side: Sequence[Stream]) -> list[Stream]:
-    """Sort streams by size within a colour, and put small ones together."""
+    """Sort streams by size within a colour, and merge small ones."""
     total = sum(one.amount for one in side) or 1.0
     shown = [one for one in side if one.amount >= _SMALL * total]
     rest = sum(one.amount for one in side if one.amount < _SMALL * total)

@@ -29,9 +29,9 @@ class Solution(Trajectories):
         options: the options of the run.
         segments: smooth pieces with fixed modes.
         events: mode changes.
-        statistics: what the run took.
-        impacts: what impacts have dissipated.
-        notices: what should be known about the run, as sentences.
+        statistics: of the run.
+        impacts: losses in impacts.
+        notices: messages about the run.
     """
 
     model: CompiledDae
@@ -98,7 +98,7 @@ class Solution(Trajectories):
         return self._cache["variables"]
 
     def together(self, *keys: str | Any) -> dict[str, Vector]:
-        """Return several trajectories by path; variables are evaluated together, which is faster than one by one.
+        """Return several trajectories by path, each of shape (len(time),); faster than one by one.
 
         Raises:
             UnknownName: there is no such variable.
@@ -110,7 +110,7 @@ class Solution(Trajectories):
         return {path: known[path] if path in known else self[path] for path in paths}
 
     def at(self, t: float) -> Values:
-        """Return all variables at a time, integrated there from the result before (right side of an event).
+        """Return all variables at a time, integrated from the result before (after an event at that time).
 
         Raises:
             ValueOutOfRange: the time is not within the run.
@@ -118,7 +118,7 @@ class Solution(Trajectories):
         return self._values(self.point(t))
 
     def point(self, t: float) -> Point:
-        """Return states, implicit unknowns and modes at a time, integrated there from the result before.
+        """Return states, implicit unknowns and modes at a time, integrated from the result before.
 
         Raises:
             ValueOutOfRange: the time is not within the run.
@@ -145,8 +145,8 @@ class Solution(Trajectories):
         """Return the energy balance of every component over the run, or over a part of it.
 
         Args:
-            begin: time in s; what happens at once at that time counts.
-            end: time in s; what happens at once at that time does not, unless the run ends there.
+            begin: time in s; an event at that time counts.
+            end: time in s; an event at that time does not count, unless the run ends there.
 
         Raises:
             ValueOutOfRange: a time is not within the run.
@@ -162,7 +162,7 @@ class Solution(Trajectories):
         return self._cache[key]
 
     def _part(self, begin: float, end: float) -> Iterator[Segment]:
-        """Go through the segments between two times."""
+        """Yield the segments between two times."""
         edges = {t: self.point(t) for t in (begin, end)}
         for one in self.segments:
             inside = (one.times >= begin) & (one.times <= end)

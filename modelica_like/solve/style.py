@@ -1,4 +1,4 @@
-"""How pictures look."""
+"""Style of pictures."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#0
 
 @contextmanager
 def picture(title: str, count: int, height: float, **grid: Any) -> Iterator[tuple[Figure, list[Any]]]:
-    """Give a figure in the house's style to be drawn within the context, and its panels, one above the other.
+    """Yield a figure in the package's style, to draw within the context, and its panels, one above the other.
 
     Args:
         title: heading.

@@ -1,4 +1,4 @@
-"""Trajectories over time, wherever they come from: what can be read from them needs no equations."""
+"""Trajectories over time from any source: everything that can be read without equations."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from fnmatch import fnmatchcase
 from typing import TYPE_CHECKING, Any
 
 from modelica_like.compile.compiled import Vector
-from modelica_like.errors import NetlistError, UnknownName, ValueOutOfRange, did_you_mean, missing_extra
+from modelica_like.errors import NetlistError, UnknownName, ValueOutOfRange, did_you_mean, extra_module
 from modelica_like.initialize import Point
 from modelica_like.language.expr import Symbol
 from modelica_like.language.mode import BoundMode
@@ -28,7 +28,7 @@ ENERGY_TERMS = ("stored_energy", "loss_power", "source_power")
 
 @dataclass(frozen=True)
 class Statistics:
-    """What a run took.
+    """Statistics of a run.
 
     Attributes:
         steps: integrator steps.
@@ -46,7 +46,7 @@ class Statistics:
 
 
 class Values(Mapping[str, float]):
-    """All variables at one instant, by path: the only result of trajectories."""
+    """All variables at one time, by path."""
 
     def __init__(self, one: Trajectories) -> None:
         self.time = float(one.time[0])
@@ -71,8 +71,8 @@ class Trajectories(ABC):
     Attributes:
         model: names, units and parameters.
         events: mode changes.
-        statistics: what the run took.
-        notices: what should be known about the run, as sentences.
+        statistics: of the run.
+        notices: messages about the run.
     """
 
     model: Any
@@ -108,7 +108,7 @@ class Trajectories(ABC):
         """Return states, implicit unknowns and modes at a time.
 
         Raises:
-            NetlistError: they are not known, as in recorded data.
+            NetlistError: they are unknown, as in recorded data.
         """
         raise needs_equations(self)
 
@@ -135,7 +135,7 @@ class Trajectories(ABC):
         return str(model.flat_discretes[model.discrete_position[name]].unit)
 
     def together(self, *keys: str | Any) -> dict[str, Vector]:
-        """Return several trajectories by path.
+        """Return several trajectories by path, each of shape (len(time),).
 
         Raises:
             UnknownName: there is no such variable.
@@ -151,12 +151,12 @@ class Trajectories(ABC):
         """Draw trajectories over time, one panel per unit, with events as dotted lines.
 
         Args:
-            patterns: names or patterns (`*.w`) of what to draw; by default speeds, torques and forces of the parts.
+            patterns: names or patterns (`*.w`) of the curves; by default speeds, torques and forces of the parts.
             title: heading; by default the name of the model.
-            display: units by path, pattern or quantity, beside those of the netlist, such as {"speed": "rpm"}.
+            display: units by path, pattern or quantity, in addition to those of the netlist, such as {"speed": "rpm"}.
 
         Raises:
-            UnknownName: nothing fits a pattern.
+            UnknownName: nothing matches a pattern.
             UnitError: a variable cannot be shown in a unit.
         """
         return upper("plot")(self, patterns, title=title, display=display)
@@ -167,12 +167,8 @@ class Trajectories(ABC):
         Raises:
             MissingExtra: pandas is not installed.
         """
-        try:
-            import pandas
-        except ImportError:
-            raise missing_extra("pandas", "data") from None
-        columns = self.together(*self.names)
-        return pandas.DataFrame(columns, index=pandas.Index(self.time, name="time"))
+        pandas = extra_module("pandas", "data")
+        return pandas.DataFrame(self.together(*self.names), index=pandas.Index(self.time, name="time"))
 
     def to_xarray(self) -> xarray.Dataset:
         """Return a dataset over time, with units and descriptions as attributes.
@@ -180,20 +176,17 @@ class Trajectories(ABC):
         Raises:
             MissingExtra: xarray is not installed.
         """
-        try:
-            import xarray
-        except ImportError:
-            raise missing_extra("xarray", "data") from None
         info = {
             v.path: {"units": str(v.unit), "long_name": v.description}
             for v in (*self.model.flat_variables, *self.model.flat_discretes)
         }
         arrays = {name: ("time", values, info[name]) for name, values in self.together(*self.names).items()}
-        return xarray.Dataset(arrays, coords={"time": ("time", self.time, {"units": "s"})})
+        time = {"time": ("time", self.time, {"units": "s"})}
+        return extra_module("xarray", "data").Dataset(arrays, coords=time)
 
 
 def needs_equations(run: Trajectories) -> NetlistError:
-    """Return the error about trajectories that are given where equations are needed."""
+    """Return the error about trajectories in place of a drive with equations."""
     return NetlistError(
         f"{run.model.name}: this needs the drive with its equations, not trajectories.",
         advice="Give the netlist, the component or the compiled model.",
@@ -201,19 +194,19 @@ def needs_equations(run: Trajectories) -> NetlistError:
 
 
 def matching(model: Any, patterns: Sequence[str]) -> list[str]:
-    """Return the variables and modes of a model that fit patterns, before it is run.
+    """Return the variables and modes of a model that match patterns, before a run.
 
     Raises:
-        UnknownName: nothing fits a pattern.
+        UnknownName: nothing matches a pattern.
     """
     return fitting((*model.position, *model.discrete_position), patterns, f"{model.name} has no variable")
 
 
 def fitting(known: Sequence[str], patterns: Sequence[str], missing: str) -> list[str]:
-    """Return the names that fit patterns; `missing` is what to say before a pattern that none fits.
+    """Return the names that match patterns; `missing` begins the message about a pattern without a match.
 
     Raises:
-        UnknownName: nothing fits a pattern.
+        UnknownName: nothing matches a pattern.
     """
     names: dict[str, None] = {}
     for pattern in patterns:

@@ -1,4 +1,4 @@
-"""Alias elimination: variables that are equal up to a factor become one, together with their derivatives."""
+"""Alias elimination: variables that are equal up to a factor are merged, together with their derivatives."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 from modelica_like.flatten.model import Coefficient, FlatModel, LinearEquation
 
 PREFERENCES = ("avoid", "default", "prefer", "always")
-"""How much a variable wants to be a state, in rising order."""
+"""Preferences of states, in rising order."""
 
 _ROUNDING = 1e-13
 _NUMBER = (float, int)
@@ -24,7 +24,7 @@ class Aliases:
         factor: value of a node = factor * value of its root.
         known: roots whose value is a number or an expression of parameters.
         derivative: root -> (root, factor) of its derivative: der(root) = factor * root.
-        remaining: positions in `FlatModel.linear` of the equations that still say something.
+        remaining: positions in `FlatModel.linear` of the equations that are left.
         contradictions: groups of equations that fix a value more than once.
     """
 
@@ -42,7 +42,7 @@ def find_aliases(model: FlatModel) -> Aliases:
 
 
 def is_number(value: Any) -> bool:
-    """Tell whether a coefficient is a number rather than an expression of parameters."""
+    """Return whether a coefficient is a number rather than an expression of parameters."""
     return isinstance(value, _NUMBER)
 
 
@@ -94,7 +94,7 @@ class _Elimination:
         return target, factor * more
 
     def find(self, node: int) -> tuple[int, float]:
-        """Return root and factor of a node, and shorten the way there."""
+        """Return root and factor of a node, with path compression."""
         above = self.parent[node]
         if self.parent[above] == above:
             return above, self.factor[node]
@@ -109,7 +109,7 @@ class _Elimination:
         return node, factor
 
     def _reduce(self, equation: LinearEquation) -> tuple[dict[int, float | None], list[tuple[Any, Any]]]:
-        """Return coefficients by root, None for one that is no number, and coefficients with known values."""
+        """Return coefficients by root, None for one that is not a number, and coefficients with known values."""
         terms: dict[int, float | None] = {}
         sizes: dict[int, float] = {}
         products: list[tuple[Any, Any]] = []
@@ -126,7 +126,7 @@ class _Elimination:
                 term = coefficient * factor
                 terms[root] = before + term
                 sizes[root] = sizes.get(root, 0.0) + abs(term)
-        # Terms that cancel but for rounding leave no unknown.
+        # Terms that cancel within rounding leave no unknown.
         left = {root: c for root, c in terms.items() if c is None or abs(c) > _ROUNDING * sizes[root]}
         return left, products
 
@@ -138,14 +138,14 @@ class _Elimination:
         return total
 
     def _consider(self, number: int) -> set[int]:
-        """Use an equation if it is simple enough; return the equations that become simpler by it."""
+        """Use an equation if it is simple enough; return the equations that it simplifies."""
         equation = self.model.linear[number]
         terms, products = self._reduce(equation)
         self.remaining.discard(number)
         if not terms:
             self.contradictions.append(self._causes(number))
             return set()
-        # Working out the constant takes longer than all the rest; only short equations need it.
+        # Computing the constant takes longer than all the rest; only short equations need it.
         constant = self._sum(equation.constant, products) if len(terms) <= 2 else 0.0
         if len(terms) == 1:
             ((root, coefficient),) = terms.items()
@@ -175,7 +175,7 @@ class _Elimination:
         return tuple(ends if len(ends) > 1 else dict.fromkeys([number, *ends]))
 
     def _learn(self, root: int, value: Any) -> set[int]:
-        """A class has a constant value, its derivatives are zero."""
+        """Store the constant value of a class; its derivatives are zero."""
         self.known[root] = value
         affected = self.watchers.pop(root, set())
         if root in self.derivative:
@@ -189,7 +189,7 @@ class _Elimination:
     def _may_merge(self, first: int, second: int) -> bool:
         if first in self.inputs and second in self.inputs:
             return False
-        # A class that were the derivative of two unknowns would have two integrals; such an equation stays.
+        # A class that is the derivative of two unknowns would have two integrals; such an equation stays.
         both = first in self.integral and second in self.integral
         return not both or self._integral_root(first) == self._integral_root(second)
 
@@ -219,7 +219,7 @@ class _Elimination:
         return affected
 
     def _merge_derivatives(self, keep: int, node: int, times: float) -> set[int]:
-        """der(keep) is known twice: times * node, and what is stored."""
+        """der(keep) is known twice: times * node, and the stored value."""
         first, a = self._derivative(keep)
         second, more = self.find(node)
         b = times * more

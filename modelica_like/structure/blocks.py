@@ -1,4 +1,4 @@
-"""Solve the equations in block lower triangular order: explicitly where possible, else by tearing."""
+"""Solve the equations in block lower triangular order: explicitly if possible, otherwise by tearing."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Block:
     Attributes:
         equations: positions in the residual.
         unknowns: positions in the unknowns.
-        tears: unknowns that are guessed while the others follow one from another.
+        tears: guessed unknowns, from which the others follow one by one.
         kind: `explicit`, `linear` (tears solved symbolically) or `implicit` (tears become algebraic variables z).
     """
 
@@ -42,7 +42,7 @@ class Solved:
     """Solution of all blocks.
 
     Attributes:
-        order: unknowns with the expressions that give them, each in terms of earlier ones, states and z.
+        order: unknowns with their expressions in earlier ones, states and z.
         z: unknowns that stay implicit.
         alg: their residuals.
         determinants: (block number, expression) of relative determinants: a block is singular where one is zero.
@@ -74,7 +74,7 @@ class BlockSolver:
         self.solved = Solved()
 
     def _safe_entries(self, volatile: Any) -> set[tuple[int, int]]:
-        """Entries of the Jacobian that depend on parameters only: they cannot vanish on the way."""
+        """Entries of the Jacobian that depend on parameters only: they cannot become zero during a run."""
         entries = self.jacobian.nz[:]
         moving = ca.which_depends(entries, volatile, 1, True) if entries.numel() else []
         rows, columns = self.jacobian.sparsity().get_triplet()
@@ -164,7 +164,7 @@ class BlockSolver:
     def _best_tear(
         self, rows: tuple[int, ...], used: set[int], open_unknowns: dict[int, set[int]], users: dict[int, list[int]]
     ) -> int:
-        """Take the unknown of the shortest open equations, most used and least safe to solve for."""
+        """Choose the unknown of the shortest open equations, most used and least safe to solve for."""
         shortest = min((len(open_unknowns[r]) for r in rows if r not in used and open_unknowns[r]), default=0)
         scores: dict[int, tuple[int, int, int]] = {}
         for row in rows:
@@ -215,7 +215,7 @@ class BlockSolver:
 
 
 def cramer(matrix: Any, right: Any) -> tuple[Any, Any]:
-    """Solve a small linear system by Cramer's rule: no pivot is divided by that could vanish in some mode.
+    """Solve a small linear system by Cramer's rule, without pivots that could be zero in some mode.
 
     Returns:
         The solution and the determinant.

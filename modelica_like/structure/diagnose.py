@@ -1,4 +1,4 @@
-"""Diagnosis of systems without a unique solution: the Dulmage-Mendelsohn blocks, in sentences."""
+"""Diagnosis of systems without a unique solution, from the Dulmage-Mendelsohn blocks."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ _SHOWN = 6
 
 
 def check_solvable(system: System, incidence: list[list[int]], contradictions: list[Origin]) -> None:
-    """Check that the equations can determine every variable, derivatives aside.
+    """Check that the equations can determine every variable.
 
     Args:
         system: the equations.
         incidence: level numbers in each equation.
-        contradictions: where the equations come from that the alias elimination found to say too much.
+        contradictions: origins of the equations that the alias elimination found to be redundant.
 
     Raises:
         Underdetermined: some unknowns have too few equations.
@@ -37,7 +37,7 @@ def check_solvable(system: System, incidence: list[list[int]], contradictions: l
     chains = list(columns)
     sparsity = ca.Sparsity.triplet(len(incidence), len(chains), [r for r, _ in pairs], [c for _, c in pairs])
     _, rows, cols, _, _, coarse_rows, coarse_cols = sparsity.btf()
-    # CasADi's coarse blocks: first what has too many equations, then the square part, then what has too few.
+    # CasADi's coarse blocks: first the overdetermined, then the square, then the underdetermined part.
     over_rows, over_cols = rows[: coarse_rows[2]], cols[: coarse_cols[1]]
     under_rows, under_cols = rows[coarse_rows[3] :], cols[coarse_cols[2] :]
     if len(over_rows) > len(over_cols):
@@ -102,13 +102,13 @@ def _contradiction(model: FlatModel, origins: list[Origin]) -> Overdetermined:
 
 
 def doubly_fixed(model: FlatModel, origins: Sequence[Origin], what: str, why: str) -> Overdetermined:
-    """Return the error about equations that fix the same more than once.
+    """Return the error about equations that fix the same quantity more than once.
 
     Args:
         model: the flat model.
-        origins: where the equations come from.
-        what: what is wrong, with {potential} and {flow} in the place of the domain's words.
-        why: the usual reason, likewise.
+        origins: of the equations.
+        what: the error, with {potential} and {flow} for the domain's words.
+        why: the usual reason, with the same fields.
     """
     domain, network = _domain(model, origins)
     words = {"potential": domain.potential, "flow": domain.flow}
@@ -131,7 +131,7 @@ def _kind(model: FlatModel, path: str) -> str:
 
 
 def _domain(model: FlatModel, origins: Sequence[Origin]) -> tuple[Domain, list[str]]:
-    """Return the domain of what equations come from, and the parts that its connections join to that, in order."""
+    """Return the domain of the equations, and the parts that its connections join, in order."""
     ends = {f"{path}.{name}" if path else name: (path, connector)
             for path, part in model.components.items() for name, connector in part.connectors.items()}  # fmt: skip
     named = {path for origin in origins for path in origin.path.split(" – ")}

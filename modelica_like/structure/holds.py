@@ -1,13 +1,13 @@
-"""Motions that modes hold, in the equations of the whole model: approaches, and sharing where several hold the same.
+"""Motions that modes hold, in the equations of the whole model: approaches, and sharing among several elements.
 
-A mode that holds a motion says der(motion) = 0. Two things are added to that equation, as values that only events
-change and that stand behind the modes and discrete values in d:
+A mode that holds a motion has the equation der(motion) = 0. It gets two additions, as values that only events
+change and that follow the modes and discrete values in d:
 
-- an *approach* r: der(motion) = r. It is zero while the model runs. An impact asks for r = -motion/tau; how much the
-  accelerations differ from those with r = 0, times tau, is the jump of the speeds, from which finite forces cancel.
-- a *circuit*: elements whose motions depend on each other, such as clutches side by side. Where all of them hold, some
-  equations say what others say already, and the reactions are undetermined. Such an equation is switched off, and says
-  instead that the reactions are shared: sum(share * reaction) = 0.
+- an *approach* r: der(motion) = r. It is zero during the run. An impact sets r = -motion/tau; the difference of the
+  accelerations from those with r = 0, times tau, is the jump of the speeds, in which finite forces cancel.
+- a *circuit*: elements whose motions depend on each other, such as parallel clutches. If all of them hold, some
+  equations are redundant, and the reactions are undetermined. A redundant equation is replaced by the sharing of the
+  reactions: sum(share * reaction) = 0.
 """
 
 from __future__ import annotations
@@ -33,12 +33,12 @@ class HeldMotion:
         component: path of the component.
         mode: position of the mode in d.
         number: number of the mode that holds.
-        loose: number of a mode that does not, or -1.
-        motion: variable that is held.
+        loose: number of a mode that does not hold it, or -1.
+        motion: held variable.
         reaction: variable that holds it, or -1.
         row: position of its equation in the residual.
-        rigid: the equation says nothing but der(motion) = 0.
-        approach: position in d of the derivative that the motion is to have; zero but in impacts.
+        rigid: whether the equation is only der(motion) = 0.
+        approach: position in d of the prescribed derivative of the motion; zero except in impacts.
         state: (state, factor) if the motion is one.
     """
 
@@ -79,7 +79,7 @@ class Circuit:
 
 
 def add_approaches(system: System) -> tuple[HeldMotion, ...]:
-    """Let every equation that holds a motion ask for an approach."""
+    """Add an approach to every equation that holds a motion."""
     holds = _find(system.model)
     if holds:
         approaches = ca.SX.sym("approach", len(holds))
@@ -118,7 +118,7 @@ def hold_terms(model: FlatModel, values: Any) -> Any:
 
 
 def gains(system: System) -> list[Any]:
-    """Slope of the equation of every held motion by its derivative; zero where it holds nothing."""
+    """Slope of the equation of every held motion by its derivative; zero where it is not held."""
     return ca.vertsplit(hold_terms(system.model, system.node_values)[:, 0])
 
 
@@ -130,7 +130,7 @@ def find_circuits(
     Args:
         system: the equations.
         holds: the held motions.
-        order: explicit unknowns (symbols) with the expressions that give them, each in terms of earlier ones.
+        order: explicit unknowns (symbols) with their expressions in earlier ones.
         states: levels that are states.
     """
     rigid = [k for k, one in enumerate(holds) if one.rigid and one.reaction >= 0]
@@ -153,21 +153,16 @@ def find_circuits(
 
 
 def _slopes(system: System, nodes: list[int], order: list[tuple[Any, Any]], states: list[int]) -> Any:
-    """Slopes of variables by the states at a point that is not special, as numbers."""
+    """Slopes of variables by the states at a generic point, as numbers."""
     motions = system.node_values[nodes]
     if order:
         _, (motions,) = ca.substitute_inplace([s for s, _ in order], [e for _, e in order], [motions], False)
     x = ca.vertcat(*(system.symbols[n] for n in states)) if states else ca.SX(0, 1)
-    slopes = ca.jacobian(motions, x)
-    others = ca.symvar(slopes)
-    parameters = zip(ca.vertsplit(system.model.p), system.model.parameters, strict=True)
-    given = {leaf.element_hash(): one.value for leaf, one in parameters}
-    values = [given.get(leaf.element_hash(), 0.3 + 0.618 * (k % 7 + 1)) for k, leaf in enumerate(others)]
-    return np.asarray(ca.Function("slopes", [ca.vertcat(*others)], [ca.densify(slopes)])(values).full())
+    return np.asarray(system.generic(ca.jacobian(motions, x)).full())
 
 
 def _groups(together: Any) -> list[list[int]]:
-    """Sets of at least two that are joined, directly or by others."""
+    """Connected sets of at least two."""
     groups: list[list[int]] = []
     seen: set[int] = set()
     for k in range(len(together)):
@@ -182,12 +177,12 @@ def _groups(together: Any) -> list[list[int]]:
 
 
 def share_reactions(system: System, holds: tuple[HeldMotion, ...], circuits: list[Circuit], residual: Any) -> Any:
-    """Let equations of circuits be switched to the sharing of the reactions.
+    """Make equations of circuits switchable to the sharing of the reactions.
 
     Args:
         system: the equations; its model gets the switches and shares.
         holds: the held motions.
-        circuits: those that depend on each other.
+        circuits: held motions that depend on each other.
         residual: column of all equations, differentiated ones included.
 
     Returns:

@@ -1,4 +1,4 @@
-"""Pantelides' algorithm: which equations must be differentiated, and how often."""
+"""Pantelides' algorithm: the equations to differentiate, and how often."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ _PREFERRED = PREFERENCES.index("prefer")
 
 
 def prefer_relative_states(system: System) -> None:
-    """Give preferred variables as many derivatives as the linear relations they stand in allow.
+    """Give preferred variables as many derivatives as their linear relations allow.
 
     A relative angle `phi_rel = phi_b - phi_a` is then differentiated along with the angles of the inertias and can
     become a state in their place: absolute angles grow without bound, and with them the error that a relative
-    tolerance allows. Behind a gear the shaft's angle is not differentiated itself, but its relation to the motor's is
-    linear: that is enough. A relation to an input gives none: the state would need the input's derivatives.
+    tolerance allows. Behind a gear the shaft's angle is not differentiated itself, but its linear relation to the
+    motor's angle is enough. A relation to an input gives no derivative: the state would need the input's derivatives.
     """
     known = set(system.inputs)
     reach = [len(chain) for chain in system.chains]
@@ -48,7 +48,7 @@ class Pantelides:
         incidence: level numbers in each equation.
 
     Attributes:
-        counts: how often each equation is differentiated.
+        counts: number of differentiations of each equation.
 
     Source: Pantelides, SIAM J. Sci. Stat. Comput. 9 (1988) 213-231.
     """
@@ -80,7 +80,7 @@ class Pantelides:
             equation = self._derived[equation]
 
     def _augment(self, start: int) -> tuple[list[int], dict[int, int], bool]:
-        """Search an augmenting path for an equation among the highest derivatives; return what was reached."""
+        """Search an augmenting path for an equation among the highest derivatives; return the reached nodes."""
         equations = [start]
         came_from: dict[int, int] = {}
         for equation in equations:

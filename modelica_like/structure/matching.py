@@ -1,4 +1,4 @@
-"""Which rows determine something new: by structure (a bipartite matching) or by numbers (Gaussian elimination)."""
+"""Independent rows: by structure (a bipartite matching) or by numbers (Gaussian elimination)."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from collections.abc import Collection, Mapping
 from heapq import heapify, heappop, heappush
 
 _ROUNDING = 1e-9
-"""Size of what is left of an entry, relative to what was added and subtracted, that is nothing but rounding."""
+"""Size of an entry that counts as rounding, relative to its added and subtracted terms."""
 
 
 class Matching:
-    """Rows matched with columns; a row is accepted if all rows so far can still have a column each.
+    """Rows matched with columns; a row is accepted if each row so far can still have its own column.
 
     Args:
         columns: number of columns.
@@ -29,7 +29,7 @@ class Matching:
         return len(self._row_of)
 
     def add(self, row: Collection[int]) -> bool:
-        """Add a row with the columns it contains; False if it finds no column of its own."""
+        """Add a row with its columns; False if it gets no column of its own."""
         number = len(self._rows)
         self._rows.append(row)
         came_from: dict[int, int] = {}
@@ -43,7 +43,7 @@ class Matching:
                     self._flip(came_from, column, number)
                     return True
                 pending.append(self._row_of[column])
-        # No way leads from these columns to an open one, and no row that is added later makes one.
+        # No path leads from these columns to an open one, and rows added later cannot create one.
         self._taken.update(came_from)
         self._rows.pop()
         return False
@@ -59,7 +59,7 @@ class Matching:
             column = released
 
     def undetermined(self) -> list[int]:
-        """Columns that some other choice of the matching would leave open, in order."""
+        """Columns that another choice of the matching could leave open, in order."""
         users: dict[int, list[int]] = {}
         for row in set(self._row_of.values()):
             for column in self._rows[row]:
@@ -125,7 +125,7 @@ class Elimination:
         return True
 
     def undetermined(self) -> list[int]:
-        """Columns that some other choice of pivots would leave open, in order."""
+        """Columns that another choice of pivots could leave open, in order."""
         open_columns = {column for column in range(self.columns) if column not in self._row_of}
         for pivot, known in reversed(self._rows):
             if not open_columns.isdisjoint(known):

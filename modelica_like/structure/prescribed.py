@@ -1,4 +1,4 @@
-"""Prescribed motions: accelerations that follow from the model before any torque or force does."""
+"""Prescribed motions: accelerations that are known before any torque or force."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from modelica_like.structure.system import System
 
 
 class Flags:
-    """Replaces the symbols that say whether a motion is prescribed by numbers, once the structure is known.
+    """Replaces the symbols for prescribed motions by numbers, once the structure is known.
 
     Args:
         system: with these symbols in its residual.
@@ -22,7 +22,7 @@ class Flags:
         self.variables = [variable for _, variable in system.model.flags]
         self._model, self._residual = system.model, system.residual
         self._symbols = ca.vertcat(*(symbol for symbol, _ in system.model.flags))
-        # Until they are settled, something that may have any value keeps both alternatives in the structure.
+        # Until they are settled, a symbol of unknown value keeps both alternatives in the structure.
         self._put(ca.repmat(system.model.time, len(self.variables), 1))
 
     def _put(self, values: Any) -> None:
@@ -32,10 +32,10 @@ class Flags:
             self.system.model = replace(self._model, q=q, flags=())
 
     def settle(self, residual: Any, unknowns: list[int]) -> bool:
-        """Find out which motions are prescribed; tell whether there was anything to find out.
+        """Find which motions are prescribed; return whether there were any symbols.
 
-        In the block triangular form, the equation that asks stands in the same block as the acceleration if it has a
-        say in it, and in a later one if the acceleration is known without it.
+        In the block triangular form, the equation with the symbol is in the block of the acceleration if it
+        influences it, and in a later block if the acceleration is known without it.
 
         Args:
             residual: of all equations, differentiated ones included.

@@ -1,4 +1,4 @@
-"""From flat equations to an index-1 system: states x with derivatives, and what stays implicit (z)."""
+"""From flat equations to an index-1 system: states x with derivatives, and implicit unknowns z."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from modelica_like.structure.blocks import Block, BlockSolver, Solved
 from modelica_like.structure.diagnose import check_solvable
 from modelica_like.structure.holds import Circuit, HeldMotion, add_approaches, find_circuits, share_reactions
 from modelica_like.structure.index import Pantelides, prefer_relative_states
+from modelica_like.structure.motion import Motion
 from modelica_like.structure.prescribed import Flags
 from modelica_like.structure.states import select_states
 from modelica_like.structure.system import System, build_system
@@ -34,14 +35,14 @@ class ReducedDae:
         values: expression of every node of the flat model in x, z, inputs, p, d and t.
         node_states: for every node (position in x, factor) if it is a state up to a factor, else None.
         blocks: blocks of the triangular form, with the names of their unknowns and the origins of their equations.
-        determinants: (names, origins, expression) whose zero makes a block singular.
+        determinants: (names, origins, expression); a block is singular if the expression is zero.
         implicit_blocks: (names, origins) of the blocks that stay implicit.
         level_values: expression of every level in x, z, inputs, p, d and t.
         explicit: (level, expression) of the explicit unknowns, each in states, z and earlier ones.
         index: structural index of the equations before the reduction.
         differentiated: origins of the differentiated equations.
         holds: motions that modes hold.
-        circuits: those that depend on each other.
+        circuits: held motions that depend on each other.
     """
 
     flat: FlatModel
@@ -81,13 +82,7 @@ class ReducedDae:
 
     def total_derivative(self, expressions: Any) -> Any:
         """Return the time derivative of expressions in x, z, p, d and t along the solution (inputs held)."""
-        time = self.flat.time
-        rates = ca.jtimes(expressions, self.x, self.ode) + ca.jtimes(expressions, time, ca.SX(1))
-        if self.z.numel() and ca.depends_on(expressions, self.z):
-            drift = ca.jtimes(self.alg, self.x, self.ode) + ca.jtimes(self.alg, time, ca.SX(1))
-            z_rates = -ca.solve(ca.densify(ca.jacobian(self.alg, self.z)), drift)
-            rates = rates + ca.jtimes(expressions, self.z, z_rates)
-        return rates
+        return Motion(self.flat.time, self.x, self.z, self.ode, self.alg).rate(expressions)
 
     def __repr__(self) -> str:
         return f"<{self}>"
@@ -102,7 +97,7 @@ class ReducedDae:
 
     @property
     def notices(self) -> tuple[str, ...]:
-        """What a reader should know: a high index and the states that were kept."""
+        """Notices for the reader: a high index and the chosen states."""
         if not self.differentiated:
             return ()
         places, count = list(dict.fromkeys(o.path or o.kind for o in self.differentiated)), len(self.differentiated)
@@ -143,7 +138,7 @@ def reduce(flat: FlatModel) -> ReducedDae:
 
 
 def _check_input_rates(system: System) -> None:
-    """Refuse a motion that an input prescribes where its derivative counts: it is not known."""
+    """Refuse a motion prescribed by an input if its derivative is needed, because that is not known."""
     for level in system.inputs:
         rate = system.derivative(level)
         if rate is not None and rate not in system.inputs:
@@ -174,15 +169,8 @@ def _top_slopes(system: System, counts: list[int]) -> list[dict[int, float]]:
     rows = [k for k, count in enumerate(counts) if count]
     if not rows:
         return slopes
-    model = system.model
-    symbols = system.everything
     # d e^(c) / d v^(d) equals d e / d v^(d - c), so the original equations are enough.
-    jacobian = ca.jacobian(system.residual[rows], symbols)
-    function = ca.Function("slopes", [symbols, model.p, model.d, model.time], [jacobian])
-    point = [0.3 + 0.61803398875 * (k % 7 + 1) for k in range(len(system.symbols))]
-    starts = [one.start if isinstance(one.start, int | float) else 0.0 for one in model.discretes]
-    starts += [0.0] * (model.d.numel() - len(starts))
-    values = function(point, [one.value for one in model.parameters], starts, 0.0)
+    values = system.generic(ca.jacobian(system.residual[rows], system.everything))
     for place, column, value in zip(*values.sparsity().get_triplet(), values.nonzeros(), strict=True):
         level = system.levels[column]
         row = rows[place]
@@ -236,13 +224,13 @@ def _unknowns(system: System, states: list[int]) -> list[int]:
 def _assemble(
     system: System, counts: list[int], states: list[int], unknowns: list[int], origins: list[Origin], solved: Solved
 ) -> ReducedDae:
-    """Put the parts of the reduced system together.
+    """Assemble the reduced system.
 
     Args:
         system: the equations over levels.
-        counts: how often each of them is differentiated.
+        counts: number of differentiations of each.
         states: levels that are states.
-        unknowns: levels that were solved for; positions in `solved` are positions in this list.
+        unknowns: solved levels; positions in `solved` are positions in this list.
         origins: of all equations, differentiated ones included; positions in blocks are positions in this list.
         solved: the blocks.
     """

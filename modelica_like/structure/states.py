@@ -13,7 +13,7 @@ def select_states(system: System, counts: list[int], slopes: list[dict[int, floa
 
     Args:
         system: with all levels that the differentiated equations need.
-        counts: how often each equation is differentiated.
+        counts: number of differentiations of each equation.
         slopes: for every equation the derivative of its highest differentiation by the highest level of each chain,
             as numbers at a generic point.
 
@@ -47,7 +47,7 @@ def _preference(system: System, chain: int, stage: int) -> int:
 
 
 def _independent(rows: list[int], columns: list[int], slopes: list[dict[int, float]]) -> dict[int, int]:
-    """Take columns in their order as long as they are linearly independent; return column -> pivot row."""
+    """Choose columns in their order as long as they are linearly independent; return column -> pivot row."""
     entries: dict[int, dict[int, float]] = {c: {} for c in columns}
     for row in rows:
         for column, slope in slopes[row].items():

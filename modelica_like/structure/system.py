@@ -17,8 +17,8 @@ class Level:
     """One derivative of a chain: `order` times differentiated.
 
     Attributes:
-        name: the shortest name of the variables it stands for.
-        preference: how much it wants to be a state (0: avoid … 3: always).
+        name: the shortest name of its variables.
+        preference: as a state (0: avoid … 3: always).
     """
 
     chain: int
@@ -38,7 +38,7 @@ class System:
         chains: for every chain the numbers of its levels by order.
         symbols: one symbol per level.
         residual: column of residuals.
-        origins: where each residual comes from.
+        origins: of each residual.
         node_level: for every node (level number, factor), or None if it is known.
         node_values: expression of every node in level symbols and parameters.
         inputs: level numbers of the model's inputs, in their order.
@@ -70,6 +70,15 @@ class System:
     def everything(self) -> Any:
         """The column of all symbols."""
         return self.column(list(range(len(self.symbols))))
+
+    def generic(self, expressions: Any) -> ca.DM:
+        """Return numbers at a point that is not special; parameters have their values, modes their starts."""
+        model = self.model
+        function = ca.Function("generic", [self.everything, model.p, model.d, model.time], [expressions])
+        point = [0.3 + 0.61803398875 * (k % 7 + 1) for k in range(len(self.symbols))]
+        starts = [one.start if isinstance(one.start, int | float) else 0.0 for one in model.discretes]
+        starts += [0.0] * (model.d.numel() - len(starts))
+        return function(point, [one.value for one in model.parameters], starts, 0.0)
 
     def add_level(self, chain: int) -> int:
         """Extend a chain by one derivative."""
@@ -136,7 +145,7 @@ def _node_levels(aliases: Aliases, place: dict[int, tuple[int, float]]) -> list[
 def _turn_chains(
     model: FlatModel, levels: list[Level], node_level: list[tuple[int, float] | None]
 ) -> list[tuple[int, float] | None]:
-    """Give the variable after which a chain is named the factor one: a state is what its name says, sign included."""
+    """Give the variable after which a chain is named the factor one, so that a state equals its variable, with sign."""
     scale: dict[int, float] = {}
     for node, placed in enumerate(node_level):
         if placed is not None and placed[1] != 1.0:
@@ -192,7 +201,7 @@ def _collect_residuals(system: System, aliases: Aliases) -> None:
     columns = evaluate(model, "residual", system.node_values)
     first = dict(zip(columns, accumulate((one.numel() for one in columns.values()), initial=0), strict=False))
     sums: list[Any] = []
-    # Positions in all columns one below the other, then the sums; taken at once, which is cheaper than one by one.
+    # Positions in all columns, then the sums; together this is cheaper than one by one.
     places = [first[instance] + row for instance, row in model.general]
     system.origins += [model.origin(instance, row) for instance, row in model.general]
     count = sum(one.numel() for one in columns.values())

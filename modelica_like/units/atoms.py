@@ -1,7 +1,7 @@
-"""The single unit names (kg, rpm, mm, ...) and what they are in SI base units.
+"""The single unit names (kg, rpm, mm, ...) and their SI base units.
 
-The names a drive-train needs stand in a small table, so that no run has to wait for pint to start; every other name is
-looked up in pint's registry, which is created when it is first needed.
+A small table has the usual names of drive-trains, so that runs do not wait for pint; other names are looked up in
+pint's registry, which is created on first use.
 """
 
 from __future__ import annotations
@@ -83,7 +83,7 @@ PINT_NAMES: Mapping[str, str] = {
     "Ohm": "ohm",
     **{f"{p}Ohm": f"{p}ohm" for p in _PREFIXES},
 }
-"""Names that pint spells in another way."""
+"""Names with another spelling in pint."""
 
 
 @lru_cache(maxsize=4096)
@@ -95,14 +95,14 @@ def find_atom(name: str) -> Atom:
     """
     if name in ATOMS:
         return ATOMS[name]
-    if name in ("Nm", "Nms"):  # pint takes the first for a number of threads
+    if name in ("Nm", "Nms"):  # pint reads the first as a number of threads
         raise UnitError(f"Unknown unit '{name}'{_suggestion(name)}")
     return _ask_pint(name)
 
 
 @lru_cache(maxsize=1)
 def pint_registry() -> Any:
-    """Return pint's registry of units; it is created by the first call, in about half a second."""
+    """Return pint's registry of units; the first call creates it, in about half a second."""
     import pint
 
     found: Any = pint.get_application_registry

@@ -22,10 +22,10 @@ def read_quantity(text: str) -> tuple[float, Unit] | None:
 
     Returns:
         The number and its unit (`ONE` if there is none), or None if the text is not a number with at most a unit
-        behind it: then it is an expression, such as `2*J`.
+        behind it: then it is an expression such as `2*J`.
 
     Raises:
-        UnitError: a number is followed by something that should be a unit and is none.
+        UnitError: the text after a number is not a unit.
     """
     match = _NUMBER.fullmatch(text.strip())
     if match is None:
@@ -61,7 +61,7 @@ def to_si(value: object, unit: Unit, name: str) -> float:
 
 
 def _counts_turns(given: Unit, unit: Unit) -> bool:
-    """50 Hz, 6000 1/min and 314 rad/s have one dimension, but a factor of 2 pi lies between a turn and a radian."""
+    """50 Hz, 6000 1/min and 314 rad/s have the same dimension, but a turn is 2 pi radians."""
     rate = tuple(-1 if name == "s" else 0 for name in BASE[:-1])
     if ANY in (given, unit) or given == unit or unit.dimension != rate:
         return False

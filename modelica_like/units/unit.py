@@ -1,4 +1,4 @@
-"""Units: products that keep their declared names, their dimensions, and how they are written."""
+"""Units: products that keep their declared names; dimensions and text forms."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ class Unit:
 
     @property
     def offset(self) -> float:
-        """SI value of zero; it differs from zero only for a temperature scale that stands alone."""
+        """SI value of zero; it differs from zero only for a temperature scale alone."""
         return _resolve(self)[2]
 
 
@@ -79,7 +79,7 @@ ANY = Unit((("*", 1),))
 
 
 def same_dimension(first: Unit, second: Unit) -> bool:
-    """Tell whether both units measure the same quantity; `ANY` fits everything, and rad is a number."""
+    """Return whether both units have the same dimension; `ANY` fits everything, and rad is a number."""
     return first == second or ANY in (first, second) or first.dimension == second.dimension
 
 

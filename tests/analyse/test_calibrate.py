@@ -52,7 +52,7 @@ def test_what_the_data_do_not_tell_is_told(identified):
     assert not current.identifiable
     assert current.rank == 2
     assert set(current.undetermined[0]) == {"R"}
-    assert "The data do not determine this combination:  R" in str(current)
+    assert "The data do not determine this combination: R" in str(current)
 
 
 def test_both_lines_as_an_independent_solver_fits_them(identified):

@@ -120,7 +120,7 @@ def test_runs_that_are_others_with_idas_are_told(monkeypatch):
     found = sweep(build(braked()), {"mass.J": np.linspace(2.0, 4.0, 150)}, ["mass.w"], until=1.0)
     assert found.attrs["checked"] == 3
     assert found.attrs["notice"] == (
-        "3 of 3 runs that IDAS did once more are others with it:\n"
+        "In 3 of 3 repeated runs IDAS has other results:\n"
         "  run 0: mass.w = 8.01 instead of 8\n"
         f"  run 100: mass.w = {10 - 4 / (2 + 200 / 149) + 0.01:.9g} instead of {10 - 4 / (2 + 200 / 149):.9g}\n"
         "  run 149: mass.w = 9.01 instead of 9"

@@ -77,7 +77,7 @@ def test_two_held_by_two(motor):
 
 
 def test_wrong_calls(motor):
-    with pytest.raises(ValueOutOfRange, match="each held variable takes one parameter"):
+    with pytest.raises(ValueOutOfRange, match="each held variable needs one parameter"):
         steady(motor, {"motor.w": 400.0})
     with pytest.raises(UnknownName, match=r"no variable 'motor.speed'"):
         steady(motor, {"motor.speed": 400.0}, by="first_load")
@@ -85,7 +85,7 @@ def test_wrong_calls(motor):
         steady(motor, {"motor.w": 400.0}, by="load")
     with pytest.raises(InitializationError, match="cannot be held by last_load"):
         steady(motor, {"motor.w": 400.0}, by="last_load")
-    with pytest.raises(ValueOutOfRange, match="over one quantity, not 2"):
+    with pytest.raises(ValueOutOfRange, match="varies one quantity, not 2"):
         characteristic(motor, {"first_load": [0.1], "supply": [24.0]})
 
 

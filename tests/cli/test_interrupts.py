@@ -46,9 +46,7 @@ def test_an_interrupted_simulation_keeps_what_there_is(tmp_path: Path) -> None:
     words = ("simulate", str(DRIVE), "--until", "20 s", "--points", "20000")
     result = command(tmp_path, "-c", PRESSED, "5", *words, "--csv", "run.csv", "--plot", "run.png")
     assert result.returncode == 130
-    told = re.fullmatch(
-        r"Interrupted\. What was computed up to t = ([0-9.]+) s is in run\.csv, run\.png\.\n", result.stderr
-    )
+    told = re.fullmatch(r"Interrupted\. The results up to t = ([0-9.]+) s are in run\.csv, run\.png\.\n", result.stderr)
     assert told is not None, result.stderr
     table = np.genfromtxt(tmp_path / "run.csv", delimiter=",", names=True)
     assert table["time"][-1] == pytest.approx(float(told[1]), rel=1e-5)
@@ -61,7 +59,7 @@ def test_an_interrupted_simulation_keeps_what_there_is(tmp_path: Path) -> None:
 def test_an_interrupted_simulation_says_what_is_lost(tmp_path: Path) -> None:
     result = command(tmp_path, "-c", PRESSED, "5", "simulate", str(DRIVE), "--until", "20 s", "--points", "20000")
     assert result.returncode == 130
-    assert result.stderr.endswith(" s is lost: no --csv or --plot was asked for.\n")
+    assert result.stderr.endswith(" s are lost: neither --csv nor --plot is given.\n")
     assert result.stderr.count("\n") == 1
 
 
@@ -133,7 +131,7 @@ def test_a_failed_simulation_keeps_what_there_is(tmp_path: Path) -> None:
     result = command(tmp_path, "-m", "modelica_like", "simulate", "drive.toml", "--csv", "run.csv")
     assert result.returncode == 1
     assert result.stderr.startswith("IDAS gave up at about t = ")
-    told = re.search(r"\nWhat was computed up to t = ([0-9.]+) s is in run\.csv\.\n$", result.stderr)
+    told = re.search(r"\nThe results up to t = ([0-9.]+) s are in run\.csv\.\n$", result.stderr)
     assert told is not None, result.stderr
     table = np.genfromtxt(tmp_path / "run.csv", delimiter=",", names=True)
     assert 0.9 < table["time"][-1] == pytest.approx(float(told[1]), rel=1e-5)
@@ -225,8 +223,8 @@ def test_an_interrupted_cosim_command_says_what_it_kept(until: str, kept: str, t
     system = split(DRIVE, "shaft", tmp_path, names=("motor", "wheel"), check=False).path
     files = ["--csv", "run.csv", "--plot", "run.png"] if kept else []
     result = command(tmp_path, "-c", PRESSED, "0.01", "cosim", str(system), "--until", until, "--step", "0.1ms", *files)
-    what = f"is in {kept}" if kept else "is lost: no --csv or --plot was asked for"
-    said = re.fullmatch(rf"Interrupted\. What was computed up to t = ([0-9.]+) s {what}\.\n", result.stderr)
+    what = f"are in {kept}" if kept else "are lost: neither --csv nor --plot is given"
+    said = re.fullmatch(rf"Interrupted\. The results up to t = ([0-9.]+) s {what}\.\n", result.stderr)
     assert (result.returncode, bool(said)) == (130, True), result.stderr
     assert "communication steps of 0.0001 s" in result.stdout
     if kept and said:

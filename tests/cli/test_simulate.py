@@ -94,7 +94,7 @@ def test_check_tells_starts_that_are_missing(run: CliRunner, tmp_path: Path) -> 
     (tmp_path / "drive.toml").write_text(STARTS.replace('start = "rest"', ""))
     result = run.invoke(app, ["check", "--start", str(tmp_path / "drive.toml")])
     assert result.exit_code == 2
-    assert "Initialisation (not the model) lacks" in result.output
+    assert "Initialization (not the model) lacks" in result.output
 
 
 def test_simulate_tells_events_and_energy(run: CliRunner) -> None:

@@ -110,7 +110,7 @@ def test_what_cannot_be_tuned_is_told():
     schedule = Assembly("s", parts={"shifts": ShiftSchedule(shifts=[[0, "N", 1], [2, "1", 0.5]])})
     with pytest.raises(LanguageError, match=r"shifts\.shifts cannot be parameters: it has texts"):
         build(schedule, tables=["shifts.shifts"])
-    with pytest.raises(LanguageError, match="Tables of a compiled model stay what they are"):
+    with pytest.raises(LanguageError, match="Tables of a compiled model cannot change"):
         build(build(drive()), tables=["*"])
     with pytest.raises(ExportError, match="A compiled model has no tables"):
         export_fmu(build(drive()), "x.fmu", tables=["*"])

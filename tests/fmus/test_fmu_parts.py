@@ -105,7 +105,7 @@ def test_a_netlist_of_fmus_alone(reference_fmus: Built, tmp_path: Path) -> None:
 
 def test_such_a_netlist_is_not_simulated(reference_fmus: Built, tmp_path: Path) -> None:
     path = netlist(tmp_path, '[parts]\ndrive = { is = "FMU", file = "drive.fmu" }')
-    with pytest.raises(NetlistError, match="drive is an FMU, which cannot stand among equations"):
+    with pytest.raises(NetlistError, match="drive is an FMU, which cannot be part of a system of equations"):
         simulate(path)
 
 

@@ -151,5 +151,5 @@ def test_refuses_damaged_content(reference_fmus: dict[tuple[str, str], Path], tm
     path.write_bytes(content)
     target = tmp_path / "unpacked"
     target.mkdir()
-    with pytest.raises(FmuRefused, match=r"^damaged\.fmu is no FMU: it is not a sound zip archive"):
+    with pytest.raises(FmuRefused, match=r"^damaged\.fmu is not an FMU: it is not a valid zip archive"):
         unpack(path, target)

@@ -118,7 +118,7 @@ def test_symbols_are_the_same_each_time_and_differ_between_instances():
 
 
 def test_a_partial_class_is_only_a_base():
-    with pytest.raises(LanguageError, match=r"TwoPins is partial: it is only a base of other components\.") as caught:
+    with pytest.raises(LanguageError, match=r"TwoPins is partial: it is only a base class\.") as caught:
         TwoPins()
     assert caught.value.where[0].file == __file__
 

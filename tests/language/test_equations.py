@@ -184,7 +184,7 @@ def test_a_function_of_math_makes_nan_of_a_symbol():
             yield from super().equations()
             yield self.tau == self.tau * math.sqrt(self.phi_rel)
 
-    with pytest.raises(LanguageError, match=r"^Lost: a number in it is nan\.") as caught:
+    with pytest.raises(LanguageError, match=r"^Lost: an expression contains nan\.") as caught:
         flatten(Lost())
     assert "math.sqrt" in caught.value.where[0].text
     assert "take sqrt" in caught.value.advice

@@ -211,7 +211,7 @@ def test_formulas_are_checked_for_their_dimension(text, unit):
 def test_only_numbers_formulas_and_declarations_stand_in_formulas():
     assert as_formula(2) == Formula("number", (2.0,))
     for value in (True, "J", None, [1]):
-        with pytest.raises(NetlistError, match="cannot stand in a formula"):
+        with pytest.raises(NetlistError, match="cannot be used in a formula"):
             as_formula(value)
 
 

@@ -6,14 +6,11 @@ reference or a closed form tells.
 """
 
 from collections.abc import Callable
-from dataclasses import replace
-from io import StringIO
 from math import pi
 from typing import Any
 
 import numpy as np
 import pytest
-from rich.console import Console
 
 from components import (
     BallScrew,
@@ -41,10 +38,8 @@ from components import (
     TranslationalFixed,
     UniversalJoint,
 )
-from modelica_like import Assembly, Solution, simulate
-from modelica_like.initialize import Impact
-from modelica_like.language import Component, Equations, Events, Mode, Parameter, Variable, absolute, der, param, var
-from modelica_like.report.run import run_report
+from modelica_like import Assembly, simulate
+from modelica_like.language import Component, Equations, Parameter, absolute, der, param
 
 
 def through(part: Component, flywheel: Component | None = None) -> Assembly:
@@ -337,40 +332,6 @@ def test_a_difference_that_cancels_over_a_turn_is_noticed_within_it() -> None:
     assert min(abs(joint.imbalance_time - k * turn / 2) for k in range(3)) < 1e-9
 
 
-# -- negative losses ---------------------------------------------------------------------------------------------------
-
-
-class Pump(Damper):
-    """A damper that drives instead, and says so: its loss is negative."""
-
-    def equations(self) -> Equations:
-        yield from super(Damper, self).equations()
-        yield self.tau == -self.d * self.w_rel
-
-    def dissipation(self) -> Any:
-        return -self.d * self.w_rel**2
-
-
-def told(run: Solution) -> str:
-    console = Console(width=200, file=StringIO())
-    console.print(run_report(run))
-    return console.file.getvalue()  # type: ignore[attr-defined]
-
-
-def test_a_negative_loss_is_noticed_with_its_time_and_power() -> None:
-    """J·dw/dt = d·w: the speed is exp(d·t/J), the loss -d·w², and largest at the end."""
-    parts = {"J": Inertia(J=0.5, phi=0.0, w=1.0), "pump": Pump(d=0.25), "wall": Fixed()}
-    run = simulate(Assembly("drive", parts=parts, series={"s": list(parts)}), 2.0, rtol=1e-9)
-    balance = run.energy()
-    pump = balance["pump"]
-    assert (pump.imbalance, pump.gain_time) == (0.0, 2.0)
-    assert pump.gain == pytest.approx(0.25 * np.exp(2.0), rel=1e-7)
-    assert balance.notices == ("pump has a negative loss, -1.84726 W at 2 s.",)
-    assert str(balance).endswith(balance.notices[0])
-    assert balance.notices[0] in told(run)
-    assert "impacts" not in told(run)
-
-
 # -- what no balance can see -------------------------------------------------------------------------------------------
 
 
@@ -415,48 +376,3 @@ def test_a_consistent_law_balances_whether_it_is_right_or_not(kind: type[Compone
     assert balance.at_events <= 1e-12
     assert balance.notices == ()
     assert "balance" not in str(balance)
-
-
-# -- events ------------------------------------------------------------------------------------------------------------
-
-
-class Sampled(Component):
-    """A mass whose speed jumps through a discrete value, without a reset of a state."""
-
-    m: Parameter = param("kg", "mass", default=2.0)
-    x: Variable = var("m", "position")
-    step: Parameter = param("m", "where", default=1.0)
-    crawl: Parameter = param("m/s", "speed before", default=1.0)
-    rapid: Parameter = param("m/s", "speed behind", default=3.0)
-    v: Variable = var("m/s", "speed")
-    gear = Mode("slow", "fast")
-
-    def equations(self) -> Equations:
-        yield der(self.x) == self.v
-        yield self.v == self.gear.choose(slow=self.crawl, fast=self.rapid)
-
-    def events(self) -> Events:
-        yield self.gear.go("slow", "fast", when=self.x > self.step)
-
-    def stored_energy(self) -> Any:
-        return 0.5 * self.m * self.v**2
-
-
-def test_energy_that_appears_at_an_event_is_noticed() -> None:
-    """2 kg from 1 m/s to 3 m/s: 8 J."""
-    balance = simulate(Sampled(x=0.0), 2.0).energy()
-    assert balance.at_events == pytest.approx(8.0, rel=1e-12)
-    assert balance[""].at_events == pytest.approx(8.0, rel=1e-12)
-    assert balance.notices == ("At an event 8 J appear or vanish without an impact or a reset.",)
-
-
-def test_an_impact_explains_what_vanishes_and_is_lost() -> None:
-    run = simulate(Sampled(x=0.0), 2.0)
-    impact = Impact(run.events[0].time, "", -8.0)
-    struck = replace(run, impacts=(impact,), _cache={})
-    balance = struck.energy()
-    assert balance.at_events < 1e-12
-    assert "of it in impacts" in told(struck)
-    assert (balance[""].impact, balance[""].lost) == (-8.0, -8.0)
-    assert balance.notices == ()
-    assert "-8 J in impacts" in str(balance)

@@ -356,6 +356,23 @@ def waves(run: Solution) -> None:
 
 
 @numbers
+def hall_sensor(run: Solution) -> None:
+    """3950/60·t² magnets have come while the speed grows; whole pulses of every half second are shown after it."""
+    passed = [int(3950 / 60 * moment**2) for moment in (0, 0.5, 1, 1.5, 2)]
+    shown = [2 * pi * (passed[k + 1] - passed[k]) / (4 * 0.5) for k in range(4)]
+    assert [run.at(moment)["meter.y"] for moment in (0.3, 0.7, 1.3, 1.8, 2.1)] == close([0, *shown])
+
+
+@numbers
+def commutation(run: Solution) -> None:
+    half, voltage = pi / 4, 0.0467 * 4000 * pi / 30
+    square = (half / sin(half)) ** 2 * (0.5 + sin(2 * half) / (4 * half))
+    assert run.energy()["motor"].source == close(voltage**2 / 8 * square * 0.06)
+    induced = run["generator.v_induced"]
+    assert [np.max(induced), np.min(induced)] == close([voltage * half / sin(half), voltage * half / tan(half)])
+
+
+@numbers
 def limited_control(run: Solution) -> None:
     assert run.at(0.2)["ramp.y"] == close(50 * 0.2)
     assert run.at(0.39)["rotor.w"] - run.at(0.3)["rotor.w"] == close(0.09 * (4 - 2) / 0.1)
@@ -476,23 +493,6 @@ def electric_drives(run: Solution) -> None:
     assert [run.final["shorted.i_d"], run.final["shorted.i_q"]] == close([i_d, i_q])
     assert run.final["spindle.w"] == pytest.approx(1200, rel=1e-6)
     assert run.final["servo.i_d"] < -50
-
-
-@numbers
-def hall_sensor(run: Solution) -> None:
-    """Pulses 4·phi/(2·pi) = 3950/60·t² while the speed grows; whole pulses of every half second are shown after it."""
-    passed = [int(3950 / 60 * moment**2) for moment in (0, 0.5, 1, 1.5, 2)]
-    shown = [2 * pi * (passed[k + 1] - passed[k]) / (4 * 0.5) for k in range(4)]
-    assert [run.at(moment)["sensor.w"] for moment in (0.3, 0.7, 1.3, 1.8, 2.1)] == close([0, *shown])
-
-
-@numbers
-def commutation(run: Solution) -> None:
-    half, voltage = pi / 4, 0.0467 * 4000 * pi / 30
-    square = (half / sin(half)) ** 2 * (0.5 + sin(2 * half) / (4 * half))
-    assert run.energy()["motor"].source == close(voltage**2 / 8 * square * 0.06)
-    induced = run["generator.v_induced"]
-    assert [np.max(induced), np.min(induced)] == close([voltage * half / sin(half), voltage * half / tan(half)])
 
 
 def test_every_netlist_has_numbers_and_a_line_on_the_page() -> None:

@@ -2,13 +2,14 @@
 
 from collections.abc import Callable
 from functools import lru_cache
-from math import acos, atan, cos, exp, log, pi, radians, sin, sqrt
+from math import acos, atan, cos, cosh, exp, log, pi, radians, sin, sqrt, tan
 from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.integrate import quad
 from scipy.linalg import expm
+from scipy.optimize import brentq
 from scipy.special import ellipk
 
 from modelica_like import simulate
@@ -122,6 +123,133 @@ def synchroniser(run: Solution) -> None:
     assert (grinding.component, grinding.time) == ("sharp", close(0.12))
     slip = 80 - 0.5 * slope * 0.02**2 / inertia
     assert grinding.energy == close(0.5 * inertia * slip**2)
+
+
+@numbers
+def hoists(run: Solution) -> None:
+    g, reach = 9.80665, 5 / 2
+    growth = sqrt(2 * g / (2 * 30 + 5 + 0.1 / 0.2**2))
+    assert run.final["hook.s"] == close(3 + reach - (3 + reach) * cosh(growth))
+    taut = sqrt(2 * 0.3 / g)
+    assert moment(run, "rope.rope", "taut") == close(taut)
+    swing = sqrt(20e3 / 50)
+    lowest = taut + (pi - atan(sqrt(2 * g * 0.3) * swing / g)) / swing
+    assert run.at(lowest)["rope.tension"] == close(50 * g * (1 + sqrt(1 + 2 * 0.3 * 20e3 / (50 * g))))
+    # A load that would pull the self-locking worm backwards brakes it: the friction of the flanks takes more than that.
+    rise, rho = tan(radians(3)), 0.06 / cos(radians(20))
+    back = (rise - rho) / (rise * (1 + rise * rho)) * 100 / 60
+    stopped = moment(run, "holds.mode", "stuck")
+    assert (back < 0, stopped) == (True, close(20 * 0.01 / -back))
+    assert [run.final["held_rotor.w"], run.final["rest_rotor.w"]] == close([0, 0])
+    rise, rho = tan(radians(20)), 0.05 / cos(radians(20))
+    back = tan(radians(20) - atan(rho)) / rise * 100 / 10
+    assert run.final["running_rotor.w"] == close(-back / 0.01)
+    assert [event.before for event in run.events if event.after == "told"] == ["locking", "starting"]
+    assert [run.final[f"{name}.self_locking"] for name in ("holds", "at_rest", "runs")] == [1, 1, 0]
+
+
+@numbers
+def switching(run: Solution) -> None:
+    # While the diode conducts: C·v' = (10·sin(w·t) - v)/1 - v/100; it blocks where the voltages are equal.
+    w, a = 100 * pi, (1 + 1 / 100) / 1e-3
+
+    def charged(t: float) -> float:
+        return 1e4 / (a**2 + w**2) * (a * sin(w * t) - w * cos(w * t) + w * exp(-a * t))
+
+    blocks = brentq(lambda t: 10 * sin(w * t) - charged(t), 0.005, 0.0099, xtol=1e-14)
+    assert next(e.time for e in run.events if (e.mode, e.before) == ("rectifier.state", "conducting")) == close(blocks)
+    assert run.at(0.015)["capacitor.v"] == close(charged(blocks) * exp(-(0.015 - blocks) / 0.1))
+    assert moment(run, "contactor.contacts", "closed") == close(0.01 + 0.6 / 48 * log(0.5 / 0.2))
+    full = 0.5 * (1 - exp(-0.05 * 48 / 0.6))
+    assert moment(run, "contactor.contacts", "open") == close(0.06 + 0.6 / 48 * log(full / 0.1))
+
+
+@numbers
+def gears_and_losses(run: Solution) -> None:
+    # A free pair: x = 10 µm·cos(w·t) for as long as the flanks touch; without backlash that is always.
+    w = sqrt(200e6 * (0.03**2 / 0.001 + 0.06**2 / 0.008))
+    period = 2 * pi / w
+    assert run.at(7.25 * period)["mesh.x"] == pytest.approx(0, abs=1e-5 * 1e-5)
+    assert run.at(8 * period)["mesh.f"] == pytest.approx(200e6 * 1e-5, rel=1e-5)
+    # Across half the backlash, half a swing on the teeth, and back across the whole.
+    gap, swing = 0.15e-3 / (0.03 * 5), pi / (0.03 * sqrt(200e6 / 0.001))
+    contacts = [event.time for event in run.events if event.mode == "loose.contact"]
+    assert contacts[:3] == close([gap, gap + swing, 3 * gap + swing])
+    # SKF: R_1·d_m^1.96·F_r^0.54·(nu·n)^0.6 with both factors, and 0.05 to 0.15 of S_1·d_m^-0.26·F_r^(5/3).
+    heating = 1 / (1 + 1.84e-9 * (3000 * 60) ** 1.28 * 20**0.64)
+    starved = exp(-3e-8 * 20 * 3000 * 120 * sqrt(3.1 / 80))
+    rolling = heating * starved * 3.9e-7 * 60**1.96 * 2000**0.54 * 60000**0.6
+    mixed = exp(-2.6e-8 * 60000**1.4 * 60)
+    sliding = (0.15 * mixed + 0.05 * (1 - mixed)) * 3.23e-3 * 60**-0.26 * 2000 ** (5 / 3)
+    assert run.final["bearing.tau"] == close(1e-3 * (rolling + sliding))
+    # Torque k·w^0.59: w^0.41 falls in a straight line.
+    theta = pi / 3
+    surface = 0.08**2 * (2 * theta - sin(2 * theta)) + 2 * 0.08 * 0.03 * theta
+    k = 0.5 * 870 * 0.08**3 * surface * 1.5 * (0.08 / 9.80665) ** -0.6 * (0.08 * 0.03 / 50e-6) ** -0.21
+    assert run.final["rotor.w"] ** 0.41 == close(200**0.41 - 0.41 * k / 0.05 * 0.02)
+
+
+@numbers
+def linkages(run: Solution) -> None:
+    t, r, rod = 0.37, 0.05, 0.18
+    phi, u = 10 * t, rod**2 - (r * sin(10 * t)) ** 2
+    bent = r * cos(phi) + r**2 * cos(2 * phi) / sqrt(u) + (r**2 * sin(phi) * cos(phi)) ** 2 / u**1.5
+    slope = -r * sin(phi) - r**2 * sin(phi) * cos(phi) / sqrt(u)
+    at = run.at(t)
+    assert [at["slide.s"], at["slide.v"]] == close([r * cos(phi) + sqrt(u), 10 * slope])
+    assert at["crank.flange_r.tau"] == close(-slope * 2 * bent * 100)
+    # The follower is accelerated most at a quarter of the rise, 2·pi·h/beta²·w², and fastest in the middle, 2·h/beta·w.
+    beta, h, w = radians(120), 0.012, 20.0
+    quarter, middle = run.at(beta / 4 / w), run.at(beta / 2 / w)
+    assert quarter["follower.s"] == close(h * (0.25 - 1 / (2 * pi)))
+    assert -quarter["cam.flange_t.f"] == close(0.5 * 2 * pi * h / beta**2 * w**2)
+    assert middle["follower.v"] == close(2 * h / beta * w)
+    resting, fallen = run.at(radians(140) / w + 2 * pi / w), run.at(radians(300) / w)
+    assert [resting["follower.s"], fallen["follower.s"]] == close([h, 0])
+    # The rocker at both stretched positions of crank and coupler, and the coupler's length in between.
+    a, b, c, d = 0.03, 0.09, 0.07, 0.1
+    for stretched in (b + a, b - a):
+        crank = acos((d**2 + stretched**2 - c**2) / (2 * d * stretched)) + (pi if stretched < b else 0)
+        rocker = pi - acos((d**2 + c**2 - stretched**2) / (2 * d * c))
+        assert run.at(crank / 3)["rocker.phi"] == close(rocker)
+        assert run.at(crank / 3)["rocker.w"] == pytest.approx(0, abs=1e-6)
+    angle, swing = 3 * 1.3, run.at(1.3)["rocker.phi"]
+    coupler = np.hypot(d + c * cos(swing) - a * cos(angle), c * sin(swing) - a * sin(angle))
+    assert coupler == close(b)
+
+
+@numbers
+def variable_drives(run: Solution) -> None:
+    ratio = 1 + exp(-0.4 / 0.2)
+    at, slower = run.at(0.5), -(1 - ratio) / 0.2
+    assert [at["variator.ratio"], at["wheel.w"]] == close([ratio, 100 / ratio])
+    torque = 20 + 0.5 * 100 / ratio**2 * slower
+    assert -at["engine.flange.tau"] == close(torque / ratio / 0.9)
+    # The chain's way on either polygon: pitch per tooth, and r·sin of what is left of it.
+    ways = []
+    for z, angle in ((11, 2 * 0.33), (22, 0.33)):
+        teeth = round(angle * z / (2 * pi))
+        ways.append(0.0127 * (teeth + sin(angle - 2 * pi / z * teeth) / (2 * sin(pi / z))))
+    assert run.at(0.33)["chain.f"] == close(100e3 * (ways[0] - ways[1]))
+
+
+@numbers
+def machine_loads(run: Solution) -> None:
+    thickness = 0.3 * sin(radians(75))
+    force = 1700 * 3 / sin(radians(75)) * thickness**0.75
+    assert run.at(0.2)["cut.tau"] == close(force * 0.04)
+    assert moment(run, "cut.mode", "stuck") == close(0.4 * 100 / (force * 0.04))
+    gas = 1e5 * 1.3 / 0.3 * (8 ** (0.3 / 1.3) - 1)
+    assert run.final["compressor.tau"] == close(0.5e-3 * gas / (2 * pi * 0.9))
+    assert run.final["oil_pump.tau"] == close(20e-6 * 100e5 / (2 * pi * 0.95))
+    flow = sqrt((60 * (2 / 3) ** 2 - 10) / 3e5)
+    head = 10 + 2e5 * flow**2
+    assert run.final["pump.Q"] == pytest.approx(flow, rel=3e-6)  # the smooth beginning of the flow
+    assert run.final["pump.tau"] == pytest.approx(9806.65 * head * flow / 0.75 / 100 + 5 * (2 / 3) ** 2, rel=1e-5)
+    assert run.final["slide.v"] == close(sqrt(2.5**2 - 2 * 80e3 * 4e-3 / 200))
+    pressing = 15 + (24 + 50) * cos(radians(10))
+    torque = 3500 - 0.4 * 60 * 9.80665 * (1.6 * 0.025 * pressing + 50 * sin(radians(10)))
+    assert run.final["conveyor.w"] == close(torque / (60 * (24 + 15 + 50) * 0.16) * 0.5)
 
 
 def test_every_netlist_has_numbers_and_a_line_on_the_page() -> None:

@@ -267,7 +267,7 @@ case(
     errors.CyclicAssembly,
     "parameters in a circle",
     lambda: flatten(Circle()),
-    "Parameters depend on each other in a circle: a → b → a.\nGive one a number.",
+    "Parameters depend on each other in a circle: a → b → a.\nGive one of them a number.",
 )
 case(
     errors.NetlistError,

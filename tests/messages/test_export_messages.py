@@ -136,4 +136,4 @@ def test_a_drift_of_phase_is_what_tolerances_do(tmp_path: Path) -> None:
     drive.simulate["until"] = "2 s"
     found = export_fmu(drive, tmp_path / "d.fmu").check
     assert not found.differs
-    assert found.sentence.startswith("Until t = 0.2 s the FMU differs from IDAS as the tolerance 1e-07 lets it: ")
+    assert found.sentence.startswith("Until t = 0.2 s the FMU differs from IDAS as its tolerance 1e-07 lets it: ")

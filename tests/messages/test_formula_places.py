@@ -28,7 +28,8 @@ PUSH = '  in bench.toml:7 `push = { is = "Torque" }`'
         ({"J": '"2*c"'}, f"disc.J: bench has no parameter 'c'. It has a, b.\n{DISC % '2*c'}"),
         (
             {"a": '"b"'},
-            'Parameters depend on each other in a circle: a → b → a.\n  in bench.toml:3 `a = "b"`\nGive one a number.',
+            'Parameters depend on each other in a circle: a → b → a.\n  in bench.toml:3 `a = "b"`\n'
+            "Give one of them a number.",
         ),
         ({"w": '"b"'}, f"disc.w = b expects rad/s; the expression is kg.m2.\n{DISC % 'b'}"),
         (

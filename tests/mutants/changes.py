@@ -99,7 +99,9 @@ class _Finder:
             if node.name in _PRINTS:
                 return
             place = node.name if place == "module" else f"{place}.{node.name}"
-        elif isinstance(node, ast.Raise | ast.JoinedStr | ast.Import | ast.ImportFrom | ast.Assert):
+        elif isinstance(node, ast.Raise | ast.JoinedStr | ast.Import | ast.ImportFrom | ast.Assert) or (
+            isinstance(node, ast.keyword) and node.arg == "strict"  # of zip: another assertion
+        ):
             return
         for start, end, after, at in self._of(node):
             before = self.text[start:end]
@@ -160,7 +162,7 @@ class _Finder:
 
     def _call(self, node: ast.Call) -> Iterator[tuple[int, int, str, int]]:
         name = node.func.id if isinstance(node.func, ast.Name) else getattr(node.func, "attr", "")
-        if name in ("param", "structural", "state", "variable"):
+        if name in ("param", "structural", "state", "variable", "connect"):  # a connection has no direction
             return
         _, end = self._span(node.func)
         if name in _CALLS:

@@ -77,7 +77,7 @@ def test_an_excitation_near_an_eigenfrequency_is_noticed(frequency: float, notes
     found = run_notes(drive, simulate(drive, 0.1, start="rest"))
     assert len(found) == notes
     assert [one.partition(" is ")[2] for one in found] == [
-        "near the eigenfrequency 5 Hz, whose damping is 0: expect resonance."
+        "near the natural frequency 5 Hz, whose damping is 0: expect resonance."
     ] * notes
 
 

@@ -1,6 +1,8 @@
 """Document 002, equations 37 to 47: bearing life, flywheels, deflection."""
 
 import math
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -89,6 +91,22 @@ def test_table_2_mixes_two_radii() -> None:
     aluminium = flywheel(0.033, 0.045, ALUMINIUM, 0.6, CLUTCH_SPEED)
     assert aluminium.inertia * 1e6 == pytest.approx(574, rel=1e-3)
     assert aluminium.switching_time == pytest.approx(0.134, abs=5e-4)
+
+
+def test_table_2_of_the_page() -> None:
+    """All ten rows of docs/examples/test_bench.md."""
+    page = (Path(__file__).parents[2] / "docs" / "examples" / "test_bench.md").read_text(encoding="utf-8")
+    table = page.partition("## Table 2")[2].partition("\n## ")[0]
+    rows = [line.strip("| ").split("|") for line in re.findall(r"^\| \d.*", table, re.MULTILINE)]
+    assert [float(row[0]) for row in rows] == pytest.approx(TIMES)
+    for cells, width, inertia in zip(rows, PRINTED_WIDTHS, PRINTED_INERTIAS, strict=True):
+        time = float(cells[0])
+        assert [float(cells[3]), float(cells[4])] == [width, inertia]
+        expected = 0.6 * time / CLUTCH_SPEED
+        widths = [2e3 * expected / (math.pi * density * 0.045**4) for density in (ALUMINIUM, STEEL)]
+        assert [float(cell) for cell in cells[5:8]] == pytest.approx([1e6 * expected, *widths], abs=0.051)
+        actual = math.pi / 2 * STEEL * 0.045**4 * width * 1e-3 * CLUTCH_SPEED / 0.6
+        assert float(cells[8]) == pytest.approx(actual, abs=5.1e-4)
 
 
 def test_flywheel_and_its_inverse() -> None:

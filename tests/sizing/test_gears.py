@@ -97,6 +97,10 @@ def test_internal_gears() -> None:
 def test_teeth_that_cannot_be() -> None:
     with pytest.raises(ValueError, match="end in a point"):
         gear_strength(GearPair(10, 30, 2e-3, 0.02, 1.5), 10.0, STEEL)
+    with pytest.raises(ValueError, match="needs a torque"):
+        gear_strength(GearPair(20, 30, 2e-3, 0.02), 0.0, STEEL)
+    with pytest.raises(ValueError, match="a load and cycles above zero"):
+        gear_life(gear_strength(GearPair(20, 30, 2e-3, 0.02), 10.0, STEEL), [LoadStage(-1.0, 1e5)])
 
 
 def test_life_factors() -> None:

@@ -99,7 +99,7 @@ class Calibration:
             lines.append(f"  {name:{width}}  {value:.6g} {spread} {unit}{note}".rstrip())
         for combination in self.undetermined:
             parts = ", ".join(f"{name} {100 * weight:+.0f} %" for name, weight in combination.items())
-            lines.append(f"  The data do not determine this combination:  {parts}.")
+            lines.append(f"  The data do not determine this combination: {parts}.")
         worst = int(np.argmax(np.abs(self.residuals)))
         lines.append(f"  largest residual {self.residuals[worst]:+.3g} of its uncertainty: {self.labels[worst]}")
         return "\n".join(lines)

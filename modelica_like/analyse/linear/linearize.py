@@ -7,9 +7,9 @@ from typing import get_args
 
 from modelica_like.analyse.linear.held import free_motions
 from modelica_like.analyse.linear.model import LinearModel
-from modelica_like.analyse.slopes import columns_of, nodes_of, slopes
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.initialize import Point, StartKind, initialize
+from modelica_like.initialize.slopes import columns_of, nodes_of, slopes
 from modelica_like.simulation import Model, build, simulate
 from modelica_like.solve.solution import Solution
 from modelica_like.units import parse_unit, to_si

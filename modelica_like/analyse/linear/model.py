@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 import casadi as ca
 import numpy as np
 
-from modelica_like.analyse.slopes import implicit_slopes, nodes_of
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import extra_module
 from modelica_like.initialize import Point, variable_slopes
+from modelica_like.initialize.slopes import implicit_slopes, nodes_of
 from modelica_like.solve.style import COLOURS, picture
 
 if TYPE_CHECKING:

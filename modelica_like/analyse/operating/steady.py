@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from modelica_like.analyse.slopes import Sizes, columns_of, nodes_of, slopes, steady_change
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import InitializationError, UnknownName, ValueOutOfRange, did_you_mean
 from modelica_like.initialize import Point, call, holding, initialize
-from modelica_like.initialize.steady import check_modes_hold, solve_steady
+from modelica_like.initialize.slopes import Sizes, columns_of, nodes_of, slopes
+from modelica_like.initialize.steady import check_modes_hold, solve_steady, steady_change
 from modelica_like.simulation import Model, build
 from modelica_like.solve.trajectories import Trajectories
 from modelica_like.units import to_si
@@ -78,8 +78,8 @@ class OperatingPoint(Mapping[str, float]):
 
     def __str__(self) -> str:
         lines = [f"Operating point of {self.model.name}"]
-        lines += [f"  {path} brings in {s:.6g} W" for path, (s, _) in self.powers.items() if s > 0]
-        lines += [f"  {path} takes away {-s:.6g} W" for path, (s, _) in self.powers.items() if s < 0]
+        lines += [f"  {path} supplies {s:.6g} W" for path, (s, _) in self.powers.items() if s > 0]
+        lines += [f"  {path} takes {-s:.6g} W" for path, (s, _) in self.powers.items() if s < 0]
         lines += [f"  {path} loses {loss:.6g} W" for path, loss in self.losses.items()]
         if np.isfinite(self.efficiency):
             lines.append(f"  efficiency {100 * self.efficiency:.4g} %")

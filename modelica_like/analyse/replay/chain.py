@@ -20,11 +20,11 @@ from modelica_like.analyse.replay.kinks import Kinks
 from modelica_like.analyse.replay.start import start_slopes
 from modelica_like.analyse.replay.step import CLOSE, Step, shortened, stuck, try_step
 from modelica_like.analyse.replay.steps import StepFunctions, Tolerances
-from modelica_like.analyse.slopes import Sizes
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import LanguageError
 from modelica_like.initialize import Point, StartKind, holding, initialize
+from modelica_like.initialize.slopes import Sizes
 from modelica_like.solve.recorder import Event, Segment
 from modelica_like.solve.solution import Solution
 

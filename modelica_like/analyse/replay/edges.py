@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from modelica_like.analyse.replay.chain import Reading, Replay
 from modelica_like.analyse.replay.holds import impact
 from modelica_like.analyse.replay.jumps import Jump
-from modelica_like.analyse.slopes import Sizes, slopes
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae, CompiledTransition
 from modelica_like.errors import NoGradient
 from modelica_like.initialize import Point, call, holding, share, solve_implicit, variable_slopes
+from modelica_like.initialize.slopes import Sizes, slopes
 from modelica_like.solve.guards import Guards
 
 _STILL = 1e-7
@@ -31,8 +31,8 @@ class Edge:
 
     Attributes:
         reading: what is zero on the edge.
-        least: change per relative change of a parameter up to which it is rounding.
-        error: what to say.
+        least: change per relative change of a parameter that counts as rounding.
+        error: the error for the user.
         matters: whether what is asked for is another one on the other side.
     """
 
@@ -67,7 +67,7 @@ def edges(chain: Replay, readings: Sequence[Reading]) -> list[Edge]:
 
 
 def _ties(chain: Replay, readings: Sequence[Reading]) -> list[Edge]:
-    """Guards that are zero all along a segment, without firing: torque that is just what friction can bear."""
+    """Guards that are zero all along a segment without firing: a torque that equals the friction limit."""
     model = chain.model
     guards, found = Guards(model), list[Edge]()
     if not guards.count:
@@ -90,7 +90,7 @@ def _ties(chain: Replay, readings: Sequence[Reading]) -> list[Edge]:
         for still, group in groupby(segments, lambda one, k=k: bool(one[2][k])):
             if still and (those := list(group)):
                 found.append(_tie(chain, readings, event, those[0][0], those[-1][1]))
-    # What fires just at the end of the run does so only on one side.
+    # A guard that fires exactly at the end of the run fires on one side only.
     last = len(chain.nodes) - 1
     fires = (np.abs(values[last]) <= near) & ~still_at[last] & (rates[last] > 0.0)
     return found + [_tie(chain, readings, guards.state_events[k], last, last) for k in np.flatnonzero(fires)]

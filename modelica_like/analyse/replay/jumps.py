@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from modelica_like.analyse.replay.holds import impact, projection, share_slopes
-from modelica_like.analyse.slopes import Sizes, slopes
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae, CompiledTransition, HeldMotion
 from modelica_like.errors import NoGradient
 from modelica_like.initialize import Point, Strike, call, holding, share, solve_implicit
+from modelica_like.initialize.slopes import Sizes, slopes
 from modelica_like.solve.recorder import Event
 
 _GRAZING = 1e-6
@@ -73,8 +73,8 @@ class Jump:
         when: the cause of its time.
         x: derivatives of the states after by (x, theta) before, shape (nx, nx + ntheta).
         d: derivatives of the discrete values after, shape (nd, nx + ntheta).
-        gain: what the integrands lose at the event: quadratures grow by it times the shift of the event, shape (nq,).
-        matters: whether it matters when it happens.
+        gain: drop of the integrands at the event: quadratures grow by it times the shift of the event, shape (nq,).
+        matters: whether anything depends on its time.
         chances: motions of zero that modes hold from then on.
     """
 
@@ -249,8 +249,8 @@ def _together(one: Event, other: Event) -> NoGradient:
 def _resting(model: CompiledDae, one: HeldMotion, t: float) -> NoGradient:
     mode, motion = model.flat_discretes[one.mode], model.flat_variables[one.motion].path
     return NoGradient(
-        f"No gradient at t = {t:.9g} s: {mode.path} begins as {mode.names[one.number]}, because {motion} is just zero.",
-        why="A small change of a parameter decides which way it moves first, so the derivatives of both sides differ.",
+        f"No gradient at t = {t:.9g} s: {mode.path} begins as {mode.names[one.number]}, because {motion} is zero.",
+        why="A small change of a parameter decides which way it moves first, so the derivatives on both sides differ.",
         advice="Move the parameters away from this limit.",
     )
 
@@ -342,7 +342,7 @@ class Work:
             return
         strike = Strike(model, point.copy(), entering)
         if strike.hard:
-            # All impacts at this instant are one, from the speeds before the first.
+            # All impacts at this instant are solved together, from the speeds before the first.
             entering = self._begin_again(entering)
             point = self.point
             strike = Strike(model, point.copy(), entering)
@@ -386,7 +386,7 @@ class Work:
         return float(value[0]), slope[0]
 
     def _project(self, targets: list[int], values: list[tuple[float, Vector]]) -> None:
-        """Move the states as little as possible until variables have their new values; see solve.events."""
+        """Change the states as little as possible until variables have their new values; see solve.events."""
         model = self.model
         nodes = [model.reset_nodes[k] for k in targets]
         solve_implicit(model, self.point)

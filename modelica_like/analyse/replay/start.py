@@ -8,10 +8,11 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from modelica_like.analyse.slopes import Sizes, steady_change
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.initialize import Point, StartKind, StartPlan, start_plan
+from modelica_like.initialize.slopes import Sizes
+from modelica_like.initialize.steady import steady_change
 
 _MAX_NEWTON = 50
 

@@ -12,11 +12,11 @@ from modelica_like.analyse.replay.chain import Reading, Replay
 from modelica_like.analyse.replay.jumps import Jump
 from modelica_like.analyse.replay.step import Step, shortened
 from modelica_like.analyse.sensitivity.outputs import Output, expression_of
-from modelica_like.analyse.slopes import Slopes, slopes
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import NoGradient, UnknownName, ValueOutOfRange
 from modelica_like.initialize import Point
+from modelica_like.initialize.slopes import Slopes, slopes
 from modelica_like.solve.solution import Solution
 
 _NEAR = 0.05

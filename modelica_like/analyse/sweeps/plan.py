@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from modelica_like.analyse.slopes import columns_of
 from modelica_like.analyse.sweeps.ranges import MOST_RUNS, too_many
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import LanguageError, ValueOutOfRange, extra_module
+from modelica_like.initialize.slopes import columns_of
 from modelica_like.units import Unit, to_si
 
 

@@ -79,7 +79,7 @@ def sweep(
 
     Raises:
         UnknownName: a name is not known.
-        ValueOutOfRange: no values to vary, no output, or no positive number of processes.
+        ValueOutOfRange: values, outputs or processes are missing.
         CheckpointMismatch: the checkpoint belongs to another sweep.
         KeyboardInterrupt: the sweep was interrupted; the note says how much is in the checkpoint.
         WorkersLost: workers died repeatedly.

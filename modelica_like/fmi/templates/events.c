@@ -100,7 +100,7 @@ void note_change(Instance *c, int name, int transition, int mode, int target) {
             text_of(m, names[(int)before]), text_of(m, names[target]));
 }
 
-/* Carry out transitions together; of one mode only the one declared first. An error if one of them ends the run. */
+/* Fire transitions together; of one mode only the one declared first. An error if one of them ends the run. */
 static Result fire(Instance *c, const unsigned char *wanting, Impacts *impacts) {
     const Model *m = c->model;
     State *s = &c->state;

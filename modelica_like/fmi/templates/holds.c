@@ -31,7 +31,7 @@ double largest_like(const Model *m, const double *values, int node) {
     return largest;
 }
 
-/* Put held motions that are zero but for rounding at zero, where they are states. */
+/* Set held motions within rounding of zero to zero, if they are states. */
 void rest(Instance *c) {
     const double *values;
     if (c->model->n_holds == 0) return;

@@ -163,7 +163,7 @@ static void choose_again(Instance *c, const Strike *strike) {
     }
 }
 
-/* Close what finite forces have opened since the first impact at this instant: they come after it. */
+/* Hold again what finite forces have released since the first impact at this instant: they act after it. */
 static Result hold_again(Instance *c, const unsigned char *entered) {
     for (int k = 0; k < c->model->n_holds; k++) {
         const Held *one = &c->model->holds[k];

@@ -1,4 +1,4 @@
-"""Expressions of component classes as LaTeX, from their source text: they read as the class was written."""
+"""Expressions of component classes as LaTeX, from their source text."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from modelica_like.report.component_pages import latex_names as names
 
 CASES, OR, AND, RELATION, SUM, PRODUCT, POWER, ATOM = range(8)
-"""How tightly an expression binds."""
+"""Precedence of an expression."""
 _FUNCTIONS = {
     "sin": r"\sin", "cos": r"\cos", "tan": r"\tan", "exp": r"\exp", "log": r"\ln", "tanh": r"\tanh",
     "sign": names.text("sgn"), "minimum": r"\min", "maximum": r"\max", "atan2": names.text("atan2"),
@@ -27,51 +27,51 @@ _OPERATORS: dict[type[ast.operator], tuple[int, int, str]] = {
     ast.Add: (SUM, SUM, " + "), ast.Sub: (SUM, PRODUCT, " - "), ast.Mult: (PRODUCT, PRODUCT, r" \cdot "),
     ast.Mod: (PRODUCT, POWER, r" \bmod "),
 }  # fmt: skip
-"""How tightly an operator binds, how tightly its right side has to, and its sign."""
+"""Precedence of an operator, required precedence of its right side, and its sign."""
 _PAIR = 2
 
 
 class Unwritable(Exception):
-    """Something that mathematics has no notation for; the page then shows the source text."""
+    """An expression without a mathematical notation; the page then shows the source text."""
 
 
 class Written(NamedTuple):
-    """LaTeX, and how tightly it binds."""
+    """LaTeX with its precedence."""
 
     latex: str
     binds: int = ATOM
 
     def inside(self, binds: int) -> str:
-        """Return it in parentheses where it binds less tightly than what stands around."""
+        """Return it, in parentheses if its precedence is lower than that of its surroundings."""
         return self.latex if self.binds >= binds else rf"\left({self.latex}\right)"
 
 
 class Path(NamedTuple):
-    """A field, connector or part of the component by its path; or a name that is none of these."""
+    """A field, connector or part of the component by its path, or another name."""
 
     path: str
     own: bool = True
 
 
 class Column(NamedTuple):
-    """A column of a table; `number` is empty where there is only one beside the abscissae."""
+    """A column of a table; `number` is empty if there is only one besides the abscissae."""
 
     table: str
     number: str
 
 
 Meaning = Written | Path | Column | ast.Dict
-"""What a local name stands for."""
+"""Meaning of a local name."""
 
 
 def cases(rows: Sequence[tuple[str, str]]) -> Written:
-    """Return a case distinction of values and what they hold for."""
+    """Return a case distinction of values and conditions."""
     lines = r" \cr ".join(f"{value} & {condition}" for value, condition in rows)
     return Written(rf"\begin{{cases}} {lines} \end{{cases}}", CASES)
 
 
 def otherwise(condition: str, then: Written, other: Written) -> Written:
-    """Return one of two values; the second may be a case distinction that goes on."""
+    """Return a choice of two values; the second may continue the case distinction."""
     begin, end = r"\begin{cases} ", r" \end{cases}"
     rest = other.latex.removeprefix(begin).removesuffix(end) if other.binds == CASES else ""
     if rest and begin not in rest and r"\text{otherwise}" in rest:
@@ -82,7 +82,7 @@ def otherwise(condition: str, then: Written, other: Written) -> Written:
 
 @dataclass(frozen=True)
 class Writer:
-    """Writes expressions of a function: `local` says what its names mean, `constants` what those of its module are."""
+    """Writes expressions of a function, with the meanings of its `local` names and the `constants` of its module."""
 
     constants: Mapping[str, Any]
     local: dict[str, Meaning]
@@ -92,23 +92,23 @@ class Writer:
         return names.name(path.lstrip("_"), dots)
 
     def function(self, name: str) -> bool:
-        """Tell whether a name is a function of the module."""
+        """Return whether a name is a function of the module."""
         return isinstance(self.constants.get(name), FunctionType)
 
     def which_mode(self, path: str) -> str:
-        """Return what stands before the name of a mode, where there are several modes."""
+        """Return the prefix of a mode's name if there are several modes."""
         return f"{path}: "
 
     def inherited(self, name: str) -> str:
-        """Return what to call the method that `super()` has under a name."""
+        """Return the name of a method reached by `super()`."""
         raise Unwritable
 
     def under(self, test: ast.expr, *, holds: bool) -> AbstractContextManager[None]:
-        """Let what is written meanwhile depend on a condition."""
+        """Make everything written meanwhile depend on a condition."""
         return nullcontext()
 
     def write(self, node: ast.expr) -> Written:
-        """Return the LaTeX of an expression, and how tightly it binds; Unwritable if there is no notation for it."""
+        """Return the LaTeX of an expression with its precedence; Unwritable if there is no notation for it."""
         method = getattr(self, f"_{type(node).__name__.lower()}", None)
         if method is None:
             raise Unwritable
@@ -119,7 +119,7 @@ class Writer:
         return self.write(node).latex
 
     def path(self, node: ast.expr) -> Path | None:
-        """Return the path that a chain of names means."""
+        """Return the path of a chain of names."""
         if isinstance(node, ast.Name):
             known = self.local.get(node.id)
             return Path("") if node.id == "self" else known if isinstance(known, Path) else None
@@ -190,7 +190,7 @@ class Writer:
         if type(node.op) not in _OPERATORS:
             raise Unwritable
         binds, needed, sign = _OPERATORS[type(node.op)]
-        # A sign in front of a sum's or a product's second part would stand beside the operator.
+        # A sign of the second part of a sum or product would follow the operator.
         shown = rf"\left({right.latex}\right)" if right.latex.startswith("-") else right.inside(needed)
         return Written(f"{left.inside(binds)}{sign}{shown}", binds)
 
@@ -295,7 +295,7 @@ class Writer:
         return Written(rf"{names.name(values.table)}{index}\left({self.latex(x)}\right)")
 
     def _column_of(self, node: ast.expr) -> Column | None:
-        """Return the column of a table that a name, or `[row[0] for row in self.table]`, means."""
+        """Return the column of a table for a name, or for `[row[0] for row in self.table]`."""
         known = self.local.get(node.id) if isinstance(node, ast.Name) else None
         if isinstance(node, ast.ListComp) and isinstance(node.elt, ast.Subscript):
             table = self.path(node.generators[0].iter)

@@ -1,6 +1,6 @@
 r"""Names and numbers as mathematics: `phi_rel` becomes an angle with a subscript, 6.2831853 becomes 2π.
 
-Only commands that Markdown leaves alone are used: it takes the backslash away from punctuation such as `\,` and `\_`.
+Only commands that Markdown does not change are used: it removes the backslash from punctuation such as `\,` and `\_`.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ def name(path: str, dots: int = 0) -> str:
 
     Args:
         path: dotted path of the field.
-        dots: how often it is differentiated in time.
+        dots: order of the time derivative.
     """
-    if path.endswith(")"):  # what the model says about a field, such as prescribed(w)
+    if path.endswith(")"):  # a property of a field, such as prescribed(w)
         said, _, about = path.removesuffix(")").partition("(")
         return rf"{text(said)}\left({name(about)}\right)"
     owner, _, field = path.rpartition(".")
@@ -54,13 +54,13 @@ def _differentiated(letter: str, times: int) -> str:
 
 
 def function(called: str, arguments: list[str], number: int = 0) -> str:
-    """Return a function of the component with its arguments, or one of several that have one name."""
+    """Return a function of the component with its arguments, with a subscript if several have the same name."""
     written = name(called) + (f"_{{{number}}}" if number else "")
     return rf"{written}\left({', '.join(arguments)}\right)" if arguments else written
 
 
 def number(value: float) -> str:
-    """Return a number: fractions and multiples of π where they are meant, else six digits."""
+    """Return a number: fractions and multiples of π if they match, otherwise six digits."""
     if abs(value) > _INFINITE:
         return r"\infty" if value > 0 else r"-\infty"
     of_pi = Fraction(value / pi).limit_denominator(12)

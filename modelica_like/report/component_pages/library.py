@@ -21,12 +21,12 @@ INDEX = "README.md"
 
 
 def component_pages(folder: Path, examples: Path | None = None, types: Sequence[str] | None = None) -> dict[Path, str]:
-    """Return pages about component types, by the files they belong in.
+    """Return pages about component types by file.
 
     Args:
-        folder: where the pages will be.
-        examples: folder of folder of netlists to link.
-        types: names as in netlists; without any, all types of the installed libraries, with an index.
+        folder: of the pages.
+        examples: folder of netlists to link.
+        types: names as in netlists; by default all types of the installed libraries, with an index.
 
     Raises:
         UnknownName: there is no such type.
@@ -40,7 +40,7 @@ def component_pages(folder: Path, examples: Path | None = None, types: Sequence[
 
 
 def write_component_pages(folder: Path, examples: Path | None = None, types: Sequence[str] | None = None) -> list[Path]:
-    """Write pages about component types, see `component_pages`; other files in the folder are left alone.
+    """Write pages about component types, see `component_pages`; other files in the folder are not touched.
 
     Raises:
         OSError: a file cannot be written.
@@ -54,7 +54,7 @@ def write_component_pages(folder: Path, examples: Path | None = None, types: Seq
 def examples_by_type(folder: Path) -> dict[str, list[Example]]:
     """Return the netlists of a folder in which each type occurs, the shortest first.
 
-    Files without parts, such as design checks, are no netlists.
+    Files without parts, such as design checks, are skipped.
     """
     if not folder.is_dir():
         raise NetlistError(f"There is no folder '{folder}' with examples.", advice="Name a folder of netlists.")
@@ -70,7 +70,7 @@ def examples_by_type(folder: Path) -> dict[str, list[Example]]:
 
 
 def _parts(table: Any) -> Iterator[Mapping[str, Any]]:
-    """Yield all tables that are parts, however deep."""
+    """Yield all tables that are parts, at any depth."""
     if isinstance(table, dict):
         inner = cast("dict[str, Any]", table)
         if isinstance(inner.get("is"), str):

@@ -13,19 +13,19 @@ from modelica_like.report.declared import filled
 
 
 def source_link(kind: type, file: Path) -> str:
-    """Return a link to the line where a class begins, relative to a page."""
+    """Return a link to the first line of a class, relative to a page."""
     source = Path(inspect.getsourcefile(kind) or "")
     line = inspect.getsourcelines(kind)[1]
     return f"[{source.name}:{line}]({relative(source, file.resolve())}#L{line})"
 
 
 def module_title(module: str) -> str:
-    """Return what a module is about, by its name."""
+    """Return the title of a module."""
     return module.rpartition(".")[2].replace("_", " ")
 
 
 def markdown(words: str) -> str:
-    """Return a text so that nothing in it is a command."""
+    """Return a text with Markdown commands escaped."""
     return words.replace("<", "&lt;").replace("*", r"\*")
 
 
@@ -35,7 +35,7 @@ def cell(words: str) -> str:
 
 
 def table(title: str, head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Return a table under a heading, without the columns that are empty; nothing if there are no rows."""
+    """Return a table under a heading, without empty columns; an empty text if there are no rows."""
     _, kept, filled_rows = filled(title, head, rows)
     lines = [kept, ["---"] * len(kept), *filled_rows] if filled_rows else []
     return (f"## {title}\n\n" if title and lines else "") + "\n".join(f"| {' | '.join(line)} |" for line in lines)

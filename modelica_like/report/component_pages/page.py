@@ -1,4 +1,4 @@
-"""A component type as a page in Markdown, made from its declarations alone."""
+"""A component type as a page in Markdown, made from its declarations."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def _notation(optional: Mapping[str, str]) -> Notation:
 
 
 def _optional(source: Source) -> dict[str, str]:
-    """Return what to say of parameters that need no value, or only where others have none."""
+    """Return the note on optional parameters and on alternatives."""
     told = dict.fromkeys(source.asked, "optional")
     for name, uses in source.uses.items():
         instead = [asked for asked in source.asked if all(use.get(asked) is False for use in uses)]
@@ -91,7 +91,7 @@ def _values(part: Component) -> str:
 
 
 def _bases(kind: type[Component], file: Path) -> list[str]:
-    """Return what the bases say: there stands the physics that several types share."""
+    """Return the docstrings of the bases, with the physics common to several types."""
     bases = [base for base in kind.__mro__[1:] if issubclass(base, Component) and base is not Component]
     texts = [
         f"### {base.__name__}\n\n{source_link(base, file)}\n\n{markdown(inspect.cleandoc(base.__doc__ or ''))}"
@@ -107,18 +107,19 @@ def _example_links(examples: Sequence[Example], file: Path) -> list[str]:
     return ["## In netlists\n\n" + "\n".join(links)]
 
 
-# -- what a class says -------------------------------------------------------------------------------------------------
+# -- content of a class
+# -------------------------------------------------------------------------------------------------
 
 
 def written(says: Iterable[Said]) -> str:
-    """Return what is said, in this order: equations in blocks, events as tables, paragraphs as they stand."""
+    """Return the items: equations in blocks, events as tables, paragraphs unchanged."""
     parts: list[str] = []
     for _, group in groupby(says, type):
         many = list(group)
         parts += [one for one in many if isinstance(one, str) and one]
         parts += filter(None, [_equations([one for one in many if isinstance(one, Term)])])
         parts += filter(None, [_events([one for one in many if isinstance(one, Event)])])
-    # Ends and source text that follow each other are one list and one text.
+    # Consecutive ends become one list, consecutive source texts one text.
     return "\n\n".join(parts).replace("`\n\n- `", "`\n- `").replace("\n```\n\n```python\n", "\n")
 
 

@@ -1,4 +1,4 @@
-"""What a component class says, read from its source text: equations, events, energy terms, definitions."""
+"""Content of a component class, read from its source text: equations, events, energy terms, definitions."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _LANGUAGE = "modelica_like.language"
 
 
 class Term(NamedTuple):
-    """An equation or a definition: both sides as LaTeX, the sign between them, and where it holds."""
+    """An equation or a definition: both sides as LaTeX, the sign between them, and its condition."""
 
     left: str
     right: str
@@ -41,7 +41,7 @@ class Term(NamedTuple):
 
 
 class Event(NamedTuple):
-    """A transition, or the choice of the mode at the start (`source` is then empty); what is mathematics as LaTeX."""
+    """A transition, or the choice of the mode at the start (`source` is then empty); mathematics as LaTeX."""
 
     mode: str
     source: str
@@ -67,12 +67,12 @@ class _Function(NamedTuple):
 
 @dataclass
 class Source:
-    """What a class says.
+    """Content of a class.
 
     Attributes:
         kind: the class.
-        asked: optional parameters on which it depends.
-        uses: for each field that occurs, on which conditions: names of parameters, and whether they are given.
+        asked: optional parameters on which its equations depend.
+        uses: conditions of each field that occurs: names of parameters, and whether they are given.
     """
 
     kind: type[Component]
@@ -82,7 +82,7 @@ class Source:
     conditions: dict[str, bool] = field(default_factory=dict[str, bool])
 
     def says(self, name: str) -> list[Said]:
-        """Return what `equations` or `events` yield."""
+        """Return the items of `equations` or `events`."""
         function = self.method(name)
         return list(_reader(self, function, {}).body(function.code.body)) if function else []
 
@@ -92,7 +92,7 @@ class Source:
         return [said for term in terms for said in term]
 
     def definitions(self) -> Iterator[Said]:
-        """Yield what the methods, properties and functions return that occurred so far, and what occurs in them."""
+        """Yield definitions of the methods, properties and functions that have occurred, recursively."""
         done: set[str] = set(_ENERGY)
         while missing := [name for name in self.found if name not in done]:
             for name in missing:
@@ -103,13 +103,13 @@ class Source:
                 yield from reader.definition(name)
 
     def symbol(self, name: str, dots: int = 0) -> str:
-        """Return the symbol of a method or property: words, where a connector has the same."""
+        """Return the symbol of a method or property: words if a connector has the same symbol."""
         made = names.name(name.lstrip("_"), dots)
         ends = (f"{end}.{one}" for end, connector in self.kind._class_connectors.items() for one in connector.fields)
         return names.text(name) if made in map(names.name, ends) else made
 
     def method(self, name: str, after: type | None = None) -> _Function | None:
-        """Return a method or property that a library gives the class, or what comes after one of its bases."""
+        """Return a method or property of the class from a library, or the next one after a base."""
         line = self.kind.__mro__[self.kind.__mro__.index(after) + 1 if after else 0 :]
         base = next((one for one in line if name in vars(one)), Component)
         return None if base in Component.__mro__ else _in_class(base, name)
@@ -184,7 +184,7 @@ class _Reader(Writer):
     # -- equations and events ------------------------------------------------------------------------------------------
 
     def body(self, statements: Sequence[ast.stmt]) -> Iterator[Said]:
-        """Yield what statements yield, one after the other; what cannot be written is shown as it stands."""
+        """Yield the items of statements, one after the other; source text for items without notation."""
         for k, statement in enumerate(statements):
             match statement:
                 case ast.If(test=test, body=[*before, ast.Return()], orelse=other):
@@ -219,7 +219,7 @@ class _Reader(Writer):
                 raise Unwritable
 
     def _from(self, call: ast.Call) -> Iterator[Said]:
-        """Yield what another method yields, in the place of its call."""
+        """Yield the items of another method in the place of its call."""
         arguments = call.args
         match call.func:
             case ast.Attribute(value=ast.Call(), attr=name):
@@ -241,7 +241,7 @@ class _Reader(Writer):
     # -- what functions return -----------------------------------------------------------------------------------------
 
     def definition(self, name: str) -> list[Said]:
-        """Return what the function returns: terms of its local names and of itself, or its source text."""
+        """Return the definition of a function: terms of its local names and of itself, or its source text."""
         lines: list[Said] = []
         formal = list(self.local)
         try:
@@ -255,11 +255,11 @@ class _Reader(Writer):
         return lines
 
     def _again(self) -> _Reader:
-        """Return a reader that may give local names another meaning."""
+        """Return a reader that may change the meaning of local names."""
         return replace(self, local=dict(self.local))
 
     def _returned(self, statements: Sequence[ast.stmt], lines: list[Said] | None = None) -> Written | None:
-        """Return what statements return, None where they raise; without lines, local names are replaced."""
+        """Return the value of statements, None if they raise; without lines, local names are replaced."""
         for k, statement in enumerate(statements):
             match statement:
                 case ast.Raise():
@@ -290,7 +290,7 @@ class _Reader(Writer):
         return None
 
     def sentence(self) -> str:
-        """Return the first sentence of the docstring, or of the one that it replaces."""
+        """Return the first sentence of the docstring, or of the overridden method's."""
         function: _Function | None = self.of
         while function is not None:
             if text := ast.get_docstring(function.code):
@@ -300,7 +300,7 @@ class _Reader(Writer):
         return ""
 
     def _assigned(self, target: ast.expr, value: ast.expr) -> Iterator[Said]:
-        """Take a local name: what it stands for where that is a path or a column of a table, else a term."""
+        """Store a local name: its meaning if that is a path or a column of a table, otherwise a term."""
         match target, value:
             case ast.Tuple(elts=targets), ast.Tuple(elts=values):
                 for one, other in zip(targets, values, strict=True):
@@ -361,7 +361,7 @@ class _Reader(Writer):
 
 
 def _reader(source: Source, of: _Function, local: dict[str, Meaning] | None = None) -> _Reader:
-    """Return a reader of a function; without meanings, its arguments stand for themselves."""
+    """Return a reader of a function; without meanings, its arguments are symbols."""
     formal = [one.arg for one in of.code.args.args if one.arg != "self"]
     return _Reader(of.constants, {one: Path(one, own=False) for one in formal} if local is None else local, source, of)
 
@@ -377,7 +377,7 @@ def _changed(statement: ast.stmt) -> Iterator[str]:
 
 
 def _where(condition: str, said: Said) -> Said:
-    """Return what is said only on a condition."""
+    """Return the items under a condition."""
     if isinstance(said, str):
         return f"${condition}$:\n\n{said}"
     return said._replace(where=rf"{condition} \text{{, }} {said.where}" if said.where else condition)

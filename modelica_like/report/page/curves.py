@@ -1,4 +1,4 @@
-"""What the script of a report draws: curves by quantity, modes as bands, events."""
+"""Data for the script of a report: curves by quantity, modes as bands, events."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from modelica_like.solve.plot import quantity as quantity_of
 from modelica_like.solve.solution import Solution
 
 _POINTS = 1200
-"""Results that are drawn; those at events are among them."""
+"""Number of drawn results, including those at events."""
 _MOST_BANDS = 400
 
 
@@ -22,10 +22,10 @@ def curves(run: Solution, patterns: Sequence[str] = ()) -> dict[str, Any]:
 
     Args:
         run: the run.
-        patterns: of what is drawn; by default speeds, torques and forces of the parts.
+        patterns: of the curves; by default speeds, torques and forces of the parts.
 
     Raises:
-        UnknownName: nothing fits a pattern.
+        UnknownName: nothing matches a pattern.
     """
     names = [name for name in chosen(run, patterns) if name in run.model.position]
     rows = _thinned(run)
@@ -43,7 +43,7 @@ def curves(run: Solution, patterns: Sequence[str] = ()) -> dict[str, Any]:
 
 
 def _thinned(run: Solution) -> NDArray[np.intp]:
-    """Positions of the results that are drawn: evenly spread ones, and both sides of every event."""
+    """Positions of the drawn results: evenly spread ones, and both sides of every event."""
     count = len(run.time)
     spread = np.unique(np.linspace(0, count - 1, min(count, _POINTS)).round().astype(int))
     times = np.unique([event.time for event in run.events][:_POINTS])
@@ -53,7 +53,7 @@ def _thinned(run: Solution) -> NDArray[np.intp]:
 
 
 def _bands(run: Solution) -> list[dict[str, Any]]:
-    """Of each mode that changes, from when to when it has which name."""
+    """Time spans of the values of each mode that changes."""
     found: dict[str, list[tuple[float, float, str]]] = {}
     begin, end = float(run.time[0]), float(run.time[-1])
     for event in run.events:

@@ -29,35 +29,35 @@ from modelica_like.writing import write_text
 
 _MOST_EVENTS = 60
 _SMALL = 1e-6
-"""Part of the energy that moves below which a component is not listed."""
+"""Share of the throughput below which a component is not listed."""
 
 
 def save_report(drive: Component, run: Solution, path: str | Path, *, show: Sequence[str] = ()) -> None:
     """Write the report of a run as a page.
 
     Args:
-        drive: what was run.
+        drive: the drive.
         run: its run.
         path: the file.
         show: patterns of the curves, such as `*.w`; by default speeds, torques and forces of the parts.
 
     Raises:
-        UnknownName: nothing fits a pattern.
+        UnknownName: nothing matches a pattern.
         OSError: the file cannot be written.
     """
     write_text(path, report(drive, run, show=show))
 
 
 def report(drive: Component, run: Solution, *, show: Sequence[str] = ()) -> str:
-    """Return the report of a run as HTML: one file that asks for nothing else.
+    """Return the report of a run as HTML: one file that loads nothing else.
 
     Args:
-        drive: what was run.
+        drive: the drive.
         run: its run.
         show: patterns of the curves; by default speeds, torques and forces of the parts.
 
     Raises:
-        UnknownName: nothing fits a pattern.
+        UnknownName: nothing matches a pattern.
     """
     folder = Path(__file__).parent
     sections = [
@@ -84,7 +84,7 @@ def report(drive: Component, run: Solution, *, show: Sequence[str] = ()) -> str:
 
 
 def _attempt(make: Callable[[], str]) -> str:
-    """A section that cannot be made says why, and the others stand."""
+    """If a section cannot be made, it shows why; the others are not affected."""
     try:
         return make()
     except ModelicaLikeError as error:
@@ -102,7 +102,7 @@ def _table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 
 def _happens(drive: Component, run: Solution) -> str:
-    """Events in words, those of one instant together, and what the run has to say."""
+    """Events in words, grouped by time, and the notices of the run."""
     instants: dict[float, dict[str, list[tuple[Event, str]]]] = {}
     for event, why in zip(run.events, reasons(run), strict=True):
         instants.setdefault(event.time, {}).setdefault(event.mode, []).append((event, why))
@@ -116,7 +116,7 @@ def _happens(drive: Component, run: Solution) -> str:
 
 
 def _told(run: Solution, events: Sequence[tuple[Event, str]]) -> str:
-    """Return what becomes of a mode at an instant: `clutch becomes stuck (slip reached zero)`."""
+    """Return the change of a mode at an instant: `clutch becomes stuck (slip reached zero)`."""
     last = events[-1][0]
     component = last.mode.rpartition(".")[0] or run.model.name
     told = ", ".join(dict.fromkeys(why for _, why in events))
@@ -124,7 +124,7 @@ def _told(run: Solution, events: Sequence[tuple[Event, str]]) -> str:
 
 
 def _energy(balance: EnergyBalance) -> str:
-    """Where the energy comes from and where it goes, in J and percent of what comes in."""
+    """Energy of each part, in J and percent of the supply."""
     total = sum(max(row.source, 0.0) + max(-row.stored, 0.0) for row in balance) or 1.0
     rows = [
         (row.component or "the drive", what, value)
@@ -147,7 +147,7 @@ def _energy(balance: EnergyBalance) -> str:
 
 
 def _small_motions(run: Solution) -> str:
-    """Eigenfrequencies in the modes in which the run ends."""
+    """Natural frequencies in the modes in which the run ends."""
     modes = [mode for mode in linearize(run).modes() if mode.oscillates]
     rows = [
         (str(k), f"{mode.frequency:.4g}", f"{mode.damping:.3g}", shares(mode.stored), shares(mode.lost))

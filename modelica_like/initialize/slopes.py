@@ -13,10 +13,12 @@ import numpy as np
 
 from modelica_like.compile.buffers import BufferedFunction, Vector
 from modelica_like.compile.compiled import CompiledDae
-from modelica_like.errors import UnknownName, did_you_mean
-from modelica_like.initialize import Point
-from modelica_like.initialize.kept import find_kept, solve_kept
-from modelica_like.initialize.steady import moving_states
+from modelica_like.errors import SingularAtStart, UnknownName, did_you_mean
+from modelica_like.initialize.point import Point
+from modelica_like.initialize.singular import is_regular
+
+_Names = tuple[str, ...]
+_ALL: _Names = ("x", "t", "theta")
 
 
 @dataclass(frozen=True)
@@ -71,11 +73,12 @@ class Slopes:
 
 
 class _Partials:
-    """Value and partial derivatives by x, z, t and (p, u, d), called sparse and given dense."""
+    """Value and partial derivatives by z and some of x, t and theta = (p, u, d), called sparse and given dense."""
 
-    def __init__(self, symbols: list[Any], value: Any) -> None:
+    def __init__(self, symbols: list[Any], value: Any, by: _Names) -> None:
         t, x, z, *theta = symbols[:6]
-        outputs = [ca.densify(value), *(ca.jacobian(value, one) for one in (x, z, t, ca.vertcat(*theta)))]
+        known = {"x": x, "t": t, "theta": ca.vertcat(*theta)}
+        outputs = [ca.densify(value), *(ca.jacobian(value, one) for one in (z, *(known[name] for name in by)))]
         self._fast = BufferedFunction(ca.Function("slopes", symbols, outputs))
         patterns = [self._fast.function.sparsity_out(k) for k in range(len(outputs))]
         self._patterns = [(one.shape, np.array(one.find(), int)) for one in patterns]
@@ -108,31 +111,77 @@ def slopes(
         constants: numbers that are not differentiated.
     """
 
-    def make() -> _Partials:
+    def make() -> tuple[list[Any], Any]:
         made: ca.Function = getattr(model, name) if function is None else function()
         # Linear equations are solved in numbers.
         as_numbers = function is not None and not made.is_a("SXFunction")
         symbols = made.mx_in() if as_numbers else [*model.arguments.values()]
         value = made(*symbols)
-        return _Partials(symbols, value if rows is None else value[list(rows)])
+        return symbols, value if rows is None else value[list(rows)]
 
-    chosen = None if rows is None else tuple(rows)
-    partials = model.once(("slopes of", name, chosen, get_ident()), make)
-    value, x, z, t, theta = partials(model, point, *constants)
-    if np.any(z):
-        z_x, z_t, z_theta = implicit_slopes(model, point)
-        x, t, theta = x + z @ z_x, t + z @ z_t, theta + z @ z_theta
+    key = name, None if rows is None else tuple(rows)
+    value, x, t, theta = _total(model, point, key, make, _ALL, *constants)
     return Slopes(model, point, value[:, 0], x, t[:, 0], theta)
 
 
-def implicit_slopes(model: CompiledDae, point: Point) -> tuple[Vector, Vector, Vector]:
-    """Derivatives of z by x, t and theta; shapes (nz, nx), (nz, 1), (nz, ntheta)."""
+def variable_slopes(model: CompiledDae, point: Point, nodes: Sequence[int]) -> Vector:
+    """Return the derivatives of variables by the states alone.
+
+    Args:
+        model: the compiled model.
+        point: where.
+        nodes: positions of the variables.
+
+    Returns:
+        Shape (nodes, states).
+
+    Raises:
+        SingularAtStart: a slope is not finite.
+    """
+
+    def make() -> tuple[list[Any], Any]:
+        symbols = [*model.arguments.values()]
+        return symbols, model.variables(*symbols)[list(nodes)]
+
+    _, x = _total(model, point, ("variables", tuple(nodes)), make, ("x",))
+    _check_finite(model, point, [x], (model.flat_variables[node].path for node in nodes))
+    return x
+
+
+def implicit_slopes(model: CompiledDae, point: Point, by: _Names = _ALL) -> list[Vector]:
+    """Derivatives of z by x, t and theta; shapes (nz, nx), (nz, 1), (nz, ntheta).
+
+    Raises:
+        SingularAtStart: a slope is not finite.
+    """
     symbols = [*model.arguments.values()]
-    make = lambda: _Partials(symbols, model.alg(*symbols))  # noqa: E731
-    _, x, z, t, theta = model.once(("slopes of z", get_ident()), make)(model, point)
-    solved = np.asarray(-np.linalg.solve(z, np.hstack([x, t, theta])), np.float64)
-    columns = x.shape[1]
-    return solved[:, :columns], solved[:, columns : columns + 1], solved[:, columns + 1 :]
+    make = lambda: _Partials(symbols, model.alg(*symbols), by)  # noqa: E731
+    _, z, *parts = model.once(("slopes of z", by, get_ident()), make)(model, point)
+    _check_finite(model, point, [z, *parts], model.implicit)
+    right = -np.hstack(parts)
+    # Reactions whose split is undetermined make the equations for z singular; what depends on them is left out.
+    solved: Any = np.linalg.solve(z, right) if is_regular(z) else np.linalg.lstsq(z, right, rcond=None)[0]
+    return np.split(solved, np.cumsum([part.shape[1] for part in parts])[:-1], axis=1)
+
+
+def _total(
+    model: CompiledDae, point: Point, key: Any, make: Callable[[], tuple[list[Any], Any]], by: _Names,
+    *constants: Vector,
+) -> list[Vector]:  # fmt: skip
+    """Return value and derivatives of what `make` gives (symbols and expression), z following."""
+    partials = model.once(("slopes of", key, by, get_ident()), lambda: _Partials(*make(), by))
+    value, z, *parts = partials(model, point, *constants)
+    if np.any(z):
+        parts = [one + z @ follows for one, follows in zip(parts, implicit_slopes(model, point, by), strict=True)]
+    return [value, *parts]
+
+
+def _check_finite(model: CompiledDae, point: Point, parts: list[Vector], names: Iterable[str]) -> None:
+    if not all(np.isfinite(part).all() for part in parts):
+        raise SingularAtStart(
+            f"The slopes of {', '.join(names)} are not finite at t = {point.t:.9g} s.",
+            advice="Look for a mass, inertia or ratio of zero, or a function outside its domain.",
+        )
 
 
 def nodes_of(model: CompiledDae, names: Iterable[str]) -> list[int]:
@@ -158,23 +207,3 @@ def _found(model: CompiledDae, names: Iterable[str], known: Mapping[str, int], w
     if missing is not None:
         raise UnknownName(f"{model.name} has no {what} '{missing}'{did_you_mean(missing, known) or '.'}")
     return [known[name] for name in names]
-
-
-def steady_change(model: CompiledDae, point: Point, theta: Vector, guess: Vector | None = None) -> Vector:
-    """Return how the states of a steady state change: the implicit function theorem.
-
-    Args:
-        model: the compiled model.
-        point: the steady state.
-        theta: changes of (p, u, d), shape (ntheta, columns).
-        guess: changes of the states that equilibrium does not determine, shape (nx, columns); none by default.
-    """
-    moving, rates = moving_states(model), slopes(model, point, "ode")
-    change = np.zeros((len(rates.x), theta.shape[1])) if guess is None else guess.copy()
-    inner = rates.x[np.ix_(moving, moving)]
-    kept = find_kept(model, point, moving, inner)
-    held = slopes(model, point, "variables", kept.held)
-    right = rates.theta[moving] @ theta + inner @ change[moving]
-    of_held = held.theta @ theta + held.x[:, moving] @ change[moving]
-    change[moving] += solve_kept(kept, inner, -right, -of_held)
-    return change

@@ -1,0 +1,66 @@
+"""Switching of drives: contactors, diodes."""
+
+from __future__ import annotations
+
+from components import icons
+from components.electrical import Pin, TwoPins
+from components.thermal import Lossy
+from modelica_like.language import Equations, Events, Expr, Mode, Parameter, Variable, der, param, var
+
+
+class Diode(Lossy, TwoPins):
+    """Diode: it conducts from p to n above the forward voltage, and a small conductance is left when it blocks."""
+
+    icon = icons.DIODE
+    V_f: Parameter = param("V", "forward voltage without current", default=0.0, min=0)
+    R: Parameter = param("Ohm", "resistance while it conducts", default=1e-5, min=0)
+    G: Parameter = param("S", "conductance while it blocks", default=1e-5, min=0)
+    state = Mode("blocking", "conducting", description="state of the diode")
+
+    def equations(self) -> Equations:
+        yield from super().equations()
+        conducting = self.v - self.V_f - self.R * self.i
+        yield self.state.choose(blocking=self.i - self.G * self.v, conducting=conducting) == 0
+
+    def events(self) -> Events:
+        yield self.state.initially("conducting", when=self.v > self.V_f)
+        yield self.state.go("blocking", "conducting", when=self.v > self.V_f)
+        yield self.state.go("conducting", "blocking", when=self.i < 0)
+
+    def dissipation(self) -> Expr:
+        return self.v * self.i
+
+
+class Contactor(Lossy, TwoPins):
+    """Contactor: its main contact closes when the current of its coil has risen to i_on, and opens below i_off."""
+
+    icon = icons.CONTACTOR
+    cp = Pin("positive terminal of the coil")
+    cn = Pin("negative terminal of the coil")
+    R_coil: Parameter = param("Ohm", "resistance of the coil", min=1e-12)
+    L_coil: Parameter = param("H", "inductance of the coil", min=1e-12)
+    i_on: Parameter = param("A", "current at which the contact closes", min=0)
+    i_off: Parameter = param("A", "current at which the contact opens; below i_on", min=0)
+    R_closed: Parameter = param("Ohm", "resistance of the closed contact", default=1e-5, min=0)
+    G_open: Parameter = param("S", "conductance of the open contact", default=1e-5, min=0)
+    i_coil: Variable = var("A", "current of the coil", default=0)
+    contacts = Mode("open", "closed", description="state of the main contact")
+
+    def equations(self) -> Equations:
+        yield from super().equations()
+        yield self.cp.i == self.i_coil
+        yield self.cn.i == -self.i_coil
+        yield self.L_coil * der(self.i_coil) == self.cp.v - self.cn.v - self.R_coil * self.i_coil
+        yield self.contacts.choose(open=self.i - self.G_open * self.v, closed=self.v - self.R_closed * self.i) == 0
+
+    def events(self) -> Events:
+        contacts, i = self.contacts, self.i_coil
+        yield contacts.initially("closed", when=i > self.i_on)
+        yield contacts.go("open", "closed", when=i > self.i_on, because="the coil pulls in")
+        yield contacts.go("closed", "open", when=i < self.i_off, because="the coil drops out")
+
+    def stored_energy(self) -> Expr:
+        return 0.5 * self.L_coil * self.i_coil**2
+
+    def dissipation(self) -> Expr:
+        return self.v * self.i + self.R_coil * self.i_coil**2

@@ -1,0 +1,210 @@
+"""What a run adds to a schematic: modes by colours, power by the width of lines."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import cast
+
+import numpy as np
+
+from modelica_like.draw.diagram import Node, Port
+from modelica_like.draw.labels import VALUE, text_width
+from modelica_like.draw.sheet import Line, Placed, Point, Sheet
+from modelica_like.errors import ValueOutOfRange
+from modelica_like.language.component import Component
+from modelica_like.language.declared import Connector
+from modelica_like.solve.trajectories import Trajectories
+from modelica_like.units import parse_unit
+
+Piece = tuple[Point, Point, float]
+HELD, OPEN, SLIDES = "held", "open", "slides"
+_WATT = parse_unit("W")
+_THICKEST = 12.0
+"""Width of the line with the largest power, in 1/96 inch."""
+_SAID = 1e-3
+"""Part of the largest power below which a line says nothing."""
+_OPEN_NAMES = ("free", "open", "off", "apart", "gap")
+_PREFIXES = ((1e9, "GW"), (1e6, "MW"), (1e3, "kW"), (1.0, "W"), (1e-3, "mW"))
+
+
+@dataclass
+class Running:
+    """A run as a schematic shows it.
+
+    Attributes:
+        modes: of each node with a mode, times at which its look changes, and the looks and names from then on.
+        powers: pieces of each line, with the power that passes in W.
+        end: of the run in s.
+        moving: show all modes one after the other instead of those of one time.
+    """
+
+    modes: dict[Node, list[tuple[float, str, str]]] = field(default_factory=dict)
+    powers: dict[Line, list[Piece]] = field(default_factory=dict)
+    end: float = 0.0
+    moving: bool = False
+
+    @property
+    def largest(self) -> float:
+        """The largest power in W."""
+        return max((abs(power) for pieces in self.powers.values() for _, _, power in pieces), default=0.0)
+
+    def width(self, line: Line, power: float) -> float:
+        """Return how thick a piece of a line is drawn."""
+        least = line.stroke.width
+        return least + (_THICKEST - least) * abs(power) / self.largest if power else least
+
+    def said(self, line: Line) -> tuple[Point, str] | None:
+        """Return the middle of the longest level stretch of a line that has room for its power, and that as a text."""
+        stretches = dict[tuple[float, str], tuple[float, float]]()
+        for (x1, y1), (x2, y2), power in self.powers.get(line, ()):
+            if y1 == y2 and abs(power) > _SAID * self.largest:
+                key = y1, spelled(abs(power))
+                low, high = stretches.get(key, (x1, x2))
+                stretches[key] = min(low, x1, x2), max(high, x1, x2)
+        longest = max(stretches.items(), key=lambda one: one[1][1] - one[1][0], default=None)
+        if longest is None or longest[1][1] - longest[1][0] < text_width(longest[0][1], VALUE):
+            return None
+        (y, text), (low, high) = longest
+        return ((low + high) / 2, y), text
+
+
+def spelled(power: float) -> str:
+    """Return a power with a suitable unit."""
+    size, unit = next((one for one in _PREFIXES if abs(power) >= one[0]), _PREFIXES[-1])
+    return f"{power / size:.3g} {unit}"
+
+
+def running(
+    drawn: Sheet, run: Trajectories, *, at: float | None = None, flow: bool = False, moving: bool = False
+) -> Running:
+    """Collect what a run adds to a sheet.
+
+    Args:
+        drawn: the schematic of what was run.
+        run: the run.
+        at: time in s whose modes and powers are shown; by default modes at the end and mean powers.
+        flow: show powers.
+        moving: show the modes of the whole run.
+
+    Raises:
+        ValueOutOfRange: the run has no such time.
+    """
+    first, last = float(run.time[0]), float(run.time[-1])
+    if at is not None and not first <= at <= last:
+        raise ValueOutOfRange(f"There is nothing at {at:g} s: the run goes from {first:g} s to {last:g} s.")
+    made = Running(end=last, moving=moving)
+    for item in (item for _, item in drawn.everything()):
+        if isinstance(item, Placed) and item.node.component is not None:
+            looks = list(_looks(item.node.component, run))
+            if looks and not moving:
+                now = last if at is None else at
+                looks = [[look for look in looks if look[0] <= now][-1]]
+            if looks:
+                made.modes[item.node] = looks
+        elif isinstance(item, Line) and flow and not item.stroke.dashed and (pieces := _pieces(item, run, at)):
+            made.powers[item] = pieces
+    return made
+
+
+def _looks(part: Component, run: Trajectories) -> Iterator[tuple[float, str, str]]:
+    """When the look of a part changes, to what look, and the mode's name."""
+    holding = {one: set(mode.holds) for one, mode in part.modes.items() if mode.holds}
+    path = _path(part)
+    for name, held in holding.items():
+        names = part.modes[name].names
+        values = run[f"{path}.{name}"].astype(int)
+        changes = [0, *(np.flatnonzero(np.diff(values)) + 1)]
+        for k in changes:
+            mode = names[values[k]]
+            look = HELD if mode in held else OPEN if mode in _OPEN_NAMES else SLIDES
+            yield float(run.time[k]), look, mode.replace("_", " ")
+        return
+
+
+def _path(part: Component) -> str:
+    names = list[str]()
+    while part._owner is not None:
+        names.append(part._name)
+        part = cast("Component", part._owner)
+    return ".".join(reversed(names))
+
+
+def _pieces(line: Line, run: Trajectories, at: float | None) -> list[Piece]:
+    """Pieces of a line between its corners and branches, and what passes each: the powers of all parts beyond it."""
+    known = {_rounded(tip): _into(port, run, at) for port, tip in line.tips.items()}
+    lacking = [tip for tip, power in known.items() if power is None]
+    if len(lacking) > 1 or len(known) < 2:
+        return []
+    into = {tip: power for tip, power in known.items() if power is not None}
+    into |= dict.fromkeys(lacking, -sum(into.values()))
+    paths = [[_rounded(corner) for corner in path] for path in line.paths]
+    corners = sorted({corner for path in paths for corner in path})
+    edges = dict[frozenset[Point], None]()
+    for path in paths:
+        for a, b in pairwise(path):
+            there = [one for one in corners if _between(one, a, b)]
+            edges |= dict.fromkeys(frozenset(pair) for pair in pairwise(there) if pair[0] != pair[1])
+    return [(min(edge), max(edge), _beyond(edge, edges, into)) for edge in edges]
+
+
+def _rounded(point: Point) -> Point:
+    return round(point[0], 2), round(point[1], 2)
+
+
+def _between(point: Point, a: Point, b: Point) -> bool:
+    return all(min(a[k], b[k]) <= point[k] <= max(a[k], b[k]) for k in (0, 1))
+
+
+def _beyond(cut: frozenset[Point], edges: Iterable[frozenset[Point]], into: Mapping[Point, float]) -> float:
+    """Power through a piece: into all that hangs on one of its ends, once it is taken out."""
+    start, _ = cut
+    reached, pending = {start}, [start]
+    while pending:
+        here = pending.pop()
+        for other in (one for edge in edges if here in edge and edge != cut for one in edge if one not in reached):
+            reached.add(other)
+            pending.append(other)
+    return sum(power for tip, power in into.items() if tip in reached)
+
+
+def _into(port: Port, run: Trajectories, at: float | None) -> float | None:
+    """Power in W into a part through a port: now, or its mean."""
+    part = port.node.component
+    connector = part and _connector(part, port.name)
+    if part is None or connector is None:
+        return None
+    path = f"{_path(part)}.{port.name}"
+    known: Mapping[str, np.ndarray] = {
+        name: run[f"{path}.{name}"] for name in connector.fields if f"{path}.{name}" in run
+    }
+    flows = [name for name in known if getattr(connector.fields[name], "is_flow", False)]
+    others = [name for name in known if name not in flows]
+    if len(flows) != 1 or len(others) != 1:
+        return None
+    flow, other = known[flows[0]], known[others[0]]
+    unit = connector.fields[flows[0]].unit
+    if unit == _WATT:
+        return _at(run.time, flow, at)
+    if (unit * connector.fields[others[0]].unit).dimension == _WATT.dimension:
+        return _at(run.time, flow * other, at)
+    # Flow times the rate of the potential.
+    spans, rises = np.diff(run.time), np.diff(other)
+    if at is None:
+        return float(np.sum(0.5 * (flow[1:] + flow[:-1]) * rises) / max(np.sum(spans), np.finfo(float).tiny))
+    moves = spans > 0.0
+    middles, rates = 0.5 * (run.time[1:] + run.time[:-1])[moves], rises[moves] / spans[moves]
+    return float(np.interp(at, middles, rates) * np.interp(at, run.time, flow)) if moves.any() else 0.0
+
+
+def _connector(part: Component, name: str) -> Connector | None:
+    found = part.connectors.get(name)
+    return found if found is not None and found.used else None
+
+
+def _at(time: np.ndarray, values: np.ndarray, at: float | None) -> float:
+    if at is not None:
+        return float(np.interp(at, time, values))
+    span = time[-1] - time[0]
+    return float(np.trapezoid(values, time) / span) if span else 0.0

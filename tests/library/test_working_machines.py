@@ -1,0 +1,121 @@
+"""Linkages, drives with a variable ratio and working machines beyond what their netlist shows."""
+
+from math import pi, sin, sqrt
+
+import numpy as np
+import pytest
+
+from components import (
+    Cam,
+    CentrifugalPump,
+    ChainDrive,
+    Constant,
+    ConstantSpeed,
+    ConstantTorque,
+    Conveyor,
+    Damper,
+    DisplacementLoad,
+    Fixed,
+    FormingForce,
+    FourBar,
+    Inertia,
+    Mass,
+    SliderCrank,
+    VariableGear,
+)
+from modelica_like import Assembly, Component, simulate
+
+TIGHT = {"rtol": 1e-10, "atol": 1e-12}
+
+
+def chain_of(**parts: Component) -> Assembly:
+    return Assembly("drive", parts=parts, series={"shaft": list(parts)})
+
+
+@pytest.mark.parametrize("linkage", [SliderCrank(r=0.1, l=0.3, e=0.04), Cam(h=0.02, rise=2.0, dwell=0.5, fall=2.5)])
+def test_linkage_passes_all_power_on(linkage: Component) -> None:
+    """A flywheel drives a mass through the linkage: their energy stays, which it does only with the right slope."""
+    drive = chain_of(wheel=Inertia(J=0.02, phi=0.3, w=30.0), linkage=linkage, mass=Mass(m=3.0))
+    run = simulate(drive, 1.0, **TIGHT)
+    kinetic = 0.5 * 0.02 * run["wheel.w"] ** 2 + 0.5 * 3.0 * run["mass.v"] ** 2
+    assert np.ptp(run["wheel.w"]) > 0.1
+    assert np.ptp(kinetic) < 1e-6 * kinetic[0]
+
+
+def test_four_bar_passes_all_power_on_and_its_coupler_keeps_its_length() -> None:
+    linkage = FourBar(crank=0.04, coupler=0.12, rocker=0.09, ground=0.13)
+    run = simulate(
+        chain_of(wheel=Inertia(J=0.02, phi=0.3, w=-20.0), linkage=linkage, rocker=Inertia(J=0.05)), 1.0, **TIGHT
+    )
+    kinetic = 0.5 * 0.02 * run["wheel.w"] ** 2 + 0.5 * 0.05 * run["rocker.w"] ** 2
+    assert np.ptp(kinetic) < 1e-6 * kinetic[0]
+    phi, psi = run["wheel.phi"], run["rocker.phi"]
+    coupler = np.hypot(0.13 + 0.09 * np.cos(psi) - 0.04 * np.cos(phi), 0.09 * np.sin(psi) - 0.04 * np.sin(phi))
+    assert np.ptp(phi) > 2 * pi
+    assert coupler == pytest.approx(0.12, rel=1e-9)
+
+
+@pytest.mark.parametrize("load", [-8.0, 8.0])
+def test_variable_gear_loses_its_share_whichever_side_drives(load: float) -> None:
+    parts: dict[str, Component] = {
+        "ratio": Constant(k=2.0), "motor": ConstantSpeed(w_fixed=50.0),
+        "gear": VariableGear(T=0.1, efficiency=0.8, ratio=2.0), "load": ConstantTorque(tau_constant=load, phi=0.0),
+    }  # fmt: skip
+    drive = Assembly(
+        "drive", parts=parts, series={"s": ["motor", "gear", "load"]}, connect={"u": ["ratio.y", "gear.u"]}
+    )
+    run = simulate(drive, 0.5, **TIGHT)
+    entering = 8 * 25 / 0.8 if load < 0 else 8 * 25
+    assert run.final["gear.loss_power"] == pytest.approx(0.2 * entering, rel=1e-9)
+
+
+def test_chain_pulls_in_both_directions_and_is_as_fast_as_its_teeth() -> None:
+    chain = ChainDrive(z_a=15, z_b=45, pitch=0.0127, c=2e5, d=500.0)
+    for speed in (20.0, -20.0):
+        drive = chain_of(
+            motor=ConstantSpeed(w_fixed=speed, phi=0.0), chain=chain.copy(),
+            wheel=Inertia(J=0.05, phi=0.0, w=speed / 3), oil=Damper(d=2.0), wall=Fixed(),
+        )  # fmt: skip
+        run = simulate(drive, 2.0, **TIGHT)
+        assert np.sign(run.final["chain.f"]) == np.sign(speed)
+        turned = run.final["wheel.phi"]
+        # 2 Nm per rad/s at the wheel stretch the chain; otherwise every tooth of one is a tooth of the other.
+        stretch = abs(2.0 * speed / 3) / (0.0127 / (2 * sin(pi / 45))) / 2e5
+        assert abs(turned - speed * 2 / 3) < 1.2 * stretch / 0.0908 + 1e-3
+        assert np.min(run["chain.loss_power"]) > -1e-9
+        assert run.energy().closure < 1e-9
+
+
+def test_centrifugal_pump_below_its_static_head_moves_nothing() -> None:
+    pump = CentrifugalPump(w_nominal=150.0, H_0=60.0, K=1e5, R=2e5, H_static=30.0, tau_0=5.0)
+    still = simulate(chain_of(motor=ConstantSpeed(w_fixed=100.0), pump=pump), 0.1, **TIGHT)
+    assert still.final["pump.Q"] == 0
+    assert still.final["pump.tau"] == pytest.approx(5 * (2 / 3) ** 2)
+    free = CentrifugalPump(w_nominal=150.0, H_0=60.0, K=1e5, R=2e5, efficiency=0.6, smooth=1e-9)
+    run = simulate(chain_of(wheel=Inertia(J=2.0, phi=0.0, w=150.0), pump=free), 20.0, **TIGHT)
+    # Without static head the affinity laws hold: torque falls with the square, so the speed as 1/(1 + t/T).
+    flow = sqrt(60 / 3e5)
+    torque = 9806.65 * 2e5 * flow**2 * flow / 0.6 / 150
+    assert run.final["wheel.w"] == pytest.approx(150 / (1 + torque * 20 / (2 * 150)), rel=1e-5)
+    assert np.min(run["pump.loss_power"]) >= 0
+
+
+def test_loads_hold_at_standstill_up_to_what_they_take() -> None:
+    pump = DisplacementLoad(V=20e-6, p_out=50e5, p_in=1e5)
+    run = simulate(
+        chain_of(motor=ConstantTorque(tau_constant=15.0), wheel=Inertia(J=1.0, phi=0.0, w=0.0), pump=pump), 1.0
+    )
+    assert run.final["wheel.w"] == 0
+    belt = Conveyor(R=0.5, L=20.0, m_L=40.0, m_B=10.0, f=0.03, slope=0.02, phi=0.0, w=0.0)
+    run = simulate(chain_of(motor=ConstantTorque(tau_constant=0.0), belt=belt), 1.0)
+    assert run.final["belt.w"] == 0
+    steep = Conveyor(R=0.5, L=20.0, m_L=40.0, m_B=10.0, f=0.03, slope=0.2, phi=0.0, w=0.0)
+    run = simulate(chain_of(motor=ConstantTorque(tau_constant=0.0), belt=steep), 1.0, **TIGHT)
+    down = 9.80665 * 20 * (40 * sin(0.2) - 0.03 * 60 * np.cos(0.2)) / (20 * 60) / 0.5
+    assert run.final["belt.w"] == pytest.approx(-down, rel=1e-6)
+
+
+def test_workpiece_resists_forward_motion_only() -> None:
+    work = FormingForce(table=((0.0, 0.0), (0.001, 1e4), (0.05, 1e4), (0.051, 0.0)))
+    run = simulate(chain_of(slide=Mass(m=10.0, s=0.03, v=-2.0), work=work), 0.02, **TIGHT)
+    assert run.final["slide.v"] == pytest.approx(-2.0, rel=1e-9)
