@@ -121,7 +121,7 @@ class StateSpace(Component):
     B: tuple[Flat, ...] = rows(column("rate by a signal"), more=True)
     C: tuple[Flat, ...] = rows(column("output by a state"), more=True)
     D: tuple[Flat, ...] = rows(column("output by a signal"), more=True, default=((0.0,),))
-    time_scale: Parameter = param("s", "time that counts as 1", default=1.0, min=1e-12)
+    time_scale: Parameter = param("s", "scale of the time", default=1.0, min=1e-12)
 
     @property
     def direct(self) -> tuple[Flat, ...]:

@@ -228,7 +228,7 @@ class Powers:
 
 
 def _slopes(model: CompiledDae) -> ca.Function:
-    """Return how fast powers change, as a function."""
+    """Return the rates of powers, as a function."""
     arguments = list(model.arguments.values())
     slopes = model.motion.held(ca.vec(model.energy(*arguments)[:, 1 : 1 + POWERS]))
     return ca.Function("slopes", arguments, [ca.densify(slopes)], {"cse": True})
