@@ -51,7 +51,7 @@ def moment(run: Solution, mode: str, after: str) -> float:
 
 
 def test_the_armature_starts_and_leaves(run: Solution) -> None:
-    assert moment(run, "coil.stop", "moving") == pytest.approx(pull_in(), abs=1e-8)
+    assert moment(run, "coil.stop", "leaving") == pytest.approx(pull_in(), abs=1e-8)
     left = [event.time for event in run.events if (event.mode, event.before) == ("coil.stop", "driven")]
     assert left == [pytest.approx(3 + T / 2 * log((FORCE + SPRING) / SPRING), abs=1e-7)]
 
