@@ -83,9 +83,11 @@ class Actuator(Component, partial=True):
         yield der(self.s) == self.v
         yield self.m * der(self.v) == self.drive() - self.f_spring - self.c * self.s - self.f_stop
         yield self.stop.choose(resting=der(self.v), driven=der(self.v), otherwise=self.f_stop) == 0
+        # Where it rests, this is the force of the stop; but the blow with which it meets a stop presses nothing.
+        push = self.drive() - self.f_spring - self.c * self.s
         pressing = self.stop.choose(
-            resting=-self.f_stop if self.presses == "resting" else 0,
-            driven=self.f_stop if self.presses == "driven" else 0, otherwise=0,
+            resting=-push if self.presses == "resting" else 0, driven=push if self.presses == "driven" else 0,
+            otherwise=0,
         )  # fmt: skip
         yield self.y == pressing / self.f_nominal
 
