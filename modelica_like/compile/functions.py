@@ -110,8 +110,7 @@ def _motion_sources(flat: FlatModel) -> tuple[str, ...]:
     for instance in flat.instances:
         prefix = f"{instance.path}." if instance.path else ""
         slots = [kinds[prefix + slot.path] for slot in instance.template.energy_slots]
-        power = instance.template.energy.sparsity_jac(0, 0) if slots else ca.Sparsity(3, 0)
-        rows = zip(*power.get_triplet(), strict=True)
+        rows = zip(*instance.template.energy.sparsity_jac(0, 0).get_triplet(), strict=True) if slots else ()
         if any(row == _SOURCE_POWER and slots[k].kind == "flow" and str(slots[k].unit) in _EFFORTS for row, k in rows):
             found.append(instance.path)
     return tuple(found)

@@ -18,6 +18,11 @@ Guards are evaluated this much later, so that for a guard that just left zero th
 _JOINS: dict[int, Callable[[Any, Any], Any]] = {ca.OP_FMIN: ca.fmin, ca.OP_FMAX: ca.fmax}
 
 
+def time_resolution(t: float) -> float:
+    """Return the time resolution of events at a time, in s."""
+    return TIME_RESOLUTION * max(1.0, abs(t))
+
+
 def guards_soon(reduced: ReducedDae, guards: Any) -> Any:
     """Follow guards for one time resolution.
 

@@ -63,8 +63,7 @@ def run_fmu(
     path = Path(path)
     job = {
         "start": start, "stop": stop, "kind": kind, "tolerance": tolerance, "step": step, "points": points,
-        "solver": solver,
-        "outputs": list(outputs) if outputs else None, "parameters": _plain(parameters or {}),
+        "solver": solver, "outputs": list(outputs) if outputs else None, "parameters": _plain(parameters or {}),
         "inputs": {name: _series(name, value) for name, value in (inputs or {}).items()},
     }  # fmt: skip
     _check_times(path.name, start, stop, step, timeout)

@@ -43,7 +43,7 @@ def find_kept(model: CompiledDae, point: Point, states: list[int], jacobian: Mat
         states: positions of the states that may change.
         jacobian: slopes of their rates, and of the implicit equations, by these states and the implicit unknowns.
     """
-    left, sizes, _ = np.linalg.svd(jacobian) if jacobian.size else (np.eye(0), np.zeros(0), None)
+    left, sizes, _ = np.linalg.svd(jacobian)
     silent = left[:, sizes <= RANK * sizes.max(initial=0.0)].T[:, : len(states)]
     conserved = _orthonormal(silent)
     held: list[int] = []

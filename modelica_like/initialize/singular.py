@@ -99,7 +99,9 @@ def is_regular(matrix: Any) -> bool:
         return False
     for axis in (1, 0):
         sizes = np.abs(matrix).max(axis=axis, keepdims=True, initial=0.0)
-        matrix = matrix / np.where(sizes > 0.0, sizes, 1.0)
+        if not sizes.all():
+            return False
+        matrix = matrix / sizes
     return int(np.linalg.matrix_rank(matrix)) == len(matrix)
 
 

@@ -7,13 +7,13 @@ from collections.abc import Callable
 import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, CompiledTransition, Vector
-from modelica_like.compile.soon import TIME_RESOLUTION
+from modelica_like.compile.soon import time_resolution
 from modelica_like.errors import StepFailed
 from modelica_like.initialize import Point
 from modelica_like.solve.between import Between
 from modelica_like.solve.guards import Candidate, Ends, Guards, Located, candidates, locate
 from modelica_like.solve.idas import Integrator
-from modelica_like.solve.instants import SAME_TIME, Instants, just_after, note_sharing
+from modelica_like.solve.instants import Instants, just_after, note_sharing
 from modelica_like.solve.looks import Cell, Looks
 from modelica_like.solve.options import Options
 from modelica_like.solve.pace import Pace
@@ -126,9 +126,8 @@ class EventLoop:
         times = self.pace.results(float(looks.times[0]), end)
         if not len(times):
             return
-        numbers = np.minimum(np.rint((times - looks.times[0]) / looks.width).astype(int), looks.count)
-        same = SAME_TIME * np.maximum(1.0, np.abs(times))
-        if self.pace.on_grid and np.all(np.abs(times - looks.times[numbers]) <= same):
+        if self.pace.on_grid:
+            numbers = np.rint((times - looks.times[0]) / looks.width).astype(int)
             self.record.add(times, looks.x[:, numbers], looks.z[:, numbers])
         else:
             piece = self.between.ask(looks, times, last)
@@ -177,7 +176,7 @@ class EventLoop:
             else:
                 looks = looks.every(1)
                 self.pace.snap(looks.times[1:])
-            if self.now.t + span >= stop - SAME_TIME * max(1.0, abs(stop)):
+            if just_after(self.now.t + span) >= stop:
                 looks.times[-1] = stop
             return looks
 
@@ -282,7 +281,7 @@ class EventLoop:
 
     def _look_behind(self, looks: Looks, cell: Cell, located: Located, late: list[int]) -> list[CompiledTransition]:
         """Go on by the time resolution; guards that are still positive fire, otherwise the search starts again."""
-        behind = located.point.t + TIME_RESOLUTION * max(1.0, abs(located.point.t))
+        behind = located.point.t + time_resolution(located.point.t)
         located.point, guards = looks.at(min(behind, cell.t + cell.width), cell)
         return [self.guards.state_events[g] for g in late if guards[0][g] > 0]
 

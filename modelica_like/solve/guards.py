@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -163,9 +164,8 @@ def candidates(values: Vector, rates: Vector, active: Any, step: float) -> Itera
 
 
 def _nearly(g0: float, g1: float, r0: float, r1: float) -> bool:
-    """Whether the cubic through both ends with the given slopes comes near zero, by a bound, and then by samples."""
-    low = -_NEAR * (abs(g0) + abs(g1))
-    return r1 < -_NOISE and max(g0 + r0 / 3, g1 - r1 / 3) > low and float(np.max(_CUBIC @ [g0, r0, g1, r1])) > low
+    """Whether the cubic through both ends with the given slopes comes near zero, by samples."""
+    return r1 < -_NOISE and float(np.max(_CUBIC @ [g0, r0, g1, r1])) > -_NEAR * (abs(g0) + abs(g1))
 
 
 def _hermite(s: Vector) -> Vector:
@@ -267,15 +267,12 @@ def _newton(watched: list[tuple[float, float]]) -> float | None:
 
 
 def _cubic(g0: float, g1: float, r0: float, r1: float, inside: bool) -> float:
-    """Rising zero (or, if `inside`, the first top) of the cubic Hermite interpolant in (0, 1)."""
+    """Rising zero (or, if `inside`, the top) of the cubic Hermite interpolant in (0, 1)."""
     a, b, c = 2 * g0 - 2 * g1 + r0 + r1, -3 * g0 + 3 * g1 - 2 * r0 - r1, r0
     if inside:
-        tops = [
-            s.real
-            for s in np.roots([3 * a, 2 * b, c])
-            if abs(s.imag) < 1e-12 and 0 < s.real < 1 and 6 * a * s.real + 2 * b < 0
-        ]
-        return min(tops, default=0.5)
+        # The slope falls from r0 > 0 to r1 < 0: one zero, in a form that also holds for a = 0.
+        down = math.sqrt(max(b * b - 3 * a * c, 0.0)) - b
+        return c / down if 0 < c < down else 0.5
     if g0 == 0 and c >= 0:
         return 0.0
     if not g0 <= 0 < g1:

@@ -136,7 +136,7 @@ class Integrator:
 
     def _make(self, outputs: int, steps: int, gentle: bool, first: float) -> ca.Function:
         length = 1.0 if gentle or self._seconds is None else self._seconds
-        problem = dict(scaled_problem(self.model, gentle=gentle, scaled=gentle or self._seconds is None))
+        problem = dict(scaled_problem(self.model, gentle=gentle, scaled=self._seconds is None))
         del problem["inner"], problem["span"]
         grid = np.arange(1, outputs + 1) / outputs
         grid = (np.sqrt(grid) if gentle else grid * length).tolist()
@@ -281,7 +281,7 @@ class Integrator:
         reached = _reached(text) ** 2 if gentle else _reached(text) / (self._seconds or 1.0)
         moment = start.t + span * reached
         speed = np.abs(call(self.model, self.model.ode, start)) / self.weights(start.x)
-        worst = self.model.states[int(np.nanargmax(speed))] if np.any(np.isfinite(speed)) else self.model.states[0]
+        worst = self.model.states[int(np.argmax(np.nan_to_num(speed)))]
         return StepFailed(
             f"IDAS gave up at about t = {moment:.6g} s: {reason}{f' ({flag})' if flag else ''}.",
             why=f"{worst} changes fastest relative to its tolerance.",

@@ -24,7 +24,7 @@ from modelica_like.initialize import (
 from modelica_like.language.transition import NAME_IN_NOTICE
 from modelica_like.solve.guards import Guards
 from modelica_like.solve.options import Options
-from modelica_like.solve.recorder import Event, Recorder
+from modelica_like.solve.recorder import IMPACT, Event, Recorder
 
 _CHATTER_EVENTS = 50
 _CHATTER_INSTANTS = 25
@@ -123,7 +123,7 @@ class Instants:
 
     def _share_anew(self, now: Point, wanting: list[CompiledTransition]) -> list[CompiledTransition]:
         """Let others take more before one of several holding elements breaks away; return the remaining transitions."""
-        if not any(now.d[one.first : one.first + len(one.members)].any() for one in self.model.circuits):
+        if not any(now.d[one.entries].any() for one in self.model.circuits):
             return wanting
         share(self.model, now)
         solve_implicit(self.model, now)
@@ -188,7 +188,7 @@ class Instants:
         for k in sorted(self._entered):
             one = self.model.holds[k]
             if now.d[one.mode] != one.number:
-                self._note(now, one.mode, one.number, -1)
+                self._note(now, one.mode, one.number, IMPACT)
                 now.d[one.mode] = one.number
         share(self.model, now)
         solve_implicit(self.model, now)
@@ -199,7 +199,7 @@ class Instants:
         chosen.d = chosen_modes(self.model, chosen)
         for mode in modes:
             if chosen.d[mode] != now.d[mode]:
-                self._note(now, mode, int(chosen.d[mode]), -1)
+                self._note(now, mode, int(chosen.d[mode]), IMPACT)
                 now.d[mode] = chosen.d[mode]
         share(self.model, now)
         solve_implicit(self.model, now)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from modelica_like.compile.compiled import Vector
-from modelica_like.solve.instants import SAME_TIME
+from modelica_like.solve.instants import SAME_TIME, just_after
 from modelica_like.solve.options import Options
 
 _SIZES = tuple(2**k for k in range(3, 12))
@@ -67,7 +67,7 @@ class Pace:
             return span, next((size for size in _SIZES if size >= span * density), _SIZES[-1])
         whole = math.floor(float(t - self.begin) / self.step + _ON_GRID)
         span = self.begin + (whole + self._even) * self.step - t
-        if t + span < stop - SAME_TIME * max(1.0, abs(stop)):
+        if just_after(t + span) < stop:
             return span, self._even
         return stop - t, max(math.ceil(float(stop - t) / self.step - _ON_GRID), 1)
 

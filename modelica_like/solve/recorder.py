@@ -10,6 +10,9 @@ from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import Source
 from modelica_like.initialize import Impact, Point
 
+IMPACT = -1
+"""Stands in the place of a transition where an impact has changed a mode."""
+
 
 @dataclass(frozen=True)
 class Event:
@@ -21,7 +24,7 @@ class Event:
         before: name of the mode before.
         after: name of the mode after.
         source: the transition's place in its component.
-        transition: position in the model's transitions; -1 for break-away in an impact.
+        transition: position in the model's transitions, or `IMPACT`.
         segment: position of the segment that follows.
         round: number of the round at its instant; a round uses the changes of the one before.
     """
@@ -31,7 +34,7 @@ class Event:
     before: str
     after: str
     source: Source
-    transition: int = -1
+    transition: int = IMPACT
     segment: int = 0
     round: int = 0
 
@@ -97,7 +100,7 @@ class Recorder:
     def note(
         self, model: CompiledDae, time: float, number: int, change: tuple[int, int], transition: int, round: int
     ) -> None:
-        """Record the change of a mode from one number to another, by a transition or (-1) by an impact."""
+        """Record the change of a mode from one number to another, by a transition or by an `IMPACT`."""
         mode = model.flat_discretes[number]
         before, after = (mode.names[k] for k in change)
         # Break-away in an impact has no transition; the first one of the mode gives its place.

@@ -36,12 +36,10 @@ def _find(root: Any, target: int) -> list[tuple[Any, int]] | None:
     """Return the way from the root to the only occurrence: pairs of a node and the operand to go to."""
     found: list[tuple[Any, int]] | None = None
     pending: list[tuple[Any, list[tuple[Any, int]]]] = [(root, [])]
-    visited = 0
-    while pending:
+    for _ in range(_MAX_NODES):
+        if not pending:
+            return found
         node, trail = pending.pop()
-        visited += 1
-        if visited > _MAX_NODES:
-            return None
         if node.element_hash() == target:
             if found is not None:
                 return None
@@ -49,7 +47,7 @@ def _find(root: Any, target: int) -> list[tuple[Any, int]] | None:
             continue
         for position in range(node.n_dep()):
             pending.append((node.dep(position), [*trail, (node, position)]))
-    return found
+    return None
 
 
 def _undo(node: Any, position: int, value: Any) -> Any | None:

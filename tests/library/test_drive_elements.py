@@ -107,6 +107,14 @@ def test_a_strand_cannot_push(torque: float, slack: bool) -> None:
     assert len(told) == slack
 
 
+def test_a_strand_that_is_damped_is_slack_before_it_is_stretched() -> None:
+    """100 mm/s between the pulleys against 2 kN.s/m: 200 N of damping in strands that have 100 N."""
+    belt = TimingBelt(r_a=0.05, r_b=0.1, c=10.0, d=2e3, F_0=100.0)
+    run = simulate(shaft(wall=Fixed(), belt=belt, wheel=Inertia(J=1e-3, phi=0.0, w=1.0)), 0.1)
+    assert run["belt.F_1"].min() == 0
+    assert sum("slack strand" in one for one in notices(run)) == 1
+
+
 def test_a_belt_without_pre_tension_pulls_with_one_strand() -> None:
     """Frequency sqrt(c·r²/J): half the stiffness, in both directions."""
     belt = TimingBelt(r_a=0.1, r_b=0.05, c=2e4, d=1e-9)

@@ -338,6 +338,7 @@ def test_brakes_side_by_side_share_a_load_by_their_capacities(load: float) -> No
     assert not run.events
     np.testing.assert_allclose(run["small.tau"], 0.25 * load, rtol=1e-12)
     np.testing.assert_allclose(run["large.tau"], 0.75 * load, rtol=1e-12)
+    assert [one.partition(" hold the same motion")[0] for one in run.notices] == ["small and large"]
 
 
 @pytest.mark.parametrize("load", [3.2, -3.2])

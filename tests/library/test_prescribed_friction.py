@@ -70,6 +70,15 @@ MOTIONS: dict[str, tuple[Any, Any, list[float]]] = {
 }  # fmt: skip
 
 
+@pytest.mark.parametrize("direction", [1.0, -1.0])
+def test_a_slow_start_breaks_away_where_it_will_exceed_what_counts_as_rest(direction: float) -> None:
+    """0.5 rad/s² reach 1 mrad/s at 2 ms, which is seen `creep_time` = 1 ms before."""
+    signal = Ramp(height=f"{0.5 * direction} rad/s", offset="0 rad/s", duration="1 s")
+    run = driven(Speed(), "w_ref", signal, BearingFriction(tau_pos=((0, 2), (1, 5)), rest=1e-3, creep_time=1e-3))
+    assert run.events[0].time == pytest.approx(1e-3, rel=1e-6)
+    assert run.final["element0.tau"] == pytest.approx(direction * 3.5, rel=1e-6)
+
+
 @pytest.mark.parametrize("motion", MOTIONS)
 @pytest.mark.parametrize("name", FRICTION)
 def test_a_prescribed_speed_meets_the_sliding_friction(name: str, motion: str) -> None:

@@ -26,6 +26,8 @@ _CALLS = {
     "floor": "ceil", "logic_or": "logic_and", "logic_and": "logic_or", "setdefault": "__setitem__",
     "minimum": "maximum", "maximum": "minimum", "argmax": "argmin", "argmin": "argmax", "sin": "cos", "cos": "sin",
 }  # fmt: skip
+_TOLERANCE = 1e-6
+"""What is smaller is one, or a limit beside zero; how small it is no test can tell."""
 _PRINTS = ("__str__", "__repr__", "_repr_html_")
 
 
@@ -99,7 +101,9 @@ class _Finder:
             if node.name in _PRINTS:
                 return
             place = node.name if place == "module" else f"{place}.{node.name}"
-        elif isinstance(node, ast.Raise | ast.JoinedStr | ast.Import | ast.ImportFrom | ast.Assert):
+        elif isinstance(node, ast.Raise | ast.JoinedStr | ast.Import | ast.ImportFrom | ast.Assert) or (
+            isinstance(node, ast.keyword) and node.arg == "strict"  # of zip: another assertion
+        ):
             return
         for start, end, after, at in self._of(node):
             before = self.text[start:end]
@@ -127,7 +131,7 @@ class _Finder:
                     yield *self._span(node), self._source(one), node.lineno
             case ast.UnaryOp(op=ast.USub() | ast.Not()):
                 yield *self._span(node), self._source(node.operand), node.lineno
-            case ast.Constant(value=value) if isinstance(value, bool | int | float):
+            case ast.Constant(value=value) if isinstance(value, bool | int | float) and not 0 < abs(value) < _TOLERANCE:
                 yield *self._span(node), _other(value), node.lineno
             case ast.Call():
                 yield from self._call(node)
@@ -160,7 +164,7 @@ class _Finder:
 
     def _call(self, node: ast.Call) -> Iterator[tuple[int, int, str, int]]:
         name = node.func.id if isinstance(node.func, ast.Name) else getattr(node.func, "attr", "")
-        if name in ("param", "structural", "state", "variable"):
+        if name in ("param", "structural", "state", "variable", "connect"):  # a connection has no direction
             return
         _, end = self._span(node.func)
         if name in _CALLS:

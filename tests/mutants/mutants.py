@@ -1,65 +1,48 @@
-"""Small wrong changes of the product, one after the other: does a narrow test fail?
+"""Small wrong changes of the product, one after the other: does a test that runs them fail?
 
-`python tests/mutants/mutants.py --sample 300 --seed 1` tries a random sample, `--in structure/alias.py` all changes of
-files whose path has this in it, `--list` only tells them. A change is killed if a test fails, or needs a minute; what
-survives is told with its place. `equivalents.toml` lists changes that change nothing, with the reason.
+    python tests/mutants/mutants.py --record             which test runs which line; once, and after greater changes
+    python tests/mutants/mutants.py --record tests/…     the same for files of tests that are new or changed
+    python tests/mutants/mutants.py --sample 300         a random sample; `--seed 2` another one
+    python tests/mutants/mutants.py --in solve/guards.py [--at 63]    all changes of a file, or of a line
+    python tests/mutants/mutants.py --list …             only tells them
+
+The tests that run a changed line go one after the other, fastest first, for four minutes of the processor. A change is
+killed if one fails, crashes, or needs far more time than usual; a test that fails without the change, too, does not
+count. What survives is told with its place and the number of tests. `equivalents.toml` lists changes that change
+nothing, with the reason.
 """
 
 from __future__ import annotations
 
 import argparse
-import contextlib
+import hashlib
 import os
-import random
+import pickle
 import re
-import shutil
-import signal
+import subprocess
 import sys
-import tempfile
 import time
 import tomllib
-from collections.abc import Iterator
-from functools import cache
+from collections import Counter
+from dataclasses import dataclass
+from functools import cache, partial
+from multiprocessing import get_context
+from multiprocessing.util import Finalize
 from pathlib import Path
 
 from changes import Change, changes
+from judge import LONGEST, PASSED, Judge, Order, Verdict, at_import
+from lines import CACHE, FILES, ROOT, Lines
 
-ROOT = Path(__file__).parents[2]
 FOLDERS = ("components", *(f"modelica_like/{name}" for name in (
     "structure", "initialize", "solve", "flatten", "compile",
 )))  # fmt: skip
 PICTURES = ("plot.py", "sankey.py", "style.py")
 """They draw; what they draw is looked at."""
-NARROW = {
-    "components/sizing": ["sizing"],
-    "components": ["library/test_audit.py", "library/test_component_examples.py", "library/test_energy.py"],
-    "modelica_like/structure": ["structure", "library/test_one_instant.py", "solve/test_initialize.py"],
-    "modelica_like/initialize": [
-        "solve/test_initialize.py", "solve/test_rest.py", "solve/test_initial_modes.py", "library/test_one_instant.py",
-        "exact/test_small_drives.py", "analyse/test_steady.py",
-    ],
-    "modelica_like/solve": [
-        "solve/test_looks.py", "solve/test_guards.py", "solve/test_time_events.py", "solve/test_events.py",
-        "solve/test_reading.py", "solve/test_solution.py", "solve/test_energy_balance.py", "solve/test_accuracy.py",
-        "library/test_one_instant.py", "report/test_compare.py",
-    ],
-    "modelica_like/flatten": [
-        "flatten", "solve/test_guards.py", "language/test_equations.py", "language/test_modes.py", "structure",
-        "solve/test_events.py",
-    ],
-    "modelica_like/compile": [
-        "solve/test_initialize.py", "structure/test_build.py", "language/test_modes.py", "solve/test_events.py",
-        "library/test_one_instant.py",
-    ],
-}  # fmt: skip
-"""Tests by the longest beginning of a path that fits; tests that name the module or its classes come before."""
-_BROKEN = 99
-_SLOW = ("test_rounding.py", "test_robustness.py", "test_endless_events.py", "test_number_kinds.py")
-PAGES = ("tests/report/test_component_pages.py::test_the_pages_are_current",)
+PAGES = "tests/library/test_declarations.py::test_declarations_are_what_netlists_rely_on"
 """They tell defaults and limits."""
-SECONDS = 60
-LONGEST = 240
-"""Time of the processor for one test, and for one change."""
+_RECORD = "lines.pickle"
+_ANY_LINE = re.compile(r":\d+ ")
 
 
 def sources() -> list[str]:
@@ -81,152 +64,146 @@ def equivalents() -> list[dict[str, str]]:
 
 def known(change: Change) -> bool:
     """Is it listed as equivalent?"""
-    about = str(change)
-    return any(
-        re.sub(r":\d+ ", " ", about, count=1) == f"{one['file']} {one['place']}: {one['change']}"
-        for one in equivalents()
-    )
+    about = _ANY_LINE.sub(" ", str(change), count=1)
+    return any(about == f"{one['file']} {one['place']}: {one['change']}" for one in equivalents())
+
+
+def sample(found: list[Change], size: int, seed: int) -> list[Change]:
+    """Choose by hashes of what changes and where, so that another line in another file chooses no other sample."""
+    alike, order = Counter[str](), list[tuple[bytes, Change]]()
+    for one in found:
+        about = _ANY_LINE.sub(" ", str(one), count=1)
+        alike[about] += 1
+        order.append((hashlib.sha256(f"{seed} {about} {alike[about]}".encode()).digest(), one))
+    return [one for _, one in sorted(order, key=lambda entry: entry[0])[:size]]
+
+
+def record(tests: list[str], jobs: int) -> None:
+    """Run all tests, or some files of them once more, and keep which line each of them runs."""
+    CACHE.mkdir(parents=True, exist_ok=True)
+    for old in CACHE.glob("*.part"):
+        old.unlink()
+    paths = os.pathsep.join((str(ROOT), str(Path(__file__).parent), os.environ.get("PYTHONPATH", "")))
+    told = {**os.environ, "PYTHONPATH": paths, "OPENBLAS_NUM_THREADS": "1", FILES: os.pathsep.join(sources())}
+    options = ["-q", "-n", str(jobs), "-m", "not slow", "-p", "lines", "--ignore", "tests/mutants"]
+    subprocess.run([sys.executable, "-m", "pytest", *options, *(tests or ["tests"])], cwd=ROOT, env=told, check=True)
+    found = Lines.merged(sorted(CACHE.glob("*.part")), sources())
+    if tests:
+        newer, found = found, recorded()
+        found.update(newer)
+    (CACHE / _RECORD).write_bytes(pickle.dumps(found))
 
 
 @cache
-def narrow_tests(file: str) -> tuple[str, ...]:
-    """Tests that should notice changes in the functions of a file, the closest ones first."""
-    text = (ROOT / file).read_text(encoding="utf-8")
-    module = file.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
-    names = [module] if not file.startswith("components") else re.findall(r"^(?:class|def) ([A-Za-z]\w+)", text, re.M)
-    mention = re.compile(rf"\b(?:{'|'.join(map(re.escape, names or [module]))})\b")
-    folders = ("sizing",) if "sizing" in file else ("library", "solve", "structure", "flatten", "language")
-    near = [
-        path
-        for folder in folders
-        for path in sorted((ROOT / "tests" / folder).glob("test_*.py"))
-        if path.name not in _SLOW and mention.search(path.read_text())
-    ]
-    near.sort(key=lambda path: -len(mention.findall(path.read_text())))
-    general = next(tests for start, tests in NARROW.items() if file.startswith(start))
-    return tuple(
-        dict.fromkeys([*(str(one.relative_to(ROOT)) for one in near[:4]), *(f"tests/{one}" for one in general)])
-    )
+def recorded() -> Lines:
+    """What `--record` found."""
+    file = CACHE / _RECORD
+    if not file.exists():
+        raise SystemExit("Which test runs which line is not known yet: call this with --record.")
+    return pickle.loads(file.read_bytes())
 
 
-@contextlib.contextmanager
-def copied() -> Iterator[Path]:
-    """A copy of the repository in which changes are made."""
-    with tempfile.TemporaryDirectory(prefix="mutants_", ignore_cleanup_errors=True) as work:
-        place = Path(work) / "tree"
-        hidden = shutil.ignore_patterns(".git", ".venv", "build", "__pycache__", ".hypothesis", "node_modules")
-        shutil.copytree(ROOT, place, ignore=hidden)
-        yield place
+_judge = Judge()
 
 
-class _Limit:
-    """Plugin: a test that needs too much time of the processor fails."""
+def _start() -> None:
+    """In each process: a copy of the repository, and what every session needs, but nothing of the product."""
+    import casadi  # noqa: F401
+    import fmpy  # noqa: F401
+    import lxml.etree  # noqa: F401
+    import scipy.integrate  # noqa: F401
+    import tomlkit  # noqa: F401
 
-    def pytest_runtest_setup(self) -> None:
-        signal.signal(signal.SIGPROF, self._stop)
-        signal.setitimer(signal.ITIMER_PROF, SECONDS)
-
-    def pytest_runtest_teardown(self) -> None:
-        signal.setitimer(signal.ITIMER_PROF, 0)
-
-    def _stop(self, *_: object) -> None:
-        raise TimeoutError
+    _judge.__enter__()
+    Finalize(None, _judge.__exit__, exitpriority=1)
 
 
-def survives(place: Path, change: Change) -> str:
-    """Run the tests of a change in a process of its own; an empty text if one fails, else what was run."""
-    declared = change.file.startswith("components/") and "." not in change.place and "sizing" not in change.file
-    tests = [*narrow_tests(change.file), *(PAGES if declared else ())]
-    original = (place / change.file).read_text(encoding="utf-8")
-    (place / change.file).write_text(change.applied(original), encoding="utf-8")
-    try:
-        child = os.fork()
-        if child == 0:
-            try:
-                os._exit(_tested(place, tests))
-            finally:  # whatever happens, this process never comes back
-                os._exit(_BROKEN)
-        _, status = os.waitpid(child, 0)
-    finally:
-        (place / change.file).write_text(original, encoding="utf-8")
-    code = os.WEXITSTATUS(status) if os.WIFEXITED(status) else 1
-    if code not in (0, 1, 2):  # 2: a file of tests cannot be imported any more
-        raise SystemExit(f"The tests of {change.file} could not be run: {code}.")
-    return ", ".join(tests) if code == 0 else ""
+@dataclass(frozen=True)
+class Tried:
+    """One change, what became of it, and what is told about that."""
+
+    change: Change
+    what: str
+    about: str
 
 
-def _tested(place: Path, tests: list[str]) -> int:
-    import resource  # not on Windows
+def tried(change: Change, longest: float) -> Tried:
+    """Run the tests of a change."""
+    text = (ROOT / change.file).read_text(encoding="utf-8")
+    if known(change) or change.applied(text) == text:
+        return Tried(change, "equivalent", "")
+    if at_import(change, text):
+        users = recorded().users(change)
+        orders = [Order({**users, PAGES: recorded().seconds[PAGES]}, change, longest, anew=True)]
+    else:
+        run, imported = recorded().tests(change, text)
+        orders = [Order(run, change, longest), Order(imported, change, longest, anew=True)]
+    begin, ran = time.monotonic(), 0
+    for order in orders:
+        verdict = _decided(order)
+        if verdict.code != PASSED:
+            return Tried(change, "killed", f"{verdict.test or 'import'}, {time.monotonic() - begin:.0f} s")
+        ran += verdict.ran
+    count = sum(len(order.tests) for order in orders)
+    return Tried(change, "survived", f"{ran} of {count} tests, {time.monotonic() - begin:.0f} s")
 
-    resource.setrlimit(resource.RLIMIT_CPU, (LONGEST, LONGEST))
-    os.chdir(place)
-    os.environ["PYTHONPATH"] = str(place)
-    sys.path.insert(0, str(place))
-    sys.dont_write_bytecode = True
-    quiet = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(quiet, 1)
-    os.dup2(quiet, 2)
-    import pytest
 
-    options = [
-        "-x",
-        "-q",
-        "-n",
-        "0",
-        "-p",
-        "no:cacheprovider",
-        "--hypothesis-seed=0",
-        "-m",
-        "not slow",
-        "--assert=plain",
-    ]
-    return int(pytest.main([*options, "-m", "not slow", *tests], plugins=[_Limit()]))
+def _decided(order: Order) -> Verdict:
+    """Run tests, again and again without those that fail anyway."""
+    while order.tests:
+        verdict = _judge.run(order)
+        if verdict.code == PASSED or not verdict.test or _fine(verdict.test):
+            return verdict
+        del order.tests[verdict.test]
+    return Verdict(PASSED)
+
+
+@cache
+def _fine(test: str) -> bool:
+    """Does a test pass without a change?"""
+    return _judge.run(Order({test: recorded().seconds[test]})).code == PASSED
 
 
 def main() -> None:
     """Try the changes that are asked for."""
-    read = argparse.ArgumentParser(description=__doc__)
+    read = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    read.add_argument("--record", nargs="*", metavar="TESTS")
     read.add_argument("--sample", type=int, default=0)
     read.add_argument("--seed", type=int, default=1)
     read.add_argument("--in", dest="inside", default="")
     read.add_argument("--at", type=int, default=0, help="line")
     read.add_argument("--list", action="store_true")
+    read.add_argument("--jobs", type=int, default=os.cpu_count())
+    read.add_argument("--longest", type=float, default=LONGEST, help="time of the processor for one change, in s")
     asked = read.parse_args()
+    if asked.record is not None:
+        record(asked.record, asked.jobs)
+        return
     found = [one for file in sources() if asked.inside in file for one in changes(ROOT, file) if wanted(one)]
     found = [one for one in found if not asked.at or one.line == asked.at]
     if asked.sample:
-        found = random.Random(asked.seed).sample(found, min(asked.sample, len(found)))
+        found = sample(found, asked.sample, asked.seed)
     if asked.list:
         sys.stdout.writelines(f"{one}\n" for one in found)
         return
-    _preload()
-    lost, same, begin = 0, 0, time.monotonic()
-    with copied() as place:
-        for number, change in enumerate(found, 1):
-            source = (place / change.file).read_text(encoding="utf-8")
-            alike = known(change) or change.applied(source) == source
-            same += alike
-            left = not alike and survives(place, change)
-            lost += bool(left)
-            verdict = "equivalent" if alike else "survived" if left else "killed"
-            sys.stdout.write(f"{verdict:10} {change}\n")
-            sys.stdout.flush()
+    _try(found, asked.jobs, asked.longest)
+
+
+def _try(found: list[Change], jobs: int, longest: float) -> None:
+    recorded()
+    counts, begin = Counter[str](), time.monotonic()
+    with get_context("fork").Pool(jobs, _start) as pool:
+        for number, one in enumerate(pool.imap_unordered(partial(tried, longest=longest), found), 1):
+            counts[one.what] += 1
+            sys.stdout.write(f"{one.what:10} {one.change}   ({one.about})\n")
             if number == len(found) or number % 25 == 0:
-                killed = number - lost - same
-                share = 100 * killed / max(number - same, 1)
-                seconds = time.monotonic() - begin
+                killed, lost, same = (counts[what] for what in ("killed", "survived", "equivalent"))
+                share = 100 * killed / max(killed + lost, 1)
                 sys.stdout.write(f"{number} changes: {killed} killed ({share:.1f} %), {lost} survived, "
-                                 f"{same} equivalent, {seconds:.0f} s\n")  # fmt: skip
-
-
-def _preload() -> None:
-    """Load what every run of the tests needs, but nothing of the product."""
-    import casadi  # noqa: F401
-    import fmpy  # noqa: F401
-    import lxml.etree  # noqa: F401
-    import numpy  # noqa: F401
-    import scipy.integrate  # noqa: F401
-    import tomlkit  # noqa: F401
+                                 f"{same} equivalent, {time.monotonic() - begin:.0f} s\n")  # fmt: skip
+            sys.stdout.flush()
+        pool.close()
+        pool.join()
 
 
 if __name__ == "__main__":

@@ -4,7 +4,9 @@ import ast
 from pathlib import Path
 
 from changes import changes
-from mutants import ROOT, equivalents, narrow_tests, sources
+from judge import at_import
+from lines import ROOT, Lines
+from mutants import equivalents
 
 SOURCE = '''
 def f(a, b, c):
@@ -28,10 +30,27 @@ def test_what_is_changed(tmp_path: Path) -> None:
         ast.parse(one.applied(SOURCE))
 
 
-def test_every_file_has_tests() -> None:
-    for file in sources():
-        missing = [one for one in narrow_tests(file) if not (ROOT / one).exists()]
-        assert not missing, file
+def test_tests_are_found_by_lines_that_moved(tmp_path: Path) -> None:
+    found = Lines()
+    found.texts = {"f.py": SOURCE}
+    found.seconds = {"slow": 2.0, "fast": 1.0, "other": 0.1, "o.py::made": 3.0}
+    found.runs = {"f.py": {3: {""}, 4: {"slow", "fast", "+o.py"}, 6: {"other"}}}
+    text = "import math\n" + SOURCE.replace("2 * c)", "2 *\n        c)")
+    (tmp_path / "f.py").write_text(text)
+    for one in changes(tmp_path, "f.py"):
+        tests = ["fast", "slow"], ["o.py::made"]
+        if one.line != 5:  # a new one
+            tests = ["other", "fast", "slow"], []
+        assert tuple(map(list, found.tests(one, text))) == tests
+        assert list(found.users(one)) == ["other", "fast", "slow"]
+    assert {one.line for one in changes(tmp_path, "f.py")} == {5, 7}
+
+
+def test_what_takes_a_new_import(tmp_path: Path) -> None:
+    text = "class A:\n    x = 1\n    def f(self, y=2):\n        return [y - i for i in self.g]\n"
+    (tmp_path / "f.py").write_text(text)
+    found = {f"{one.before} → {one.after}": at_import(one, text) for one in changes(tmp_path, "f.py")}
+    assert found == {"1 → 2": True, "2 → 3": True, "y - i → y": False, "y - i → i": False, "- → +": False}
 
 
 def test_what_is_equivalent_still_exists() -> None:

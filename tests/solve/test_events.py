@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from modelica_like import Solution, simulate
+from modelica_like.compile.soon import time_resolution
 from modelica_like.errors import SolveError
 from modelica_like.language import (
     Component,
@@ -24,6 +25,7 @@ from modelica_like.language import (
     sin,
     var,
 )
+from modelica_like.solve.instants import just_after
 
 TIGHT = {"rtol": 1e-11, "atol": 1e-13}
 
@@ -47,6 +49,12 @@ def story(run: Solution) -> list[tuple[str, str]]:
 
 def times(run: Solution) -> np.ndarray:
     return np.array([event.time for event in run.events])
+
+
+def test_events_are_as_sharp_as_the_numbers_of_time() -> None:
+    times = np.array([-1e6, -0.5, 0.0, 2.0])
+    assert [time_resolution(t) for t in times] == pytest.approx([1e-4, 1e-10, 1e-10, 2e-10])
+    assert [just_after(t) for t in times] - times == pytest.approx([1e-6, 1e-12, 1e-12, 2e-12], rel=1e-3)
 
 
 # -- location --------------------------------------------------------------------------------------------------------

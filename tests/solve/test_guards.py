@@ -91,10 +91,11 @@ def test_the_first_guess_is_the_zero_of_the_cubic(root: float, other: tuple[floa
     assert _cubic(*ends(value), inside=False) == pytest.approx(root, abs=1e-9)
 
 
-@pytest.mark.parametrize("top", [0.1, 0.35, 0.9])
-def test_the_first_guess_of_a_hump_is_the_top_of_the_cubic(top: float) -> None:
-    """Its slope is (s - top)·(s - 2)."""
-    value = (np.poly1d([1.0, -top]) * np.poly1d([1.0, -2.0])).integ() - 5.0
+@pytest.mark.parametrize(("top", "bottom"), [(0.1, 2.0), (0.35, 2.0), (0.9, 2.0), (0.7, -0.5)])
+def test_the_first_guess_of_a_hump_is_the_top_of_the_cubic(top: float, bottom: float) -> None:
+    """Its slope is ±(s - top)·(s - bottom)."""
+    sign = 1.0 if bottom > top else -1.0
+    value = sign * (np.poly1d([1.0, -top]) * np.poly1d([1.0, -bottom])).integ() - 5.0
     assert _cubic(*ends(value), inside=True) == pytest.approx(top, abs=1e-9)
     assert not _nearly(*ends(value))
     assert _nearly(*ends(value - value(top)))

@@ -13,7 +13,7 @@ from components import (
     SpeedDependentLoad,
     SpringDamper,
 )
-from modelica_like import simulate
+from modelica_like import Assembly, simulate
 from modelica_like.errors import ContradictingStart, InitializationError, MissingStart, UnknownName
 from modelica_like.language import (
     Component,
@@ -179,6 +179,16 @@ def test_missing_start_values(start, values, message):
     with pytest.raises(MissingStart) as caught:
         start(Geared(), **values)
     assert caught.value.what == message
+
+
+@pytest.mark.parametrize(("count", "more"), [(8, ""), (9, ", …")])
+def test_of_many_missing_start_values_eight_are_named_at_three_places(start, count, more):
+    parts = {f"i{k}": Inertia(J=1.0, phi=0.0) for k in range(count)}
+    with pytest.raises(MissingStart) as caught:
+        start(Assembly("many", parts=parts))
+    named = ", ".join(f"i{k}.w" for k in range(8))
+    assert caught.value.what.endswith(f" lacks {count} equations: give {named}{more} start values.")
+    assert len(caught.value.where) == 3
 
 
 def test_several_states_may_take_the_missing_value(start):

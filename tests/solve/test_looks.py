@@ -8,7 +8,7 @@ import pytest
 from modelica_like.solve.between import Piece, interpolate
 from modelica_like.solve.guards import Guards
 from modelica_like.solve.idas import Integrator
-from modelica_like.solve.looks import Looks
+from modelica_like.solve.looks import SCHEMES, Looks, Scheme
 
 TIMES = np.linspace(2.0, 4.0, 9)
 BETWEEN = np.array([2.01, 2.3, 2.9, 3.49, 3.99])
@@ -43,6 +43,26 @@ def between(seen: Looks) -> tuple[np.ndarray, set[int]]:
     return piece.x, {interval for _, interval in unknown}
 
 
+@pytest.mark.parametrize("scheme", SCHEMES, ids=["slopes", "values"])
+@pytest.mark.parametrize("degree", range(8))
+def test_in_every_interval_one_polynomial_is_of_degree_seven_and_one_of_five(scheme: Scheme, degree: int) -> None:
+    nodes, shares = np.arange(float(scheme.nodes)), np.array([0.2, 0.5, 0.9])
+    data = np.concatenate([nodes**degree, *([degree * nodes ** max(degree - 1, 0)] if scheme.slopes else [])])
+    for cell in range(scheme.nodes - 1):
+        exactly = (cell + shares) ** degree
+        precise, coarse = (
+            shares[:, None] ** np.arange(8) @ one[cell] @ data for one in (scheme.precise, scheme.coarse)
+        )
+        rounding = 1e-12 * nodes[-1] ** degree
+        np.testing.assert_allclose(precise, exactly, rtol=0, atol=rounding)
+        assert np.allclose(coarse, exactly, rtol=0, atol=rounding) == (degree <= 5)
+        assert scheme.doubt[cell] @ data == pytest.approx(exactly[1] - coarse[1], abs=rounding)
+    last = scheme.nodes + 4
+    firsts = [int(scheme.first(k, last)) for k in range(last)]
+    assert all(0 <= first <= k < first + scheme.nodes - 1 <= last for k, first in enumerate(firsts))
+    assert firsts[scheme.nodes // 2] == 1  # as many looks before as behind
+
+
 @pytest.mark.parametrize("degree", range(6))
 def test_polynomials_up_to_degree_five_are_exact_and_precise(degree: int) -> None:
     x, unknown = between(looks(TIMES**degree, degree * TIMES ** max(degree - 1, 0)))
@@ -62,6 +82,19 @@ def test_slopes_that_are_nothing_but_rounding_are_left_out() -> None:
     x, unknown = between(looks(TIMES**5, noise))
     np.testing.assert_allclose(x[0], BETWEEN**5, rtol=1e-12)
     assert len(unknown) == 0
+
+
+def test_looks_may_be_left_out() -> None:
+    seen = looks(TIMES**2, 2 * TIMES)
+    assert seen.every(1) is seen
+    half = seen.every(2)
+    assert (half.count, half.width) == (4, 0.5)
+    np.testing.assert_array_equal(half.x[0], TIMES[::2] ** 2)
+    assert half.within(1) is None
+    few = seen.every(4).within(1)
+    assert few is not None
+    np.testing.assert_array_equal(few.times, TIMES[4:])
+    assert seen.intervals(np.array([2.0, 2.1, 2.26, 3.99, 4.0])).tolist() == [0, 0, 1, 7, 7]
 
 
 def test_a_kink_between_looks_is_noticed() -> None:

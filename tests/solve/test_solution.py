@@ -96,6 +96,23 @@ def test_energy_terms_at_one_instant_are_those_of_that_instant(run):
     assert run.at(0.5)["clutch.loss_power"] == pytest.approx(5.0 * 5.0, rel=1e-6)
 
 
+def test_a_time_far_from_every_result() -> None:
+    """160 periods are thousands of steps, to a result as well as to a time in between."""
+
+    class Swing(Component):
+        x: Variable = var("1", "position", default=1.0)
+        v: Variable = var("1/s", "velocity", default=0.0)
+        w: Parameter = param("1/s", "angular frequency", default=1e3)
+
+        def equations(self) -> Equations:
+            yield der(self.x) == self.v
+            yield der(self.v) == -(self.w**2) * self.x
+
+    swing = simulate(Swing(), 2.0, points=1, rtol=1e-9, atol=1e-12)
+    assert swing.at(1.0)["x"] == pytest.approx(np.cos(1000.0), abs=1e-4)
+    assert swing.final["x"] == pytest.approx(np.cos(2000.0), abs=2e-4)
+
+
 def test_unknown_names_are_told_with_a_suggestion(run):
     with pytest.raises(UnknownName, match=r"^Drive has no variable 'clutch\.tua'; did you mean 'clutch\.tau'\?"):
         run["clutch.tua"]

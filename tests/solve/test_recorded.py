@@ -1,0 +1,65 @@
+"""Trajectories from elsewhere: values between results, events and energies by their columns."""
+
+import numpy as np
+import pytest
+
+from modelica_like.errors import MissingValue, UnknownName, ValueOutOfRange
+from modelica_like.solve.recorded import RecordedModel, RecordedSolution, RecordedVariable
+
+TIME = np.array([0.0, 1.0, 2.0, 2.0, 4.0])
+COLUMNS = {
+    "w": [0.0, 10.0, 20.0, 5.0, 9.0],
+    "motor.source_power": [10.0, 10.0, 10.0, 4.0, 4.0],
+    "brake.loss_power": [0.0, 2.0, 4.0, 6.0, 6.0],
+    "wheel.stored_energy": [1.0, 5.0, 8.0, 3.0, 5.0],
+}
+MODES = RecordedVariable("brake.mode", names={0: "free", 1: "stuck"})
+GEAR = RecordedVariable("gear", kind="discrete")
+DISCRETES = np.array([[0.0, 0.0, 0.0, 1.0, 1.0], [1.0, 1.0, 1.0, 1.0, 2.5]])
+
+
+def recorded(*names: str) -> RecordedSolution:
+    variables = tuple(RecordedVariable(name) for name in names)
+    model = RecordedModel("drive", variables, (MODES, GEAR), {"wheel.J": 0.5})
+    return RecordedSolution(model, TIME, np.array([COLUMNS[name] for name in names]), DISCRETES, 0.0)
+
+
+def test_values_by_name() -> None:
+    run = recorded(*COLUMNS)
+    np.testing.assert_array_equal(run["time"], TIME)
+    np.testing.assert_array_equal(run["w"], COLUMNS["w"])
+    np.testing.assert_array_equal(run["gear"], DISCRETES[1])
+    np.testing.assert_array_equal(run["wheel.J"], np.full(5, 0.5))
+    assert all(name in run for name in ("w", "gear", "wheel.J"))
+    assert "v" not in run
+    with pytest.raises(UnknownName, match=r"^drive has no variable 'wheel\.j'; did you mean 'wheel\.J'\?"):
+        run["wheel.j"]
+
+
+@pytest.mark.parametrize(
+    ("t", "w", "gear"), [(0.0, 0.0, 1.0), (0.25, 2.5, 1.0), (2.0, 5.0, 1.0), (3.5, 8.0, 1.0), (4, 9.0, 2.5)]
+)
+def test_between_results_it_is_a_straight_line_and_at_events_the_right_side(t: float, w: float, gear: float) -> None:
+    now = recorded(*COLUMNS).at(t)
+    assert (now["w"], now["gear"]) == (w, gear)
+    with pytest.raises(ValueOutOfRange):
+        recorded(*COLUMNS).at(4.1)
+
+
+def test_the_end_and_the_events() -> None:
+    run = recorded(*COLUMNS)
+    assert (run.final["w"], run.final["gear"], run.final["brake.loss_power"]) == (9.0, 2.5, 6.0)
+    told = [(event.time, event.mode, event.before, event.after) for event in run.events]
+    assert told == [(2.0, "brake.mode", "free", "stuck"), (4.0, "gear", "1", "2.5")]
+
+
+def test_energies_are_integrals_of_columns() -> None:
+    """Motor 20 + 8 J, brake 4 + 12 J, wheel 4 J more; what they keep or take has come through connectors."""
+    balance = recorded(*COLUMNS).energy()
+    assert (balance.source, balance.lost, balance.stored) == (28.0, 16.0, 4.0)
+    assert {row.component: row.inflow for row in balance} == {"motor": -28.0, "brake": 16.0, "wheel": 4.0}
+    assert balance.throughput == 48.0
+    assert balance.closure == pytest.approx(8 / 48)
+    assert recorded("wheel.stored_energy").energy().throughput == 4.0
+    with pytest.raises(MissingValue):
+        recorded("w").energy()
