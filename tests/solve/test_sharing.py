@@ -29,8 +29,8 @@ def test_an_impulse_is_unbearable_beyond_what_can_be_borne_for_an_instant(
     strike: Any = SimpleNamespace(point=SimpleNamespace(t=t), model=model)
 
     def unbearable(impulse: float, bears: float, reaction: float, k: int = 0, larger: float = 0.0) -> bool:
-        table = np.full((3, 3), np.nan)
-        table[:, 1 if sign > 0 else 2] = bears
+        table = np.full((3, 2), np.nan)
+        table[:, 0 if sign > 0 else 1] = bears
         return k in Strike._unbearable(strike, table, {k: sign * impulse, 2: larger}, {k: sign * reaction})
 
     assert unbearable(5.001 * instant, 5.0, 0.0)

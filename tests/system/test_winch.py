@@ -49,7 +49,7 @@ def test_brake_by_hand() -> None:
     control = 1 / (1 / 16 + 1 / 100)
     settled = 24 / (16 * (1 + 0.02 / control))
     at_gap = 0.4 / (1 + 0.4 / 0.5)
-    opens = moment("brake.coil.stop", "moving") - 0.1
+    opens = moment("brake.coil.stop", "leaving") - 0.1
     # The coil of the contactor takes its current from the same cable: some 1e-4 less voltage.
     assert opens == pytest.approx(at_gap / 16 * log(settled / (settled - lifting)), rel=1e-3)
     pulls_in = moment("contactor.contacts", "closed") - 0.1
