@@ -37,7 +37,7 @@ from lines import CACHE, FILES, ROOT, Lines
 FOLDERS = ("components", *(f"modelica_like/{name}" for name in (
     "structure", "initialize", "solve", "flatten", "compile",
 )))  # fmt: skip
-PICTURES = ("plot.py", "sankey.py", "style.py")
+PICTURES = ("icons.py", "plot.py", "sankey.py", "style.py")
 """They draw; what they draw is looked at."""
 PAGES = "tests/report/test_component_pages.py::test_the_pages_are_current"
 """They tell defaults and limits."""
