@@ -131,3 +131,9 @@ def test_pressure_and_temperature_multiply_and_the_end_of_a_table_is_told() -> N
     assert run.at(0)["clutch.tau"] == pytest.approx(-(20 * 1.0 + 1))
     assert run.final["clutch.tau"] == pytest.approx(-(20 * 0.5 + 1))
     assert any("leaves the rows of mu_T" in notice for notice in notices(run))
+
+
+def test_wind_cools_a_clutch_that_turns() -> None:
+    clutch = ThermalClutch(capacity=20.0, C=10.0, G=2.0, w_G=50.0)
+    run = simulate(slipping(clutch), 60.0, **TIGHT)
+    assert run.final["clutch.T"] == pytest.approx(293.15 + 20 * 100 / (2 * (1 + 2**0.8)), rel=1e-9)

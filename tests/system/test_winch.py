@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from modelica_like import Solution, load, sensitivities, simulate
+from modelica_like import Solution, cosim, load, sensitivities, simulate, split
 
 WINCH = Path(__file__).parents[2] / "examples" / "winch.toml"
 G = 9.80665
@@ -75,6 +75,15 @@ def test_stop_by_hand() -> None:
 
 def test_energy_closes() -> None:
     assert run().energy().closure < 1e-10
+
+
+def test_cut_below_the_rope(tmp_path: Path) -> None:
+    parts = split(WINCH, "rope", tmp_path, names=("winch", "hook"))
+    cut = cosim(parts.path, until=0.5, step=5e-4, master="gauss-seidel")
+    whole = run().at(0.5)
+    assert [cut.final[name] for name in ("load.s", "load.v", "rope.tension")] == pytest.approx(
+        [whole[name] for name in ("load.s", "load.v", "rope.tension")], rel=1e-4
+    )
 
 
 def test_gradient_is_the_slope_of_runs() -> None:
