@@ -217,8 +217,11 @@ static void runs(void) {
 static void carries_derivatives(void) {
     fmi3Instance c = made(1, 0);
     fmi3ValueReference state = first_of(KIND_STATE), rate = first_of(KIND_DERIVATIVE);
-    fmi3ValueReference by[2] = {first_of(KIND_PARAMETER), state};
+    fmi3ValueReference by[2] = {first_of(KIND_PARAMETER), first_of(KIND_PARAMETER)};
     double found[2];
+    for (int k = 0; k < model->n_variables; k++)
+        if (model->variables[k].kind == KIND_STATE && model->variables[k].start >= 0)
+            by[1] = model->variables[k].reference; /* a start value */
     EXPECT(1, modelica_like_gradient_start(NULL, by, 2));
     EXPECT(1, modelica_like_gradient_start(c, by, 2));
     OK(fmi3EnterInitializationMode(c, 1, 1e-6, 0, 1, 1.0));

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from modelica_like.analyse.replay.holds import impact, projection, share_slopes
-from modelica_like.analyse.replay.when import Coincidence, Trigger, When, at_rest, event_time
+from modelica_like.analyse.replay.when import Coincidence, Trigger, When, at_rest, either_first, event_time
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.initialize import Point, Strike, holding, share, solve_implicit
@@ -121,6 +121,8 @@ def make_jump(
     matters |= np.any(states > _SMOOTH * (model.nominals + np.abs(before.x)))
     if when.reason is not None and matters:
         raise when.reason
+    if when.apart and not gain.size and either_first(model, before, events, work.point):
+        matters = False
     if trigger is not None:
         work.x -= np.outer(rate_after, trigger.by)
         work.point.x = work.point.x - rate_after * trigger.shift

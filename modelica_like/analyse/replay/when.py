@@ -9,8 +9,9 @@ import numpy as np
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae, CompiledTransition
 from modelica_like.errors import NoGradient
-from modelica_like.initialize import Point, call, holding, solve_implicit
+from modelica_like.initialize import Point, call, holding, share, solve_implicit
 from modelica_like.initialize.slopes import slopes
+from modelica_like.solve.guards import Guards
 from modelica_like.solve.recorder import Event
 
 _GRAZING = 1e-6
@@ -96,6 +97,28 @@ def _difference(model: CompiledDae, before: Point, by: Vector) -> Vector:
         return by
     held = slopes(model, before, "variables", nodes)
     return by - held.by.T @ np.linalg.lstsq(held.x.T, by[: len(before.x)], rcond=None)[0]
+
+
+def either_first(model: CompiledDae, before: Point, events: tuple[Event, ...], after: Point) -> bool:
+    """Whether two events may come in either order with the same result: both begin to hold motions, and go on to.
+
+    What the later one does in between is undone by what it then holds. The one that comes first must hold alone, and
+    the other one must still come.
+    """
+    pair = [model.transitions[one.transition] for one in events if not one.round and one.transition >= 0]
+    held = {(model.holds[k].mode, model.holds[k].number) for k in holding(model, after)}
+    if len(pair) != 2 or any(one.timed or (one.mode, one.target) not in held for one in pair):
+        return False
+    for first, second in (pair, pair[::-1]):
+        alone = before.copy()
+        alone.d[first.mode] = first.target
+        share(model, alone)
+        solve_implicit(model, alone)
+        rates = [float(slopes(model, at, "guards", [second.index]).rate[0]) for at in (before, alone)]
+        leaves = any(one.mode == first.mode for one in Guards(model).wanting(alone))
+        if leaves or not rates[1] > _GRAZING * rates[0]:
+            return False
+    return True
 
 
 def _moment(model: CompiledDae, before: Point, transition: CompiledTransition) -> Trigger:

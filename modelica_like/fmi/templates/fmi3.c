@@ -95,9 +95,9 @@ static size_t elements(const Instance *c, fmi3ValueReference reference, fmi3Valu
     return array ? (size_t)v->count : 1;
 }
 
-#define REFERENCES fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences
+#define REFERENCES const fmi3ValueReference valueReferences[], size_t nValueReferences
 #define VALUES(name, phases, type, done)                                                            \
-    fmi3Status fmi3##name(REFERENCES, type values[], size_t nValues) {                              \
+    fmi3Status fmi3##name(fmi3Instance instance, REFERENCES, type values[], size_t nValues) {       \
         fmi3ValueReference r;                                                                       \
         size_t count = 0;                                                                           \
         ENTER(name, phases);                                                                        \
@@ -117,12 +117,9 @@ VALUES(GetInt64, READABLE, fmi3Int64, get_mode(c, r, values))
 VALUES(SetInt64, SETTABLE, const fmi3Int64, set_value(c, known_variable(c, r, TYPE_ENUMERATION), (double)*values))
 
 /* Functions for what no model has: other types, clocks, parts. They refuse every call that asks for something. */
-#define NOTHING(name, phases, what, unused, ...)                                          \
-    fmi3Status fmi3##name(REFERENCES, __VA_ARGS__) {                                      \
-        ENTER(name, phases);                                                              \
-        (void)valueReferences, unused;                                                    \
-        return nValueReferences == 0 ? fmi3OK : refuse(c, "This model has no " what "."); \
-    }
+#define NOTHING(name, phases, what, unused, ...)           \
+    CALL(name, phases, (unused, (void)valueReferences, 1), \
+        nValueReferences == 0 ? RESULT_OK : fail(c, "This model has no " what "."), REFERENCES, __VA_ARGS__)
 #define NO_VALUES(type)                                                                                    \
     NOTHING(Get##type, READABLE, "variables of type " #type, ((void)a, (void)n), fmi3##type a[], size_t n) \
     NOTHING(Set##type, SETTABLE, "variables of type " #type, ((void)a, (void)n), const fmi3##type a[], size_t n)

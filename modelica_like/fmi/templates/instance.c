@@ -122,7 +122,7 @@ static uint64_t place_work(const Model *m, Work *w, double *memory) {
         {n_z, sizeof(int), {&w->order}}, {square, 8, {&w->square}}, {m->n_starts, 8, {&w->start_values}},
         {larger(m->n_start_values, resets), 8, {&w->start_residual}},
         {resets, 8, {&w->reset_values, &w->target_values}}, {resets, sizeof(int), {&w->targets}},
-        {n_x, 8, {&w->seen_rates}}, {n, 8, {&w->first_rates}}, {n_guards, 8, {&w->seen_indicators}},
+        {n, 8, {&w->seen_rates, &w->first_rates}}, {n_guards, 8, {&w->seen_indicators}},
         {m->n_derived, 8, {&w->seen_derived}}, {m->n_slots, sizeof(int), {&w->same, &w->places_of_slots}},
         {m->n_slots, 1, {&w->known_slots, &w->needed_slots}}, {m->n_nodes, 1, {&w->asked}}, {m->n_p, 1, {&w->tuned}},
         {left, sizeof(Run), {&w->special_runs}}, {left, sizeof(Operands), {&w->special_operands}},
@@ -172,19 +172,15 @@ void instance_reset(Instance *c) {
 
 static Instance *instance_make(const Instance *bare) {
     const Model *m = bare->model;
-    size_t length = strlen(bare->name) + 1;
-    Instance measured = *bare, *c = bare->allocate(1, sizeof *c + length);
-    uint64_t size = lay_out(&measured, NULL);
-    double *numbers = size > SIZE_MAX / sizeof(double) ? NULL : bare->allocate((size_t)size, sizeof(double));
-    if (c == NULL || numbers == NULL) {
-        if (c != NULL) bare->release(c);
-        if (numbers != NULL) bare->release(numbers);
-        return NULL;
-    }
+    Instance measured = *bare, *c;
+    size_t length = strlen(bare->name) + 1, head = (sizeof *c + length) / sizeof(double) + 1;
+    uint64_t size = head + lay_out(&measured, NULL);
+    c = size > SIZE_MAX / sizeof(double) ? NULL : bare->allocate((size_t)size, sizeof(double));
+    if (c == NULL) return NULL;
     *c = *bare;
     c->name = memcpy(c + 1, bare->name, length);
-    c->numbers = numbers;
-    lay_out(c, numbers);
+    c->numbers = (double *)(void *)c + head;
+    lay_out(c, c->numbers);
     c->z = c->x + m->n_x;
     share_out_specials(c);
     memcpy(c->work.slots + m->slot_constants, m->constants, (size_t)m->n_constants * sizeof(double));
@@ -236,7 +232,6 @@ void instance_free(Instance *c) {
     Release release = c->release;
     gradient_end(c);
     if (c->own_model != NULL) model_free(c->own_model);
-    release(c->numbers);
     release(c);
 }
 

@@ -39,10 +39,7 @@ static const double *seen(Instance *c, const Variable *v) {
     if (v->kind != KIND_DERIVED && settle(c) != RESULT_OK) return NULL;
     switch (v->kind) {
         case KIND_DERIVED: evaluate_now(c, &c->model->tapes.derived, w->seen_derived); break;
-        case KIND_DERIVATIVE:
-            evaluate_special(c, SPECIAL_RATES, c->state.t, c->x, w->rhs);
-            memcpy(w->seen_rates, w->rhs, (size_t)c->model->n_x * sizeof(double));
-            break;
+        case KIND_DERIVATIVE: evaluate_special(c, SPECIAL_RATES, c->state.t, c->x, w->seen_rates); break;
         case KIND_GUARD: get_indicators(c, w->seen_indicators); break;
         default: evaluate_special(c, SPECIAL_VARIABLES, c->state.t, c->x, w->variables);
     }
