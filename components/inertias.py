@@ -55,7 +55,7 @@ class OnSlope(Component, partial=True):
 class Mass(OnSlope):
     """Rigid sliding mass.
 
-    The acceleration force m·der(v) is the sum of both cut forces. On a slope, or hanging, its weight acts, too.
+    The acceleration force m·der(v) is the sum of both cut forces. On a slope, or hanging, its weight also acts.
     """
 
     icon = icons.MASS

@@ -121,7 +121,7 @@ class StateSpace(Component):
     B: tuple[Flat, ...] = rows(column("rate by a signal"), more=True)
     C: tuple[Flat, ...] = rows(column("output by a state"), more=True)
     D: tuple[Flat, ...] = rows(column("output by a signal"), more=True, default=((0.0,),))
-    time_scale: Parameter = param("s", "time that counts as 1", default=1.0, min=1e-12)
+    time_scale: Parameter = param("s", "scale of the time", default=1.0, min=1e-12)
 
     @property
     def direct(self) -> tuple[Flat, ...]:
@@ -150,5 +150,5 @@ class StateSpace(Component):
             yield one == _product(by_state, x) + _product(by_signal, u)
 
 
-def _product(row: Flat, values: Sequence[Expr]) -> Expr:
-    return sum((a * x for a, x in zip(row, values, strict=True) if not isinstance(a, float) or a), Expr(0))
+def _product(row: Flat, values: Sequence[Expr]) -> Expr | float:
+    return sum(a * x for a, x in zip(row, values, strict=True) if not isinstance(a, float) or a)

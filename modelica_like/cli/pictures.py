@@ -12,7 +12,7 @@ from modelica_like.cli.shared import Assignments, Debug, Netlist, load_netlist, 
 def draw(
     netlist: Netlist, assignments: Assignments = None, *,
     output: Annotated[Path | None, Option("--output", "-o", metavar="FILE", help="A .svg, .png or .pdf file.")] = None,
-    depth: Annotated[int, Option(metavar="N", help="How many levels of assemblies are open.")] = 1,
+    depth: Annotated[int, Option(metavar="N", help="Levels of assemblies to open.")] = 1,
     at: Annotated[str | None, Option(metavar="TIME", help="Run the drive; show modes and powers at a time.")] = None,
     flow: Annotated[bool, Option("--flow", help="Run the drive; show mean powers as line widths.")] = False,
     animate: Annotated[bool, Option("--animate", help="Run the drive; show its modes one by one.")] = False,

@@ -62,7 +62,7 @@ def schematic(
 
 
 def check_format(path: Path, *, moving: bool = False) -> None:
-    """Tell why a schematic cannot be written there.
+    """Raise an error if a schematic cannot be written there.
 
     Args:
         path: the file.
@@ -93,7 +93,7 @@ def save_schematic(
     Args:
         component: the drive.
         path: the file.
-        depth: how many levels of assemblies are open.
+        depth: number of levels of open assemblies.
         run: a run of the drive, as of `schematic`.
         at: time in s, as of `schematic`.
         flow: show power.

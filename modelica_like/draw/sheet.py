@@ -59,7 +59,7 @@ class Line:
         paths: corners of each.
         dots: where three or more meet.
         arrows: tips at inputs, and the direction they point to.
-        ports: what it joins.
+        ports: joined ports.
         tips: where it meets the symbols.
     """
 

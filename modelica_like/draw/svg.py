@@ -24,8 +24,8 @@ def svg(drawn: Sheet, title: str, *, background: bool = True, run: Running | Non
 
     Args:
         drawn: what to draw.
-        title: for readers who do not see it.
-        background: fill the paper.
+        title: for screen readers.
+        background: whether to fill the paper.
         run: what a run adds.
     """
     run = run or Running()
@@ -187,7 +187,7 @@ def icon_shapes(icon: Icon, *, turned: bool = False, ink: str = "ink") -> Iterat
 
     Args:
         icon: the icon.
-        turned: west and east are exchanged.
+        turned: whether west and east are exchanged.
         ink: `ink`, or how a mode looks.
     """
     colour = _LOOKS.get(ink, (_INK, ""))[0]

@@ -160,7 +160,7 @@ def implicit_slopes(model: CompiledDae, point: Point, by: _Names = _ALL) -> list
     _check_finite(model, point, [z, *parts], model.implicit)
     right = -np.hstack(parts)
     # Reactions whose split is undetermined make the equations for z singular; what depends on them is left out.
-    solved: Vector = np.linalg.solve(z, right) if is_regular(z) else np.linalg.lstsq(z, right, rcond=None)[0]
+    solved: Any = np.linalg.solve(z, right) if is_regular(z) else np.linalg.lstsq(z, right, rcond=None)[0]
     return np.split(solved, np.cumsum([part.shape[1] for part in parts])[:-1], axis=1)
 
 

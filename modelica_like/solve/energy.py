@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 _ROUNDING = 1e-9
 """Part of a component's largest power that counts as rounding in a difference of powers."""
 _NOTHING = 1e-12
-"""Part of the model's largest power below which a power is rounding."""
+"""Part of the model's largest power that counts as rounding."""
 _LAST_DIGITS = 1e-14
 """By what part numbers are changed to see what is rounding, ..."""
 _CHANGES = 6
@@ -267,7 +267,7 @@ class _Audit:
         return self._worst > np.maximum(_ROUNDING * self._largest, floor)
 
     def found(self, model: CompiledDae) -> tuple[Vector, Vector, Vector, Vector]:
-        """Return imbalances, as fractions of the largest powers, and negative losses, without what is rounding."""
+        """Return imbalances, as fractions of the largest powers, and negative losses, without rounding."""
         real = self._counts()
         for component in map(int, np.flatnonzero(real[0])):
             real[0, component] = not _is_rounding(model, self._points[component], component)

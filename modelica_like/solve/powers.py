@@ -31,7 +31,7 @@ _FINEST = 1e-12
 """Factor of precision of a repeated integration over the run, and its limit."""
 _NEAR = 8
 """Intervals that are also integrated again, because a new start would cost more."""
-_MORE, _LEAST, _DEEPEST = 4, 4, 6
+_MORE, _LEAST, _DEEPEST = 4, 4, 12
 """Finer results per interval, the smallest number of intervals for this, and the number of repetitions."""
 _FAILURES = 20
 """Failures of IDAS in a piece of a run after which the given results must suffice."""
@@ -228,7 +228,7 @@ class Powers:
 
 
 def _slopes(model: CompiledDae) -> ca.Function:
-    """Return how fast powers change, as a function."""
+    """Return the rates of powers, as a function."""
     arguments = list(model.arguments.values())
     slopes = model.motion.held(ca.vec(model.energy(*arguments)[:, 1 : 1 + POWERS]))
     return ca.Function("slopes", arguments, [ca.densify(slopes)], {"cse": True})

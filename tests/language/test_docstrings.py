@@ -42,7 +42,7 @@ PUBLIC = {name: (function, least) for name, function, least in functions()}
 
 
 @pytest.mark.parametrize("name", PUBLIC)
-def test_arguments_are_described(name):
+def test_arguments_are_described(name: str):
     function, least = PUBLIC[name]
     parameters = [key for key in inspect.signature(function).parameters if key not in ("self", "cls")]
     text = inspect.getdoc(function) or ""
@@ -52,7 +52,7 @@ def test_arguments_are_described(name):
 
 
 @pytest.mark.parametrize("name", PUBLIC)
-def test_arrays_have_shapes(name):
+def test_arrays_have_shapes(name: str):
     function, _ = PUBLIC[name]
     hints = getattr(function, "__annotations__", {})
     if any(ARRAY.search(str(hint)) for hint in hints.values()):

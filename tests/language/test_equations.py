@@ -187,7 +187,7 @@ def test_a_function_of_math_makes_nan_of_a_symbol():
     with pytest.raises(LanguageError, match=r"^Lost: an expression contains nan\.") as caught:
         flatten(Lost())
     assert "math.sqrt" in caught.value.where[0].text
-    assert "take sqrt" in caught.value.advice
+    assert "import sqrt" in caught.value.advice
 
 
 def test_numbers_of_numpy_are_numbers():

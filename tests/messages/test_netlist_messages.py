@@ -16,7 +16,7 @@ MESSAGES = {
     ),
     "unknown parameter": (
         '[parts]\nm = { is = "Mass", n = 3 }\n',
-        "Mass has no parameter or variable 'n'. It has m, L, angle, g, s, v.\n"
+        "Mass has no parameter or variable 'n'. It has m, angle, g, s, v, L.\n"
         '  in bad.toml:2 `m = { is = "Mass", n = 3 }`',
     ),
     "wrong unit": (

@@ -39,7 +39,7 @@ FOLDERS = ("components", *(f"modelica_like/{name}" for name in (
 )))  # fmt: skip
 PICTURES = ("icons.py", "plot.py", "sankey.py", "style.py")
 """They draw; what they draw is looked at."""
-PAGES = "tests/report/test_component_pages.py::test_the_pages_are_current"
+PAGES = "tests/library/test_declarations.py::test_declarations_are_what_netlists_rely_on"
 """They tell defaults and limits."""
 _RECORD = "lines.pickle"
 _ANY_LINE = re.compile(r":\d+ ")

@@ -1,4 +1,4 @@
-"""Load spectra: cycles counted in a trajectory, damage by a Wöhler line, and what each gear has to bear."""
+"""Load spectra: cycles counted in a trajectory, damage by a Wöhler line, and the spectrum of each gear."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class WoehlerLine:
-    """Cycles that a part survives, over the amplitude of its load: N = cycles·(amplitude/load)^slope.
+    """Cycles to failure of a part over the amplitude of its load: N = cycles·(amplitude/load)^slope.
 
     Attributes:
         amplitude: at the knee, in the SI unit of the load.
         cycles: at the knee.
         slope: exponent above the knee.
-        below: what counts below it: the same slope (`elementary`), that of E. Haibach, 2·slope - 1 (`haibach`), or
+        below: line below the knee: the same slope (`elementary`), that of E. Haibach, 2·slope - 1 (`haibach`), or
             nothing (`original`).
     """
 
@@ -38,7 +38,7 @@ class WoehlerLine:
             raise ValueOutOfRange(f"Amplitude, cycles and slope of a Wöhler line must be above zero, not {self}.")
 
     def life(self, amplitudes: Any) -> Vector:
-        """Return the cycles that it survives at amplitudes; infinite where they do no damage."""
+        """Return the cycles to failure at amplitudes, of their shape; infinite where there is no damage."""
         share = np.abs(np.asarray(amplitudes, float)) / self.amplitude
         slope = {"elementary": self.slope, "haibach": 2 * self.slope - 1, "original": np.inf}[self.below]
         with np.errstate(divide="ignore", over="ignore"):
