@@ -299,6 +299,15 @@ def test_clutch_actuator_follows_its_times() -> None:
     np.testing.assert_allclose(run["actuator.y"], shape, atol=1e-9)
 
 
+def test_clutch_actuator_that_is_switched_on_again_rises_from_where_it_is() -> None:
+    pulse = Pulse(start_time=0.1, period=0.2, width=0.9)
+    actuator = ClutchActuator(t11=0.04, t12=0.1, t2=0.05)
+    loop = Assembly("loop", parts={"pulse": pulse, "actuator": actuator}, connect={"on": ["pulse.y", "actuator.on"]})
+    run = simulate(loop, "0.45 s", rtol=1e-9)
+    shape = np.interp(run.time, [0, 0.14, 0.24, 0.28, 0.3, 0.34, 0.45], [0, 0, 1, 1, 0.6, 1, 1])
+    np.testing.assert_allclose(run["actuator.y"], shape, atol=1e-9)
+
+
 def test_clutch_actuator_that_is_switched_off_again_too_soon() -> None:
     pulse = Pulse(start_time=0.1, period=1.0, width=0.03)
     actuator = ClutchActuator(t11=0.04, t12=0.1, t2=0.05)
