@@ -70,6 +70,19 @@ def test_belt_oscillates_as_a_spring_of_two_strands() -> None:
     assert run.energy().closure <= 1e-8
 
 
+def test_a_belt_that_turns_with_its_housing_rests_in_it() -> None:
+    parts = {
+        "frame": ConstantSpeed(w_fixed=3.0), "belt": TimingBelt(r_a=0.1, r_b=0.05, c=2e4, d=50.0, F_0=100.0),
+        "a": Inertia(J=0.02, phi=0.0, w=3.0), "b": Inertia(J=0.01, phi=0.0, w=3.0),
+    }  # fmt: skip
+    wires = {
+        "frame": ("frame.flange", "belt.support"), "a": ("belt.flange_a", "a.flange_a"),
+        "b": ("belt.flange_b", "b.flange_a"),
+    }  # fmt: skip
+    run = simulate(Assembly("turning", parts=parts, connect=wires), "0.2 s", **TIGHT)
+    np.testing.assert_allclose([run["belt.f"], run["a.w"] - 3.0, run["b.w"] - 3.0], 0.0, atol=1e-9)
+
+
 @pytest.mark.parametrize("direction", [1.0, -1.0])
 def test_belt_slips_by_eytelwein(direction: float) -> None:
     """At the limit the strand forces have the ratio exp(mu·wrap_angle); the load turns with the force of the belt."""
@@ -296,6 +309,15 @@ def test_clutch_actuator_follows_its_times() -> None:
     run = simulate(loop, "1.5 s", rtol=1e-9)
     on, full, off, none = 0.1 + 0.04, 0.1 + 0.04 + 0.1, 0.6, 0.65
     shape = np.interp(run.time, [0, on, full, off, none, 1.14, 1.24, 1.5], [0, 0, 1, 1, 0, 0, 1, 1])
+    np.testing.assert_allclose(run["actuator.y"], shape, atol=1e-9)
+
+
+def test_clutch_actuator_that_is_switched_on_again_rises_from_where_it_is() -> None:
+    pulse = Pulse(start_time=0.1, period=0.2, width=0.9)
+    actuator = ClutchActuator(t11=0.04, t12=0.1, t2=0.05)
+    loop = Assembly("loop", parts={"pulse": pulse, "actuator": actuator}, connect={"on": ["pulse.y", "actuator.on"]})
+    run = simulate(loop, "0.45 s", rtol=1e-9)
+    shape = np.interp(run.time, [0, 0.14, 0.24, 0.28, 0.3, 0.34, 0.45], [0, 0, 1, 1, 0.6, 1, 1])
     np.testing.assert_allclose(run["actuator.y"], shape, atol=1e-9)
 
 

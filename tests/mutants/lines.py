@@ -186,6 +186,11 @@ class Lines:
             text: the file without the change.
         """
         found = self._of_statement(change, text)
+        # What a test runs in another process is not recorded; a file of tests that is called after the module may.
+        if called := [
+            test for test in self.seconds if test.partition("::")[0].endswith(f"/test_{Path(change.file).name}")
+        ]:
+            found = {*found, *called}
         files = {one.removeprefix(_IMPORT) for one in found if one.startswith(_IMPORT)}
         return self._sorted(found), self._sorted(test for test in self.seconds if test.partition("::")[0] in files)
 

@@ -39,7 +39,7 @@ FOLDERS = ("components", *(f"modelica_like/{name}" for name in (
 )))  # fmt: skip
 PICTURES = ("icons.py", "plot.py", "sankey.py", "style.py")
 """They draw; what they draw is looked at."""
-PAGES = "tests/library/test_declarations.py::test_declarations_are_what_netlists_rely_on"
+DECLARED = "tests/library/test_declarations.py::test_declarations_are_what_netlists_rely_on"
 """They tell defaults and limits."""
 _RECORD = "lines.pickle"
 _ANY_LINE = re.compile(r":\d+ ")
@@ -134,7 +134,7 @@ def tried(change: Change, longest: float) -> Tried:
         return Tried(change, "equivalent", "")
     if at_import(change, text):
         users = recorded().users(change)
-        orders = [Order({**users, PAGES: recorded().seconds[PAGES]}, change, longest, anew=True)]
+        orders = [Order({DECLARED: 1.0, **users}, change, longest, anew=True)]
     else:
         run, imported = recorded().tests(change, text)
         orders = [Order(run, change, longest), Order(imported, change, longest, anew=True)]

@@ -24,6 +24,7 @@ from components.sizing import (
     shunt_motor,
     torque_at_speed,
 )
+from components.sizing.dc_motor_fit import _rates
 
 RPM = math.pi / 30
 LINES = MotorLines(24.0, 4736.5 * RPM, 3.48e3 * RPM, 1.06, 20.0)
@@ -51,6 +52,22 @@ NUMBERS = {
     "M at 3960": (torque_at_speed(LINES, 3960 * RPM), 0.24, 0.2231322, -7.028),
     "I_gen overload": (overload_current(0.6, 3.0, SET_A), None, 3.223672, None),
 }
+
+
+def test_how_speed_and_current_depend_on_the_parameters() -> None:
+    """Central differences of w = (k·U - R·M)/(k² + R·b) and I = (k·M + b·U)/(k² + R·b) with M = M_load + M_f."""
+
+    def state(k: float, R: float, friction: float, b: float) -> np.ndarray:
+        M = 0.1 + friction
+        return np.array([k * 24.0 - R * M, k * M + b * 24.0]) / (k**2 + R * b)
+
+    values = np.array([0.05, 0.8, 0.02, 1e-3])
+    speed, current = state(*values)
+    rates = _rates(DcMotor(*values), 24.0, speed, current, 0.1)
+    for row, name in zip(np.eye(4), ("constant", "resistance", "friction", "damping"), strict=True):
+        step = 1e-5 * values * row
+        change = (state(*(values + step)) - state(*(values - step))) / (2 * step.sum())
+        assert rates[name] == pytest.approx(change, rel=1e-6)
 
 
 def test_damping_of_a_generator_takes_its_part_of_an_overload() -> None:

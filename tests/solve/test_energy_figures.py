@@ -41,6 +41,7 @@ def test_the_largest_error_counts() -> None:
 
 def test_what_is_wrong_is_told() -> None:
     assert BALANCE.notices == ()
+    assert replace(BALANCE, rows=(replace(SPRING, drift=1e6),)).notices == ()  # a run without a tolerance
     drifts = replace(BALANCE, tolerance=1e-9).notices
     assert len(drifts) == 1
     assert drifts[0].startswith("The stored energy of spring drifts by -0.002 J, 1.7e+04 times the run's")

@@ -6,7 +6,7 @@ import pytest
 from modelica_like import simulate
 from modelica_like.initialize import Point
 from modelica_like.language import Component, Equations, Events, Mode, Parameter, Variable, der, param, var
-from modelica_like.solve.guards import Candidate, _cubic, _nearly, candidates, locate
+from modelica_like.solve.guards import Candidate, _cubic, _nearly, _newton, candidates, locate
 
 
 class Steps(Component):
@@ -78,6 +78,14 @@ def test_a_straight_guard_is_met_at_its_zero() -> None:
     assert found is not None
     assert found.point.t == pytest.approx(1 / 3, abs=2e-13)
     assert guard.asked < 5
+
+
+def test_the_earliest_zero_of_straight_guards_that_rise() -> None:
+    assert _newton([(-1.0, 2.0), (-1.0, 4.0), (-1.0, -9.0)]) == 0.25
+    assert _newton([(1.0, 2.0)]) == -0.5
+    assert _newton([(-1.0, -1.0)]) is None
+    assert _newton([(-1.0, 2.0), (1.0, -1.0)]) is None  # it has risen before
+    assert _newton([(-1.0, 2.0), (1.0, 0.0)]) is None
 
 
 def ends(value: np.poly1d) -> tuple[float, float, float, float]:
