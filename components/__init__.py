@@ -77,13 +77,13 @@ _NAMES = {
     ),
     "stepped_signals": "BooleanPulse BooleanStep BooleanTable StepTable",
     "switching": "Contactor Diode",
-    "synchronous_machines": "MappedDrive PMSynchronousDrive PMSynchronousMachine",
     "synchronisers": "Synchroniser",
+    "synchronous_machines": "MappedDrive PMSynchronousDrive PMSynchronousMachine",
     "thermal": (
         "FixedTemperature HeatPort HeatSource PrescribedHeatFlow PrescribedTemperature TemperatureSensor "
         "ThermalConductor ThermalMass"
     ),
-    "thermal_clutches": "ThermalClutch",
+    "thermal_clutches": "ThermalBrake ThermalClutch",
     "torque_converters": "TorqueConverter",
     "translational_sensors": (
         "LinearAccelerationSensor LinearMultiSensor LinearPowerSensor RelativeLinearAccelerationSensor "

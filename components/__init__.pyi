@@ -201,6 +201,7 @@ from components.thermal import PrescribedTemperature as PrescribedTemperature
 from components.thermal import TemperatureSensor as TemperatureSensor
 from components.thermal import ThermalConductor as ThermalConductor
 from components.thermal import ThermalMass as ThermalMass
+from components.thermal_clutches import ThermalBrake as ThermalBrake
 from components.thermal_clutches import ThermalClutch as ThermalClutch
 from components.torque_converters import TorqueConverter as TorqueConverter
 from components.translational_sensors import LinearAccelerationSensor as LinearAccelerationSensor

@@ -31,6 +31,11 @@ from modelica_like.language import (
     where,
 )
 
+_ROUNDING = 1e-6
+"""Part of the travel up to which what leaves a stop may be a rounding behind it."""
+_AWAY = 1e-3
+"""Part of the travel from which on it has left the stop."""
+
 
 class Actuator(Component, partial=True):
     """Armature or piston between two rigid stops; a spring pushes it back to its rest position.
@@ -54,7 +59,7 @@ class Actuator(Component, partial=True):
     f_stop: Variable = var("N", "force of the stops against forward motion")
     y: Output = signal_out("1", "pressing force over f_nominal, e.g. for f_normalized of a clutch")
     stop = Mode(
-        "resting", "moving", "driven", description="stop at which it is",
+        "resting", "leaving", "moving", "driven", description="stop at which it is",
         holds={
             "resting": Hold("v", reaction="f_stop", capacity="at_rest"),
             "driven": Hold("v", reaction="f_stop", capacity="at_end"),
@@ -77,24 +82,31 @@ class Actuator(Component, partial=True):
         yield from super().equations()
         yield der(self.s) == self.v
         yield self.m * der(self.v) == self.drive() - self.f_spring - self.c * self.s - self.f_stop
-        yield self.stop.choose(resting=der(self.v), moving=self.f_stop, driven=der(self.v)) == 0
+        yield self.stop.choose(resting=der(self.v), driven=der(self.v), otherwise=self.f_stop) == 0
+        # Where it rests, this is the force of the stop; but the blow with which it meets a stop presses nothing.
+        push = self.drive() - self.f_spring - self.c * self.s
         pressing = self.stop.choose(
-            resting=-self.f_stop if self.presses == "resting" else 0, moving=0,
-            driven=self.f_stop if self.presses == "driven" else 0,
+            resting=-push if self.presses == "resting" else 0, driven=push if self.presses == "driven" else 0,
+            otherwise=0,
         )  # fmt: skip
         yield self.y == pressing / self.f_nominal
 
     def events(self) -> Events:
-        stop, faint = self.stop, self.faint
-        # It leaves a stop exactly there and at rest: rounding would make it meet the stop again.
+        stop, pull, s, v, travel = self.stop, self.f_stop, self.s, self.v, self.travel
+        # It leaves a stop exactly there, at rest and without force: rounding must not make it meet the stop again.
         rest, end = {self.s: 0.0, self.v: 0.0}, {self.s: self.travel, self.v: 0.0}
         yield stop.initially("driven", when=all_of(self.s >= self.travel, self.v >= 0))
         yield stop.initially("moving", when=self.s > 0)
         yield stop.initially("moving", when=self.v > 0)
-        yield stop.go("resting", "moving", when=self.f_stop > faint, reset=rest, because="the drive exceeds the spring")
-        yield stop.go("driven", "moving", when=self.f_stop < -faint, reset=end, because="the spring exceeds the drive")
-        yield stop.go("moving", "driven", when=all_of(self.s > self.travel, self.v > 0), reset={self.s: self.travel})
-        yield stop.go("moving", "resting", when=all_of(self.s < 0, self.v < 0), reset={self.s: 0.0})
+        yield stop.go("resting", "leaving", when=pull > self.faint, reset=rest, because="the drive exceeds the spring")
+        yield stop.go("driven", "leaving", when=pull < -self.faint, reset=end, because="the spring exceeds the drive")
+        away = all_of(s > _AWAY * travel, s < (1 - _AWAY) * travel)
+        yield stop.go("leaving", "moving", when=away, because="away from the stop")
+        beyond, behind = s > (1 + _ROUNDING) * travel, s < -_ROUNDING * travel
+        yield stop.go("leaving", "driven", when=all_of(beyond, v > 0), reset={self.s: self.travel})
+        yield stop.go("leaving", "resting", when=all_of(behind, v < 0), reset={self.s: 0.0})
+        yield stop.go("moving", "driven", when=all_of(s > travel, v > 0), reset={self.s: self.travel})
+        yield stop.go("moving", "resting", when=all_of(s < 0, v < 0), reset={self.s: 0.0})
 
     def moving_energy(self) -> Expr:
         """Return the energy of mass and spring."""

@@ -69,8 +69,8 @@ class RigidBacklash(CompliantWithRelativeStates):
             side = sign * (self.phi_rel - self.phi_rel0) - 0.5 * self.b
             end = {self.phi_rel: self.phi_rel0 + sign * 0.5 * self.b}
             yield contact.initially(name, when=all_of(side >= 0, sign * w >= 0))
-            yield contact.go("gap", name, when=all_of(side > 0, sign * w > 0), reset=end)
-            yield contact.go(name, "gap", when=sign * self.tau < -self.faint)
+            yield contact.go("gap", name, when=all_of(side > 0, sign * w > 0), reset=end, because="flanks meet")
+            yield contact.go(name, "gap", when=sign * self.tau < -self.faint, because="the flanks would pull")
 
 
 class DogClutch(CompliantWithRelativeStates):

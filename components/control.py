@@ -30,7 +30,8 @@ _SETTLED_AFTER = 9
 
 
 def at_limits(limit: BoundMode, free: Expr, low: Expr, high: Expr) -> Events:
-    """Yield the events at which an unlimited signal reaches and leaves its limits."""
+    """Yield the events at which an unlimited signal reaches and leaves its limits; the run ends where these cross."""
+    yield limit.go("*", "free", when=high < low, notice="has its upper limit below its lower one", fails=True)
     yield limit.initially("high", when=free > high)
     yield limit.initially("low", when=free < low)
     yield limit.go("free", "high", when=free > high)

@@ -12,6 +12,7 @@ from modelica_like.language import (
     Events,
     Expr,
     Hold,
+    LanguageError,
     Mode,
     Parameter,
     Variable,
@@ -46,6 +47,13 @@ class ElasticCoupling(Lossy, CompliantWithRelativeStates):
     phi_scale: Parameter = param("rad", "twist that counts as 1 in stages", default=1.0)
     c_scale: Parameter = param("N.m/rad", "stiffness that counts as 1 in stages", default=1.0)
     d: Parameter = param("N.m.s/rad", "damping coefficient", default=0.0, min=0)
+
+    def build(self) -> None:
+        if self.stages[0][0] != 0:
+            raise LanguageError(
+                f"{self.label}: the first stage begins at {self.stages[0][0]:g}, not at zero.",
+                advice="Say the stiffness from zero on; for play write a stiffness of zero there.",
+            )
 
     def pressed(self, begin: float) -> Expr:
         """Return the twist beyond the begin of a stage."""

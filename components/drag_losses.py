@@ -5,6 +5,7 @@ from __future__ import annotations
 from math import pi
 
 from components import icons
+from components.feasible import Feasible
 from components.friction import ShaftFriction
 from components.interfaces import ShaftInHousing
 from components.thermal import Lossy
@@ -26,7 +27,7 @@ from modelica_like.language import (
 _SLOWEST = 1e-9
 
 
-class DeepGrooveBearing(ShaftFriction, ShaftInHousing):
+class DeepGrooveBearing(Feasible, ShaftFriction, ShaftInHousing):
     """Friction of a deep groove ball bearing after the SKF model, with its rolling, sliding and seal parts.
 
     With the speed n in 1/min, the viscosity nu in mm²/s, the mean diameter d_m in mm and loads in N, in N.mm (SKF:
@@ -58,6 +59,10 @@ class DeepGrooveBearing(ShaftFriction, ShaftInHousing):
     rpm: Parameter = param("rad/s", "speed that counts as 1", default=pi / 30, min=1e-12)
     N: Parameter = param("N", "force that counts as 1", default=1.0, min=1e-12)
     w: Variable = var("rad/s", "speed of the shaft relative to the housing", state="always")
+    misfit = "is no bearing: its bore d is not below its outer diameter D"
+
+    def fits(self) -> Expr:
+        return self.d < self.D
 
     @property
     def slip(self) -> Expr:

@@ -27,18 +27,15 @@ from modelica_like.language import (
 )
 
 
-class CombustionEngine(Tabulated, Rotor):
-    """Engine whose torque is a map over speed and pedal, with drag, idle controller and rev limit.
+class MappedEngine(Tabulated, Rotor, partial=True):
+    """Engine whose torque is a map over speed and throttle, with firing orders and drag.
 
     The torque of combustion is that of the map times 1 + Σ a·cos(order·phi + phase), the sum over the firing orders;
-    the drag acts against it, alone while the fuel is cut. A PI controller presses the pedal to keep the speed above
-    w_idle. Above w_max the fuel is cut until the speed has fallen by w_band, and
-    below w_stall the engine stalls, until it is turned faster than w_start.
+    the drag acts against it. A subclass says what the throttle is, and when there is combustion.
     """
 
     icon = icons.ENGINE
     flange = Flange("crankshaft", free=True)
-    pedal: Input = signal_in("1", "pedal, 0 to 1", default=0.0)
     speeds: Flat = rows(column("speed of a row", scale="w_scale", rising=True), flat=True)
     pedals: Flat = rows(column("pedal of a column", rising=True), flat=True)
     torque: tuple[Flat, ...] = rows(column("torque of the combustion", scale="tau_scale", min=0), more=True)
@@ -52,52 +49,27 @@ class CombustionEngine(Tabulated, Rotor):
     tau_scale: Parameter = param("N.m", "torque that counts as 1 in the tables", default=1.0)
     J: Parameter = param("kg.m2", "moment of inertia of crankshaft and flywheel", min=0)
     w_0: Parameter = param("rad/s", "speed from which on the drag is the full one", default=1.0, min=1e-12)
-    w_idle: Parameter = param("rad/s", "idle speed; without a value there is no idle controller", default=None, min=0)
-    k_idle: Parameter = param("s/rad", "gain of the idle controller, pedal over speed", default=0.01, min=1e-12)
-    T_idle: Parameter = param("s", "reset time of the idle controller", default=0.5, min=1e-12)
-    w_max: Parameter = param("rad/s", "speed at which the fuel is cut", default=1e6, min=0)
-    w_band: Parameter = param("rad/s", "by which the speed falls until it is given again", default=5.0, min=0)
-    w_stall: Parameter = param("rad/s", "speed below which the engine goes out", default=0.0, min=0)
-    w_start: Parameter = param("rad/s", "speed from which it runs again", default="1.2 * w_stall", min=0)
-    idle: Variable = var("1", "integral of the idle controller", default=0.0)
-    throttle: Variable = var("1", "pedal of driver or idle controller")
+    throttle: Variable = var("1", "pedal that counts, 0 to 1")
     tau_combustion: Variable = var("N.m", "torque of the combustion")
     tau_drag: Variable = var("N.m", "drag against forward rotation")
-    fuel = Mode("given", "cut", "out", description="whether there is combustion")
 
-    def idling(self) -> Equations:
-        """Yield the equations of the idle controller."""
-        driver = minimum(maximum(self.pedal, 0), 1)
-        if not self.given("w_idle"):
-            yield self.idle == 0
-            yield self.throttle == driver
-            return
-        missing = self.k_idle * (self.w_idle - self.w)
-        free = missing + self.idle
-        pressed = minimum(maximum(free, 0), 1)
-        yield self.T_idle * der(self.idle) == missing + pressed - free
-        yield self.throttle == maximum(driver, pressed)
+    def full_torque(self) -> Expr:
+        """Return the torque of combustion while there is fuel."""
+        speed = self.w / self.w_scale
+        mean = self.tau_scale * self.look_up_map(speed, self.speeds, self.throttle, self.pedals, self.torque)
+        return mean * sum((a * cos(order * self.phi + phase) for order, a, phase in self.orders), 1.0)
 
     def equations(self) -> Equations:
         yield from super().equations()
-        yield from self.idling()
-        speed = self.w / self.w_scale
-        mean = self.tau_scale * self.look_up_map(speed, self.speeds, self.throttle, self.pedals, self.torque)
-        firing = sum((a * cos(order * self.phi + phase) for order, a, phase in self.orders), 1.0)
-        yield self.tau_combustion == self.fuel.choose(given=mean * firing, cut=0, out=0)
-        turning = maximum(minimum(self.w / self.w_0, 1), -1)
-        yield self.tau_drag == turning * self.tau_scale * self.look_up(absolute(speed), self.drag)
+        full = minimum(maximum(self.w / self.w_0, -1), 1)
+        yield self.tau_drag == full * self.tau_scale * self.look_up(absolute(self.w) / self.w_scale, self.drag)
         yield from self.turning(self.J, self.tau_combustion - self.tau_drag)
 
     def events(self) -> Events:
-        fuel, w = self.fuel, self.w
-        yield fuel.initially("out", when=w < self.w_stall)
-        yield fuel.go("given", "cut", when=w > self.w_max, because="the rev limit is reached")
-        yield fuel.go("cut", "given", when=w < self.w_max - self.w_band, because="the speed is below the rev limit")
-        yield fuel.go(("given", "cut"), "out", when=w < self.w_stall, notice="stalls")
-        yield fuel.go("out", "given", when=w > self.w_start, because="the engine is turned fast enough")
-        yield from self.leaving("drag", w / self.w_scale, self.drag)
-        yield from self.leaving("speeds", w / self.w_scale, [(one,) for one in self.speeds])
+        yield from super().events()
+        speed = self.w / self.w_scale
+        yield from self.leaving("drag", speed, self.drag)
+        yield from self.leaving("speeds", speed, [(one,) for one in self.speeds])
 
     def stored_energy(self) -> Expr:
         return 0.5 * self.J * self.w_rotor**2
@@ -107,3 +79,44 @@ class CombustionEngine(Tabulated, Rotor):
 
     def source_power(self) -> Expr:
         return self.tau_combustion * self.w
+
+
+class CombustionEngine(MappedEngine):
+    """Engine by its map, with firing orders, drag, idle controller and rev limit.
+
+    A PI controller presses the pedal to keep the speed above w_idle. Above w_max the fuel is cut until the speed has
+    fallen by w_band, and below w_stall the engine stalls, until it is turned faster than w_start.
+    """
+
+    pedal: Input = signal_in("1", "pedal, 0 to 1", default=0.0)
+    w_idle: Parameter = param("rad/s", "idle speed; without a value there is no idle controller", default=None, min=0)
+    k_idle: Parameter = param("s/rad", "gain of the idle controller, pedal over speed", default=0.01, min=1e-12)
+    T_idle: Parameter = param("s", "reset time of the idle controller", default=0.5, min=1e-12)
+    w_max: Parameter = param("rad/s", "speed at which the fuel is cut", default=1e6, min=0)
+    w_band: Parameter = param("rad/s", "by which the speed falls until it is given again", default=5.0, min=0)
+    w_stall: Parameter = param("rad/s", "speed below which the engine goes out", default=0.0, min=0)
+    w_start: Parameter = param("rad/s", "speed from which it runs again", default="1.2 * w_stall", min=0)
+    idle: Variable = var("1", "integral of the idle controller", default=0.0)
+    fuel = Mode("given", "cut", "out", description="whether there is combustion")
+
+    def equations(self) -> Equations:
+        yield from super().equations()
+        driver = minimum(maximum(self.pedal, 0), 1)
+        if self.given("w_idle"):
+            missing = self.k_idle * (self.w_idle - self.w)
+            pressed = minimum(maximum(missing + self.idle, 0), 1)
+            yield self.T_idle * der(self.idle) == pressed - self.idle
+            yield self.throttle == maximum(driver, pressed)
+        else:
+            yield self.idle == 0
+            yield self.throttle == driver
+        yield self.tau_combustion == self.fuel.choose(given=self.full_torque(), cut=0, out=0)
+
+    def events(self) -> Events:
+        fuel, w = self.fuel, self.w
+        yield fuel.initially("out", when=w < self.w_stall)
+        yield fuel.go("given", "cut", when=w > self.w_max, because="the rev limit is reached")
+        yield fuel.go("cut", "given", when=w < self.w_max - self.w_band, because="the speed is below the rev limit")
+        yield fuel.go(("given", "cut"), "out", when=w < self.w_stall, notice="stalls")
+        yield fuel.go("out", "given", when=w > self.w_start, because="the engine is turned fast enough")
+        yield from super().events()

@@ -126,11 +126,12 @@ FOUR_BAR = Icon(56, 40, lines="M-22 12 L-14 -4 L14 -14 L22 12 M-28 14 h12 M16 14
 WHEEL = replace(RACK, lines=_hatch(-22, 12, 44), heavy="M-22 12 h44", solid=_circle(0, -4, 4))
 TYRE = replace(WHEEL, ports={"flange_t": "E", "F_z": "N"}, key=("mu",))
 
-DRUM = replace(
-    RACK, paper=_circle(-4, -4, 15), lines="M11 -4 v24 M11 20 h13", solid=_circle(-4, -4, 2.5), key=("radius",)
-)
-HOLDING_BRAKE = replace(BRAKE, lines=f"{BRAKE.lines} M-5 -19 l10 -6 M-5 25 l10 -6", key=("capacity",),
-                        ports={"p": ("N", -8), "n": ("N", 8)})  # fmt: skip
+DRUM = replace(RACK, paper=_circle(-4, -4, 15), lines="M-24 0 h5 M-4 11 h28", key=("radius",),
+               solid=_circle(-4, -4, 2.5), ports={**RACK.ports, "flange_t": ("E", 11)})  # fmt: skip
+HOLDING_BRAKE = replace(
+    BRAKE, lines=f"{BRAKE.lines} M-5 -19 l10 -6 M-5 25 l10 -6 M-17 -28 v5 h8 M17 -28 v5 h-8", key=("capacity",),
+    ports={"p": ("N", -17), "n": ("N", 17)},
+)  # fmt: skip
 
 # -- slides ----------------------------------------------------------------------------------------------------------
 

@@ -5,11 +5,27 @@ from __future__ import annotations
 from math import pi
 
 from components import icons
+from components.feasible import Feasible
 from components.interfaces import Flange, LinearFlange, Supported, TwoFlanges
-from modelica_like.language import Equations, Expr, Parameter, atan2, cos, floor, param, sin, sqrt, where
+from modelica_like.language import (
+    Equations,
+    Expr,
+    Parameter,
+    absolute,
+    all_of,
+    atan2,
+    cos,
+    floor,
+    param,
+    sin,
+    sqrt,
+    where,
+)
+
+_ROUNDING = 1e-12
 
 
-class AngleToWay(Supported, partial=True):
+class AngleToWay(Feasible, Supported, partial=True):
     """Linkage from a shaft to a slide, without mass and loss: s = way(phi), and the torque is -slope(phi)·f."""
 
     flange_r = Flange("shaft end")
@@ -42,6 +58,10 @@ class SliderCrank(AngleToWay):
     r: Parameter = param("m", "crank radius", min=1e-12)
     l: Parameter = param("m", "length of the rod; above r + |e|", min=1e-12)  # noqa: E741
     e: Parameter = param("m", "offset of the slide from the axis of the crank", default=0.0)
+    misfit = "cannot turn: its rod l is shorter than the crank r and the offset e together"
+
+    def fits(self) -> Expr:
+        return self.l > self.r + absolute(self.e)
 
     def rod(self, phi: Expr) -> Expr:
         """Return the part of the rod along the slide."""
@@ -66,6 +86,10 @@ class Cam(AngleToWay):
     rise: Parameter = param("rad", "angle in which it rises", min=1e-6)
     dwell: Parameter = param("rad", "angle for which it rests up there", default=0.0, min=0)
     fall: Parameter = param("rad", "angle in which it falls", min=1e-6)
+    misfit = "needs more than a turn: rise, dwell and fall are more than 360° together"
+
+    def fits(self) -> Expr:
+        return self.rise + self.dwell + self.fall <= (2 + _ROUNDING) * pi
 
     def stage(self, phi: Expr) -> tuple[Expr, Expr, Expr]:
         """Return the angle in the turn, and the shares of rise and fall that have passed."""
@@ -85,12 +109,12 @@ class Cam(AngleToWay):
         return self.h * where(up < 1, rising, above)
 
 
-class FourBar(TwoFlanges):
+class FourBar(Feasible, TwoFlanges):
     """Four-bar linkage: a crank at flange_a moves a rocker at flange_b through a coupler, without mass and loss.
 
     Both angles count from the line from the axis of the crank to that of the rocker; the linkage is not crossed. It
-    turns all around where crank and ground together are shorter than coupler and rocker (F. Grashof), and the crank is
-    the shortest. VDI 2127.
+    turns all around: crank and ground are shorter together than coupler and rocker, and in both stretched positions the
+    coupler reaches (F. Grashof). VDI 2127.
     """
 
     icon = icons.FOUR_BAR
@@ -98,6 +122,14 @@ class FourBar(TwoFlanges):
     coupler: Parameter = param("m", "length of the coupler", min=1e-12)
     rocker: Parameter = param("m", "length of the rocker", min=1e-12)
     ground: Parameter = param("m", "distance of both axes", min=1e-12)
+    misfit = (
+        "cannot turn all around: coupler and rocker must be longer together than ground and crank, "
+        "and differ by less than ground and crank do"
+    )
+
+    def fits(self) -> Expr:
+        longest = self.ground + self.crank < self.coupler + self.rocker
+        return all_of(longest, absolute(self.coupler - self.rocker) < self.ground - self.crank)
 
     def pin(self, phi: Expr) -> tuple[Expr, Expr]:
         """Return the way from the pin of the crank to the axis of the rocker."""

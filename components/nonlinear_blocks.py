@@ -112,6 +112,8 @@ class Hysteresis(Component):
         yield self.y == self.state.choose(off=0, on=1)
 
     def events(self) -> Events:
+        crossed = self.u_high < self.u_low
+        yield self.state.go("*", "off", when=crossed, notice="becomes 1 below where it becomes 0", fails=True)
         yield self.state.initially("on", when=self.u > self.u_high)
         yield self.state.go("off", "on", when=self.u > self.u_high)
         yield self.state.go("on", "off", when=self.u < self.u_low)
@@ -122,7 +124,7 @@ class Quantizer(Component):
 
     icon = icons.SCHEDULE
     u: Input = signal_in("*", "signal")
-    q: Parameter = param("*", "step")
+    q: Parameter = param("*", "step", min=1e-30)
     y: Output = signal_out("*", "rounded signal")
     level: Discrete = discrete("1", "number of steps")
     rounding = Mode("kept", description="each change of level is an event")
@@ -158,6 +160,7 @@ class PulseCounter(Component):
 
     def events(self) -> Events:
         low = self.u_low if self.given("u_low") else self.u_high
+        yield self.pulse.go("*", "low", when=self.u_high < low, notice="has u_high below u_low", fails=True)
         yield self.pulse.initially("high", when=self.u > self.u_high)
         yield self.pulse.go("low", "high", when=self.u > self.u_high, reset={self.number: self.number + 1})
         yield self.pulse.go("high", "low", when=self.u < low)

@@ -92,8 +92,8 @@ class ElastoGap(Lossy, LinearCompliantWithRelativeStates):
     def events(self) -> Events:
         spring, damper = self.spring, self.damper
         yield self.contact.initially("touching", when=self.s_rel < self.s_rel0)
-        yield self.contact.go("gap", "touching", when=self.s_rel < self.s_rel0)
-        yield self.contact.go("touching", "gap", when=self.s_rel > self.s_rel0)
+        yield self.contact.go("gap", "touching", when=self.s_rel < self.s_rel0, because="surfaces meet")
+        yield self.contact.go("touching", "gap", when=self.s_rel > self.s_rel0, because="surfaces part")
         yield self.surfaces.go("pressed", "meeting", when=damper > spring)
         yield self.surfaces.go("meeting", "pressed", when=damper < spring)
         yield self.surfaces.go("pressed", "leaving", when=damper < -spring)

@@ -105,10 +105,10 @@ class Backlash(Lossy, CompliantWithRelativeStates, partial=True):
         half = 0.5 * self.b
         yield self.contact.initially("forward", when=self.phi_diff > half)
         yield self.contact.initially("backward", when=self.phi_diff < -half)
-        yield self.contact.go("gap", "forward", when=self.phi_diff > half)
-        yield self.contact.go("gap", "backward", when=self.phi_diff < -half)
-        yield self.contact.go("forward", "gap", when=self.phi_diff < half)
-        yield self.contact.go("backward", "gap", when=self.phi_diff > -half)
+        yield self.contact.go("gap", "forward", when=self.phi_diff > half, because="flanks meet")
+        yield self.contact.go("gap", "backward", when=self.phi_diff < -half, because="flanks meet")
+        yield self.contact.go("forward", "gap", when=self.phi_diff < half, because="flanks part")
+        yield self.contact.go("backward", "gap", when=self.phi_diff > -half, because="flanks part")
 
     def stored_energy(self) -> Expr:
         return 0.5 * self.spring**2 / self.c

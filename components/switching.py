@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from components import icons
 from components.electrical import Pin, TwoPins
+from components.feasible import Feasible
 from components.thermal import Lossy
 from modelica_like.language import Equations, Events, Expr, Mode, Parameter, Variable, der, param, var
 
@@ -31,7 +32,7 @@ class Diode(Lossy, TwoPins):
         return self.v * self.i
 
 
-class Contactor(Lossy, TwoPins):
+class Contactor(Feasible, Lossy, TwoPins):
     """Contactor: its main contact closes when the current of its coil has risen to i_on, and opens below i_off."""
 
     icon = icons.CONTACTOR
@@ -44,7 +45,11 @@ class Contactor(Lossy, TwoPins):
     R_closed: Parameter = param("Ohm", "resistance of the closed contact", default=1e-5, min=0)
     G_open: Parameter = param("S", "conductance of the open contact", default=1e-5, min=0)
     i_coil: Variable = var("A", "current of the coil", default=0)
+    misfit = "cannot hold: its i_off is not below its i_on"
     contacts = Mode("open", "closed", description="state of the main contact")
+
+    def fits(self) -> Expr:
+        return self.i_off < self.i_on
 
     def equations(self) -> Equations:
         yield from super().equations()
@@ -54,6 +59,7 @@ class Contactor(Lossy, TwoPins):
         yield self.contacts.choose(open=self.i - self.G_open * self.v, closed=self.v - self.R_closed * self.i) == 0
 
     def events(self) -> Events:
+        yield from super().events()
         contacts, i = self.contacts, self.i_coil
         yield contacts.initially("closed", when=i > self.i_on)
         yield contacts.go("open", "closed", when=i > self.i_on, because="the coil pulls in")

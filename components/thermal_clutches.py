@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from components import icons
-from components.friction import Clutch, Rows
+from components.friction import Brake, Clutch, PressedFriction, Rows
+from components.interfaces import Flange
 from modelica_like.language import (
     Equations,
     Events,
@@ -11,8 +14,10 @@ from modelica_like.language import (
     Output,
     Parameter,
     Variable,
+    absolute,
     column,
     der,
+    maximum,
     param,
     rows,
     signal_out,
@@ -20,21 +25,27 @@ from modelica_like.language import (
 )
 
 _NONE = ((0.0, 1.0),)
+_STILL = 1e-9
+"""Part of w_G below which there is no wind."""
 
 
-class ThermalClutch(Clutch):
-    """Friction clutch whose plates store the friction work as heat and release it to the air or the heat port.
+class HotFriction(PressedFriction, partial=True):
+    """Friction surfaces whose plates store the friction work as heat and release it to the air or the heat port.
 
-    C·der(T) = P - G·(T - T_air). The coefficient of friction of a `Clutch` is multiplied by mu_T over the temperature
-    (fading) and by mu_p over the surface pressure p_max·f_normalized. Wear is in proportion to the friction work:
-    its depth is wear_rate·W/A (VDI 2241: Schaltbare fremdbetätigte Reibkupplungen und -bremsen). The heat in the plates
-    counts as lost unless a heat port is connected. The design check `clutch_heat` gives the limits per engagement and
-    per hour.
+    C·der(T) = P - G·(T - T_air); with w_G given, G grows by (w/w_G)^0.8, as the convection of a turbulent flow does.
+    The coefficient of friction is multiplied by mu_T over the temperature (fading) and by mu_p over the surface
+    pressure p_max·f_normalized. Wear is in proportion to the friction work: its depth is wear_rate·W/A (VDI 2241:
+    Schaltbare fremdbetätigte Reibkupplungen und -bremsen). The heat in the plates counts as lost unless a heat port is
+    connected. The design check `clutch_heat` gives the limits per engagement and per hour.
     """
 
-    icon = icons.THERMAL_CLUTCH
+    if TYPE_CHECKING:
+        flange_a: Flange
     C: Parameter = param("J/K", "heat capacity of the plates", min=1e-12)
     G: Parameter = param("W/K", "conductance to the air, or to what is at the heat port", default=0.0, min=0)
+    w_G: Parameter = param(
+        "rad/s", "speed of flange_a that doubles G by its wind; without a value there is none", default=None, min=1e-12
+    )
     T_air: Parameter = param("K", "temperature of the air without a heat port", default=293.15, min=0)
     mu_T: Rows = rows(
         column("temperature", scale="T_scale", rising=True),
@@ -50,7 +61,8 @@ class ThermalClutch(Clutch):
     p_scale: Parameter = param("Pa", "pressure that counts as 1 in mu_p", default=1.0)
     A: Parameter = param("m2", "area of all friction surfaces", default=1.0, min=1e-12)
     wear_rate: Parameter = param("m3/J", "volume that wears off per friction work", default=0.0, min=0)
-    T: Variable = var("K", "temperature of the plates", nominal=300.0, default="T_air", guess=293.15)
+    T: Variable = var("K", "temperature of the plates", state="avoid", nominal=300.0, default="T_air", guess=293.15)
+    rise: Variable = var("K", "temperature above T_air", state="prefer", nominal=10.0)
     W: Variable = var("J", "friction work since the start", nominal=1000.0, default=0)
     wear: Output = signal_out("m", "depth that has worn off all surfaces together")
 
@@ -67,7 +79,10 @@ class ThermalClutch(Clutch):
     @property
     def cooling(self) -> Expr:
         """Heat flow from the plates."""
-        return self.G * (self.T - (self.heat_port.T if self.heat_port.used else self.T_air))
+        wind = 1.0
+        if self.given("w_G"):
+            wind = 1 + maximum(absolute(der(self.flange_a.phi)) / self.w_G, _STILL) ** 0.8
+        return self.G * wind * (self.T - (self.heat_port.T if self.heat_port.used else self.T_air))
 
     def sliding_friction(self, speed: Expr | float) -> Expr:
         return (super().sliding_friction(speed) - self.tau_drag) * self.fade + self.tau_drag
@@ -77,7 +92,9 @@ class ThermalClutch(Clutch):
 
     def equations(self) -> Equations:
         yield from super().equations()
-        yield self.C * der(self.T) == self.dissipation() - self.cooling
+        # The rise is the state: it is integrated more precisely than the temperature, which is large.
+        yield self.T_air + self.rise == self.T
+        yield self.C * der(self.rise) == self.dissipation() - self.cooling
         yield der(self.W) == self.dissipation()
         yield self.wear == self.wear_rate * self.W / self.A
 
@@ -88,3 +105,13 @@ class ThermalClutch(Clutch):
 
     def stored_energy(self) -> Expr | float:
         return self.C * (self.T - self.T_air) if self.heat_port.used else 0.0
+
+
+class ThermalClutch(HotFriction, Clutch):
+    """Friction clutch with the temperature of its plates, fading and wear."""
+
+    icon = icons.THERMAL_CLUTCH
+
+
+class ThermalBrake(HotFriction, Brake):
+    """Friction brake with the temperature of its disc, fading and wear."""

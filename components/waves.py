@@ -66,8 +66,7 @@ class Sinc(Started):
 
     def running(self, elapsed: Expr) -> Expr:
         x = 2 * pi * self.f * elapsed
-        series = 1 - x**2 / 6
-        return self.amplitude * where(x**2 < 1e-8, series, sin(x) / x)
+        return self.amplitude * where(x**2 < 1e-12, 1, sin(x) / x)
 
 
 class Exponentials(Component):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from components import icons
+from components.feasible import Feasible
 from components.lossy_gears import MeshWithFriction
 from components.sources import AT_ONCE
 from modelica_like.language import (
@@ -17,6 +18,7 @@ from modelica_like.language import (
     cos,
     discrete,
     exp,
+    maximum,
     param,
     signal_out,
     tan,
@@ -24,7 +26,7 @@ from modelica_like.language import (
 )
 
 
-class WormGear(MeshWithFriction):
+class WormGear(Feasible, MeshWithFriction):
     """Worm gear with the friction of its flanks: the worm is at flange_a, the wheel at flange_b.
 
     With the lead angle gamma and the friction angle rho, tan(rho) = mu/cos(alpha_n), the worm drives with the
@@ -48,8 +50,12 @@ class WormGear(MeshWithFriction):
     tau_friction: Parameter = param("N.m", "friction torque of the bearings at the worm", default=0.0, min=0)
     efficiency: Output = signal_out("1", "efficiency at this speed, if the worm drives")
     self_locking: Output = signal_out("1", "1 where the wheel cannot start the worm, otherwise 0")
+    misfit = "cannot turn: its worm cannot drive, because lead angle and friction angle are 90° together"
     t_told: Discrete = discrete("s", "time at which the report tells that it holds: at the start", start=AT_ONCE)
     lock = Mode("open", "starting", "locking", "told", description="whether the report has to tell that it holds")
+
+    def fits(self) -> Expr:
+        return tan(self.gamma) * maximum(self.mu, self.mu_static) < cos(self.alpha_n)
 
     def rubbing(self, speed: Expr | float) -> Expr:
         """Return the tangent of the friction angle."""

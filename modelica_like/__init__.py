@@ -104,6 +104,7 @@ def __getattr__(name: str) -> Any:
 _OFFERED = {name: _HOME[name] for name in ("Native", "schematic", "simulation_function")}
 _OFFERED |= {
     "NativeLoop": "modelica_like.native.run",
+    "html": "modelica_like.report.notebook",
     "plot": "modelica_like.solve.plot",
     "sankey": "modelica_like.solve.sankey",
 }

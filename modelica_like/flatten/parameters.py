@@ -141,21 +141,19 @@ class Parameters:
         if not isinstance(field, Parameter | Input):
             known = [key for key, one in owner.fields.items() if isinstance(one, Parameter)]
             raise unknown("parameter", f"{label}: {owner.label}", path, known)
-        full = f"{owner.path}.{name}" if owner.path else name
-        return self._q[self.position(owner, name, full)]
+        return self._q[self.position(owner, name)]
 
-    def position(self, component: Component, name: str, path: str = "") -> int:
+    def position(self, component: Component, name: str) -> int:
         """Return the position of a parameter in q.
 
         Args:
             component: the component that declares it.
             name: of the parameter or input.
-            path: its dotted name, if already known.
 
         Raises:
             MissingValue: it has no value.
         """
-        label = path or (f"{component.path}.{name}" if component.path else name)
+        label = f"{component.path}.{name}" if component.path else name
         position = self.declare(component, name, label)
         if position is None:
             kind = type(component).__name__

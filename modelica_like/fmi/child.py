@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, Literal
@@ -98,14 +98,34 @@ def choose_kind(description: Any, kind: str | None) -> str:
     return chosen
 
 
-def check_names(job: dict[str, Any], causality: dict[str, str]) -> None:
+def take_arrays(parameters: dict[str, Any], arrays: dict[str, tuple[int, ...]]) -> None:
+    """Write arrays number behind number, row by row, as FMPy wants them.
+
+    Args:
+        parameters: what was asked for, under names that the FMU has.
+        arrays: shapes of its arrays; all else are scalars.
+    """
+    for name, value in parameters.items():
+        given, wanted = np.shape(value), arrays.get(name, ())
+        if given not in (wanted, (math.prod(wanted),) if wanted else ()):
+            raise Refused(kind="shape", name=name, wanted=_size(wanted), given=_size(given))
+        if given:
+            parameters[name] = np.ravel(value).tolist()
+
+
+def _size(shape: tuple[int, ...]) -> str:
+    return f"an array of {' x '.join(map(str, shape))}" if shape else "a number"
+
+
+def check_names(job: dict[str, Any], causality: dict[str, str], arrays: Collection[str] = ()) -> None:
     """Refuse parameters, inputs and outputs that the FMU does not have.
 
     Args:
         job: the request.
-        causality: of every variable.
+        causality: of every scalar variable.
+        arrays: what else may be a parameter.
     """
-    for name in [*job["parameters"], *(job["outputs"] or ()), *job["inputs"]]:
+    for name in [*(set(job["parameters"]) - set(arrays)), *(job["outputs"] or ()), *job["inputs"]]:
         if name not in causality:
             raise Refused(kind="unknown", name=name, known=list(causality))
     for name in job["inputs"]:
@@ -255,9 +275,11 @@ def run(job: Job) -> None:
     asked, fmu = job.asked, str(job.folder / "0")
     description: Any = fmpy.read_model_description(fmu, validate=False)
     kind = choose_kind(description, asked["kind"])
-    scalars = [v for v in description.modelVariables if v.type in (*REAL, *DISCRETE) and not v.shape]
-    known = {v.name: v for v in scalars if v.name != "time"}
-    check_names(asked, {name: v.causality or "local" for name, v in known.items()})
+    numbers = [v for v in description.modelVariables if v.type in (*REAL, *DISCRETE)]
+    known = {v.name: v for v in numbers if v.name != "time" and not v.shape}
+    arrays = {v.name: tuple(v.shape) for v in numbers if v.shape}
+    check_names(asked, {name: v.causality or "local" for name, v in known.items()}, arrays)
+    take_arrays(asked["parameters"], arrays)
     outputs = asked["outputs"] or [name for name, v in known.items() if v.causality != "parameter"]
     np.save(job.folder / "result.npy", np.asarray(simulate(job, description, kind, outputs)))
     parameters = {name: v.start for name, v in known.items() if v.causality == "parameter"}

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from modelica_like.errors import FmuFailed, FmuRefused, ModelicaLikeError, UnknownName, did_you_mean
+from modelica_like.errors import FmuFailed, FmuRefused, ModelicaLikeError, UnknownName, ValueOutOfRange, did_you_mean
 from modelica_like.fmi.unpack import printable
 
 Failures = dict[str, tuple[type[ModelicaLikeError], str, str, str]]
@@ -16,6 +16,10 @@ Failures = dict[str, tuple[type[ModelicaLikeError], str, str, str]]
 FAILURES: Failures = {
     "unknown": (UnknownName, "{unit} has no variable '{name}'{hint}", "", ""),
     "no input": (UnknownName, "{unit}: '{name}' is not an input but {causality}. {has}", "", ""),
+    "shape": (
+        ValueOutOfRange, "{unit}: '{name}' takes {wanted}, not {given}.",
+        "", "Numbers of an array are given as rows, or one behind the other.",
+    ),
     "scheduled": (
         FmuRefused,
         "{unit} is for Scheduled Execution only: its importer activates its tasks one by one, by a schedule.",

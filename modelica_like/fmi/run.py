@@ -23,7 +23,7 @@ _CHILD = Path(__file__).with_name("child.py")
 
 
 def run_fmu(
-    path: str | Path, inputs: Mapping[str, Any] | None = None, parameters: Mapping[str, float] | None = None, *,
+    path: str | Path, inputs: Mapping[str, Any] | None = None, parameters: Mapping[str, Any] | None = None, *,
     start: float = 0.0, stop: float | None = None, kind: Kind | None = None, tolerance: float | None = None,
     step: float | None = None, points: int | None = None, outputs: Sequence[str] | None = None,
     timeout: float = TIMEOUT, solver: Solver = "CVode",
@@ -40,7 +40,8 @@ def run_fmu(
             A Co-Simulation gets their slopes if it supports them (FMI 2.0, `canInterpolateInputs`), otherwise their
             means over steps in which no input changes by more than a five-hundredth of its range, or over its own fixed
             steps.
-        parameters: start values of parameters and variables by name, in the FMU's units.
+        parameters: start values of parameters and variables by name, in the FMU's units: numbers, and for arrays
+            (FMI 3.0) nested sequences of the array's shape, or all its numbers, row by row.
         start: start time in s.
         stop: end time in s; by default that of the FMU.
         kind: `me` (Model Exchange) or `cs` (Co-Simulation); by default `cs` if the FMU has it.
@@ -56,13 +57,13 @@ def run_fmu(
         FmuRefused: the file is not an FMU, is unsafe to unpack, or lacks what was requested.
         FmuFailed: the FMU reported an error; FmuCrashed: it crashed its process; FmuTimeout: it did not finish.
         UnknownName: it has no such variable.
+        ValueOutOfRange: an array has another shape, or a time is wrong.
         OSError: the file cannot be read.
     """
     path = Path(path)
     job = {
         "start": start, "stop": stop, "kind": kind, "tolerance": tolerance, "step": step, "points": points,
-        "solver": solver,
-        "outputs": list(outputs) if outputs else None, "parameters": _plain(parameters or {}),
+        "solver": solver, "outputs": list(outputs) if outputs else None, "parameters": _plain(parameters or {}),
         "inputs": {name: _series(name, value) for name, value in (inputs or {}).items()},
     }  # fmt: skip
     _check_times(path.name, start, stop, step, timeout)
@@ -76,7 +77,21 @@ def run_fmu(
 
 
 def _plain(values: Mapping[str, Any]) -> dict[str, Any]:
-    return {name: value.item() if isinstance(value, np.generic) else value for name, value in values.items()}
+    return {name: _numbers(name, value) for name, value in values.items()}
+
+
+def _numbers(name: str, value: Any) -> Any:
+    if isinstance(value, np.generic):
+        return value.item()
+    if not isinstance(value, Sequence | np.ndarray) or isinstance(value, str):
+        return value
+    try:
+        return np.asarray(value, float).tolist()
+    except (TypeError, ValueError) as error:
+        raise ValueOutOfRange(
+            f"The parameter '{name}' must be a number or an array of numbers.",
+            advice="All rows of an array have the same length.",
+        ) from error
 
 
 def _series(name: str, value: Any) -> Any:

@@ -20,7 +20,7 @@ _TEMPLATES = Path(__file__).parent / "templates"
 RUNTIME = (
     "model.c", "model_check.c", "model_file.c", "tape.c", "linear.c", "special.c", "point.c", "start.c", "holds.c",
     "impacts.c", "events.c", "rosenbrock.c", "locate.c", "integrate.c", "fixed.c", "values.c", "derivatives.c",
-    "taylor.c", "instance.c",
+    "gradient.c", "taylor.c", "instance.c",
 )  # fmt: skip
 LOG_CATEGORIES = {
     "logStatusError": "errors: what went wrong, where, and what to do",
@@ -63,7 +63,7 @@ def runtime_sources(faces: Iterable[Face]) -> dict[str, str]:
 def own_sources(faces: Iterable[Face]) -> dict[str, str]:
     """Read the same without the headers of the standard."""
     own = (name for face in faces for name in _FACES[face])
-    names = ("core.h", "model.h", "operations.h", "model_data.c", *RUNTIME, *own)
+    names = ("core.h", "model.h", "modelica_like.h", "operations.h", "model_data.c", *RUNTIME, *own)
     return {name: (_TEMPLATES / name).read_text(encoding="utf-8") for name in names}
 
 

@@ -52,6 +52,11 @@ def terms(model: CompiledDae, point: Point) -> Any:
     return call(model, model.hold_terms, point).reshape(-1, TERMS)
 
 
+def capacities(model: CompiledDae, point: Point) -> Any:
+    """Return the forward and backward capacity of every held motion; shape (holds, 2)."""
+    return terms(model, point)[:, 1:3]
+
+
 def rest(model: CompiledDae, point: Point) -> None:
     """Set held motions within rounding of zero to zero, if they are states."""
     held = [model.holds[k] for k in holding(model, point)]
@@ -95,7 +100,7 @@ def share(model: CompiledDae, point: Point) -> None:
     if not any(len(active.intersection(circuit.members)) > 1 for circuit in model.circuits):
         _share_circuits(model, point, active, np.zeros(0))
         return
-    limits = terms(model, point)[:, 1:3]
+    limits = capacities(model, point)
     weights = base = 1.0 / _capacities(limits)
     best, least = point.d, np.inf
     for _ in range(_SPLITS):
@@ -248,8 +253,8 @@ class Strike:
         self.loose: list[int] = []
         before = self._motions()
         # Friction never stops a motion at once; if an importer lets it overrun standstill, that is not an impact.
-        limits = terms(model, point)[:, 1:3].max(axis=1)
-        moving = [k for k in self.entering if before[k] != 0.0 and limits[k] >= UNLIMITED]
+        limits = capacities(model, point)
+        moving = [k for k in self.entering if before[k] != 0.0 and max(limits[k]) >= UNLIMITED]
         self.hard = self._stops(before, moving)
         self.knocked: list[int] = []
 
@@ -261,14 +266,13 @@ class Strike:
         model, point = self.model, self.point
         before = self._motions()
         moving = [k for k in sorted(self.entering) if before[k] != 0.0]
-        table = terms(model, point)
-        restitution = table[:, 3]
+        limits, restitution = capacities(model, point), terms(model, point)[:, -1]
         trials = 0
         while True:
             approaches = {k: -(1.0 + restitution[k]) * before[k] / _INSTANT for k in moving if k not in self.loose}
             jump, impulses, reactions = self._response(approaches)
-            unbearable = self._unbearable(table, impulses, reactions) if self.hard else []
-            again = [] if unbearable else self._approaching(table, jump)
+            unbearable = self._unbearable(limits, impulses, reactions) if self.hard else []
+            again = [] if unbearable else self._approaching(limits, jump)
             trials += 1
             if trials == _TRIALS or not (unbearable or again):
                 break
@@ -319,14 +323,14 @@ class Strike:
         impulses = dict(zip(held, _INSTANT * (asked_for - finite), strict=True))
         return _INSTANT * (rates - rest), impulses, dict(zip(held, finite, strict=True))
 
-    def _unbearable(self, table: Any, impulses: dict[int, float], reactions: dict[int, float]) -> list[int]:
+    def _unbearable(self, limits: Any, impulses: dict[int, float], reactions: dict[int, float]) -> list[int]:
         """The motions whose reactions exceed the impulsive capacity of their elements."""
         instant = 10.0 * time_resolution(self.point.t)
         scale = max((abs(one) for one in impulses.values()), default=0.0)
         found: list[int] = []
         for k, impulse in impulses.items():
             own = self.model.holds[k]
-            forward, backward = table[k, 1:3]
+            forward, backward = limits[k]
             capacity, sign = (forward, 1.0) if impulse > 0.0 else (backward, -1.0)
             if own.loose < 0:
                 continue
@@ -335,7 +339,7 @@ class Strike:
                 found.append(k)
         return found
 
-    def _approaching(self, table: Any, jump: Vector) -> list[int]:
+    def _approaching(self, limits: Any, jump: Vector) -> list[int]:
         """Released motions that would now move against an unlimited stop."""
         if not self.loose:
             return []
@@ -343,7 +347,7 @@ class Strike:
         motions = call(self.model, self.model.variables, after)
         found: list[int] = []
         for k in self.loose:
-            motion, (forward, backward) = motions[self.model.holds[k].motion], table[k, 1:3]
+            motion, (forward, backward) = motions[self.model.holds[k].motion], limits[k]
             nominal = self.model.flat_variables[self.model.holds[k].motion].nominal
             against = forward if motion > 0.0 else backward
             if against >= UNLIMITED and abs(motion) > ROUNDING * nominal and k in self.entering:

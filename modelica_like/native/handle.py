@@ -38,6 +38,7 @@ class Native:
         start: `given`, `rest` or `steady`; by default that of the netlist.
         rtol: relative tolerance.
         atol: absolute tolerance, in nominal values.
+        by: parameters, inputs that are held, and start values; `gradient` differentiates with respect to them.
         fixed_step: step size in s, or a time such as "1 ms", for bounded work per step; steps and output intervals
             are whole numbers of it. By default the step size is adaptive.
 
@@ -50,7 +51,7 @@ class Native:
     """
 
     def __init__(
-        self, model: CompiledDae, inputs: Sequence[str] = (), outputs: Sequence[str] = (), *,
+        self, model: CompiledDae, inputs: Sequence[str] = (), outputs: Sequence[str] = (), *, by: Sequence[str] = (),
         start: StartKind | None = None, rtol: float = Options.rtol, atol: float | None = None,
         fixed_step: float | str | None = None,
     ) -> None:  # fmt: skip
@@ -59,6 +60,7 @@ class Native:
         self._tolerances = rtol, rtol / 100 if atol is None else atol
         names = self._instance.native
         self._references = names.references(inputs), names.references(outputs)
+        self._by = names.references(by)
         self.inputs, self.outputs = np.zeros(len(inputs)), np.zeros(len(outputs))
         self._step = tuple(
             part
@@ -82,6 +84,9 @@ class Native:
         given = values or {}
         self._instance.reset(t0, until, *self._tolerances)
         self.set(given)
+        if self._by.size:
+            whole = self._library.instance(self._address)
+            self._instance.check(self._library.gradient_start(whole, self._by.ctypes.data, self._by.size))
         self._instance.check(self._library.begin(self._address))
         self._read(self._references[0], self.inputs)
         self._read(self._references[1], self.outputs)
@@ -108,6 +113,21 @@ class Native:
         if code:
             self._instance.check(code)
         return self.outputs
+
+    def gradient(self) -> Vector:
+        """Return the derivatives of `outputs` with respect to `by`, through all events since the start.
+
+        Returns:
+            Shape (outputs, by).
+
+        Raises:
+            NoGradient: at an event a small change leads to other modes, or a copy was restored.
+        """
+        self._read(self._references[1], self.outputs)  # after events that come first
+        found = np.zeros((len(self.outputs), self._by.size))
+        whole, of = self._library.instance(self._address), self._references[1]
+        self._instance.check(self._library.gradient(whole, of.ctypes.data, of.size, found.ctypes.data))
+        return found
 
     @property
     def time(self) -> float:

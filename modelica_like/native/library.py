@@ -1,4 +1,4 @@
-"""The functions of native.c and batch.c by ctypes, which lets other threads run."""
+"""The functions of native.c, batch.c and modelica_like.h by ctypes, which lets other threads run."""
 
 from __future__ import annotations
 
@@ -64,7 +64,13 @@ _SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
     "counts": (None, 2 * [_POINTER]),
     "run": (_CODE, [_POINTER, _NUMBER, _COUNT, c.POINTER(Run)]),
     "batch": (_COUNT, [_POINTER, c.POINTER(BatchArguments)]),
+    "instance": (_POINTER, [_POINTER]),
 }
+_GRADIENTS = {
+    "gradient_start": [_POINTER, _POINTER, c.c_size_t],
+    "gradient": [_POINTER, _POINTER, c.c_size_t, _POINTER],
+}
+"""Of modelica_like.h."""
 
 
 @cache
@@ -79,8 +85,10 @@ def library() -> Any:
 
 def declared(loaded: c.CDLL) -> Any:
     """Declare the functions of a library."""
-    for name, (result, arguments) in _SIGNATURES.items():
-        function = getattr(loaded, f"native_{name}")
+    native = [(f"native_{name}", name, *types) for name, types in _SIGNATURES.items()]
+    gradients = [(f"modelica_like_{name}", name, _CODE, arguments) for name, arguments in _GRADIENTS.items()]
+    for exported, name, result, arguments in [*native, *gradients]:
+        function = getattr(loaded, exported)
         function.restype, function.argtypes = result, arguments
         setattr(loaded, name, function)
     return loaded

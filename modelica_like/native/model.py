@@ -16,6 +16,7 @@ from modelica_like.errors import (
     ContradictingStart,
     InitializationError,
     ModelicaLikeError,
+    NoGradient,
     SingularAtStart,
     StepFailed,
     UnknownName,
@@ -34,6 +35,7 @@ _ERRORS: tuple[tuple[str, type[ModelicaLikeError]], ...] = (
     ("Modes still switch|Events follow each other", Chattering),
     ("The Jacobian is singular|The derivative of .* is not finite", SingularAtStart),
     ("Two start values|A start value of", ContradictingStart),
+    ("There are no derivatives", NoGradient),
     ("The equations for|No start|No steady|The modes at the start", InitializationError),
 )
 """Error class of a message of the run-time; all others are wrong values."""

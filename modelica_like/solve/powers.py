@@ -31,7 +31,7 @@ _FINEST = 1e-12
 """Factor of precision of a repeated integration over the run, and its limit."""
 _NEAR = 8
 """Intervals that are also integrated again, because a new start would cost more."""
-_MORE, _LEAST, _DEEPEST = 4, 4, 6
+_MORE, _LEAST, _DEEPEST = 4, 4, 12
 """Finer results per interval, the smallest number of intervals for this, and the number of repetitions."""
 _FAILURES = 20
 """Failures of IDAS in a piece of a run after which the given results must suffice."""

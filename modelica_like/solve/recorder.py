@@ -100,7 +100,7 @@ class Recorder:
     def note(
         self, model: CompiledDae, time: float, number: int, change: tuple[int, int], transition: int, round: int
     ) -> None:
-        """Record the change of a mode from one number to another, by a transition or (-1) by an impact."""
+        """Record the change of a mode from one number to another, by a transition or by an `IMPACT`."""
         mode = model.flat_discretes[number]
         before, after = (mode.names[k] for k in change)
         # Break-away in an impact has no transition; the first one of the mode gives its place.

@@ -13,6 +13,7 @@ from modelica_like.errors import NetlistError, UnknownName, ValueOutOfRange, did
 from modelica_like.initialize import Point
 from modelica_like.language.expr import Symbol
 from modelica_like.language.mode import BoundMode
+from modelica_like.solve.branches import member, next_names
 from modelica_like.solve.recorder import Event
 from modelica_like.upper import upper
 
@@ -79,6 +80,22 @@ class Trajectories(ABC):
     events: tuple[Event, ...]
     statistics: Statistics
     notices: tuple[str, ...] = ()
+
+    def __getattr__(self, name: str) -> Any:
+        """Return a variable, or the variables of a part: `run.clutch.tau`."""
+        if name.startswith("_") or "model" not in self.__dict__:
+            raise AttributeError(f"'{type(self).__name__}' has no attribute '{name}'")
+        return member(self, name)
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *next_names(self.names, "")]
+
+    def _ipython_key_completions_(self) -> list[str]:
+        return list(self.names)
+
+    def _repr_html_(self) -> str:
+        """Return curves, events and statistics, for notebooks."""
+        return upper("html")(self)
 
     @property
     @abstractmethod

@@ -198,3 +198,28 @@ def share_reactions(system: System, holds: tuple[HeldMotion, ...], circuits: lis
             row = holds[k].row
             rows[row] = (1 - switches[place]) * rows[row] + slope[k] * ca.mtimes(shares[place, :], reactions)
     return ca.vertcat(*rows)
+
+
+def held_rates(model: FlatModel, ode: Any, values: Any, holds: tuple[HeldMotion, ...], circuits: list[Circuit]) -> Any:
+    """Let states that modes hold stay where they are, exactly.
+
+    What holds them would otherwise be solved for among accelerations that may be a million times as large, and in hours
+    their rounding adds up: a state that drifts under a large reaction takes power.
+
+    Args:
+        model: the flat model, with approaches and circuits.
+        ode: derivatives of the states.
+        values: of all nodes, in terms of states and implicit unknowns.
+        holds: the held motions, with their states.
+        circuits: those that depend on each other.
+    """
+    switched = {k: one.first + place for one in circuits for place, k in enumerate(one.members)}
+    gain, rates, d = hold_terms(model, values)[:, 0], ca.SX(ode), model.d
+    for k, one in enumerate(holds):
+        if one.rigid and one.state is not None:
+            state, factor = one.state
+            own = ca.logic_and(d[one.mode] == one.number, gain[k] != 0)
+            if k in switched:
+                own = ca.logic_and(own, d[switched[k]] == 0)
+            rates[state] = ca.if_else(own, d[one.approach] / factor, rates[state])
+    return rates

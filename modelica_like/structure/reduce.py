@@ -12,7 +12,14 @@ from modelica_like.flatten.model import FlatModel, Origin
 from modelica_like.structure.alias import find_aliases
 from modelica_like.structure.blocks import Block, BlockSolver, Solved
 from modelica_like.structure.diagnose import check_solvable
-from modelica_like.structure.holds import Circuit, HeldMotion, add_approaches, find_circuits, share_reactions
+from modelica_like.structure.holds import (
+    Circuit,
+    HeldMotion,
+    add_approaches,
+    find_circuits,
+    held_rates,
+    share_reactions,
+)
 from modelica_like.structure.index import Pantelides, prefer_relative_states
 from modelica_like.structure.motion import Motion
 from modelica_like.structure.prescribed import Flags
@@ -134,7 +141,8 @@ def reduce(flat: FlatModel) -> ReducedDae:
         solved = BlockSolver(residual, system.column(unknowns), _volatile(system)).run()
     reduced = _assemble(system, counts, states, unknowns, origins, solved)
     held = tuple(replace(one, state=reduced.node_states[one.motion]) for one in holds)
-    return replace(reduced, holds=held, circuits=tuple(circuits))
+    ode = held_rates(reduced.flat, reduced.ode, reduced.values, held, circuits)
+    return replace(reduced, ode=ode, holds=held, circuits=tuple(circuits))
 
 
 def _check_input_rates(system: System) -> None:

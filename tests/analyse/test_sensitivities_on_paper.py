@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from components import Clutch, ConstantTorque, Fixed, Inertia, SpeedDependentLoad, SpringDamper
-from modelica_like import Assembly, Component, load, sensitivities, simulate
+from modelica_like import Assembly, Component, build, load, sensitivities, simulate
 from modelica_like.analyse.sensitivity.derivatives import Sensitivities
 from modelica_like.language import Equations, Events, Mode, Parameter, Variable, der, guess, param, series, var, where
 
@@ -20,6 +20,14 @@ def relative_error(result: Sensitivities, expected: np.ndarray) -> float:
     weights = np.array([one.value for one in result.parameters])
     scale = np.max(np.abs(expected * weights), axis=1, keepdims=True)
     return float(np.max(np.abs((result.derivatives - expected) * weights) / scale))
+
+
+def carried(model: Component, of: list[str], by: list[str], until: float, **how: str) -> np.ndarray:
+    """Derivatives that a handle carries along its run in C."""
+    handle = build(model).native(outputs=of, by=by, rtol=1e-9, **how)
+    handle.reset(until=until)
+    handle.step(until)
+    return handle.gradient()
 
 
 def complex_step(function: Callable[[np.ndarray], np.ndarray], values: np.ndarray) -> np.ndarray:
@@ -117,6 +125,8 @@ def test_final_values_times_and_integrals_of_an_oscillator() -> None:
     values = np.array([100.0, 1.0, 1.0])
     end = complex_step(lambda v: damped(v, 1.3), values)
     inside = complex_step(lambda v: damped(v, 0.31), values)
+    found = carried(Bench(), ["mass.phi", "mass.w"], ["spring.c", "spring.d", "mass.J"], 1.3)
+    np.testing.assert_allclose(found, end[:2], rtol=1e-6)
     assert relative_error(result, np.vstack([end, inside[:1], end[2:]])) < 1e-8
 
 
@@ -188,6 +198,20 @@ def test_a_bouncing_ball_with_resets() -> None:
         return np.array([second, speed * rest - g * rest**2 / 2, speed - g * rest])
 
     assert relative_error(result, complex_step(paper, np.array([0.7, 9.81]))) < 1e-9
+    expected = complex_step(paper, np.array([0.7, 9.81]))[1:]
+    np.testing.assert_allclose(carried(Ball(s=2.0, v=0.0), ["s", "v"], ["e", "g"], 1.9), expected, rtol=1e-8)
+
+
+def test_a_handle_differentiates_by_start_values() -> None:
+    # By the height h and the speed v0 from which a ball falls that jumps off the floor once.
+    def paper(values: np.ndarray) -> np.ndarray:
+        h, v0 = values
+        first = (v0 + np.sqrt(v0**2 + 2 * 9.81 * h)) / 9.81
+        speed, rest = 0.7 * np.sqrt(v0**2 + 2 * 9.81 * h), 1.2 - first
+        return np.array([speed * rest - 9.81 * rest**2 / 2, speed - 9.81 * rest])
+
+    found = carried(Ball(s=2.0, v=0.5), ["s", "v"], ["s", "v"], 1.2)
+    np.testing.assert_allclose(found, complex_step(paper, np.array([2.0, 0.5])), rtol=1e-8)
 
 
 class Bent(Component):
@@ -288,6 +312,8 @@ def test_a_steady_start_and_a_moving_moment() -> None:
         return np.array([way * (np.cos(o * r) + s / o * np.sin(o * r)), -way * c / (m * o) * np.sin(o * r)])
 
     assert relative_error(result, complex_step(paper, np.array([3.0, 50.0, 2.0, 0.2]))) < 1e-8
+    found = carried(Leaning(), ["s", "v"], ["force", "c", "m", "end"], 1.0, start="steady")
+    np.testing.assert_allclose(found, complex_step(paper, np.array([3.0, 50.0, 2.0, 0.2])), rtol=1e-7)
 
 
 class Stop(Component):
@@ -321,6 +347,8 @@ def test_a_reset_of_a_variable_that_follows_from_states() -> None:
         return np.array([v + step + a * (1.5 - t), w + k * step + 0.5 * a * (1.5 - t)])
 
     assert relative_error(result, complex_step(paper, np.array([2.0, 0.5, 3.0]))) < 1e-9
+    found = carried(Stop(v=1.0, w=2.0), ["v", "w"], ["ratio", "moment", "a"], 1.5)
+    np.testing.assert_allclose(found, complex_step(paper, np.array([2.0, 0.5, 3.0])), rtol=1e-8)
 
 
 class Coupled(Component):
@@ -341,3 +369,5 @@ def test_a_steady_start_with_a_clutch_that_sticks() -> None:
         Coupled(), ["rotor.w", "wheel.w"], ["push.tau_constant", "load.a", "rotor.J"], until="1 s", start="steady"
     )
     np.testing.assert_allclose(result.derivatives, [[1.0, -1.0, 0.0]] * 2, atol=1e-9)
+    found = carried(Coupled(), ["rotor.w", "wheel.w"], ["push.tau_constant", "load.a", "rotor.J"], 1.0, start="steady")
+    np.testing.assert_allclose(found, [[1.0, -1.0, 0.0]] * 2, atol=1e-9)

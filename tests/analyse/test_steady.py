@@ -17,7 +17,7 @@ from modelica_like import build, simulate
 from modelica_like.analyse.operating.curves import characteristic
 from modelica_like.analyse.operating.steady import steady
 from modelica_like.errors import InitializationError, UnknownName, ValueOutOfRange
-from modelica_like.language import Component, Equations, guess, series
+from modelica_like.language import Component, Equations, Parameter, Variable, der, guess, param, series, var
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 # Document 002, set A: the measured speed line and the no-load current exactly.
@@ -35,6 +35,20 @@ def current(torque):
 
 def speed(torque):
     return (SUPPLY - R * current(torque)) / K
+
+
+def test_an_implicit_unknown_without_a_steady_value_is_named():
+    class Open(Component):
+        x: Variable = var("1", "state")
+        y: Variable = var("1", "implicit")
+        T: Parameter = param("s", "time constant", default=1.0)
+
+        def equations(self) -> Equations:
+            yield self.T * der(self.x) == -self.x
+            yield self.y**2 + self.y + 1 + self.x == 0
+
+    with pytest.raises(InitializationError, match="y keeps changing"):
+        simulate(Open(), 1.0, start="steady")
 
 
 def test_characteristic_curves_of_the_motor(motor):

@@ -213,6 +213,30 @@ static void runs(void) {
     fmi3FreeInstance(c);
 }
 
+/* With two tangents through all events, chosen twice. */
+static void carries_derivatives(void) {
+    fmi3Instance c = made(1, 0);
+    fmi3ValueReference state = first_of(KIND_STATE), rate = first_of(KIND_DERIVATIVE);
+    fmi3ValueReference by[2] = {first_of(KIND_PARAMETER), first_of(KIND_PARAMETER)};
+    double found[2];
+    for (int k = 0; k < model->n_variables; k++)
+        if (model->variables[k].kind == KIND_STATE && model->variables[k].start >= 0)
+            by[1] = model->variables[k].reference; /* a start value */
+    EXPECT(1, modelica_like_gradient_start(NULL, by, 2));
+    EXPECT(1, modelica_like_gradient_start(c, by, 2));
+    OK(fmi3EnterInitializationMode(c, 1, 1e-6, 0, 1, 1.0));
+    EXPECT(1, modelica_like_gradient_start(c, NULL, 2));
+    EXPECT(1, modelica_like_gradient_start(c, &rate, 1));
+    for (int k = 0; k < 2; k++) EXPECT(0, modelica_like_gradient_start(c, by, 2));
+    OK(fmi3ExitInitializationMode(c));
+    for (int k = 0; k < 10; k++) OK(step(c, 0.1 * k, 0.1));
+    EXPECT(0, modelica_like_gradient(c, &state, 1, found));
+    EXPECT(1, modelica_like_gradient(c, NULL, 1, found));
+    OK(fmi3Reset(c));
+    EXPECT(1, modelica_like_gradient(c, &state, 1, found));
+    fmi3FreeInstance(c);
+}
+
 int main(int argc, char **argv) {
     int cycles = argc > 1 ? atoi(argv[1]) : 1;
     char message[MESSAGE_LENGTH];
@@ -222,6 +246,7 @@ int main(int argc, char **argv) {
     refuses_wrong_order();
     refuses_wrong_sizes();
     refuses_damaged_states();
+    carries_derivatives();
     for (int k = 0; k < cycles; k++) {
         fmi3Instance c = started(k % 2, 0);
         if (k % 2) OK(step(c, 0, 0.05));

@@ -199,7 +199,7 @@ def test_instances_of_different_models_do_not_disturb_each_other(exported):
         np.testing.assert_array_equal(exported(drive).states(fmu), alone[drive])
 
 
-def test_one_library_has_the_functions_of_both_versions_and_of_native_runs_only():
+def test_one_library_has_the_functions_of_both_versions_of_native_runs_and_gradients_only():
     library = runtime_library(NATIVE)
     listed = subprocess.run(["nm", "-D", "--defined-only", library], capture_output=True, text=True, check=True).stdout
     sources = runtime_sources(("2.0", "3.0", "native"))
@@ -207,8 +207,8 @@ def test_one_library_has_the_functions_of_both_versions_and_of_native_runs_only(
     for v in "23":
         declared |= set(re.findall(rf"FMI{v}_Export \w+\s+(fmi\w+);", sources[f"fmi{v}Functions.h"]))
     assert len(declared) == 44 + 75
-    for name in ("native.c", "batch.c"):
-        declared |= set(re.findall(r"^EXPORTED .*?\b(native_\w+)\(", sources[name], re.MULTILINE))
+    for name in ("native.c", "batch.c", "modelica_like.h"):
+        declared |= set(re.findall(r"^EXPORTED .*?\b((?:native|modelica_like)_\w+)\(", sources[name], re.MULTILINE))
     assert {line.split()[-1] for line in listed.splitlines()} == declared
     needed = re.findall(rb"GLIBC_(\d+)\.(\d+)", library.read_bytes())
     assert max((int(a), int(b)) for a, b in needed) <= (2, 17)

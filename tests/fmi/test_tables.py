@@ -16,6 +16,7 @@ from components.shift_schedule import ShiftSchedule
 from components.signals import Table
 from modelica_like import Assembly, build, export_fmu, sensitivities, simulate
 from modelica_like.errors import ExportError, LanguageError, ModelicaLikeError, UnknownName, ValueOutOfRange
+from modelica_like.fmi.run import run_fmu
 from modelica_like.language import interpolate
 
 ROWS = [[0.0, 1.0], [10.0, 1.5], [20.0, 4.0]]
@@ -155,6 +156,32 @@ def test_importers_set_arrays_and_scalars(fmus, kind):
             relative_tolerance=1e-8,
         )
         assert run["J.w"][-1] == pytest.approx(speed(2.5, END), rel=1e-5)
+
+
+@pytest.mark.parametrize("rows", [flat(2.5), np.reshape(flat(2.5), (3, 2)), [[w, 2.5] for w, _ in ROWS]])
+def test_run_fmu_sets_arrays(fmus, rows):
+    run = run_fmu(fmus["3.0"], parameters={"bearing.tau_pos": rows, "J.J": 2 * INERTIA}, stop=END, outputs=["J.w"])
+    assert run["J.w"][-1] == pytest.approx(SPEED - 2.5 / (2 * INERTIA) * END, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "said"),
+    [
+        (
+            "bearing.tau_pos",
+            [[0, 10, 20], [2, 2, 2]],
+            "'bearing.tau_pos' takes an array of 3 x 2, not an array of 2 x 3.",
+        ),
+        ("bearing.tau_pos", [0, 1, 2, 3], "'bearing.tau_pos' takes an array of 3 x 2, not an array of 4."),
+        ("bearing.tau_pos", 2.5, "'bearing.tau_pos' takes an array of 3 x 2, not a number."),
+        ("J.J", [2.0], "'J.J' takes a number, not an array of 1."),
+        ("bearing.tau_pos", [[0, 1], [2]], "'bearing.tau_pos' must be a number or an array of numbers."),
+        ("bearing.tau_pos", [["a", "b"]] * 3, "'bearing.tau_pos' must be a number or an array of numbers."),
+    ],
+)
+def test_run_fmu_refuses_arrays_of_other_shapes(fmus, name, value, said):
+    with pytest.raises(ValueOutOfRange, match=re.escape(said)):
+        run_fmu(fmus["3.0"], parameters={name: value}, stop=END)
 
 
 @pytest.fixture

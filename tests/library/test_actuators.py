@@ -46,7 +46,7 @@ def coil(**values: Any) -> Solution:
 def test_magnet_moves_as_scipy_says() -> None:
     """From the release of the armature to its impact: m·v' = F - f_spring - c·s, and the circuit with its back-EMF."""
     run = coil(L_s=0.05)
-    events = [event.time for event in run.events if event.mode == "coil.stop"]
+    events = [event.time for event in run.events if event.mode == "coil.stop" and event.after != "moving"]
 
     def rates(t: float, y: list[float]) -> list[float]:
         s, v, i = y
@@ -66,7 +66,7 @@ def test_magnet_moves_as_scipy_says() -> None:
 def test_remanence_holds_the_armature_after_switching_off() -> None:
     """What the iron keeps draws with i_rem²/2·L_m/gap: more than the spring's 6 N at the far stop."""
     run = coil(i_rem=0.1)
-    assert [event.after for event in run.events if event.mode == "coil.stop"] == ["moving", "driven"]
+    assert [event.after for event in run.events if event.mode == "coil.stop"] == ["leaving", "moving", "driven"]
     left = 0.1 + 2 * exp(-0.05 * 112 / 0.3)
     assert run.final["coil.y"] == pytest.approx(0.5 * left**2 * 0.3 / 0.2e-3 - 6, rel=1e-6)
     assert coil(i_rem=0.08).final["coil.s"] == pytest.approx(0, abs=1e-12)
@@ -131,3 +131,9 @@ def test_pressure_and_temperature_multiply_and_the_end_of_a_table_is_told() -> N
     assert run.at(0)["clutch.tau"] == pytest.approx(-(20 * 1.0 + 1))
     assert run.final["clutch.tau"] == pytest.approx(-(20 * 0.5 + 1))
     assert any("leaves the rows of mu_T" in notice for notice in notices(run))
+
+
+def test_wind_cools_a_clutch_that_turns() -> None:
+    clutch = ThermalClutch(capacity=20.0, C=10.0, G=2.0, w_G=50.0)
+    run = simulate(slipping(clutch), 60.0, **TIGHT)
+    assert run.final["clutch.T"] == pytest.approx(293.15 + 20 * 100 / (2 * (1 + 2**0.8)), rel=1e-9)

@@ -106,6 +106,10 @@ def test_a_signal_that_ends_the_run() -> None:
     assert simulate(signal, 1.0).final["s.y"] == 2.0
     with pytest.raises(LimitPassed, match="At 1 s s has no more rows"):
         simulate(signal, 2.0)
+    late = Assembly("d", parts={"s": Table(table=((1000, 0), (1000.1, 2)), extrapolate="error")})
+    with pytest.raises(LimitPassed) as caught:
+        simulate(late, 1002.0, t0=1000.0)
+    assert caught.value.run.time[-1] - 1000.1 == pytest.approx(0.0, abs=1e-9)
 
 
 WRONG = {

@@ -18,6 +18,7 @@ from components import (
     FrequencyMeter,
     Hysteresis,
     Integrator,
+    Limiter,
     NormalNoise,
     P,
     PulseCounter,
@@ -34,6 +35,7 @@ from components import (
     ZeroOrderHold,
 )
 from modelica_like import Assembly, Component, ModelicaLikeError, Solution, simulate
+from modelica_like.errors import LimitPassed
 
 TIGHT: dict[str, Any] = {"rtol": 1e-9, "atol": 1e-11}
 
@@ -254,3 +256,28 @@ def test_what_is_no_state_space(name: str, told: str) -> None:
         values["B"] = ((1.0,),)
     with pytest.raises(ModelicaLikeError, match=told):
         StateSpace(**values)
+
+
+@pytest.mark.parametrize(
+    ("block", "told"),
+    [
+        (Limiter(y_max=-1.0), "b has its upper limit below its lower one"),
+        (DeadZone(u_max=0.1, u_min=0.2), "b has its upper limit below its lower one"),
+        (SlewRateLimiter(rising=-1.0, y=0.0), "b has its upper limit below its lower one"),
+        (Hysteresis(u_low=1.0, u_high=-1.0), "b becomes 1 below where it becomes 0"),
+        (PulseCounter(u_low=1.0, u_high=-1.0), "b has u_high below u_low"),
+    ],
+)
+def test_crossed_limits_end_the_run(block: Component, told: str) -> None:
+    with pytest.raises(LimitPassed, match=f"At 0 s {told}"):
+        driven(block, s=Sine(f=0.5))
+
+
+def test_limits_may_cross_later() -> None:
+    with pytest.raises(LimitPassed, match="At 3 s b has its upper limit below its lower one"):
+        driven(
+            VariableLimiter(),
+            s=Sine(f=0.5),
+            limit1=Ramp(offset=2.0, height=-4.0, duration=4.0),
+            limit2=Constant(k=-1.0),
+        )

@@ -184,6 +184,16 @@ def test_nominal_operating_point(name: str, quasi_static: bool) -> None:
     assert run.energy().closure <= 1e-8
 
 
+@pytest.mark.parametrize("w", [300.0, 0.2, 0.075, 0.0, -0.03, -40.0])
+def test_friction_follows_a_power_of_the_speed_and_is_linear_about_standstill(w: float) -> None:
+    """0.5 N.m·(w/w_nominal)^1.5 down to a thousandth of the nominal speed, with no jump there."""
+    machine = PermanentMagnetDCMachine(P_friction=75.0, p_friction=1.5, w_nominal=150.0)
+    run = simulate(bench(machine, ConstantSpeed(w_fixed=w)), "1 s", start="steady", points=1)
+    x = abs(w) / 150.0
+    friction = np.sign(w) * 0.5 * (x**1.5 if x > 1e-3 else 1e-3**0.5 * x)
+    assert run.final["machine.tau_electrical"] + run.final["machine.flange.tau"] == pytest.approx(friction, abs=1e-9)
+
+
 @pytest.mark.parametrize("tau", [0.1, 20.0, 63.66, -40.0])
 def test_speed_falls_linearly_with_the_torque(tau: float) -> None:
     """Magnet machine: w = (V - R·M/k)/k; a negative load makes it a generator that feeds the supply."""

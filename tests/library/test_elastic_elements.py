@@ -1,6 +1,6 @@
 """Couplings with hysteresis, breaking points, absorbers and clutches by speed, against closed forms."""
 
-from math import exp, pi, sqrt, tanh
+from math import atan, exp, pi, sqrt, tan, tanh
 
 import numpy as np
 import pytest
@@ -9,16 +9,21 @@ from components import (
     CentrifugalPendulum,
     ConstantSpeed,
     ConstantTorque,
+    ConstantVelocity,
+    ElasticCoupling,
     Fixed,
     FixedTemperature,
     HystereticCoupling,
     Inertia,
     OldhamCoupling,
     Position,
+    Rope,
     RuptureCoupling,
     Sine,
+    Step,
     Synchroniser,
     Torque,
+    TranslationalFixed,
     ViscousClutch,
 )
 from modelica_like import Assembly, Component, simulate
@@ -120,3 +125,72 @@ def test_synchroniser_is_pulled_out_by_a_negative_force() -> None:
     run = simulate(drive, 1.5, **TIGHT)
     assert run.at(0.9)["shaft.w"] == pytest.approx(50)
     assert run.final["shaft.w"] == pytest.approx(50 - 1 / 0.01 * 0.5, rel=1e-6)
+
+
+def test_damped_coupling_rings_down_as_its_logarithmic_decrement_says() -> None:
+    coupling = ElasticCoupling(stages=((0.0, 400.0),), d=2.0)
+    parts: dict[str, Component] = {"wall": Fixed(), "coupling": coupling, "wheel": Inertia(J=1.0, phi=0.1, w=0.0)}
+    run = simulate(Assembly("drive", parts=parts, series={"s": list(parts)}), 2.0, **TIGHT)
+    swing = sqrt(400 - 1)
+    assert run.at(2 * 2 * pi / swing)["wheel.phi"] == pytest.approx(0.1 * exp(-2 * 2 * pi / swing), rel=1e-7)
+
+
+def test_disc_of_an_oldham_coupling_is_an_inertia() -> None:
+    disc = OldhamCoupling(offset=0.1, arm=0.2, mu=0.0, J=0.3, m=20.0, w=0.0)
+    parts: dict[str, Component] = {
+        "motor": ConstantTorque(tau_constant=6.0),
+        "disc": disc,
+        "load": Inertia(J=0.5, phi=0.0),
+    }
+    run = simulate(Assembly("drive", parts=parts, series={"s": list(parts)}), 1.0, **TIGHT)
+    assert run.final["load.w"] == pytest.approx(6 / (0.3 + 20 * 0.1**2 + 0.5), rel=1e-9)
+
+
+def test_filling_of_a_viscous_clutch() -> None:
+    clutch = ViscousClutch(tau_nominal=10.0, w_nominal=50.0, fill=0.25)
+    parts: dict[str, Component] = {"motor": ConstantSpeed(w_fixed=100.0), "clutch": clutch, "wall": Fixed()}
+    run = simulate(Assembly("drive", parts=parts, series={"s": list(parts)}), 0.1, **TIGHT)
+    assert run.final["clutch.tau"] == pytest.approx(-5.0)
+
+
+@pytest.mark.parametrize(("cones", "blocks"), [(1.01, True), (0.99, False)])
+def test_ring_blocks_where_the_cones_turn_it_harder_than_the_chamfers(cones: float, blocks: bool) -> None:
+    """Chamfers of half the angle beta with friction mu_t turn the ring with F·r_t/tan(beta + rho)."""
+    turning = 0.04 / tan(0.8 + atan(0.15))
+    ring = Synchroniser(
+        fn_max=500.0, cgeo=cones * turning / 0.1, mu_pos=((0.0, 0.1),), r_t=0.04, beta=0.8, mu_t=0.15, travel_time=0.01
+    )
+    parts: dict[str, Component] = {
+        "fork": Step(start_time=0.1), "car": Inertia(J=100.0, phi=0.0, w=50.0), "ring": ring,
+        "shaft": Inertia(J=0.1, w=0.0, phi=0.0),
+    }  # fmt: skip
+    drive = Assembly(
+        "drive", parts=parts, series={"s": ["car", "ring", "shaft"]}, connect={"f": ["fork.y", "ring.f_normalized"]}
+    )
+    run = simulate(drive, 0.15, **TIGHT)
+    assert bool(run.impacts) is not blocks
+
+
+def test_pendulum_loses_what_its_damping_takes() -> None:
+    pendulum = CentrifugalPendulum(m=0.5, R=0.09, l=0.01, d=1e-3, theta=0.01, w_theta=0.0)
+    parts: dict[str, Component] = {"engine": ConstantSpeed(w_fixed=100.0), "pendulum": pendulum}
+    run = simulate(Assembly("drive", parts=parts, series={"s": list(parts)}), 1.0, **TIGHT)
+    # Small swings decay with d/(2·m·l²): that is 10 per second.
+    w = sqrt(300**2 - 10**2)
+    assert run.at(4 * pi / w)["pendulum.theta"] == pytest.approx(0.01 * exp(-10 * 4 * pi / w), rel=1e-4)
+    assert run.energy().closure < 1e-9
+
+
+def test_rope_pulls_with_spring_and_damper_and_slackens_faster_than_it_can_follow() -> None:
+    for speed, tension in ((-0.1, 2e4 * (0.1 * 0.05) + 500 * 0.1), (0.1, 0.0)):
+        parts: dict[str, Component] = {
+            "beam": TranslationalFixed(),
+            "rope": Rope(c=2e4, d=500.0),
+            "slide": ConstantVelocity(v_fixed=speed, s=0.0),
+        }
+        run = simulate(Assembly("drive", parts=parts, series={"s": list(parts)}), 0.1, **TIGHT)
+        assert run.at(0.05)["rope.tension"] == pytest.approx(tension, rel=1e-7)
+    parts["slide"] = ConstantVelocity(v_fixed=2.0, s=-0.01)
+    run = simulate(Assembly("drive", parts=parts, series={"s": list(parts)}), 0.002, **TIGHT)
+    assert np.max(run["rope.tension"]) == 0  # 500·2 N.s/m·m/s are more than the 200 N of its stretch
+    assert run.energy()["rope"].lost == pytest.approx(0.5 * 2e4 * (0.01**2 - 0.006**2), rel=1e-6)

@@ -359,3 +359,21 @@ def test_brakes_hold_what_they_can_hold_together(load: float) -> None:
     assert np.abs(near).max() <= 2.0 * (1 + 1e-9)
     assert np.abs(far).max() <= 0.75 * (1 + 1e-9)
     assert np.array_equal(run["rotor.w"], np.zeros(len(run.time)))
+
+
+def test_brakes_share_anew_while_others_slip() -> None:
+    """As before, but the load grows, and another shaft with two brakes turns meanwhile."""
+    parts = {
+        "growth": Ramp(height="3.2 N.m", duration="1 s"), "push": Torque(), "rotor": Inertia(J=1.0, phi=0.0, w=0.0),
+        "near": Brake(capacity=2.0), "gear": IdealGear(ratio=0.5), "far": Brake(capacity=0.75),
+        "flywheel": Inertia(J=10.0, phi=0.0, w=100.0), "one": Brake(capacity=1.0), "other": Brake(capacity=1.0),
+    }  # fmt: skip
+    wires = {
+        "load": ("growth.y", "push.tau"),
+        "shaft": ("push.flange", "rotor.flange_a", "near.flange_a", "gear.flange_a"),
+        "fast": ("gear.flange_b", "far.flange_a"),
+        "apart": ("flywheel.flange_a", "one.flange_a", "other.flange_a"),
+    }
+    run = simulate(Assembly("shared", parts=parts, connect=wires), 1.0, points=4)
+    assert not [event for event in run.events if event.mode.endswith(".mode")]
+    assert run.final["near.tau"] + 2 * run.final["far.tau"] == pytest.approx(3.2, rel=1e-12)

@@ -64,18 +64,20 @@ def test_move_follows_without_differentiating() -> None:
     assert run.energy().closure <= 1e-8
 
 
-def test_deviation_of_inconsistent_signals_dies_out() -> None:
-    """A kink in the angle of which the speed knows nothing: e(t) = -0.1·exp(-p·t)·(1 + p·t) after a step of 0.1."""
-    angle = Table(table=((0, 0), (1, 0), (1.0001, 0.1), (3, 0.1)), scale="1 rad")
+@pytest.mark.parametrize("turning", [True, False])
+def test_deviation_of_inconsistent_signals_dies_out(turning: bool) -> None:
+    """A kink in the place of which the speed knows nothing: e(t) = -0.1·exp(-p·t)·(1 + p·t) after a step of 0.1."""
+    unit, place, speed = ("rad", "phi", "w") if turning else ("m", "s", "v")
     parts = {
-        "angle": angle, "w": Constant(k="0 rad/s"), "a": Constant(k="0 rad/s2"), "drive": Move(f_crit=2.0),
-        "J": Inertia(J=2.0),
+        "q": Table(table=((0, 0), (1, 0), (1.0001, 0.1), (3, 0.1)), scale=f"1 {unit}"),
+        "w": Constant(k=f"0 {unit}/s"), "a": Constant(k=f"0 {unit}/s2"),
+        "drive": (Move if turning else TranslationalMove)(f_crit=2.0), "J": Inertia(J=2.0) if turning else Mass(m=2.0),
     }  # fmt: skip
-    connect = {"q": ["angle.y", "drive.phi_ref"], "w": ["w.y", "drive.w_ref"], "a": ["a.y", "drive.a_ref"]}
+    connect = {one: [f"{one}.y", f"drive.{name}_ref"] for one, name in (("q", place), ("w", speed), ("a", "a"))}
     run = simulate(Assembly("d", parts=parts, series={"a": ["drive", "J"]}, connect=connect), "2 s", rtol=1e-9)
     pull = 4 * np.pi
     left = 0.1 * np.exp(-pull * 0.2) * (1 + pull * 0.2)
-    assert 0.1 - run.at(1.2)["J.phi"] == pytest.approx(left, rel=1e-3)
+    assert 0.1 - run.at(1.2)[f"J.{place}"] == pytest.approx(left, rel=1e-3)
 
 
 @pytest.mark.parametrize(("use_phi", "use_w"), [(True, True), (True, False), (False, True)])

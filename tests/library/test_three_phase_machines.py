@@ -1,6 +1,7 @@
 """Asynchronous and synchronous machines, against closed forms, phasors and an independent solver."""
 
 from math import log, pi, sqrt
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,7 @@ from components import (
     PMSynchronousDrive,
     PMSynchronousMachine,
 )
-from modelica_like import Assembly, Component, ModelicaLikeError, Solution, simulate
+from modelica_like import Assembly, Component, ModelicaLikeError, Solution, sensitivities, simulate
 
 TIGHT: dict[str, Any] = {"rtol": 1e-9, "atol": 1e-10}
 
@@ -190,3 +191,10 @@ def test_a_drive_whose_battery_cannot_give_the_power() -> None:
     cells = Battery(ocv=((0.0, 400.0), (1.0, 400.0)), Q="50 A.h", R_i=2.0)
     with pytest.raises(ModelicaLikeError, match="gave up"):
         supplied(MappedDrive(**MAP, tau_ref=100.0), speed(450.0), 0.5, cells)
+
+
+def test_gradients_come_through_the_load_step_of_a_weakened_field() -> None:
+    """0.5 kg.m2 under 200 N.m with the lag T: dw/dT = -400 rad/s²·(1 - exp(-t/T)·(1 + t/T))."""
+    netlist = Path(__file__).parents[2] / "examples" / "components" / "electric_drives.toml"
+    found = sensitivities(netlist, ["at(axle.w, 1.5 s)"], ["motor.T"])
+    assert found["at(axle.w, 1.5 s)", "motor.T"] == pytest.approx(-400.0, rel=1e-5)

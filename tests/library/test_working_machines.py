@@ -14,7 +14,9 @@ from components import (
     ConstantTorque,
     Conveyor,
     Damper,
+    DeepGrooveBearing,
     DisplacementLoad,
+    ElasticCoupling,
     Fixed,
     FormingForce,
     FourBar,
@@ -22,8 +24,10 @@ from components import (
     Mass,
     SliderCrank,
     VariableGear,
+    WormGear,
 )
 from modelica_like import Assembly, Component, simulate
+from modelica_like.errors import LanguageError, LimitPassed
 
 TIGHT = {"rtol": 1e-10, "atol": 1e-12}
 
@@ -119,3 +123,27 @@ def test_workpiece_resists_forward_motion_only() -> None:
     work = FormingForce(table=((0.0, 0.0), (0.001, 1e4), (0.05, 1e4), (0.051, 0.0)))
     run = simulate(chain_of(slide=Mass(m=10.0, s=0.03, v=-2.0), work=work), 0.02, **TIGHT)
     assert run.final["slide.v"] == pytest.approx(-2.0, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("part", "sentence"),
+    [
+        (SliderCrank(r=0.1, l=0.12, e=0.03), "its rod l is shorter than the crank r and the offset e together"),
+        (Cam(h=0.01, rise=4.0, fall=4.0), "rise, dwell and fall are more than 360° together"),
+        (FourBar(crank=0.1, coupler=0.05, rocker=0.05, ground=0.12), "cannot turn all around"),
+        (FourBar(crank=0.03, coupler=0.2, rocker=0.05, ground=0.1), "cannot turn all around"),
+        (WormGear(z_2=40, gamma=0.9, mu=0.9), "lead angle and friction angle are 90° together"),
+    ],
+)
+def test_parameters_that_do_not_fit_end_the_run_with_a_sentence(part: Component, sentence: str) -> None:
+    follower = Inertia(J=1.0) if isinstance(part, FourBar | WormGear) else Mass(m=1.0)
+    with pytest.raises(LimitPassed, match=sentence):
+        simulate(chain_of(motor=ConstantSpeed(w_fixed=10.0, phi=0.0), part=part, follower=follower), 1.0)
+    bearing = DeepGrooveBearing(d=0.08, D=0.04, F_r=100.0, C_0=1e4, nu=2e-5)
+    with pytest.raises(LimitPassed, match="its bore d is not below its outer diameter D"):
+        simulate(chain_of(motor=ConstantSpeed(w_fixed=10.0, phi=0.0), bearing=bearing), 1.0)
+
+
+def test_stages_of_a_coupling_begin_at_zero() -> None:
+    with pytest.raises(LanguageError, match="the first stage begins at"):
+        ElasticCoupling(stages=((0.1, 100.0),))

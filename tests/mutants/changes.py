@@ -26,6 +26,8 @@ _CALLS = {
     "floor": "ceil", "logic_or": "logic_and", "logic_and": "logic_or", "setdefault": "__setitem__",
     "minimum": "maximum", "maximum": "minimum", "argmax": "argmin", "argmin": "argmax", "sin": "cos", "cos": "sin",
 }  # fmt: skip
+_TOLERANCE = 1e-6
+"""What is smaller is one, or a limit beside zero; how small it is no test can tell."""
 _PRINTS = ("__str__", "__repr__", "_repr_html_")
 
 
@@ -129,7 +131,7 @@ class _Finder:
                     yield *self._span(node), self._source(one), node.lineno
             case ast.UnaryOp(op=ast.USub() | ast.Not()):
                 yield *self._span(node), self._source(node.operand), node.lineno
-            case ast.Constant(value=value) if isinstance(value, bool | int | float):
+            case ast.Constant(value=value) if isinstance(value, bool | int | float) and not 0 < abs(value) < _TOLERANCE:
                 yield *self._span(node), _other(value), node.lineno
             case ast.Call():
                 yield from self._call(node)

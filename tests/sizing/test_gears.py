@@ -94,6 +94,28 @@ def test_internal_gears() -> None:
     assert made.wheel_form == pytest.approx(2.053 * 2.65)
 
 
+def test_the_direction_of_the_torque_does_not_matter() -> None:
+    pair = GearPair(20, 30, 4e-3, 0.04)
+    assert gear_strength(pair, -200.0, STEEL) == gear_strength(pair, 200.0, STEEL)
+
+
+def test_every_factor_acts_where_it_should() -> None:
+    """Load factors raise root stresses in proportion and contact stresses by the root; the others raise strengths."""
+    pair = GearPair(20, 30, 4e-3, 0.04)
+    plain = gear_strength(pair, 200.0, STEEL)
+    for name in ("application", "dynamic", "face_load", "transverse_load"):
+        made = gear_strength(pair, 200.0, STEEL, **{name: 1.44})
+        assert made.contact_stress == pytest.approx(1.2 * plain.contact_stress)
+        assert made.wheel_root_stress == pytest.approx(1.44 * plain.wheel_root_stress)
+    for name, line in (
+        ("flank_life", "pitting_safety"), ("flank_influence", "pitting_safety"), ("root_life", "wheel_root_safety"),
+        ("root_influence", "pinion_root_safety"), ("pinion_reversal", "pinion_root_safety"),
+        ("wheel_reversal", "wheel_root_safety"),
+    ):  # fmt: skip
+        made = gear_strength(pair, 200.0, STEEL, **{name: 0.7})
+        assert getattr(made, line) == pytest.approx(0.7 * getattr(plain, line))
+
+
 def test_teeth_that_cannot_be() -> None:
     with pytest.raises(ValueError, match="end in a point"):
         gear_strength(GearPair(10, 30, 2e-3, 0.02, 1.5), 10.0, STEEL)

@@ -53,6 +53,12 @@ NUMBERS = {
 }
 
 
+def test_damping_of_a_generator_takes_its_part_of_an_overload() -> None:
+    generator = DcMotor(0.05, 0.8, 0.02, 1e-3)
+    assert overload_current(0.6, 3.0, generator) == pytest.approx(0.18 / 0.05)
+    assert overload_current(0.6, 3.0, generator, 50.0) == pytest.approx(0.13 / 0.05)
+
+
 @pytest.mark.parametrize(("value", "published", "recomputed", "deviation"), NUMBERS.values(), ids=NUMBERS)
 def test_number(value: float, published: float | None, recomputed: float, deviation: float | None) -> None:
     assert value == pytest.approx(recomputed, rel=1e-6)

@@ -48,3 +48,18 @@ def test_mean_stress_near_yielding() -> None:
     torque = 150e6 * pi * 0.02**3 / 16
     made = shaft_fatigue(1.0, torque, 0.02, S275, roughness=1e-6)
     assert made.bending_strength == pytest.approx(275e6 - sqrt(3) * 150e6, rel=1e-9)
+
+
+def test_directions_and_treatments() -> None:
+    plain = shaft_fatigue(10.0, 20.0, 0.02, S275, alternating=0.5)
+    assert shaft_fatigue(-10.0, -20.0, 0.02, S275, alternating=0.5).safety == plain.safety
+    hard = shaft_fatigue(10.0, 0.0, 0.02, S275, hardening=1.1, technological_size=0.9)
+    assert hard.bending_strength == pytest.approx(0.99 * shaft_fatigue(10.0, 0.0, 0.02, S275).bending_strength)
+
+
+def test_deep_shoulders() -> None:
+    """For d/D up to 0.67 the stress gradient in bending is 2.3/r."""
+    support = 10 ** -(0.33 + 275 / 712)
+    made = shaft_fatigue(10.0, 20.0, 0.02, S275, 0.04, 2e-3, 2.0, 1.8)
+    assert made.bending_notch == pytest.approx(2.0 / (1 + sqrt(2.3 / 2) * support))
+    assert made.torsion_notch == pytest.approx(1.8 / (1 + sqrt(1.15 / 2) * support))

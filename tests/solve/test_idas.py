@@ -88,3 +88,14 @@ def test_what_it_reached_is_an_answer_to_who_is_not_patient() -> None:
     assert integrator.gave_up.what.startswith("IDAS gave up at about t = ")
     with pytest.raises(StepFailed):
         integrator.run(start, 4.0, 3, patient=False)
+
+
+def test_what_is_not_finite_has_failed(monkeypatch: pytest.MonkeyPatch) -> None:
+    integrator, start = started(Decay())
+    states = np.array([[1.0, 2.0, 3.0], [4.0, 5.0, np.nan]])
+    monkeypatch.setattr(integrator, "_call", lambda *_: (states, np.zeros((1, 3)), ""))
+    with pytest.raises(StepFailed, match="not finite"):
+        integrator.run(start, 1.0, 3)
+    x, z = integrator.run(start, 1.0, 3, patient=False)
+    np.testing.assert_array_equal(x, states[:, :2])
+    assert z.shape == (1, 2)

@@ -187,9 +187,7 @@ def test_of_many_missing_start_values_eight_are_named_at_three_places(start, cou
     with pytest.raises(MissingStart) as caught:
         start(Assembly("many", parts=parts))
     named = ", ".join(f"i{k}.w" for k in range(8))
-    assert (
-        caught.value.what == f"Initialization (not the model) lacks {count} equations: give {named}{more} start values."
-    )
+    assert caught.value.what.endswith(f" lacks {count} equations: give {named}{more} start values.")
     assert len(caught.value.where) == 3
 
 

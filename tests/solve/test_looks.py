@@ -84,6 +84,28 @@ def test_slopes_that_are_nothing_but_rounding_are_left_out() -> None:
     assert len(unknown) == 0
 
 
+@pytest.mark.parametrize(
+    ("rough", "moved", "sharp", "fresh"),
+    [(0.9e-4, 0.9, True, True), (1.1e-4, 0.9, False, False), (0.9e-4, 1.1, False, True), (1.1e-4, 1.1, False, False)],
+)
+@pytest.mark.parametrize("sign", [1, -1])
+def test_what_a_guard_takes_of_states_is_judged_by_its_size(
+    monkeypatch: pytest.MonkeyPatch, rough: float, moved: float, sharp: bool, fresh: bool, sign: int
+) -> None:
+    """Its difference by two degrees, and by a tolerance, over its values at both looks; guard 1 is of no interest."""
+    seen = looks(TIMES**2, 2 * TIMES)
+    size = 0.25 + 0.75
+    near = np.array([[3.0, 0.0], [3.0 + sign * rough * size, 9.0], [3.0 - sign * moved * size, 9.0]])
+    monkeypatch.setattr(Known, "near", lambda *_: near, raising=False)
+    (cell, *_) = seen.cells(3, 8)
+    ends = {0: (-0.25 * sign, 0.75 * sign, 1.0, 1.0)}
+    assert seen.is_sharp(cell, ends, fresh=False) == sharp
+    assert seen.is_sharp(cell, ends, fresh=True) == fresh
+    rough_states = looks(TIMES**7, 7 * TIMES**6)
+    (cell, *_) = rough_states.cells(3, 8)
+    assert not rough_states.is_sharp(cell, ends, fresh=True)
+
+
 def test_looks_may_be_left_out() -> None:
     seen = looks(TIMES**2, 2 * TIMES)
     assert seen.every(1) is seen

@@ -61,7 +61,7 @@ def test_a_panel_has_as_many_looks_as_steps_are_expected() -> None:
     span = 2**0.5
     assert chosen.panel(0.0, STOP) == (pytest.approx(span), 512)
     chosen = pace(1000)
-    chosen.stride(0, 64, 0.1)
+    chosen.stride(0, 8, 1e-5)
     assert chosen.panel(0.0, STOP) == (pytest.approx(32 * STEP), 32)  # no steps: one for each result
     chosen.stride(30 + 64 * 40, 64, 1e-3)
     # No more than 2048 looks: 25.6 ms of 40 per ms, of which half are spare.

@@ -48,6 +48,7 @@ def test_between_results_it_is_a_straight_line_and_at_events_the_right_side(t: f
 
 def test_the_end_and_the_events() -> None:
     run = recorded(*COLUMNS)
+    assert run.final["time"] == 4.0
     assert (run.final["w"], run.final["gear"], run.final["brake.loss_power"]) == (9.0, 2.5, 6.0)
     told = [(event.time, event.mode, event.before, event.after) for event in run.events]
     assert told == [(2.0, "brake.mode", "free", "stuck"), (4.0, "gear", "1", "2.5")]

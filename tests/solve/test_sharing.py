@@ -6,7 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from modelica_like.initialize.holds import Strike, _capacities
+from components import Clutch, Inertia
+from modelica_like import Assembly, build
+from modelica_like.initialize import initialize
+from modelica_like.initialize.holds import Strike, _capacities, rest
 from modelica_like.language.hold import UNLIMITED
 
 
@@ -29,8 +32,8 @@ def test_an_impulse_is_unbearable_beyond_what_can_be_borne_for_an_instant(
     strike: Any = SimpleNamespace(point=SimpleNamespace(t=t), model=model)
 
     def unbearable(impulse: float, bears: float, reaction: float, k: int = 0, larger: float = 0.0) -> bool:
-        table = np.full((3, 3), np.nan)
-        table[:, 1 if sign > 0 else 2] = bears
+        table = np.full((3, 2), np.nan)
+        table[:, 0 if sign > 0 else 1] = bears
         return k in Strike._unbearable(strike, table, {k: sign * impulse, 2: larger}, {k: sign * reaction})
 
     assert unbearable(5.001 * instant, 5.0, 0.0)
@@ -43,3 +46,20 @@ def test_an_impulse_is_unbearable_beyond_what_can_be_borne_for_an_instant(
     assert not unbearable(1.0, 5.0, 0.0, k=1)  # it cannot be knocked loose
     assert unbearable(1e-3, 0.0, 0.0, larger=1.0)
     assert not unbearable(1e-15, 0.0, 0.0, larger=-1.0)  # nothing but rounding
+
+
+@pytest.mark.parametrize(("slip", "left"), [(0.9e-7, 0.0), (-0.9e-7, 0.0), (1.1e-7, 1.1e-7)])
+def test_what_is_held_rests_exactly_where_it_moves_by_rounding_of_the_largest_speed(slip: float, left: float) -> None:
+    """1e-10 of 1000 rad/s."""
+    parts = {
+        "a": Inertia(J=1.0, phi=0.0, w=1000.0),
+        "c": Clutch(capacity=5.0, phi_rel=0.0, w_rel=0.0),
+        "b": Inertia(J=1.0),
+    }
+    model = build(Assembly("d", parts=parts, series={"s": list(parts)}))
+    point = initialize(model, 0.0, "given")
+    state = model.states.index("c.w_rel")
+    assert point.x[state] == 0.0
+    point.x[state] = slip
+    rest(model, point)
+    assert point.x[state] == left

@@ -52,3 +52,15 @@ def test_the_clutch_limits_how_fast_it_can_be(run: Solution) -> None:
              for share in (1.01, 0.99)]  # fmt: skip
     assert slips[0] == pytest.approx(0, abs=1e-9)
     assert slips[1] > 1e-3
+
+
+def test_the_page_has_these_numbers(run: Solution) -> None:
+    page = (NETLIST.parents[1] / "docs" / "examples" / "dc_bench.md").read_text(encoding="utf-8")
+    fine = simulate(NETLIST, rtol=1e-10, points=20_000)
+    loaded = fine.time > 0.6
+    for value in (
+        f"speed 50 ms later / 1/min | {run.at(0.15)['motor.w'] / RPM:.2f} |",
+        f"| largest torque of the clutch / N·m | {np.max(np.abs(run['clutch.tau'])):.4f} |",
+        f"lowest speed / 1/min | {np.min(fine['motor.w'][loaded]) / RPM:.2f} |",
+    ):
+        assert value in page

@@ -62,3 +62,10 @@ def test_releasing_parts_no_flanks() -> None:
     run = simulate(NETLIST, "4 s", points=8000)
     assert not [event for event in run.events if event.mode == "shaft2.contact" and event.time > 3]
     assert np.max(run["shaft2.tau"][run.time > 3]) < -2.0
+
+
+@pytest.mark.parametrize("play", [0.1, 0.5, 2.0])
+def test_the_page_has_these_numbers(play: float) -> None:
+    page = (NETLIST.parents[1] / "docs" / "examples" / "machine_tool_startup.md").read_text(encoding="utf-8")
+    tau = simulate(NETLIST, "0.6 s", parameters={"backlash": radians(play)}, points=12_000)["shaft2.tau"]
+    assert f"| {play:g} | {-np.min(tau):.1f} | {np.max(tau):.1f} |" in page

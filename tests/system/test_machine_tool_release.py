@@ -83,6 +83,20 @@ def test_samples(after: float, run: Solution, reference: Any) -> None:
     assert -at["clutch.tau"] == pytest.approx(M, rel=1e-5)
 
 
+def test_the_page_has_these_numbers(run: Solution) -> None:
+    page = (NETLIST.parents[1] / "docs" / "examples" / "machine_tool_startup.md").read_text(encoding="utf-8")
+    later = ", ".join(f"{-run.at(slips + after)['clutch.tau']:.3f}" for after in (0.005, 0.01, 0.02, 0.05))
+    assert f"| 5, 10, 20, 50 ms later / N·m | {later} |" in page
+    stopped = next(event.time for event in run.events if (event.mode, event.after) == ("load.mode", "stuck"))
+    assert f"| the machine stands still after / s | {stopped - switch_off:.3f} |" in page
+    assert f"| the clutch holds for / ms | {1e3 * (slips - switch_off):.2f} |" in page
+    after = (run.time >= slips) & (run.time <= stopped)
+    work = np.trapezoid(run["clutch.loss_power"][after], run.time[after])
+    assert f"| friction work from the slip to standstill / J | {work:.0f} |" in page
+    smallest = np.min(-run["shaft2.tau"][run.time >= slips])
+    assert f"| smallest torque of shaft 2 / N·m | {smallest:.2f} |" in page
+
+
 def test_what_is_left(run: Solution) -> None:
     """The motor idles against the residual torque; the driven side swings at 87.2 Hz, and the load stops it."""
     assert run.final["J2.w"] == pytest.approx(motor_speed - drag / h0, rel=1e-7)

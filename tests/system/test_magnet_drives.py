@@ -51,7 +51,7 @@ def moment(run: Solution, mode: str, after: str) -> float:
 
 
 def test_the_armature_starts_and_leaves(run: Solution) -> None:
-    assert moment(run, "coil.stop", "moving") == pytest.approx(pull_in(), abs=1e-8)
+    assert moment(run, "coil.stop", "leaving") == pytest.approx(pull_in(), abs=1e-8)
     left = [event.time for event in run.events if (event.mode, event.before) == ("coil.stop", "driven")]
     assert left == [pytest.approx(3 + T / 2 * log((FORCE + SPRING) / SPRING), abs=1e-7)]
 
@@ -86,23 +86,20 @@ def test_engaging(run: Solution) -> None:
     def locks(t: float, y: Any) -> float:
         return y[5] - y[4]
 
-    for event in (seated, moves, locks):
-        event.terminal, event.direction = True, 1
+    ends: Any
+    for ends in (seated, moves, locks):
+        ends.terminal, ends.direction = True, 1
     current = U / R * (1 - exp(-pull_in() * R * (1 + GAP / X0) / L))
-    options = {"method": "DOP853", "rtol": 1e-10, "atol": 1e-12}
+    options: dict[str, Any] = {"method": "DOP853", "rtol": 1e-10, "atol": 1e-12}
     flight = solve_ivp(armature, (pull_in(), 0.1), [current, 0, 0], events=seated, **options)
     assert moment(run, "coil.stop", "driven") == pytest.approx(flight.t[-1], abs=1e-7)
     idle = motor_speed - drag / h0
     # Residual torque heats the plates from the start.
     warm = OIL + drag * idle / G * (1 - exp(-G / C * flight.t[-1]))
-    # The armature's blow presses the plates: friction passes µ·R times its impulse on, with the mu_p of high pressure.
-    push = MASS * flight.y[2, -1] * radius * float(np.interp(idle, SLIPS, MU)) * fade(warm, FORCE)
-    after = idle - push / J2, push / J3
-    warm += push * (idle + after[0] - after[1]) / 2 / C
-    start = [flight.y[0, -1], drag / k0, idle, drag / k1, *after, drag / k2, 0, warm]
+    start = [flight.y[0, -1], drag / k0, idle, drag / k1, idle, 0, drag / k2, 0, warm]
     first = solve_ivp(engaging, (flight.t[-1], 1.0), start, args=(False,), max_step=1e-4,
                       events=lambda t, y, _: moves(t, y), **options)  # fmt: skip
-    when = brentq(lambda t: moves(t, np.array([np.interp(t, first.t, row) for row in first.y])), 0.0291, 0.0300)
+    when = brentq(lambda t: moves(t, np.array([np.interp(t, first.t, row) for row in first.y])), 0.0291, 0.0330)
     assert moment(run, "load.mode", "forward") == pytest.approx(when, abs=2e-6)
     state = [np.interp(when, first.t, row) for row in first.y]
     ends = lambda t, y, _: locks(t, y)  # noqa: E731
@@ -130,13 +127,10 @@ def test_disengaging(run: Solution) -> None:
 
 def test_heat_and_wear(run: Solution) -> None:
     early, late = run.at(1.0), run.at(2.9)
-    assert late["clutch.T"] - OIL == pytest.approx((early["clutch.T"] - OIL) * exp(-G / C * 1.9), rel=1e-6)
+    # The solver's tolerance counts for the temperature, not for its rise.
+    assert late["clutch.T"] == pytest.approx(OIL + (early["clutch.T"] - OIL) * exp(-G / C * 1.9), rel=1e-8)
     assert run.final["clutch.wear"] == pytest.approx(1e-15 * run.final["clutch.W"] / 0.245, rel=1e-9)
-    # The balance has what is lost over time; the friction of the armature's blow is 0.83 J more.
-    blow = moment(run, "coil.stop", "driven")
-    heat = run.at(blow + 1e-9)["clutch.W"] - run.at(blow - 1e-9)["clutch.W"]
-    assert run.final["clutch.W"] - heat == pytest.approx(run.energy()["clutch"].lost, rel=1e-6)
-    assert heat == pytest.approx(0.829, abs=1e-3)
+    assert run.final["clutch.W"] == pytest.approx(run.energy()["clutch"].lost, rel=1e-6)
 
 
 def test_cold_and_hot_oil() -> None:
@@ -172,3 +166,29 @@ def test_every_engagement_heats_the_clutch(bench: Solution) -> None:
     warm = bench.at(2.5)["clutch.T"] - 293.15
     assert bench.at(3.9)["clutch.T"] - 293.15 == pytest.approx(warm * exp(-0.3 / 60 * 1.4), rel=1e-6)
     assert warm == pytest.approx(first / 60 * exp(-0.3 / 60 * (2.5 - 0.2)), rel=5e-3)
+
+
+def test_the_pages_have_these_numbers(run: Solution, bench: Solution) -> None:
+    pages = EXAMPLES.parent / "docs" / "examples"
+    tool, dc = ((pages / name).read_text(encoding="utf-8") for name in ("machine_tool_startup.md", "dc_bench.md"))
+    left = next(event.time for event in run.events if (event.mode, event.before) == ("coil.stop", "driven"))
+    slips = next(event.time for event in run.events if event.mode == "clutch.mode" and event.time > 3)
+    fine = simulate(EXAMPLES / "machine_tool_magnet.toml", "0.5 s", points=20_000)
+    torques = ", ".join(f"{-np.min(fine[f'{name}.tau']):.1f}" for name in ("shaft1", "shaft2", "clutch"))
+    for line in (
+        f"| the armature starts / ms | {1e3 * pull_in():.3f} |",
+        f"| it presses / ms | {1e3 * moment(run, 'coil.stop', 'driven'):.3f} |",
+        f"| the clutch locks / s | {moment(run, 'clutch.mode', 'stuck'):.5f} |",
+        f"| largest torque of shaft 1, shaft 2, clutch / N·m | {torques} |",
+        f"| switched off, it slips after / ms | {1e3 * (slips - 3):.2f} |",
+        f"| the armature lets go after / ms | {1e3 * (left - 3):.2f} |",
+        f"| the plates get warmer by / K | {np.max(run['clutch.T'][run.time < 1]) - OIL:.2f} |",
+    ):
+        assert line in tool
+    locked = next(event.time for event in bench.events if (event.mode, event.after) == ("clutch.mode", "stuck"))
+    for line in (
+        f"| clutch locks / s | {locked:.4f} |",
+        f"| friction work of one engagement / J | {bench.at(3.9)['clutch.W']:.2f} |",
+        f"| the plates get warmer by / K | {bench.at(1.9)['clutch.T'] - 293.15:.3f} |",
+    ):
+        assert line in dc

@@ -14,6 +14,7 @@ from modelica_like.errors import extra_module
 from modelica_like.initialize import Point, variable_slopes
 from modelica_like.initialize.slopes import implicit_slopes, nodes_of
 from modelica_like.solve.style import COLOURS, picture
+from modelica_like.upper import upper
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -219,6 +220,9 @@ class Modes(Sequence[Mode]):
 
     linear: LinearModel = field(repr=False)
     modes: tuple[Mode, ...]
+
+    def _repr_html_(self) -> str:
+        return upper("html")(self)
 
     def __getitem__(self, index: Any) -> Any:
         return self.modes[index]

@@ -16,6 +16,7 @@ from modelica_like.initialize.steady import check_modes_hold, solve_steady, stea
 from modelica_like.simulation import Model, build
 from modelica_like.solve.trajectories import Trajectories
 from modelica_like.units import to_si
+from modelica_like.upper import upper
 
 _MAX_NEWTON = 40
 _HALVINGS = 20
@@ -35,6 +36,9 @@ class OperatingPoint(Mapping[str, float]):
     model: CompiledDae = field(repr=False)
     point: Point = field(repr=False)
     _values: dict[str, float] = field(repr=False)
+
+    def _repr_html_(self) -> str:
+        return upper("html")(self)
 
     def __getitem__(self, path: str) -> float:
         if path not in self._values:

@@ -15,11 +15,12 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from modelica_like.analyse.replay.jumps import Coincidence, Jump, Work, event_time, make_jump
+from modelica_like.analyse.replay.jumps import Jump, Work, make_jump
 from modelica_like.analyse.replay.kinks import Kinks
 from modelica_like.analyse.replay.start import start_slopes
 from modelica_like.analyse.replay.step import CLOSE, Step, shortened, stuck, try_step
 from modelica_like.analyse.replay.steps import StepFunctions, Tolerances
+from modelica_like.analyse.replay.when import Coincidence, event_time
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import LanguageError
@@ -161,8 +162,12 @@ class Replay:
                 result[number] += reading.quadratures @ total
         return result, whole
 
-    def adjoint(self, readings: Sequence[Reading]) -> Vector:
+    def adjoint(self, readings: Sequence[Reading], kept: dict[int, Vector] | None = None) -> Vector:
         """Derivatives of readings by all parameters and inputs.
+
+        Args:
+            readings: what to differentiate.
+            kept: positions of nodes; gets the derivatives by (x, theta) there, shape (nx + ntheta, readings).
 
         Returns:
             Shape (readings, np + nu).
@@ -177,6 +182,8 @@ class Replay:
                 whole = self.moves[k].adjoint(whole, Q)
             for number, row in at_node.get(id(self.nodes[k]), ()):
                 whole[:, number] += row
+            if kept is not None and k in kept:
+                kept[k] = whole.copy()
         x, fixed, d = np.split(whole, [size.x, size.x + size.fixed])
         return x.T @ self.start_x + fixed.T + d.T @ self.start_d
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import groupby, product
 from typing import Any
 
@@ -63,12 +64,27 @@ def edges(chain: Replay, readings: Sequence[Reading]) -> list[Edge]:
         apart = jump.when.apart if jump.matters or id(jump.before) in timed else ()
         chances += [(jump.before, one) for one in (*apart, *jump.chances)]
     found = [Edge(Reading(0.0, ((node, one.by),)), one.size, one.reason) for node, one in chances]
-    return found + _ties(chain, readings)
+    return found + _ties(_Later(chain, readings))
 
 
-def _ties(chain: Replay, readings: Sequence[Reading]) -> list[Edge]:
+@dataclass(frozen=True)
+class _Later:
+    """What is asked for, and how it depends on where the run is after each jump."""
+
+    chain: Replay
+    readings: Sequence[Reading]
+
+    @cached_property
+    def multipliers(self) -> dict[int, Vector]:
+        """Derivatives of the readings by (x, theta) at the nodes after jumps; shapes (nx + ntheta, readings)."""
+        found = {k + 1: np.zeros(0) for k, _ in self.chain.jumps}
+        self.chain.adjoint(self.readings, found)
+        return found
+
+
+def _ties(later: _Later) -> list[Edge]:
     """Guards that are zero all along a segment without firing: a torque that equals the friction limit."""
-    model = chain.model
+    chain, model = later.chain, later.chain.model
     guards, found = Guards(model), list[Edge]()
     if not guards.count:
         return found
@@ -89,21 +105,22 @@ def _ties(chain: Replay, readings: Sequence[Reading]) -> list[Edge]:
     for k, event in enumerate(guards.state_events):
         for still, group in groupby(segments, lambda one, k=k: bool(one[2][k])):
             if still and (those := list(group)):
-                found.append(_tie(chain, readings, event, those[0][0], those[-1][1]))
+                found.append(_tie(later, event, those[0][0], those[-1][1]))
     # A guard that fires exactly at the end of the run fires on one side only.
     last = len(chain.nodes) - 1
     fires = (np.abs(values[last]) <= near) & ~still_at[last] & (rates[last] > 0.0)
-    return found + [_tie(chain, readings, guards.state_events[k], last, last) for k in np.flatnonzero(fires)]
+    return found + [_tie(later, guards.state_events[k], last, last) for k in np.flatnonzero(fires)]
 
 
-def _tie(chain: Replay, readings: Sequence[Reading], one: CompiledTransition, first: int, last: int) -> Edge:
-    model, point = chain.model, chain.nodes[last]
+def _tie(later: _Later, one: CompiledTransition, first: int, last: int) -> Edge:
+    chain, model, point = later.chain, later.chain.model, later.chain.nodes[last]
     mode = model.flat_discretes[one.mode]
     part = slopes(model, point, "guards", [one.index])
     x = np.max([np.abs(node.x) for node in chain.nodes], axis=0) + model.nominals
     terms = np.abs(part.by[0]) @ np.abs(np.concatenate([x, model.p, model.u, point.d]))
     # The slope of an acceleration that the others hold at zero is nothing but rounding, and so are its terms.
-    largest = max(abs(float(call(model, model.guards, node)[one.index])) for node in chain.nodes)
+    begins = [chain.nodes[0], *(jump.after for _, jump in chain.jumps)]
+    largest = max(abs(float(call(model, model.guards, node)[one.index])) for node in begins)
     error = NoGradient(
         f"No gradient from t = {chain.nodes[first].t:.9g} s on: {mode.path} stays {mode.names[int(point.d[one.mode])]} "
         f"exactly at the limit where it becomes {mode.names[one.target]}.",
@@ -113,20 +130,21 @@ def _tie(chain: Replay, readings: Sequence[Reading], one: CompiledTransition, fi
     )
     return Edge(
         Reading(float(part.value[0]), ((point, part.by[0]),)), _ROUNDING * max(float(terms), largest), error,
-        lambda: _felt(chain, readings, first, last, one.mode),
+        lambda: _felt(later, first, last, one.mode),
     )  # fmt: skip
 
 
-def _felt(chain: Replay, readings: Sequence[Reading], first: int, last: int, mode: int) -> bool:
+def _felt(later: _Later, first: int, last: int, mode: int) -> bool:
     """Whether it is felt at all that a surface slides in a tie, or sticks: later friction may make up for it.
 
     On both sides of the limit accelerations differ by what the surface does when it slides, and by nothing else. Where
     it sticks after the tie, it stops at once.
     """
-    model, size, end = chain.model, Sizes.of(chain.model), len(chain.moves)
+    chain, readings, model = later.chain, later.readings, later.chain.model
+    size, end = Sizes.of(model), len(chain.moves)
     own = [k for k, one in enumerate(model.holds) if one.mode == mode]
     until = min(last + 1, end)
-    for hold, begin in product(own, {first, last}):
+    for hold, begin in product(own, dict.fromkeys((last, first))):
         change = _sliding(model, chain.nodes[begin], hold)
         nominals = model.nominals * np.max(np.abs(change) / model.nominals)
         sizes = [sum(float(np.abs(row[: size.x]) @ nominals) for _, row in one.parts) for one in readings]
@@ -134,8 +152,8 @@ def _felt(chain: Replay, readings: Sequence[Reading], first: int, last: int, mod
         if until > last and hold in holding(model, chain.nodes[until]):
             stop = slopes(model, chain.nodes[until], f"impact {[hold]}", None, lambda hold=hold: impact(model, [hold]))
             whole[: size.x] += stop.x @ whole[: size.x]
-        later = chain.carried(readings, whole, until, end)[0] if until > last else 0.0
-        if np.any(np.maximum(np.abs(read), np.abs(later))[:, 0] > _ROUNDING * np.array(sizes)):
+        behind = later.multipliers[until].T @ whole if until > last else 0.0
+        if np.any(np.maximum(np.abs(read), np.abs(behind))[:, 0] > _ROUNDING * np.array(sizes)):
             return True
     return not own
 

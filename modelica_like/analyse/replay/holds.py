@@ -12,7 +12,7 @@ from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import Circuit, CompiledDae
 from modelica_like.flatten.holds import TERMS
 from modelica_like.initialize import Point, variable_slopes
-from modelica_like.initialize.holds import terms
+from modelica_like.initialize.holds import capacities
 from modelica_like.language.hold import UNLIMITED
 
 Total = Callable[..., tuple[Vector, Vector]]
@@ -91,7 +91,7 @@ def share_slopes(model: CompiledDae, point: Point, circuit: Circuit, columns: in
 
 def _relative(model: CompiledDae, point: Point, members: list[int], total: Total) -> Vector:
     """Derivatives of capacities over the capacities; zero for unlimited and zero capacities."""
-    given = terms(model, point)[members, 1:3]
+    given = capacities(model, point)[members]
     rows = [k * TERMS + 1 + int(np.argmax(pair)) for k, pair in zip(members, given, strict=True)]
     values, slopes = total("hold_terms", rows)
     limited = (values > 0.0) & (values < UNLIMITED)

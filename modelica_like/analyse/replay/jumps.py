@@ -9,57 +9,14 @@ from typing import Any
 import numpy as np
 
 from modelica_like.analyse.replay.holds import impact, projection, share_slopes
+from modelica_like.analyse.replay.when import Coincidence, Trigger, When, at_rest, either_first, event_time
 from modelica_like.compile.buffers import Vector
-from modelica_like.compile.compiled import CompiledDae, CompiledTransition, HeldMotion
-from modelica_like.errors import NoGradient
-from modelica_like.initialize import Point, Strike, call, holding, share, solve_implicit
+from modelica_like.compile.compiled import CompiledDae
+from modelica_like.initialize import Point, Strike, holding, share, solve_implicit
 from modelica_like.initialize.slopes import Sizes, slopes
 from modelica_like.solve.recorder import Event
 
-_GRAZING = 1e-6
-_ROUNDING = 1e-12
-_SAME = 1e-9
 _SMOOTH = 1e-9
-
-
-@dataclass(frozen=True)
-class Trigger:
-    """When an event happens: its time is t_k + shift, and depends on x and theta before it.
-
-    Attributes:
-        shift: numerical difference to the recorded time; rounding of the location.
-        by: derivative of the time by (x, theta) before the event, shape (nx + ntheta,).
-    """
-
-    shift: float
-    by: Vector
-
-
-@dataclass(frozen=True)
-class Coincidence:
-    """What is zero just at these parameters: the time between two events, or a motion that friction then holds.
-
-    Attributes:
-        by: its derivative by (x, theta) before the event, shape (nx + ntheta,).
-        size: changes up to which it stays zero but for rounding.
-        reason: what to say where it does not.
-    """
-
-    by: Vector
-    size: float
-    reason: NoGradient
-
-
-@dataclass(frozen=True)
-class When:
-    """The cause of an event's time, why there is none, and other causes at the same time.
-
-    There is no trigger at the start of the run, or if nothing depends on the time of the event.
-    """
-
-    trigger: Trigger | None = None
-    reason: NoGradient | None = None
-    apart: tuple[Coincidence, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -164,95 +121,13 @@ def make_jump(
     matters |= np.any(states > _SMOOTH * (model.nominals + np.abs(before.x)))
     if when.reason is not None and matters:
         raise when.reason
+    if when.apart and not gain.size and either_first(model, before, events, work.point):
+        matters = False
     if trigger is not None:
         work.x -= np.outer(rate_after, trigger.by)
         work.point.x = work.point.x - rate_after * trigger.shift
         solve_implicit(model, work.point)
     return Jump(before, work.point, events, when, work.x, work.d, gain, bool(matters), chances)
-
-
-def event_time(model: CompiledDae, before: Point, events: tuple[Event, ...], begin: Point) -> When:
-    """Find the cause of the event's time: the transitions that fire in the first round."""
-    if not events:
-        # Elements that hold the same motion share it again, and nothing else happens.
-        return When()
-    # A step leaves the implicit unknowns as precise as its states need them; rates of guards need them better.
-    solve_implicit(model, before)
-    found: list[tuple[Event, Trigger]] = []
-    for event in events:
-        if event.round or event.transition < 0:
-            continue
-        one = model.transitions[event.transition]
-        trigger = _moment(model, before, one) if one.timed else _crossing(model, before, one, begin)
-        if trigger is None:
-            return When(None, _grazing(event))
-        found.append((event, trigger))
-    first, trigger = found[0]
-    theta = np.concatenate([model.p, model.u, before.d])
-    weights = np.concatenate([np.maximum(np.abs(before.x), model.nominals), np.maximum(np.abs(theta), 1.0)])
-    nx = len(before.x)
-    spans = [float(np.max(np.abs(one.by[:nx]) * weights[:nx])) for _, one in found]
-    size = _SAME * max(before.t - begin.t, abs(before.t), *spans)
-    apart: list[Coincidence] = []
-    for other, second in found[1:]:
-        by = _difference(model, before, trigger.by - second.by)
-        if np.any(np.abs(by) * weights > size):
-            apart.append(Coincidence(by, size, _together(first, other)))
-    return When(trigger, None, tuple(apart))
-
-
-def _difference(model: CompiledDae, before: Point, by: Vector) -> Vector:
-    """The difference of two triggers, without motions that modes hold, which cannot move."""
-    nodes = [model.holds[k].motion for k in holding(model, before)]
-    if not nodes or not np.any(by[: len(before.x)]):
-        return by
-    held = slopes(model, before, "variables", nodes)
-    return by - held.by.T @ np.linalg.lstsq(held.x.T, by[: len(before.x)], rcond=None)[0]
-
-
-def _moment(model: CompiledDae, before: Point, transition: CompiledTransition) -> Trigger:
-    part = slopes(model, before, "moments", [transition.index])
-    return Trigger(float(part.value[0]) - before.t, part.by[0])
-
-
-def _crossing(model: CompiledDae, before: Point, transition: CompiledTransition, begin: Point) -> Trigger | None:
-    """Event time of a guard: it moves by minus its change over its rate; None if it only grazes zero."""
-    part = slopes(model, before, "guards", [transition.index])
-    rate = float(part.rate[0])
-    change = abs(float(call(model, model.guards, begin)[transition.index]))
-    terms = float(np.abs(part.x[0]) @ (np.abs(before.x) + model.nominals))
-    if not rate * (before.t - begin.t) > _GRAZING * change + _ROUNDING * terms:
-        return None
-    return Trigger(-float(part.value[0]) / rate, -part.by[0] / rate)
-
-
-def _grazing(event: Event) -> NoGradient:
-    return NoGradient(
-        f"No gradient at t = {event.time:.9g} s: {event.mode} changes from {event.before} to {event.after} "
-        "where its condition only grazes zero.",
-        where=event.source,
-        why="A small change of a parameter moves the event far, or removes it.",
-        advice="Move the parameters away from this limit.",
-    )
-
-
-def _together(one: Event, other: Event) -> NoGradient:
-    return NoGradient(
-        f"No gradient at t = {one.time:.9g} s: '{one.mode}: {one.before} → {one.after}' and "
-        f"'{other.mode}: {other.before} → {other.after}' happen at the same instant but for different reasons.",
-        where=[one.source, other.source],
-        why="A small change of a parameter decides which comes first, so the derivatives on both sides differ.",
-        advice="Choose parameter values that separate the two events.",
-    )
-
-
-def _resting(model: CompiledDae, one: HeldMotion, t: float) -> NoGradient:
-    mode, motion = model.flat_discretes[one.mode], model.flat_variables[one.motion].path
-    return NoGradient(
-        f"No gradient at t = {t:.9g} s: {mode.path} begins as {mode.names[one.number]}, because {motion} is zero.",
-        why="A small change of a parameter decides which way it moves first, so the derivatives on both sides differ.",
-        advice="Move the parameters away from this limit.",
-    )
 
 
 @dataclass
@@ -267,7 +142,9 @@ class Work:
     struck: tuple[Vector, Vector] | None = None
     entered: set[int] = field(default_factory=set)
     resting: set[int] = field(default_factory=set)
-    """Held motions that have not been stopped: they are zero."""
+    """Motions that modes hold because they are zero: nothing has stopped them."""
+    passing: dict[int, Coincidence] = field(default_factory=dict)
+    """Motions that a later round has stopped, as they were before: they were zero, too."""
 
     @classmethod
     def at(cls, model: CompiledDae, point: Point) -> Work:
@@ -313,7 +190,7 @@ class Work:
         if projected:
             self._project([node for node, _ in projected], values)
             solve_implicit(model, self.point)
-        self._stop_motions(before)
+        self._stop_motions(before, later=events[0].round > 0)
         knocked = [event for event in events if event.transition < 0]
         for event in knocked:
             mode = model.discrete_position[event.mode]
@@ -333,8 +210,11 @@ class Work:
             self.d[own] = 0.0
             self.d[own] = share_slopes(model, self.point, circuit, columns, self._total)
 
-    def _stop_motions(self, before: Vector) -> None:
-        """Stop the motions that modes hold since `before`, including those already at rest."""
+    def _stop_motions(self, before: Vector, *, later: bool) -> None:
+        """Stop what modes have begun to hold since `before`, also where it stands still already.
+
+        In a `later` round nothing has come to a stop: what begins to be held was zero.
+        """
         model, point = self.model, self.point
         held = holding(model, point)
         entering = [k for k in held if before[model.holds[k].mode] != model.holds[k].number]
@@ -353,20 +233,20 @@ class Work:
         share(model, trial)
         solve_implicit(model, trial)
         struck = [k for k in entering if k not in strike.knocked]
+        if later and not strike.hard:
+            self.passing |= {k: self._at_rest(k) for k in struck}
         if struck:
             self.x = self.x + self._total(f"impact {struck}", None, lambda: impact(model, struck), at=trial)[1]
         self.point = strike.point
 
     def chances(self) -> tuple[Coincidence, ...]:
-        """Tell which resting motions do not stay zero: friction then stops them, but not the same from both sides."""
-        model, found = self.model, list[Coincidence]()
-        for k in sorted(self.resting):
-            one = model.holds[k]
-            own = slopes(model, self.point, "variables", [one.motion])
-            size = _SAME * float(np.abs(own.x[0]) @ (np.abs(self.point.x) + model.nominals))
-            by = self._total("variables", [one.motion])[1][0]
-            found.append(Coincidence(by, size, _resting(model, one, self.point.t)))
-        return tuple(found)
+        """Tell what is zero just at these parameters: motions that rest, and those that stop and go on at once."""
+        held = holding(self.model, self.point)
+        return (*map(self._at_rest, sorted(self.resting)), *(one for k, one in self.passing.items() if k not in held))
+
+    def _at_rest(self, hold: int) -> Coincidence:
+        by = self._total("variables", [self.model.holds[hold].motion])[1][0]
+        return at_rest(self.model, self.point, hold, by)
 
     def _begin_again(self, entering: list[int]) -> list[int]:
         """Go back to the states before the first impact, hold all motions that were hit, and return these."""

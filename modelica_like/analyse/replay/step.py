@@ -90,7 +90,10 @@ def _solved(functions: StepFunctions, point: Point, h: float, W: Vector) -> Vect
     weights = np.concatenate([functions.tolerances.rtol * scale] * len(functions.tableau.nodes))
     size = np.inf
     for _ in range(_ITERATIONS):
-        correction = functions.newton(point.t, h, point.x, W, model.p, model.u, point.d)[0]
+        try:
+            correction = functions.newton(point.t, h, point.x, W, model.p, model.u, point.d)[0]
+        except RuntimeError:  # CasADi's solvers refuse a matrix with nan: so far away the equations have no value
+            return None
         W = W + correction
         before, size = size, float(np.abs(correction / weights).max(initial=0.0))
         if not np.isfinite(size):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -121,6 +122,9 @@ def _differentiate(
     else:
         derivatives = chain.forward(total, np.eye(len(chain.model.fixed_position))[:, positions])
     # Without `to`, the other parameters still get their derivatives.
+    if series:
+        # Somewhere along the run everything is felt.
+        on_edge = [replace(edge, matters=lambda: True) for edge in on_edge]
     kept, left_out = _by_existence(on_edge, derivatives[len(total) - len(on_edge) :], [one for _, one in chosen], named)
     derivatives, chosen = derivatives[: len(total) - len(on_edge), kept], [chosen[k] for k in kept]
     if freed.slopes:

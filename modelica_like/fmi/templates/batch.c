@@ -1,9 +1,6 @@
-/* Many runs of one model that leave nothing but numbers behind: sweeps.
- *
- * Every run has its own parameters and inputs, begins where these start it, and is read by `Reading`s. Results are at
- * equal distances and on both sides of every event; what happens between them is read off the dense output of the
- * steps.
- */
+/* Many runs of one model that leave nothing but numbers behind: sweeps. Every run has its own parameters and inputs,
+ * begins where these start it, and is read by `Reading`s. Results are at equal distances and on both sides of every
+ * event; what happens between them is read off the dense output of the steps. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -41,10 +38,9 @@ typedef struct {
 typedef struct {
     Instance *c;
     const NativeBatch *asked;
-    double *values,
-        *kept;            /* of the present run; kept: the last value, or the count, or the energy of former instants */
-    double last;          /* time of the last result */
-    int64_t next, events; /* number of the next result */
+    double *values, *kept; /* of the present run; the last value, or the count, or the energy of former instants */
+    double last;           /* time of the last result */
+    int64_t next, events;  /* number of the next result */
     int failed, sampled, in_steps;
 } Batch;
 
@@ -74,15 +70,6 @@ static void take_result(Batch *b, double t, const double *variables) {
     b->last = t;
 }
 
-/* Values at times within a step; at its beginning, behind an event there. */
-static void read_moments(Batch *b, double begin, double end) {
-    for (int64_t k = 0; k < b->asked->n_readings; k++) {
-        const Reading *one = &b->asked->readings[k];
-        if (one->kind != READ_AT || !(one->moment >= begin && one->moment < end)) continue;
-        b->values[k] = variables_at(b, one->moment, 0)[one->place];
-    }
-}
-
 /* Gauss's rule of order six: the dense output has order four. */
 static void add_work(Batch *b, double begin, double end) {
     static const double places[] = {-0.7745966692414834, 0, 0.7745966692414834}, weights[] = {5, 8, 5};
@@ -103,7 +90,11 @@ static void read_piece(Batch *b) {
         if (t >= end) break;
         if (t > begin) take_result(b, t, variables_at(b, t, 0));
     }
-    if (b->in_steps & 1 << READ_AT) read_moments(b, begin, end);
+    for (int64_t k = 0; k < a->n_readings; k++) { /* a moment at the beginning is behind an event there */
+        const Reading *one = &a->readings[k];
+        if (one->kind == READ_AT && one->moment >= begin && one->moment < end)
+            b->values[k] = variables_at(b, one->moment, 0)[one->place];
+    }
     if (b->in_steps & 1 << READ_WORK) add_work(b, begin, end);
 }
 
@@ -145,9 +136,8 @@ static void begin_readings(Batch *b, int64_t run) {
     b->next = 1;
     b->events = b->failed = 0;
     for (int64_t k = 0; k < a->n_readings; k++) {
-        int sum =
-            a->readings[k].kind == READ_AREA || a->readings[k].kind == READ_WORK || a->readings[k].kind == READ_IMPACT;
-        b->values[k] = sum ? 0 : NAN;
+        int kind = a->readings[k].kind;
+        b->values[k] = kind == READ_AREA || kind == READ_WORK || kind == READ_IMPACT ? 0 : NAN;
         b->kept[k] = 0;
     }
 }
@@ -158,10 +148,7 @@ static void set_numbers(Batch *b, int64_t run) {
     size_t n_p = (size_t)c->model->n_p, n_u = (size_t)c->model->n_u;
     const double *p = b->asked->parameters + (size_t)run * n_p;
     for (size_t k = 0; k < n_p && run > 0; k++)
-        if (p[k] != p[k - n_p] && !c->work.tuned[k]) {
-            c->work.tuned[k] = 1;
-            c->work.decided_by++;
-        }
+        if (p[k] != p[k - n_p]) mark_tuned(c, (int)k);
     memcpy(c->p, p, n_p * sizeof(double));
     memcpy(c->u, b->asked->inputs + (size_t)run * n_u, n_u * sizeof(double));
 }
@@ -211,17 +198,11 @@ static void read_end(Batch *b) {
 static int begin_batch(Batch *b, const Model *m) {
     const NativeBatch *a = b->asked;
     b->kept = calloc((size_t)a->n_readings + 1, sizeof(double));
-    b->c = instance_new((Instance){.model = m,
-                            .name = "batch",
-                            .environment = b,
-                            .co_simulation = 1,
-                            .allocate = calloc,
-                            .release = free,
-                            .noted = count_change,
-                            .struck = add_impact,
-                            .step_finished = after_step},
-        m->token);
+    b->c = instance_for(m, b);
     if (b->kept == NULL || b->c == NULL) return 0;
+    b->c->noted = count_change;
+    b->c->struck = add_impact;
+    b->c->step_finished = after_step;
     for (int64_t k = 0; k < a->n_readings; k++) {
         int kind = a->readings[k].kind;
         b->in_steps |= 1 << kind;

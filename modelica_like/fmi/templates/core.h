@@ -4,19 +4,12 @@
  * behind it, none of which are pointers, so that a copy of these bytes is a copy of the instance's state. Work memory
  * holds only what can be computed again. Nothing is static and mutable, so instances are independent of each other.
  *
- * The files are compiled one by one or all as one: names of static functions are not used twice.
- */
+ * The files are compiled one by one or all as one: names of static functions are not used twice. */
 #ifndef CORE_H
 #define CORE_H
 
 #include "model.h"
-
-/* What programs see that load this library. */
-#ifdef _WIN32
-#define EXPORTED __declspec(dllexport)
-#else
-#define EXPORTED __attribute__((visibility("default")))
-#endif
+#include "modelica_like.h" /* EXPORTED: what programs see that load this library */
 
 /* Compiled on a new Linux, the FMU is to run on an old one: these functions have got new versions since glibc 2.17.
    Versions can only be told to a linker that is given libm. */
@@ -117,47 +110,37 @@ typedef struct { /* a tape for the present modes, see special.c */
  * not share with it. */
 typedef struct {
     double *slots, *dots; /* values, and derivatives in either direction or three Taylor coefficients, of tape slots */
-    double *jacobian, *matrix, *qr_v, *qr_r, *qr_beta, *qr_work;
-    double *stages, *point; /* of the integrator: 8 stages, a point */
-    double *variables, *guards, *guards_before, *looks, *rhs, *dense_matrix, *square, *vector, *residual;
+    double *jacobian, *matrix, *qr_v, *qr_r, *qr_beta, *qr_work, *dense_matrix, *square, *vector, *residual, *rhs;
+    double *stages, *point, *first, *first_rates; /* of the integrator: 8 stages, a point; where the step begins */
+    double *variables, *guards, *guards_before, *looks, *seen_rates, *seen_indicators, *seen_derived;
     double *start_unknowns, *start_values, *start_residual;
-    int *order; /* pivots of the implicit equations */
-    unsigned char *known, *decided, *wanting;
-    double *d_before, *d_fired, *reset_values, *target_values;
-    int *targets;
-    unsigned char *changed;
-    double *first; /* point before a step */
-    Piece *whole;
-    unsigned char *kinds;
-    Terms *terms, *strike_terms;
-    unsigned char *held, *other;
+    double *begun; /* motions that may be held, where the search for a steady state began */
+    double *d_before, *d_fired, *reset_values, *target_values, *respond_d, *respond_z, *rates, *x_kept;
     double *weights, *base_weights, *use, *best, *kept_z, *reactions, *sizes, *zeros;
-    int *places, *member, *pivots;
+    int *order; /* pivots of the implicit equations */
+    int *targets, *standing, *places, *member, *pivots, *same, *places_of_slots, *special_outputs;
+    unsigned char *known, *decided, *wanting, *changed, *kinds, *held, *other, *known_slots, *needed_slots;
+    unsigned char *asked, *tuned; /* variables that somebody reads; parameters that have changed in a run */
+    Piece *whole;
+    Terms *terms, *strike_terms;
     Strike strike;
     Impacts impacts;
-    double *respond_d, *respond_z, *rates, *x_kept;
     Special special[N_SPECIALS];
     Run *special_runs;
     Operands *special_operands;
-    int *special_outputs;
     uint64_t decided_by; /* counts changes of what decides about tapes: modes and parameters */
-    int *same, *places_of_slots;
-    unsigned char *known_slots, *needed_slots;
-    unsigned char *asked, *tuned; /* variables that somebody reads; parameters that have changed in a run */
-    double *seen_rates, *seen_indicators, *seen_derived;
-    double *first_rates; /* right hand side where the step begins */
-    double *begun;       /* motions that may be held, where the search for a steady state began */
-    int *standing;
 } Work;
+
+typedef struct Gradient Gradient; /* see gradient.c */
 
 typedef struct Instance {
     const Model *model;
     Model *own_model; /* to be freed with the instance, or NULL */
     State state;
-    double *numbers; /* the rest of the state: the arrays that follow */
-    size_t n_numbers;
-    double *x, *z, *p, *u, *d; /* z stands behind x: together they are a point */
-    double *u_rate;            /* inputs are u + u_rate * (t - u_time) */
+    double *numbers;            /* the rest of the state: the arrays that follow */
+    size_t n_numbers, n_smooth; /* how many; the first ones, of which the rest of the run is a function */
+    double *x, *z, *p, *u, *d;  /* z stands behind x: together they are a point */
+    double *u_rate;             /* inputs are u + u_rate * (t - u_time) */
     double *start_value;
     unsigned char *start_given, *mode_given;
     unsigned char *wanting; /* transitions that fire at the end of the piece */
@@ -169,8 +152,7 @@ typedef struct Instance {
     AnyFunction logger, intermediate_update;
     LogFunction log;
     double (*step_finished)(struct Instance *c); /* tells until when to go on; or NULL */
-    /* Told of mode changes (transition -1: an impact's), and what impacts cost (held -1: forget what was told); or NULL
-     */
+    /* Told of mode changes (transition -1: an impact's) and of impacts (held -1: forget what was told); or NULL. */
     void (*noted)(struct Instance *c, int transition, int mode, int target);
     void (*struck)(struct Instance *c, int held, double energy, int first);
     int round; /* of the events at the present instant */
@@ -182,6 +164,7 @@ typedef struct Instance {
     int budget;          /* rounds of events and further pieces that are left of a bounded step */
     int variables_valid; /* which values belong to the present point, see values.c */
     int look_valid;      /* the last look at the guards was at the present point */
+    Gradient *gradient;  /* or NULL */
 } Instance;
 
 /* tape.c */
@@ -191,23 +174,21 @@ void tape_run(const Tape *tape, double *slots, double *outputs);
 void tape_tangent(const Tape *tape, const double *slots, double *dots, double *output_dots);
 void tape_adjoint(const Tape *tape, const double *slots, double *bars, const double *output_bars);
 void slopes(int operation, double a, double b, double f, double *by_left, double *by_right);
-
 /* linear.c */
 int qr_factor(const QrPattern *pattern, const double *values, Work *work);
 void qr_solve(const QrPattern *pattern, const Work *work, double *x);
 int lu_factor(int n, double *matrix, int *order);
 void lu_solve(int n, const double *matrix, const int *order, double *x);
 void lu_solve_transposed(int n, const double *matrix, const int *order, double *x);
+double dot(int n, const double *p, const double *q);
 void make_orthogonal(int rows, int columns, double *a, double *turns, double *b);
 void least_squares(int rows, int columns, double *a, double *b, double *x);
 void keeping_least_squares(int n, int states, double *a, double *turns, double *b, double *x);
-
 /* special.c */
 const Tape *full_tape(const Model *m, SpecialTape which);
 void run_special(Instance *c, SpecialTape which, double *outputs);
 void evaluate_special(Instance *c, SpecialTape which, double t, const double *point, double *outputs);
 void ask_for(Instance *c, int node);
-
 /* point.c */
 void load(Instance *c, double t, const double *point);
 void evaluate(Instance *c, const Tape *tape, double t, const double *point, double *outputs);
@@ -220,12 +201,11 @@ Result solve_now(Instance *c, int quiet);
 Result check_singular(Instance *c);
 Result settle(Instance *c);
 double input_at(const Instance *c, int k, double t);
-
 /* start.c */
 void start_defaults(Instance *c);
+void start_values(Instance *c);
 Result start_solve(Instance *c);
 void choose_modes(Instance *c, unsigned char *decided);
-
 /* holds.c */
 #define UNLIMITED 1e30
 #define ROUNDING 1e-10 /* relative size of a motion that is nothing but rounding */
@@ -236,10 +216,8 @@ int anything_shared(const Instance *c);
 void share(Instance *c);
 void rest(Instance *c);
 void rest_rates(Instance *c, double *rates);
-
 /* impacts.c */
 Result stop_motions(Instance *c, const double *before, Impacts *impacts);
-
 /* events.c */
 int guard_active(const Instance *c, int guard);
 double next_moment(Instance *c);
@@ -250,61 +228,65 @@ double number_or_false(double guard);
 void move_states(Instance *c, const int *nodes, const double *values, int count);
 void note_change(Instance *c, int name, int transition, int mode, int target);
 unsigned char *nothing_wanting(Instance *c);
-
 /* rosenbrock.c */
 int rosenbrock_step(
     Instance *c, double t, const double *first, double h, int keep_jacobian, Piece *piece, double *error);
 double *last_of(const Model *m, Piece *piece);
+int factor_step(Instance *c, double diagonal);
 size_t piece_size(const Model *m);
 void piece_at(const Model *m, const Piece *piece, double t, double *point);
 double first_step(Instance *c);
-
 /* locate.c */
 #define MOST_LOOKS 9 /* at guards, that there is room for */
 double cubic_guess(double g0, double r0, double g1, double r1);
 int search_events(Instance *c);
-
 /* integrate.c */
 typedef enum { REACHED, AT_EVENT, FAILED } Arrival;
 Arrival integrate_to(Instance *c, double target, int stop_at_events);
-void leave_piece(Instance *c);
 Result handle_event(Instance *c);
 Result check_whole(Instance *c, double size);
 Result check_step(Instance *c, double point, double size, double *target);
 Result move_to(Instance *c, double t);
 Result take_changes(Instance *c, int *event);
 int is_due(Instance *c);
-
 /* fixed.c */
 Arrival step_fixed(Instance *c, double target);
-
 /* values.c */
 const Variable *find_variable(const Model *m, uint32_t reference);
 const Variable *known_variable(Instance *c, uint32_t reference, ValueType type);
 #define ANY_TYPE N_TYPES
 Result get_value(Instance *c, const Variable *v, double *value);
 Result set_value(Instance *c, const Variable *v, double value);
-Result set_input_rate(Instance *c, uint32_t reference, double rate);
+Result set_input_rate(Instance *c, uint32_t reference, int order, double rate);
 Result set_time(Instance *c, double time);
 Result set_states(Instance *c, const double *x);
 Result make_consistent(Instance *c);
 Result check_tables(Instance *c);
+void mark_tuned(Instance *c, int parameter);
 void get_derivatives(Instance *c, double *derivatives);
 void get_indicators(Instance *c, double *indicators);
-
 /* derivatives.c */
 Result directional(Instance *c, const uint32_t *unknowns, size_t n_unknowns, const uint32_t *knowns, size_t n_knowns,
     const double *seed, double *result);
 Result adjoint(Instance *c, const uint32_t *unknowns, size_t n_unknowns, const uint32_t *knowns, size_t n_knowns,
     const double *seed, double *result);
+Result check_knowns(Instance *c, const uint32_t *knowns, size_t n);
+Result check_unknowns(Instance *c, const uint32_t *unknowns, size_t n);
+void tangent_of_implicit(Instance *c, const int *order);
+void read_tangents(Instance *c, const uint32_t *unknowns, size_t n, double *result, size_t stride);
 void slope_of_node(Instance *c, int node, int again, double *by_state);
 Result factor_implicit(Instance *c, int *order);
-
+/* gradient.c */
+void gradient_move(Instance *c, double t);
+int gradient_round(Instance *c, int round, unsigned char *wanting, int any);
+Result gradient_through(Instance *c, Result (*pass)(Instance *c), int start);
+void gradient_lose(Instance *c, const char *why, const Variable *by);
+void gradient_end(Instance *c);
 /* taylor.c */
 Result output_rate(Instance *c, uint32_t reference, int order, double *value);
-
 /* instance.c */
 Instance *instance_new(Instance bare, const char *token);
+Instance *instance_for(const Model *m, void *environment);
 Instance *instance_open(Instance bare, const char *token, const char *location);
 void instance_free(Instance *c);
 void instance_reset(Instance *c);
@@ -312,7 +294,8 @@ Result set_experiment(
     Instance *c, int tolerance_defined, double tolerance, double start, int stop_defined, double stop);
 Result state_copy_out(Instance *c, void **copy);
 Result state_copy_in(Instance *c, const void *copy);
-void state_release(Instance *c, void **copy);
+const double *copied(const Instance *c, const void *copy, const double *values);
+Result state_release(Instance *c, void **copy);
 size_t state_size(const Instance *c);
 Result state_write(Instance *c, const void *copy, unsigned char *bytes, size_t size);
 Result state_read(Instance *c, const unsigned char *bytes, size_t size, void **copy);

@@ -20,7 +20,7 @@ static int is_start(const Instance *c, const Variable *v) {
     return c->state.phase == PHASE_INITIALIZATION && (v->kind == KIND_STATE || v->kind == KIND_VARIABLE);
 }
 
-static Result check_knowns(Instance *c, const uint32_t *knowns, size_t n) {
+Result check_knowns(Instance *c, const uint32_t *knowns, size_t n) {
     for (size_t k = 0; k < n; k++) {
         const Variable *v = known_variable(c, knowns[k], TYPE_FLOAT64);
         if (v == NULL) return RESULT_ERROR;
@@ -32,7 +32,7 @@ static Result check_knowns(Instance *c, const uint32_t *knowns, size_t n) {
     return RESULT_OK;
 }
 
-static Result check_unknowns(Instance *c, const uint32_t *unknowns, size_t n) {
+Result check_unknowns(Instance *c, const uint32_t *unknowns, size_t n) {
     for (size_t k = 0; k < n; k++) {
         const Variable *v = known_variable(c, unknowns[k], TYPE_FLOAT64);
         if (v == NULL) return RESULT_ERROR;
@@ -53,7 +53,7 @@ Result factor_implicit(Instance *c, int *order) {
 }
 
 /* With the dots of the arguments given, fills those of z. */
-static void tangent_of_implicit(Instance *c, const int *order) {
+void tangent_of_implicit(Instance *c, const int *order) {
     const Model *m = c->model;
     Work *w = &c->work;
     double *dots = w->dots;
@@ -120,24 +120,39 @@ static Result start_tangent(Instance *c, const uint32_t *knowns, size_t n, const
     return m->n_start_unknowns > 0 ? start_system_tangent(c, starts) : RESULT_OK;
 }
 
-/* Kinds of variables whose values a tape gives. */
-static const Kind given[] = {KIND_DERIVATIVE, KIND_VARIABLE, KIND_DERIVED, KIND_GUARD};
-enum { N_GIVEN = sizeof given / sizeof given[0] };
+/* A tape that gives values of one kind of variables, and room for them. */
+typedef struct {
+    const Tape *tape;
+    double *room;
+} Given;
 
-static const Tape *tape_of(const Model *m, int kind) {
-    if (kind == KIND_DERIVATIVE) return &m->tapes.rates;
-    if (kind == KIND_VARIABLE) return &m->tapes.variables;
-    return kind == KIND_DERIVED ? &m->tapes.derived : &m->tapes.guards;
+static void find_given(const Instance *c, Given *by_kind) {
+    const Model *m = c->model;
+    const Work *w = &c->work;
+    memset(by_kind, 0, N_KINDS * sizeof *by_kind);
+    by_kind[KIND_DERIVATIVE] = (Given){&m->tapes.rates, w->rhs};
+    by_kind[KIND_VARIABLE] = (Given){&m->tapes.variables, w->variables};
+    by_kind[KIND_DERIVED] = (Given){&m->tapes.derived, w->guards};
+    by_kind[KIND_GUARD] = (Given){&m->tapes.guards, w->guards_before};
 }
 
-/* Room for the results of such a tape; NULL: no tape gives this kind. */
-static double *room_of(const Work *w, int kind) {
-    switch (kind) {
-        case KIND_DERIVATIVE: return w->rhs;
-        case KIND_VARIABLE: return w->variables;
-        case KIND_DERIVED: return w->guards;
-        case KIND_GUARD: return w->guards_before;
-        default: return NULL;
+/* Reads derivatives off the tangents of all arguments. */
+void read_tangents(Instance *c, const uint32_t *unknowns, size_t n, double *result, size_t stride) {
+    const Model *m = c->model;
+    Work *w = &c->work;
+    Given given[N_KINDS];
+    find_given(c, given);
+    c->variables_valid = 0;
+    for (int k = 0; k < N_KINDS; k++) {
+        if (given[k].tape == NULL) continue;
+        evaluate_now(c, given[k].tape, given[k].room);
+        tape_tangent(given[k].tape, w->slots, w->dots, given[k].room);
+    }
+    for (size_t k = 0; k < n; k++) {
+        const Variable *v = find_variable(m, unknowns[k]);
+        const double *room = given[v->kind].room;
+        if (v->kind == KIND_GUARD && !guard_active(c, v->index)) result[k * stride] = 0;
+        else result[k * stride] = room == NULL ? w->dots[known_slot(m, v)] : room[v->index];
     }
 }
 
@@ -153,17 +168,7 @@ Result directional(Instance *c, const uint32_t *unknowns, size_t n_unknowns, con
     } else if (start_tangent(c, knowns, n_knowns, seed) != RESULT_OK) return RESULT_ERROR;
     if (factor_implicit(c, w->order) != RESULT_OK) return RESULT_ERROR;
     tangent_of_implicit(c, w->order);
-    c->variables_valid = 0;
-    for (int k = 0; k < N_GIVEN; k++) {
-        evaluate_now(c, tape_of(m, given[k]), room_of(w, given[k]));
-        tape_tangent(tape_of(m, given[k]), w->slots, w->dots, room_of(w, given[k]));
-    }
-    for (size_t k = 0; k < n_unknowns; k++) {
-        const Variable *v = find_variable(m, unknowns[k]);
-        const double *room = room_of(w, v->kind);
-        if (v->kind == KIND_GUARD && !guard_active(c, v->index)) result[k] = 0;
-        else result[k] = room == NULL ? w->dots[known_slot(m, v)] : room[v->index];
-    }
+    read_tangents(c, unknowns, n_unknowns, result, 1);
     return RESULT_OK;
 }
 
@@ -190,6 +195,7 @@ Result adjoint(Instance *c, const uint32_t *unknowns, size_t n_unknowns, const u
     const Model *m = c->model;
     Work *w = &c->work;
     int *order = c->work.order;
+    Given given[N_KINDS];
     if (check_unknowns(c, unknowns, n_unknowns) != RESULT_OK || check_knowns(c, knowns, n_knowns) != RESULT_OK)
         return RESULT_ERROR;
     if (factor_implicit(c, order) != RESULT_OK) return RESULT_ERROR;
@@ -199,15 +205,16 @@ Result adjoint(Instance *c, const uint32_t *unknowns, size_t n_unknowns, const u
         if (slot >= 0) w->dots[slot] += seed[k];
     }
     c->variables_valid = 0;
-    for (int kind = 0; kind < N_GIVEN; kind++) {
-        const Tape *tape = tape_of(m, given[kind]);
-        double *bars = room_of(w, given[kind]);
+    find_given(c, given);
+    for (int kind = 0; kind < N_KINDS; kind++) {
+        const Tape *tape = given[kind].tape;
+        double *bars = given[kind].room;
+        if (tape == NULL) continue;
         evaluate_now(c, tape, bars);
         memset(bars, 0, (size_t)tape->n_outputs * sizeof(double));
         for (size_t k = 0; k < n_unknowns; k++) {
             const Variable *v = find_variable(m, unknowns[k]);
-            if (v->kind == (int)given[kind] && (v->kind != KIND_GUARD || guard_active(c, v->index)))
-                bars[v->index] += seed[k];
+            if (v->kind == kind && (v->kind != KIND_GUARD || guard_active(c, v->index))) bars[v->index] += seed[k];
         }
         tape_adjoint(tape, w->slots, w->dots, bars);
     }

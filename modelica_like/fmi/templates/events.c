@@ -31,13 +31,12 @@ unsigned char *nothing_wanting(Instance *c) { return memset(c->work.wanting, 0, 
 static double just_after(const State *s) { return s->t + SAME_TIME * fmax(1, fabs(s->t)); }
 
 double next_moment(Instance *c) {
-    State *s = &c->state;
     double *moments = c->work.guards, next = INFINITY;
     if (c->model->n_moments == 0) return next;
     evaluate_now(c, &c->model->tapes.moments, moments);
     for (int k = 0; k < c->model->n_transitions; k++) {
         const Transition *one = &c->model->transitions[k];
-        if (one->timed && is_source(c, one) && moments[one->index] > just_after(s))
+        if (one->timed && is_source(c, one) && moments[one->index] > just_after(&c->state))
             next = fmin(next, moments[one->index]);
     }
     return next;
@@ -177,7 +176,7 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
             if (any && round >= TOGETHER) wanting[k] = 0;
             any |= wanting[k];
         }
-        if (!any) return RESULT_OK;
+        if (!gradient_round(c, round, wanting, any)) return RESULT_OK;
         if (c->bounded && --c->budget < 1) {
             s->at_event = 1; /* the rest comes at the beginning of the next step */
             return RESULT_OK;

@@ -22,16 +22,11 @@
     Instance *c = instance; \
     if (c == NULL || allowed(c, TEXT(FMI(name)), phases) != RESULT_OK) return FMI(Error)
 
-/* Refuses arguments: null pointers where n > 0, wrong sizes. */
-#define NEED(n, ...)                                                                                    \
-    do {                                                                                                \
-        const void *const given[] = {__VA_ARGS__};                                                      \
-        if ((n) > 0 && refuse_null(c, given, sizeof given / sizeof given[0], TEXT((__VA_ARGS__))) != 0) \
-            return FMI(Error);                                                                          \
-    } while (0)
-#define NEED_SIZE(n, wanted, what) \
-    if ((n) != (size_t)(wanted))   \
-    return status(fail(c, "There must be %zu %s, not %zu.", (size_t)(wanted), what, (size_t)(n)))
+/* Are arguments what they must be: no null pointers where n > 0, the right sizes? If not, it is told. */
+#define GIVEN(n, ...) ((n) == 0 || all_given(c, (const void *const[]){__VA_ARGS__}, TEXT((__VA_ARGS__))))
+#define SIZED(n, wanted, what) is_size(c, n, (size_t)(wanted), what)
+#define NEED(n, ...) \
+    if (!GIVEN(n, __VA_ARGS__)) return FMI(Error)
 
 typedef FMI(Status) Status;
 
@@ -42,27 +37,55 @@ static inline Status status(Result result) {
 
 static inline Status refuse(Instance *c, const char *why) { return status(fail(c, "%s", why)); }
 
-/* Names which of the arguments is a null pointer; `names`: (a, b, c). */
-static inline int refuse_null(Instance *c, const void *const *given, size_t count, const char *names) {
-    for (size_t k = 0; k < count; k++) {
+/* `names`: (a, b, c). */
+static inline int all_given(Instance *c, const void *const *given, const char *names) {
+    for (; *names != ')'; given++) {
         size_t length = strcspn(++names, ",)");
-        if (given[k] == NULL)
-            return fail(c, "The argument %.*s is a null pointer.", (int)length, names) == RESULT_ERROR;
-        names += length + strspn(names + length, ", ") - 1;
+        if (*given == NULL) return fail(c, "The argument %.*s is a null pointer.", (int)length, names) == RESULT_OK;
+        names += length + strspn(names + length, ", ") - (names[length] == ',');
     }
-    return 0;
+    return 1;
 }
+
+static inline int is_size(Instance *c, size_t n, size_t wanted, const char *what) {
+    return n == wanted || fail(c, "There must be %zu %s, not %zu.", wanted, what, n) == RESULT_OK;
+}
+
+/* A function whose work is one call of the run-time, if arguments are what it needs. */
+#define CALL(name, phases, needs, call, ...)        \
+    Status FMI(name)(void *instance, __VA_ARGS__) { \
+        ENTER(name, phases);                        \
+        if (!(needs)) return FMI(Error);            \
+        return status(call);                        \
+    }
+/* A function that does the same for everything that it is given. */
+#define EACH(name, phases, n, needs, call, ...)         \
+    Status FMI(name)(void *instance, __VA_ARGS__) {     \
+        ENTER(name, phases);                            \
+        if (!(needs)) return FMI(Error);                \
+        for (size_t k = 0; k < (n); k++)                \
+            if ((call) != RESULT_OK) return FMI(Error); \
+        return FMI(OK);                                 \
+    }
+/* A function that changes nothing but the phase. */
+#define CHANGE_PHASE(name, from, to, forbidden, why)          \
+    Status FMI(name)(void *instance) {                        \
+        ENTER(name, from);                                    \
+        if (forbidden) return refuse(c, TEXT(FMI(name)) why); \
+        c->state.phase = to;                                  \
+        return FMI(OK);                                       \
+    }
 
 static inline Status failed(Instance *c) {
     c->state.phase = PHASE_FAILED;
     return FMI(Error);
 }
 
-static inline int get_mode(Instance *c, uint32_t reference, INTEGER *value) {
-    double number;
-    if (get_value(c, known_variable(c, reference, TYPE_ENUMERATION), &number) != RESULT_OK) return 0;
-    *value = (INTEGER)number;
-    return 1;
+static inline Result get_mode(Instance *c, uint32_t reference, INTEGER *value) {
+    double number = 0;
+    Result result = get_value(c, known_variable(c, reference, TYPE_ENUMERATION), &number);
+    if (result == RESULT_OK) *value = (INTEGER)number;
+    return result;
 }
 
 /* ---- life of an instance ---------------------------------------------------------------------------------------- */
@@ -76,9 +99,8 @@ Status FMI(SetDebugLogging)(
     Result result = RESULT_OK;
     ENTER(SetDebugLogging, ANY_PHASE);
     NEED(nCategories, categories);
-    if (nCategories == 0) result = set_log_category(c, NULL, loggingOn);
-    for (size_t k = 0; k < nCategories; k++)
-        if (set_log_category(c, categories[k], loggingOn) != RESULT_OK) result = RESULT_ERROR;
+    for (size_t k = 0; k < nCategories || k == 0; k++)
+        if (set_log_category(c, nCategories > 0 ? categories[k] : NULL, loggingOn) != RESULT_OK) result = RESULT_ERROR;
     return status(result);
 }
 
@@ -91,11 +113,7 @@ Status FMI(ExitInitializationMode)(void *instance) {
     return FMI(OK);
 }
 
-Status FMI(Terminate)(void *instance) {
-    ENTER(Terminate, PHASE_EVENT | PHASE_CONTINUOUS | PHASE_STEP | PHASE_FAILED);
-    c->state.phase = PHASE_TERMINATED;
-    return FMI(OK);
-}
+CHANGE_PHASE(Terminate, PHASE_EVENT | PHASE_CONTINUOUS | PHASE_STEP | PHASE_FAILED, PHASE_TERMINATED, 0, "")
 
 Status FMI(Reset)(void *instance) {
     ENTER(Reset, ANY_PHASE);
@@ -105,12 +123,7 @@ Status FMI(Reset)(void *instance) {
 
 /* ---- Model Exchange --------------------------------------------------------------------------------------------- */
 
-Status FMI(EnterContinuousTimeMode)(void *instance) {
-    ENTER(EnterContinuousTimeMode, PHASE_EVENT);
-    if (c->co_simulation) return refuse(c, TEXT(FMI(EnterContinuousTimeMode)) " belongs to Model Exchange.");
-    c->state.phase = PHASE_CONTINUOUS;
-    return FMI(OK);
-}
+CHANGE_PHASE(EnterContinuousTimeMode, PHASE_EVENT, PHASE_CONTINUOUS, c->co_simulation, " belongs to Model Exchange.")
 
 Status FMI(CompletedIntegratorStep)(void *instance, FMI(Boolean) noSetFMUStatePriorToCurrentPoint,
     FMI(Boolean) * enterEventMode, FMI(Boolean) * terminateSimulation) {
@@ -123,27 +136,14 @@ Status FMI(CompletedIntegratorStep)(void *instance, FMI(Boolean) noSetFMUStatePr
     return FMI(OK);
 }
 
-Status FMI(SetTime)(void *instance, double time) {
-    ENTER(SetTime, PHASE_EVENT | PHASE_CONTINUOUS);
-    return status(set_time(c, time));
-}
+CALL(SetTime, PHASE_EVENT | PHASE_CONTINUOUS, 1, set_time(c, time), double time)
+CALL(SetContinuousStates, PHASE_EVENT | PHASE_CONTINUOUS, SIZED(n, c->model->n_x, "continuous states") && GIVEN(n, x),
+    set_states(c, x), const double x[], size_t n)
 
-Status FMI(SetContinuousStates)(void *instance, const double x[], size_t nx) {
-    ENTER(SetContinuousStates, PHASE_EVENT | PHASE_CONTINUOUS);
-    NEED_SIZE(nx, c->model->n_x, "continuous states");
-    NEED(nx, x);
-    return status(set_states(c, x));
-}
-
-#define GET_ALL(name, array, phases, count, what, action)                                \
-    Status FMI(name)(void *instance, double array[], size_t n) {                         \
-        ENTER(name, phases);                                                             \
-        NEED_SIZE(n, count, what);                                                       \
-        NEED(n, array);                                                                  \
-        if ((phases) != ANY_PHASE && make_consistent(c) != RESULT_OK) return FMI(Error); \
-        action;                                                                          \
-        return FMI(OK);                                                                  \
-    }
+#define GET_ALL(name, array, phases, count, what, action)                                                       \
+    CALL(name, phases,                                                                                          \
+        SIZED(n, count, what) && GIVEN(n, array) && ((phases) == ANY_PHASE || make_consistent(c) == RESULT_OK), \
+        (action, RESULT_OK), double array[], size_t n)
 #define GET_STATES(name, array, phases, action) GET_ALL(name, array, phases, c->model->n_x, "continuous states", action)
 
 GET_STATES(GetDerivatives, derivatives, READABLE, get_derivatives(c, derivatives))
@@ -153,42 +153,16 @@ GET_ALL(GetEventIndicators, indicators, READABLE, c->model->n_guards, "event ind
 
 /* ---- copies of the state ---------------------------------------------------------------------------------------- */
 
-Status FMI(JOIN(Get, FMUState))(void *instance, void **FMUState) {
-    ENTER(JOIN(Get, FMUState), ANY_PHASE);
-    NEED(1, FMUState);
-    return status(state_copy_out(c, FMUState));
-}
-
-Status FMI(JOIN(Set, FMUState))(void *instance, void *FMUState) {
-    ENTER(JOIN(Set, FMUState), ANY_PHASE);
-    NEED(1, FMUState);
-    return status(state_copy_in(c, FMUState));
-}
-
-Status FMI(JOIN(Free, FMUState))(void *instance, void **FMUState) {
-    ENTER(JOIN(Free, FMUState), ANY_PHASE);
-    if (FMUState != NULL) state_release(c, FMUState);
-    return FMI(OK);
-}
-
-Status FMI(SerializedSize)(void *instance, void *FMUState, size_t *size) {
-    ENTER(SerializedSize, ANY_PHASE);
-    NEED(1, FMUState, size);
-    *size = state_size(c);
-    return FMI(OK);
-}
-
-Status FMI(JOIN(Serialize, FMUState))(void *instance, void *FMUState, FMI(Byte) serializedState[], size_t size) {
-    ENTER(JOIN(Serialize, FMUState), ANY_PHASE);
-    NEED(1, FMUState, serializedState);
-    return status(state_write(c, FMUState, (unsigned char *)serializedState, size));
-}
-
-Status FMI(JOIN(Deserialize, FMUState))(
-    void *instance, const FMI(Byte) serializedState[], size_t size, void **FMUState) {
-    ENTER(JOIN(Deserialize, FMUState), ANY_PHASE);
-    NEED(1, FMUState, serializedState);
-    return status(state_read(c, (const unsigned char *)serializedState, size, FMUState));
-}
+CALL(JOIN(Get, FMUState), ANY_PHASE, GIVEN(1, FMUState), state_copy_out(c, FMUState), void **FMUState)
+CALL(JOIN(Set, FMUState), ANY_PHASE, GIVEN(1, FMUState), state_copy_in(c, FMUState), void *FMUState)
+CALL(JOIN(Free, FMUState), ANY_PHASE, 1, state_release(c, FMUState), void **FMUState)
+CALL(SerializedSize, ANY_PHASE, GIVEN(1, FMUState, size), (*size = state_size(c), RESULT_OK), void *FMUState,
+    size_t *size)
+CALL(JOIN(Serialize, FMUState), ANY_PHASE, GIVEN(1, FMUState, serializedState),
+    state_write(c, FMUState, (unsigned char *)serializedState, size), void *FMUState, FMI(Byte) serializedState[],
+    size_t size)
+CALL(JOIN(Deserialize, FMUState), ANY_PHASE, GIVEN(1, FMUState, serializedState),
+    state_read(c, (const unsigned char *)serializedState, size, FMUState), const FMI(Byte) serializedState[],
+    size_t size, void **FMUState)
 
 #endif

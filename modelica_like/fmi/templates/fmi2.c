@@ -41,62 +41,35 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
     return instance_open(bare, fmuGUID, fmuResourceLocation);
 }
 
-fmi2Status fmi2SetupExperiment(fmi2Component instance, fmi2Boolean toleranceDefined, fmi2Real tolerance,
-    fmi2Real startTime, fmi2Boolean stopTimeDefined, fmi2Real stopTime) {
-    ENTER(SetupExperiment, PHASE_INSTANTIATED);
-    return status(set_experiment(c, toleranceDefined, tolerance, startTime, stopTimeDefined, stopTime));
-}
-
-fmi2Status fmi2EnterInitializationMode(fmi2Component instance) {
-    ENTER(EnterInitializationMode, PHASE_INSTANTIATED);
-    c->state.phase = PHASE_INITIALIZATION;
-    return fmi2OK;
-}
+CALL(SetupExperiment, PHASE_INSTANTIATED, 1,
+    set_experiment(c, toleranceDefined, tolerance, startTime, stopTimeDefined, stopTime), fmi2Boolean toleranceDefined,
+    fmi2Real tolerance, fmi2Real startTime, fmi2Boolean stopTimeDefined, fmi2Real stopTime)
+CHANGE_PHASE(EnterInitializationMode, PHASE_INSTANTIATED, PHASE_INITIALIZATION, 0, "")
+CHANGE_PHASE(EnterEventMode, PHASE_CONTINUOUS | PHASE_EVENT, PHASE_EVENT, 0, "")
 
 /* ---- values ----------------------------------------------------------------------------------------------------- */
 
-#define REFERENCES fmi2Component instance, const fmi2ValueReference vr[], size_t nvr
-#define VALUES(name, phases, type, done)              \
-    fmi2Status fmi2##name(REFERENCES, type value[]) { \
-        ENTER(name, phases);                          \
-        NEED(nvr, vr, value);                         \
-        for (size_t k = 0; k < nvr; k++)              \
-            if (!(done)) return fmi2Error;            \
-        return fmi2OK;                                \
-    }
-#define NO_VALUES(name, phases, type, kind)                                                    \
-    fmi2Status fmi2##name(REFERENCES, type value[]) {                                          \
-        ENTER(name, phases);                                                                   \
-        (void)vr, (void)value;                                                                 \
-        return nvr == 0 ? fmi2OK : refuse(c, "This model has no variables of type " kind "."); \
-    }
+#define REFERENCES const fmi2ValueReference vr[], size_t nvr
+#define VALUES(name, phases, type, call) EACH(name, phases, nvr, GIVEN(nvr, vr, value), call, REFERENCES, type value[])
+#define NO_VALUES(name, phases, type, kind)        \
+    CALL(name, phases, ((void)vr, (void)value, 1), \
+        nvr == 0 ? RESULT_OK : fail(c, "This model has no variables of type " kind "."), REFERENCES, type value[])
 
-VALUES(GetReal, READABLE, fmi2Real, get_value(c, known_variable(c, vr[k], TYPE_FLOAT64), &value[k]) == RESULT_OK)
-VALUES(SetReal, SETTABLE, const fmi2Real, set_value(c, known_variable(c, vr[k], TYPE_FLOAT64), value[k]) == RESULT_OK)
+VALUES(GetReal, READABLE, fmi2Real, get_value(c, known_variable(c, vr[k], TYPE_FLOAT64), &value[k]))
+VALUES(SetReal, SETTABLE, const fmi2Real, set_value(c, known_variable(c, vr[k], TYPE_FLOAT64), value[k]))
 VALUES(GetInteger, READABLE, fmi2Integer, get_mode(c, vr[k], &value[k]))
-VALUES(SetInteger, SETTABLE, const fmi2Integer,
-    set_value(c, known_variable(c, vr[k], TYPE_ENUMERATION), value[k]) == RESULT_OK)
+VALUES(SetInteger, SETTABLE, const fmi2Integer, set_value(c, known_variable(c, vr[k], TYPE_ENUMERATION), value[k]))
 NO_VALUES(GetBoolean, READABLE, fmi2Boolean, "Boolean")
 NO_VALUES(SetBoolean, SETTABLE, const fmi2Boolean, "Boolean")
 NO_VALUES(GetString, READABLE, fmi2String, "String")
 NO_VALUES(SetString, SETTABLE, const fmi2String, "String")
 
-fmi2Status fmi2GetDirectionalDerivative(fmi2Component instance, const fmi2ValueReference vUnknown_ref[],
-    size_t nUnknown, const fmi2ValueReference vKnown_ref[], size_t nKnown, const fmi2Real dvKnown[],
-    fmi2Real dvUnknown[]) {
-    ENTER(GetDirectionalDerivative, READABLE);
-    NEED(nUnknown, vUnknown_ref, dvUnknown);
-    NEED(nKnown, vKnown_ref, dvKnown);
-    return status(directional(c, vUnknown_ref, nUnknown, vKnown_ref, nKnown, dvKnown, dvUnknown));
-}
+CALL(GetDirectionalDerivative, READABLE, GIVEN(nUnknown, vUnknown_ref, dvUnknown) && GIVEN(nKnown, vKnown_ref, dvKnown),
+    directional(c, vUnknown_ref, nUnknown, vKnown_ref, nKnown, dvKnown, dvUnknown),
+    const fmi2ValueReference vUnknown_ref[], size_t nUnknown, const fmi2ValueReference vKnown_ref[], size_t nKnown,
+    const fmi2Real dvKnown[], fmi2Real dvUnknown[])
 
 /* ---- Model Exchange --------------------------------------------------------------------------------------------- */
-
-fmi2Status fmi2EnterEventMode(fmi2Component instance) {
-    ENTER(EnterEventMode, PHASE_CONTINUOUS | PHASE_EVENT);
-    c->state.phase = PHASE_EVENT;
-    return fmi2OK;
-}
 
 fmi2Status fmi2NewDiscreteStates(fmi2Component instance, fmi2EventInfo *eventInfo) {
     double next;
@@ -115,23 +88,10 @@ fmi2Status fmi2NewDiscreteStates(fmi2Component instance, fmi2EventInfo *eventInf
 
 /* ---- Co-Simulation ---------------------------------------------------------------------------------------------- */
 
-fmi2Status fmi2SetRealInputDerivatives(REFERENCES, const fmi2Integer order[], const fmi2Real value[]) {
-    ENTER(SetRealInputDerivatives, PHASE_INITIALIZATION | PHASE_STEP);
-    NEED(nvr, vr, order, value);
-    for (size_t k = 0; k < nvr; k++) {
-        if (order[k] != 1) return refuse(c, "Inputs have derivatives of order 1 only.");
-        if (set_input_rate(c, vr[k], value[k]) != RESULT_OK) return fmi2Error;
-    }
-    return fmi2OK;
-}
-
-fmi2Status fmi2GetRealOutputDerivatives(REFERENCES, const fmi2Integer order[], fmi2Real value[]) {
-    ENTER(GetRealOutputDerivatives, PHASE_STEP | PHASE_TERMINATED);
-    NEED(nvr, vr, order, value);
-    for (size_t k = 0; k < nvr; k++)
-        if (output_rate(c, vr[k], order[k], &value[k]) != RESULT_OK) return fmi2Error;
-    return fmi2OK;
-}
+EACH(SetRealInputDerivatives, PHASE_INITIALIZATION | PHASE_STEP, nvr, GIVEN(nvr, vr, order, value),
+    set_input_rate(c, vr[k], order[k], value[k]), REFERENCES, const fmi2Integer order[], const fmi2Real value[])
+EACH(GetRealOutputDerivatives, PHASE_STEP | PHASE_TERMINATED, nvr, GIVEN(nvr, vr, order, value),
+    output_rate(c, vr[k], order[k], &value[k]), REFERENCES, const fmi2Integer order[], fmi2Real value[])
 
 fmi2Status fmi2DoStep(fmi2Component instance, fmi2Real currentCommunicationPoint, fmi2Real communicationStepSize,
     fmi2Boolean noSetFMUStatePriorToCurrentPoint) {

@@ -21,13 +21,11 @@ const char *fmi3GetVersion(void) { return fmi3Version; }
 fmi3Instance fmi3InstantiateModelExchange(fmi3String instanceName, fmi3String instantiationToken,
     fmi3String resourcePath, fmi3Boolean visible, fmi3Boolean loggingOn, fmi3InstanceEnvironment instanceEnvironment,
     fmi3LogMessageCallback logMessage) {
-    const Instance bare = {.name = instanceName,
-        .log_enabled = loggingOn,
-        .environment = instanceEnvironment,
-        .logger = (AnyFunction)logMessage,
-        .log = logMessage ? log_fmi3 : NULL,
-        .allocate = calloc,
-        .release = free};
+    Instance bare = {.name = instanceName, .log_enabled = loggingOn, .environment = instanceEnvironment};
+    bare.logger = (AnyFunction)logMessage;
+    bare.log = logMessage ? log_fmi3 : NULL;
+    bare.allocate = calloc;
+    bare.release = free;
     (void)visible;
     return instance_open(bare, instantiationToken, resourcePath);
 }
@@ -81,17 +79,11 @@ fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean tolera
     return fmi3OK;
 }
 
-fmi3Status fmi3EnterConfigurationMode(fmi3Instance instance) {
-    ENTER(EnterConfigurationMode, PHASE_INSTANTIATED);
-    c->state.phase = PHASE_CONFIGURATION;
-    return fmi3OK;
-}
-
-fmi3Status fmi3ExitConfigurationMode(fmi3Instance instance) {
-    ENTER(ExitConfigurationMode, PHASE_CONFIGURATION);
-    c->state.phase = PHASE_INSTANTIATED;
-    return fmi3OK;
-}
+CHANGE_PHASE(EnterConfigurationMode, PHASE_INSTANTIATED, PHASE_CONFIGURATION, 0, "")
+CHANGE_PHASE(ExitConfigurationMode, PHASE_CONFIGURATION, PHASE_INSTANTIATED, 0, "")
+CHANGE_PHASE(EnterEventMode, PHASE_CONTINUOUS | PHASE_STEP, PHASE_EVENT, c->co_simulation && !c->event_mode_used,
+    ": this instance was made with eventModeUsed = false.")
+CHANGE_PHASE(EnterStepMode, PHASE_EVENT, PHASE_STEP, !c->co_simulation, " belongs to Co-Simulation.")
 
 /* ---- values ----------------------------------------------------------------------------------------------------- */
 
@@ -103,35 +95,31 @@ static size_t elements(const Instance *c, fmi3ValueReference reference, fmi3Valu
     return array ? (size_t)v->count : 1;
 }
 
-#define REFERENCES fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences
+#define REFERENCES const fmi3ValueReference valueReferences[], size_t nValueReferences
 #define VALUES(name, phases, type, done)                                                            \
-    fmi3Status fmi3##name(REFERENCES, type values[], size_t nValues) {                              \
+    fmi3Status fmi3##name(fmi3Instance instance, REFERENCES, type values[], size_t nValues) {       \
         fmi3ValueReference r;                                                                       \
         size_t count = 0;                                                                           \
         ENTER(name, phases);                                                                        \
         NEED(nValueReferences, valueReferences);                                                    \
         for (size_t k = 0; k < nValueReferences; k++) count += elements(c, valueReferences[k], &r); \
-        NEED_SIZE(nValues, count, "values");                                                        \
+        if (!SIZED(nValues, count, "values")) return fmi3Error;                                     \
         NEED(nValues, values);                                                                      \
         for (size_t k = 0; k < nValueReferences; k++)                                               \
             for (count = elements(c, valueReferences[k], &r); count > 0; count--, r++, values++)    \
-                if (!(done)) return fmi3Error;                                                      \
+                if ((done) != RESULT_OK) return fmi3Error;                                          \
         return fmi3OK;                                                                              \
     }
 
-VALUES(GetFloat64, READABLE, fmi3Float64, get_value(c, known_variable(c, r, TYPE_FLOAT64), values) == RESULT_OK)
-VALUES(SetFloat64, SETTABLE, const fmi3Float64, set_value(c, known_variable(c, r, TYPE_FLOAT64), *values) == RESULT_OK)
+VALUES(GetFloat64, READABLE, fmi3Float64, get_value(c, known_variable(c, r, TYPE_FLOAT64), values))
+VALUES(SetFloat64, SETTABLE, const fmi3Float64, set_value(c, known_variable(c, r, TYPE_FLOAT64), *values))
 VALUES(GetInt64, READABLE, fmi3Int64, get_mode(c, r, values))
-VALUES(SetInt64, SETTABLE, const fmi3Int64,
-    set_value(c, known_variable(c, r, TYPE_ENUMERATION), (double)*values) == RESULT_OK)
+VALUES(SetInt64, SETTABLE, const fmi3Int64, set_value(c, known_variable(c, r, TYPE_ENUMERATION), (double)*values))
 
 /* Functions for what no model has: other types, clocks, parts. They refuse every call that asks for something. */
-#define NOTHING(name, phases, what, unused, ...)                                          \
-    fmi3Status fmi3##name(REFERENCES, __VA_ARGS__) {                                      \
-        ENTER(name, phases);                                                              \
-        (void)valueReferences, unused;                                                    \
-        return nValueReferences == 0 ? fmi3OK : refuse(c, "This model has no " what "."); \
-    }
+#define NOTHING(name, phases, what, unused, ...)           \
+    CALL(name, phases, (unused, (void)valueReferences, 1), \
+        nValueReferences == 0 ? RESULT_OK : fail(c, "This model has no " what "."), REFERENCES, __VA_ARGS__)
 #define NO_VALUES(type)                                                                                    \
     NOTHING(Get##type, READABLE, "variables of type " #type, ((void)a, (void)n), fmi3##type a[], size_t n) \
     NOTHING(Set##type, SETTABLE, "variables of type " #type, ((void)a, (void)n), const fmi3##type a[], size_t n)
@@ -164,62 +152,30 @@ NO_PAIRS(SetIntervalFraction, const fmi3UInt64, const fmi3UInt64)
 NOTHING(GetIntervalFraction, ANY_PHASE, "clocks", ((void)a, (void)b, (void)q), fmi3UInt64 a[], fmi3UInt64 b[],
     fmi3IntervalQualifier q[])
 
-fmi3Status fmi3ActivateModelPartition(
-    fmi3Instance instance, fmi3ValueReference clockReference, fmi3Float64 activationTime) {
-    ENTER(ActivateModelPartition, ANY_PHASE);
-    (void)clockReference, (void)activationTime;
-    return refuse(c, "This model has no scheduled execution.");
-}
+/* Dependencies stand in the description, which does not announce these (providesPerElementDependencies). */
+#define REFUSED(name, why, unused, ...) CALL(name, ANY_PHASE, (unused, 1), fail(c, why), __VA_ARGS__)
+REFUSED(ActivateModelPartition, "This model has no scheduled execution.", ((void)k, (void)t), fmi3ValueReference k,
+    fmi3Float64 t)
+#define SEE_DESCRIPTION "The model description lists the dependencies of variables."
+REFUSED(GetNumberOfVariableDependencies, SEE_DESCRIPTION, ((void)v, (void)n), fmi3ValueReference v, size_t *n)
+REFUSED(GetVariableDependencies, SEE_DESCRIPTION, ((void)v, (void)a, (void)r, (void)b, (void)k, (void)n),
+    fmi3ValueReference v, size_t a[], fmi3ValueReference r[], size_t b[], fmi3DependencyKind k[], size_t n)
 
 /* ---- derivatives ------------------------------------------------------------------------------------------------ */
 
-/* Dependencies stand in the description, which does not announce these (providesPerElementDependencies). */
-#define SEE_DESCRIPTION "The model description lists the dependencies of variables."
-fmi3Status fmi3GetNumberOfVariableDependencies(
-    fmi3Instance instance, fmi3ValueReference valueReference, size_t *nDependencies) {
-    ENTER(GetNumberOfVariableDependencies, ANY_PHASE);
-    (void)valueReference, (void)nDependencies;
-    return refuse(c, SEE_DESCRIPTION);
-}
-
-fmi3Status fmi3GetVariableDependencies(fmi3Instance instance, fmi3ValueReference dependent, size_t elements[],
-    fmi3ValueReference independents[], size_t others[], fmi3DependencyKind kinds[], size_t nDependencies) {
-    ENTER(GetVariableDependencies, ANY_PHASE);
-    (void)dependent, (void)elements, (void)independents, (void)others, (void)kinds, (void)nDependencies;
-    return refuse(c, SEE_DESCRIPTION);
-}
-
-fmi3Status fmi3GetDirectionalDerivative(fmi3Instance instance, const fmi3ValueReference unknowns[], size_t nUnknowns,
-    const fmi3ValueReference knowns[], size_t nKnowns, const fmi3Float64 seed[], size_t nSeed,
-    fmi3Float64 sensitivity[], size_t nSensitivity) {
-    ENTER(GetDirectionalDerivative, READABLE);
-    NEED_SIZE(nSeed, nKnowns, "seeds, one per known");
-    NEED_SIZE(nSensitivity, nUnknowns, "sensitivities, one per unknown");
-    NEED(nUnknowns, unknowns, sensitivity);
-    NEED(nKnowns, knowns, seed);
-    return status(directional(c, unknowns, nUnknowns, knowns, nKnowns, seed, sensitivity));
-}
-
-fmi3Status fmi3GetAdjointDerivative(fmi3Instance instance, const fmi3ValueReference unknowns[], size_t nUnknowns,
-    const fmi3ValueReference knowns[], size_t nKnowns, const fmi3Float64 seed[], size_t nSeed,
-    fmi3Float64 sensitivity[], size_t nSensitivity) {
-    ENTER(GetAdjointDerivative, PHASE_EVENT | PHASE_CONTINUOUS | PHASE_STEP | PHASE_TERMINATED);
-    NEED_SIZE(nSeed, nUnknowns, "seeds, one per unknown");
-    NEED_SIZE(nSensitivity, nKnowns, "sensitivities, one per known");
-    NEED(nUnknowns, unknowns, seed);
-    NEED(nKnowns, knowns, sensitivity);
-    return status(adjoint(c, unknowns, nUnknowns, knowns, nKnowns, seed, sensitivity));
-}
+#define DERIVATIVES                                                                                           \
+    const fmi3ValueReference unknowns[], size_t nUnknowns, const fmi3ValueReference knowns[], size_t nKnowns, \
+        const fmi3Float64 seed[], size_t nSeed, fmi3Float64 sensitivity[], size_t nSensitivity
+CALL(GetDirectionalDerivative, READABLE,
+    SIZED(nSeed, nKnowns, "seeds, one per known") && GIVEN(nKnowns, knowns, seed) &&
+        SIZED(nSensitivity, nUnknowns, "sensitivities, one per unknown") && GIVEN(nUnknowns, unknowns, sensitivity),
+    directional(c, unknowns, nUnknowns, knowns, nKnowns, seed, sensitivity), DERIVATIVES)
+CALL(GetAdjointDerivative, PHASE_EVENT | PHASE_CONTINUOUS | PHASE_STEP | PHASE_TERMINATED,
+    SIZED(nSeed, nUnknowns, "seeds, one per unknown") && GIVEN(nUnknowns, unknowns, seed) &&
+        SIZED(nSensitivity, nKnowns, "sensitivities, one per known") && GIVEN(nKnowns, knowns, sensitivity),
+    adjoint(c, unknowns, nUnknowns, knowns, nKnowns, seed, sensitivity), DERIVATIVES)
 
 /* ---- events ----------------------------------------------------------------------------------------------------- */
-
-fmi3Status fmi3EnterEventMode(fmi3Instance instance) {
-    ENTER(EnterEventMode, PHASE_CONTINUOUS | PHASE_STEP);
-    if (c->co_simulation && !c->event_mode_used)
-        return refuse(c, "fmi3EnterEventMode: this instance was made with eventModeUsed = false.");
-    c->state.phase = PHASE_EVENT;
-    return fmi3OK;
-}
 
 fmi3Status fmi3EvaluateDiscreteStates(fmi3Instance instance) {
     ENTER(EvaluateDiscreteStates, PHASE_INITIALIZATION | PHASE_EVENT);
@@ -244,39 +200,15 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discrete
 
 /* ---- Model Exchange --------------------------------------------------------------------------------------------- */
 
-fmi3Status fmi3GetNumberOfEventIndicators(fmi3Instance instance, size_t *nEventIndicators) {
-    ENTER(GetNumberOfEventIndicators, ANY_PHASE);
-    NEED(1, nEventIndicators);
-    *nEventIndicators = c->model->n_guards;
-    return fmi3OK;
-}
-
-fmi3Status fmi3GetNumberOfContinuousStates(fmi3Instance instance, size_t *nContinuousStates) {
-    ENTER(GetNumberOfContinuousStates, ANY_PHASE);
-    NEED(1, nContinuousStates);
-    *nContinuousStates = c->model->n_x;
-    return fmi3OK;
-}
+#define COUNT(name, count) CALL(name, ANY_PHASE, GIVEN(1, n), (*n = (size_t)(count), RESULT_OK), size_t *n)
+COUNT(GetNumberOfEventIndicators, c->model->n_guards)
+COUNT(GetNumberOfContinuousStates, c->model->n_x)
 
 /* ---- Co-Simulation ---------------------------------------------------------------------------------------------- */
 
-fmi3Status fmi3EnterStepMode(fmi3Instance instance) {
-    ENTER(EnterStepMode, PHASE_EVENT);
-    if (!c->co_simulation) return refuse(c, "fmi3EnterStepMode belongs to Co-Simulation.");
-    c->state.phase = PHASE_STEP;
-    return fmi3OK;
-}
-
-fmi3Status fmi3GetOutputDerivatives(fmi3Instance instance, const fmi3ValueReference valueReferences[],
-    size_t nValueReferences, const fmi3Int32 orders[], fmi3Float64 values[], size_t nValues) {
-    ENTER(GetOutputDerivatives, PHASE_STEP | PHASE_TERMINATED);
-    NEED_SIZE(nValues, nValueReferences, "values");
-    NEED(nValues, valueReferences, orders, values);
-    for (size_t k = 0; k < nValues; k++) {
-        if (output_rate(c, valueReferences[k], orders[k], &values[k]) != RESULT_OK) return fmi3Error;
-    }
-    return fmi3OK;
-}
+EACH(GetOutputDerivatives, PHASE_STEP | PHASE_TERMINATED, n, SIZED(n, nVr, "values") && GIVEN(n, vr, orders, values),
+    output_rate(c, vr[k], orders[k], &values[k]), const fmi3ValueReference vr[], size_t nVr, const fmi3Int32 orders[],
+    fmi3Float64 values[], size_t n)
 
 fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoint, fmi3Float64 communicationStepSize,
     fmi3Boolean noSetFMUStatePriorToCurrentPoint, fmi3Boolean *eventHandlingNeeded, fmi3Boolean *terminateSimulation,

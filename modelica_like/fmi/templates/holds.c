@@ -1,5 +1,4 @@
-/* Motions that modes hold, as in initialize/holds.py: which they are, and how elements share what they hold together.
- */
+/* Motions that modes hold, as in initialize/holds.py: which they are, and how elements share what they hold. */
 #include <math.h>
 #include <string.h>
 #include "core.h"
@@ -60,8 +59,7 @@ void rest_rates(Instance *c, double *rates) {
 
 /* ---- sharing ---------------------------------------------------------------------------------------------------- */
 
-/* Bring dependences to the form of an identity in one column each, the largest one left; write these columns' shares.
- */
+/* Bring dependences to the form of an identity in one column each, the largest one left; write their shares. */
 static void eliminate(
     int *pivots, int rows, int n, double *silent, double *weighted, const int *place, int members, double *switches) {
     double *shares = switches + members;
@@ -81,10 +79,8 @@ static void eliminate(
     }
     for (int row = 0; row < rows; row++) {
         const double *own = weighted + (size_t)row * n;
-        double largest = 0;
-        for (int k = 0; k < n; k++) largest = fmax(largest, fabs(own[k]));
+        double largest = copysign(largest_of(n, own), own[pivots[row]]);
         switches[place[pivots[row]]] = 1;
-        largest = copysign(largest, own[pivots[row]]);
         for (int k = 0; k < n; k++) shares[place[pivots[row]] * members + place[k]] = own[k] / largest;
     }
 }
@@ -107,20 +103,17 @@ static int dependences(Instance *c, const int *member, int n, double *silent) {
     double *sizes = c->work.sizes, *nothing = c->work.zeros;
     int rows = 0;
     memset(nothing, 0, (size_t)n * sizeof(double));
-    memset(turns, 0, (size_t)n * (size_t)n * sizeof(double));
     for (int i = 0; i < n; i++) {
-        double *slope = slopes + (size_t)i * m->n_x, sum = 0;
+        double *slope = slopes + (size_t)i * m->n_x, square;
         slope_of_node(c, m->holds[member[i]].motion, i > 0, slope);
-        for (int k = 0; k < m->n_x; k++) sum += slope[k] * slope[k];
-        sizes[i] = sum > 0 ? sqrt(sum) : 1;
+        square = dot(m->n_x, slope, slope);
+        sizes[i] = square > 0 ? sqrt(square) : 1;
         for (int k = 0; k < m->n_x; k++) slope[k] /= sizes[i];
-        turns[(size_t)i * n + i] = 1;
     }
     make_orthogonal(n, m->n_x, slopes, turns, nothing);
     for (int i = 0; i < n; i++) {
-        double sum = 0;
-        for (int k = 0; k < m->n_x; k++) sum += slopes[(size_t)i * m->n_x + k] * slopes[(size_t)i * m->n_x + k];
-        if (sqrt(sum) > DEPENDENT) continue;
+        const double *slope = slopes + (size_t)i * m->n_x;
+        if (sqrt(dot(m->n_x, slope, slope)) > DEPENDENT) continue;
         for (int k = 0; k < n; k++) silent[(size_t)rows * n + k] = turns[(size_t)i * n + k] / sizes[k];
         rows++;
     }

@@ -6,15 +6,8 @@
 #include <string.h>
 #include "core.h"
 
-static const struct {
-    LogCategory category;
-    const char *name;
-} categories[] = {
-    {LOG_ERROR, "logStatusError"},
-    {LOG_WARNING, "logStatusWarning"},
-    {LOG_EVENTS, "logEvents"},
-    {LOG_INTEGRATOR, "logIntegrator"},
-};
+static const char *const categories[] = {
+    "logStatusError", "logStatusWarning", "logEvents", "logIntegrator"}; /* by the bits of LogCategory */
 enum { N_CATEGORIES = sizeof categories / sizeof categories[0] };
 
 /* ---- logging ---------------------------------------------------------------------------------------------------- */
@@ -29,38 +22,29 @@ Result report(Instance *c, LogCategory category, Result result, const char *form
     vsnprintf(message, sizeof message, format, arguments);
     va_end(arguments);
     for (int k = 0; k < N_CATEGORIES; k++)
-        if (categories[k].category == category) name = categories[k].name;
+        if ((int)category == 1 << k) name = categories[k];
     c->log(c, (int)result, name, message);
     return result;
 }
 
 Result set_log_category(Instance *c, const char *category, int on) {
-    unsigned chosen = 0;
-    if (category == NULL || strcmp(category, "logAll") == 0) chosen = LOG_ALL;
-    else
-        for (int k = 0; k < N_CATEGORIES; k++)
-            if (strcmp(category, categories[k].name) == 0) chosen = categories[k].category;
+    unsigned chosen = category == NULL || strcmp(category, "logAll") == 0 ? LOG_ALL : 0;
+    for (int k = 0; k < N_CATEGORIES && chosen == 0; k++)
+        if (strcmp(category, categories[k]) == 0) chosen = 1u << k;
     if (chosen == 0) return fail(c, "There is no log category '%.100s'.", category);
     c->log_enabled = on ? c->log_enabled | chosen : c->log_enabled & ~chosen;
     return RESULT_OK;
 }
 
-static const char *phase_name(int phase) {
-    switch (phase) {
-        case PHASE_INSTANTIATED: return "the instance is not initialized";
-        case PHASE_CONFIGURATION: return "the instance is in configuration mode";
-        case PHASE_INITIALIZATION: return "the instance is in initialization mode";
-        case PHASE_EVENT: return "the instance is in event mode";
-        case PHASE_CONTINUOUS: return "the instance is in continuous-time mode";
-        case PHASE_STEP: return "the instance is between communication steps";
-        case PHASE_TERMINATED: return "the run has been terminated";
-        default: return "an earlier call failed: reset or free the instance";
-    }
-}
-
 Result allowed(Instance *c, const char *function, int phases) {
+    static const char *const names[] = {"the instance is not initialized", "the instance is in initialization mode",
+        "the instance is in event mode", "the instance is in continuous-time mode",
+        "the instance is between communication steps", "the run has been terminated",
+        "the instance is in configuration mode", "an earlier call failed: reset or free the instance"}; /* as Phase */
+    int phase = 0;
     if (c->state.phase & phases) return RESULT_OK;
-    return fail(c, "%s is not allowed now: %s.", function, phase_name(c->state.phase));
+    while (!(c->state.phase >> phase & 1)) phase++;
+    return fail(c, "%s is not allowed now: %s.", function, names[phase]);
 }
 
 /* ---- memory ----------------------------------------------------------------------------------------------------- */
@@ -88,11 +72,13 @@ static uint64_t place(const Room *rooms, size_t count, double *memory) {
 static uint64_t place_state(Instance *c, double *memory) {
     const Model *m = c->model;
     uint64_t n = m->n_unknowns, n_d = m->n_d, n_starts = m->n_starts;
-    const Room rooms[] = {{n, 8, {&c->x}}, {m->n_p, 8, {&c->p}}, {m->n_u, 8, {&c->u, &c->u_rate}}, {n_d, 8, {&c->d}},
-        {n_d, 1, {&c->mode_given}}, {n_starts, 8, {&c->start_value}}, {n_starts, 1, {&c->start_given}},
-        {2 + 5 * n, 8, {&c->piece}}, {m->settings->fixed_step > 0 ? 2 * (uint64_t)m->n_guards : 0, 8, {&c->end_look}},
+    const Room smooth[] = {{n, 8, {&c->x}}, {m->n_p, 8, {&c->p}}, {m->n_u, 8, {&c->u, &c->u_rate}}, {n_d, 8, {&c->d}},
+        {n_starts, 8, {&c->start_value}}};
+    const Room rest[] = {{2 + 5 * n, 8, {&c->piece}}, {n_d, 1, {&c->mode_given}}, {n_starts, 1, {&c->start_given}},
+        {m->settings->fixed_step > 0 ? 2 * (uint64_t)m->n_guards : 0, 8, {&c->end_look}},
         {m->n_transitions, 1, {&c->wanting}}};
-    return PLACE(rooms, memory);
+    c->n_smooth = (size_t)PLACE(smooth, memory);
+    return c->n_smooth + PLACE(rest, memory == NULL ? NULL : memory + c->n_smooth);
 }
 
 /* Operations, or outputs, of the first tapes that are specialised. */
@@ -111,6 +97,8 @@ static void share_out_specials(Instance *c) {
         s->operands = c->work.special_operands + before;
         s->outputs = c->work.special_outputs + special_size(c->model, k, 1);
         s->first_known = c->model->n_slots + (int)before;
+        s->tape =
+            (Tape){0, 0, full_tape(c->model, k)->n_outputs, c->model->slot_results, s->runs, s->operands, s->outputs};
     }
 }
 
@@ -134,7 +122,7 @@ static uint64_t place_work(const Model *m, Work *w, double *memory) {
         {n_z, sizeof(int), {&w->order}}, {square, 8, {&w->square}}, {m->n_starts, 8, {&w->start_values}},
         {larger(m->n_start_values, resets), 8, {&w->start_residual}},
         {resets, 8, {&w->reset_values, &w->target_values}}, {resets, sizeof(int), {&w->targets}},
-        {n_x, 8, {&w->seen_rates}}, {n, 8, {&w->first_rates}}, {n_guards, 8, {&w->seen_indicators}},
+        {n, 8, {&w->seen_rates, &w->first_rates}}, {n_guards, 8, {&w->seen_indicators}},
         {m->n_derived, 8, {&w->seen_derived}}, {m->n_slots, sizeof(int), {&w->same, &w->places_of_slots}},
         {m->n_slots, 1, {&w->known_slots, &w->needed_slots}}, {m->n_nodes, 1, {&w->asked}}, {m->n_p, 1, {&w->tuned}},
         {left, sizeof(Run), {&w->special_runs}}, {left, sizeof(Operands), {&w->special_operands}},
@@ -178,24 +166,21 @@ void instance_reset(Instance *c) {
     s->phase = PHASE_INSTANTIATED;
     set_tolerance(s, c->model, c->model->settings->default_tolerance);
     c->variables_valid = c->look_valid = 0;
+    gradient_end(c);
     start_defaults(c);
 }
 
 static Instance *instance_make(const Instance *bare) {
     const Model *m = bare->model;
-    size_t length = strlen(bare->name) + 1;
-    Instance measured = *bare, *c = bare->allocate(1, sizeof *c + length);
-    uint64_t size = lay_out(&measured, NULL);
-    double *numbers = size > SIZE_MAX / sizeof(double) ? NULL : bare->allocate((size_t)size, sizeof(double));
-    if (c == NULL || numbers == NULL) {
-        if (c != NULL) bare->release(c);
-        if (numbers != NULL) bare->release(numbers);
-        return NULL;
-    }
+    Instance measured = *bare, *c;
+    size_t length = strlen(bare->name) + 1, head = (sizeof *c + length) / sizeof(double) + 1;
+    uint64_t size = head + lay_out(&measured, NULL);
+    c = size > SIZE_MAX / sizeof(double) ? NULL : bare->allocate((size_t)size, sizeof(double));
+    if (c == NULL) return NULL;
     *c = *bare;
     c->name = memcpy(c + 1, bare->name, length);
-    c->numbers = numbers;
-    lay_out(c, numbers);
+    c->numbers = (double *)(void *)c + head;
+    lay_out(c, c->numbers);
     c->z = c->x + m->n_x;
     share_out_specials(c);
     memcpy(c->work.slots + m->slot_constants, m->constants, (size_t)m->n_constants * sizeof(double));
@@ -215,6 +200,13 @@ Instance *instance_new(Instance bare, const char *token) {
         fail(&bare, "The instantiation token is that of another export of the model.");
     else if ((c = instance_make(&bare)) == NULL) fail(&bare, "There is not enough memory.");
     return c;
+}
+
+/* The same for a program that has loaded this library. */
+Instance *instance_for(const Model *m, void *environment) {
+    Instance bare = {.model = m, .name = "native", .environment = environment, .allocate = calloc, .release = free};
+    bare.co_simulation = 1;
+    return instance_new(bare, m->token);
 }
 
 /* The same with a model of its own: the one that is compiled in, or else the one in the folder of resources. */
@@ -238,8 +230,8 @@ Instance *instance_open(Instance bare, const char *token, const char *location) 
 
 void instance_free(Instance *c) {
     Release release = c->release;
+    gradient_end(c);
     if (c->own_model != NULL) model_free(c->own_model);
-    release(c->numbers);
     release(c);
 }
 
@@ -268,7 +260,7 @@ typedef struct {
 static size_t copy_size(const Instance *c) { return sizeof(State) + c->n_numbers * sizeof(double); }
 
 static Header header_of(const Instance *c, const void *copy) {
-    Header h = {"MLSTATE", copy_size(c), 0, 0};
+    Header h = {"MLSTAT2", copy_size(c), 0, 0};
     h.model = crc32_of((const unsigned char *)c->model->token, strlen(c->model->token));
     h.check = crc32_of(copy, copy_size(c));
     return h;
@@ -287,16 +279,23 @@ Result state_copy_out(Instance *c, void **copy) {
     return RESULT_OK;
 }
 
+/* Where numbers of the state lie in a copy. */
+const double *copied(const Instance *c, const void *copy, const double *values) {
+    return (const double *)(const void *)((const char *)copy + sizeof(State)) + (values - c->numbers);
+}
+
 Result state_copy_in(Instance *c, const void *copy) {
     memcpy(&c->state, copy, sizeof(State));
     memcpy(c->numbers, (const char *)copy + sizeof(State), c->n_numbers * sizeof(double));
     c->variables_valid = c->look_valid = 0;
+    gradient_lose(c, "the state was set", NULL);
     return RESULT_OK;
 }
 
-void state_release(Instance *c, void **copy) {
-    if (*copy != NULL) c->release(*copy);
-    *copy = NULL;
+Result state_release(Instance *c, void **copy) {
+    if (copy != NULL && *copy != NULL) c->release(*copy);
+    if (copy != NULL) *copy = NULL;
+    return RESULT_OK;
 }
 
 size_t state_size(const Instance *c) { return sizeof(Header) + copy_size(c); }

@@ -1,8 +1,6 @@
-/* Co-Simulation: steps that run as far as accuracy allows, events located inside them, results interpolated.
- *
- * A step does not end where a communication step ends: the importer's points are read from the dense output. Only where
- * inputs move does a step end there, so that their jumps fall between steps.
- */
+/* Co-Simulation: steps that run as far as accuracy allows, events located inside them, results interpolated. A step
+ * does not end where a communication step ends: the importer's points are read from the dense output. Only where inputs
+ * move does a step end there, so that their jumps fall between steps. */
 #include <math.h>
 #include <string.h>
 #include "core.h"
@@ -17,7 +15,7 @@ static void clear_pending(Instance *c) {
     memset(c->wanting, 0, (size_t)c->model->n_transitions);
 }
 
-void leave_piece(Instance *c) {
+static void leave_piece(Instance *c) {
     c->state.piece_valid = c->state.looked = c->look_valid = 0;
     clear_pending(c);
 }
@@ -49,17 +47,11 @@ static Result take_step(Instance *c, double limit) {
         if (!rosenbrock_step(c, s->t, first, h, rejected > 0, c->piece, &error) || !isfinite(error)) error = 1e30;
         if (cut) c->piece->end = limit;
         factor = 0.9 * pow(fmax(error, 1e-10), -0.2);
-        if (error > 1) {
-            rejected++;
-            s->n_rejected++;
-            wished = h * fmax(0.1, factor);
-            continue;
-        }
-        if (solve_implicit(c, c->piece->end, last_of(c->model, c->piece), 1) != RESULT_OK ||
+        if (error > 1 || solve_implicit(c, c->piece->end, last_of(c->model, c->piece), 1) != RESULT_OK ||
             (c->model->n_guards > 0 && !search_events(c))) {
             rejected++;
             s->n_rejected++;
-            wished = 0.25 * h;
+            wished = h * (error > 1 ? fmax(0.1, factor) : 0.25);
             continue;
         }
         s->n_steps++;
@@ -80,6 +72,7 @@ static Result take_step(Instance *c, double limit) {
 
 /* Makes a point of the piece the present one. */
 Result move_to(Instance *c, double t) {
+    gradient_move(c, t);
     piece_at(c->model, c->piece, t, c->x);
     c->state.t = t;
     c->variables_valid = c->state.z_valid = 0;
@@ -93,15 +86,13 @@ Result take_changes(Instance *c, int *event) {
     if (check_tables(c) != RESULT_OK) return RESULT_ERROR;
     c->state.inputs_changed = 0;
     leave_piece(c);
-    c->state.z_valid = 0;
-    c->variables_valid = 0;
+    c->state.z_valid = c->variables_valid = 0;
     if (settle(c) != RESULT_OK) return RESULT_ERROR;
     *event = find_wanting(c, nothing_wanting(c), 1);
     return RESULT_OK;
 }
 
-/* Fires what was located at the present point, or what wants to fire. */
-Result handle_event(Instance *c) {
+static Result pass_event(Instance *c) {
     State *s = &c->state;
     unsigned char *wanting = nothing_wanting(c);
     int located = s->event_pending;
@@ -114,6 +105,9 @@ Result handle_event(Instance *c) {
     s->z_valid = 1;
     return RESULT_OK;
 }
+
+/* Fires what was located at the present point, or what wants to fire. */
+Result handle_event(Instance *c) { return gradient_through(c, pass_event, 0); }
 
 int is_due(Instance *c) { return c->model->n_moments > 0 && find_wanting(c, nothing_wanting(c), 0); }
 
@@ -145,17 +139,14 @@ Result check_step(Instance *c, double point, double size, double *target) {
 /* Goes to `target`, or to the first event before it; inputs may also move where an internal step has ended. */
 Arrival integrate_to(Instance *c, double target, int stop_at_events) {
     State *s = &c->state;
-    int held = 0, event;
+    int held = 0;
     if (c->model->settings->fixed_step > 0) return step_fixed(c, target);
     if (s->at_event && handle_event(c) != RESULT_OK) return FAILED;
     for (;;) {
         held |= s->inputs_changed;
-        if (take_changes(c, &event) != RESULT_OK) return FAILED;
-        if (event) {
-            s->at_event = 1;
-            if (stop_at_events) return AT_EVENT;
-            if (handle_event(c) != RESULT_OK) return FAILED;
-        }
+        if (take_changes(c, &s->at_event) != RESULT_OK) return FAILED;
+        if (s->at_event && stop_at_events) return AT_EVENT;
+        if (s->at_event && handle_event(c) != RESULT_OK) return FAILED;
         if (!(s->t < target)) return REACHED;
         if (!s->piece_valid && target - s->t < least_step(s)) {
             /* An event was located a rounding error before the target. */
@@ -171,11 +162,9 @@ Arrival integrate_to(Instance *c, double target, int stop_at_events) {
         if (c->piece->end > target) return move_to(c, target) == RESULT_OK ? REACHED : FAILED;
         if (move_to(c, c->piece->end) != RESULT_OK) return FAILED;
         s->piece_valid = 0;
-        if (s->event_pending || is_due(c)) {
-            s->at_event = 1;
-            if (stop_at_events) return AT_EVENT;
-            if (handle_event(c) != RESULT_OK) return FAILED;
-        }
+        s->at_event = s->event_pending || is_due(c);
+        if (s->at_event && stop_at_events) return AT_EVENT;
+        if (s->at_event && handle_event(c) != RESULT_OK) return FAILED;
         if (c->step_finished != NULL) target = fmin(target, fmax(c->step_finished(c), s->t));
     }
 }

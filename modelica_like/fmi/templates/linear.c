@@ -63,6 +63,12 @@ void qr_solve(const QrPattern *a, const Work *work, double *x) {
     for (int k = 0; k < a->size; k++) x[a->column_order[k]] = y[k];
 }
 
+static void swap(double *a, double *b) {
+    double kept = *a;
+    *a = *b;
+    *b = kept;
+}
+
 /* LU with partial pivoting of a matrix stored by columns. Returns 0 if it is singular to working precision. */
 int lu_factor(int n, double *m, int *order) {
     double largest = 0, smallest = DBL_MAX;
@@ -76,12 +82,7 @@ int lu_factor(int n, double *m, int *order) {
         if (size > largest) largest = size;
         if (size < smallest) smallest = size;
         order[j] = pivot;
-        if (pivot != j)
-            for (int k = 0; k < n; k++) {
-                double swap = m[j + n * k];
-                m[j + n * k] = m[pivot + n * k];
-                m[pivot + n * k] = swap;
-            }
+        for (int k = 0; k < n && pivot != j; k++) swap(&m[j + n * k], &m[pivot + n * k]);
         for (int i = j + 1; i < n; i++) m[i + n * j] /= m[j + n * j];
         for (int k = j + 1; k < n; k++)
             for (int i = j + 1; i < n; i++) m[i + n * k] -= m[i + n * j] * m[j + n * k];
@@ -90,11 +91,7 @@ int lu_factor(int n, double *m, int *order) {
 }
 
 void lu_solve(int n, const double *m, const int *order, double *x) {
-    for (int j = 0; j < n; j++) {
-        double swap = x[j];
-        x[j] = x[order[j]];
-        x[order[j]] = swap;
-    }
+    for (int j = 0; j < n; j++) swap(&x[j], &x[order[j]]);
     for (int j = 0; j < n; j++)
         for (int i = j + 1; i < n; i++) x[i] -= m[i + n * j] * x[j];
     for (int j = n - 1; j >= 0; j--) {
@@ -110,30 +107,27 @@ void lu_solve_transposed(int n, const double *m, const int *order, double *x) {
     }
     for (int j = n - 1; j >= 0; j--)
         for (int i = j + 1; i < n; i++) x[j] -= m[i + n * j] * x[i];
-    for (int j = n - 1; j >= 0; j--) {
-        double swap = x[j];
-        x[j] = x[order[j]];
-        x[order[j]] = swap;
-    }
+    for (int j = n - 1; j >= 0; j--) swap(&x[j], &x[order[j]]);
 }
 
 static void rotate(int n, double *p, double *q, double c, double s) {
     for (int k = 0; k < n; k++) {
-        double swap = c * p[k] - s * q[k];
+        double turned = c * p[k] - s * q[k];
         q[k] = s * p[k] + c * q[k];
-        p[k] = swap;
+        p[k] = turned;
     }
 }
 
-static double dot(int n, const double *p, const double *q) {
+double dot(int n, const double *p, const double *q) {
     double sum = 0;
     for (int k = 0; k < n; k++) sum += p[k] * q[k];
     return sum;
 }
 
-/* Turns the rows of A until they are orthogonal, by one-sided Jacobi rotations (Hestenes); b is rotated along. `turns`
- * may be there, too: from the unit matrix it becomes the combinations of rows of A that have come out. */
+/* Turns the rows of A until they are orthogonal, by one-sided Jacobi rotations (Hestenes); b is rotated along. `turns`,
+ * if it is there, becomes the combinations of rows of A that have come out. */
 void make_orthogonal(int rows, int columns, double *a, double *turns, double *b) {
+    for (int k = 0; k < rows * rows && turns != NULL; k++) turns[k] = k % (rows + 1) == 0;
     for (int sweep = 0; sweep < 60; sweep++) {
         int rotated = 0;
         for (int i = 0; i < rows; i++)
@@ -181,8 +175,6 @@ void least_squares(int rows, int columns, double *a, double *b, double *x) {
  * of a clutch that sticks. `turns` has room for n*n. */
 void keeping_least_squares(int n, int states, double *a, double *turns, double *b, double *x) {
     double largest;
-    memset(turns, 0, (size_t)n * (size_t)n * sizeof(double));
-    for (int i = 0; i < n; i++) turns[(size_t)i * n + i] = 1;
     make_orthogonal(n, n, a, turns, b);
     largest = largest_row(n, n, a);
     for (int i = 0; i < n; i++) {

@@ -65,24 +65,19 @@ static int is_hump(double g0, double r0, double g1, double r1) {
 
 /* First zero of the cubic, or its top. */
 double cubic_guess(double g0, double r0, double g1, double r1) {
-    double best = -INFINITY, place = 0.5;
-    for (int k = 1; k <= 40; k++) {
+    double best = -INFINITY, low = 0, high = 0.5;
+    for (int k = 1; k <= 40 && !(best > 0); k++) {
         double value = cubic(k / 40.0, g0, r0, g1, r1);
-        if (value > best) {
-            best = value;
-            place = k / 40.0;
-        }
-        if (value > 0) {
-            double low = (k - 1) / 40.0, high = k / 40.0;
-            for (int n = 0; n < 30; n++) {
-                double middle = 0.5 * (low + high);
-                if (cubic(middle, g0, r0, g1, r1) > 0) high = middle;
-                else low = middle;
-            }
-            return high;
-        }
+        if (!(value > best)) continue;
+        best = value;
+        low = (k - 1) / 40.0;
+        high = k / 40.0;
     }
-    return place;
+    for (int n = 0; n < 30 && best > 0; n++) {
+        double middle = 0.5 * (low + high);
+        *(cubic(middle, g0, r0, g1, r1) > 0 ? &high : &low) = middle;
+    }
+    return high;
 }
 
 /* Where the cubic through two looks says that a guard has a zero, or its top. */

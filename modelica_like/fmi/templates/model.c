@@ -1,6 +1,5 @@
 /* Reads a model from the bytes of its file (model_file.py), and checks everything that the run-time relies on: whatever
  * stands in a file, nothing is read or written outside of the tables. */
-#include <stdio.h>
 #include <string.h>
 #include "model.h"
 
@@ -147,23 +146,19 @@ static int find_sizes(Model *m, size_t size, char *message) {
 }
 
 /* Results of tapes are as many as the tables that they belong to have records. */
+#define RESULTS(tape, wanted) {#tape, m->tapes.tape.n_outputs, wanted}
 static int check_sizes(const Model *m, char *message) {
     const int64_t n_z = m->n_z;
     const struct {
         const char *name;
         int64_t found, wanted;
-    } sizes[] = {{"rates", m->tapes.rates.n_outputs, m->n_unknowns},
-        {"jacobian", m->tapes.jacobian.n_outputs, m->n_jacobian}, {"alg", m->tapes.alg.n_outputs, n_z},
-        {"alg_jacobian", m->tapes.alg_jacobian.n_outputs, n_z * n_z},
-        {"guards", m->tapes.guards.n_outputs, 2 * (int64_t)m->n_guards},
-        {"guards_soon", m->tapes.guards_soon.n_outputs, m->n_guards},
-        {"start_conditions", m->tapes.start_conditions.n_outputs, m->n_start_modes},
-        {"discrete_starts", m->tapes.discrete_starts.n_outputs, m->n_d},
-        {"hold_terms", m->tapes.hold_terms.n_outputs, 4 * (int64_t)m->n_holds},
-        {"determinants", m->tapes.determinants.n_outputs, m->n_determinants},
-        {"start_jacobian", m->tapes.start_jacobian.n_outputs, m->start.n_nonzeros},
-        {"step", m->step.size, m->n_unknowns}, {"start", m->start.size, m->n_start_unknowns},
-        {"guesses", m->n_guesses, m->n_unknowns}, {"units", m->n_units, m->n_holds > 0 ? m->n_nodes : 0}};
+    } sizes[] = {RESULTS(rates, m->n_unknowns), RESULTS(jacobian, m->n_jacobian), RESULTS(alg, n_z),
+        RESULTS(alg_jacobian, n_z * n_z), RESULTS(guards, 2 * (int64_t)m->n_guards), RESULTS(guards_soon, m->n_guards),
+        RESULTS(start_conditions, m->n_start_modes), RESULTS(discrete_starts, m->n_d),
+        RESULTS(hold_terms, 4 * (int64_t)m->n_holds), RESULTS(determinants, m->n_determinants),
+        RESULTS(start_jacobian, m->start.n_nonzeros), {"step", m->step.size, m->n_unknowns},
+        {"start", m->start.size, m->n_start_unknowns}, {"guesses", m->n_guesses, m->n_unknowns},
+        {"units", m->n_units, m->n_holds > 0 ? m->n_nodes : 0}};
     for (size_t k = 0; k < sizeof sizes / sizeof sizes[0]; k++)
         if (sizes[k].found != sizes[k].wanted) return damaged(message, sizes[k].name);
     if (m->n_steady > m->n_unknowns) return damaged(message, "steady");
@@ -176,10 +171,7 @@ Model *model_read(const unsigned char *bytes, size_t size, Allocate allocate, Re
     Model *m;
     if (!check_header(bytes, size, message)) return NULL;
     m = allocate(1, sizeof *m);
-    if (m == NULL) {
-        snprintf(message, MESSAGE_LENGTH, "There is not enough memory.");
-        return NULL;
-    }
+    if (m == NULL) return REFUSE("There is not enough memory.");
     memset(m, 0, sizeof *m);
     m->release = release;
     if (find_tables(m, bytes, size, message) && find_sizes(m, size, message) && check_sizes(m, message) &&

@@ -4,6 +4,7 @@
 
 #include <stddef.h>
 #include <stdint.h>
+#include <stdio.h>
 
 #define OPERATION(name, value, by_a, by_b) OPERATION_##name,
 typedef enum {
@@ -148,6 +149,8 @@ enum { N_TAPES = sizeof((Model *)0)->tapes / sizeof(Tape) };
 
 /* model.c */
 #define MESSAGE_LENGTH 512
+/* What is wrong, in place of a model. */
+#define REFUSE(...) (snprintf(message, MESSAGE_LENGTH, __VA_ARGS__), (void *)0)
 typedef void *(*Allocate)(size_t count, size_t size);
 typedef void (*Release)(void *memory);
 Model *model_read(const unsigned char *bytes, size_t size, Allocate allocate, Release release, char *message);

@@ -1,5 +1,4 @@
 /* Checks the tables of a model: every index is one of the table that it points into. */
-#include <stdio.h>
 #include <string.h>
 #include "model.h"
 
@@ -18,10 +17,34 @@ typedef struct { /* integers of records, not below `low` and below `end` */
     int count, low, end;
 } Range;
 #define COLUMN(table, field, n, low, end) {#table "." #field, &m->table[0].field, sizeof m->table[0], n, low, end}
+#define INDEX(table, field, end) COLUMN(table, field, m->n_##table, 0, end)
 #define ARRAY(table, n, end) {#table, m->table, sizeof(int), n, 0, end}
 
-static int check_ranges(const Range *ranges, size_t count, char *message) {
-    for (size_t k = 0; k < count; k++)
+/* Every index is one of the table that it points into. */
+static int check_indices(const Model *m, char *message) {
+    const Range ranges[] = {ARRAY(state_names, m->n_x, m->n_text), ARRAY(implicit_names, m->n_z, m->n_text),
+        ARRAY(singular_names, m->n_determinants, m->n_text), INDEX(variables, kind, N_KINDS),
+        INDEX(variables, type, N_TYPES), INDEX(variables, name, m->n_text),
+        COLUMN(variables, count, m->n_variables, 1, m->n_p + 2), INDEX(rising, below, m->n_p),
+        INDEX(rising, above, m->n_p), INDEX(rising, below_name, m->n_text), INDEX(rising, above_name, m->n_text),
+        ARRAY(mode_names, m->n_mode_names, m->n_text), INDEX(modes, first_name, m->n_mode_names + 1),
+        INDEX(modes, n_names, m->n_mode_names + 1), INDEX(transitions, mode, m->n_modes),
+        INDEX(transitions, name, m->n_text), INDEX(transitions, notice, m->n_text),
+        ARRAY(guard_transition, m->n_guards, m->n_transitions), ARRAY(reset_nodes, m->n_reset_nodes, m->n_nodes),
+        INDEX(resets, kind, N_RESET_KINDS), INDEX(resets, value, m->n_reset_values), INDEX(holds, mode, m->n_modes),
+        INDEX(holds, motion, m->n_nodes), COLUMN(holds, state, m->n_holds, -1, m->n_x),
+        COLUMN(holds, reaction, m->n_holds, -1, m->n_nodes), INDEX(holds, approach, m->n_d),
+        INDEX(holds, name, m->n_text), ARRAY(members, m->n_members, m->n_holds),
+        INDEX(circuits, first_member, m->n_members + 1), INDEX(circuits, n_members, m->n_members + 1),
+        INDEX(circuits, first, m->n_d + 1), INDEX(start_modes, mode, m->n_modes), INDEX(start_direct, position, m->n_x),
+        INDEX(start_direct, start, m->n_starts), INDEX(start_default, position, m->n_x),
+        INDEX(start_default, start, m->n_starts), INDEX(start_guess, position, m->n_unknowns),
+        INDEX(start_guess, start, m->n_starts), COLUMN(start_rows, start, m->n_start_unknowns, -1, m->n_starts),
+        COLUMN(start_rows, row, m->n_start_unknowns, 0, m->n_start_values), INDEX(start_dependent, start, m->n_starts),
+        INDEX(start_dependent, node, m->n_nodes), ARRAY(start_zero, m->n_start_zero, m->n_x),
+        ARRAY(start_columns, m->n_start_unknowns, m->n_unknowns + m->n_y), ARRAY(steady, m->n_steady, m->n_unknowns),
+        ARRAY(jacobian_to_step, m->n_jacobian, m->step.n_nonzeros), ARRAY(step_diagonal, m->n_x, m->step.n_nonzeros)};
+    for (size_t k = 0; k < sizeof ranges / sizeof ranges[0]; k++)
         for (int i = 0; i < ranges[k].count; i++) {
             int value;
             memcpy(&value, (const char *)ranges[k].first + (size_t)i * ranges[k].stride, sizeof value);
@@ -31,21 +54,6 @@ static int check_ranges(const Range *ranges, size_t count, char *message) {
 }
 
 static int check_events(const Model *m, char *message) {
-    const Range ranges[] = {ARRAY(mode_names, m->n_mode_names, m->n_text),
-        COLUMN(modes, first_name, m->n_modes, 0, m->n_mode_names + 1),
-        COLUMN(modes, n_names, m->n_modes, 0, m->n_mode_names + 1),
-        COLUMN(transitions, mode, m->n_transitions, 0, m->n_modes),
-        COLUMN(transitions, name, m->n_transitions, 0, m->n_text),
-        COLUMN(transitions, notice, m->n_transitions, 0, m->n_text),
-        ARRAY(guard_transition, m->n_guards, m->n_transitions), ARRAY(reset_nodes, m->n_reset_nodes, m->n_nodes),
-        COLUMN(resets, kind, m->n_resets, 0, N_RESET_KINDS), COLUMN(resets, value, m->n_resets, 0, m->n_reset_values),
-        COLUMN(holds, mode, m->n_holds, 0, m->n_modes), COLUMN(holds, motion, m->n_holds, 0, m->n_nodes),
-        COLUMN(holds, state, m->n_holds, -1, m->n_x), COLUMN(holds, reaction, m->n_holds, -1, m->n_nodes),
-        COLUMN(holds, approach, m->n_holds, 0, m->n_d), COLUMN(holds, name, m->n_holds, 0, m->n_text),
-        ARRAY(members, m->n_members, m->n_holds), COLUMN(circuits, first_member, m->n_circuits, 0, m->n_members + 1),
-        COLUMN(circuits, n_members, m->n_circuits, 0, m->n_members + 1),
-        COLUMN(circuits, first, m->n_circuits, 0, m->n_d + 1)};
-    if (!check_ranges(ranges, sizeof ranges / sizeof ranges[0], message)) return 0;
     for (int k = 0; k < m->n_modes; k++)
         if (m->modes[k].n_names > m->n_mode_names - m->modes[k].first_name) return damaged(message, "modes.n_names");
     for (int k = 0; k < m->n_transitions; k++)
@@ -69,36 +77,12 @@ static int check_events(const Model *m, char *message) {
     return 1;
 }
 
-static int check_starts(const Model *m, char *message) {
-    const Range ranges[] = {COLUMN(start_modes, mode, m->n_start_modes, 0, m->n_modes),
-        COLUMN(start_direct, position, m->n_start_direct, 0, m->n_x),
-        COLUMN(start_direct, start, m->n_start_direct, 0, m->n_starts),
-        COLUMN(start_default, position, m->n_start_default, 0, m->n_x),
-        COLUMN(start_default, start, m->n_start_default, 0, m->n_starts),
-        COLUMN(start_guess, position, m->n_start_guess, 0, m->n_unknowns),
-        COLUMN(start_guess, start, m->n_start_guess, 0, m->n_starts),
-        COLUMN(start_rows, start, m->n_start_unknowns, -1, m->n_starts),
-        COLUMN(start_rows, row, m->n_start_unknowns, 0, m->n_start_values),
-        COLUMN(start_dependent, start, m->n_start_dependent, 0, m->n_starts),
-        COLUMN(start_dependent, node, m->n_start_dependent, 0, m->n_nodes), ARRAY(start_zero, m->n_start_zero, m->n_x),
-        ARRAY(start_columns, m->n_start_unknowns, m->n_unknowns + m->n_y), ARRAY(steady, m->n_steady, m->n_unknowns),
-        ARRAY(jacobian_to_step, m->n_jacobian, m->step.n_nonzeros), ARRAY(step_diagonal, m->n_x, m->step.n_nonzeros)};
-    return check_ranges(ranges, sizeof ranges / sizeof ranges[0], message);
-}
-
 static int check_variables(const Model *m, char *message) {
     const int ends[N_KINDS] = {
         1, m->n_x, m->n_x, m->n_nodes, m->n_p, m->n_derived, m->n_u, m->n_modes, m->n_guards}; /* as Kind */
-    const Range ranges[] = {ARRAY(state_names, m->n_x, m->n_text), ARRAY(implicit_names, m->n_z, m->n_text),
-        ARRAY(singular_names, m->n_determinants, m->n_text), COLUMN(variables, kind, m->n_variables, 0, N_KINDS),
-        COLUMN(variables, type, m->n_variables, 0, N_TYPES), COLUMN(variables, name, m->n_variables, 0, m->n_text),
-        COLUMN(variables, count, m->n_variables, 1, m->n_p + 2), COLUMN(rising, below, m->n_rising, 0, m->n_p),
-        COLUMN(rising, above, m->n_rising, 0, m->n_p), COLUMN(rising, below_name, m->n_rising, 0, m->n_text),
-        COLUMN(rising, above_name, m->n_rising, 0, m->n_text)};
     /* Texts end at the latest where their section ends. */
     if (m->n_text == 0 || m->text[m->n_text - 1] != 0) return damaged(message, "text");
     if (m->n_token == 0 || m->token[m->n_token - 1] != 0) return damaged(message, "token");
-    if (!check_ranges(ranges, sizeof ranges / sizeof ranges[0], message)) return 0;
     for (int k = 0; k < m->n_variables; k++) {
         const Variable *v = &m->variables[k];
         if (v->index < 0 || v->index >= ends[v->kind]) return damaged(message, "variables.index");
@@ -161,6 +145,6 @@ static int check_tapes(const Model *m, char *message) {
 }
 
 int check_model(const Model *m, char *message) {
-    return check_variables(m, message) && check_events(m, message) && check_starts(m, message) &&
+    return check_indices(m, message) && check_variables(m, message) && check_events(m, message) &&
            check_tapes(m, message);
 }

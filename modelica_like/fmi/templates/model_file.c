@@ -76,13 +76,9 @@ static Model *read_all(FILE *file, Allocate allocate, Release release, char *mes
     long size = fseek(file, 0, SEEK_END) == 0 ? ftell(file) : -1;
     unsigned char *bytes = size > 0 && fseek(file, 0, SEEK_SET) == 0 ? allocate((size_t)size, 1) : NULL;
     Model *m = NULL;
-    if (bytes == NULL) {
-        snprintf(message, MESSAGE_LENGTH, "The model file is empty, or there is not enough memory for it.");
-        return NULL;
-    }
-    if (fread(bytes, 1, (size_t)size, file) == (size_t)size)
-        m = model_read(bytes, (size_t)size, allocate, release, message);
-    else snprintf(message, MESSAGE_LENGTH, "The model file cannot be read completely.");
+    if (bytes == NULL) return REFUSE("The model file is empty, or there is not enough memory for it.");
+    if (fread(bytes, 1, (size_t)size, file) != (size_t)size) (void)REFUSE("The model file cannot be read completely.");
+    else m = model_read(bytes, (size_t)size, allocate, release, message);
     if (m == NULL) release(bytes);
     else m->own = bytes;
     return m;
@@ -92,21 +88,13 @@ Model *model_open(const char *location, Allocate allocate, Release release, char
     char path[LONGEST_PATH];
     FILE *file;
     Model *m;
-    if (location == NULL || *location == 0) {
-        snprintf(message, MESSAGE_LENGTH,
-            "The importer does not say where the FMU's resources are, so its model cannot be read. Export it with the "
-            "model compiled in (--embed).");
-        return NULL;
-    }
-    if (!resource_path(location, ON_WINDOWS, path, sizeof path)) {
-        snprintf(message, MESSAGE_LENGTH, "The location of the FMU's resources names no folder: '%.300s'.", location);
-        return NULL;
-    }
+    if (location == NULL || *location == 0)
+        return REFUSE("The importer does not say where the FMU's resources are, so its model cannot be read. Export it "
+                      "with the model compiled in (--embed).");
+    if (!resource_path(location, ON_WINDOWS, path, sizeof path))
+        return REFUSE("The location of the FMU's resources names no folder: '%.300s'.", location);
     file = open_file(path);
-    if (file == NULL) {
-        snprintf(message, MESSAGE_LENGTH, "The model file cannot be opened: '%.400s'.", path);
-        return NULL;
-    }
+    if (file == NULL) return REFUSE("The model file cannot be opened: '%.400s'.", path);
     m = read_all(file, allocate, release, message);
     fclose(file);
     return m;

@@ -1,10 +1,7 @@
-/* Whole runs and single steps for programs that load this library: Python through ctypes, a page in a browser.
- *
- * Open a model from the bytes of its file; make a handle of it for every thread, reset it, set what is to be other than
- * in the model, begin, then step, or run into buffers. Functions return NATIVE_OK or NATIVE_FAILED (native_message
- * tells why), runs also NATIVE_MORE or NATIVE_PAUSED. Variables go by value references. Handles share nothing that
- * changes.
- */
+/* Whole runs and single steps for programs that load this library: Python through ctypes, a page in a browser. Open a
+ * model from the bytes of its file; make a handle of it for every thread, reset it, set what is to be other than in the
+ * model, begin, then step, or run into buffers. Functions return NATIVE_OK or NATIVE_FAILED (native_message tells why),
+ * runs also NATIVE_MORE or NATIVE_PAUSED. Variables go by value references. Handles share nothing that changes. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -66,14 +63,8 @@ EXPORTED void native_close(Model *m) { model_free(m); }
 EXPORTED Native *native_new(const Model *m) {
     Native *n = calloc(1, sizeof *n);
     if (n == NULL) return NULL;
-    n->c = instance_new((Instance){.model = m,
-                            .name = "native",
-                            .log = keep_message,
-                            .environment = n,
-                            .co_simulation = 1,
-                            .allocate = calloc,
-                            .release = free},
-        m->token);
+    n->c = instance_for(m, n);
+    if (n->c != NULL) n->c->log = keep_message;
     if (n->c != NULL) return n;
     free(n);
     return NULL;
@@ -85,6 +76,9 @@ EXPORTED void native_free(Native *n) {
     free(n);
 }
 
+/* The instance as FMI functions know it, for modelica_like.h. */
+EXPORTED void *native_instance(const Native *n) { return n->c; }
+
 EXPORTED const char *native_message(const Native *n) { return n->message; }
 
 /* Back to the model's values; start and end (infinite: unknown) in s, relative tolerance, absolute one in nominals. */
@@ -93,6 +87,7 @@ EXPORTED int native_reset(Native *n, double start, double stop, double rtol, dou
     instance_reset(n->c);
     result = set_experiment(n->c, 1, rtol, start, isfinite(stop), stop);
     n->c->state.absolute = atol;
+    n->c->state.phase = PHASE_INITIALIZATION;
     return code(result);
 }
 
@@ -136,10 +131,7 @@ static int begun(Native *n) {
 }
 
 /* Finds the start from the model's start values and from those that were set. */
-EXPORTED int native_begin(Native *n) {
-    n->c->state.phase = PHASE_INITIALIZATION;
-    return start_solve(n->c) == RESULT_OK ? begun(n) : NATIVE_FAILED;
-}
+EXPORTED int native_begin(Native *n) { return start_solve(n->c) == RESULT_OK ? begun(n) : NATIVE_FAILED; }
 
 /* Begins at states, implicit unknowns and d that are given; events there have not happened yet. */
 EXPORTED int native_begin_at(Native *n, const double *x, const double *z, const double *d) {
@@ -209,9 +201,8 @@ static int write_point(Native *n, NativeRun *r) {
     int64_t k = r->n_points++;
     r->last = c->state.t;
     if (r->times != NULL) r->times[k] = c->state.t;
-    if (r->states != NULL) {
+    if (r->states != NULL)
         memcpy(r->states + k * c->model->n_unknowns, c->x, (size_t)c->model->n_unknowns * sizeof(double));
-    }
     if (r->outputs == NULL) return NATIVE_OK;
     return read_values(n->c, r->n_outputs, r->references, r->outputs + k * r->n_outputs);
 }
@@ -250,9 +241,9 @@ static int run_on(Native *n, double end, int64_t results, NativeRun *r) {
     double width = (end - r->begin) / (double)results;
     while (s->t < end || event_first(n->c) || r->n_segments == 0) {
         double t = r->begin + (end - r->begin) * ((double)r->next / (double)results);
-        int result = NATIVE_OK;
+        Arrival arrival;
         if (event_first(n->c) || r->n_segments == 0) {
-            result = instant(n, r, width);
+            int result = instant(n, r, width);
             if (result != NATIVE_OK) return result;
             continue;
         }
@@ -260,15 +251,11 @@ static int run_on(Native *n, double end, int64_t results, NativeRun *r) {
         if (r->n_points == r->room_points) return NATIVE_MORE;
         if (r->next++ < results && t <= s->t + fmin(0.5 * NEAR_EVENT * width, SAME * fmax(1, fabs(s->t)))) continue;
         t = r->next <= results ? t : end;
-        switch (integrate_to(n->c, t, 1)) {
-            case FAILED: return NATIVE_FAILED;
-            case AT_EVENT: r->next--; continue;
-            case REACHED: break;
-        }
-        if (s->t < t) {
-            r->next--;
-            return NATIVE_PAUSED;
-        }
+        arrival = integrate_to(n->c, t, 1);
+        if (arrival == FAILED) return NATIVE_FAILED;
+        if (arrival == AT_EVENT || s->t < t) r->next--;
+        if (arrival == AT_EVENT) continue;
+        if (s->t < t) return NATIVE_PAUSED;
         if (write_point(n, r) != NATIVE_OK) return NATIVE_FAILED;
     }
     return NATIVE_OK;

@@ -1,8 +1,7 @@
 /* One step of RODAS5P: a stiffly accurate, L-stable Rosenbrock method of order 5(4) for index-1 systems with dense
  * output of order 4 (G. Steinebach, BIT Numerical Mathematics 63:27, 2023). Notation as in Hairer & Wanner II, ch.
  * IV.7, with the transformation that avoids products with the Jacobian, M = diag(1 for x, 0 for z): (M/(h gamma) - J)
- * k_i = f(t + c_i h, y + sum a_ij k_j) + sum (C_ij/h) M k_j + h d_i df/dt.
- */
+ * k_i = f(t + c_i h, y + sum a_ij k_j) + sum (C_ij/h) M k_j + h d_i df/dt. */
 #include <math.h>
 #include <string.h>
 #include "core.h"
@@ -62,13 +61,13 @@ static void linearize(Instance *c, double t, const double *y, double *slope) {
     run_special(c, SPECIAL_JACOBIAN, w->jacobian);
 }
 
-/* M/(h gamma) - J, factorised. */
-static int factor(Instance *c, double h) {
+/* M * diagonal - J, factorised. */
+int factor_step(Instance *c, double diagonal) {
     const Model *m = c->model;
     Work *w = &c->work;
     memset(w->matrix, 0, (size_t)m->step.n_nonzeros * sizeof(double));
     for (int k = 0; k < m->n_jacobian; k++) w->matrix[m->jacobian_to_step[k]] = -w->jacobian[k];
-    for (int k = 0; k < m->n_x; k++) w->matrix[m->step_diagonal[k]] += 1 / (h * GAMMA);
+    for (int k = 0; k < m->n_x; k++) w->matrix[m->step_diagonal[k]] += diagonal;
     return qr_factor(&m->step, w->matrix, w);
 }
 
@@ -94,7 +93,7 @@ int rosenbrock_step(
     piece->end = t + h;
     memcpy(piece->points, first, size);
     if (!keep_jacobian) linearize(c, t, first, slope);
-    if (!factor(c, h)) return 0;
+    if (!factor_step(c, 1 / (h * GAMMA))) return 0;
     c->state.n_evaluations += STAGES - keep_jacobian;
     for (int i = 0; i < STAGES; i++) {
         double *stage = w->stages + (size_t)i * n;

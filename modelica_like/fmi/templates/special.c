@@ -1,8 +1,6 @@
 /* Tapes for the present modes and parameters: what these decide is worked out once, and what nothing asks for is left
- * out. A model is one set of equations for all modes, of which few matter at a time, so little is left of a tape.
- *
- * The operations that are left are the same, in the same order, so values are the same; only x + 0 and x * 1 are x.
- */
+ * out. A model is one set of equations for all modes, of which few matter at a time, so little is left of a tape. The
+ * operations that are left are the same, in the same order, so values are the same; only x + 0 and x * 1 are x. */
 #include <string.h>
 #include "core.h"
 
@@ -111,35 +109,21 @@ static void write_special(Instance *c, SpecialTape which, const Tape *tape, cons
 
 static void specialise(Instance *c, SpecialTape which, const Tape *tape) {
     Work *w = &c->work;
-    Special *s = &w->special[which];
     work_out(c, tape, w->same, w->known_slots);
     mark_needed(c, which, tape, w->same, w->needed_slots);
     write_special(c, which, tape, w->needed_slots);
-    s->tape.runs = s->runs;
-    s->tape.operands = s->operands;
-    s->tape.outputs = s->outputs;
-    s->tape.n_outputs = tape->n_outputs;
-    s->tape.first_result = tape->first_result;
 }
 
 /* Runs a tape with the slots as they are loaded. Of outputs that are not wanted, any value may come. */
 void run_special(Instance *c, SpecialTape which, double *outputs) {
     const Tape *tape = full_tape(c->model, which);
     Special *s = &c->work.special[which];
-    if (c->bounded) { /* working out costs more than a step */
-        tape_run(tape, c->work.slots, outputs);
-        return;
-    }
-    if (s->belongs_to != c->work.decided_by) {
-        s->belongs_to = c->work.decided_by;
-        s->uses = 0;
-    }
-    if (s->uses > WORTH_IT) {
-        tape_run(&s->tape, c->work.slots, outputs);
-        return;
-    }
-    tape_run(tape, c->work.slots, outputs);
-    if (++s->uses > WORTH_IT) specialise(c, which, tape);
+    int special;
+    if (s->belongs_to != c->work.decided_by) s->uses = 0;
+    s->belongs_to = c->work.decided_by;
+    special = s->uses > WORTH_IT && !c->bounded; /* where the work is bounded: working out costs more than a step */
+    tape_run(special ? &s->tape : tape, c->work.slots, outputs);
+    if (!special && !c->bounded && ++s->uses > WORTH_IT) specialise(c, which, tape);
 }
 
 /* The same at a point. */

@@ -16,7 +16,7 @@ void start_defaults(Instance *c) {
 }
 
 /* Start values as the model says, or as they were given. */
-static void start_values(Instance *c) {
+void start_values(Instance *c) {
     evaluate_now(c, &c->model->tapes.start_values, c->work.start_values);
     for (int k = 0; k < c->model->n_starts; k++)
         if (c->start_given[k]) c->work.start_values[k] = c->start_value[k];
@@ -201,8 +201,7 @@ static Result check_modes_hold(Instance *c) {
     return RESULT_OK;
 }
 
-/* States from parameters and start values; events at the start have not happened yet. */
-Result start_solve(Instance *c) {
+static Result pass_start(Instance *c) {
     const Model *m = c->model;
     double *begun = c->work.begun;
     int round;
@@ -234,3 +233,6 @@ Result start_solve(Instance *c) {
     c->variables_valid = 0;
     return RESULT_OK;
 }
+
+/* States from parameters and start values; events at the start have not happened yet. */
+Result start_solve(Instance *c) { return gradient_through(c, pass_start, 1); }

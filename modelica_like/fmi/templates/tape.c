@@ -14,23 +14,6 @@ static inline double if_else_zero(double a, double b) {
     return b;
 }
 
-/* Results of one run of equal operations. */
-static void run_one(int operation, const Operands *operand, int count, const double *slots, double *result) {
-#define OPERATION(name, value, by_a, by_b)                                  \
-    case OPERATION_##name:                                                  \
-        for (int k = 0; k < count; k++) {                                   \
-            double a = slots[operand[k].left], b = slots[operand[k].right]; \
-            (void)b;                                                        \
-            result[k] = value;                                              \
-        }                                                                   \
-        break;
-    switch (operation) {
-#include "operations.h"
-        default: break;
-    }
-#undef OPERATION
-}
-
 /* Partial derivatives of a value f = operation(a, b). A unary operation has its operand on both sides. */
 void slopes(int operation, double a, double b, double f, double *by_left, double *by_right) {
 #define OPERATION(name, value, by_a, by_b) \
@@ -46,14 +29,26 @@ void slopes(int operation, double a, double b, double f, double *by_left, double
 }
 
 void tape_run(const Tape *tape, double *slots, double *outputs) {
+#define OPERATION(name, value, by_a, by_b)                                  \
+    case OPERATION_##name:                                                  \
+        for (int k = 0; k < count; k++) {                                   \
+            double a = slots[operand[k].left], b = slots[operand[k].right]; \
+            (void)b;                                                        \
+            result[k] = value;                                              \
+        }                                                                   \
+        break;
     double *result = slots + tape->first_result;
     const Operands *operand = tape->operands;
     for (int r = 0; r < tape->n_runs; r++) {
         int count = tape->runs[r].count;
-        run_one(tape->runs[r].operation, operand, count, slots, result);
+        switch (tape->runs[r].operation) {
+#include "operations.h"
+            default: break;
+        }
         operand += count;
         result += count;
     }
+#undef OPERATION
     for (int k = 0; k < tape->n_outputs; k++) outputs[k] = slots[tape->outputs[k]];
 }
 

@@ -147,8 +147,7 @@ static void run_series(Instance *c, const Tape *tape, int order, double *outputs
         outputs[n] = terms[(order - 1) * m->n_slots + tape->outputs[n]];
 }
 
-/* Derivative of a variable along the solution, with inputs on their straight lines and the implicit unknowns following.
- */
+/* Derivative of a variable along the solution, with inputs on their straight lines; implicit unknowns follow. */
 Result output_rate(Instance *c, uint32_t reference, int order, double *value) {
     const Model *m = c->model;
     const Variable *v = known_variable(c, reference, TYPE_FLOAT64);

@@ -39,10 +39,7 @@ static const double *seen(Instance *c, const Variable *v) {
     if (v->kind != KIND_DERIVED && settle(c) != RESULT_OK) return NULL;
     switch (v->kind) {
         case KIND_DERIVED: evaluate_now(c, &c->model->tapes.derived, w->seen_derived); break;
-        case KIND_DERIVATIVE:
-            evaluate_special(c, SPECIAL_RATES, c->state.t, c->x, w->rhs);
-            memcpy(w->seen_rates, w->rhs, (size_t)c->model->n_x * sizeof(double));
-            break;
+        case KIND_DERIVATIVE: evaluate_special(c, SPECIAL_RATES, c->state.t, c->x, w->seen_rates); break;
         case KIND_GUARD: get_indicators(c, w->seen_indicators); break;
         default: evaluate_special(c, SPECIAL_VARIABLES, c->state.t, c->x, w->variables);
     }
@@ -60,6 +57,7 @@ static Result make_ready(Instance *c, const Variable *v) {
 
 /* Of a variable that is known, or NULL: then its reference was wrong. */
 Result get_value(Instance *c, const Variable *v, double *value) {
+    const double *values;
     if (v == NULL || make_ready(c, v) != RESULT_OK) return RESULT_ERROR;
     switch (v->kind) {
         case KIND_TIME: *value = c->state.t; return RESULT_OK;
@@ -67,13 +65,10 @@ Result get_value(Instance *c, const Variable *v, double *value) {
         case KIND_PARAMETER: *value = c->p[v->index]; return RESULT_OK;
         case KIND_INPUT: *value = input_at(c, v->index, c->state.t); return RESULT_OK;
         case KIND_DISCRETE: *value = c->d[v->index]; return RESULT_OK;
-        default: {
-            const double *values = seen(c, v);
-            if (values == NULL) return RESULT_ERROR;
-            *value = values[v->index];
-            return RESULT_OK;
-        }
+        default: values = seen(c, v);
     }
+    if (values != NULL) *value = values[v->index];
+    return values != NULL ? RESULT_OK : RESULT_ERROR;
 }
 
 /* Solves what getting a value from the present point needs. */
@@ -123,6 +118,12 @@ static int before_start(const State *s) {
     return s->phase == PHASE_INSTANTIATED || s->phase == PHASE_INITIALIZATION || s->phase == PHASE_CONFIGURATION;
 }
 
+/* From now on tapes are not specialised for the value of a parameter. */
+void mark_tuned(Instance *c, int parameter) {
+    c->work.decided_by += !c->work.tuned[parameter];
+    c->work.tuned[parameter] = 1;
+}
+
 static Result set_parameter(Instance *c, const Variable *v, double value) {
     State *s = &c->state;
     double low = c->model->parameter_min[v->index], high = c->model->parameter_max[v->index];
@@ -133,12 +134,10 @@ static Result set_parameter(Instance *c, const Variable *v, double value) {
     if (value < low || value > high)
         return fail(c, "%s = %g is out of range: it must be at %s %g.", text_of(c->model, v->name), value,
             value < low ? "least" : "most", value < low ? low : high);
-    if (c->p[v->index] != value) touch(c);
-    if (c->p[v->index] != value && !before_start(s) && !c->work.tuned[v->index]) {
-        c->work.tuned[v->index] = 1;
-        c->work.decided_by++;
-    }
+    if (c->p[v->index] == value) return RESULT_OK;
+    if (!before_start(s)) mark_tuned(c, v->index);
     c->p[v->index] = value;
+    touch(c);
     return RESULT_OK;
 }
 
@@ -186,8 +185,9 @@ Result set_value(Instance *c, const Variable *v, double value) {
 }
 
 /* From now on the input moves with this rate. */
-Result set_input_rate(Instance *c, uint32_t reference, double rate) {
+Result set_input_rate(Instance *c, uint32_t reference, int order, double rate) {
     const Variable *v = known_variable(c, reference, TYPE_FLOAT64);
+    if (order != 1) return fail(c, "Inputs have derivatives of order 1 only.");
     if (v == NULL) return RESULT_ERROR;
     if (v->kind != KIND_INPUT) return refuse_value(c, v, "it is not an input, so it has no input derivative.");
     if (!isfinite(rate)) return refuse_value(c, v, "the derivative is not a finite number.");

@@ -1,0 +1,339 @@
+/* Derivatives of a whole run by parameters, inputs and start values: tangents that go along with it.
+ *
+ * Between instants they follow the linear equations of the derivatives over the dense output of every step, whose
+ * coefficients are exact (ESDIRK4(3)6L of C. Kennedy, M. Carpenter: NASA TM 2001-211038, order 4, L-stable). Instants,
+ * the start and events, are passed twice more, a little to both sides along every tangent, with the transitions that
+ * have fired: central differences. Along a tangent an event moves so that its guard stays zero, and states move on at
+ * the rates before and behind it (the saltation of M. A. Aizerman, F. R. Gantmakher, 1958). What cannot be differenced
+ * is lost: the run goes on, and whoever asks for derivatives is told. */
+#include <math.h>
+#include <string.h>
+#include "core.h"
+
+#define NEARBY 3e-6      /* of the sizes of states and parameters: how far instants are moved */
+#define FELT_CHANGE 1e-9 /* of states and rates, relative to their sizes */
+#define MOST_ROUNDS 32
+#define MOST_TANGENTS 100000
+#define STEPS 4 /* per step of the run */
+enum { N_STAGES = 6 };
+
+static const double NODES[N_STAGES] = {0, 0.5, 0.332, 0.62, 0.85, 1};
+static const double WEIGHTS[N_STAGES][N_STAGES - 1] = {
+    {0}, /* in each row 1/4 follows, the factor of the stage itself */
+    {0.25},
+    {0.137776, -0.055776},
+    {0.14463686602698217, -0.22393190761334475, 0.4492950415863626},
+    {0.09825878328356477, -0.5915442428196704, 0.8101210538282996, 0.283164405707806},
+    {0.15791629516167136, 0, 0.18675894052400077, 0.6805652953093346, -0.27524053099500667},
+};
+
+typedef struct { /* derivatives of a run by one of its values */
+    const Variable *by;
+    ptrdiff_t place;             /* of its value among the numbers of the state */
+    double shift;                /* by how much the present instant comes later */
+    double *now, *next, *stages; /* derivatives of these numbers; rates of a step's stages */
+} Tangent;
+
+struct Gradient {
+    int n, passing, n_rounds;
+    Tangent *tangents;
+    void *before, *behind; /* copies of the state at an instant */
+    double *rates;         /* before it */
+    unsigned char *rounds; /* transitions that have fired there, by rounds */
+    const char *why, *by;  /* why there are no derivatives, or NULL; by what */
+    double lost_at;
+};
+
+void gradient_lose(Instance *c, const char *why, const Variable *by) {
+    Gradient *g = c->gradient;
+    if (g == NULL || g->passing || g->why != NULL) return;
+    g->why = why;
+    g->by = by == NULL ? "anything" : text_of(c->model, by->name);
+    g->lost_at = c->state.t;
+}
+
+/* The part of a tangent of the state's numbers from `values` on. */
+static double *part_of(const Instance *c, const Tangent *one, const double *values) {
+    return one->now + (values - c->numbers);
+}
+
+/* ---- steps ------------------------------------------------------------------------------------------------------ */
+
+/* Parameters, inputs and discrete values move along a tangent; if `moving` (at the present point, where factor_implicit
+ * has been called) also states, with the implicit unknowns. */
+static void load_tangent(Instance *c, const Tangent *one, int moving) {
+    const Model *m = c->model;
+    double *dots = memset(c->work.dots, 0, m->slot_results * sizeof(double));
+    memcpy(dots + m->slot_p, part_of(c, one, c->p), m->n_p * sizeof(double));
+    memcpy(dots + m->slot_u, part_of(c, one, c->u), m->n_u * sizeof(double));
+    memcpy(dots + m->slot_d, part_of(c, one, c->d), m->n_d * sizeof(double));
+    if (moving) memcpy(dots + m->slot_x, part_of(c, one, c->x), m->n_x * sizeof(double));
+    if (moving) tangent_of_implicit(c, c->work.order);
+}
+
+/* Stage i of a step: (M/(h gamma) - J) s = M/(h gamma) begin + b; the matrix is factorised, the rates' tape has run. */
+static void take_stage(Instance *c, Tangent *one, int i, double h) {
+    const Model *m = c->model;
+    int n_x = m->n_x;
+    double *solved = c->work.vector, *begin = c->work.point, *x = part_of(c, one, c->x);
+    load_tangent(c, one, 0);
+    tape_tangent(&m->tapes.rates, c->work.slots, c->work.dots, solved);
+    for (int k = 0; k < n_x; k++) {
+        begin[k] = x[k];
+        for (int j = 0; j < i; j++) begin[k] += h * WEIGHTS[i][j] * one->stages[j * n_x + k];
+        solved[k] += 4 / h * begin[k];
+    }
+    qr_solve(&m->step, &c->work, solved);
+    for (int k = 0; k < n_x; k++) one->stages[i * n_x + k] = 4 / h * (solved[k] - begin[k]);
+    if (i == N_STAGES - 1) memcpy(x, solved, n_x * sizeof(double));
+}
+
+/* Goes to a time in the present piece, from the present point. */
+void gradient_move(Instance *c, double end) {
+    Gradient *g = c->gradient;
+    const Model *m = c->model;
+    double begin = c->state.t, h = (end - begin) / STEPS, *rates = c->work.rhs;
+    if (g == NULL || g->why != NULL || h <= 0) return;
+    if (factor_implicit(c, c->work.order) != RESULT_OK) gradient_lose(c, "its equations are singular there", NULL);
+    for (int j = 0; j < g->n; j++) {
+        load_tangent(c, &g->tangents[j], 1);
+        evaluate_now(c, &m->tapes.rates, rates);
+        tape_tangent(&m->tapes.rates, c->work.slots, c->work.dots, rates);
+        memcpy(g->tangents[j].stages, rates, m->n_x * sizeof(double));
+    }
+    for (int i = 1; i <= STEPS * (N_STAGES - 1); i++) {
+        int stage = (i - 1) % (N_STAGES - 1) + 1;
+        double t = begin + h * ((i - 1) / (N_STAGES - 1) + NODES[stage]);
+        piece_at(m, c->piece, t, c->work.point);
+        evaluate(c, &m->tapes.jacobian, t, c->work.point, c->work.jacobian);
+        if (!factor_step(c, 4 / h)) gradient_lose(c, "its equations are singular there", NULL);
+        evaluate(c, &m->tapes.rates, t, c->work.point, rates);
+        for (int j = 0; j < g->n; j++) {
+            double *stages = g->tangents[j].stages;
+            if (stage == 1 && i > 1) memcpy(stages, stages + (N_STAGES - 1) * m->n_x, m->n_x * sizeof(double));
+            take_stage(c, &g->tangents[j], stage, h);
+        }
+    }
+}
+
+/* ---- instants --------------------------------------------------------------------------------------------------- */
+
+/* The transition whose guard, or moment, tells when the present instant is; NULL: its time is given. */
+static const Transition *find_cause(Instance *c) {
+    const unsigned char *wanting = c->state.event_pending ? c->wanting : nothing_wanting(c);
+    if (!c->state.event_pending) find_wanting(c, c->work.wanting, 0);
+    for (int k = 0; k < c->model->n_transitions; k++)
+        if (wanting[k] && c->state.n_steps > 0) return &c->model->transitions[k];
+    return NULL;
+}
+
+/* By how much the instant comes later, per tangent. */
+static void find_shifts(Instance *c, Gradient *g) {
+    const Transition *cause = find_cause(c);
+    const Tape *tape = cause != NULL && cause->timed ? &c->model->tapes.moments : &c->model->tapes.guards;
+    double *values = tape == &c->model->tapes.moments ? c->work.guards : c->work.guards_before, speed = -1;
+    for (int j = 0; j < g->n; j++) g->tangents[j].shift = 0;
+    if (cause == NULL || factor_implicit(c, c->work.order) != RESULT_OK) return;
+    evaluate_now(c, &c->model->tapes.rates, c->work.rhs);
+    memcpy(g->rates, c->work.rhs, c->model->n_x * sizeof(double));
+    evaluate_now(c, tape, values);
+    if (!cause->timed) speed = values[c->model->n_guards + cause->index];
+    for (int j = 0; j < g->n; j++) {
+        load_tangent(c, &g->tangents[j], 1);
+        evaluate_now(c, tape, values);
+        tape_tangent(tape, c->work.slots, c->work.dots, values);
+        g->tangents[j].shift = -values[cause->index] / speed;
+    }
+}
+
+/* Leaves the instant where it is if it makes no difference when it is: rounding may decide that, and no guard. */
+static void check_shifts(Instance *c, Gradient *g) {
+    const Model *m = c->model;
+    const double *x = copied(c, g->before, c->x), *d = copied(c, g->before, c->d), *rates = c->work.rhs;
+    int matters = 0;
+    evaluate_now(c, &m->tapes.rates, c->work.rhs);
+    for (int k = 0; k < m->n_x; k++) {
+        double change = fmax(fabs(c->x[k] - x[k]), fabs(rates[k] - g->rates[k]));
+        matters |= !(change <= FELT_CHANGE * (fabs(x[k]) + fabs(rates[k]) + m->nominals[k]));
+    }
+    for (int k = 0; k < m->n_modes; k++) matters |= d[k] != c->d[k] && m->modes[k].n_names == 0;
+    for (int j = 0; j < g->n; j++) {
+        if (!matters) g->tangents[j].shift = 0;
+        else if (!isfinite(g->tangents[j].shift))
+            gradient_lose(c, "the guard of that event only touches zero", g->tangents[j].by);
+    }
+}
+
+/* Writes down which transitions fire in a round, or says it; tells whether any do. */
+int gradient_round(Instance *c, int round, unsigned char *wanting, int any) {
+    Gradient *g = c->gradient;
+    size_t n = (size_t)c->model->n_transitions;
+    if (g == NULL || g->why != NULL) return any;
+    if (g->passing && round < g->n_rounds) memcpy(wanting, g->rounds + n * (size_t)round, n);
+    if (g->passing) return round < g->n_rounds;
+    g->n_rounds = any ? round + 1 : round;
+    if (any && round >= MOST_ROUNDS) gradient_lose(c, "that event has too many rounds", NULL);
+    else if (any) memcpy(g->rounds + n * (size_t)round, wanting, n);
+    return any;
+}
+
+/* A part of a tangent along which everything changes but little. */
+static double small_part(const Instance *c, const Tangent *one) {
+    const double *x = part_of(c, one, c->x), *d = part_of(c, one, c->d);
+    double value = c->numbers[one->place], largest = value == 0 ? 1 : fabs(1 / value);
+    for (int k = 0; k < c->model->n_x; k++)
+        largest = fmax(largest, fabs(x[k]) / (fabs(c->x[k]) + c->model->nominals[k]));
+    for (int k = 0; k < c->model->n_d; k++) largest = fmax(largest, fabs(d[k]) / (1 + fabs(c->d[k])));
+    return NEARBY / fmax(largest, fabs(one->shift) / fmax(1, fabs(c->state.t)));
+}
+
+/* Passes the instant on both sides of the run; returns 0 if other modes follow. */
+static int difference(Instance *c, const Gradient *g, Tangent *one, Result (*pass)(Instance *c)) {
+    const double *modes = copied(c, g->behind, c->d);
+    double *next = memset(one->next, 0, c->n_smooth * sizeof(double)), part = small_part(c, one);
+    int same = 1;
+    for (int side = -1; side <= 1; side += 2) {
+        state_copy_in(c, g->before);
+        for (size_t k = 0; k < c->n_smooth; k++) c->numbers[k] += side * part * one->now[k];
+        c->state.t += side * part * one->shift;
+        same &= pass(c) == RESULT_OK;
+        for (int k = 0; k < c->model->n_modes; k++) same &= c->model->modes[k].n_names == 0 || c->d[k] == modes[k];
+        for (size_t k = 0; k < c->n_smooth; k++) next[k] += side * c->numbers[k] / (2 * part);
+    }
+    one->next = one->now;
+    one->now = next;
+    return same;
+}
+
+/* Moves states on at their rates, by a part of what the instant comes later. */
+static void move_on(const Instance *c, const Gradient *g, const double *rates, double part) {
+    for (int j = 0; j < g->n; j++)
+        for (int k = 0; k < c->model->n_x && g->tangents[j].shift != 0; k++)
+            part_of(c, &g->tangents[j], c->x)[k] += part * g->tangents[j].shift * rates[k];
+}
+
+/* The tangents pass the instant that the run has passed. */
+static void pass_tangents(Instance *c, Gradient *g, Result (*pass)(Instance *c)) {
+    const Instance whole = *c;
+    const Variable *other = NULL;
+    move_on(c, g, g->rates, 1);
+    c->log = NULL;
+    c->noted = NULL;
+    c->struck = NULL;
+    g->passing = 1;
+    for (int j = 0; j < g->n && other == NULL; j++) {
+        state_copy_in(c, g->before);
+        if (!difference(c, g, &g->tangents[j], pass)) other = g->tangents[j].by;
+    }
+    state_copy_in(c, g->behind);
+    g->passing = 0;
+    c->log = whole.log;
+    c->noted = whole.noted;
+    c->struck = whole.struck;
+    if (other != NULL) gradient_lose(c, "a small change of it leads to other modes there", other);
+    evaluate_now(c, &c->model->tapes.rates, c->work.rhs);
+    move_on(c, g, c->work.rhs, -1);
+}
+
+/* Passes the start, or an event, with the tangents. */
+Result gradient_through(Instance *c, Result (*pass)(Instance *c), int start) {
+    Gradient *g = c->gradient;
+    Result result;
+    if (g == NULL || g->passing) return pass(c);
+    for (int j = 0; j < g->n && start; j++) {
+        g->why = NULL;
+        g->tangents[j].shift = 0;
+        memset(g->tangents[j].now, 0, c->n_smooth * sizeof(double));
+        g->tangents[j].now[g->tangents[j].place] = 1;
+    }
+    if (!start && g->why == NULL) find_shifts(c, g);
+    g->n_rounds = 0;
+    if (state_copy_out(c, &g->before) != RESULT_OK) return RESULT_ERROR;
+    result = pass(c);
+    if (result != RESULT_OK || g->why != NULL) return result;
+    if (state_copy_out(c, &g->behind) != RESULT_OK) return RESULT_ERROR;
+    if (!start) check_shifts(c, g);
+    if (g->why == NULL) pass_tangents(c, g, pass);
+    return RESULT_OK;
+}
+
+/* ---- for importers ---------------------------------------------------------------------------------------------- */
+
+void gradient_end(Instance *c) {
+    Gradient *g = c->gradient;
+    if (g == NULL) return;
+    state_release(c, &g->before);
+    state_release(c, &g->behind);
+    c->release(g);
+    c->gradient = NULL;
+}
+
+/* Room for derivatives by n values; NULL if there is no memory. */
+static Gradient *gradient_new(const Instance *c, size_t n) {
+    size_t own = sizeof(Gradient) / 8 + 1, n_x = (size_t)c->model->n_x, list = n * sizeof(Tangent) / 8 + 1;
+    size_t marks = MOST_ROUNDS * (size_t)c->model->n_transitions / 8 + 1, one = 2 * c->n_smooth + N_STAGES * n_x;
+    double *memory = n > MOST_TANGENTS ? NULL : c->allocate(own + n_x + marks + list + n * one, 8);
+    Gradient *g = (Gradient *)(void *)memory;
+    if (g == NULL) return NULL;
+    g->n = (int)n;
+    g->rates = memory + own;
+    g->rounds = (unsigned char *)(g->rates + n_x);
+    g->tangents = (Tangent *)(void *)(g->rates + n_x + marks);
+    for (size_t j = 0; j < n; j++) {
+        g->tangents[j].now = g->rates + n_x + marks + list + j * one;
+        g->tangents[j].next = g->tangents[j].now + c->n_smooth;
+        g->tangents[j].stages = g->tangents[j].next + c->n_smooth;
+    }
+    return g;
+}
+
+/* The value of a parameter, an input or a start value, which is then given, among the numbers of the state. */
+static double *value_of(Instance *c, const Variable *v) {
+    if (v->kind == KIND_INPUT) return &c->u[v->index];
+    if (v->kind == KIND_PARAMETER) mark_tuned(c, v->index);
+    if (v->kind == KIND_PARAMETER) return &c->p[v->index];
+    start_values(c);
+    c->start_value[v->start] = c->work.start_values[v->start];
+    c->start_given[v->start] = 1;
+    return &c->start_value[v->start];
+}
+
+static Result begin(Instance *c, const uint32_t by[], size_t n) {
+    if (allowed(c, "modelica_like_gradient_start", PHASE_INITIALIZATION) != RESULT_OK) return RESULT_ERROR;
+    if (!c->co_simulation || c->model->settings->fixed_step > 0)
+        return fail(c, "Derivatives of a run need Co-Simulation with adaptive steps.");
+    if (by == NULL && n > 0) return fail(c, "The argument by is a null pointer.");
+    if (check_knowns(c, by, n) != RESULT_OK) return RESULT_ERROR;
+    gradient_end(c);
+    if (n > 0 && (c->gradient = gradient_new(c, n)) == NULL) return fail(c, "There is not enough memory.");
+    for (size_t j = 0; j < n; j++) {
+        c->gradient->tangents[j].by = find_variable(c->model, by[j]);
+        c->gradient->tangents[j].place = value_of(c, c->gradient->tangents[j].by) - c->numbers;
+    }
+    c->state.solved = 0;
+    return RESULT_OK;
+}
+
+int modelica_like_gradient_start(void *instance, const uint32_t by[], size_t n) {
+    return instance == NULL || begin(instance, by, n) != RESULT_OK;
+}
+
+static Result read_gradient(Instance *c, const uint32_t of[], size_t n, double gradient[]) {
+    const Gradient *g = c->gradient;
+    if (allowed(c, "modelica_like_gradient", PHASE_EVENT | PHASE_STEP | PHASE_TERMINATED) != RESULT_OK)
+        return RESULT_ERROR;
+    if (g == NULL || of == NULL || gradient == NULL)
+        return fail(c, "An argument is a null pointer, or modelica_like_gradient_start has not been called.");
+    if (g->why != NULL)
+        return fail(c, "There are no derivatives with respect to %s after t = %.9g s: %s.", g->by, g->lost_at, g->why);
+    if (check_unknowns(c, of, n) != RESULT_OK || factor_implicit(c, c->work.order) != RESULT_OK) return RESULT_ERROR;
+    for (int j = 0; j < g->n; j++) {
+        load_tangent(c, &g->tangents[j], 1);
+        read_tangents(c, of, n, gradient + j, (size_t)g->n);
+    }
+    return RESULT_OK;
+}
+
+int modelica_like_gradient(void *instance, const uint32_t of[], size_t n_of, double gradient[]) {
+    return instance == NULL || read_gradient(instance, of, n_of, gradient) != RESULT_OK;
+}

@@ -1,0 +1,107 @@
+"""Derivatives that runs in C carry along: against the replay, against differences of runs, and where there are none."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from components import Clutch, Inertia
+from modelica_like import Assembly, build, sensitivities, simulate
+from modelica_like.errors import NoGradient, ValueOutOfRange
+
+ROOT = Path(__file__).parents[2]
+STARTUP = ROOT / "examples" / "machine_tool_startup.toml"
+CLUTCHES = ROOT / "examples" / "msl" / "rotational" / "CoupledClutches.toml"
+WINCH = ROOT / "tests" / "system" / "new_drives" / "winch.toml"
+DRIVES = {
+    ROOT / "examples" / "two_mass.toml": (
+        0.5, ["J1.w", "shaft.phi_rel", "shaft.tau"], ["J1.J", "J2.J", "shaft.c", "shaft.d", "motor.tau"],
+    ),
+    CLUTCHES: (1.5, ["J1.w", "J3.w", "J4.phi"], ["J1.J", "f", "sin1.amplitude", "clutch1.fn_max", "T2", "J4.J"]),
+    STARTUP: (
+        1.0, ["load.w", "J1.phi", "shaft1.tau"], ["J1.J", "k1", "h1", "force", "drag", "coil.start_time", "load.a"],
+    ),
+}  # fmt: skip
+
+
+def handle_at(drive, until, of, by, **how):
+    handle = build(drive).native(outputs=of, by=by, **how)
+    handle.reset(until=until)
+    handle.step(until)
+    return handle
+
+
+def error_of(found, exact, values):
+    """Largest error of every output, relative to its largest derivative, all by relative changes."""
+    return np.max(np.abs(found - exact) * np.abs(values), axis=1) / np.max(np.abs(exact) * np.abs(values), axis=1)
+
+
+@pytest.mark.parametrize("drive", DRIVES, ids=lambda path: path.stem)
+def test_derivatives_are_those_of_the_replay(drive):
+    until, of, by = DRIVES[drive]
+    values = build(drive).native(outputs=by).outputs
+    found = handle_at(drive, until, of, by).gradient()
+    exact = sensitivities(simulate(drive, until=until, solver="native", rtol=1e-9), of, by).derivatives
+    assert np.all(error_of(found, exact, values) < 1e-6)
+
+
+def test_derivatives_are_differences_of_runs():
+    """Of the winch, whose brake and gear share the load, by central differences of order four."""
+    of, by = ["load.s", "rope.f"], ["motor.Ra", "winding.radius", "rope.c"]
+    found = handle_at(WINCH, 4.0, of, by, rtol=1e-9).gradient()
+    handle = build(WINCH).native(outputs=of, rtol=1e-11)
+    values, exact = handle.get(*by), np.zeros_like(found)
+    for column, (name, value) in enumerate(zip(by, values, strict=True)):
+        step, sides = 3e-5 * value, []
+        for side in (-2, -1, 1, 2):
+            handle.reset({name: value + side * step}, until=4.0)
+            sides.append(handle.step(4.0).copy())
+        exact[:, column] = (8 * (sides[2] - sides[1]) - (sides[3] - sides[0])) / (12 * step)
+    assert np.all(error_of(found, exact, values) < 1e-6)
+
+
+@pytest.mark.parametrize("drive", [CLUTCHES, WINCH], ids=lambda path: path.stem)
+def test_they_do_not_change_the_run(drive):
+    """Not by a bit, with communication points inside of steps."""
+    of = ["J1.w", "J4.phi"] if drive == CLUTCHES else ["load.s", "gear.mode"]
+    by = ["J1.J"] if drive == CLUTCHES else ["load.m"]
+    runs = []
+    for chosen in ([], by):
+        handle = build(drive).native(outputs=of, by=chosen)
+        handle.reset(until=4.0)
+        runs.append([handle.step(0.01 * k).copy() for k in range(1, 121)])
+    assert np.array_equal(*runs)
+
+
+def test_points_on_the_way_change_nothing_but_the_error():
+    until, of, by = 0.9, ["J3.w"], ["J1.J", "clutch1.fn_max"]
+    whole = handle_at(CLUTCHES, until, of, by).gradient()
+    handle = build(CLUTCHES).native(outputs=of, by=by)
+    handle.reset(until=until)
+    for k in range(1, 91):
+        handle.step(until * k / 90)
+        handle.gradient()
+    np.testing.assert_allclose(handle.gradient(), whole, rtol=1e-6)
+
+
+def test_where_there_are_none():
+    parts = {"J1": Inertia(J=1.0, w=1.0, phi=0.0), "clutch": Clutch(capacity=5.0), "J2": Inertia(J=2.0, w=1.0)}
+    handle = build(Assembly("equal", parts=parts, series={"shaft": [*parts]})).native(outputs=["J1.w"], by=["J1.w"])
+    handle.reset(until=1.0)  # at equal speeds the clutch sticks, at all others it slides
+    handle.step(0.1)
+    with pytest.raises(NoGradient, match=r"to J1\.w after t = 0 s: a small change of it leads to other modes"):
+        handle.gradient()
+    handle = build(CLUTCHES).native(outputs=["J1.w"], by=["J1.J"])
+    handle.reset(until=1.0)
+    copy = handle.copy()
+    handle.restore(copy)
+    with pytest.raises(NoGradient, match="the state was set"):
+        handle.gradient()
+    handle.reset(until=1.0)
+    assert handle.gradient()[0, 0] == 0.0
+    with pytest.raises(ValueOutOfRange, match="has not been called"):
+        build(CLUTCHES).native(outputs=["J1.w"]).gradient()
+    with pytest.raises(ValueOutOfRange, match="need Co-Simulation with adaptive steps"):
+        build(CLUTCHES).native(outputs=["J1.w"], by=["J1.J"], fixed_step=1e-3)
+    with pytest.raises(ValueOutOfRange, match=r"Derivatives with respect to clutch1\.tau are not available"):
+        build(CLUTCHES).native(by=["clutch1.tau"])
