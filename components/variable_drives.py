@@ -36,7 +36,7 @@ class VariableGear(Lossy, TwoFlanges):
     """
 
     icon = icons.VARIABLE_GEAR
-    u: Input = signal_in("1", "wanted ratio, speed of flange_a over speed of flange_b")
+    u: Input = signal_in("1", "wanted ratio, speed of flange_a over speed of flange_b; above zero")
     T: Parameter = param("s", "time constant of the adjustment", min=1e-6)
     efficiency: Parameter = param("1", "power out over power in", default=1.0, min=1e-3, max=1)
     w_smooth: Parameter = param("rad/s", "speed at which 76 % of the loss are reached", default=0.1, min=1e-12)

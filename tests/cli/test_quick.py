@@ -22,6 +22,7 @@ CALLS = [
     "simulate a.toml --until 2s --start rest --csv=out.csv --points 7 --units --show x --show=y.*",
     "simulate --no-energy a.toml --points=250 --energy --no-energy --sankey s.svg --plot p.png",
     "draw a.toml -o a.svg --depth 2",
+    "draw a.toml --at 1s --flow --animate --until 2s",
     "report a.toml -o a.html --until 1s --show *.w",
     "explore a.toml --until 1s --show *.w -o folder --no-browser",
     "modes a.toml --at=0.5s --input u --output a.w --output b.w --shapes m.png --bode b.svg",

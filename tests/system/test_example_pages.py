@@ -44,7 +44,9 @@ def test_example_has_a_page(netlist: Path) -> None:
 @pytest.mark.parametrize("page", sorted(PAGES.glob("*.md")), ids=lambda path: path.stem)
 def test_links_of_a_page_lead_somewhere(page: Path) -> None:
     for link in re.findall(r"\]\(([^)#]+)\)", page.read_text(encoding="utf-8")):
-        assert (page.parent / link).exists(), link
+        # `make site` generates the pages of components, and checks what points there.
+        generated = (page.parent / link).resolve().is_relative_to(ROOT / "docs" / "components")
+        assert generated or (page.parent / link).exists(), link
 
 
 def test_pictures_are_drawn_and_small() -> None:
