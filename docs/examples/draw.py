@@ -38,6 +38,7 @@ PICTURES: dict[str, tuple[str, ...]] = {
     ),
     "dc_bench": ("motor.w", "clutch_pulley.w", "flywheel.w", "motor.ia", "generator.v", "clutch.tau"),
     "winch": ("motor.w", "load.v", "motor.ia", "rope.tension", "load.s"),
+    "launch": ("engine.w", "input.w", "car.v", "clutch.T", "tyre.f", "tyre.F_z", "clutch.tau"),
     "dc_bench_cycles": ("clutch_pulley.w", "flywheel.w", "coil.i", "coil.y", "clutch.T"),
     "machine_tool_magnet": ("coil.i", "coil.f", "clutch.tau", "J2.w", "J3.w", "clutch.T"),
     "dc_bench_speed_control": ("motor.w", "converter.v", "motor.ia", "sink.i", "clutch.tau"),
@@ -302,7 +303,20 @@ def families() -> Figure:
     return figure
 
 
+def servo() -> Figure:
+    """The servo axis: what the drive does, and where the table is that the encoder does not see."""
+    run = simulate(EXAMPLES / "servo_axis.toml")
+    behind = run["table.s"] - run["servo.motor.phi"] * 0.01 / (4 * pi)
+    rows = {
+        "motor in 1/min": [Curve("speed", run.time, run["servo.motor.w"] * RPM)],
+        "current in A": [Curve("current", run.time, run["servo.motor.ia"])],
+        "position in µm": [Curve("table less motor", run.time, 1e6 * behind)],
+    }
+    return panels("servo_axis: 100 mm forth and back", "time in s", rows)
+
+
 FIGURES: dict[str, Callable[[], Figure]] = {
+    "servo_axis": servo,
     "dc_bench_motor": motor_curves,
     "dc_bench_release": release,
     "dc_bench_overload": overload,

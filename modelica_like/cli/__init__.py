@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
 # Modules and their commands, in the order in which the help lists them.
 _GROUPS = {
+    "starters": ("new",),
     "models": ("check", "simulate"),
     "pictures": ("draw", "report", "explore"),
     "analysis": ("modes", "steady", "sweep", "sensitivity"),

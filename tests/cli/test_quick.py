@@ -14,6 +14,8 @@ from modelica_like.cli.complete import application
 from modelica_like.cli.quick import read
 
 CALLS = [
+    "new winch",
+    "new blank -o a.toml",
     "check a.toml",
     "check --set a.b=1 a.toml --set c=2 --debug",
     "simulate a.toml",
@@ -46,6 +48,8 @@ CALLS = [
     "demo --pictures folder",
 ]
 UNUSUAL = [
+    "new",
+    "new car",
     "simulate",
     "simulate a.toml b.toml",
     "simulate a.toml --help",

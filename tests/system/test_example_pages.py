@@ -14,7 +14,16 @@ ROOT = Path(__file__).parents[2]
 PAGES = ROOT / "docs" / "examples"
 OURS = [
     ROOT / "examples" / f"{name}.toml"
-    for name in ("fan", "winch", "machine_table_direct", "machine_table_geared", "machine_tool_startup", "dc_bench")
+    for name in (
+        "fan",
+        "winch",
+        "launch",
+        "servo_axis",
+        "machine_table_direct",
+        "machine_table_geared",
+        "machine_tool_startup",
+        "dc_bench",
+    )
 ] + [ROOT / "examples" / "dc_bench_motor.toml", *(ROOT / "examples" / "dc_machines").glob("*.toml")]
 
 

@@ -110,6 +110,12 @@ def test_export_takes_no_compiler(run, examples: Path, tmp_path: Path, version: 
     assert not (tmp_path / "cache").exists()
 
 
+def test_new(run, examples: Path, tmp_path: Path) -> None:
+    for drive, name in (("winch", "winch"), ("launch", "launch"), ("servo", "servo_axis"), ("blank", "blank")):
+        run("modelica-like", "new", drive)
+        assert (tmp_path / f"{drive}.toml").read_bytes() == (examples / f"{name}.toml").read_bytes()
+
+
 def test_schema(run) -> None:
     assert "Clutch" in json.dumps(json.loads(run("modelica-like", "schema")))
 

@@ -1,0 +1,61 @@
+"""The tutorial and the how-to pages are run from top to bottom; what they print stands there."""
+
+import contextlib
+import io
+import re
+import shlex
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+from modelica_like.cli import app
+from modelica_like.explore import Explorer
+from modelica_like.netlist import library_types
+
+DOCS = Path(__file__).parents[2] / "docs"
+PAGES = [DOCS / "tutorial.md", *sorted((DOCS / "how_to").glob("*.md"))]
+
+
+def command(line: str) -> None:
+    words = shlex.split(line, comments=True)[1:]
+    if words[0] == "explore":  # would wait for a browser
+        with Explorer(words[1]) as explorer:
+            assert explorer.address.startswith("http://127.0.0.1")
+        return
+    result = CliRunner().invoke(app, words)
+    assert result.exit_code == 0, f"{line}: {result.stderr}"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda path: path.stem)
+def test_a_page_runs(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, Any] = {"__name__": "page"}
+    printed = ""
+    text = page.read_text(encoding="utf-8")
+    for before, language, block in re.findall(r"([^\n]*)\n*```(\w+)\n(.*?)```", text, re.DOTALL):
+        if language == "sh":
+            for line in block.splitlines():
+                command(line)
+        elif language == "toml":
+            (name,) = re.findall(r"`(\w+\.toml)`", before)
+            Path(name).write_text(block, encoding="utf-8")
+        elif language == "python":
+            with contextlib.redirect_stdout(io.StringIO()) as stream:
+                exec(compile(block, str(page), "exec"), names)
+            printed = stream.getvalue()
+        else:
+            assert language == "text"
+            assert block == printed
+
+
+def test_types_named_for_newcomers_exist() -> None:
+    """What stands in code in the right column and begins with a capital is a component, or a word of the language."""
+    words = {"Component", "Assembly", "Flange", "LinearFlange", "Pin", "HeatPort", "Mode", "Parameter", "Variable"}
+    known = words | set(library_types())
+    text = (DOCS / "coming_from.md").read_text(encoding="utf-8")
+    right = [row.split("|")[2] for row in text.splitlines() if row.startswith("| ")]
+    named = {name for cell in right for name in re.findall(r"`([A-Z]\w+)`", cell)}
+    assert len(named) > 40
+    assert named <= known
