@@ -153,7 +153,7 @@ class EnergyBalance:
             told.append(
                 f"The stored energy of {worst.component or 'the model itself'} drifts by {worst.drift:.2g} J, "
                 f"{self.drift / self.tolerance:.2g} times the run's relative tolerance: errors of the integrator's "
-                f"steps add up. A smaller rtol lowers them."
+                f"steps add up. Smaller tolerances (rtol, atol) lower them."
             )
         return tuple(told)
 

@@ -31,6 +31,10 @@ _FINEST = 1e-12
 """Factor of precision of a repeated integration over the run, and its limit."""
 _NEAR = 8
 """Intervals that are also integrated again, because a new start would cost more."""
+_DIGITS = 4e-16
+"""Relative change of states that shows what in the energies is rounding."""
+_ROUNDING = 10.0
+"""Errors that are left, in such changes."""
 _MORE, _LEAST, _DEEPEST = 4, 4, 12
 """Finer results per interval, the smallest number of intervals for this, and the number of repetitions."""
 _FAILURES = 20
@@ -121,7 +125,7 @@ class Powers:
     def __init__(self, model: CompiledDae, options: Options, count: int) -> None:
         self.model, self.options = model, options
         self._share = min(_SHARE, _ALL / count)
-        self.stored, self.moved = 0.0, _NOTHING
+        self.stored, self.moved, self._noise = 0.0, _NOTHING, np.zeros(2)
         rtol = min(options.rtol, max(_FINER * options.rtol, _FINEST))
         self._integrator = Integrator(model, replace(options, rtol=rtol, atol=options.atol * rtol / options.rtol))
 
@@ -137,6 +141,8 @@ class Powers:
         terms = np.take(every.terms, kept, axis=-1)
         powers = terms[1 : 1 + POWERS].reshape(-1, len(kept))
         self._move(terms[0], powers, np.diff(every.times[kept]))
+        if not depth:
+            self._hear(every)
         bent, bends = intervals[:0], np.zeros((2, len(powers), 0))
         coarse = self._coarse(terms, intervals, places, weights, bent, bends, depth)
         ends = np.stack([kept[intervals], kept[intervals + 1]])
@@ -191,6 +197,18 @@ class Powers:
         most = 0.0 if least else np.max(sizes[:, 1:] @ steps, initial=0.0)
         self.moved = max(self.moved, self.stored, float(least), float(most))
 
+    def _hear(self, every: Results) -> None:
+        """Estimate the rounding of stored energies in J and of powers in W: what the last digits of states change."""
+        places = np.unique([0, len(every.times) // 2, len(every.times) - 1])
+        x = every.x[:, places]
+        function = self.model.along("energy terms", lambda: _terms(self.model))
+        signs = np.where(np.add.outer(np.arange(len(x)), np.arange(len(places))) % 2, 1.0, -1.0)
+        others = every.z[:, places], self.model.p, self.model.u, every.d[:, places]
+        changed = function(every.times[places], x * (1.0 + _DIGITS * signs), *others)[0]
+        changes = np.abs(changed.reshape(-1, len(self.model.components), len(places)) - every.terms[..., places])
+        found = _ROUNDING * np.array([np.max(np.sum(one, axis=0)) for one in (changes[0], changes[1:].sum(axis=0))])
+        self._noise = np.maximum(self._noise, found)
+
     def _bends(self, every: Results, ends: Places) -> Vector:
         """Return the part of slopes of powers in the integrals of the first two rules; shape (2, 4 components, m)."""
         model = self.model
@@ -224,7 +242,9 @@ class Powers:
         gain = np.maximum(_ratio(near[:2], far[:2]), _ratio(known, smooth))
         errors = np.maximum(np.maximum(*(near[:2] * gain)), np.minimum(known, smooth))
         allowed = self.options.rtol * self.moved
-        return ~((errors <= self._share * allowed) & (known <= _ASTRAY * allowed))
+        # A weight that exactly balances a motion leaves nothing but rounding, which no finer result makes smaller.
+        noise = self._noise[0] + self._noise[1] * np.abs(weights[:, 0].sum(axis=1))
+        return ~((errors <= np.maximum(self._share * allowed, noise)) & (known <= np.maximum(_ASTRAY * allowed, noise)))
 
 
 def _slopes(model: CompiledDae) -> ca.Function:

@@ -30,7 +30,7 @@ every_drive = settings(deadline=None, max_examples=EXAMPLES)
 def run(tree: Tree, **how: object) -> Solution:
     drive = assembly(tree, start="rest", until=END, **how)  # type: ignore[arg-type]
     note(dumps(drive))
-    return simulate(drive, rtol=RTOL, points=40)
+    return simulate(drive, rtol=RTOL, atol=RTOL / 1000, points=40)
 
 
 def speeds(solution: Solution, tree: Tree, rename: Callable[[str], str] = str) -> np.ndarray:

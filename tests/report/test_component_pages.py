@@ -61,7 +61,7 @@ def test_links_of_the_pages_lead_somewhere(pages: dict[File, str]) -> None:
         (file.name, link)
         for file, text in pages.items()
         for link in re.findall(r"\]\(([^)#]+)", text)
-        if not (file.parent / link).exists() and (file.parent / link).resolve() not in written
+        if not (file.parent / link).resolve().exists() and (file.parent / link).resolve() not in written
     ]
     assert broken == []
 
@@ -70,7 +70,7 @@ def test_source_links_name_the_line_of_the_class(pages: dict[File, str]) -> None
     for name, kind in library_types().items():
         file, text = next((file, page) for file, page in pages.items() if file.stem == name)
         link, line = re.findall(r"\(([^)#]+)#L(\d+)\)", text)[0]
-        source = (file.parent / link).read_text(encoding="utf-8").splitlines()
+        source = (file.parent / link).resolve().read_text(encoding="utf-8").splitlines()
         assert source[int(line) - 1].startswith(f"class {kind.__name__}(")
 
 

@@ -217,8 +217,11 @@ class Number(float):
     def is_(self, *names: str) -> bool:
         return self.modes[self.path] in names
 
-    def choose(self, otherwise: float | None = None, **values: float) -> float | None:
-        return values.get(self.modes[self.path], otherwise)
+    def choose(self, otherwise: float | None = None, **values: float) -> float:
+        found = values.get(self.modes[self.path], otherwise)
+        if found is None:  # a subclass has more modes, and equations of its own for them
+            raise KeyError(self.modes[self.path])
+        return found
 
 
 def rate(what: Number) -> Number:
