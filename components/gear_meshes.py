@@ -64,7 +64,10 @@ class GearMesh(Lossy, TwoFlanges):
         yield self.x == self.r_a * self.phi_a + self.r_b * phi_b - self.e * sin(angle + self.phase)
         yield self.v == der(self.x)
         half = 0.5 * self.b
-        yield self.press == self.contact.choose(gap=0, forward=self.x - half, backward=self.x + half)
+        # Flanks that are about to part do not pull: the event is located to rounding only.
+        yield self.press == self.contact.choose(
+            gap=0, forward=maximum(self.x - half, 0), backward=-maximum(-self.x - half, 0)
+        )
         pressed, rate = self.stiffness * self.press, self.d * self.v
         forward, backward = maximum(pressed + rate, 0), -maximum(-pressed - rate, 0)
         yield self.f == self.contact.choose(gap=0, forward=forward, backward=backward)

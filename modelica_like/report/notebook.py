@@ -14,7 +14,7 @@ from modelica_like.analyse.operating.steady import OperatingPoint
 from modelica_like.analyse.sensitivity.result import Sensitivities
 from modelica_like.report.analysis import modes_report, point_report, sensitivity_report
 from modelica_like.report.run import run_report
-from modelica_like.solve.plot import plot
+from modelica_like.solve.plot import picture_bytes, plot
 from modelica_like.solve.trajectories import Trajectories
 
 _WIDE = 110
@@ -39,7 +39,5 @@ def html(shown: Any) -> str:
 
 
 def _picture(run: Trajectories) -> str:
-    written = io.BytesIO()
-    plot(run, ()).savefig(written, format="png")
-    data = base64.b64encode(written.getvalue()).decode()
+    data = base64.b64encode(picture_bytes(plot(run, ()), "png")).decode()
     return f'<img alt="curves" style="max-width:100%" src="data:image/png;base64,{data}">'

@@ -21,6 +21,8 @@ from modelica_like.solve.recorder import Recorder
 
 _NEVER = 1e-12
 """Rates, relative to the value and per second, that do not count as rising."""
+_NOTHING = 1e-25
+"""Value of a guard, in SI units, below which it is rounding."""
 _CLOSER = 8
 """Number of closer looks into an interval between two looks."""
 _DEEPEST = 10
@@ -221,6 +223,8 @@ class EventLoop:
         if begins:
             # A guard that the last event left positive did not fire: it is falling.
             values[:, 0] = np.minimum(values[:, 0], 0.0)
+        # A guard at the limit, such as a rope without load, has values of rounding only: it crosses nothing.
+        values[np.abs(values).max(axis=1) < _NOTHING] = 0.0
         active = self.guards.active(looks.d)
         for group in candidates(values, rates, active, looks.width):
             k = group[0].interval

@@ -83,9 +83,20 @@ def save_plot(figure: Figure, path: Path, **options: Any) -> None:
     """
     check_picture(path)
     # In memory first: not every format reports a full disk.
+    write_bytes(path, picture_bytes(figure, path.suffix[1:].lower(), **options))
+
+
+def picture_bytes(figure: Figure, kind: str, **options: Any) -> bytes:
+    """Return a picture in a format of matplotlib, such as `png`.
+
+    Args:
+        figure: the picture.
+        kind: the format.
+        options: of matplotlib's `savefig`.
+    """
     content = io.BytesIO()
-    figure.savefig(content, format=path.suffix[1:].lower(), **options)
-    write_bytes(path, content.getvalue())
+    figure.savefig(content, format=kind, **options)
+    return content.getvalue()
 
 
 def chosen(solution: Trajectories, patterns: Sequence[str]) -> list[str]:

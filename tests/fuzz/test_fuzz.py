@@ -46,7 +46,7 @@ FOUND: dict[str, tuple[Callable[[], object], str]] = {
     ),
     "a mode that is a list": (
         lambda: loads('[parts]\nk = { is = "P", y_max = 1, limit = [["0 rad/s", 0.1]] }\n'),
-        "P.limit has no mode '[['0 rad/s', 0.1]]'. It has",
+        "Controller.limit has no mode '[['0 rad/s', 0.1]]'. It has",
     ),
     "a formula that is a number": (
         lambda: loads('[parts]\nk = { is = "TimeFormula", formula = -0.0 }\n'),
@@ -99,7 +99,7 @@ SIZINGS = {
     "a list without numbers": (LIFE.replace('"150 N"', "[]"), "checks.k.radial_load must be a list of numbers"),
     "a number without end": (
         LIFE.replace('"150 N"', '"a*1 N"') + "[parameters]\na = " + "9" * 401 + "\n",
-        "parameters.a is larger than any",
+        "parameters.a is too large for a number",
     ),
     "an array in published": (LIFE + "published = [1, 2]\n", "checks.k.published must be a table by line"),
 }
