@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from components import icons
 from components.electrical import TwoPins
-from components.tabulated import Tabulated
+from components.tabulated import ROUNDING, Tabulated
 from components.thermal import Lossy
 from modelica_like.language import (
     Equations,
@@ -66,8 +66,8 @@ class Battery(Tabulated, Lossy, TwoPins):
         yield der(self.E) == self.N_s * self.N_p * self.v_cell * self.i_cell
 
     def events(self) -> Events:
-        yield self.charge.go("kept", "empty", when=self.soc < 0, notice="is empty: it gives what it does not have")
-        yield self.charge.go("kept", "full", when=self.soc > 1, notice="is overcharged")
+        yield self.charge.go("kept", "empty", when=self.soc < -ROUNDING, notice="is empty: it gives more than it had")
+        yield self.charge.go("kept", "full", when=self.soc > 1 + ROUNDING, notice="is overcharged")
         yield from self.leaving("ocv", self.soc, self.ocv, self.soc > 0, self.soc < 1)
 
     def stored_energy(self) -> Expr:

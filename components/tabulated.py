@@ -8,7 +8,7 @@ from typing import Literal
 from modelica_like.language import Component, Events, Expr, LanguageError, Mode, all_of, any_of, interpolate
 
 Flat = tuple[float, ...]
-_ROUNDING = 1e-10
+ROUNDING = 1e-10
 
 
 class Tabulated(Component, partial=True):
@@ -61,7 +61,7 @@ class Tabulated(Component, partial=True):
             first, last = table[0][0], table[-1][0]
             above = isinstance(first, float | int) and first <= least
             # Reaching the end of a table does not leave it.
-            slack = _ROUNDING * (last - first)
+            slack = ROUNDING * (last - first)
             outside = x > last + slack if above else any_of(x > last + slack, x < first - slack)
             yield self.range.go(
                 "kept", "left", when=all_of(outside, *conditions), fails=self.extrapolate == "error",

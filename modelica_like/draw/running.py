@@ -25,7 +25,8 @@ _THICKEST = 12.0
 """Width of the line with the largest power, in 1/96 inch."""
 _SAID = 1e-3
 """Part of the largest power below which a line says nothing."""
-_OPEN_NAMES = ("free", "open", "off", "apart", "gap")
+_CARRIES = 1e-9
+"""Part of its largest reaction above which a part is not open."""
 _PREFIXES = ((1e9, "GW"), (1e6, "MW"), (1e3, "kW"), (1.0, "W"), (1e-3, "mW"))
 
 
@@ -110,17 +111,19 @@ def running(
 
 def _looks(part: Component, run: Trajectories) -> Iterator[tuple[float, str, str]]:
     """When the look of a part changes, to what look, and the mode's name."""
-    holding = {one: set(mode.holds) for one, mode in part.modes.items() if mode.holds}
-    path = _path(part)
-    for name, held in holding.items():
-        names = part.modes[name].names
-        values = run[f"{path}.{name}"].astype(int)
-        changes = [0, *(np.flatnonzero(np.diff(values)) + 1)]
-        for k in changes:
-            mode = names[values[k]]
-            look = HELD if mode in held else OPEN if mode in _OPEN_NAMES else SLIDES
-            yield float(run.time[k]), look, mode.replace("_", " ")
+    name = next((one for one, mode in part.modes.items() if mode.holds), None)
+    if name is None:
         return
+    path, mode = _path(part), part.modes[name]
+    values = run[f"{path}.{name}"].astype(int)
+    # A hold knows its reaction only by the node of the flat system.
+    held = next(one for one in run.model.holds if one.component == path and one.reaction >= 0)
+    carried = np.abs(run[run.model.flat_variables[held.reaction].path])
+    changes = [0, *(np.flatnonzero(np.diff(values)) + 1), len(values)]
+    for k, end in pairwise(changes):
+        now = mode.names[values[k]]
+        carries = np.max(carried[k:end]) > _CARRIES * np.max(carried)
+        yield float(run.time[k]), HELD if now in mode.holds else SLIDES if carries else OPEN, now.replace("_", " ")
 
 
 def _path(part: Component) -> str:

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator
 
-import numpy as np
-
 from modelica_like.compile.compiled import Vector
 from modelica_like.draw.diagram import Diagram, diagram
 from modelica_like.errors import ModelicaLikeError
@@ -25,7 +23,8 @@ _COMPARED = {
     "kg.m2": ("inertia", "kg.cm2 for kg.m2"), "kg": ("mass", "g for kg"),
     "N.m/rad": ("stiffness", "N.m/rad for kN.m/rad"), "N/m": ("stiffness", "N/m for kN/m"),
 }  # fmt: skip
-_HERTZ, _RADIANS = parse_unit("Hz"), parse_unit("rad/s")
+_PASSED = (*_COMPARED, "N.m.s/rad", "N.s/m")
+_HERTZ = parse_unit("Hz")
 
 
 def drive_notes(drive: Component) -> list[str]:
@@ -56,7 +55,7 @@ def run_notes(drive: Component, run: Solution) -> list[str]:
     return [
         *([f"{names} never {verb} 0 during the whole run."] if idle else []),
         *held,
-        *_resonances(run),
+        *_resonances(drive, run),
     ]
 
 
@@ -77,8 +76,8 @@ def _neighbours(drawn: Diagram) -> Iterator[str]:
                 for other in joined[pending.popleft()] - reached:
                     reached.add(other)
                     if other not in sized:
-                        # Parts behind a gear or inside an assembly are seen through a ratio.
-                        if other.component and not other.component.parts and "ratio" not in other.component.fields:
+                        # What else is in between, such as a gear or an assembly, may have a ratio.
+                        if other.component and any(_size(other.component, one) for one in _PASSED):
                             pending.append(other)
                         continue
                     near, size = sized[other]
@@ -118,10 +117,8 @@ def _unread(drawn: Diagram) -> Iterator[str]:
 
 def _input(drive: Component, hold: HeldMotion) -> str | None:
     """Return the path of the input of a component that holds, if it has one."""
-    part = drive
-    for name in filter(None, hold.component.split(".")):
-        part = part.parts[name]
-    inputs = (name for name, field in part.fields.items() if isinstance(field, Input))
+    fields = _part(drive, hold.component).fields
+    inputs = (name for name, field in fields.items() if isinstance(field, Input))
     return next((f"{hold.component}.{name}".lstrip(".") for name in inputs), None)
 
 
@@ -141,11 +138,23 @@ def _unopened(drive: Component, run: Solution, hold: HeldMotion) -> Iterator[str
         yield f"{hold.component} holds during the whole run: nothing drives {path}, which is {value} by default."
 
 
-def _resonances(run: Solution) -> Iterator[str]:
+def _is_source(part: Component) -> bool:
+    """Whether it gives a signal and takes none."""
+    kinds = [type(field) for field in part.fields.values()]
+    return Output in kinds and Input not in kinds
+
+
+def _part(drive: Component, path: str) -> Component:
+    for name in filter(None, path.split(".")):
+        drive = drive.parts[name]
+    return drive
+
+
+def _resonances(drive: Component, run: Solution) -> Iterator[str]:
     excited = {
-        one.path: value * (1.0 if one.unit == _HERTZ else 0.5 / np.pi)
+        one.path: value
         for one, value in zip(run.model.flat_parameters, run.model.p, strict=True)
-        if one.path.rpartition(".")[2] in ("f", "frequency") and one.unit in (_HERTZ, _RADIANS) and value > 0.0
+        if one.unit == _HERTZ and value > 0.0 and _is_source(_part(drive, one.path.rpartition(".")[0]))
     }
     if not excited:
         return

@@ -60,7 +60,6 @@ def signal_of(values: list[float]) -> Solution:
 
 def test_the_example_of_astm_e1049() -> None:
     """Figure 6 of the standard: ranges 3 (0.5), 4 (1.5), 6 (0.5), 8 (1), 9 (0.5)."""
-    pytest.importorskip("rainflow")
     found = load_spectrum(signal_of([-2, 1, -3, 5, -1, 3, -4, 4, -2]), "s.y")
     counts: dict[float, float] = {}
     for size, count in zip(2 * found.amplitudes, found.counts, strict=True):
@@ -74,7 +73,6 @@ def test_the_example_of_astm_e1049() -> None:
 
 def test_the_damage_of_a_steady_vibration() -> None:
     """20 cycles of ±100 N.m about 40 N.m; a mean counts as 0.3 of its size."""
-    pytest.importorskip("rainflow")
     drive = Assembly("d", parts={"s": Sine(amplitude="100 N.m", offset="40 N.m", f=10.0, phase=pi / 2)})
     spectrum = load_spectrum(simulate(drive, 2.0, points=2000), "s.y")
     line = WoehlerLine(100.0, 2e6, 6.0)

@@ -41,7 +41,17 @@ def test_a_branch_shows_what_goes_there() -> None:
     # In gear 1 all goes through the ring, and clutch_e is free.
     assert found["clutch_e.flange_a"][0] < 1e-3 * found["clutch_e.flange_a"][-1]
     assert found["front.ring"][-1] == pytest.approx(found["clutch_a.flange_a"][-1], rel=1e-3)
-    assert found["clutch_speed.flange"] == [0.0] if "clutch_speed.flange" in found else True
+
+
+def test_a_sensor_takes_no_power() -> None:
+    drive = load(EXAMPLES / "dc_bench.toml")
+    drawn = layout(drive)
+    found = running(drawn, simulate(drive), flow=True).powers
+    line = next(line for line in found if any(port.node.name == "clutch_speed" for port in line.ports))
+    sensor = next(tip for port, tip in line.tips.items() if port.node.name == "clutch_speed")
+    at_sensor = [power for a, b, power in found[line] if sensor in (a, b)]
+    assert at_sensor == [0.0]
+    assert max(abs(power) for *_, power in found[line]) > 1.0
 
 
 def test_power_at_a_time_is_torque_times_speed() -> None:
@@ -63,6 +73,15 @@ def test_modes_have_looks() -> None:
     (clutch,) = (shown for node, shown in moving.items() if node.name == "clutch")
     assert [look for _, look, _ in clutch] == ["slides", "held"]
     assert clutch[1][0] == pytest.approx(0.265473, abs=1e-6), "document 003"
+
+
+def test_what_carries_nothing_is_open() -> None:
+    drive = load(EXAMPLES / "lepelletier.toml")
+    shown = running(layout(drive), simulate(drive), at=1.4).modes
+    looks = {node.name: looks[-1][1] for node, looks in shown.items()}
+    # Gear 1: clutch A and brake D hold.
+    names = ("clutch_a", "clutch_b", "clutch_e", "brake_c", "brake_d")
+    assert [looks[name] for name in names] == ["held", "open", "open", "open", "held"]
 
 
 def test_an_animation_switches_all_modes_once_per_cycle() -> None:

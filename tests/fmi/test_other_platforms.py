@@ -62,9 +62,10 @@ def macos_exports(data: bytes) -> tuple[int, set[str]]:
     ("platform", "read", "machine"),
     [("x86_64-windows", windows_exports, X86_64), ("aarch64-darwin", macos_exports, ARM64)],
 )
-def test_only_the_fmi_functions_are_exported(platform, read, machine, tmp_path):
+def test_only_declared_functions_are_exported(platform, read, machine, tmp_path):
     model = build_model(EXAMPLES / "fan.toml")
     sources = generate(model, interface(model), "3.0", token="{t}")
     library = build(sources, platform, tmp_path)
     declared = set(re.findall(r"FMI3_Export \w+\s+(fmi\w+);", sources["fmi3Functions.h"]))
+    declared |= set(re.findall(r"EXPORTED \w+ (modelica_like_\w+)\(", sources["modelica_like.h"]))
     assert read(library.read_bytes()) == (machine, declared)

@@ -57,7 +57,7 @@ def test_a_battery_is_discharged() -> None:
 
 def test_a_battery_tells_that_it_is_empty_or_full() -> None:
     empty = discharged(Battery(**CELL, soc=0.1), 2.0, 400.0)
-    assert notices(empty) == ["At 360 s b is empty: it gives what it does not have."]
+    assert notices(empty) == ["At 360 s b is empty: it gives more than it had."]
     full = discharged(Battery(**CELL, soc=0.9), -2.0, 400.0)
     assert notices(full) == ["At 360 s b is overcharged."]
     partly = discharged(Battery(ocv=((0.2, 3.0), (0.9, 4.0)), Q="2 A.h", soc=0.4), 2.0, 800.0)

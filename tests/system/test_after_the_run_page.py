@@ -5,8 +5,6 @@ from pathlib import Path
 
 import pytest
 
-pytest.importorskip("rainflow")
-
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "after_the_run.md"
 
