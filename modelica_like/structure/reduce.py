@@ -133,12 +133,14 @@ def reduce(flat: FlatModel) -> ReducedDae:
     unknowns = _unknowns(system, states)
     if flags.settle(residual, unknowns):
         residual, origins = _differentiate(system, counts)
-    solved = BlockSolver(residual, system.column(unknowns), _volatile(system)).run()
+    derivatives = {system.derivative(state) for state in states}
+    rates = [k for k, unknown in enumerate(unknowns) if unknown in derivatives]
+    solved = BlockSolver(residual, system.column(unknowns), _volatile(system), rates).run()
     order = [(system.symbols[unknowns[k]], expression) for k, expression in solved.order]
     circuits = find_circuits(system, holds, order, states)
     if circuits:
         residual = share_reactions(system, holds, circuits, residual)
-        solved = BlockSolver(residual, system.column(unknowns), _volatile(system)).run()
+        solved = BlockSolver(residual, system.column(unknowns), _volatile(system), rates).run()
     reduced = _assemble(system, counts, states, unknowns, origins, solved)
     held = tuple(replace(one, state=reduced.node_states[one.motion]) for one in holds)
     ode = held_rates(reduced.flat, reduced.ode, reduced.values, held, circuits)
