@@ -42,7 +42,7 @@ def simulate(
     points: Annotated[int | None, Option(metavar="N", help="Number of equal intervals of the results.")] = None,
     units: Annotated[bool, Option("--units", help="Units in a second header line of the table.")] = False,
     plot: Annotated[Path | None, Option(metavar="FILE", help="Draw the results: .png, .svg or .pdf.")] = None,
-    show: Annotated[list[str] | None, Option(metavar="PATTERN", help="Variables to draw, e.g. '*.w'.")] = None,
+    show: Annotated[list[str] | None, Option(metavar="PATTERN", help="Curves: '*.w', '2*pi*motor.w'.")] = None,
     display: Annotated[
         list[str] | None, Option(metavar="WHAT=UNIT", help="Unit of results, e.g. speed=rpm or '*.phi=deg'.")
     ] = None,
@@ -63,10 +63,10 @@ def simulate(
         from modelica_like.simulation import simulate as run
         from modelica_like.solve.display import Display
         from modelica_like.solve.plot import plot as draw
-        from modelica_like.solve.trajectories import matching
+        from modelica_like.solve.signals import read_signals
 
         model = build(assembly)
-        matching(model, show or ())
+        read_signals(model, show or ())
         shown = assigned(display, "--display")
         Display(model, shown)
         with Bar(until or model.settings.get("until")) as bar:
@@ -74,8 +74,8 @@ def simulate(
                 lambda: run(model, until, start=start, points=points, progress=bar, solver=solver), debug=debug
             )
         energy = energy and made.stopped is None and made.attempt("The energy balance", made.solution.energy)
-        made.tell(lambda one: run_report(one, energy=energy, debug=debug, display=shown), csv)
+        made.tell(lambda one: run_report(one, energy=energy, debug=debug, display=shown, show=show or ()), csv)
         made.attempt("The notes", lambda: note(*notes(assembly, made.solution)))
         curves = (plot, lambda one: draw(one, show or (), display=shown))
         pictures = curves, (sankey, lambda one: one.energy().sankey(model.name))
-        made.write(csv, units=units or bool(display), display=shown, pictures=pictures)
+        made.write(csv, units=units or bool(display), display=shown, pictures=pictures, show=show or ())

@@ -135,11 +135,8 @@ class _Flattener:
     def _declare_variable(self, owner: Declared, name: str, path: str, kind: str, field: Variable) -> None:
         self.variable_of[id(owner), name] = len(self.variables)
         unit = coherent(self.wiring.inferred.get((id(owner), name)) or unit_of_field(owner, name))
-        self.variables.append(
-            FlatVariable(
-                path, unit, field.description, kind, field.state, field.guess, field.nominal, field.min, field.max
-            )
-        )
+        limits = field.nominal, field.min, field.max, field.driving
+        self.variables.append(FlatVariable(path, unit, field.description, kind, field.state, field.guess, *limits))
 
     def _declare_discrete(self, component: Component, name: str, path: str, field: Discrete) -> None:
         value = component.start(name)
