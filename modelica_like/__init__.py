@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from modelica_like.native.page import export_html as export_html
     from modelica_like.netlist import load as load
     from modelica_like.report.compare import compare as compare
+    from modelica_like.report.overlay import overlay as overlay
     from modelica_like.report.page import save_report as save_report
     from modelica_like.simulation import build as build
     from modelica_like.simulation import simulate as simulate
@@ -77,6 +78,7 @@ _HOME = {
     "load_spectrum": "modelica_like.analyse.after.spectra",
     "order_map": "modelica_like.analyse.after.orders",
     "order_response": "modelica_like.analyse.after.orders",
+    "overlay": "modelica_like.report.overlay",
     "run_fmu": "modelica_like.fmi.run",
     "save_report": "modelica_like.report.page",
     "save_schematic": "modelica_like.draw",

@@ -157,7 +157,9 @@ def draw_panels(
         for axes, panel in zip(rows, panels, strict=False):
             panel.draw(axes)
             label = with_unit(panel.quantity, panel.unit)
-            axes.set_ylabel(label if text_width(label, 9.0) < _HEIGHT else label.replace(" in ", "\nin "))
+            label = label if text_width(label, 9.0) < _HEIGHT else label.replace(" in ", "\nin ")
+            longest = max(text_width(line, 9.0) for line in label.split("\n"))
+            axes.set_ylabel(label, fontsize=9.0 * min(1.0, _HEIGHT / max(longest, 1e-9)))
             axes.margins(y=0.08)
             if panel.labels:
                 axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), borderaxespad=0.0)
@@ -168,9 +170,9 @@ def draw_panels(
                 axes.axvline(t, color="#999999", linewidth=0.7, linestyle=":", zorder=0.5)
         rows[-1].set_xlabel("time in s")
         rows[-1].set_xlim(*reach)
+        figure.align_ylabels(rows[: len(panels)])
         shares = [(t - reach[0]) / (reach[1] - reach[0]) for t, _ in marks]
         numbered(rows[0], shares, width - _BESIDE - legend)
-        figure.align_ylabels(rows[: len(panels)])
     return figure
 
 

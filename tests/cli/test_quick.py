@@ -21,6 +21,7 @@ CALLS = [
     "simulate a.toml",
     "simulate a.toml --until 2s --start rest --csv=out.csv --points 7 --units --show x --show=y.*",
     "simulate --no-energy a.toml --points=250 --energy --no-energy --sankey s.svg --plot p.png",
+    "simulate a.toml --plot p.png --compare measured.csv --compare gear.ratio=2,3 --show 2*pi*a.w",
     "draw a.toml -o a.svg --depth 2",
     "draw a.toml --at 1s --flow --animate --until 2s",
     "report a.toml -o a.html --until 1s --show *.w",
