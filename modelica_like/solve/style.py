@@ -14,6 +14,7 @@ STYLE: Any = {
     "font.size": 9, "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True, "grid.color": "#e4e4e4",
     "grid.linewidth": 0.6, "axes.axisbelow": True, "axes.edgecolor": "#666666", "xtick.color": "#444444",
     "ytick.color": "#444444", "lines.linewidth": 1.5, "legend.frameon": False, "legend.fontsize": 8,
+    "axes.formatter.useoffset": False,
 }  # fmt: skip
 DPI = 200
 # Okabe and Ito's palette: distinct also for colour-blind readers.
@@ -52,7 +53,7 @@ def picture(
                 figure.text((0.1 + x) / width, y / whole, line, fontsize=_FOOTER, color="#444444", va="top",
                             parse_math=False)  # fmt: skip
             foot -= _LINE * rows + 0.05
-        yield figure, list(figure.subplots(count, 1, sharex=True, squeeze=False, **grid)[:, 0])
+        yield figure, list(figure.subplots(count, 1, squeeze=False, **({"sharex": True} | grid))[:, 0])
 
 
 def _columns(block: Sequence[str], width: float) -> tuple[int, list[tuple[str, float, int]]]:
