@@ -22,7 +22,8 @@ _HATCHES = ("", "////", "....", "xxxx")
 _HEIGHT, _ROW = 1.5, 0.19
 _BESIDE = 1.25
 """Inches that the labels of the vertical axis and the margins take."""
-_WRAPPED = 150
+_LETTER = 0.064
+"""Inches that a letter of the text below takes at most on average."""
 _SHORT = 1e-5
 """Part of the run that is too short to be drawn."""
 
@@ -150,9 +151,10 @@ def draw_panels(
     count = max(len(panels), 1) + bool(bands)
     heights = [_HEIGHT] * max(len(panels), 1) + [_ROW * max(len(bands), len(states) * 0.8) + 0.1] * bool(bands)
     reach = float(time[0]), float(time[-1])
-    below = [[f"{k}  {_told(t)} s  {text}" for k, (t, text) in enumerate(marks, 1)],
-             [line for note in notes for line in wrap(note, _WRAPPED, subsequent_indent="    ")]]  # fmt: skip
-    below[0] = [line for text in below[0] for line in wrap(text, _WRAPPED, subsequent_indent="      ")]
+    told = [f"{k}  {_told(t)} s  {text}" for k, (t, text) in enumerate(marks, 1)]
+    wrapped = [(one, _wrapped(told, (width - 0.2) / one - 0.3)) for one in (1, 2, 3)]
+    _, listed = min(wrapped, key=lambda pair: -(-len(pair[1]) // pair[0]))
+    below = [listed, _wrapped(notes, width - 0.5)]
     with picture(title, count, 0.85 + sum(heights), width=width, below=below, height_ratios=heights) as (figure, rows):
         for axes, panel in zip(rows, panels, strict=False):
             panel.draw(axes)
@@ -174,6 +176,11 @@ def draw_panels(
         shares = [(t - reach[0]) / (reach[1] - reach[0]) for t, _ in marks]
         numbered(rows[0], shares, width - _BESIDE - legend)
     return figure
+
+
+def _wrapped(texts: Sequence[str], room: float) -> list[str]:
+    """Break texts into lines that have room, in inches."""
+    return [line for text in texts for line in wrap(text, int(room / _LETTER), subsequent_indent="      ")]
 
 
 def _looks(bands: Sequence[Bands]) -> dict[str, tuple[str, str]]:

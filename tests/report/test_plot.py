@@ -121,7 +121,9 @@ def clashes(figure: Figure) -> list[tuple[str, str]]:
     ]  # fmt: skip
 
 
-@pytest.mark.parametrize("drive", ["launch", "winch", "dc_bench_speed_control"])
+@pytest.mark.parametrize(
+    "drive", ["launch", "winch", "dc_bench_speed_control", "msl/rotational/Backlash", "msl/translational/PreLoad"]
+)
 def test_no_label_overlaps_another(drive: str) -> None:
     run = simulate(EXAMPLES / f"{drive}.toml", points=50)
     assert clashes(run.plot()) == []
