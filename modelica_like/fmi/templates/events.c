@@ -157,7 +157,7 @@ static void keep_wanting(Instance *c, const double *soon, unsigned char *wanting
 /* Before one of several that hold a motion gives way, let the others take more. */
 static Result share_anew(Instance *c, unsigned char *wanting) {
     double *soon = c->work.guards;
-    if (c->model->n_circuits == 0 || (c->bounded && !anything_shared(c))) return RESULT_OK;
+    if (!anything_shared(c)) return RESULT_OK;
     share(c);
     c->variables_valid = 0;
     if (solve_now(c, 0) != RESULT_OK) return RESULT_ERROR;
