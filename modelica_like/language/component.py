@@ -64,8 +64,17 @@ class Component(Declared):
         plain |= {name: table.default for name, table in tables.items()}
         cls._tables = {name: table for base in ancestors for name, table in base._tables.items()} | tables
         cls._structural = {name: value for base in ancestors for name, value in base._structural.items()} | plain
-        for name in (*cls._class_fields, *cls._class_connectors, *cls._class_modes, *cls._class_parts):
+        for name in (
+            *cls._class_fields,
+            *cls._class_connectors,
+            *cls._class_modes,
+            *cls._class_parts,
+            *cls._structural,
+        ):
             require_identifier(name, cls.__name__)
+            if hasattr(Component, name):
+                what = f"{cls.__name__} declares '{name}', which every component has already."
+                raise DuplicateName(what, where=caller(), advice="Choose another name.")
         for mode in cls._class_modes.values():
             mode.check()
 
