@@ -10,8 +10,10 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
+from modelica_like.analyse.linear.model import Modes
 from modelica_like.draw.diagram import diagram
 from modelica_like.draw.running import running
+from modelica_like.draw.shapes import shapes
 from modelica_like.draw.sheet import Sheet, sheet
 from modelica_like.draw.svg import svg
 from modelica_like.errors import NetlistError, missing_extra
@@ -24,6 +26,7 @@ if TYPE_CHECKING:
 
 _PACKAGES = {".pdf": "svglib", ".png": "resvg_py"}
 FORMATS = (".pdf", ".png", ".svg")
+_SHAPES = 4
 _SHARP = 2
 """Pixels of a PNG file per unit of the drawing."""
 
@@ -40,7 +43,7 @@ def layout(component: Component, *, depth: int = 1) -> Sheet:
 
 def schematic(
     component: Component, *, depth: int = 1, background: bool = True, run: Trajectories | None = None,
-    at: float | None = None, flow: bool = False, moving: bool = False,
+    at: float | None = None, flow: bool = False, moving: bool = False, modes: Modes | None = None,
 ) -> str:  # fmt: skip
     """Draw a drive as SVG: power from left to right, a symbol for each machine element.
 
@@ -52,13 +55,15 @@ def schematic(
         at: time in s whose modes and powers are shown; by default modes at the end and mean powers.
         flow: show power as the width of lines, and in numbers.
         moving: animate the modes of the whole run.
+        modes: small motions of the drive, drawn below: the shapes of the first four oscillations.
 
     Raises:
         ValueOutOfRange: the run has no such time.
     """
     drawn = layout(component, depth=depth)
     added = running(drawn, run, at=at, flow=flow, moving=moving) if run is not None else None
-    return svg(drawn, component.label, background=background, run=added)
+    below = shapes(drawn, modes, _SHAPES) if modes is not None else ()
+    return svg(drawn, component.label, background=background, run=added, shapes=below)
 
 
 def check_format(path: Path, *, moving: bool = False) -> None:
@@ -86,7 +91,7 @@ def check_format(path: Path, *, moving: bool = False) -> None:
 
 def save_schematic(
     component: Component, path: str | Path, *, depth: int = 1, run: Trajectories | None = None,
-    at: float | None = None, flow: bool = False, moving: bool = False,
+    at: float | None = None, flow: bool = False, moving: bool = False, modes: Modes | None = None,
 ) -> None:  # fmt: skip
     """Write the schematic of a drive as SVG, PNG or PDF, by the ending of the file.
 
@@ -98,6 +103,7 @@ def save_schematic(
         at: time in s, as of `schematic`.
         flow: show power.
         moving: animate the modes; SVG only.
+        modes: small motions, as of `schematic`.
 
     Raises:
         NetlistError: the ending is none of these, or the format does not move.
@@ -107,7 +113,7 @@ def save_schematic(
     """
     path = Path(path)
     check_format(path, moving=moving)
-    text = schematic(component, depth=depth, run=run, at=at, flow=flow, moving=moving)
+    text = schematic(component, depth=depth, run=run, at=at, flow=flow, moving=moving, modes=modes)
     convert = {".svg": str.encode, ".png": _png, ".pdf": _pdf}[path.suffix.lower()]
     write_bytes(path, convert(text))
 

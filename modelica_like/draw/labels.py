@@ -36,6 +36,11 @@ class Text:
         west = self.at[0] - wide * {"start": 0.0, "middle": 0.5, "end": 1.0}[self.anchor]
         return west, self.at[1] - self.size, west + wide, self.at[1] + 2.0
 
+    def meets(self, other: Text) -> bool:
+        """Whether its box overlaps that of another text."""
+        (a, b, c, d), (west, north, east, south) = self.box, other.box
+        return a < east and west < c and b < south and north < d
+
 
 def text_width(text: str, size: float) -> float:
     """Width of a text in a sans-serif font, slightly overestimated."""

@@ -114,7 +114,7 @@ def _looks(part: Component, run: Trajectories) -> Iterator[tuple[float, str, str
     name = next((one for one, mode in part.modes.items() if mode.holds), None)
     if name is None:
         return
-    path, mode = _path(part), part.modes[name]
+    path, mode = path_of(part), part.modes[name]
     values = run[f"{path}.{name}"].astype(int)
     # A hold knows its reaction only by the node of the flat system.
     held = next(one for one in run.model.holds if one.component == path and one.reaction >= 0)
@@ -126,7 +126,8 @@ def _looks(part: Component, run: Trajectories) -> Iterator[tuple[float, str, str
         yield float(run.time[k]), HELD if now in mode.holds else SLIDES if carries else OPEN, now.replace("_", " ")
 
 
-def _path(part: Component) -> str:
+def path_of(part: Component) -> str:
+    """Return the path of a part in the whole drive."""
     names = list[str]()
     while part._owner is not None:
         names.append(part._name)
@@ -175,10 +176,10 @@ def _beyond(cut: frozenset[Point], edges: Iterable[frozenset[Point]], into: Mapp
 def _into(port: Port, run: Trajectories, at: float | None) -> float | None:
     """Power in W into a part through a port: now, or its mean."""
     part = port.node.component
-    connector = part and _connector(part, port.name)
+    connector = part and used_connector(part, port.name)
     if part is None or connector is None:
         return None
-    path = f"{_path(part)}.{port.name}"
+    path = f"{path_of(part)}.{port.name}"
     known: Mapping[str, np.ndarray] = {
         name: run[f"{path}.{name}"] for name in connector.fields if f"{path}.{name}" in run
     }
@@ -201,7 +202,8 @@ def _into(port: Port, run: Trajectories, at: float | None) -> float | None:
     return float(np.interp(at, middles, rates) * np.interp(at, run.time, flow)) if moves.any() else 0.0
 
 
-def _connector(part: Component, name: str) -> Connector | None:
+def used_connector(part: Component, name: str) -> Connector | None:
+    """Return a connector of a part, if something is connected to it."""
     found = part.connectors.get(name)
     return found if found is not None and found.used else None
 
