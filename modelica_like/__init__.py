@@ -107,5 +107,6 @@ _OFFERED |= {
     "html": "modelica_like.report.notebook",
     "plot": "modelica_like.solve.plot",
     "sankey": "modelica_like.solve.sankey",
+    "size": "modelica_like.sizing.run",
 }
 provide(tuple(_OFFERED), lambda name: getattr(import_module(_OFFERED[name]), name))

@@ -13,11 +13,11 @@ from modelica_like.cli.shared import Assignments, Debug, Netlist, load_netlist, 
 def modes(
     netlist: Netlist, assignments: Assignments = None, *,
     at: Annotated[
-        str | None, Option(metavar="WHEN", help="Time, e.g. 0.5s, or given, rest, steady; default: the netlist's start.")
+        str | None, Option(metavar="WHEN", help="Time, e.g. 0.5s, or given, rest, steady; else as the netlist starts.")
     ] = None,
     shapes: Annotated[Path | None, Option(metavar="FILE", help="Draw the shapes of the modes.")] = None,
     show: Annotated[list[str] | None, Option(metavar="NAME", help="Variables along the shapes.")] = None,
-    draw: Annotated[Path | None, Option(metavar="FILE", help="Schematic with the shapes below, .svg .png .pdf.")] = None,
+    draw: Annotated[Path | None, Option(metavar="FILE", help="Schematic with shapes below: .svg, .png, .pdf.")] = None,
     bode: Annotated[Path | None, Option(metavar="FILE", help="Draw the frequency response.")] = None,
     inputs: Annotated[list[str] | None, Option("--input", metavar="NAME", help="Input or parameter.")] = None,
     outputs: Annotated[list[str] | None, Option("--output", metavar="NAME", help="Variable.")] = None,

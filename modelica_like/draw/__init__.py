@@ -11,13 +11,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
 from modelica_like.analyse.linear.model import Modes
-from modelica_like.draw.diagram import diagram
-from modelica_like.draw.running import running
+from modelica_like.draw.diagram import Notes, diagram
+from modelica_like.draw.running import energy_notes, running
 from modelica_like.draw.shapes import shapes
 from modelica_like.draw.sheet import Sheet, sheet
 from modelica_like.draw.svg import svg
 from modelica_like.errors import NetlistError, missing_extra
 from modelica_like.language.component import Component
+from modelica_like.solve.energy import EnergyBalance
 from modelica_like.solve.trajectories import Trajectories
 from modelica_like.writing import check_writable, write_bytes
 
@@ -31,19 +32,21 @@ _SHARP = 2
 """Pixels of a PNG file per unit of the drawing."""
 
 
-def layout(component: Component, *, depth: int = 1) -> Sheet:
+def layout(component: Component, *, depth: int = 1, notes: Notes | None = None) -> Sheet:
     """Place the parts and connections of a drive on a sheet.
 
     Args:
         component: the drive.
         depth: number of levels of open assemblies.
+        notes: returns texts below the name of a part.
     """
-    return sheet(diagram(component, depth))
+    return sheet(diagram(component, depth, notes))
 
 
 def schematic(
     component: Component, *, depth: int = 1, background: bool = True, run: Trajectories | None = None,
-    at: float | None = None, flow: bool = False, moving: bool = False, modes: Modes | None = None,
+    at: float | None = None, flow: bool = False, moving: bool = False, balance: EnergyBalance | None = None,
+    modes: Modes | None = None,
 ) -> str:  # fmt: skip
     """Draw a drive as SVG: power from left to right, a symbol for each machine element.
 
@@ -55,13 +58,14 @@ def schematic(
         at: time in s whose modes and powers are shown; by default modes at the end and mean powers.
         flow: show power as the width of lines, and in numbers.
         moving: animate the modes of the whole run.
+        balance: of the run: energies, also as shares of what came in, are shown instead of powers.
         modes: small motions of the drive, drawn below: the shapes of the first four oscillations.
 
     Raises:
         ValueOutOfRange: the run has no such time.
     """
-    drawn = layout(component, depth=depth)
-    added = running(drawn, run, at=at, flow=flow, moving=moving) if run is not None else None
+    drawn = layout(component, depth=depth, notes=energy_notes(balance) if balance else None)
+    added = running(drawn, run, at=at, flow=flow, moving=moving, balance=balance) if run is not None else None
     below = shapes(drawn, modes, _SHAPES) if modes is not None else ()
     return svg(drawn, component.label, background=background, run=added, shapes=below)
 

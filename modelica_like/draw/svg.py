@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from xml.sax.saxutils import escape
 
-from modelica_like.draw.labels import NAME, VALUE, Text
+from modelica_like.draw.labels import NAME, VALUE, Text, meet
 from modelica_like.draw.running import HELD, OPEN, SLIDES, Running
 from modelica_like.draw.shapes import Shape
 from modelica_like.draw.sheet import TITLE, Line, Placed, Point, Sheet, texts
@@ -106,9 +107,8 @@ def _line(at: Point, line: Line, run: Running) -> Iterator[str]:
             f'<circle class="{_css(stroke)}-dot" cx="{_n(at[0] + x)}" cy="{_n(at[1] + y)}" '
             f'r="{_n(stroke.width + 1.0)}" fill="{stroke.colour}"/>'
         )
-    if said := run.said(line):
-        (x, y), text = said
-        yield _text(Text(text, (at[0] + x, at[1] + y + 16.0), VALUE))
+    for one in run.said.get(line, ()):
+        yield _text(replace(one, at=(at[0] + one.at[0], at[1] + one.at[1])))
     for (x, y), way in line.arrows:
         turn = {"E": 0, "S": 90, "W": 180, "N": 270}[way]
         yield (
@@ -156,7 +156,7 @@ def _shape(shape: Shape, top: float, width: float) -> Iterator[str]:
         )
         said = Text(one.said, ((x1 + x2) / 2, y1 + (14.0 if y1 > zero else -5.0)), VALUE)
         # Branches lie above one another: the first number stays.
-        if one.said and not any(said.meets(other) for other in written):
+        if one.said and not any(meet(said.box, other.box) for other in written):
             written.append(said)
             yield _text(said)
 

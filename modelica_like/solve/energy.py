@@ -112,6 +112,11 @@ class EnergyBalance:
         return -sum(row.source for row in self.rows if row.source < 0)
 
     @property
+    def supply(self) -> float:
+        """Energy from sources and stores, component by component, J."""
+        return sum(max(row.source, 0.0) + max(-row.stored, 0.0) for row in self.rows)
+
+    @property
     def efficiency(self) -> float:
         """Energy that loads took away over energy from sources and stores; nan without any."""
         given = sum(max(row.source, 0.0) for row in self.rows) + max(-self.stored, 0.0)
