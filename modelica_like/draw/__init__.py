@@ -70,6 +70,18 @@ def schematic(
     return svg(drawn, component.label, background=background, run=added, shapes=below)
 
 
+def icon(component: Component) -> tuple[str, bytes | None]:
+    """Draw a drive as its icon, with closed assemblies: as SVG, and as PNG if the extra `pictures` is installed.
+
+    The same drive gives the same bytes on every machine.
+
+    Args:
+        component: the drive.
+    """
+    text = schematic(component, depth=0)
+    return text, _png(text, alike=True) if find_spec(_PACKAGES[".png"]) else None
+
+
 def check_format(path: Path, *, moving: bool = False) -> None:
     """Raise an error if a schematic cannot be written there.
 
@@ -122,13 +134,19 @@ def save_schematic(
     write_bytes(path, convert(text))
 
 
-def _png(text: str) -> bytes:
-    import matplotlib
+def _png(text: str, *, alike: bool = False) -> bytes:
+    """Return an SVG as PNG, with the fonts of the machine, or `alike` on all machines."""
     import resvg_py
 
     # A machine without fonts has those of matplotlib.
-    fonts = [str(Path(matplotlib.get_data_path()) / "fonts" / "ttf")]
-    return bytes(resvg_py.svg_to_bytes(svg_string=text, zoom=_SHARP, font_dirs=fonts, sans_serif_family="DejaVu Sans"))
+    package = find_spec("matplotlib")
+    fonts = [str(Path(str(package and package.origin)).parent / "mpl-data" / "fonts" / "ttf")]
+    return bytes(
+        resvg_py.svg_to_bytes(
+            svg_string=text, zoom=1 if alike else _SHARP, skip_system_fonts=alike, font_dirs=fonts,
+            sans_serif_family="DejaVu Sans",
+        )
+    )  # fmt: skip
 
 
 def _pdf(text: str) -> bytes:
