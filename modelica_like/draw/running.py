@@ -204,7 +204,7 @@ def path_of(part: Component) -> str:
 
 def _pieces(line: Line, run: Trajectories, at: float | None) -> list[Piece]:
     """Pieces of a line between its corners and branches, and what passes each: the powers of all parts beyond it."""
-    known = {_rounded(tip): _into(port, run, at) for port, tip in line.tips.items()}
+    known = {_rounded(tip): power_into(port, run, at) for port, tip in line.tips.items()}
     lacking = [tip for tip, power in known.items() if power is None]
     if len(lacking) > 1 or len(known) < 2:
         return []
@@ -240,8 +240,8 @@ def _beyond(cut: frozenset[Point], edges: Iterable[frozenset[Point]], into: Mapp
     return sum(power for tip, power in into.items() if tip in reached)
 
 
-def _into(port: Port, run: Trajectories, at: float | None) -> float | None:
-    """Power in W into a part through a port: now, or its mean."""
+def power_into(port: Port, run: Trajectories, at: float | None = None) -> float | None:
+    """Return the power in W into a part through a port at a time, or its mean; None where the run does not tell it."""
     part = port.node.component
     connector = part and used_connector(part, port.name)
     if part is None or connector is None:
