@@ -18,8 +18,11 @@ from modelica_like.sizing.document import SizingDocument, placed, read_document
 from modelica_like.sizing.formulas import Value, read_value
 from modelica_like.sizing.simulated import Simulations
 from modelica_like.units import ONE, to_si
+from modelica_like.upper import Shown
 
 if TYPE_CHECKING:
+    from rich.console import RenderableType
+
     from modelica_like.solve.solution import Solution
 
 _OWN = ("is", "note", "limits", "published")
@@ -57,13 +60,18 @@ class CheckedResult:
 
 
 @dataclass(frozen=True)
-class Sizing:
+class Sizing(Shown):
     """All design checks of a file in their order, and names of checks to compare, by heading."""
 
     name: str
     description: str
     checks: tuple[CheckedResult, ...]
     compare: dict[str, list[str]]
+
+    def __rich__(self) -> RenderableType:
+        from modelica_like.sizing.report import sizing_report
+
+        return sizing_report(self)
 
     @property
     def exceeded(self) -> int:

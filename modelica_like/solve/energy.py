@@ -13,7 +13,7 @@ from modelica_like.initialize import Impact, Point, call, solve_implicit
 from modelica_like.solve.options import Options
 from modelica_like.solve.powers import POWERS, Powers, Results, results
 from modelica_like.solve.recorder import Event, Segment
-from modelica_like.upper import upper
+from modelica_like.upper import Shown, upper
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -69,7 +69,7 @@ class EnergyRow:
 
 
 @dataclass(frozen=True)
-class EnergyBalance:
+class EnergyBalance(Shown):
     """Energy balance of a run, component by component.
 
     Attributes:
