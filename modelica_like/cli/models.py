@@ -92,7 +92,7 @@ def simulate(
             )
         energy = energy and made.stopped is None and made.attempt("The energy balance", made.solution.energy)
         made.tell(lambda one: run_report(one, energy=energy, debug=debug, display=shown, show=show or ()), csv)
-        made.attempt("The notes", lambda: note(*notes(assembly, made.solution)))
+        made.attempt("The notes", lambda: note(*notes(assembly, made.solution, energy=energy)))
         again = partial(run, model, until, start=start, points=points)
         curves = (plot, lambda one: _drawn(one, variants, files, again, show or (), shown))
         pictures = curves, (sankey, lambda one: one.energy().sankey(model.name))

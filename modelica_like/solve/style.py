@@ -25,16 +25,24 @@ _FOOTER, _LINE, _GAP = 7.5, 0.15, 0.3
 
 @contextmanager
 def picture(
-    title: str, count: int, height: float, *, width: float = 8.0, below: Sequence[Sequence[str]] = (), **grid: Any
+    title: str,
+    count: int,
+    height: float,
+    *,
+    width: float = 8.0,
+    below: Sequence[Sequence[str]] = (),
+    sharex: bool = True,
+    **grid: Any,
 ) -> Iterator[tuple[Figure, list[Any]]]:
     """Yield a figure in the package's style, to draw within the context, and its panels, one above the other.
 
     Args:
         title: heading.
-        count: number of panels; they share the horizontal axis.
+        count: number of panels.
         height: in inches, without the text below.
         width: in inches.
         below: blocks of lines below the panels, each in as many columns as fit side by side.
+        sharex: whether they share the horizontal axis.
         grid: of matplotlib's `subplots`.
     """
     import matplotlib as mpl
@@ -53,7 +61,7 @@ def picture(
                 figure.text((0.1 + x) / width, y / whole, line, fontsize=_FOOTER, color="#444444", va="top",
                             parse_math=False)  # fmt: skip
             foot -= _LINE * rows + 0.05
-        yield figure, list(figure.subplots(count, 1, squeeze=False, **({"sharex": True} | grid))[:, 0])
+        yield figure, list(figure.subplots(count, 1, sharex=sharex, squeeze=False, **grid)[:, 0])
 
 
 def _columns(block: Sequence[str], width: float) -> tuple[int, list[tuple[str, float, int]]]:

@@ -26,7 +26,7 @@ CALLS = [
     "draw a.toml --at 1s --flow --animate --until 2s",
     "report a.toml -o a.html --until 1s --show *.w",
     "explore a.toml --until 1s --show *.w -o folder --no-browser",
-    "modes a.toml --at=0.5s --input u --output a.w --output b.w --shapes m.png --bode b.svg",
+    "modes a.toml --at=0.5s --input u --output a.w --output b.w --shapes m.png --bode b.svg --draw d.svg",
     "modes a.toml --open pi.y --bode b.svg --nyquist n.svg",
     "steady a.toml --hold motor.w=4000 --by load --over load=0:0.25:26 --after 2s",
     "sweep a.toml --over a=1:2:3 --of max(x) --of b -o out.csv --plot p.png --processes 4 --checkpoint folder",
