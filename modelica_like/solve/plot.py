@@ -133,7 +133,7 @@ def picture_bytes(figure: Figure, kind: str, **options: Any) -> bytes:
     return content.getvalue()
 
 
-def chosen(solution: Trajectories, patterns: Sequence[str]) -> list[str]:
+def chosen(solution: Trajectories, patterns: Sequence[str] = ()) -> list[str]:
     """Return the names that match the patterns, or without patterns a choice of a few for a page.
 
     Raises:
