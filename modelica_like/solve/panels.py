@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 _MOST_EVENTS, _MOST_BANDS, _MOST_HELD = 24, 8, 16
 _HELD, _FIRST, _OTHERS = "#7fc097", "#dbe1e8", ("#f4b183", "#9dc3e6", "#ffe08a", "#cdb5e6", "#e8a9b8", "#c9b79c")
 _HATCHES = ("", "////", "....", "xxxx")
+_MOST_NAMES = 12
 _HEIGHT, _ROW = 1.5, 0.19
 _BESIDE = 1.25
 """Inches that the labels of the vertical axis and the margins take."""
@@ -81,7 +82,7 @@ def bands_of(run: Trajectories, wanted: Sequence[str] = ()) -> tuple[list[Bands]
     if not wanted and len(paths) > _MOST_BANDS and any(path in held for path in paths):
         paths = [path for path in paths if path in held]
     most = len(paths) if wanted else _MOST_HELD
-    left = [f"No bands: {', '.join(paths[most:])}."] if paths[most:] else []
+    left = [f"No bands: {listed(paths[most:])}."] if paths[most:] else []
     names = {one.path: tuple(one.names) for one in run.model.flat_discretes}
     least = _SHORT * float(run.time[-1] - run.time[0])
     spans = {path: tuple(one for one in mode_spans(run, path) if one[1] - one[0] > least) for path in paths[:most]}
@@ -116,14 +117,20 @@ def marks_of(run: Trajectories, banded: Sequence[str]) -> tuple[list[Mark], list
                 changes[event.mode.removesuffix(".mode")] = event.after
         if len(instants) <= _MOST_EVENTS:
             break
-    listed = dict(list(instants.items())[:_MOST_EVENTS])
-    marks = [(time, ", ".join(f"{mode}: {name}" for mode, name in what.items())) for time, what in listed.values()]
+    told = dict(list(instants.items())[:_MOST_EVENTS])
+    marks = [(time, ", ".join(f"{mode}: {name}" for mode, name in what.items())) for time, what in told.values()]
     rest: dict[str, int] = {}
     for event in run.events:
-        if event.mode.removesuffix(".mode") not in listed.get(_told(event.time), (0.0, {}))[1]:
+        if event.mode.removesuffix(".mode") not in told.get(_told(event.time), (0.0, {}))[1]:
             rest[event.mode] = rest.get(event.mode, 0) + 1
-    counts = ", ".join(f"{mode} {count}\u00d7" for mode, count in rest.items())
+    counts = listed([f"{mode} {count}\u00d7" for mode, count in rest.items()])
     return marks, [f"Not numbered: {counts}."] if rest else []
+
+
+def listed(names: Sequence[str]) -> str:
+    """Return names as a text; of many only the first, and the number of the others."""
+    shown = [*names[:_MOST_NAMES], *([f"{len(names) - _MOST_NAMES} others"] if len(names) > _MOST_NAMES else [])]
+    return ", ".join(shown)
 
 
 def _told(time: float) -> str:

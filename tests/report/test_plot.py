@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from components import Fixed, Inertia, SpringDamper
-from modelica_like import Solution, simulate
+from modelica_like import Solution, build, simulate
 from modelica_like.errors import ModelicaLikeError, NetlistError, UnitError, UnknownName
 from modelica_like.language import Assembly
 from modelica_like.solve.plot import chosen, plot, save_plot
@@ -127,6 +127,27 @@ def clashes(figure: Figure) -> list[tuple[str, str]]:
 def test_no_label_overlaps_another(drive: str) -> None:
     run = simulate(EXAMPLES / f"{drive}.toml", points=50)
     assert clashes(run.plot()) == []
+
+
+@pytest.mark.slow
+def test_no_label_overlaps_another_in_any_example() -> None:
+    for netlist in sorted(path for kind in ("*", "components/*", "elements/*", "msl/*/*", "dc_machines/*")
+                          for path in EXAMPLES.glob(f"{kind}.toml")):  # fmt: skip
+        model = build(netlist)
+        run = simulate(model, model.settings.get("until", 1.0), points=40)
+        assert clashes(run.plot()) == [], netlist.name
+
+
+def test_a_long_chain_has_a_picture_of_a_page_that_counts_the_rest() -> None:
+    parts = {f"mass{k}": Inertia(J=1, w=float(k), phi=0) for k in range(40)}
+    run = simulate(Assembly("many", parts=parts, free=[f"mass{k}.flange_{e}" for k in range(40) for e in "ab"]), 1.0)
+    figure = run.plot()
+    assert figure.get_size_inches()[1] < 8
+    said = " ".join(text.get_text() for text in figure.texts)
+    assert "Not drawn: 27 more of speed (mass13.w, " in said
+    assert "15 others)" in said
+    every = {line.get_label() for axes in run.plot("*.w").axes for line in axes.lines}
+    assert every == {f"mass{k}.w" for k in range(40)}
 
 
 def test_nothing_is_left_out_without_a_word() -> None:
