@@ -105,6 +105,7 @@ _OFFERED = {name: _HOME[name] for name in ("Native", "schematic", "simulation_fu
 _OFFERED |= {
     "NativeLoop": "modelica_like.native.run",
     "html": "modelica_like.report.notebook",
+    "load_modelica": "modelica_like.modelica_text.read",
     "plot": "modelica_like.solve.plot",
     "sankey": "modelica_like.solve.sankey",
 }
