@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from modelica_like.netlist import load as load
     from modelica_like.report.compare import compare as compare
     from modelica_like.report.page import save_report as save_report
+    from modelica_like.report.progress import Bar as Bar
     from modelica_like.simulation import build as build
     from modelica_like.simulation import simulate as simulate
     from modelica_like.solve.options import Options as Options
@@ -53,6 +54,7 @@ __version__ = "0.1.0"
 
 _HOME = {
     "Assembly": "modelica_like.language",
+    "Bar": "modelica_like.report.progress",
     "CompiledDae": "modelica_like.compile.compiled",
     "Component": "modelica_like.language",
     "ModelicaLikeError": "modelica_like.errors",
@@ -105,8 +107,11 @@ _OFFERED = {name: _HOME[name] for name in ("Native", "schematic", "simulation_fu
 _OFFERED |= {
     "NativeLoop": "modelica_like.native.run",
     "html": "modelica_like.report.notebook",
+    "icon": "modelica_like.draw",
     "load_modelica": "modelica_like.modelica_text.read",
+    "mathematics": "modelica_like.report.mathematics",
     "plot": "modelica_like.solve.plot",
     "sankey": "modelica_like.solve.sankey",
+    "size": "modelica_like.sizing.run",
 }
 provide(tuple(_OFFERED), lambda name: getattr(import_module(_OFFERED[name]), name))

@@ -13,10 +13,11 @@ from modelica_like.cli.shared import Assignments, Debug, Netlist, load_netlist, 
 def modes(
     netlist: Netlist, assignments: Assignments = None, *,
     at: Annotated[
-        str, Option(metavar="WHEN", help="Time, e.g. 0.5s, or kind of start: given, rest, steady.")
-    ] = "given",
+        str | None, Option(metavar="WHEN", help="Time, e.g. 0.5s, or given, rest, steady; else as the netlist starts.")
+    ] = None,
     shapes: Annotated[Path | None, Option(metavar="FILE", help="Draw the shapes of the modes.")] = None,
     show: Annotated[list[str] | None, Option(metavar="NAME", help="Variables along the shapes.")] = None,
+    draw: Annotated[Path | None, Option(metavar="FILE", help="Schematic with shapes below: .svg, .png, .pdf.")] = None,
     bode: Annotated[Path | None, Option(metavar="FILE", help="Draw the frequency response.")] = None,
     inputs: Annotated[list[str] | None, Option("--input", metavar="NAME", help="Input or parameter.")] = None,
     outputs: Annotated[list[str] | None, Option("--output", metavar="NAME", help="Variable.")] = None,
@@ -26,15 +27,20 @@ def modes(
     with told(debug, pictures=[shapes, bode]):
         assembly = load_netlist(netlist, assignments)
         from modelica_like.analyse.linear.linearize import linearize, when
+        from modelica_like.draw import check_format, save_schematic
         from modelica_like.report.analysis import modes_report
         from modelica_like.solve.plot import save_plot
 
-        linear = linearize(assembly, when(at), inputs=inputs, outputs=outputs)
+        if draw:
+            check_format(draw)
+        linear = linearize(assembly, when(at) if at else None, inputs=inputs, outputs=outputs)
         found = linear.modes()
         out().print(modes_report(found))
         if shapes:
             speeds = [one.path for one in linear.model.flat_variables if _is_speed(one.path, str(one.unit))]
             save_plot(found.plot(show or speeds), shapes)
+        if draw:
+            save_schematic(assembly, draw, modes=found)
         if bode:
             save_plot(linear.bode(), bode)
 

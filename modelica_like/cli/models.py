@@ -75,7 +75,7 @@ def simulate(
             )
         energy = energy and made.stopped is None and made.attempt("The energy balance", made.solution.energy)
         made.tell(lambda one: run_report(one, energy=energy, debug=debug, display=shown), csv)
-        made.attempt("The notes", lambda: note(*notes(assembly, made.solution)))
+        made.attempt("The notes", lambda: note(*notes(assembly, made.solution, energy=energy)))
         curves = (plot, lambda one: draw(one, show or (), display=shown))
         pictures = curves, (sankey, lambda one: one.energy().sankey(model.name))
         made.write(csv, units=units or bool(display), display=shown, pictures=pictures)

@@ -52,6 +52,7 @@ def _sections() -> dict[str, Any]:
         "free": {"type": "array", "items": {"type": "string"}, "description": "connectors left free on purpose"},
         "expose": _map({"type": "string"}, "outer connectors: name and inner connector"),
         "simulate": _simulate(),
+        "sizing": {"type": "string", "description": "sizing file, whose checks stand in reports"},
         "display": _map({"type": "string"}, "units in which results are shown, by path, pattern or quantity"),
     }
 

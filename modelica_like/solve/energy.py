@@ -13,7 +13,7 @@ from modelica_like.initialize import Impact, Point, call, solve_implicit
 from modelica_like.solve.options import Options
 from modelica_like.solve.powers import POWERS, Powers, Results, results
 from modelica_like.solve.recorder import Event, Segment
-from modelica_like.upper import upper
+from modelica_like.upper import Shown, upper
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -69,7 +69,7 @@ class EnergyRow:
 
 
 @dataclass(frozen=True)
-class EnergyBalance:
+class EnergyBalance(Shown):
     """Energy balance of a run, component by component.
 
     Attributes:
@@ -110,6 +110,11 @@ class EnergyBalance:
     def delivered(self) -> float:
         """Energy that loads took away, J."""
         return -sum(row.source for row in self.rows if row.source < 0)
+
+    @property
+    def supply(self) -> float:
+        """Energy from sources and stores, component by component, J."""
+        return sum(max(row.source, 0.0) + max(-row.stored, 0.0) for row in self.rows)
 
     @property
     def efficiency(self) -> float:

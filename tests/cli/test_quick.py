@@ -25,7 +25,7 @@ CALLS = [
     "draw a.toml --at 1s --flow --animate --until 2s",
     "report a.toml -o a.html --until 1s --show *.w",
     "explore a.toml --until 1s --show *.w -o folder --no-browser",
-    "modes a.toml --at=0.5s --input u --output a.w --output b.w --shapes m.png --bode b.svg",
+    "modes a.toml --at=0.5s --input u --output a.w --output b.w --shapes m.png --bode b.svg --draw d.svg",
     "steady a.toml --hold motor.w=4000 --by load --over load=0:0.25:26 --after 2s",
     "sweep a.toml --over a=1:2:3 --of max(x) --of b -o out.csv --processes 4 --checkpoint folder",
     "sensitivity a.toml --of max(a.tau) --to b.J --tornado t.png --start steady",

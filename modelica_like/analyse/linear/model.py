@@ -14,7 +14,7 @@ from modelica_like.errors import extra_module
 from modelica_like.initialize import Point, variable_slopes
 from modelica_like.initialize.slopes import implicit_slopes, nodes_of
 from modelica_like.solve.style import COLOURS, picture
-from modelica_like.upper import upper
+from modelica_like.upper import Shown
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -29,7 +29,7 @@ _DECADES = 1.0
 
 
 @dataclass(frozen=True, eq=False)
-class LinearModel:
+class LinearModel(Shown):
     """Small motions about a point: der(x) = A x + B u, y = C x + D u, in deviations from x0, u0, y0.
 
     Attributes:
@@ -215,14 +215,11 @@ class Mode:
 
 
 @dataclass(frozen=True, eq=False)
-class Modes(Sequence[Mode]):
+class Modes(Shown, Sequence[Mode]):
     """All modes of a linear model: oscillations, the slowest first, then real eigenvalues."""
 
     linear: LinearModel = field(repr=False)
     modes: tuple[Mode, ...]
-
-    def _repr_html_(self) -> str:
-        return upper("html")(self)
 
     def __getitem__(self, index: Any) -> Any:
         return self.modes[index]

@@ -12,7 +12,7 @@ from modelica_like.compile.buffers import Vector
 from modelica_like.errors import UnknownName, did_you_mean, extra_module
 from modelica_like.solve.style import COLOURS, picture
 from modelica_like.units import Unit
-from modelica_like.upper import upper
+from modelica_like.upper import Shown
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -38,7 +38,7 @@ class Quantity:
 
 
 @dataclass(frozen=True, eq=False)
-class Sensitivities:
+class Sensitivities(Shown):
     """Derivatives of outputs by parameters, in SI units.
 
     Attributes:
@@ -60,9 +60,6 @@ class Sensitivities:
     time: Vector = field(default_factory=lambda: np.zeros(0))
     series: Mapping[str, Vector] = field(default_factory=dict)
     left_out: Mapping[str, str] = field(default_factory=dict)
-
-    def _repr_html_(self) -> str:
-        return upper("html")(self)
 
     def __getitem__(self, key: tuple[str, str]) -> float:
         """Derivative of an output by a parameter.
