@@ -233,7 +233,8 @@ class _Arguments:
                 value = self._plain(name, self.part.__dict__[name])
             else:
                 known = self.part.value(name)
-                value = f"({self.writer._value(known, self.owner)})" if known is not None else name
+                value = self.writer._value(known, self.owner) if known is not None else name
+                value = value if re.fullmatch(r"[\w.]+", value) else f"({value})"
             made = re.sub(rf"(?<![\w.]){name}(?![\w.])", lambda _, value=value: value, made)
         node = parse_expression(made)
         if any(True for _ in names_in(node)) or any(True for _ in calls_in(node)):
