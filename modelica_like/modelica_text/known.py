@@ -67,7 +67,7 @@ class _Part:
                 continue
             elif name in used or isinstance(self.fields.get(here), Parameter | Input) or here in self.kind._structural:
                 self._read(name, one)
-            elif isinstance(self.fields.get(here), Variable):
+            elif isinstance(self.fields.get(here), Variable) or "." in here:
                 starts.append((here, one))
             else:
                 self._unknown(name, one)
@@ -172,7 +172,8 @@ class _Part:
         }
         if "displayUnit" in attributes:
             self.notes.display[f"{self.owner.path}.{self.name}.{here}".lstrip(".")] = attributes["displayUnit"].args[0]
-        if isinstance(self.fields[here], Output):
+        path, _, last = here.rpartition(".")
+        if isinstance(part.find(path).fields[last], Output):
             return
         start = one.inner.get("start")
         value: Any = self.known.starts.get(here, 0.0)
@@ -183,9 +184,9 @@ class _Part:
         if attributes.get("fixed") == Expr(
             "boolean", (True,), attributes["fixed"].line if "fixed" in attributes else 0
         ):
-            part.give(here, value)
+            part.set(here, value)
         elif value != 0.0:
-            part.give(here, guess(value))
+            part.set(here, guess(value))
 
     def _unknown(self, name: str, one: Given) -> None:
         fixed = one.inner.get("fixed")

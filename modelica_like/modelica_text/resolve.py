@@ -10,7 +10,7 @@ from modelica_like.errors import ModelicaTextError, did_you_mean
 from modelica_like.modelica_text import fold, members
 from modelica_like.modelica_text.classes import Classes
 from modelica_like.modelica_text.instance import Given, Instance, Member, refused
-from modelica_like.modelica_text.library import Known
+from modelica_like.modelica_text.library import Known, table
 from modelica_like.modelica_text.tree import ClassText, Declaration, Expr, Import
 from modelica_like.modelica_text.types import Basic, basic_type
 
@@ -189,6 +189,10 @@ class Resolver:
             inner = part.here(inner)
             if self.numeric:
                 return members.value_of_known(owner, member, part, inner, self.text, line)
+            fields = part.type._class_fields
+            for below in table()["rates"].get(inner, "").split() if inner not in fields else ():
+                if below in fields:
+                    return Expr("call", ("der", (Expr("name", ((f"{path}.{below}", ()),), line),), ()), line)
         return Expr("name", ((f"{path}.{inner}", ()),), line)
 
     def _scalar(

@@ -123,8 +123,12 @@ class _Writer:
 
     def _starts(self, part: Component, known: Known | None, owner: Assembly) -> dict[str, str]:
         starts: dict[str, str] = {}
-        for name, value in part._starts.items():
+        inside = [(f"{one.path.removeprefix(f'{part.path}.')}.", one) for one in part.walk() if one is not part]
+        given = [(f"{path}{name}", value) for path, one in [("", part), *inside] for name, value in one._starts.items()]
+        for name, value in given:
             there = known.there(name) if known else name
+            if "." in there:
+                raise ModelicaTextError(f"The start value of {part.label}.{name} has no counterpart in Modelica text.")
             fixed = ", fixed = true" if value.fixed else ""
             starts[f"{there}(start = {self._value(value, owner)}{fixed})"] = ""
         if part._start_modes:

@@ -59,7 +59,8 @@ MESSAGES: dict[str, tuple[str, str]] = {
     ),
     "overdetermined connectors": (
         model("Real x;", "Connections.branch(a.R, b.R);"),
-        "Connections.branch(…) among equations: that is not supported here.\n  in a.mo:5 `Connections.branch(a.R, b.R);`",
+        "Connections.branch(…) among equations: that is not supported here.\n"
+        "  in a.mo:5 `Connections.branch(a.R, b.R);`",
     ),
     "state machine": (
         model("Real x;", "x = transition(a, b);"),

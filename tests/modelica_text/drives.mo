@@ -73,6 +73,7 @@ package Drives "Texts that use every construct that is read"
     Rotational.Components.Brake brake(fn_max = 20, mu_pos = [0, 0.5; 1, 0.25]) if not damped;
     Fixed fixed;
     output SI.Power power = torque.flange.tau*motor.w "into the shaft";
+    output SI.AngularAcceleration a = motor.a;
   equation
     connect(step.y, torque.tau);
     connect(torque.flange, motor.flange_a);

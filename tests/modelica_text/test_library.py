@@ -52,7 +52,7 @@ def netlist(name: str) -> tuple[str, list[str]]:
 @pytest.mark.parametrize("name", ["TwoMasses", "Modified"])
 def test_a_text_becomes_a_netlist_with_units(name: str) -> None:
     text, notes = netlist(name)
-    assert notes[0] == "power: left out, because a netlist has no equations."
+    assert notes[0] == "a, power: left out, because a netlist has no equations."
     assert notes[1].startswith("J = 0.1 * ratio**2.0 is the number 0.")
     assert len(notes) == 2
     same(simulate(loads(text, str(DRIVES.parent / "x.toml")), 1.5), simulate(load(f"{DRIVES}:{name}"), 1.5))
@@ -90,6 +90,7 @@ def test_two_masses_obey_the_law_of_momentum() -> None:
     torque = run["torque.tau"] - 3 * run["load[2].w"]
     change = np.concatenate([[0], np.cumsum(np.diff(run.time) * (torque[1:] + torque[:-1]) / 2)])
     assert momentum == pytest.approx(2.9 + change, abs=2e-3)
+    assert 0.9 * run["a"] == pytest.approx(run["motor.flange_a.tau"] + run["motor.flange_b.tau"])
     assert run["power"] == pytest.approx(run["torque.flange.tau"] * run["motor.w"])
 
 
