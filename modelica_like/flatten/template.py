@@ -212,7 +212,7 @@ def _build(component: Component) -> Template:
     wiring = tuple(s for s in statements if isinstance(s, Connection | FreeEnd))
     joined = {name for one in wiring if isinstance(one, Connection) for name in taken(component, one)}
     check_balance(component, equations, joined)
-    inferred = check_units(component, equations, events)
+    inferred = check_units(component, equations, events) if component.units_checked else {}
     residuals = [e.left - e.right for e in equations]
     changes = _Changes(component, events)
     holds, hold_terms = hold_forms(component, residuals)

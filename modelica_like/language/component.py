@@ -34,6 +34,8 @@ class Component(Declared):
     outlet: ClassVar[str] = "flange_b flange"
     terminal: ClassVar[Terminal | None] = None
     icon: ClassVar[Icon | None] = None
+    units_checked: ClassVar[bool] = True
+    """Whether the units of its equations, of its connections and of the values it gives to parts must fit."""
     _partial: ClassVar[bool] = True
     _class_connectors: ClassVar[dict[str, Connector]] = {}
     _class_parts: ClassVar[dict[str, Component | list[Component]]] = {}
