@@ -203,14 +203,17 @@ class _Builder:
                 self.derivatives[k] = self.add(name, ("der", k), unit=unit, derivative_of=self.states[k])
 
     def discretes(self, modes: ModesAs) -> None:
-        """Modes, and other discrete values, which are local."""
-        for k, one in enumerate(self.model.flat_discretes):
+        """Modes, and other discrete values, which are local; equations determine some at the start, too."""
+        determined = {row.reset.index for row in self.model.update_rows if row.at_start}
+        for k, one in ((k, one) for k, one in enumerate(self.model.flat_discretes) if not one.hidden):
             slot, about = ("discrete", k), {"unit": one.unit, "description": _mode_text(one)}
             if one.names:
                 kind, names = ("Int64", ()) if modes == "integer" else ("Enumeration", one.names)
                 causality = "local" if modes == "local" else "output"
                 about |= {"min": 0, "max": len(one.names) - 1, "modes": names}
                 self.add(one.path, slot, causality, "discrete", kind=kind, **about)
+            elif k in determined:
+                self.add(one.path, slot, "local", "discrete", **about)
             else:
                 self.add(one.path, slot, "local", "discrete", "exact", start=self.starts.discrete[k], **about)
 

@@ -206,7 +206,9 @@ class Output(Variable):
 
 
 class Discrete(_Symbolic):
-    """Number that changes only at events."""
+    """Number that changes only at events; `boolean` and `integer` also say which numbers it can be."""
+
+    kind: Literal["number", "boolean", "integer"] = "number"
 
 
 def param(
@@ -295,6 +297,30 @@ def discrete(unit: str, description: str = "", *, start: Any = 0.0) -> Any:
         start: a number, a quantity or a formula of the component's parameters.
     """
     return Discrete(unit, description, default=start)
+
+
+def boolean(description: str = "", *, start: bool = False) -> Any:
+    """Declare a Boolean variable: 1 or 0, changed only at events, by its equation or a `when`.
+
+    Args:
+        description: one phrase.
+        start: its `pre` at the start.
+    """
+    declared = Discrete("1", description, default=float(start), min=0.0, max=1.0)
+    declared.kind = "boolean"
+    return declared
+
+
+def integer(description: str = "", *, start: Any = 0) -> Any:
+    """Declare a whole number that is changed only at events, by its equation or a `when`.
+
+    Args:
+        description: one phrase.
+        start: its `pre` at the start: a number or a formula of the component's parameters.
+    """
+    declared = Discrete("1", description, default=start)
+    declared.kind = "integer"
+    return declared
 
 
 def require_identifier(name: str, where: str) -> None:

@@ -32,7 +32,7 @@ from modelica_like.solve.options import Options
 
 _ERRORS: tuple[tuple[str, type[ModelicaLikeError]], ...] = (
     ("The integrator gave up|The step from", StepFailed),
-    ("Modes still switch|Events follow each other", Chattering),
+    ("Modes still switch|Discrete variables do not|Events follow each other", Chattering),
     ("The Jacobian is singular|The derivative of .* is not finite", SingularAtStart),
     ("Two start values|A start value of", ContradictingStart),
     ("There are no derivatives", NoGradient),

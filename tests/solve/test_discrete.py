@@ -1,0 +1,316 @@
+"""Discrete equations against closed forms, by both solvers: when, pre, edge, change, initial, relations with events."""
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from modelica_like import Assembly, build, sensitivities, simulate
+from modelica_like.errors import Chattering
+from modelica_like.language import (
+    Component,
+    Discrete,
+    Equations,
+    Events,
+    Mode,
+    Output,
+    Parameter,
+    Variable,
+    absolute,
+    all_of,
+    any_of,
+    boolean,
+    change,
+    connect,
+    cos,
+    der,
+    discrete,
+    edge,
+    floor,
+    if_,
+    initial,
+    integer,
+    maximum,
+    minimum,
+    mod,
+    negate,
+    param,
+    pre,
+    sign,
+    signal_in,
+    signal_out,
+    sin,
+    var,
+    when,
+)
+
+pytestmark = pytest.mark.parametrize("solver", ["idas", "native"])
+CLOSE = 1e-9
+
+
+def run(drive, until, solver, **how):
+    return simulate(drive, until, solver=solver, **{"rtol": 1e-10, "atol": 1e-12, **how})
+
+
+def times(found, mode):
+    return [event.time for event in found.events if event.mode == mode]
+
+
+class Ball(Component):
+    """Falls on a table; whens set its speed and count."""
+
+    h: Variable = var("m", "height", state="always")
+    v: Variable = var("m/s", "speed", state="always")
+    e: Parameter = param("1", "restitution", default=0.8)
+    g: Parameter = param("m/s2", "gravity", default=9.81)
+    n: Discrete = integer("bounces")
+    top: Discrete = discrete("m", "height of the next flight")
+    y: Variable = var("m", "the same")
+
+    def equations(self) -> Equations:
+        yield der(self.h) == self.v
+        yield der(self.v) == -self.g
+        yield self.y == self.top
+
+    def events(self) -> Events:
+        up = -self.e * self.v
+        yield when(self.h < 0, {self.v: up, self.n: pre(self.n) + 1, self.top: up**2 / 2 / self.g})
+
+
+def test_a_when_sets_a_state_at_the_edge(solver):
+    found = run(Ball(h=1.0, v=0.0), 2.0, solver)
+    fall = np.sqrt(2 / 9.81)
+    hits = [fall, fall * (1 + 2 * 0.8), fall * (1 + 2 * 0.8 + 2 * 0.64)]
+    assert times(found, "relation[1]")[::2] == pytest.approx(hits, abs=CLOSE)
+    assert found.final["n"] == 3
+    assert found.final["top"] == pytest.approx(0.8**6, rel=CLOSE)
+    last = 2.0 - hits[-1]
+    assert found.final["h"] == pytest.approx(9.81 * fall * 0.8**3 * last - 9.81 * last**2 / 2, abs=1e-8)
+
+
+def test_derivatives_go_through_whens(solver):
+    model, of, by = build(Ball(h=1.0, v=0.0)), ["h", "y"], ["e", "g"]
+    found = sensitivities(model, of, by, until=1.0)
+
+    def exact(e, g):  # one bounce before 1 s
+        fall = np.sqrt(2 / g)
+        late = 1.0 - fall
+        return np.array([e * g * fall * late - g * late**2 / 2, e**2])
+
+    step = 1e-20j
+    expected = np.array([exact(0.8 + step, 9.81).imag, exact(0.8, 9.81 + step).imag]).T / 1e-20
+    assert np.array([[found[o, b] for b in by] for o in of]) == pytest.approx(expected, abs=1e-7)
+    if solver == "native":
+        handle = model.native(outputs=of, by=by)
+        handle.reset(until=1.0)
+        handle.step(1.0)
+        assert handle.gradient() == pytest.approx(expected, abs=1e-5)
+
+
+class Counter(Component):
+    """Counts what a sine does."""
+
+    f: Parameter = param("Hz", "frequency", default=1.0)
+    late: Parameter = param("s", "time", default=2.6)
+    y: Variable = var("1", "sine")
+    high: Discrete = boolean("above one half")
+    latched: Discrete = boolean("has been above one half")
+    ups: Discrete = integer("how often it has risen above 0.25", start=10)
+    both: Discrete = integer("edges of high", start=0)
+    changes: Discrete = integer("changes of high")
+    firsts: Discrete = integer("starts")
+
+    def equations(self) -> Equations:
+        yield self.y == sin(2 * np.pi * self.f * self.time)
+        yield self.high == (self.y > 0.5)
+        yield self.latched == any_of(pre(self.latched), self.high)
+
+    def events(self) -> Events:
+        yield when(self.y > 0.25, {self.ups: pre(self.ups) + 1})
+        yield when(edge(self.high), {self.both: pre(self.both) + 1}).elsewhen(
+            self.time > self.late, {self.both: pre(self.both) + 100}
+        )
+        yield when(change(self.high), {self.changes: pre(self.changes) + 1})
+        yield when((initial(), self.time > 100 * self.late), {self.firsts: pre(self.firsts) + 1})
+
+
+def test_edges_changes_priorities_and_the_start(solver):
+    found = run(Counter(), 2.9, solver)
+    names = ("ups", "both", "changes", "firsts", "latched", "high")
+    assert [found.final[name] for name in names] == [13, 103, 6, 1, 1, 0]
+    assert times(found, "relation[1]") == pytest.approx([(k + s / 12) for k in range(3) for s in (1, 5)], abs=CLOSE)
+
+
+class Simultaneous(Component):
+    """Two whens at one instant: the second uses the new value of the first, whatever the order of their lines."""
+
+    t_go: Parameter = param("s", "time", default=0.5)
+    x: Variable = var("1", "none", default=0)
+    a: Discrete = integer("first")
+    b: Discrete = integer("second")
+    c: Discrete = integer("by priority")
+    rate: Parameter = param("Hz", "rate", default=1.0)
+
+    def equations(self) -> Equations:
+        yield der(self.x) == self.rate
+
+    def events(self) -> Events:
+        yield when(self.time > self.t_go, {self.b: 10 * self.a + pre(self.a)})
+        yield when(self.time > self.t_go, {self.a: pre(self.a) + 3})
+        yield when(self.time > self.t_go, {self.c: 1}).elsewhen(self.x > 0.5, {self.c: 2})
+
+
+def test_whens_at_one_instant_use_each_others_new_values(solver):
+    final = run(Simultaneous(), 1.0, solver).final
+    assert [final[name] for name in "abc"] == [3, 30, 1]
+
+
+class Gated(Component):
+    """A level-triggered and an edge-triggered transition of a mode with itself."""
+
+    x: Variable = var("1", "ramp", default=0)
+    rate: Parameter = param("Hz", "rate", default=1.0)
+    n: Discrete = integer("count")
+    gate = Mode("on")
+
+    def equations(self) -> Equations:
+        yield der(self.x) == self.rate * sin(2 * np.pi * self.rate * self.time)
+
+    def events(self) -> Events:
+        yield self.gate.go("on", "on", when=self.x > 0.1, reset={self.n: self.n + 1}, once=True)
+
+
+def test_once_fires_at_the_edge_only(solver):
+    found = run(Gated(), 2.5, solver)  # the ramp is (1 - cos 2 pi t)/(2 pi)
+    first = np.arccos(1 - 0.2 * np.pi) / 2 / np.pi
+    assert found.final["n"] == 3
+    assert times(found, "gate") == pytest.approx([first, 1 + first, 2 + first], abs=CLOSE)
+
+
+class Forms(Component):
+    """Both forms of functions with a kink or a jump."""
+
+    f: Parameter = param("Hz", "frequency", default=2.0)
+    saw: Variable = var("1", "sawtooth")
+    area: Variable = var("1", "its integral", default=0)
+    s: Variable = var("1", "sign")
+    a: Variable = var("1", "absolute value")
+    high: Variable = var("1", "larger")
+    low: Variable = var("1", "smaller")
+    plain: Variable = var("1", "without events")
+    steps: Variable = var("1", "floor of a fall")
+
+    def equations(self) -> Equations:
+        u, w = sin(7 * self.f * self.time), cos(7 * self.f * self.time)
+        yield self.saw == mod(self.f * self.time - 0.3, 1, events=True)
+        yield der(self.area) == self.f * self.saw
+        yield self.s == sign(u, events=True)
+        yield self.a == absolute(w, events=True)
+        yield self.high == maximum(u, w, events=True)
+        yield self.low == minimum(u, w, events=True)
+        yield self.plain == absolute(w) + maximum(u, w) + minimum(u, w) + sign(u) + mod(self.f * self.time, 1)
+        yield self.steps == floor(0.5 - self.f * self.time, events=True)
+
+
+def test_functions_with_events(solver):
+    found = run(Forms(), 3.0, solver)
+    t = found.time
+    u, w = np.sin(14 * t), np.cos(14 * t)
+    assert found.final["area"] == pytest.approx(3.0, abs=1e-8)
+    for name, expected in (("a", np.abs(w)), ("high", np.maximum(u, w)), ("low", np.minimum(u, w))):
+        assert np.abs(found[name] - expected).max() < 1e-12, name
+    inside = np.abs(u) > 1e-6
+    assert (found["s"][inside] == np.sign(u[inside])).all()
+    inside = np.abs((2 * t + 0.5) % 1 - 0.5 - 0.5) > 1e-6
+    inside &= np.abs((2 * t + 0.5) % 1) > 1e-6
+    assert (found["steps"][inside] == np.floor(0.5 - 2 * t[inside])).all()
+    counted = [event.time for event in found.events if event.mode.startswith("counting floor[1]")]
+    assert counted == pytest.approx([0.15 + 0.5 * k for k in range(6)], abs=CLOSE)
+
+
+class Rectifier(Component):
+    """A branch by if_, whose other branch is undefined."""
+
+    f: Parameter = param("Hz", "frequency", default=1.0)
+    q: Variable = var("1", "integral of the positive half wave", default=0)
+
+    def equations(self) -> Equations:
+        u = sin(2 * np.pi * self.f * self.time)
+        yield der(self.q) == self.f * if_(all_of(u > 0, self.time * self.f < 2), u**2, 0)
+
+
+def test_relations_are_located(solver):
+    found = run(Rectifier(), 3.0, solver)
+    assert found.final["q"] == pytest.approx(0.5, abs=1e-8)
+    assert times(found, "relation[1]")[:6] == pytest.approx([0, 0.5, 1, 1.5, 2, 2.5], abs=CLOSE)
+    assert times(found, "relation[2]") == pytest.approx([2], abs=CLOSE)
+
+
+class Source(Component):
+    """A Boolean that a part has."""
+
+    f: Parameter = param("Hz", "frequency", default=1.0)
+    y: Output = signal_out("1", "1 in the first and last quarter of every period")
+    on: Discrete = boolean("whether it is on", start=True)
+
+    def equations(self) -> Equations:
+        yield self.on == (cos(2 * np.pi * self.f * self.time) > 0)
+        yield self.y == if_(self.on, 1, 0)
+
+
+class Divider(Component):
+    """Halves the frequency of what comes in."""
+
+    u = signal_in("1", "pulses")
+    q: Discrete = boolean("divided")
+    y: Output = signal_out("1", "divided")
+
+    def equations(self) -> Equations:
+        yield self.y == self.q
+
+    def events(self) -> Events:
+        yield when(self.u > 0.5, {self.q: negate(pre(self.q))})
+
+
+class Chain(Component):
+    """Dividers one after the other change at one instant."""
+
+    source, first, second, third = Source(), Divider(), Divider(), Divider()
+
+    def equations(self) -> Equations:
+        yield connect(self.source.y, self.first.u)
+        yield connect(self.first.y, self.second.u)
+        yield connect(self.second.y, self.third.u)
+
+
+def test_a_chain_of_dividers_counts_in_binary(solver):
+    found = run(Chain(), 11.9, solver)
+    counts = 1 + np.arange(11)  # rising edges at 0.75, 1.75, …; at the start it is on, which is no edge
+
+    def bits(t: float) -> Iterator[float]:
+        place = np.searchsorted(found.time, t)
+        yield from (found[f"{name}.q"][place] for name in ("third", "second", "first"))
+
+    for k in counts:
+        # toggled at every rising edge: each stage rises at every second rise of the one before
+        expected = (k % 2, (k + 1) // 2 % 2, ((k + 1) // 2 + 1) // 2 % 2)[::-1]
+        assert tuple(bits(k)) == expected, k
+
+
+def test_what_does_not_settle_is_told(solver):
+    class Endless(Component):
+        b: Discrete = boolean("never equals its pre")
+        x: Variable = var("1", "x")
+
+        def equations(self) -> Equations:
+            yield self.b == negate(pre(self.b))
+            yield self.x == self.b
+
+    with pytest.raises(Chattering, match=r"^Discrete variables do not settle at t = 0 s"):
+        run(Endless(), 1.0, solver)
+
+
+def test_discrete_parts_in_an_assembly_have_their_paths(solver):
+    found = run(Assembly("two", parts={"a": Ball(h=1.0, v=0.0), "b": Ball(h=2.0, v=0.0)}), 1.0, solver)
+    assert (found.final["a.n"], found.final["b.n"]) == (1, 1)
+    assert times(found, "b.relation[1]")[0] == pytest.approx(np.sqrt(4 / 9.81), abs=CLOSE)
