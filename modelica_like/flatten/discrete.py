@@ -181,8 +181,8 @@ class DiscreteEquations:
             self._write_relation(one, source)
             return ()
         self.hidden.append(Hidden(one.name, f"{one.kind} {own}"))
-        if one.kind == "floor":
-            self._write_floor(one, source)
+        if one.kind in ("floor", "clock"):
+            (self._write_floor if one.kind == "floor" else self._write_clock)(one, source)
             return ()
         value = own if one.kind == "was" else edge(own)
         self.updates.append(Update(one, _ONE, value, source, at_start=one.kind == "was"))
@@ -199,16 +199,27 @@ class DiscreteEquations:
     def _write_floor(self, one: Marker, source: Source) -> None:
         """Count up and down by what is passed; the value itself may still be on the other side by rounding."""
         value, number = cast(Any, one.of), cast(Any, one)
-        symbol = Marker("relation", one.of)
-        symbol.name = f"counting {one.name}"
-        one.__dict__["_mode"] = symbol
-        mode = self._mode(symbol.name, f"floor({value})", symbol, ("counting",))
+        mode = self._counting(one, f"floor({value})")
         up, down = ca.fmax(number + 1, ca.floor(value)), ca.fmin(number - 1, ca.floor(value))
         self.events += [
             replace(mode.go("counting", "counting", when=value >= number + 1, reset={one: up}), source=source),
             replace(mode.go("counting", "counting", when=value < number, reset={one: down}), source=source),
         ]
         self.updates.append(Update(one, INITIAL, ca.floor(value), source, at_start=True))
+
+    def _write_clock(self, one: Marker, source: Source) -> None:
+        """Count ticks; where a run starts late, all earlier ones at once."""
+        number, period, offset = cast(Any, one), cast(Any, one.of), cast(Any, one.offset)
+        mode = self._counting(one, f"clock({period}, {offset})")
+        ticks = ca.fmax(number + 1, ca.floor((cast(Any, TIME) - offset) / period) + 1)
+        tick = mode.go("counting", "counting", at=offset + number * period, reset={one: ticks})
+        self.events.append(replace(tick, source=source))
+
+    def _counting(self, one: Marker, description: str) -> BoundMode:
+        """Declare the mode whose transitions count."""
+        symbol = one.__dict__["_mode"] = Marker(one.kind, one.of)
+        symbol.name = f"counting {one.name}"
+        return self._mode(symbol.name, description, symbol, ("counting",))
 
     def _mode(self, path: str, description: str, symbol: Symbol, names: tuple[str, ...]) -> BoundMode:
         mode = Mode(*names, description=description)

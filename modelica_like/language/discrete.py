@@ -14,7 +14,7 @@ from modelica_like.language.expr import TIME, Expr, Scalar, Symbol, symbols_in
 from modelica_like.language.fields import Discrete, Variable
 from modelica_like.language.places import NOWHERE, caller
 
-MarkerKind = Literal["relation", "floor", "was", "once"]
+MarkerKind = Literal["relation", "floor", "was", "once", "clock"]
 
 
 class Marker(Symbol):
@@ -22,17 +22,20 @@ class Marker(Symbol):
 
     Attributes:
         kind: `relation`: whether `of` is true, changed by events; `floor`: the whole number below `of`, changed by
-            events; `was`: the condition `of` at the present instant; `once`: 1 where `of` has just become true.
+            events; `was`: the condition `of` at the present instant; `once`: 1 where `of` has just become true;
+            `clock`: number of ticks, `of` is their period.
         of: the condition or value.
+        offset: time of the first tick of a clock.
         name: path from the component, given when its template is made.
     """
 
     kind: MarkerKind
     of: Expr
+    offset: Expr
 
-    def __init__(self, kind: MarkerKind, of: Expr) -> None:
+    def __init__(self, kind: MarkerKind, of: Expr, offset: Scalar = 0.0) -> None:
         super().__init__(None, kind)
-        self.kind, self.of = kind, of
+        self.kind, self.of, self.offset = kind, of, ca.SX(cast(Any, offset))
 
 
 class Pre(Symbol):
@@ -50,13 +53,15 @@ _timed: list[Marker] = []
 """Markers of expressions of time alone, which no component owns."""
 
 
-def marker(kind: MarkerKind, of: Expr) -> Marker:
+def marker(kind: MarkerKind, of: Expr, offset: Scalar = 0.0) -> Marker:
     """Return the marker for an expression, the same one for equal expressions."""
+    wanted: Any = ca.vertcat(of, offset)
     owner = _owner_in(of)
     known: list[Marker] = _timed if owner is None else owner.__dict__.setdefault("_markers", [])
-    found = next((one for one in known if one.kind == kind and ca.is_equal(cast(Any, one.of), cast(Any, of), 99)), None)
+    same = (one for one in known if one.kind == kind and ca.is_equal(ca.vertcat(one.of, one.offset), wanted, 99))
+    found = next(same, None)
     if found is None:
-        known.append(found := Marker(kind, of))
+        known.append(found := Marker(kind, of, offset))
     return found
 
 
@@ -168,6 +173,25 @@ def change(value: Expr) -> Expr:
     return value != pre(value)
 
 
+def clock(period: Expr, offset: Scalar = 0.0) -> Expr:
+    """Return a condition that becomes true every period, exactly at `offset + k * period`; for `when`.
+
+    Where a run starts later, earlier ticks count as one at the start. Clocks whose ticks fall together tick at one
+    instant, and their whens use each other's new values.
+
+    Args:
+        period: time between two ticks in s: a parameter, or an expression of parameters and discrete variables.
+        offset: time of the first tick in s.
+
+    Raises:
+        LanguageError: the period changes between events.
+    """
+    if moves(period) or moves(ca.SX(cast(Any, offset))):
+        what = f"The ticks of clock({period}) are not known in advance, because they move between events."
+        raise LanguageError(what, where=caller(), advice="Use parameters or discrete variables.")
+    return change(marker("clock", ca.SX(cast(Any, period)), offset))
+
+
 def initial() -> Expr:
     """Return a condition that is true at the start of a run."""
     return INITIAL
@@ -222,7 +246,8 @@ def when(condition: Expr | tuple[Expr, ...], values: Mapping[Expr, Scalar]) -> W
         if not any(symbol is TIME or symbol.owner is None or not _is_fixed(symbol) for symbol in symbols):
             what = f"when({one}, …) has no edge: its condition is the same during the whole run."
             raise LanguageError(what, where=caller(), advice="Compare what changes, such as a variable or time.")
-        edges.append(INITIAL if one is INITIAL else edge(one))
+        ticks = any(isinstance(symbol, Marker) and symbol.kind == "clock" for symbol in symbols)
+        edges.append(one if one is INITIAL or (ticks and cast(Any, one).op() == ca.OP_NE) else edge(one))
     active = cast(Expr, functools.reduce(ca.logic_or, edges))
     return When(((active, dict(values)),), conditions)
 

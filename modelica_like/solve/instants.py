@@ -200,8 +200,9 @@ class Instants:
         rows = [row for row, value in zip(self.model.update_rows, values, strict=True)
                 if row.reset.kind == "discrete" and value != now.d[row.reset.index]]  # fmt: skip
         names = ", ".join(self.model.flat_discretes[row.reset.index].path for row in rows)
+        change = "changes" if len(rows) == 1 else "change"
         return Chattering(
-            f"Discrete variables do not settle at t = {now.t:.9g} s: {names} still change after {rounds} rounds.",
+            f"Discrete variables do not settle at t = {now.t:.9g} s: {names} still {change} after {rounds} rounds.",
             where=[row.source for row in rows if row.source.file][:3],
             advice="An equation like n == pre(n) + 1 never equals its pre(…): count in a `when`.",
         )

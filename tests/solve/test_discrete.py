@@ -21,6 +21,7 @@ from modelica_like.language import (
     any_of,
     boolean,
     change,
+    clock,
     connect,
     cos,
     der,
@@ -314,3 +315,92 @@ def test_discrete_parts_in_an_assembly_have_their_paths(solver):
     found = run(Assembly("two", parts={"a": Ball(h=1.0, v=0.0), "b": Ball(h=2.0, v=0.0)}), 1.0, solver)
     assert (found.final["a.n"], found.final["b.n"]) == (1, 1)
     assert times(found, "b.relation[1]")[0] == pytest.approx(np.sqrt(4 / 9.81), abs=CLOSE)
+
+
+class Machine(Component):
+    """Direct-current machine without friction."""
+
+    i: Variable = var("A", "current", default=0)
+    w: Variable = var("rad/s", "speed", default=0)
+    R: Parameter = param("Ohm", "resistance", default=0.5)
+    L: Parameter = param("H", "inductance", default=5e-3)
+    k: Parameter = param("V.s/rad", "constant", default=0.1)
+    J: Parameter = param("kg.m2", "inertia", default=1e-3)
+    u = signal_in("V", "voltage")
+    speed: Output = signal_out("rad/s", "speed")
+
+    def equations(self) -> Equations:
+        yield self.L * der(self.i) == self.u - self.R * self.i - self.k * self.w
+        yield self.J * der(self.w) == self.k * self.i
+        yield self.speed == self.w
+
+
+class SampledPI(Component):
+    """Controller with a clock."""
+
+    u = signal_in("rad/s", "speed")
+    y: Output = signal_out("V", "voltage")
+    kp: Parameter = param("V.s/rad", "gain", default=0.05)
+    Ti: Parameter = param("s", "integral time", default=0.1)
+    T: Parameter = param("s", "period", default=1e-2)
+    wish: Parameter = param("rad/s", "wished speed", default=50)
+    e: Discrete = discrete("rad/s", "error")
+    total: Discrete = discrete("rad/s", "its sum")
+
+    def equations(self) -> Equations:
+        yield self.y == self.kp * (self.e + self.total)
+
+    def events(self) -> Events:
+        error = self.wish - self.u
+        yield when(clock(self.T), {self.e: error, self.total: pre(self.total) + self.T / self.Ti * self.e})
+
+
+class Servo(Component):
+    machine, controller = Machine(), SampledPI()
+
+    def equations(self) -> Equations:
+        yield connect(self.machine.speed, self.controller.u)
+        yield connect(self.controller.y, self.machine.u)
+
+
+def test_a_sampled_controller_is_its_difference_equation(solver):
+    model = np.array([[-100.0, -20.0, 200.0], [100.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    step, power = np.eye(3), np.eye(3)
+    for k in range(1, 30):
+        power = power @ model * 1e-2 / k
+        step = step + power
+    x, total, found = np.zeros(2), 0.0, run(Servo(), 0.505, solver)
+    for k in range(51):
+        assert found["controller.total"][np.searchsorted(found.time, k * 1e-2, side="right") - 1] == pytest.approx(
+            total + 0.1 * (50 - x[1]), abs=1e-7
+        )
+        e = 50 - x[1]
+        total += 0.1 * e
+        x = step[:2, :2] @ x + step[:2, 2] * 0.05 * (e + total)
+
+
+class Rates(Component):
+    """Clocks of different periods: their common ticks are one instant, and late starts skip what has passed."""
+
+    T: Parameter = param("s", "period", default=0.1)
+    t: Variable = var("s", "time")
+    fast: Discrete = integer("fast ticks")
+    slow: Discrete = integer("slow ticks")
+    seen: Discrete = integer("fast ticks at the last slow one")
+    late: Discrete = discrete("s", "time of the last tick of the third")
+
+    def equations(self) -> Equations:
+        yield self.t == self.time
+
+    def events(self) -> Events:
+        yield when(clock(3 * self.T), {self.slow: pre(self.slow) + 1, self.seen: self.fast})
+        yield when(clock(self.T), {self.fast: pre(self.fast) + 1})
+        yield when(clock(self.T, 0.7 * self.T), {self.late: self.time})
+
+
+def test_clocks_of_several_rates(solver):
+    final = run(Rates(), 1.25, solver).final
+    assert [final[name] for name in ("fast", "slow", "seen")] == [13, 5, 13]
+    assert final["late"] == pytest.approx(1.17, abs=1e-12)
+    final = run(Rates(), 1.25, solver, t0=1.12).final
+    assert [final[name] for name in ("fast", "slow", "seen")] == [2, 2, 2]
