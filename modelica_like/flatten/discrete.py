@@ -171,7 +171,8 @@ class DiscreteEquations:
                     continue
                 seen.add(id(one))
                 counts[one.kind] = counts.get(one.kind, 0) + 1
-                one.name = f"{one.kind}[{counts[one.kind]}]"
+                counts_up = one.kind in ("floor", "clock")
+                one.name = f"{'count of ' * counts_up}{one.kind}[{counts[one.kind]}]"
                 pending += [(one.of, source), *((e, source) for e in self._write_marker(one, source))]
 
     def _write_marker(self, one: Marker, source: Source) -> Iterable[Any]:
@@ -218,7 +219,7 @@ class DiscreteEquations:
     def _counting(self, one: Marker, description: str) -> BoundMode:
         """Declare the mode whose transitions count."""
         symbol = one.__dict__["_mode"] = Marker(one.kind, one.of)
-        symbol.name = f"counting {one.name}"
+        symbol.name = one.name.removeprefix("count of ")
         return self._mode(symbol.name, description, symbol, ("counting",))
 
     def _mode(self, path: str, description: str, symbol: Symbol, names: tuple[str, ...]) -> BoundMode:

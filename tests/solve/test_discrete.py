@@ -225,7 +225,7 @@ def test_functions_with_events(solver):
     inside = np.abs((2 * t + 0.5) % 1 - 0.5 - 0.5) > 1e-6
     inside &= np.abs((2 * t + 0.5) % 1) > 1e-6
     assert (found["steps"][inside] == np.floor(0.5 - 2 * t[inside])).all()
-    counted = [event.time for event in found.events if event.mode.startswith("counting floor[1]")]
+    counted = [event.time for event in found.events if event.mode.startswith("floor[1]")]
     assert counted == pytest.approx([0.15 + 0.5 * k for k in range(6)], abs=CLOSE)
 
 
