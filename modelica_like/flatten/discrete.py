@@ -8,13 +8,14 @@ from typing import Any, cast
 
 import casadi as ca
 
-from modelica_like.errors import LanguageError, Source
+from modelica_like.errors import LanguageError, Source, did_you_mean
 from modelica_like.language.component import Component
-from modelica_like.language.discrete import INITIAL, Marker, Pre, When, edge, eventful, is_a, moves
+from modelica_like.language.discrete import INITIAL, Assertion, Marker, Pre, When, edge, eventful, is_a, moves
 from modelica_like.language.equation import Equation
 from modelica_like.language.expr import TIME, Expr, Symbol, is_expression, symbols_in
 from modelica_like.language.fields import Discrete, Input, Variable
 from modelica_like.language.mode import BoundMode, Mode, StartMode, Transition
+from modelica_like.language.transition import NAME_IN_NOTICE
 
 Located = tuple[Any, Source]
 _ONE: Any = ca.SX(1)
@@ -79,11 +80,14 @@ class DiscreteEquations:
     ) -> None:
         self._component, self._kind = component, type(component).__name__
         self.updates = [self._of_equation(one) for one in equations]
-        self.events: list[Transition | StartMode] = [one for one in events if not isinstance(one, When)]
-        for one in events:
+        self.events: list[Transition | StartMode] = [one for one in events if isinstance(one, Transition | StartMode)]
+        self.hidden: list[Hidden] = []
+        self._kept: list[Symbol] = []
+        for number, one in enumerate(events, 1):
             if isinstance(one, When):
                 self.updates += self._of_when(one)
-        self.hidden: list[Hidden] = []
+            elif isinstance(one, Assertion):
+                self._write_assertion(one, f"assertion[{number}]")
         told = [(expression, one.source) for one in self.events for expression in _expressions(one)]
         for expression, source in (*others, *told):
             self._check_pre(expression, source)
@@ -208,6 +212,20 @@ class DiscreteEquations:
         ]
         self.updates.append(Update(one, INITIAL, ca.floor(value), source, at_start=True))
 
+    def _write_assertion(self, one: Assertion, path: str) -> None:
+        for name in NAME_IN_NOTICE.findall(one.text):
+            if name not in self._component.fields:
+                what = f"{self._kind}: the text of an assertion names {name}, which is not declared"
+                raise LanguageError(f"{what}{did_you_mean(name, self._component.fields) or '.'}", where=one.source)
+        symbol = Marker("relation", one.condition)
+        symbol.name = path
+        self._kept.append(symbol)
+        mode = self._mode(path, str(one.condition), symbol, ("holds", "broken"))
+        broken = cast(Expr, ca.logic_not(cast(Any, one.condition)))
+        self.events.append(
+            replace(mode.go("holds", "broken", when=broken, notice=one.text, fails=True), source=one.source)
+        )
+
     def _write_clock(self, one: Marker, source: Source) -> None:
         """Count ticks; where a run starts late, all earlier ones at once."""
         number, period, offset = cast(Any, one), cast(Any, one.of), cast(Any, one.offset)
@@ -218,7 +236,7 @@ class DiscreteEquations:
 
     def _counting(self, one: Marker, description: str) -> BoundMode:
         """Declare the mode whose transitions count."""
-        symbol = one.__dict__["_mode"] = Marker(one.kind, one.of)
+        self._kept.append(symbol := Marker(one.kind, one.of))
         symbol.name = one.name.removeprefix("count of ")
         return self._mode(symbol.name, description, symbol, ("counting",))
 

@@ -252,5 +252,25 @@ def when(condition: Expr | tuple[Expr, ...], values: Mapping[Expr, Scalar]) -> W
     return When(((active, dict(values)),), conditions)
 
 
+@dataclass(frozen=True, eq=False)
+class Assertion:
+    """A condition that must hold, and what to say where it does not."""
+
+    condition: Expr
+    text: str
+    source: Source = NOWHERE
+
+
+def assert_(condition: Expr, text: str) -> Assertion:
+    """End the run with an error where a condition becomes false, or is false at the start.
+
+    Args:
+        condition: relations and Boolean variables, joined with `all_of`, `any_of`, `negate`.
+        text: goes on after the name of the component, such as "turns with {w} rad/s, more than its {w_max} rad/s";
+            names in braces become numbers in SI units.
+    """
+    return Assertion(condition, text)
+
+
 def _is_fixed(symbol: Symbol) -> bool:
     return symbol.order == 0 and not is_a(symbol, (Variable, Discrete)) and symbol.name in symbol.owner.fields

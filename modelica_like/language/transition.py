@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Any
 
 from modelica_like.errors import LanguageError, Source, did_you_mean
-from modelica_like.language.discrete import When
+from modelica_like.language.discrete import Assertion, When
 from modelica_like.language.expr import TIME, Symbol, symbols_in
 from modelica_like.language.fields import Discrete, Input, Parameter, Variable
 from modelica_like.language.mode import StartMode, Transition
@@ -17,7 +17,7 @@ NAME_IN_NOTICE = re.compile(r"\{([\w.]+)\}")
 """A parameter in the notice or the reason of a transition."""
 
 
-EventStatement = Transition | StartMode | When
+EventStatement = Transition | StartMode | When | Assertion
 Events = Iterator[EventStatement]
 """Return type of `events()`."""
 
@@ -40,7 +40,7 @@ def as_event(item: Any, source: Source, component: str) -> EventStatement:
         return replace(item, source=source)
     raise LanguageError(
         f"{component}.events() yields {type(item).__name__} instead of a transition.",
-        where=source, advice="Yield `mode.go(…)`, `mode.initially(…)` or `when(…)`.",
+        where=source, advice="Yield `mode.go(…)`, `mode.initially(…)`, `when(…)` or `assert_(…)`.",
     )  # fmt: skip
 
 

@@ -146,9 +146,7 @@ class Instants:
         for transition in chosen.values():
             self._note(now, transition.mode, transition.target, self._number(transition))
             if transition.fails:
-                owner = self.record.events[-1].mode.rpartition(".")[0] or self.model.name
-                told = NAME_IN_NOTICE.sub(r"\1", transition.notice)
-                raise LimitPassed(f"At {now.t:.9g} s {owner} {told}.")
+                raise self._passed(now, transition.notice)
             d[transition.mode] = transition.target
             for reset in transition.resets:
                 if reset.kind == "state":
@@ -161,6 +159,22 @@ class Instants:
         now.x, now.d = x, d
         if targets:
             self._project(now, targets)
+
+    def _passed(self, now: Point, notice: str) -> LimitPassed:
+        owner, dot, _ = self.record.events[-1].mode.rpartition(".")
+        told = NAME_IN_NOTICE.sub(lambda name: self._told(now, owner + dot + name[1]), notice)
+        return LimitPassed(f"At {now.t:.9g} s {owner or self.model.name} {told}.")
+
+    def _told(self, now: Point, path: str) -> str:
+        """Return a parameter, variable or discrete value as a number."""
+        model = self.model
+        if path in model.position:
+            return f"{call(model, model.variables, now)[model.position[path]]:g}"
+        if path in model.discrete_position:
+            return f"{now.d[model.discrete_position[path]]:g}"
+        if path in model.derived_position:
+            return f"{float(model.derived(model.p)[model.derived_position[path]]):g}"
+        return f"{model.p[model.parameter_position[path]]:g}"
 
     def _solve(self, now: Point) -> None:
         share(self.model, now)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from modelica_like import Assembly, build, sensitivities, simulate
-from modelica_like.errors import Chattering
+from modelica_like.errors import Chattering, LimitPassed
 from modelica_like.language import (
     Component,
     Discrete,
@@ -19,6 +19,7 @@ from modelica_like.language import (
     absolute,
     all_of,
     any_of,
+    assert_,
     boolean,
     change,
     clock,
@@ -404,3 +405,29 @@ def test_clocks_of_several_rates(solver):
     assert final["late"] == pytest.approx(1.17, abs=1e-12)
     final = run(Rates(), 1.25, solver, t0=1.12).final
     assert [final[name] for name in ("fast", "slow", "seen")] == [2, 2, 2]
+
+
+class Asserting(Component):
+    """Ends where it moves too far."""
+
+    x: Variable = var("m", "way", default=0)
+    v: Parameter = param("m/s", "speed", default=2)
+    end: Parameter = param("m", "end of the way", default=3)
+    n: Discrete = integer("steps")
+
+    def equations(self) -> Equations:
+        yield der(self.x) == self.v
+
+    def events(self) -> Events:
+        yield when(self.x > 0.5 * self.end, {self.n: pre(self.n) + 1})
+        yield assert_(self.x < self.end, "has gone {x} m of {end} m after {n} step")
+
+
+def test_an_assertion_ends_the_run(solver):
+    drive = Assembly("way", parts={"sledge": Asserting()})
+    told = "sledge has gone 3 m of 3 m after 1 step" if solver == "idas" else ".*sledge has gone x m of end m"
+    with pytest.raises(LimitPassed, match=rf"At 1\.5 s {told}" if solver == "idas" else told):
+        run(drive, 2.0, solver)
+    with pytest.raises(LimitPassed, match="0 s"):
+        run(Assembly("way", parts={"sledge": Asserting(end=-1.0)}), 1.0, solver)
+    assert run(drive, 1.4, solver).final["sledge.x"] == pytest.approx(2.8)
