@@ -10,6 +10,7 @@ from modelica_like.errors import MissingValue, ModelicaLikeError, Source, raise_
 from modelica_like.flatten.checks import unit_of_field
 from modelica_like.flatten.discrete import Hidden
 from modelica_like.flatten.model import (
+    INITIAL_EQUATION,
     Coefficient,
     FlatDiscrete,
     FlatModel,
@@ -71,6 +72,8 @@ class _Flattener:
         used = {self._owner(one, _plain(name)) for one, template in templates for name in template.discretes}
         for component, template in templates:
             self._declare(component, used)
+            for path, text in template.initial:
+                self._declare_initial(component, path, text)
             for one in template.hidden:
                 self._hide(id(component), one.path, f"{component.path}.{one.path}".lstrip("."), one)
         self.nodes = [(k, 0) for k in range(len(self.variables))]
@@ -146,6 +149,14 @@ class _Flattener:
                 path, unit, field.description, kind, field.state, field.guess, field.nominal, field.min, field.max
             )
         )
+
+    def _declare_initial(self, component: Component, name: str, text: str) -> None:
+        """Declare what is left of an initial equation, which is zero at the start."""
+        path, node = f"{component.path}.{name}".lstrip("."), len(self.variables)
+        self.variable_of[id(component), name] = node
+        told = f"{INITIAL_EQUATION} `{text}`"
+        self.variables.append(FlatVariable(path, ONE, told, "local", "avoid", 0.0, 1.0, None, None))
+        self.starts.append(StartValue(node, 0.0, "fixed"))
 
     def _declare_discrete(self, component: Component, name: str, path: str, field: Discrete) -> None:
         value = component.start(name)

@@ -13,6 +13,9 @@ from modelica_like.language.component import Component
 from modelica_like.language.fields import StatePreference, in_range
 from modelica_like.units import Unit
 
+INITIAL_EQUATION = "the initial equation"
+"""Begins the description of what is left of an initial equation, which is zero at the start."""
+
 
 @dataclass(frozen=True, slots=True)
 class FlatVariable:

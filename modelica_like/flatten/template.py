@@ -18,9 +18,10 @@ from modelica_like.flatten.wiring import taken
 from modelica_like.language.component import Component
 from modelica_like.language.declared import Declared
 from modelica_like.language.discrete import INITIAL, Marker, Pre
-from modelica_like.language.equation import Connection, Equation, FreeEnd, as_statement
+from modelica_like.language.equation import Connection, Equation, FreeEnd, as_equation, as_statement
 from modelica_like.language.expr import TIME, Symbol, flagged_motion, is_expression, symbol_of, symbols_in
 from modelica_like.language.fields import Parameter, Variable
+from modelica_like.language.functions import der
 from modelica_like.language.mode import StartMode, Transition
 from modelica_like.language.places import NOWHERE, located
 from modelica_like.language.transition import as_event
@@ -101,6 +102,7 @@ class Template:
     discretes: tuple[str, ...]
     residual: ca.Function
     sources: tuple[Source, ...]
+    initial: tuple[tuple[str, str], ...]
     incidence: tuple[tuple[int, ...], ...]
     linear: tuple[LinearForm | None, ...]
     coefficients: ca.Function
@@ -119,6 +121,10 @@ class Template:
     energy: ca.Function
     connections: tuple[Connection | FreeEnd, ...] = field(compare=False)
     inferred: dict[str, Unit] = field(compare=False)
+
+
+class InitialResidual(Symbol):
+    """What is left of an initial equation: zero at the start."""
 
 
 class Names:
@@ -142,7 +148,7 @@ class Names:
     def _add(self, symbol: Symbol) -> None:
         path = path_of(symbol, self.root)
         kind = None if symbol.owner is None or isinstance(symbol, Pre) else symbol.owner.fields.get(symbol.name)
-        if isinstance(kind, Variable):
+        if isinstance(kind, Variable) or isinstance(symbol, InitialResidual):
             self.variables.setdefault(Slot(path, symbol.order), symbol)
         elif isinstance(kind, Parameter) or flagged_motion(symbol.name):
             self.parameters.setdefault(path, symbol)
@@ -223,17 +229,25 @@ def _build(component: Component) -> Template:
     ]
     events = [as_event(item, source, kind) for item, source in located(component.events(), f"{kind}.events()")]
     equations = [s for s in statements if isinstance(s, Equation) and not is_discrete(s)]
+    equations += _constants(component)
+    initial = [
+        as_equation(item, source, kind)
+        for item, source in located(component.initial_equations(), f"{kind}.initial_equations()")
+    ]
     wiring = tuple(s for s in statements if isinstance(s, Connection | FreeEnd))
     joined = {name for one in wiring if isinstance(one, Connection) for name in taken(component, one)}
     check_balance(component, equations, joined)
+    starts = [InitialResidual(component, f"initial[{k}]") for k in range(1, len(initial) + 1)]
     residuals = [e.left - e.right for e in equations]
+    sources = tuple(e.source for e in (*equations, *initial))
+    residuals += [one - (e.left - e.right) for one, e in zip(starts, initial, strict=True)]
     holds, hold_terms = hold_forms(component, residuals)
     energy, energy_terms = Names(component), _energy_terms(component, wiring)
     discrete = DiscreteEquations(
         component, [s for s in statements if isinstance(s, Equation) and is_discrete(s)], events,
-        [*zip(residuals, (e.source for e in equations), strict=True), *((e, NOWHERE) for e in energy_terms)],
+        [*zip(residuals, sources, strict=True), *((e, NOWHERE) for e in energy_terms)],
     )  # fmt: skip
-    inferred = check_units(component, equations, discrete.events, discrete.updates)
+    inferred = check_units(component, [*equations, *initial], discrete.events, discrete.updates)
     changes = _Changes(component, discrete)
     names = Names(component)
     names.add([*residuals, *hold_terms, *changes.expressions()])
@@ -249,7 +263,8 @@ def _build(component: Component) -> Template:
         parameters=tuple(names.parameters),
         discretes=tuple(names.discretes),
         residual=residual,
-        sources=tuple(e.source for e in equations),
+        sources=sources,
+        initial=tuple((one.name, e.source.text.removeprefix("yield ")) for one, e in zip(starts, initial, strict=True)),
         incidence=_rows(residual.jac_sparsity(0, 0)),
         linear=linear,
         coefficients=coefficients,
@@ -265,6 +280,12 @@ def _build(component: Component) -> Template:
         connections=wiring,
         inferred=inferred,
     )
+
+
+def _constants(component: Component) -> list[Equation]:
+    """Equations of parameters that initial equations determine: they do not change."""
+    kept = (name for name, field in component.fields.items() if isinstance(field, Variable) and field.constant)
+    return [Equation(der(symbol_of(component, name)), ca.SX(0)) for name in kept]
 
 
 class _Changes:

@@ -185,7 +185,12 @@ class Variable(_Symbolic):
         guess: first guess of its start value (SI).
         is_flow: whether it sums to zero in a connection.
         bounds: as of `var`.
+
+    Attributes:
+        constant: whether it keeps its start value: a parameter that initial equations determine.
     """
+
+    constant = False
 
     def __init__(
         self, unit: str, description: str = "", *, state: StatePreference = "default", guess: float = 0.0,
@@ -213,7 +218,7 @@ class Discrete(_Symbolic):
 
 def param(
     unit: str, description: str = "", *, default: Any = None,
-    min: float | None = None, max: float | None = None, nominal: float = 1.0, tunable: bool = True,
+    min: float | None = None, max: float | None = None, nominal: float = 1.0, tunable: bool = True, fixed: bool = True,
 ) -> Any:  # fmt: skip
     """Declare a parameter.
 
@@ -226,7 +231,12 @@ def param(
         max: largest allowed value, SI.
         nominal: order of magnitude, SI.
         tunable: whether it can change after compilation.
+        fixed: False: initial equations determine it, otherwise its default; it is a variable that keeps its value.
     """
+    if not fixed:
+        kept = Variable(unit, description, state="always", default=default, min=min, max=max, nominal=nominal)
+        kept.constant = True
+        return kept
     parameter = Parameter(unit, description, default=default, min=min, max=max, nominal=nominal)
     parameter.tunable = tunable
     return parameter
