@@ -215,6 +215,18 @@ class Discrete(_Symbolic):
 
     kind: Literal["number", "boolean", "integer"] = "number"
 
+    def read(self, given: Any) -> Value:
+        """Read a start value, as `Field.read`; that of a Boolean is true or false.
+
+        Raises:
+            ValueOutOfRange: also, it is not a whole number where it should be one.
+        """
+        value = super().read(float(given) if self.kind == "boolean" and isinstance(given, bool) else given)
+        if self.kind != "number" and value.number is not None and value.number % 1:
+            wanted = "true or false" if self.kind == "boolean" else "a whole number"
+            raise ValueOutOfRange(f"{self.label} = {given} must be {wanted}.")
+        return value
+
 
 def param(
     unit: str, description: str = "", *, default: Any = None,

@@ -431,3 +431,61 @@ def test_an_assertion_ends_the_run(solver):
     with pytest.raises(LimitPassed, match="0 s"):
         run(Assembly("way", parts={"sledge": Asserting(end=-1.0)}), 1.0, solver)
     assert run(drive, 1.4, solver).final["sledge.x"] == pytest.approx(2.8)
+
+
+class Sledge(Component):
+    """Dry friction by Boolean equations and a path parameter, the way of M. Otter, H. Elmqvist, S. E. Mattsson (1999).
+
+    q is the friction force while it sticks, and the acceleration plus the sliding force while it slides.
+    """
+
+    v: Variable = var("m/s", "speed", default=0)
+    a: Variable = var("m/s2", "acceleration")
+    f: Variable = var("N", "friction")
+    q: Variable = var("1", "path parameter")
+    m: Parameter = param("kg", "mass", default=1.0)
+    slide: Parameter = param("1", "friction that slides in N", default=2.0)
+    stick: Parameter = param("1", "friction that sticks in N", default=3.0)
+    pull: Parameter = param("N", "amplitude of the force", default=5.0)
+    w: Parameter = param("rad/s", "its frequency", default=np.pi / 2)
+    unit_a: Parameter = param("m/s2", "unit", default=1.0)
+    unit_f: Parameter = param("N", "unit", default=1.0)
+    mode: Discrete = integer("1: forward, 0: sticks, -1: backward")
+    starts: Discrete = boolean("begins to slide forward")
+    backs: Discrete = boolean("begins to slide backward")
+    locked: Discrete = boolean("sticks", start=True)
+
+    def equations(self) -> Equations:
+        old, q = pre(self.mode), self.q
+        yield der(self.v) == self.a
+        yield self.m * self.a == self.pull * sin(self.w * self.time) - self.f
+        up, down = (
+            any_of(q > self.stick, all_of(pre(self.starts), q > self.slide)),
+            any_of(q < -self.stick, all_of(pre(self.backs), q < -self.slide)),
+        )
+        yield self.starts == any_of(all_of(old == 0, up), all_of(old == -1, self.v > 0))
+        yield self.backs == any_of(all_of(old == 0, down), all_of(old == 1, self.v < 0))
+        yield self.locked == negate(any_of(old != 0, self.starts, self.backs))
+        forward = any_of(self.starts, all_of(negate(self.backs), self.mode == 1))
+        yield self.a / self.unit_a == if_(self.locked, 0, if_(forward, q - self.slide, q + self.slide))
+        yield self.f / self.unit_f == if_(self.locked, q, if_(forward, self.slide, -self.slide))
+        begun, gone = any_of(old == 1, self.starts), any_of(old == -1, self.backs)
+        yield self.mode == if_(all_of(begun, self.v > 0), 1, if_(all_of(gone, self.v < 0), -1, 0))
+
+
+def test_friction_by_boolean_equations(solver):
+    found = run(Sledge(), 4.0, solver)
+    w, leaves = np.pi / 2, np.arcsin(0.6) / (np.pi / 2)  # 5 sin(w t) = 3
+
+    def speed(t, begin, friction):
+        return 5 / w * (np.cos(w * begin) - np.cos(w * t)) - friction * (t - begin)
+
+    low, high = 1.5, 3.0  # it stops in between; there the force is -4.07 N, so it goes back at once
+    for _ in range(60):
+        low, high = (
+            (0.5 * (low + high), high) if speed(0.5 * (low + high), leaves, 2) > 0 else (low, 0.5 * (low + high))
+        )
+    changes = np.flatnonzero(np.diff(found["mode"]))
+    assert found.time[changes] == pytest.approx([leaves, low], abs=CLOSE)
+    assert found["mode"][[0, changes[0] + 1, -1]].tolist() == [0, 1, -1]
+    assert found.final["v"] == pytest.approx(speed(4.0, low, -2), abs=1e-8)
