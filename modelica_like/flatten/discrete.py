@@ -89,7 +89,7 @@ class DiscreteEquations:
             elif isinstance(one, Assertion):
                 self._write_assertion(one, f"assertion[{number}]")
         told = [(expression, one.source) for one in self.events for expression in _expressions(one)]
-        for expression, source in (*others, *told):
+        for expression, source in told:
             self._check_pre(expression, source)
         self._write_markers([*others, *told, *((e, u.source) for u in self.updates for e in (u.active, u.value))])
 
@@ -157,10 +157,9 @@ class DiscreteEquations:
         for one in symbols_in(expression) if is_expression(expression) else ():
             if isinstance(one, Pre):
                 raise LanguageError(
-                    f"{self._kind}: {one.name} is in an equation or a transition; between events it is {one.of.name}.",
+                    f"{self._kind}: {one.name} is in a transition, where it never differs from {one.of.name}.",
                     where=source,
-                    advice=f"Write {one.of.name}; in a reset it is the value before. pre(…), edge(…) and change(…) "
-                    "belong in equations of discrete variables and in `when`.",
+                    advice=f"Write {one.of.name}: in a reset it is the value before. For an edge, write once=True.",
                 )
 
     def _write_markers(self, pending: list[Located]) -> None:
@@ -245,6 +244,14 @@ class DiscreteEquations:
         mode.name, mode.owner = path, self._kind
         self.hidden.append(Hidden(path, description, names))
         return BoundMode(mode, symbol)
+
+
+def between_events(expression: Any) -> Any:
+    """Return an expression as it is between events, where the `pre` of a discrete variable is the variable."""
+    pres = [one for one in symbols_in(expression) if isinstance(one, Pre)]
+    if not pres:
+        return expression
+    return ca.substitute(ca.SX(expression), ca.vertcat(*pres), ca.vertcat(*(one.of for one in pres)))
 
 
 def is_discrete(equation: Equation) -> bool:

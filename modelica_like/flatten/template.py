@@ -11,7 +11,7 @@ import casadi as ca
 from modelica_like.errors import LanguageError, Source
 from modelica_like.flatten.checks import check_balance, check_units, unit_of_field
 from modelica_like.flatten.conditions import guard_of
-from modelica_like.flatten.discrete import DiscreteEquations, Hidden, UpdateForm, is_discrete
+from modelica_like.flatten.discrete import DiscreteEquations, Hidden, UpdateForm, between_events, is_discrete
 from modelica_like.flatten.holds import HoldForm, hold_forms
 from modelica_like.flatten.reasons import reason
 from modelica_like.flatten.wiring import taken
@@ -238,7 +238,7 @@ def _build(component: Component) -> Template:
     joined = {name for one in wiring if isinstance(one, Connection) for name in taken(component, one)}
     check_balance(component, equations, joined)
     starts = [InitialResidual(component, f"initial[{k}]") for k in range(1, len(initial) + 1)]
-    residuals = [e.left - e.right for e in equations]
+    residuals = [between_events(e.left - e.right) for e in equations]
     sources = tuple(e.source for e in (*equations, *initial))
     residuals += [one - (e.left - e.right) for one, e in zip(starts, initial, strict=True)]
     holds, hold_terms = hold_forms(component, residuals)

@@ -128,7 +128,7 @@ def if_(condition: Expr | bool, then: Scalar, otherwise: Scalar) -> Expr:
 def pre(value: Expr) -> Expr:
     """Return a discrete value as it was before the present event, or before the present iteration of it.
 
-    It belongs in equations of discrete variables and in `when`.
+    It belongs in equations of discrete variables and in `when`; in equations of variables it is the value itself.
 
     Args:
         value: a discrete, Boolean or integer variable.

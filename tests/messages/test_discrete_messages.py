@@ -20,6 +20,7 @@ from modelica_like.language import (
     boolean,
     clock,
     der,
+    edge,
     integer,
     negate,
     param,
@@ -121,8 +122,15 @@ class Units(Basis):
 
 
 class Outside(Basis):
+    gate = Mode("open")
+
     def equations(self) -> Equations:
-        yield self.T * der(self.x) == 1 - self.x + pre(self.n)  # outside
+        yield from super().equations()
+        yield self.on == (self.x > 0.5)
+
+    def events(self) -> Events:
+        yield from super().events()
+        yield self.gate.go("open", "open", when=edge(self.on))  # outside
 
 
 class Varying(Basis):
@@ -212,10 +220,9 @@ CASES: dict[type[Component], tuple[type[ModelicaLikeError], str]] = {
     ),
     Outside: (
         LanguageError,
-        "Outside: pre(n) is in an equation or a transition; between events it is n.\n"
-        f"  in {HERE}:{{outside}} `yield self.T * der(self.x) == 1 - self.x + pre(self.n)`\n"
-        "Write n; in a reset it is the value before. pre(…), edge(…) and change(…) belong in equations of discrete "
-        "variables and in `when`.",
+        "Outside: pre(on) is in a transition, where it never differs from on.\n"
+        f'  in {HERE}:{{outside}} `yield self.gate.go("open", "open", when=edge(self.on))`\n'
+        "Write on: in a reset it is the value before. For an edge, write once=True.",
     ),
     Varying: (
         LanguageError,

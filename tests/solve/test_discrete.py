@@ -466,7 +466,7 @@ class Sledge(Component):
         yield self.starts == any_of(all_of(old == 0, up), all_of(old == -1, self.v > 0))
         yield self.backs == any_of(all_of(old == 0, down), all_of(old == 1, self.v < 0))
         yield self.locked == negate(any_of(old != 0, self.starts, self.backs))
-        forward = any_of(self.starts, all_of(negate(self.backs), self.mode == 1))
+        forward = any_of(self.starts, all_of(negate(self.backs), old == 1))
         yield self.a / self.unit_a == if_(self.locked, 0, if_(forward, q - self.slide, q + self.slide))
         yield self.f / self.unit_f == if_(self.locked, q, if_(forward, self.slide, -self.slide))
         begun, gone = any_of(old == 1, self.starts), any_of(old == -1, self.backs)
