@@ -18,16 +18,20 @@ def _types() -> Iterable[str]:
 
 def describe(
     kind: Annotated[
-        str, Argument(metavar="TYPE", help="Component type, as in a netlist.", show_default=False, choices=_types)
+        str, Argument(metavar="TYPE", help="Component type, or a netlist.", show_default=False, choices=_types)
     ],
     *, json: Json = False, debug: Debug = False,
 ) -> None:  # fmt: skip
-    """Describe a component type: parameters, units, connectors, modes, parts, equations and events."""
-    with told(debug, json=json) as page:
-        from modelica_like.netlist import find_type
-        from modelica_like.report.types import describe as described
+    """Describe a component type: parameters, units, connectors, modes, parts, equations and events.
 
-        page.print(described(find_type(kind)))
+    Of a netlist: its parameters, its parts and those of its assemblies, and its connections.
+    """
+    with told(debug, json=json) as page:
+        from modelica_like.netlist import find_type, load
+        from modelica_like.report.types import describe as described
+        from modelica_like.report.types import describe_netlist
+
+        page.print(describe_netlist(load(kind)) if kind.endswith(".toml") else described(find_type(kind)))
 
 
 def library(

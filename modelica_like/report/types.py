@@ -11,7 +11,7 @@ from rich.padding import Padding
 from rich.text import Text
 
 from modelica_like.errors import UnknownName, did_you_mean
-from modelica_like.language import Component
+from modelica_like.language import Assembly, Component, Parameter
 from modelica_like.report.component_pages.source import Source
 from modelica_like.report.declared import Notation, declared, filled
 from modelica_like.report.statements import statements
@@ -72,6 +72,24 @@ def describe(kind: type[Component]) -> RenderableType:
     made = [table(title, f"{first}*", *others, rows=rows) for title, (first, *others), rows in tables]
     lists = [Lines(title, lines) for title, lines in _lines(kind).items()]
     sections: list[RenderableType] = [heading, Text(text), *made, *lists]
+    return Group(*(Padding(section, (0, 0, 1, 0), expand=False) for section in sections))
+
+
+def describe_netlist(drive: Assembly) -> RenderableType:
+    """Return a page about a netlist: its parameters, all parts of it and of its assemblies, and its connections."""
+    own = (name for name, field in drive.fields.items() if isinstance(field, Parameter))
+    parameters = [(name, str(value.given)) for name in own if (value := drive.value(name)) is not None]
+    inner = [part for part in drive.walk() if part is not drive]
+    parts = ((part.path, type(part).__name__, _given(part), summary(type(part))) for part in inner)
+    joined = {**{name: " - ".join(ends) for name, ends in drive.chains.items()},
+              **{name: " = ".join(ends) for name, ends in drive.wires.items()}}  # fmt: skip
+    sections: list[RenderableType] = [
+        Text.assemble((drive._name, "bold"), f"  {drive._description}"),
+        *([table("parameters", "name*", "value", rows=parameters)] if parameters else []),
+        table("parts", "name*", "type", "values", "what it is", rows=parts),
+        Lines("connections", [f"{name}: {ends}" for name, ends in joined.items()]),
+        *([Lines("outer connectors", [" = ".join(pair) for pair in drive.exposed])] if drive.exposed else []),
+    ]
     return Group(*(Padding(section, (0, 0, 1, 0), expand=False) for section in sections))
 
 

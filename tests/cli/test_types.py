@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 from modelica_like.cli import app
 from modelica_like.errors import UnitError
-from modelica_like.netlist import library_types, schema
+from modelica_like.netlist import library_types, load, schema
 from modelica_like.netlist.json_units import Quantities
 from modelica_like.report.component_pages.source import Source
 from modelica_like.report.statements import statements
@@ -81,6 +81,20 @@ def test_conditions_parts_and_codes_are_told(run: CliRunner) -> None:
     begin = lines("ServoMotor").index("parts")
     told = {line.split()[0]: line.split()[1] for line in lines("ServoMotor")[begin + 2 :][: len(servo._class_parts)]}
     assert told == {name: type(part).__name__ for name, part in servo._class_parts.items()}
+
+
+def test_a_netlist_is_described_with_the_parts_of_its_assemblies(run: CliRunner) -> None:
+    file = Path(__file__).parents[2] / "examples" / "lepelletier.toml"
+    tables = json.loads(run.invoke(app, ["describe", str(file), "--json"]).stdout)["tables"]
+    drive = load(file)
+    assert [(row["name"], row["type"]) for row in tables["parts"]] == [
+        (part.path, type(part).__name__) for part in drive.walk() if part is not drive
+    ]
+    (clutch,) = (row for row in tables["parts"] if row["name"] == "box.clutch_a")
+    assert clutch["values"] == "capacity = 500 N.m"
+    assert "clutch_a: selector.a = box.pressure_a" in tables["connections"]
+    startup = run.invoke(app, ["describe", str(file.with_name("machine_tool_startup.toml"))]).stdout
+    assert re.search(r"^h1 +10 N.m.s/rad *$", startup, re.MULTILINE)
 
 
 @pytest.mark.parametrize("words", [["worm"], ["gear", "--group", "gears"], ["FRICTION", "clutch"]])
