@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
+from rich.markup import escape
+
 from modelica_like.cli.declare import Option
 from modelica_like.cli.models import Start
 from modelica_like.cli.shared import TABLE, Assignments, Debug, Json, Netlist, Plot, Until, load_netlist, told
@@ -13,30 +15,47 @@ from modelica_like.cli.shared import TABLE, Assignments, Debug, Json, Netlist, P
 def modes(
     netlist: Netlist, assignments: Assignments = None, *,
     at: Annotated[
-        str, Option(metavar="WHEN", help="Time, e.g. 0.5s, or kind of start: given, rest, steady.")
-    ] = "given",
+        str | None, Option(metavar="WHEN", help="Time, e.g. 0.5s, or given, rest, steady; else as the netlist starts.")
+    ] = None,
     shapes: Annotated[Path | None, Option(metavar="FILE", help="Draw the shapes of the modes.")] = None,
     show: Annotated[list[str] | None, Option(metavar="NAME", help="Variables along the shapes.")] = None,
+    draw: Annotated[Path | None, Option(metavar="FILE", help="Schematic with shapes below: .svg, .png, .pdf.")] = None,
     bode: Annotated[Path | None, Option(metavar="FILE", help="Draw the frequency response.")] = None,
+    nyquist: Annotated[Path | None, Option(metavar="FILE", help="Draw it in the complex plane.")] = None,
+    opened: Annotated[
+        str | None, Option("--open", metavar="SIGNAL", help="Open a loop there: its response, its margins.")
+    ] = None,
     inputs: Annotated[list[str] | None, Option("--input", metavar="NAME", help="Input or parameter.")] = None,
     outputs: Annotated[list[str] | None, Option("--response", metavar="NAME", help="Variable that answers.")] = None,
     json: Json = False, debug: Debug = False,
 ) -> None:  # fmt: skip
     """Linearize a netlist at a point: eigenvalues, damping, energy shares of each mode."""
-    with told(debug, json=json, pictures=[shapes, bode]) as page:
+    with told(debug, json=json, pictures=[shapes, bode, nyquist]) as page:
         assembly = load_netlist(netlist, assignments)
         from modelica_like.analyse.linear.linearize import linearize, when
+        from modelica_like.analyse.linear.loop import open_loop
+        from modelica_like.draw import check_format, save_schematic
         from modelica_like.report.analysis import modes_report
         from modelica_like.solve.plot import save_plot
 
-        linear = linearize(assembly, when(at), inputs=inputs, outputs=outputs)
+        if draw:
+            check_format(draw)
+        start = when(at) if at else None
+        loop = open_loop(assembly, opened, start) if opened else None
+        linear = loop or linearize(assembly, start, inputs=inputs, outputs=outputs)
         found = linear.modes()
         page.print(modes_report(found))
+        if loop:
+            page.print("", escape(str(loop.margins())))
         if shapes:
             speeds = [one.path for one in linear.model.flat_variables if _is_speed(one.path, str(one.unit))]
             save_plot(found.plot(show or speeds), shapes)
+        if draw:
+            save_schematic(assembly, draw, modes=found)
         if bode:
             save_plot(linear.bode(), bode)
+        if nyquist:
+            save_plot(linear.nyquist(), nyquist)
 
 
 def _is_speed(path: str, unit: str) -> bool:
@@ -88,12 +107,12 @@ def sweep(
     scheduler: Annotated[str | None, Option(metavar="ADDRESS", help="Dask scheduler, e.g. tcp://host:8786.")] = None,
     solver: Annotated[Literal["native", "idas"], Option(help="The compiled run-time of FMUs, or IDAS.")] = "native",
     output: Annotated[Path | None, Option("--output", "-o", metavar="FILE", help=TABLE)] = None,
+    plot: Annotated[Path | None, Option(metavar="FILE", help="Draw lines, a map, or parallel coordinates.")] = None,
     json: Json = False, debug: Debug = False,
 ) -> None:  # fmt: skip
     """Simulate a netlist over a grid of parameter values."""
-    with told(
-        debug, json=json, tables=[output], files=[checkpoint / "zarr.json" if checkpoint else None]
-    ) as page:  # fmt: skip
+    finished = checkpoint / "zarr.json" if checkpoint else None
+    with told(debug, json=json, tables=[output], pictures=[plot], files=[finished]) as page:
         assembly = load_netlist(netlist, assignments)
         from modelica_like.analyse.sweeps.ranges import read_range
         from modelica_like.analyse.sweeps.sweep import sweep as run
@@ -109,6 +128,11 @@ def sweep(
         page.print(sweep_report(found))
         if output:
             write_dataset(found, output)
+        if plot:
+            from modelica_like.analyse.sweeps.pictures import plot_sweep
+            from modelica_like.solve.plot import save_plot
+
+            save_plot(plot_sweep(found), plot)
 
 
 def sensitivity(

@@ -10,11 +10,11 @@ from modelica_like.cli.export import Fmi
 from modelica_like.cli.shared import (
     Assignments,
     Csv,
+    Curves,
     Debug,
     Json,
     Netlist,
     Plot,
-    Show,
     Timeout,
     Units,
     Until,
@@ -77,7 +77,7 @@ def cosim(
     ] = None,
     master: Annotated[Master | None, Option(help="All FMUs at once, or one after the other.")] = None,
     inputs: Annotated[Inputs | None, Option(help="Interpolate inputs linearly, or hold them.")] = None,
-    csv: Csv = None, units: Units = False, plot: Plot = None, show: Show = None, timeout: Timeout = "600s",
+    csv: Csv = None, units: Units = False, plot: Plot = None, show: Curves = None, timeout: Timeout = "600s",
     json: Json = False, debug: Debug = False,
 ) -> None:  # fmt: skip
     """Run a system of FMUs together: mode changes, energies at the couplings, results as table and picture."""
@@ -90,12 +90,12 @@ def cosim(
         from modelica_like.report.run import cosimulation_report
         from modelica_like.simulation import seconds
         from modelica_like.solve.plot import plot as draw
-        from modelica_like.solve.trajectories import matching
+        from modelica_like.solve.signals import read_signals
 
         values = _numbers(assignments or ())
         with opened(system) as known, Bar(until or known.settings.until) as bar:
             if show:
-                matching(described_model(known), show)
+                read_signals(described_model(known), show)
             made = Outcome(
                 lambda: run(
                     known, until, step=step, master=master, inputs=inputs, tolerance=rtol,
@@ -103,7 +103,7 @@ def cosim(
                 ), debug=debug,
             )  # fmt: skip
         made.tell(cosimulation_report, page)
-        made.write(csv, units=units, pictures=[(plot, lambda one: draw(one, show or ()))])
+        made.write(csv, units=units, show=show or (), pictures=[(plot, lambda one: draw(one, show or ()))])
 
 
 def _numbers(assignments: list[str] | tuple[str, ...]) -> dict[str, float]:

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from modelica_like.cli.declare import Option
+from modelica_like.cli.declare import Option, WrongUse
 from modelica_like.cli.shared import (
     Assignments,
     Csv,
+    Curves,
     Debug,
     Json,
     Netlist,
     Plot,
     Points,
-    Show,
     Tolerance,
     Units,
     Until,
@@ -23,6 +24,13 @@ from modelica_like.cli.shared import (
     note,
     told,
 )
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from matplotlib.figure import Figure
+
+    from modelica_like.solve.trajectories import Trajectories
 
 Start = Annotated[
     Literal["given", "rest", "steady"] | None,
@@ -61,7 +69,10 @@ def check(
 def simulate(
     netlist: Netlist, assignments: Assignments = None, *,
     until: Until = None, start: Start = None, solver: Solver = None, rtol: Tolerance = None, points: Points = None,
-    csv: Csv = None, units: Units = False, plot: Plot = None, show: Show = None,
+    csv: Csv = None, units: Units = False, plot: Plot = None, show: Curves = None,
+    compare: Annotated[
+        list[str] | None, Option(metavar="WHAT", help="In the picture, too: a file, or runs, e.g. 'gear.ratio=2,3'.")
+    ] = None,
     display: Annotated[
         list[str] | None, Option(metavar="WHAT=UNIT", help="Unit of results, e.g. speed=rpm or '*.phi=deg'.")
     ] = None,
@@ -84,11 +95,11 @@ def simulate(
         from modelica_like.simulation import build
         from modelica_like.simulation import simulate as run
         from modelica_like.solve.display import Display
-        from modelica_like.solve.plot import plot as draw
-        from modelica_like.solve.trajectories import matching
+        from modelica_like.solve.signals import read_signals
 
-        model = build(assembly)
-        matching(model, show or ())
+        variants, files = _beside(compare or (), plot)
+        model = build(assembly, free=[path for path, _ in variants])
+        read_signals(model, show or ())
         shown = assigned(display, "--display")
         Display(model, shown)
         with Bar(until or model.settings.get("until")) as bar:
@@ -97,8 +108,38 @@ def simulate(
                 debug=debug,
             )
         energy = energy and made.stopped is None and made.attempt("The energy balance", made.solution.energy)
-        made.tell(lambda one: run_report(one, energy=energy, debug=debug, display=shown), page)
-        made.attempt("The notes", lambda: note(*notes(assembly, made.solution)))
-        curves = (plot, lambda one: draw(one, show or (), display=shown))
+        made.tell(lambda one: run_report(one, energy=energy, debug=debug, display=shown, show=show or ()), page)
+        made.attempt("The notes", lambda: note(*notes(assembly, made.solution, energy=energy)))
+        again = partial(run, model, until, start=start, rtol=rtol, points=points)
+        curves = (plot, lambda one: _drawn(one, variants, files, again, show or (), shown))
         pictures = curves, (sankey, lambda one: one.energy().sankey(model.name))
-        made.write(csv, units=units or bool(display), display=shown, pictures=pictures)
+        made.write(csv, units=units or bool(display), display=shown, pictures=pictures, show=show or ())
+
+
+def _beside(texts: Sequence[str], plot: Path | None) -> tuple[list[tuple[str, Sequence[Any]]], list[Path]]:
+    """Return the values and the files to compare with."""
+    from modelica_like.analyse.sweeps.ranges import read_range
+
+    if texts and plot is None:
+        raise WrongUse("it is drawn into the picture of --plot, which is missing.", "--compare")
+    files = [Path(text) for text in texts if "=" not in text]
+    for file in files:
+        file.stat()
+    return [read_range(text) for text in texts if "=" in text], files
+
+
+def _drawn(
+    run: Trajectories, variants: Sequence[tuple[str, Sequence[Any]]], files: Sequence[Path],
+    again: Callable[..., Trajectories], show: Sequence[str], display: Mapping[str, str],
+) -> Figure:  # fmt: skip
+    """Draw a run alone, or with runs for other parameter values and files beside it."""
+    if not (variants or files):
+        from modelica_like.solve.plot import plot
+
+        return plot(run, show, display=display)
+    from modelica_like.report.overlay import overlay
+
+    pairs = ((path, value) for path, values in variants for value in values)
+    family = {f"{path} = {value}": again(parameters={path: value}) for path, value in pairs}
+    beside = {file.name: file for file in files}
+    return overlay({"as given": run} | family | beside, *show, title=run.model.name, display=display)

@@ -40,6 +40,9 @@ Csv = Annotated[Path | None, Option(metavar="FILE", help=TABLE)]
 Units = Annotated[bool, Option("--units", help="Write the units of [display], named in a second header line.")]
 Plot = Annotated[Path | None, Option(metavar="FILE", help="Draw a picture: .png, .svg or .pdf.")]
 Show = Annotated[list[str] | None, Option(metavar="PATTERN", help="Variables to show, e.g. '*.w'.")]
+Curves = Annotated[
+    list[str] | None, Option("--show", metavar="PATTERN", help="Curves, also formulas: '*.w', '2*pi*motor.w'.")
+]
 Timeout = Annotated[str, Option(metavar="TIME", help="Time limit of a run.")]
 Json = Annotated[bool, Option("--json", help="Print the tables as JSON, with all digits and rows.")]
 

@@ -12,11 +12,12 @@ from modelica_like.flatten.template import Template
 from modelica_like.language.component import Component
 from modelica_like.language.fields import StatePreference, in_range
 from modelica_like.units import Unit
+from modelica_like.upper import upper
 
 
 @dataclass(frozen=True, slots=True)
 class FlatVariable:
-    """A continuous variable; `kind` is local, output, input, potential or flow."""
+    """A continuous variable; `kind` is local, output, input, potential or flow, `driving` as of `Variable`."""
 
     path: str
     unit: Unit
@@ -27,6 +28,7 @@ class FlatVariable:
     nominal: float
     min: float | None
     max: float | None
+    driving: int = 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -191,6 +193,9 @@ class FlatModel:
 
     def __repr__(self) -> str:
         return f"<{self}>"
+
+    def _repr_markdown_(self) -> str:
+        return upper("mathematics")(self)
 
     def __str__(self) -> str:
         unknowns = len(self.variables) - len(self.inputs)

@@ -94,6 +94,7 @@ def _sections() -> dict[str, Any]:
         },
         "expose": _map({"type": "string"}, "outer connectors and signals", {"input": "hub.flange_a"}),
         "simulate": {"description": "how the drive is run", **_simulate()},
+        "sizing": {"type": "string", "description": "sizing file, whose checks stand in reports"},
         "display": _map(
             {"type": "string"},
             "units in which results are shown, by quantity, path or pattern",

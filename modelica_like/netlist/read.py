@@ -78,6 +78,8 @@ class _Loader:
             description=document.description,
         )  # fmt: skip
         assembly.__dict__.update(_origin=str(chain[-1]), _simulate=document.simulate, _display=document.display)
+        if document.sizing:
+            assembly.__dict__["_sizing"] = str(chain[-1].parent / document.sizing)
         task = _Task(document, assembly, chain, self)
         task.run()
         if task.errors:

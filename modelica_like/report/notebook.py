@@ -8,11 +8,13 @@ from collections.abc import Callable
 from typing import Any
 
 from rich.console import Console
+from rich.text import Text
 
 from modelica_like.analyse.linear.model import Modes
+from modelica_like.analyse.operating.curves import Curves
 from modelica_like.analyse.operating.steady import OperatingPoint
 from modelica_like.analyse.sensitivity.result import Sensitivities
-from modelica_like.report.analysis import modes_report, point_report, sensitivity_report
+from modelica_like.report.analysis import curves_report, modes_report, point_report, sensitivity_report
 from modelica_like.report.run import run_report
 from modelica_like.solve.plot import picture_bytes, plot
 from modelica_like.solve.trajectories import Trajectories
@@ -25,11 +27,12 @@ def html(shown: Any) -> str:
     """Return a result as HTML.
 
     Args:
-        shown: a run, the modes of a linear model, an operating point or sensitivities.
+        shown: a run, or another result; those without a table of their own show their text.
     """
     make: dict[type, Callable[[Any], Any]] = {
-        Modes: modes_report, OperatingPoint: point_report, Sensitivities: sensitivity_report,
+        Modes: modes_report, OperatingPoint: point_report, Sensitivities: sensitivity_report, Curves: curves_report,
         Trajectories: lambda run: run_report(run, energy=False),
+        object: lambda other: other if hasattr(other, "__rich__") else Text(str(other)),
     }  # fmt: skip
     tell = next(tell for kind, tell in make.items() if isinstance(shown, kind))
     console = Console(record=True, file=io.StringIO(), width=_WIDE, highlight=False, emoji=False)

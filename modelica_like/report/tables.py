@@ -67,6 +67,7 @@ def table(
         ends: whether the rows left out are those in the middle, not the last ones.
     """
     heads, marks, formats = zip(*(column.rstrip("*").partition(">") for column in columns), strict=True)
+    assert len(set(heads)) == len(heads), "a heading is a key of the rows as data"
     known = list(rows)
     records = [dict(zip(heads, map(_value, row, marks), strict=False)) for row in [*known, *filter(None, [total])]]
     made = Listed(title, name or title.partition(" in ")[0], records)

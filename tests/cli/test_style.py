@@ -16,6 +16,7 @@ DIFFERENT = {
     "--set": {"PATH=VALUE", "FMU.PATH=VALUE"},
     "--at": {"WHEN", "TIME", "PLACE"},
     "--show": {"PATTERN", "NAME"},
+    "--open": {"PATH", "SIGNAL"},
 }
 """Names whose values are not the same for all commands, with what their values are."""
 
