@@ -23,7 +23,7 @@ from modelica_like.solve.plot import picture_bytes
 from modelica_like.writing import write_text
 
 HERE = Path(__file__).resolve().parent
-DPI = 50
+DPI = 70
 
 
 def read(path: Path) -> dict[str, Any]:
