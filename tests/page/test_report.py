@@ -235,3 +235,12 @@ def test_it_has_dark_colours_and_prints(browser: Any, page: Path) -> None:
     assert browser.run(INK) != light
     browser.call("Emulation.setEmulatedMedia", features=[])
     assert len(json.dumps(browser.call("Page.printToPDF"))) > 20_000
+
+
+@pytest.mark.browser
+def test_a_long_drive_fits_a_narrow_window(browser: Any, tmp_path: Path) -> None:
+    drive = load(EXAMPLES / "winch.toml")
+    save_report(drive, simulate(drive), tmp_path / "winch.html")
+    browser.open(tmp_path / "winch.html", 420)
+    assert browser.complaints == []
+    assert browser.run("[document.documentElement.scrollWidth, innerWidth]") == [420, 420]

@@ -60,8 +60,9 @@ def report(drive: Component, run: Solution, *, show: Sequence[str] = ()) -> str:
         UnknownName: nothing matches a pattern.
     """
     folder, drawn = Path(__file__).parent, curves(run, show)
-    # The last curves of a panel are closest to the load.
-    ends = [panel["curves"][-1]["name"] for panel in drawn["panels"]]
+    # Of the parts that are not inside of others, the last one is closest to the load.
+    ends = [min(reversed([one["name"] for one in panel["curves"]]), key=lambda name: name.count("."))
+            for panel in drawn["panels"]]  # fmt: skip
     sections = [
         ("Schematic", f'<div class="wide">{schematic(drive, background=False)}</div>'),
         ("What happens", _happens(drive, run)),
