@@ -6,7 +6,7 @@ from typing import Any
 
 import casadi as ca
 
-from modelica_like.errors import MissingValue, ModelicaLikeError, Source, raise_together_or_one
+from modelica_like.errors import MissingValue, ModelicaLikeError, Source, WrongConnection, raise_together_or_one
 from modelica_like.flatten.checks import unit_of_field
 from modelica_like.flatten.model import (
     Coefficient,
@@ -220,10 +220,15 @@ class _Flattener:
 
     def _bind_inputs(self, component: Component) -> None:
         for name, field in component.fields.items():
-            if not isinstance(field, Input) or (id(component), name) in self.wiring.driven:
+            if not isinstance(field, Input):
                 continue
             node = self.variable_of[id(component), name]
             path = self.variables[node].path
+            if (id(component), name) in self.wiring.driven:
+                if name in component._values:
+                    what, advice = f"{path} has a value and a connection: only one can count.", "Remove one of the two."
+                    self.errors.append(WrongConnection(what, where=component.place_of(name), advice=advice))
+                continue
             if component is self.root or self._is_open(component, name):
                 self.inputs.append(node)
             elif component.value(name) is not None:
@@ -248,10 +253,11 @@ class _Flattener:
 
     def _read_starts(self, component: Component) -> None:
         for name, field in component.fields.items():
-            if not isinstance(field, Variable) or isinstance(field, Input):
+            if not isinstance(field, Variable):
                 continue
             given = component._starts.get(name)
-            if given is None and field.default is None:
+            # The default of an input is its value where nothing is connected.
+            if given is None and (field.default is None or isinstance(field, Input)):
                 continue
             value = field.read(field.default) if given is None else given
             node = self.variable_of[id(component), name]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Generator, Iterator, Mapping
 from contextlib import contextmanager
+from itertools import chain
 from types import MappingProxyType
 from typing import Any, ClassVar, Self, TypeVar, cast, dataclass_transform
 
@@ -64,8 +65,12 @@ class Component(Declared):
         plain |= {name: table.default for name, table in tables.items()}
         cls._tables = {name: table for base in ancestors for name, table in base._tables.items()} | tables
         cls._structural = {name: value for base in ancestors for name, value in base._structural.items()} | plain
-        for name in (*cls._class_fields, *cls._class_connectors, *cls._class_modes, *cls._class_parts):
+        kinds = (cls._class_fields, cls._class_connectors, cls._class_modes, cls._class_parts, cls._structural)
+        for name in chain.from_iterable(kinds):
             require_identifier(name, cls.__name__)
+            if hasattr(Component, name):
+                what = f"{cls.__name__} declares '{name}', which every component has already."
+                raise DuplicateName(what, where=caller(), advice="Choose another name.")
         for mode in cls._class_modes.values():
             mode.check()
 

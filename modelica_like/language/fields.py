@@ -298,10 +298,10 @@ def discrete(unit: str, description: str = "", *, start: Any = 0.0) -> Any:
 
 
 def require_identifier(name: str, where: str) -> None:
-    """Refuse names that would clash with the component's own methods.
+    """Refuse names that are not public identifiers.
 
     Raises:
-        LanguageError: the name is private or reserved.
+        LanguageError: the name is private, or not an identifier.
     """
     if name.startswith("_") or not name.isidentifier():
         raise LanguageError(f"{where} declares '{name}'.", advice="Names begin with a letter.")
