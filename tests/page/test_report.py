@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from modelica_like import load, simulate
+from modelica_like import export_fmu, load, simulate
 from modelica_like.cli import app
 from modelica_like.errors import UnknownName
+from modelica_like.report.files import write_solution
 from modelica_like.report.page import report, save_report
 from modelica_like.report.page.curves import curves
 
@@ -244,3 +245,24 @@ def test_a_long_drive_fits_a_narrow_window(browser: Any, tmp_path: Path) -> None
     browser.open(tmp_path / "winch.html", 420)
     assert browser.complaints == []
     assert browser.run("[document.documentElement.scrollWidth, innerWidth]") == [420, 420]
+
+
+def test_results_without_equations_have_a_report(tmp_path: Path) -> None:
+    drive = load(EXAMPLES / "machine_table_direct.toml")
+    export_fmu(drive, tmp_path / "table.fmu", check=False)
+    write_solution(simulate(drive), tmp_path / "table.csv")
+    for source, curve in (("table.fmu", "clutch.tau"), ("table.csv", "table.v")):
+        words = ["report", str(tmp_path / source), "-o", str(tmp_path / "page.html"), "--show", curve]
+        result = CliRunner().invoke(app, words)
+        assert result.exit_code == 0, result.output
+        text = (tmp_path / "page.html").read_text("utf-8")
+        assert re.findall(r"<h2>(.*?)</h2>", text) == ["What happens", "Curves"]
+        assert f'"name":"{curve}"' in text
+    result = CliRunner().invoke(app, ["report", str(tmp_path / "table.csv"), "--set", "k=1"])
+    assert (result.exit_code, result.stderr) == (2, "--set changes netlists; 'table.csv' is none.\n")
+
+
+def test_a_circuit_says_how_to_choose_curves() -> None:
+    drive = load(EXAMPLES / "components" / "circuits.toml")
+    text = report(drive, simulate(drive))
+    assert ("choose curves by <code>--show</code>" in text) == ('"panels":[]' in text)

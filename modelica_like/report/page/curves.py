@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 
 from modelica_like.solve.plot import chosen
 from modelica_like.solve.plot import quantity as quantity_of
-from modelica_like.solve.solution import Solution
+from modelica_like.solve.trajectories import Trajectories
 
 _POINTS = 1200
 """Number of drawn results, including those at events."""
 _MOST_BANDS = 400
 
 
-def curves(run: Solution, patterns: Sequence[str] = ()) -> dict[str, Any]:
+def curves(run: Trajectories, patterns: Sequence[str] = ()) -> dict[str, Any]:
     """Return times, panels of curves by unit, modes as bands and events.
 
     Args:
@@ -42,7 +42,7 @@ def curves(run: Solution, patterns: Sequence[str] = ()) -> dict[str, Any]:
     }
 
 
-def _thinned(run: Solution) -> NDArray[np.intp]:
+def _thinned(run: Trajectories) -> NDArray[np.intp]:
     """Positions of the drawn results: evenly spread ones, and both sides of every event."""
     count = len(run.time)
     spread = np.unique(np.linspace(0, count - 1, min(count, _POINTS)).round().astype(int))
@@ -52,7 +52,7 @@ def _thinned(run: Solution) -> NDArray[np.intp]:
     return np.unique(np.concatenate([spread, beside])).astype(np.intp)
 
 
-def _bands(run: Solution) -> list[dict[str, Any]]:
+def _bands(run: Trajectories) -> list[dict[str, Any]]:
     """Time spans of the values of each mode that changes."""
     found: dict[str, list[tuple[float, float, str]]] = {}
     begin, end = float(run.time[0]), float(run.time[-1])
