@@ -70,7 +70,9 @@ def test_it_is_one_file_that_asks_for_nothing(page: Path) -> None:
 
 def test_what_happens_is_told_in_words(page: Path) -> None:
     text = page.read_text("utf-8")
-    assert "<b>0.265473 s</b> clutch becomes stuck (slip reached zero)." in text
+    assert "<b>0.265473 s</b> clutch becomes stuck (slip reached zero, 537.7 J of friction work)." in text, (
+        "document 003"
+    )
     assert "load becomes forward (friction limit exceeded, slip begins)." in text
 
 

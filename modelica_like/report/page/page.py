@@ -107,6 +107,8 @@ def _happens(drive: Component | None, run: Trajectories) -> str:
     """Events in words, grouped by time, and the notices of the run."""
     instants: dict[float, dict[str, list[tuple[Event, str]]]] = {}
     for event, why in zip(run.events, reasons(run), strict=True):
+        if event.before == event.after:  # a kink of a curve
+            continue
         instants.setdefault(event.time, {}).setdefault(event.mode, []).append((event, why))
     lines = [
         f"<li><b>{time:.6g} s</b> {'; '.join(escape(_told(run, events)) for events in modes.values())}.</li>"
@@ -122,8 +124,24 @@ def _told(run: Trajectories, events: Sequence[tuple[Event, str]]) -> str:
     """Return the change of a mode at an instant: `clutch becomes stuck (slip reached zero)`."""
     last = events[-1][0]
     component = last.mode.rpartition(".")[0] or run.model.name
-    told = ", ".join(dict.fromkeys(why for _, why in events if why))
+    told = ", ".join(dict.fromkeys(filter(None, (*(why for _, why in events), _slid(run, last)))))
     return f"{component} becomes {last.after.replace('_', ' ')}{f' ({told})' if told else ''}"
+
+
+def _slid(run: Trajectories, event: Event) -> str:
+    """Return the friction work of surfaces that begin to hold, since they held last."""
+    if not isinstance(run, Solution):
+        return ""
+    modes = [(run.model.flat_discretes[hold.mode], hold.number) for hold in run.model.holds]
+    held = {(mode.path, mode.names[number]) for mode, number in modes}
+    if (event.mode, event.after) not in held:
+        return ""
+    left = (one.time for one in run.events if one.time < event.time and (one.mode, one.before) in held and
+            one.mode == event.mode)  # fmt: skip
+    begin, owner = max(left, default=float(run.time[0])), event.mode.rpartition(".")[0]
+    lost = run.energy(begin, event.time)[owner].lost if event.time > begin else 0.0
+    size, unit = (_KILO, "kJ") if lost >= 10.0 * _KILO else (1.0, "J")
+    return f"{lost / size:.4g} {unit} of friction work" if lost > _SMALL * run.energy().supply else ""
 
 
 def _energy(drive: Component | None, run: Trajectories) -> str:
