@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from modelica_like import export_fmu, load, simulate
+from components import ConstantTorque, Inertia
+from modelica_like import export_fmu, load, sensitivities, simulate
 from modelica_like.cli import app
 from modelica_like.errors import UnknownName
+from modelica_like.language import Assembly
 from modelica_like.report.files import write_solution
 from modelica_like.report.page import report, save_report
 from modelica_like.report.page.curves import curves
@@ -170,9 +172,6 @@ def test_modes_are_bands_without_gaps() -> None:
 
 
 def test_names_from_outside_are_text() -> None:
-    from components import ConstantTorque, Inertia
-    from modelica_like.language import Assembly
-
     parts = {"motor": ConstantTorque(tau_constant=1), "J": Inertia(J=1)}
     wires = {"a": ["motor.flange", "J.flange_a"]}
     drive = Assembly("</script><b>", parts=parts, connect=wires, description="<i>")
@@ -268,3 +267,12 @@ def test_a_circuit_says_how_to_choose_curves() -> None:
     drive = load(EXAMPLES / "components" / "circuits.toml")
     text = report(drive, simulate(drive))
     assert ("choose curves by <code>--show</code>" in text) == ('"panels":[]' in text)
+
+
+def test_a_run_knows_how_it_has_started() -> None:
+    drive = Assembly("drive", parts={"motor": ConstantTorque(tau_constant=2.0), "J": Inertia(J=4.0)},
+                     connect={"a": ["motor.flange", "J.flange_a"]})  # fmt: skip
+    run = simulate(drive, 3.0, start="rest")
+    assert sensitivities(run, ["J.w"])["J.w", "J.J"] == pytest.approx(-2.0 / 4.0**2 * 3.0, rel=1e-9)
+    text = report(drive, run)
+    assert "<td>J.w</td>" in text.partition("<h2>Start</h2>")[2].partition("</section>")[0]

@@ -185,7 +185,7 @@ def _parameters(run: Solution) -> str:
 
 
 def _start(drive: Component, run: Solution) -> str:
-    rows = start_values(drive, run.model, run.model.settings.get("start", "given"))
+    rows = start_values(drive, run.model, run.start)
     cells = [(row.path, f"{row.value:.6g}", row.unit, row.origin) for row in rows]
     return details(table(("variable", "value>", "unit", "where from"), cells))
 
