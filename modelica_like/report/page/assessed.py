@@ -19,7 +19,7 @@ from modelica_like.upper import upper
 
 _PATIENCE = 3.0
 """Seconds of a run whose derivatives a page waits for; they take two to four times as long."""
-_RANKED, _MOST_ENDS = 12, 3
+_RANKED, _MOST_ENDS, _MOST_MODES = 12, 3, 20
 _MATTERS = 5e-4
 """Percent per percent below which a parameter does not matter."""
 _ZERO = 0.01
@@ -96,4 +96,5 @@ def small_motions(drive: Component, run: Solution) -> str:
         if mode.oscillates
     ]
     drawn = f'<div class="wide">{schematic(drive, background=False, modes=modes)}</div>' if rows else ""
-    return drawn + table(("mode", "frequency in Hz>", "damping>", "energy in", "lost in"), rows)
+    more = f"<p>… and {len(rows) - _MOST_MODES} more.</p>" if len(rows) > _MOST_MODES else ""
+    return drawn + table(("mode", "frequency in Hz>", "damping>", "energy in", "lost in"), rows[:_MOST_MODES]) + more
