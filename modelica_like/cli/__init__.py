@@ -19,6 +19,7 @@ _GROUPS = {
     "pictures": ("draw", "report", "explore"),
     "analysis": ("modes", "steady", "sweep", "sensitivity"),
     "export": ("export", "runtimes"),
+    "modelica": ("from-modelica", "to-modelica"),
     "cosimulation": ("split", "cosim"),
     "types": ("describe", "schema", "library", "docs"),
     "validation": ("validate", "compare", "size", "demo"),
@@ -28,7 +29,7 @@ _HOME = {name: group for group, names in _GROUPS.items() for name in names}
 
 def command(name: str) -> Callable[..., None]:
     """Return the function of a command."""
-    return getattr(import_module(f"modelica_like.cli.{_HOME[name]}"), name)
+    return getattr(import_module(f"modelica_like.cli.{_HOME[name]}"), name.replace("-", "_"))
 
 
 def __getattr__(name: str) -> Any:

@@ -2,13 +2,24 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import casadi as ca
 
-from modelica_like.errors import MissingValue, ModelicaLikeError, Source, WrongConnection, raise_together_or_one
+from modelica_like.errors import (
+    MissingValue,
+    ModelicaLikeError,
+    Source,
+    UnknownName,
+    WrongConnection,
+    did_you_mean,
+    raise_together_or_one,
+)
 from modelica_like.flatten.checks import unit_of_field
+from modelica_like.flatten.discrete import Hidden
 from modelica_like.flatten.model import (
+    INITIAL_EQUATION,
     Coefficient,
     FlatDiscrete,
     FlatModel,
@@ -23,6 +34,7 @@ from modelica_like.flatten.template import Template, template_of
 from modelica_like.flatten.wiring import Wiring
 from modelica_like.language.component import Component
 from modelica_like.language.declared import Declared
+from modelica_like.language.discrete import INITIAL
 from modelica_like.language.expr import TIME, flagged_motion
 from modelica_like.language.fields import Discrete, Input, Output, Parameter, Variable
 from modelica_like.units import ONE, coherent
@@ -30,25 +42,28 @@ from modelica_like.units import ONE, coherent
 _WIRE = Source("")
 
 
-def flatten(root: Component, *, open_inputs: bool = False) -> FlatModel:
+def flatten(root: Component, *, open_inputs: bool = False, disturbed: str = "") -> FlatModel:
     """Write out all equations of a component tree.
 
     Args:
         root: the model; its own inputs become inputs of the flat model.
         open_inputs: whether unconnected inputs of adaptors, and of parts without a value for them, also become inputs.
+        disturbed: path of a connected signal: an input `….added` is added to what its output sends, or its input gets.
 
     Raises:
+        UnknownName: no signal of this path is connected.
         WiringErrors, WrongConnection, FreeFlange, MissingValue: all errors of the wiring, reported together.
         LanguageError, UnitMismatch: a component class is declared wrongly.
         CyclicAssembly: parameters depend on each other cyclically.
     """
-    return _Flattener(root, open_inputs).run()
+    return _Flattener(root, open_inputs, disturbed).run()
 
 
 class _Flattener:
-    def __init__(self, root: Component, open_inputs: bool) -> None:
+    def __init__(self, root: Component, open_inputs: bool, disturbed: str) -> None:
         self.root = root
         self.open_inputs = open_inputs
+        self.disturbed = disturbed
         self.wiring = Wiring()
         self.parameters = Parameters(root)
         self.variables: list[FlatVariable] = []
@@ -61,16 +76,22 @@ class _Flattener:
         self.starts: list[StartValue] = []
         self.inputs: list[int] = []
         self.flags: list[tuple[Any, int]] = []
+        self.pres: dict[int, int] = {}
         self.errors: list[ModelicaLikeError] = []
 
     def run(self) -> FlatModel:
         templates = self._elaborate()
-        used = {self._owner(component, name) for component, template in templates for name in template.discretes}
-        for component, _ in templates:
+        used = {self._owner(one, _plain(name)) for one, template in templates for name in template.discretes}
+        for component, template in templates:
             self._declare(component, used)
+            for path, text in template.initial:
+                self._declare_initial(component, path, text)
+            for one in template.hidden:
+                self._hide(id(component), one.path, f"{component.path}.{one.path}".lstrip("."), one)
+        added = self._disturb() if self.disturbed else None
         self.nodes = [(k, 0) for k in range(len(self.variables))]
         instances = [self._instance(component, template) for component, template in templates]
-        self._connect()
+        self._connect(added)
         for component, _ in templates:
             self._bind_inputs(component)
             self._relate_inputs(component)
@@ -90,6 +111,7 @@ class _Flattener:
             discretes=self.discretes, d=d, time=ca.SX(TIME), instances=instances, linear=self.linear,
             general=general, starts=self.starts, inputs=self.inputs,
             components={component.path: component for component, _ in templates}, flags=tuple(self.flags),
+            pres=self.pres,
         )  # fmt: skip
 
     def _elaborate(self) -> list[tuple[Component, Template]]:
@@ -132,14 +154,31 @@ class _Flattener:
                         kind = "flow" if field.is_flow else "potential"
                         self._declare_variable(connector, name, f"{prefix}{end}.{name}", kind, field)
 
+    def _disturb(self) -> int:
+        """Declare the input that is added to a signal."""
+        signals = {self.variable_of[id(one.owner), one.name] for pair in self.wiring.signals for one in pair[:2]}
+        paths = {self.variables[k].path: self.variables[k] for k in sorted(signals)}
+        if self.disturbed not in paths:
+            near = did_you_mean(self.disturbed, paths)
+            raise UnknownName(f"{self.root.label} has no connected signal '{self.disturbed}'{near or '.'}")
+        path = f"{self.disturbed}.added"
+        self.variables.append(replace(paths[self.disturbed], path=path, kind="input", description="added"))
+        self.inputs.append(len(self.variables) - 1)
+        return self.inputs[-1]
+
     def _declare_variable(self, owner: Declared, name: str, path: str, kind: str, field: Variable) -> None:
         self.variable_of[id(owner), name] = len(self.variables)
         unit = coherent(self.wiring.inferred.get((id(owner), name)) or unit_of_field(owner, name))
-        self.variables.append(
-            FlatVariable(
-                path, unit, field.description, kind, field.state, field.guess, field.nominal, field.min, field.max
-            )
-        )
+        limits = field.nominal, field.min, field.max, field.driving
+        self.variables.append(FlatVariable(path, unit, field.description, kind, field.state, field.guess, *limits))
+
+    def _declare_initial(self, component: Component, name: str, text: str) -> None:
+        """Declare what is left of an initial equation, which is zero at the start."""
+        path, node = f"{component.path}.{name}".lstrip("."), len(self.variables)
+        self.variable_of[id(component), name] = node
+        told = f"{INITIAL_EQUATION} `{text}`"
+        self.variables.append(FlatVariable(path, ONE, told, "local", "avoid", 0.0, 1.0, None, None))
+        self.starts.append(StartValue(node, 0.0, "fixed"))
 
     def _declare_discrete(self, component: Component, name: str, path: str, field: Discrete) -> None:
         value = component.start(name)
@@ -147,14 +186,34 @@ class _Flattener:
         with component.at_its_place(name):
             start = 0.0 if value is None else self.parameters.evaluate(value, scope or component, path)
         self.discrete_of[id(component), name] = len(self.discretes)
-        self.discretes.append(FlatDiscrete(path, coherent(field.unit), field.description, start))
+        self.discretes.append(FlatDiscrete(path, coherent(field.unit), field.description, start, (), field.kind))
+
+    def _hide(self, owner: int, name: str, path: str, one: Hidden, start: Any = 0.0) -> int:
+        """Declare a discrete value that no user has declared."""
+        self.discrete_of[owner, name] = len(self.discretes)
+        self.discretes.append(FlatDiscrete(path, ONE, one.description, start, one.names, hidden=True))
+        return len(self.discretes) - 1
+
+    def _discrete(self, component: Component, path: str) -> int:
+        """Return the position of a mode, a discrete value, a `pre`, or `initial()`."""
+        key = (0, path) if path == INITIAL.name else self._owner(component, _plain(path))
+        if path != _plain(path):
+            of = self.discrete_of[key]
+            key = key[0], f"pre({key[1]})"
+            if key not in self.discrete_of:
+                flat = self.discretes[of]
+                self.pres[self._hide(*key, f"pre({flat.path})", Hidden("", ""), flat.start)] = of
+        elif key not in self.discrete_of:
+            first = self._hide(*key, path, Hidden("", "whether a run begins"), 1.0)
+            self.pres[first] = first
+        return self.discrete_of[key]
 
     # -- instances ---------------------------------------------------------------------------------------------------
 
     def _instance(self, component: Component, template: Template) -> Instance:
         nodes = [self._node(self._variable(component, slot.path), slot.order) for slot in template.slots]
         parameters = [self._parameter(component, name) for name in template.parameters]
-        discretes = [self.discrete_of[self._owner(component, name)] for name in template.discretes]
+        discretes = [self._discrete(component, name) for name in template.discretes]
         return Instance(component.path, template, tuple(nodes), tuple(parameters), tuple(discretes))
 
     def _owner(self, component: Component, path: str) -> tuple[int, str]:
@@ -188,7 +247,7 @@ class _Flattener:
 
     # -- equations ---------------------------------------------------------------------------------------------------
 
-    def _connect(self) -> None:
+    def _connect(self, added: int | None) -> None:
         for ends in self.wiring.sets():
             connectors = [self.wiring.connectors[end] for end in ends]
             source = self.wiring.sources[ends[0]]
@@ -210,7 +269,10 @@ class _Flattener:
         for driver, sink, source in self.wiring.signals:
             nodes = [self.variable_of[id(symbol.owner), symbol.name] for symbol in (driver, sink)]
             origin = Origin(self.variables[nodes[1]].path, "connection", source)
-            self.linear.append(LinearEquation(((nodes[0], 1.0), (nodes[1], -1.0)), 0.0, origin))
+            terms = (nodes[0], 1.0), (nodes[1], -1.0)
+            if added is not None and self.disturbed in (self.variables[node].path for node in nodes):
+                terms = (*terms, (added, 1.0))
+            self.linear.append(LinearEquation(terms, 0.0, origin))
 
     def _end_flows(self, path: str, connector: Any) -> None:
         for name, field in connector.fields.items():
@@ -285,3 +347,8 @@ class _Flattener:
                 origin = Origin(instance.path, template.component, template.sources[row])
                 self.linear.append(LinearEquation(terms, values[-1], origin, (number, row)))
         return general
+
+
+def _plain(path: str) -> str:
+    """Return the path of what a path is the `pre` of, or the path itself."""
+    return path[4:-1] if path.startswith("pre(") else path

@@ -14,10 +14,13 @@ from modelica_like.language.fields import StatePreference, in_range
 from modelica_like.units import Unit
 from modelica_like.upper import upper
 
+INITIAL_EQUATION = "the initial equation"
+"""Begins the description of what is left of an initial equation, which is zero at the start."""
+
 
 @dataclass(frozen=True, slots=True)
 class FlatVariable:
-    """A continuous variable; `kind` is local, output, input, potential or flow."""
+    """A continuous variable; `kind` is local, output, input, potential or flow, `driving` as of `Variable`."""
 
     path: str
     unit: Unit
@@ -28,6 +31,7 @@ class FlatVariable:
     nominal: float
     min: float | None
     max: float | None
+    driving: int = 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,13 +62,18 @@ class FlatParameter:
 
 @dataclass(frozen=True, slots=True)
 class FlatDiscrete:
-    """A mode (with `names`) or a discrete value (without); `start` is a number or an expression of parameters."""
+    """A mode (with `names`) or a discrete value (without); `start` is a number or an expression of parameters.
+
+    `kind` is number, boolean or integer; a hidden one belongs to a relation or an edge, and no user has declared it.
+    """
 
     path: str
     unit: Unit
     description: str
     start: Any
     names: tuple[str, ...] = ()
+    kind: str = "number"
+    hidden: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,6 +158,7 @@ class FlatModel:
         general: (instance, row) of the remaining equations.
         inputs: variables given from outside.
         components: the tree of the model.
+        pres: discrete value -> the one that it is the `pre` of; and `initial()` -> itself.
         flags: symbols in q for "the motion is prescribed", with the variable; none once the structure is
             known.
     """
@@ -172,6 +182,7 @@ class FlatModel:
     inputs: list[int]
     components: dict[str, Component] = field(repr=False)
     flags: tuple[tuple[Any, int], ...] = ()
+    pres: dict[int, int] = field(default_factory=dict[int, int])
 
     def node_name(self, node: int) -> str:
         """Return the name of a node: `motor.phi`, `der(motor.phi)`."""

@@ -15,7 +15,7 @@ from modelica_like.explore import Explorer
 from modelica_like.netlist import library_types
 
 DOCS = Path(__file__).parents[2] / "docs"
-PAGES = [DOCS / "tutorial.md", *sorted((DOCS / "how_to").glob("*.md"))]
+PAGES = [DOCS / "tutorial.md", DOCS / "modelica_text.md", *sorted((DOCS / "how_to").glob("*.md"))]
 
 
 def command(line: str) -> None:
@@ -38,8 +38,8 @@ def test_a_page_runs(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
         if language == "sh":
             for line in block.splitlines():
                 command(line)
-        elif language == "toml":
-            (name,) = re.findall(r"`(\w+\.toml)`", before)
+        elif language in ("toml", "modelica"):
+            (name,) = re.findall(r"`(\w+\.(?:toml|mo))`", before)
             Path(name).write_text(block, encoding="utf-8")
         elif language == "python":
             with contextlib.redirect_stdout(io.StringIO()) as stream:
