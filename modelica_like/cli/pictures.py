@@ -47,7 +47,7 @@ def report(
         from modelica_like.report.progress import Bar
         from modelica_like.report.sources import trajectories
         from modelica_like.simulation import build, seconds, simulate
-        from modelica_like.solve.trajectories import matching
+        from modelica_like.solve.signals import read_signals
 
         if source.suffix.lower() != ".toml" or describes_system(source):
             if assignments:
@@ -57,7 +57,7 @@ def report(
             return
         drive = load_netlist(source, assignments)
         model = build(drive)
-        matching(model, show or ())
+        read_signals(model, show or ())
         with Bar(until or model.settings.get("until")) as bar:
             run = simulate(model, until, progress=bar)
         save_report(drive, run, path, show=show or ())
