@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Annotated
 
 from modelica_like.cli.declare import Argument, Option
-from modelica_like.cli.shared import Assignments, Debug, Netlist, Show, Until, load_netlist, say, told
+from modelica_like.cli.shared import Assignments, Curves, Debug, Netlist, Show, Until, load_netlist, say, told
 from modelica_like.errors import NetlistError
 
 
@@ -37,7 +37,7 @@ def report(
     source: Annotated[Path, Argument(metavar="NETLIST", help="Netlist, FMU, system or CSV file.", show_default=False)],
     assignments: Assignments = None, *,
     output: Annotated[Path | None, Option("--output", "-o", metavar="FILE", help="By default DRIVE.html.")] = None,
-    until: Until = None, show: Show = None, debug: Debug = False,
+    until: Until = None, show: Curves = None, debug: Debug = False,
 ) -> None:  # fmt: skip
     """Simulate a netlist and write a page about it: schematic, events, curves, energies, numbers."""
     path = output or Path(f"{source.stem}.html")
