@@ -53,8 +53,9 @@ def test_one_panel_per_quantity_with_bands_and_events(start_up: Solution) -> Non
     assert [line.get_xdata()[0] for line in panels[1].lines[1:]] == [event.time for event in start_up.events]
     assert [text.get_text() for text in panels[0].texts] == ["1"]
     assert "1  0.2 s  clutch: stuck" in [text.get_text() for text in figure.texts]
-    sliding, stuck = (bar.get_bbox().intervalx for bar in panels[-1].patches)
-    assert [*sliding, *stuck] == pytest.approx([0, 0.2, 0.2, start_up.time[-1]])
+    bands = {one.get_label(): one.get_paths()[0].get_extents().intervalx for one in panels[-1].collections}
+    assert bands["backward"] == pytest.approx([0, 0.2])
+    assert bands["stuck"] == pytest.approx([0.2, start_up.time[-1]])
 
 
 def test_what_drives_is_positive_and_says_its_sign(start_up: Solution) -> None:
