@@ -62,7 +62,7 @@ class HotFriction(PressedFriction, partial=True):
     A: Parameter = param("m2", "area of all friction surfaces", default=1.0, min=1e-12)
     wear_rate: Parameter = param("m3/J", "volume that wears off per friction work", default=0.0, min=0)
     T: Variable = var("K", "temperature of the plates", state="avoid", nominal=300.0, default="T_air", guess=293.15)
-    rise: Variable = var("K", "temperature above T_air", state="prefer", nominal=10.0)
+    rise: Variable = var("K", "temperature above T_air", state="prefer", nominal=10.0, difference=True)
     W: Variable = var("J", "friction work since the start", nominal=1000.0, default=0)
     wear: Output = signal_out("m", "depth that has worn off all surfaces together")
 

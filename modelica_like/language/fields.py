@@ -188,10 +188,12 @@ class Variable(_Symbolic):
 
     Attributes:
         driving: sign of the torque or force between two ends while it drives the right one; pictures show it positive.
+        difference: whether it is a difference, which is not counted from the zero of a temperature scale.
         constant: whether it keeps its start value: a parameter that initial equations determine.
     """
 
     driving = 1
+    difference = False
     constant = False
 
     def __init__(
@@ -259,6 +261,7 @@ def param(
 def var(
     unit: str, description: str = "", *, state: StatePreference = "default", guess: float = 0.0, default: Any = None,
     min: float | None = None, max: float | None = None, nominal: float = 1.0, driving: Literal[1, -1] = 1,
+    difference: bool = False,
 ) -> Any:  # fmt: skip
     """Declare an unknown; as a keyword of the constructor it takes a fixed start value or a `guess(…)`.
 
@@ -272,9 +275,10 @@ def var(
         max: largest sensible value, SI.
         nominal: order of magnitude, SI.
         driving: sign of a torque or force while it drives what is on its right; pictures show that as positive.
+        difference: a difference of temperatures, which is shown in K and not counted from the zero of degC.
     """
     made = Variable(unit, description, state=state, guess=guess, default=default, min=min, max=max, nominal=nominal)
-    made.driving = driving
+    made.driving, made.difference = driving, difference
     return made
 
 

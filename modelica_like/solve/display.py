@@ -33,6 +33,7 @@ class Display:
 
     def __init__(self, model: Any, chosen: Mapping[str, str] | None = None) -> None:
         self._own = {one.path: str(one.unit) for one in (*model.flat_variables, *model.flat_discretes)}
+        self._differences = {one.path for one in model.flat_variables if getattr(one, "difference", False)}
         wanted = {**getattr(model, "settings", {}).get("display", {}), **(chosen or {})}
         self._quantities: dict[str, str] = {}
         self._paths: dict[str, str] = {}
@@ -58,8 +59,9 @@ class Display:
         return path in self._own
 
     def of(self, path: str) -> str:
-        """Return the unit in which a variable is shown."""
-        return self._paths.get(path) or self.of_quantity(self._own[path])
+        """Return the unit in which a variable is shown; a difference of temperatures has no zero of a scale."""
+        shown = self._paths.get(path) or self.of_quantity(self._own[path])
+        return self._own[path] if path in self._differences and parse_unit(shown).offset else shown
 
     def of_quantity(self, unit: str) -> str:
         """Return the unit in which a coherent unit is shown."""

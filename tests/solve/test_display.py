@@ -8,12 +8,14 @@ import pytest
 from rich.console import Console
 
 from components import Constant, Ramp
-from modelica_like import Assembly, Solution, load, simulate
+from modelica_like import Assembly, Solution, build, load, simulate
 from modelica_like.errors import ModelicaLikeError, UnitError, UnknownName
 from modelica_like.netlist.write import save
 from modelica_like.report.files import write_solution
 from modelica_like.report.run import run_report
+from modelica_like.solve.display import Display
 
+EXAMPLES = Path(__file__).parents[2] / "examples"
 NETLIST = """
 name = "spindle"
 
@@ -81,6 +83,12 @@ def test_a_picture_is_in_the_units_of_the_netlist(run: Solution) -> None:
     assert curves["oil.phi_rel"] == (pytest.approx(-100 * np.pi, rel=1e-6), "relative angle in rad")
     assert curves["motor.flange.tau"] == (pytest.approx(-0.1 * np.pi, rel=1e-6), "torque in kN·m")
     assert curves["wall.flange.tau"] == (pytest.approx(100 * np.pi, rel=1e-6), "torque in N·m")
+
+
+def test_a_difference_of_temperatures_is_not_counted_from_the_zero_of_a_scale() -> None:
+    """The plates are 20 °C warm and no warmer than the air: not -273 °C above it."""
+    shown = Display(build(EXAMPLES / "launch.toml"))
+    assert (shown.of("clutch.T"), shown.of("clutch.rise")) == ("degC", "K")
 
 
 def test_an_argument_wins_over_the_netlist(run: Solution) -> None:
