@@ -60,7 +60,7 @@ def _pairs(left: Expr, right: Expr, instance: Instance, source: Source) -> list[
 
 def _ends(end: Expr, instance: Instance) -> list[str]:
     """Return the paths of an end; several for an array."""
-    (name, subscripts), rest = end.args[0], end.args[1:]
+    (name, subscripts), *rest = end.args
     member = instance.members.get(name)
     if member is None:
         raise unknown_name(f"{instance.text.name} has no '{name}'.", instance.text, end.line)
@@ -79,7 +79,7 @@ def _ends(end: Expr, instance: Instance) -> list[str]:
         return [f"{head}.{inner}" for head in heads]
     if len(rest) > 1:
         raise refused("a connection with the inside of a component", instance.text, end.line)
-    ((last, index),) = rest
+    last, index = next(iter(rest))
     outer = part.members.get(last)
     shape = sizes(part, outer) if outer is not None and not index else ()
     if len(heads) == 1 and shape:
