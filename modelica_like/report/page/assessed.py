@@ -42,6 +42,7 @@ def design_checks(drive: Component, run: Solution) -> str:
          if bool(one.verdict) is limited]
         for limited in (True, False)
     )  # fmt: skip
+    judged.sort(key=lambda row: row[3] == "ok")
     missed, heads = sizing.exceeded, ("line", "value>", "unit", "verdict!", "what it is")
     verdict = f"{len(judged)} limits, {missed or 'none'} missed: {escape(Path(path).name)}."
     said = f'<p class="notice">{verdict}</p>' if missed else f"<p>{verdict}</p>"
