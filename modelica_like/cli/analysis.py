@@ -7,7 +7,7 @@ from typing import Annotated
 
 from modelica_like.cli.declare import Option
 from modelica_like.cli.models import Solver, Start
-from modelica_like.cli.shared import Assignments, Debug, Netlist, load_netlist, out, told
+from modelica_like.cli.shared import Assignments, Debug, Netlist, load_netlist, out, say, told
 
 
 def modes(
@@ -19,23 +19,32 @@ def modes(
     show: Annotated[list[str] | None, Option(metavar="NAME", help="Variables along the shapes.")] = None,
     draw: Annotated[Path | None, Option(metavar="FILE", help="Schematic with shapes below: .svg, .png, .pdf.")] = None,
     bode: Annotated[Path | None, Option(metavar="FILE", help="Draw the frequency response.")] = None,
+    nyquist: Annotated[Path | None, Option(metavar="FILE", help="Draw it in the complex plane.")] = None,
+    opened: Annotated[
+        str | None, Option("--open", metavar="SIGNAL", help="Open a loop there: its response, its margins.")
+    ] = None,
     inputs: Annotated[list[str] | None, Option("--input", metavar="NAME", help="Input or parameter.")] = None,
     outputs: Annotated[list[str] | None, Option("--output", metavar="NAME", help="Variable.")] = None,
     debug: Debug = False,
 ) -> None:  # fmt: skip
     """Linearize a netlist at a point: eigenvalues, damping, energy shares of each mode."""
-    with told(debug, pictures=[shapes, bode]):
+    with told(debug, pictures=[shapes, bode, nyquist]):
         assembly = load_netlist(netlist, assignments)
         from modelica_like.analyse.linear.linearize import linearize, when
+        from modelica_like.analyse.linear.loop import open_loop
         from modelica_like.draw import check_format, save_schematic
         from modelica_like.report.analysis import modes_report
         from modelica_like.solve.plot import save_plot
 
         if draw:
             check_format(draw)
-        linear = linearize(assembly, when(at) if at else None, inputs=inputs, outputs=outputs)
+        start = when(at) if at else None
+        loop = open_loop(assembly, opened, start) if opened else None
+        linear = loop or linearize(assembly, start, inputs=inputs, outputs=outputs)
         found = linear.modes()
         out().print(modes_report(found))
+        if loop:
+            say(f"\n{loop.margins()}")
         if shapes:
             speeds = [one.path for one in linear.model.flat_variables if _is_speed(one.path, str(one.unit))]
             save_plot(found.plot(show or speeds), shapes)
@@ -43,6 +52,8 @@ def modes(
             save_schematic(assembly, draw, modes=found)
         if bode:
             save_plot(linear.bode(), bode)
+        if nyquist:
+            save_plot(linear.nyquist(), nyquist)
 
 
 def _is_speed(path: str, unit: str) -> bool:
@@ -95,10 +106,11 @@ def sweep(
     scheduler: Annotated[str | None, Option(metavar="ADDRESS", help="Dask scheduler, e.g. tcp://host:8786.")] = None,
     solver: Annotated[Solver, Option(help="The compiled run-time of FMUs, or IDAS.")] = "native",
     output: Annotated[Path | None, Option("--output", "-o", metavar="FILE", help=".csv, .parquet, .nc.")] = None,
+    plot: Annotated[Path | None, Option(metavar="FILE", help="Draw lines, a map, or parallel coordinates.")] = None,
     debug: Debug = False,
 ) -> None:  # fmt: skip
     """Simulate a netlist over a grid of parameter values."""
-    with told(debug, tables=[output], files=[checkpoint / "zarr.json" if checkpoint else None]):
+    with told(debug, tables=[output], pictures=[plot], files=[checkpoint / "zarr.json" if checkpoint else None]):
         assembly = load_netlist(netlist, assignments)
         from modelica_like.analyse.sweeps.ranges import read_range
         from modelica_like.analyse.sweeps.sweep import sweep as run
@@ -114,6 +126,11 @@ def sweep(
         out(stderr=output == STDOUT).print(sweep_report(found))
         if output:
             write_dataset(found, output)
+        if plot:
+            from modelica_like.analyse.sweeps.pictures import plot_sweep
+            from modelica_like.solve.plot import save_plot
+
+            save_plot(plot_sweep(found), plot)
 
 
 def sensitivity(

@@ -67,7 +67,7 @@ def cosim(
     csv: Annotated[Path | None, Option(metavar="FILE", help="Write a table: .csv, .parquet, .nc.")] = None,
     units: Annotated[bool, Option("--units", help="Units in a second header line of the table.")] = False,
     plot: Annotated[Path | None, Option(metavar="FILE", help="Draw the results: .png, .svg or .pdf.")] = None,
-    show: Annotated[list[str] | None, Option(metavar="PATTERN", help="Variables to draw, e.g. '*.w'.")] = None,
+    show: Annotated[list[str] | None, Option(metavar="PATTERN", help="Curves: '*.w', '2*pi*motor.w'.")] = None,
     timeout: Annotated[float, Option(metavar="SECONDS", help="Time limit.")] = 600.0,
     debug: Debug = False,
 ) -> None:  # fmt: skip
@@ -80,12 +80,12 @@ def cosim(
         from modelica_like.report.progress import Bar
         from modelica_like.report.run import cosimulation_report
         from modelica_like.solve.plot import plot as draw
-        from modelica_like.solve.trajectories import matching
+        from modelica_like.solve.signals import read_signals
 
         values = _numbers(assignments or ())
         with opened(system) as known, Bar(until or known.settings.until) as bar:
             if show:
-                matching(described_model(known), show)
+                read_signals(described_model(known), show)
             made = Outcome(
                 lambda: run(
                     known, until, step=step, master=master, inputs=inputs, tolerance=tolerance,
@@ -93,7 +93,7 @@ def cosim(
                 ), debug=debug,
             )  # fmt: skip
         made.tell(cosimulation_report, csv)
-        made.write(csv, units=units, pictures=[(plot, lambda one: draw(one, show or ()))])
+        made.write(csv, units=units, show=show or (), pictures=[(plot, lambda one: draw(one, show or ()))])
 
 
 def _numbers(assignments: list[str] | tuple[str, ...]) -> dict[str, float]:

@@ -53,8 +53,9 @@ class Outcome:
         return False
 
     def write(
-        self, table: Path | None, *, units: bool, pictures: Sequence[Picture], display: Mapping[str, str] | None = None
-    ) -> None:
+        self, table: Path | None, *, units: bool, pictures: Sequence[Picture],
+        display: Mapping[str, str] | None = None, show: Sequence[str] = (),
+    ) -> None:  # fmt: skip
         """Write the requested files.
 
         Raises:
@@ -64,7 +65,8 @@ class Outcome:
         if table:
             from modelica_like.report.files import write_solution
 
-            self.attempt("The table", lambda: write_solution(self.solution, table, units=units, display=display), table)
+            options: Any = {"units": units, "display": display, "show": show}
+            self.attempt("The table", lambda: write_solution(self.solution, table, **options), table)
         for file, draw in pictures:
             if file:
                 self.attempt(f"The picture {file.name}", lambda file=file, draw=draw: self._draw(file, draw), file)

@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import casadi as ca
 
-from modelica_like.errors import MissingValue, ModelicaLikeError, Source, WrongConnection, raise_together_or_one
+from modelica_like.errors import (
+    MissingValue,
+    ModelicaLikeError,
+    Source,
+    UnknownName,
+    WrongConnection,
+    did_you_mean,
+    raise_together_or_one,
+)
 from modelica_like.flatten.checks import unit_of_field
 from modelica_like.flatten.model import (
     Coefficient,
@@ -30,25 +39,28 @@ from modelica_like.units import ONE, coherent
 _WIRE = Source("")
 
 
-def flatten(root: Component, *, open_inputs: bool = False) -> FlatModel:
+def flatten(root: Component, *, open_inputs: bool = False, disturbed: str = "") -> FlatModel:
     """Write out all equations of a component tree.
 
     Args:
         root: the model; its own inputs become inputs of the flat model.
         open_inputs: whether unconnected inputs of adaptors, and of parts without a value for them, also become inputs.
+        disturbed: path of a connected signal: an input `….added` is added to what its output sends, or its input gets.
 
     Raises:
+        UnknownName: no signal of this path is connected.
         WiringErrors, WrongConnection, FreeFlange, MissingValue: all errors of the wiring, reported together.
         LanguageError, UnitMismatch: a component class is declared wrongly.
         CyclicAssembly: parameters depend on each other cyclically.
     """
-    return _Flattener(root, open_inputs).run()
+    return _Flattener(root, open_inputs, disturbed).run()
 
 
 class _Flattener:
-    def __init__(self, root: Component, open_inputs: bool) -> None:
+    def __init__(self, root: Component, open_inputs: bool, disturbed: str) -> None:
         self.root = root
         self.open_inputs = open_inputs
+        self.disturbed = disturbed
         self.wiring = Wiring()
         self.parameters = Parameters(root)
         self.variables: list[FlatVariable] = []
@@ -68,9 +80,10 @@ class _Flattener:
         used = {self._owner(component, name) for component, template in templates for name in template.discretes}
         for component, _ in templates:
             self._declare(component, used)
+        added = self._disturb() if self.disturbed else None
         self.nodes = [(k, 0) for k in range(len(self.variables))]
         instances = [self._instance(component, template) for component, template in templates]
-        self._connect()
+        self._connect(added)
         for component, _ in templates:
             self._bind_inputs(component)
             self._relate_inputs(component)
@@ -132,14 +145,23 @@ class _Flattener:
                         kind = "flow" if field.is_flow else "potential"
                         self._declare_variable(connector, name, f"{prefix}{end}.{name}", kind, field)
 
+    def _disturb(self) -> int:
+        """Declare the input that is added to a signal."""
+        signals = {self.variable_of[id(one.owner), one.name] for pair in self.wiring.signals for one in pair[:2]}
+        paths = {self.variables[k].path: self.variables[k] for k in sorted(signals)}
+        if self.disturbed not in paths:
+            near = did_you_mean(self.disturbed, paths)
+            raise UnknownName(f"{self.root.label} has no connected signal '{self.disturbed}'{near or '.'}")
+        path = f"{self.disturbed}.added"
+        self.variables.append(replace(paths[self.disturbed], path=path, kind="input", description="added"))
+        self.inputs.append(len(self.variables) - 1)
+        return self.inputs[-1]
+
     def _declare_variable(self, owner: Declared, name: str, path: str, kind: str, field: Variable) -> None:
         self.variable_of[id(owner), name] = len(self.variables)
         unit = coherent(self.wiring.inferred.get((id(owner), name)) or unit_of_field(owner, name))
-        self.variables.append(
-            FlatVariable(
-                path, unit, field.description, kind, field.state, field.guess, field.nominal, field.min, field.max
-            )
-        )
+        limits = field.nominal, field.min, field.max, field.driving
+        self.variables.append(FlatVariable(path, unit, field.description, kind, field.state, field.guess, *limits))
 
     def _declare_discrete(self, component: Component, name: str, path: str, field: Discrete) -> None:
         value = component.start(name)
@@ -188,7 +210,7 @@ class _Flattener:
 
     # -- equations ---------------------------------------------------------------------------------------------------
 
-    def _connect(self) -> None:
+    def _connect(self, added: int | None) -> None:
         for ends in self.wiring.sets():
             connectors = [self.wiring.connectors[end] for end in ends]
             source = self.wiring.sources[ends[0]]
@@ -210,7 +232,10 @@ class _Flattener:
         for driver, sink, source in self.wiring.signals:
             nodes = [self.variable_of[id(symbol.owner), symbol.name] for symbol in (driver, sink)]
             origin = Origin(self.variables[nodes[1]].path, "connection", source)
-            self.linear.append(LinearEquation(((nodes[0], 1.0), (nodes[1], -1.0)), 0.0, origin))
+            terms = (nodes[0], 1.0), (nodes[1], -1.0)
+            if added is not None and self.disturbed in (self.variables[node].path for node in nodes):
+                terms = (*terms, (added, 1.0))
+            self.linear.append(LinearEquation(terms, 0.0, origin))
 
     def _end_flows(self, path: str, connector: Any) -> None:
         for name, field in connector.fields.items():

@@ -17,7 +17,7 @@ from modelica_like.upper import upper
 
 @dataclass(frozen=True, slots=True)
 class FlatVariable:
-    """A continuous variable; `kind` is local, output, input, potential or flow."""
+    """A continuous variable; `kind` is local, output, input, potential or flow, `driving` as of `Variable`."""
 
     path: str
     unit: Unit
@@ -28,6 +28,7 @@ class FlatVariable:
     nominal: float
     min: float | None
     max: float | None
+    driving: int = 1
 
 
 @dataclass(frozen=True, slots=True)

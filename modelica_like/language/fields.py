@@ -185,7 +185,12 @@ class Variable(_Symbolic):
         guess: first guess of its start value (SI).
         is_flow: whether it sums to zero in a connection.
         bounds: as of `var`.
+
+    Attributes:
+        driving: sign of the torque or force between two ends while it drives the right one; pictures show it positive.
     """
+
+    driving = 1
 
     def __init__(
         self, unit: str, description: str = "", *, state: StatePreference = "default", guess: float = 0.0,
@@ -232,7 +237,7 @@ def param(
 
 def var(
     unit: str, description: str = "", *, state: StatePreference = "default", guess: float = 0.0, default: Any = None,
-    min: float | None = None, max: float | None = None, nominal: float = 1.0,
+    min: float | None = None, max: float | None = None, nominal: float = 1.0, driving: Literal[1, -1] = 1,
 ) -> Any:  # fmt: skip
     """Declare an unknown; as a keyword of the constructor it takes a fixed start value or a `guess(…)`.
 
@@ -245,8 +250,11 @@ def var(
         min: smallest sensible value, SI.
         max: largest sensible value, SI.
         nominal: order of magnitude, SI.
+        driving: sign of a torque or force while it drives what is on its right; pictures show that as positive.
     """
-    return Variable(unit, description, state=state, guess=guess, default=default, min=min, max=max, nominal=nominal)
+    made = Variable(unit, description, state=state, guess=guess, default=default, min=min, max=max, nominal=nominal)
+    made.driving = driving
+    return made
 
 
 def flow(unit: str, description: str = "", *, nominal: float = 1.0) -> Any:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
 from rich.console import Group, RenderableType
 from rich.markup import escape
 from rich.table import Table
@@ -12,6 +13,7 @@ from rich.table import Table
 from modelica_like.language.transition import NAME_IN_NOTICE
 from modelica_like.report.types import table
 from modelica_like.solve.display import Display
+from modelica_like.solve.signals import evaluated, read_signals
 from modelica_like.solve.trajectories import Trajectories
 from modelica_like.units import parse_unit
 
@@ -22,17 +24,20 @@ _SHOWN = 20
 
 
 def run_report(
-    solution: Trajectories, *, energy: bool = True, debug: bool = False, display: Mapping[str, str] | None = None
-) -> RenderableType:
-    """Return events, energy balance and statistics of a run.
+    solution: Trajectories, *, energy: bool = True, debug: bool = False, display: Mapping[str, str] | None = None,
+    show: Sequence[str] = (),
+) -> RenderableType:  # fmt: skip
+    """Return events, values, energy balance and statistics of a run.
 
     Args:
         solution: the run.
         energy: whether to show the energy balance.
         debug: whether to show the source line of every event's transition.
         display: units by quantity, in addition to those of the netlist, such as {"energy": "kJ"}.
+        show: names, patterns and formulas whose extremes are told.
     """
     parts = _head(solution, notices(solution), debug=debug)
+    parts += ["", values_table(solution, show, display)] if show else []
     if energy:
         parts += ["", energy_table(solution, display), f"[dim]{closure_line(solution)}[/]"]
         parts += [f"[bold]{escape(notice)}[/]" for notice in solution.energy().notices]
@@ -59,6 +64,25 @@ def events_table(solution: Trajectories, *, debug: bool = False) -> Table:
         rows[_SHOWN // 2 : -_SHOWN // 2] = [("…", *[""] * (len(rows[0]) - 1))]
     heads = ("time in s>", "mode", "from", "to", "because", "declared in")[:columns]
     return table(_mode_changes(len(solution.events)), *heads, rows=rows)
+
+
+def values_table(solution: Trajectories, words: Sequence[str], display: Mapping[str, str] | None = None) -> Table:
+    """Return first and last value and extremes of what names, patterns and formulas stand for.
+
+    Raises:
+        UnknownName: nothing matches.
+    """
+    shown, signals = Display(solution.model, display), read_signals(solution.model, words)
+    values, rows = evaluated(solution, signals), list[tuple[str, ...]]()
+    for one in signals:
+        unit = one.shown_in(shown)
+        curve = shown.converted(values[one.name], one.unit, unit)
+        told = [f"{curve[k]:.6g}" for k in (0, -1)]
+        for k in (np.argmin(curve), np.argmax(curve)):
+            told += [f"{curve[k]:.6g}", f"{solution.time[k]:.6g}"]
+        rows.append((one.name, "" if unit in ("1", "*") else unit, *told))
+    heads = "name", "unit", "first>", "last>", "smallest>", "at s>", "largest>", "at s>"
+    return table("values", *heads, rows=rows, most=_SHOWN, rest=", which --csv writes")
 
 
 def reasons(solution: Trajectories) -> list[str]:

@@ -74,12 +74,14 @@ class Trajectories(Shown, ABC):
         events: mode changes.
         statistics: of the run.
         notices: messages about the run.
+        measured: whether they are a table, to be drawn as dots.
     """
 
     model: Any
     events: tuple[Event, ...]
     statistics: Statistics
     notices: tuple[str, ...] = ()
+    measured: bool = False
 
     def __getattr__(self, name: str) -> Any:
         """Return a variable, or the variables of a part: `run.clutch.tau`."""

@@ -107,10 +107,12 @@ class Sensitivities(Shown):
             most: largest number of parameters.
         """
         quantity = self.outputs[_position(self.outputs, output, "output")]
-        ranking = [(one, derivative) for one, derivative, _ in self.ranking(output) if one.value * derivative][:most]
+        ranking = [(one, derivative) for one, derivative, _ in self.ranking(output) if one.value * derivative]
+        rest = f"Not drawn: {len(ranking) - most} parameters with less effect." if len(ranking) > most else ""
+        ranking = ranking[:most]
         places, unit = np.arange(len(ranking))[::-1], quantity.unit_text
         title = f"{output} = {quantity.value:.6g} {unit}".rstrip()
-        with picture(title, 1, 1.5 + 0.32 * len(ranking)) as (figure, (axes,)):
+        with picture(title, 1, 1.5 + 0.32 * len(ranking), below=[[rest]] if rest else []) as (figure, (axes,)):
             for sign, mark, colour in ((1, "+", COLOURS[0]), (-1, "−", COLOURS[4])):
                 widths = [sign * change * abs(p.value) * d for p, d in ranking]
                 axes.barh(places, widths, height=0.66, color=colour, label=f"parameter {mark}{change:.0%}")

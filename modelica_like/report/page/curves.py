@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from modelica_like.solve.panels import mode_spans
 from modelica_like.solve.plot import chosen
 from modelica_like.solve.plot import quantity as quantity_of
 from modelica_like.solve.solution import Solution
@@ -54,16 +55,5 @@ def _thinned(run: Solution) -> NDArray[np.intp]:
 
 def _bands(run: Solution) -> list[dict[str, Any]]:
     """Time spans of the values of each mode that changes."""
-    found: dict[str, list[tuple[float, float, str]]] = {}
-    begin, end = float(run.time[0]), float(run.time[-1])
-    for event in run.events:
-        bands = found.setdefault(event.mode, [])
-        bands.append((bands[-1][1] if bands else begin, event.time, event.before))
-    last = {event.mode: event.after for event in run.events}
-    return [
-        {
-            "name": mode,
-            "bands": [band for band in [*bands, (bands[-1][1], end, last[mode])] if band[1] > band[0]][:_MOST_BANDS],
-        }
-        for mode, bands in found.items()
-    ]
+    modes = dict.fromkeys(event.mode for event in run.events)
+    return [{"name": mode, "bands": mode_spans(run, mode)[:_MOST_BANDS]} for mode in modes]
