@@ -104,6 +104,10 @@ class Component(Declared):
         """Yield the equations and connections."""
         return iter(())
 
+    def initial_equations(self) -> Equations:
+        """Yield equations that hold at the start only: they take the place of start values."""
+        return iter(())
+
     def events(self) -> Events:
         """Yield the transitions of the modes."""
         return iter(())
