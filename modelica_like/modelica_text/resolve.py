@@ -22,7 +22,7 @@ ELEMENTARY = {
 KEPT = {"der", "pre", "noEvent", "smooth", "initial", "sample", "edge", "change", "reinit", "terminal"}
 _REFUSED = {
     "delay": "a delay", "spatialDistribution": "spatialDistribution", "cardinality": "cardinality(…)",
-    "terminal": "terminal()", "change": "change(…)",
+    "terminal": "terminal()",
     "inStream": "a stream connector", "actualStream": "a stream connector",
     "previous": "a clocked partition", "hold": "a clocked partition", "Clock": "a clocked partition",
     "transition": "a state machine", "initialState": "a state machine",
