@@ -8,7 +8,7 @@ from modelica_like.errors import ModelicaTextError, Source
 from modelica_like.modelica_text import fold
 from modelica_like.modelica_text.instance import Instance, refused
 from modelica_like.modelica_text.resolve import Resolver
-from modelica_like.modelica_text.tree import ClassText, Expr, Statement
+from modelica_like.modelica_text.tree import ClassText, Expr, Statement, calls_in
 from modelica_like.modelica_text.types import basic_type
 from modelica_like.modelica_text.written import Happening
 
@@ -57,6 +57,25 @@ class Statements:
                 self.memory[left.args[1][0].args[0][0]] = right
             else:
                 self.initial.append((left, right, source))
+        for left, right, source in self.equations:
+            for call in (*calls_in(left), *calls_in(right)):
+                self._check_memory(call, source)
+
+    def _check_memory(self, call: Expr, source: Source) -> None:
+        """Refuse `pre` and `change` of a variable that changes all the time."""
+        one = call.args[1][0] if call.args[0] in ("pre", "change") else None
+        name = one.args[0][0] if one is not None and one.kind == "name" else ""
+        member = self.instance.members.get(name)
+        basic = basic_type(self.instance, member) if member is not None else None
+        if (
+            basic is not None
+            and basic.kind == "Real"
+            and "discrete" not in basic.prefixes
+            and name not in self.assigned
+        ):
+            raise ModelicaTextError(
+                f"{call.args[0]}({name}): only what changes at events has a value before them.", where=source
+            )
 
     def _bindings(self) -> None:
         """Collect declarations `Real x = …`."""
