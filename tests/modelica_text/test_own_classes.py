@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from modelica_like import build, load, simulate
+from modelica_like import build, export_fmu, load, simulate
 from modelica_like.netlist import loads
 
 DRIVES = Path(__file__).with_name("drives.mo")
@@ -161,6 +161,11 @@ def test_a_broken_assertion_ends_the_run(tmp_path: Path) -> None:
     (tmp_path / "drives.mo").write_text(text)
     with pytest.raises(Exception, match="too many bounces"):
         simulate(load(f"{tmp_path / 'drives.mo'}:Ball"), 2.0)
+
+
+def test_an_fmu_of_a_text_agrees_with_idas(tmp_path: Path) -> None:
+    done = export_fmu(drive("Thermostat"), tmp_path / "thermostat.fmu", "2.0", ("me",))
+    assert "differs" not in str(done)
 
 
 def test_derivatives_by_parameters_exist() -> None:
