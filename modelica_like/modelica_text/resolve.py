@@ -279,4 +279,5 @@ class Resolver:
             return self._told(lambda: functions.OF_ARRAYS[short](values, line), line)
         if short in ELEMENTARY:
             return self._told(lambda: fold.function(short, values, line), line)
-        return functions.called(self, expression, values, {key: self(one) for key, one in named})
+        others = {key: self(one) for key, one in named}
+        return self._told(lambda: functions.called(self, expression, values, others), line)

@@ -60,6 +60,15 @@ class Statements:
         for left, right, source in self.equations:
             for call in (*calls_in(left), *calls_in(right)):
                 self._check_memory(call, source)
+        values = [side for left, right, _ in (*self.equations, *self.initial) for side in (left, right)]
+        sources = [source for _, _, source in (*self.equations, *self.initial) for _ in (0, 1)]
+        for one in self.happenings:
+            for conditions, new in one.branches:
+                values += [*conditions, *new.values()]
+                sources += [one.source] * (len(conditions) + len(new))
+        for value, source in zip(values, sources, strict=True):
+            if not _is_numeric(value):
+                raise ModelicaTextError("A text, an array or a choice stands where a number belongs.", where=source)
 
     def _check_memory(self, call: Expr, source: Source) -> None:
         """Refuse `pre` and `change` of a variable that changes all the time."""
@@ -257,6 +266,11 @@ def _condition(node: Expr) -> Expr:
     taken = fold.operation("and", (condition, _condition(value)), node.line)
     left = fold.operation("and", (fold.operation("not", (condition,), node.line), other), node.line)
     return fold.operation("or", (taken, left), node.line)
+
+
+def _is_numeric(node: Expr) -> bool:
+    inner = node.args[1] if node.kind == "call" else [one for one in node.args if isinstance(one, Expr)]
+    return node.kind not in ("string", "array", "literal") and all(map(_is_numeric, inner))
 
 
 def _choice(branches: list[tuple[Expr | None, Expr]], line: int) -> Expr:

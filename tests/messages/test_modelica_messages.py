@@ -78,6 +78,10 @@ MESSAGES: dict[str, tuple[str, str]] = {
         "model A\n  Real x;\nalgorithm\n  x := 1;\nend A;\n",
         "An algorithm outside a function: that is not supported here.\n  in a.mo:3 `algorithm`",
     ),
+    "a text as a number": (
+        model("Real x;", 'x = 2*"two";'),
+        'A text, an array or a choice stands where a number belongs.\n  in a.mo:5 `x = 2*"two";`',
+    ),
     "two results": (
         model("Real x;", "(x, y) = f(1);"),
         "Functions with several results are not supported.\n  in a.mo:5 `(x, y) = f(1);`",
