@@ -25,7 +25,7 @@ from modelica_like.flatten.template import Template, template_of
 from modelica_like.flatten.wiring import Wiring
 from modelica_like.language.component import Component
 from modelica_like.language.declared import Declared
-from modelica_like.language.discrete import INITIAL
+from modelica_like.language.discrete import INITIAL, TERMINAL
 from modelica_like.language.expr import TIME, flagged_motion
 from modelica_like.language.fields import Discrete, Input, Output, Parameter, Variable
 from modelica_like.units import ONE, coherent
@@ -174,13 +174,15 @@ class _Flattener:
 
     def _discrete(self, component: Component, path: str) -> int:
         """Return the position of a mode, a discrete value, a `pre`, or `initial()`."""
-        key = (0, path) if path == INITIAL.name else self._owner(component, _plain(path))
+        key = (0, path) if path in (INITIAL.name, TERMINAL.name) else self._owner(component, _plain(path))
         if path != _plain(path):
             of = self.discrete_of[key]
             key = key[0], f"pre({key[1]})"
             if key not in self.discrete_of:
                 flat = self.discretes[of]
                 self.pres[self._hide(*key, f"pre({flat.path})", Hidden("", ""), flat.start)] = of
+        elif path == TERMINAL.name and key not in self.discrete_of:
+            self._hide(*key, path, Hidden("", "whether a run ends"))
         elif key not in self.discrete_of:
             first = self._hide(*key, path, Hidden("", "whether a run begins"), 1.0)
             self.pres[first] = first

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from modelica_like import Assembly, build, sensitivities, simulate
-from modelica_like.errors import Chattering, LimitPassed
+from modelica_like.errors import Chattering, LimitPassed, NoGradient
 from modelica_like.language import (
     Component,
     Discrete,
@@ -42,6 +42,7 @@ from modelica_like.language import (
     signal_in,
     signal_out,
     sin,
+    terminal,
     var,
     when,
 )
@@ -489,3 +490,27 @@ def test_friction_by_boolean_equations(solver):
     assert found.time[changes] == pytest.approx([leaves, low], abs=CLOSE)
     assert found["mode"][[0, changes[0] + 1, -1]].tolist() == [0, 1, -1]
     assert found.final["v"] == pytest.approx(speed(4.0, low, -2), abs=1e-8)
+
+
+class Ending(Component):
+    """Tells at the end how far it got, and starts anew."""
+
+    x: Variable = var("m", "way", default=0)
+    v: Parameter = param("m/s", "speed", default=2)
+    far: Discrete = discrete("m", "way at the end", start=-1.0)
+    n: Discrete = integer("ends")
+
+    def equations(self) -> Equations:
+        yield der(self.x) == self.v
+
+    def events(self) -> Events:
+        yield when(terminal(), {self.far: self.x, self.x: 0, self.n: pre(self.n) + 1})
+
+
+def test_the_end_is_an_event(solver):
+    found = run(Ending(), 1.5, solver)
+    assert [found.final[name] for name in ("far", "x", "n")] == pytest.approx([3.0, 0.0, 1.0], abs=CLOSE)
+    assert found["far"][-2] == -1.0
+    assert found["x"][-2] == pytest.approx(3.0, abs=CLOSE)
+    with pytest.raises(NoGradient, match="No gradient: Ending changes at the end of a run"):
+        sensitivities(build(Ending()), "x", "v", until=1.0)

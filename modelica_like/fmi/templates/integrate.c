@@ -109,6 +109,14 @@ static Result pass_event(Instance *c) {
 /* Fires what was located at the present point, or what wants to fire. */
 Result handle_event(Instance *c) { return gradient_through(c, pass_event, 0); }
 
+/* The end of a run is an event where discrete equations ask for it. */
+Result finish(Instance *c) {
+    int terminal = c->model->settings->terminal;
+    if (terminal < 0 || c->d[terminal] != 0) return RESULT_OK;
+    c->d[terminal] = 1;
+    return handle_event(c);
+}
+
 int is_due(Instance *c) { return c->model->n_moments > 0 && find_wanting(c, nothing_wanting(c), 0); }
 
 /* Fixed steps go to whole numbers of them only. */
