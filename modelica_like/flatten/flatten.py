@@ -155,7 +155,7 @@ class _Flattener:
         path, node = f"{component.path}.{name}".lstrip("."), len(self.variables)
         self.variable_of[id(component), name] = node
         told = f"{INITIAL_EQUATION} `{text}`"
-        self.variables.append(FlatVariable(path, ONE, told, "local", "avoid", 0.0, 1.0, None, None))
+        self.variables.append(FlatVariable(path, ONE, told, "local", "avoid", 0.0, 1.0, None, None, hidden=True))
         self.starts.append(StartValue(node, 0.0, "fixed"))
 
     def _declare_discrete(self, component: Component, name: str, path: str, field: Discrete) -> None:

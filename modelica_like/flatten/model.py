@@ -19,7 +19,7 @@ INITIAL_EQUATION = "the initial equation"
 
 @dataclass(frozen=True, slots=True)
 class FlatVariable:
-    """A continuous variable; `kind` is local, output, input, potential or flow."""
+    """A continuous variable; `kind` is local, output, input, potential or flow. No user has declared a hidden one."""
 
     path: str
     unit: Unit
@@ -30,6 +30,7 @@ class FlatVariable:
     nominal: float
     min: float | None
     max: float | None
+    hidden: bool = False
 
 
 @dataclass(frozen=True, slots=True)

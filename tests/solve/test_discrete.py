@@ -316,6 +316,7 @@ def test_what_does_not_settle_is_told(solver):
 def test_discrete_parts_in_an_assembly_have_their_paths(solver):
     found = run(Assembly("two", parts={"a": Ball(h=1.0, v=0.0), "b": Ball(h=2.0, v=0.0)}), 1.0, solver)
     assert (found.final["a.n"], found.final["b.n"]) == (1, 1)
+    assert sorted(found.names) == sorted(f"{part}.{name}" for part in "ab" for name in ("h", "v", "y", "n", "top"))
     assert times(found, "b.relation[1]")[0] == pytest.approx(np.sqrt(4 / 9.81), abs=CLOSE)
 
 
