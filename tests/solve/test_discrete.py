@@ -515,3 +515,32 @@ def test_the_end_is_an_event(solver):
     assert found["x"][-2] == pytest.approx(3.0, abs=CLOSE)
     with pytest.raises(NoGradient, match="No gradient: Ending changes at the end of a run"):
         sensitivities(build(Ending()), "x", "v", until=1.0)
+
+
+class Relay(Component):
+    """A mode that follows a Boolean variable, and one that counts its edges."""
+
+    x: Variable = var("1", "swings")
+    f: Parameter = param("Hz", "frequency", default=1.0)
+    on: Discrete = boolean("positive half wave")
+    contact = Mode("open", "closed")
+    tooth = Mode("even", "odd")
+    closed_for: Variable = var("s", "time closed", default=0)
+
+    def equations(self) -> Equations:
+        yield self.x == sin(2 * np.pi * self.f * self.time)
+        yield self.on == (self.x > 0.5)
+        yield der(self.closed_for) == self.contact.choose(open=0, closed=1)
+
+    def events(self) -> Events:
+        yield self.contact.go("open", "closed", when=self.on)
+        yield self.contact.go("closed", "open", when=negate(self.on))
+        yield self.tooth.go("even", "odd", when=self.on, once=True)
+        yield self.tooth.go("odd", "even", when=self.on, once=True)
+
+
+def test_modes_follow_boolean_variables(solver):
+    found = run(Relay(), 2.9, solver)
+    assert found.final["closed_for"] == pytest.approx(3 / 3, abs=1e-8)
+    assert times(found, "contact") == pytest.approx([k + s / 12 for k in range(3) for s in (1, 5)], abs=CLOSE)
+    assert times(found, "tooth") == pytest.approx([k + 1 / 12 for k in range(3)], abs=CLOSE)
