@@ -544,3 +544,29 @@ def test_modes_follow_boolean_variables(solver):
     assert found.final["closed_for"] == pytest.approx(3 / 3, abs=1e-8)
     assert times(found, "contact") == pytest.approx([k + s / 12 for k in range(3) for s in (1, 5)], abs=CLOSE)
     assert times(found, "tooth") == pytest.approx([k + 1 / 12 for k in range(3)], abs=CLOSE)
+
+
+class Measured(Component):
+    """A machine at a voltage that swings; its speed is only sampled."""
+
+    A: Parameter = param("V", "voltage", default=5.0)
+    f: Parameter = param("rad/s", "frequency", default=3.0)
+    T: Parameter = param("s", "period", default=1e-2)
+    v: Output = signal_out("V", "voltage")
+    held: Discrete = discrete("rad/s", "speed at the last tick")
+    machine = Machine()
+
+    def equations(self) -> Equations:
+        yield self.v == self.A * (1 + sin(self.f * self.time))
+        yield connect(self.v, self.machine.u)
+
+    def events(self) -> Events:
+        yield when(clock(self.T), {self.held: self.machine.w})
+
+
+def test_ticks_that_move_nothing_do_not_begin_the_steps_anew(solver):
+    found = simulate(Measured(), 3.0, solver=solver)
+    assert len(found.events) == 301
+    assert found.final["held"] == pytest.approx(found.final["machine.w"], rel=1e-12)
+    if solver == "native":  # IDAS begins anew at every event
+        assert found.statistics.steps < 1.2 * 301

@@ -95,14 +95,22 @@ Result take_changes(Instance *c, int *event) {
 static Result pass_event(Instance *c) {
     State *s = &c->state;
     unsigned char *wanting = nothing_wanting(c);
-    int located = s->event_pending;
+    int located = s->event_pending, ticks = c->model->n_moments > 0 && !located;
+    size_t size = (size_t)c->model->n_x * sizeof(double);
+    double *x = c->work.first, *rates = c->work.first_rates, step = s->step;
     if (located) memcpy(wanting, c->wanting, c->model->n_transitions);
     leave_piece(c);
     s->at_event = 0;
     s->step = 0;
     s->z_valid = 0;
-    if (settle(c) != RESULT_OK || iterate_events(c, wanting, located) != RESULT_OK) return RESULT_ERROR;
+    if (settle(c) != RESULT_OK) return RESULT_ERROR;
+    if (ticks) evaluate_now(c, &c->model->tapes.rates, rates);
+    memcpy(x, c->x, size);
+    if (iterate_events(c, wanting, located) != RESULT_OK) return RESULT_ERROR;
     s->z_valid = 1;
+    if (!ticks || memcmp(x, c->x, size) != 0) return RESULT_OK;
+    evaluate_now(c, &c->model->tapes.rates, c->work.rhs);
+    if (memcmp(rates, c->work.rhs, size) == 0) s->step = step; /* a tick without effect on what moves */
     return RESULT_OK;
 }
 
