@@ -41,7 +41,7 @@ class Compliant(Component, partial=True):
     flange_a = Flange("left end")
     flange_b = Flange("right end")
     phi_rel: Variable = var("rad", "relative angle, flange_b.phi - flange_a.phi", state="prefer")
-    tau: Variable = var("N.m", "torque between the flanges, flange_b.tau")
+    tau: Variable = var("N.m", "torque between the flanges, flange_b.tau", driving=-1)
 
     def equations(self) -> Equations:
         yield self.phi_rel == self.flange_b.phi - self.flange_a.phi
@@ -68,7 +68,7 @@ class LinearCompliant(Component, partial=True):
     flange_a = LinearFlange("left end")
     flange_b = LinearFlange("right end")
     s_rel: Variable = var("m", "relative position, flange_b.s - flange_a.s", state="prefer")
-    f: Variable = var("N", "force between the flanges, flange_b.f")
+    f: Variable = var("N", "force between the flanges, flange_b.f", driving=-1)
 
     def equations(self) -> Equations:
         yield self.s_rel == self.flange_b.s - self.flange_a.s

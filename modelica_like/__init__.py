@@ -20,11 +20,13 @@ if TYPE_CHECKING:
     from modelica_like.analyse.calibration.calibrate import calibrate as calibrate
     from modelica_like.analyse.linear.campbell import campbell as campbell
     from modelica_like.analyse.linear.linearize import linearize as linearize
+    from modelica_like.analyse.linear.loop import open_loop as open_loop
     from modelica_like.analyse.operating.curves import characteristic as characteristic
     from modelica_like.analyse.operating.steady import steady as steady
     from modelica_like.analyse.sensitivity.derivatives import sensitivities as sensitivities
     from modelica_like.analyse.sensitivity.function import simulation_function as simulation_function
     from modelica_like.analyse.sweeps.importance import importance as importance
+    from modelica_like.analyse.sweeps.pictures import plot_sweep as plot_sweep
     from modelica_like.analyse.sweeps.sweep import sweep as sweep
     from modelica_like.compile.compiled import CompiledDae as CompiledDae
     from modelica_like.cosimulation.run import cosim as cosim
@@ -42,7 +44,9 @@ if TYPE_CHECKING:
     from modelica_like.native.page import export_html as export_html
     from modelica_like.netlist import load as load
     from modelica_like.report.compare import compare as compare
+    from modelica_like.report.overlay import overlay as overlay
     from modelica_like.report.page import save_report as save_report
+    from modelica_like.report.progress import Bar as Bar
     from modelica_like.simulation import build as build
     from modelica_like.simulation import simulate as simulate
     from modelica_like.solve.options import Options as Options
@@ -53,6 +57,7 @@ __version__ = "0.1.0"
 
 _HOME = {
     "Assembly": "modelica_like.language",
+    "Bar": "modelica_like.report.progress",
     "CompiledDae": "modelica_like.compile.compiled",
     "Component": "modelica_like.language",
     "ModelicaLikeError": "modelica_like.errors",
@@ -75,8 +80,11 @@ _HOME = {
     "linearize": "modelica_like.analyse.linear.linearize",
     "load": "modelica_like.netlist",
     "load_spectrum": "modelica_like.analyse.after.spectra",
+    "open_loop": "modelica_like.analyse.linear.loop",
     "order_map": "modelica_like.analyse.after.orders",
     "order_response": "modelica_like.analyse.after.orders",
+    "overlay": "modelica_like.report.overlay",
+    "plot_sweep": "modelica_like.analyse.sweeps.pictures",
     "run_fmu": "modelica_like.fmi.run",
     "save_report": "modelica_like.report.page",
     "save_schematic": "modelica_like.draw",
@@ -105,7 +113,11 @@ _OFFERED = {name: _HOME[name] for name in ("Native", "schematic", "simulation_fu
 _OFFERED |= {
     "NativeLoop": "modelica_like.native.run",
     "html": "modelica_like.report.notebook",
+    "icon": "modelica_like.draw",
+    "load_modelica": "modelica_like.modelica_text.read",
+    "mathematics": "modelica_like.report.mathematics",
     "plot": "modelica_like.solve.plot",
     "sankey": "modelica_like.solve.sankey",
+    "size": "modelica_like.sizing.run",
 }
 provide(tuple(_OFFERED), lambda name: getattr(import_module(_OFFERED[name]), name))

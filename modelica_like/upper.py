@@ -16,3 +16,10 @@ def provide(names: tuple[str, ...], load: Callable[[str], Any]) -> None:
 def upper(name: str) -> Any:
     """Return a function of an upper layer."""
     return _makers[name](name)
+
+
+class Shown:
+    """A result that a notebook shows as its tables."""
+
+    def _repr_html_(self) -> str:
+        return upper("html")(self)

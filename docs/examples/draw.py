@@ -1,6 +1,13 @@
-"""Draw the pictures of these pages: python docs/examples/draw.py [NAME...]."""
+"""Draw the pictures of the documentation: python docs/examples/draw.py [NAME...].
 
+A NAME is that of a picture of these pages, or of a page of docs/ whose blocks draw pictures, such as analysis.md.
+"""
+
+import contextlib
+import re
+import runpy
 import sys
+import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import cycle
@@ -8,15 +15,15 @@ from math import pi
 from pathlib import Path
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
+from PIL import Image
 
 from components.sizing import DcMotor, commutated, dc_motor_point
-from modelica_like import load, simulate
+from modelica_like import load, sensitivities, simulate
 from modelica_like.sizing import size
 from modelica_like.solve.plot import save_plot
-from modelica_like.solve.style import COLOURS, STYLE
+from modelica_like.solve.style import COLOURS, picture
 
 HERE = Path(__file__).parent
 EXAMPLES = HERE.parents[1] / "examples"
@@ -30,11 +37,9 @@ PICTURES: dict[str, tuple[str, ...]] = {
     "lepelletier": (
         "crankshaft.w",
         "car.w",
-        "box.clutch_a.tau",
-        "box.clutch_b.tau",
-        "box.brake_c.tau",
-        "box.clutch_e.tau",
+        *(f"box.{name}.tau" for name in ("clutch_a", "clutch_b", "brake_c", "brake_d", "clutch_e")),
         "selector.gear",
+        *(f"box.{name}.mode" for name in ("clutch_a", "clutch_b", "brake_c", "brake_d", "clutch_e")),
     ),
     "dc_bench": ("motor.w", "clutch_pulley.w", "flywheel.w", "motor.ia", "generator.v", "clutch.tau"),
     "winch": ("motor.w", "load.v", "motor.ia", "rope.tension", "load.s"),
@@ -60,6 +65,25 @@ PICTURES: dict[str, tuple[str, ...]] = {
     "msl/translational/PreLoad": ("spool.s", "innerContactA.f", "innerContactB.f", "force.f"),
     "msl/dcmachines/DCPM_Start": ("dcpm.ia", "dcpm.w", "dcpm.tau_electrical"),
     "msl/dcmachines/DCSE_Start": ("dcse.ia", "dcse.w", "dcse.tau_electrical"),
+}
+
+PAGES = ("plots.md", "analysis.md", "after_the_run.md")
+"""Pages of docs/ whose blocks draw their pictures."""
+
+TURNING = {"speed": "rpm"}
+DISPLAY: dict[str, dict[str, str]] = {
+    "fan": TURNING,
+    "machine_table_direct": TURNING,
+    "machine_table_geared": TURNING,
+    "ravigneaux": TURNING,
+    "lepelletier": TURNING,
+    "dc_bench": TURNING,
+    "dc_bench_cycles": TURNING | {"temperature": "degC"},
+    "machine_tool_magnet": {"force": "kN", "temperature": "degC"},
+    "winch": {"force": "kN"},
+    "dc_machines/series_runaway": TURNING,
+    "msl/dcmachines/DCPM_Start": TURNING,
+    "msl/dcmachines/DCSE_Start": TURNING,
 }
 
 END = {"fan": "4 s", "ravigneaux": "20 ms"}
@@ -96,10 +120,8 @@ def panels(title: str, xlabel: str, rows: Mapping[str, Sequence[Curve]]) -> Figu
     """Draw curves in rows, one per quantity; those of one name have one colour."""
     names = list(dict.fromkeys(curve.name for row in rows.values() for curve in row))
     colours = dict(zip(names, cycle(COLOURS), strict=False))
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(8.0, 0.8 + 2.1 * len(rows)), layout="constrained")
+    with picture(title, len(rows), 0.8 + 1.7 * len(rows)) as (figure, grid):
         told: set[str] = set()
-        grid = figure.subplots(len(rows), 1, sharex=True, squeeze=False)[:, 0]
         for axes, (label, row) in zip(grid, rows.items(), strict=True):
             for curve in row:
                 style = DASHED.get(curve.name, "-")
@@ -108,8 +130,8 @@ def panels(title: str, xlabel: str, rows: Mapping[str, Sequence[Curve]]) -> Figu
             if {curve.name for curve in row} != told:
                 axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
             told = {curve.name for curve in row}
-        axes.set_xlabel(xlabel)
-        figure.suptitle(title, x=0.01, ha="left", fontsize=11, fontweight="bold")
+        grid[-1].set_xlabel(xlabel)
+        figure.align_ylabels(grid)
     return figure
 
 
@@ -273,9 +295,7 @@ def families() -> Figure:
     """Diagrams 01 to 03 and 06 of document 002: set A over the supply, beside the points whose values are printed."""
     motor = DcMotor(SET_A["k"], SET_A["R"], SET_A["friction"], 0.0)
     supply = np.linspace(0.1, 24, 240)
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(8.0, 7.2), layout="constrained")
-        voltage, current, bench = figure.subplots(3, 1)
+    with picture("dc_bench: families of curves", 3, 8.0, sharex=False) as (figure, (voltage, current, bench)):
         for load_torque in (0.0, *WEIGHTS):
             made = dc_motor_point(motor, supply, load_torque)
             turns = made.speed > 0
@@ -315,8 +335,31 @@ def servo() -> Figure:
     return panels("servo_axis: 100 mm forth and back", "time in s", rows)
 
 
+def shifts() -> Figure:
+    """The shift diagram: engine speed over the speed of the car, along the lines of the gears."""
+    run = simulate(EXAMPLES / "lepelletier.toml")
+    # The inertia of the car is that of 1600 kg on wheels of this radius.
+    radius = float(np.sqrt(run["car.J"][0] / 1600))
+    engine, car, gear = run["crankshaft.w"] * RPM, 3.6 * radius * run["car.w"], run["selector.gear"]
+    at_rest = np.abs(run["selector.stage"] - run["selector.stage"][-1]) < 0.5
+    with picture("lepelletier: shift diagram", 1, 4.2) as (figure, (axes,)):
+        for number in range(1, 7):
+            some = at_rest & (gear == number) & (car > 0)
+            ratio = float(np.median(engine[some] / car[some]))
+            reach = np.array([0.0, min(7000 / ratio, 1.05 * car[-1])])
+            axes.plot(reach, ratio * reach, color="#bbbbbb", linewidth=0.8, zorder=1)
+            axes.annotate(
+                f"{number}", (reach[1], ratio * reach[1]), xytext=(3, 1), textcoords="offset points", fontsize=8
+            )
+            axes.plot(car, np.where(gear == number, engine, np.nan), color=COLOURS[number % 6], label=f"gear {number}")
+        axes.set(xlabel="speed of the car in km/h", ylabel="engine speed in rpm", xlim=(0, None), ylim=(0, 7500))
+        axes.legend(loc="center left", bbox_to_anchor=(1.02, 0.5))
+    return figure
+
+
 FIGURES: dict[str, Callable[[], Figure]] = {
     "servo_axis": servo,
+    "lepelletier_shifts": shifts,
     "dc_bench_motor": motor_curves,
     "dc_bench_release": release,
     "dc_bench_overload": overload,
@@ -332,9 +375,48 @@ FIGURES: dict[str, Callable[[], Figure]] = {
 }
 
 
-def save(figure: Figure, name: str) -> None:
-    """Write a small picture."""
-    save_plot(figure, HERE / "pictures" / f"{name}.png", dpi=60, pil_kwargs={"optimize": True})
+def tornado() -> Figure:
+    """The picture of docs/sensitivities.md."""
+    return sensitivities(EXAMPLES / "machine_tool_startup.toml", ["clutch.lock_time"]).tornado("clutch.lock_time")
+
+
+def readme() -> Figure:
+    """The run of the README."""
+    text = (EXAMPLES.parent / "README.md").read_text(encoding="utf-8")
+    return run_blocks(text, Path())["run"].plot("*.w", "clutch.tau", "shaft.tau", "table.v", display=TURNING)
+
+
+ELSEWHERE = {"tornado_lock_time": tornado, "spindle_drive": readme}
+"""Pictures in docs/pictures that no block of a page draws."""
+
+
+def run_blocks(text: str, folder: Path) -> dict[str, Any]:
+    """Run the Python blocks of a page in a folder."""
+    with tempfile.TemporaryDirectory() as place, contextlib.chdir(folder):
+        (program := Path(place) / "page.py").write_text("\n".join(re.findall(r"```python\n(.*?)```", text, re.DOTALL)))
+        return runpy.run_path(str(program))
+
+
+def small(picture: Path, place: Path) -> None:
+    """Copy a picture with as many colours as it needs: a third of the bytes, and no visible difference."""
+    with Image.open(picture) as full:
+        full.convert("RGB").quantize(96, dither=Image.Dither.NONE).save(place, optimize=True)
+
+
+def save(figure: Figure, name: str, folder: Path = HERE) -> None:
+    """Write a picture."""
+    save_plot(figure, place := folder / "pictures" / f"{name}.png", dpi=150)
+    small(place, place)
+
+
+def draw_page(page: Path) -> None:
+    """Run the blocks of a page, and keep the pictures that it shows."""
+    text = page.read_text(encoding="utf-8")
+    with tempfile.TemporaryDirectory() as folder:
+        (Path(folder) / "examples").symlink_to(EXAMPLES)
+        run_blocks(text, Path(folder))
+        for name in re.findall(r"\(pictures/(\w+\.png)\)", text):
+            small(Path(folder) / name, page.parent / "pictures" / name)
 
 
 def main(*wanted: str) -> None:
@@ -342,10 +424,16 @@ def main(*wanted: str) -> None:
     for netlist, shown in PICTURES.items():
         if not wanted or Path(netlist).name in wanted:
             run = simulate(EXAMPLES / f"{netlist}.toml", END.get(netlist))
-            save(run.plot(*shown), Path(netlist).name)
+            save(run.plot(*shown, display=DISPLAY.get(netlist)), Path(netlist).name)
     for name, figure in FIGURES.items():
         if not wanted or name in wanted:
             save(figure(), name)
+    for name, figure in ELSEWHERE.items():
+        if not wanted or name in wanted:
+            save(figure(), name, HERE.parent)
+    for page in PAGES:
+        if not wanted or page in wanted:
+            draw_page(HERE.parent / page)
 
 
 if __name__ == "__main__":

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from modelica_like.cli.shared import DEFECTS, out, warn
+from modelica_like.cli.shared import DEFECTS, Page, warn
 from modelica_like.errors import ModelicaLikeError, SolveError
 
 if TYPE_CHECKING:
@@ -53,8 +53,9 @@ class Outcome:
         return False
 
     def write(
-        self, table: Path | None, *, units: bool, pictures: Sequence[Picture], display: Mapping[str, str] | None = None
-    ) -> None:
+        self, table: Path | None, *, units: bool, pictures: Sequence[Picture],
+        display: Mapping[str, str] | None = None, show: Sequence[str] = (),
+    ) -> None:  # fmt: skip
         """Write the requested files.
 
         Raises:
@@ -64,7 +65,8 @@ class Outcome:
         if table:
             from modelica_like.report.files import write_solution
 
-            self.attempt("The table", lambda: write_solution(self.solution, table, units=units, display=display), table)
+            options: Any = {"units": units, "display": display, "show": show}
+            self.attempt("The table", lambda: write_solution(self.solution, table, **options), table)
         for file, draw in pictures:
             if file:
                 self.attempt(f"The picture {file.name}", lambda file=file, draw=draw: self._draw(file, draw), file)
@@ -81,8 +83,6 @@ class Outcome:
 
         save_plot(draw(self.solution), file)
 
-    def tell(self, report: Callable[[Any], Any], table: Path | None) -> None:
-        """Print a report, unless the table goes to standard output."""
-        from modelica_like.report.files import STDOUT
-
-        self.attempt("The report", lambda: out(stderr=table == STDOUT).print(report(self.solution)))
+    def tell(self, report: Callable[[Any], Any], page: Page) -> None:
+        """Print a report."""
+        self.attempt("The report", lambda: page.print(report(self.solution)))

@@ -122,7 +122,8 @@ def _plain(discrete: FlatDiscrete) -> FlatDiscrete:
 
 def _input_values(flat: FlatModel) -> Vector:
     places = [flat.variables[k].path.rpartition(".") for k in flat.inputs]
-    given = [flat.components[path].value(name) for path, _, name in places]
+    # An input that is added to a signal belongs to no component.
+    given = [flat.components[path].value(name) if path in flat.components else None for path, _, name in places]
     return np.array([0.0 if value is None or value.number is None else value.number for value in given], float)
 
 

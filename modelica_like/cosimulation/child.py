@@ -14,7 +14,7 @@ from typing import Any
 
 from modelica_like.cosimulation.master import Balance, Master, Signal
 from modelica_like.cosimulation.slaves import Slave
-from modelica_like.fmi.inside import Job, Messages, Refused, about
+from modelica_like.fmi.inside import Job, Refused, about
 
 
 class Recorder:
@@ -56,9 +56,8 @@ def open_slaves(job: Job) -> list[Slave]:
     """Instantiate all FMUs, and check the names."""
     slaves: list[Slave] = []
     for k, unit in enumerate(job.asked["units"]):
-        name, messages = unit["name"], Messages()
-        job.messages[name] = messages
-        slaves.append(Slave(name, job.folder / str(k), messages, lambda k=k, name=name: job.call(k, name)))
+        name = unit["name"]
+        slaves.append(Slave(name, job.folder / str(k), job.hear, lambda k=k, name=name: job.call(k, name)))
         for name in unit["parameters"]:
             check_name(slaves[-1], name, "parameters")
     for link in job.asked["links"]:
@@ -105,7 +104,7 @@ def connect(slaves: list[Slave], job: dict[str, Any]) -> Master:
         (n, name), *targets = link["ends"]
         nominal = getattr(slaves[n].all[name], "nominal", None)
         signals.append(Signal((n, name), [(m, other) for m, other in targets], float(nominal or 1.0)))
-    balances = [Balance(bond["flow"], bond["rate"]) for bond in job["bonds"]]
+    balances = [Balance(bond["flow"], bond["rate"], bond["name"]) for bond in job["bonds"]]
     return Master(slaves, signals, balances, job["master"] == "gauss-seidel", job["inputs"] == "linear")
 
 

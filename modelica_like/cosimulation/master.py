@@ -13,7 +13,9 @@ from modelica_like.cosimulation.system import Energies
 Row = Any
 Memory = list[dict[str, Any]]
 
-_NOT_FINITE = "not finite"
+_NOT_FINITE, _UNSTABLE = "not finite", "unstable"
+_DECADES, _WILD = 10, 0.5
+"""A run ends where the energy through a bond grows so many times tenfold, and differs by this share all the time."""
 _ROUNDS = 50
 _SETTLED = 1e-10
 _SAFETY, _SHORTEST, _LONGEST = 0.9, 0.2, 2.0
@@ -60,11 +62,22 @@ class Signal:
 
 @dataclass
 class Balance(Energies):
-    """Energy at a bond of two signals, by their numbers, and its power in W at the last communication point."""
+    """Energy at a bond of two signals.
+
+    Attributes:
+        flow, rate: numbers of the signals.
+        name: of the bond.
+        power: at the last communication point, in W.
+        mark: throughput and mismatch when the throughput had last grown tenfold, in J.
+        wild: how often in a row it has done so while both sides disagreed.
+    """
 
     flow: int
     rate: int
+    name: str = ""
     power: float = 0.0
+    mark: tuple[float, float] = (0.0, 0.0)
+    wild: int = 0
 
     def add(self, signals: Sequence[Signal], before: Sequence[float], size: float) -> None:
         """Add a step, by the trapezoidal rule."""
@@ -76,6 +89,10 @@ class Balance(Energies):
         self.received += received
         self.throughput += (abs(delivered) + abs(received)) / 2
         self.mismatch += abs(received - delivered)
+        if self.throughput > 10.0 * self.mark[0]:
+            through, differing = self.throughput - self.mark[0], self.mismatch - self.mark[1]
+            self.wild = self.wild + 1 if differing > _WILD * through else 0
+            self.mark = self.throughput, self.mismatch
         self.power = flow.reached * rate.reached
 
     def told(self) -> list[float]:
@@ -182,6 +199,8 @@ class Master:
             signal.reached = signal.value
         for balance in self.balances:
             balance.add(self.signals, before, size)
+            if balance.wild >= _DECADES:
+                raise Refused(kind=_UNSTABLE, bond=balance.name, time=time + size, size=size)
         self.settle(time + size)
         for signal, old in zip(self.signals, before, strict=True):
             signal.slope = (signal.value - old) / size
@@ -261,7 +280,7 @@ class Master:
             middle = observer.look(time + size / 2)
             self.step(time + size / 2, size / 2)
         except Refused as refusal:
-            if refusal.detail["kind"] != _NOT_FINITE:
+            if refusal.detail["kind"] not in (_NOT_FINITE, _UNSTABLE):
                 raise
             return inf, None  # a shorter step may succeed
         return self._error(once, tolerance), middle

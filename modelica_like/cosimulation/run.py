@@ -158,7 +158,7 @@ def _job(system: System, settings: Settings) -> dict[str, Any]:
         "links": [
             {"ends": [[number[p.unit], p.variable] for p in (link.source, *link.targets)]} for link in system.links
         ],
-        "bonds": [{"flow": links[bond.flow], "rate": links[bond.rate]} for bond in system.bonds],
+        "bonds": [{"flow": links[bond.flow], "rate": links[bond.rate], "name": bond.name} for bond in system.bonds],
         "own_names": system.own_names, "start": 0.0, **vars(settings),
     }  # fmt: skip
 
@@ -230,6 +230,11 @@ _FAILURES: failures.Failures = failures.FAILURES | {
     "not finite": (
         FmuFailed, "{unit}: {name} is not finite at t = {time:.6g} s.", "",
         "If the values before it grow without bounds, choose a shorter step.",
+    ),
+    "unstable": (
+        StepFailed, "{system}: at t = {time:.6g} s the energy that the coupling {bond} makes grows without bounds.",
+        "The values that the FMUs exchange swing against each other: the step of {size:.6g} s is too long.",
+        "Choose a shorter step, or give a tolerance.",
     ),
     "step": (
         StepFailed, "{system}: after t = {time:.6g} s no step is short enough for the tolerance of the coupling.", "",

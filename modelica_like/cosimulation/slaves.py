@@ -9,13 +9,13 @@ from typing import Any
 import fmpy
 from fmpy.simulation import instantiate_fmu
 
-from modelica_like.fmi.inside import DISCRETE, REAL, Messages, Refused, savings
+from modelica_like.fmi.inside import DISCRETE, REAL, Refused, savings
 
 _STORED = {name: name for name in (*REAL, *DISCRETE)} | {"Enumeration": "Integer"}
 
 
 class Slave:
-    """One FMU, with its messages in `messages`; `notice` is called before each call of the FMU.
+    """One FMU, whose messages `hear` gets; `notice` is called before each call of the FMU.
 
     Attributes:
         variables: FMPy's descriptions of the scalar variables by name, without parameters.
@@ -23,7 +23,7 @@ class Slave:
         can_save: whether its state can be saved and restored (`save`, `load`, `free`) and its steps may vary.
     """
 
-    def __init__(self, name: str, folder: Path, messages: Messages, notice: Callable[[], None]) -> None:
+    def __init__(self, name: str, folder: Path, hear: Callable[..., None], notice: Callable[[], None]) -> None:
         self.name, self.notice = name, notice
         notice()
         self.description: Any = fmpy.read_model_description(str(folder), validate=False)
@@ -38,7 +38,7 @@ class Slave:
         self.slopes = second and bool(about.canInterpolateInputs)
         self.can_save = bool(about.canGetAndSetFMUstate and about.canHandleVariableCommunicationStepSize)
         self._fmu: Any = instantiate_fmu(
-            str(folder), self.description, "CoSimulation", logger=messages, event_mode_used=False
+            str(folder), self.description, "CoSimulation", logger=hear, event_mode_used=False
         )
         self.save, self.load, self.free = map(self._noticed, savings(self._fmu, self.description.fmiVersion))
 

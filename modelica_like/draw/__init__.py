@@ -10,12 +10,15 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
-from modelica_like.draw.diagram import diagram
-from modelica_like.draw.running import running
+from modelica_like.analyse.linear.model import Modes
+from modelica_like.draw.diagram import Notes, diagram
+from modelica_like.draw.running import energy_notes, running
+from modelica_like.draw.shapes import shapes
 from modelica_like.draw.sheet import Sheet, sheet
 from modelica_like.draw.svg import svg
 from modelica_like.errors import NetlistError, missing_extra
 from modelica_like.language.component import Component
+from modelica_like.solve.energy import EnergyBalance
 from modelica_like.solve.trajectories import Trajectories
 from modelica_like.writing import check_writable, write_bytes
 
@@ -24,23 +27,26 @@ if TYPE_CHECKING:
 
 _PACKAGES = {".pdf": "svglib", ".png": "resvg_py"}
 FORMATS = (".pdf", ".png", ".svg")
+_SHAPES = 4
 _SHARP = 2
 """Pixels of a PNG file per unit of the drawing."""
 
 
-def layout(component: Component, *, depth: int = 1) -> Sheet:
+def layout(component: Component, *, depth: int = 1, notes: Notes | None = None) -> Sheet:
     """Place the parts and connections of a drive on a sheet.
 
     Args:
         component: the drive.
         depth: number of levels of open assemblies.
+        notes: returns texts below the name of a part.
     """
-    return sheet(diagram(component, depth))
+    return sheet(diagram(component, depth, notes))
 
 
 def schematic(
     component: Component, *, depth: int = 1, background: bool = True, run: Trajectories | None = None,
-    at: float | None = None, flow: bool = False, moving: bool = False,
+    at: float | None = None, flow: bool = False, moving: bool = False, balance: EnergyBalance | None = None,
+    modes: Modes | None = None,
 ) -> str:  # fmt: skip
     """Draw a drive as SVG: power from left to right, a symbol for each machine element.
 
@@ -52,13 +58,28 @@ def schematic(
         at: time in s whose modes and powers are shown; by default modes at the end and mean powers.
         flow: show power as the width of lines, and in numbers.
         moving: animate the modes of the whole run.
+        balance: of the run: energies, also as shares of what came in, are shown instead of powers.
+        modes: small motions of the drive, drawn below: the shapes of the first four oscillations.
 
     Raises:
         ValueOutOfRange: the run has no such time.
     """
-    drawn = layout(component, depth=depth)
-    added = running(drawn, run, at=at, flow=flow, moving=moving) if run is not None else None
-    return svg(drawn, component.label, background=background, run=added)
+    drawn = layout(component, depth=depth, notes=energy_notes(balance) if balance else None)
+    added = running(drawn, run, at=at, flow=flow, moving=moving, balance=balance) if run is not None else None
+    below = shapes(drawn, modes, _SHAPES) if modes is not None else ()
+    return svg(drawn, component.label, background=background, run=added, shapes=below)
+
+
+def icon(component: Component) -> tuple[str, bytes | None]:
+    """Draw a drive as its icon, with closed assemblies: as SVG, and as PNG if the extra `pictures` is installed.
+
+    The same drive gives the same bytes on every machine.
+
+    Args:
+        component: the drive.
+    """
+    text = schematic(component, depth=0)
+    return text, _png(text, alike=True) if find_spec(_PACKAGES[".png"]) else None
 
 
 def check_format(path: Path, *, moving: bool = False) -> None:
@@ -86,7 +107,7 @@ def check_format(path: Path, *, moving: bool = False) -> None:
 
 def save_schematic(
     component: Component, path: str | Path, *, depth: int = 1, run: Trajectories | None = None,
-    at: float | None = None, flow: bool = False, moving: bool = False,
+    at: float | None = None, flow: bool = False, moving: bool = False, modes: Modes | None = None,
 ) -> None:  # fmt: skip
     """Write the schematic of a drive as SVG, PNG or PDF, by the ending of the file.
 
@@ -98,6 +119,7 @@ def save_schematic(
         at: time in s, as of `schematic`.
         flow: show power.
         moving: animate the modes; SVG only.
+        modes: small motions, as of `schematic`.
 
     Raises:
         NetlistError: the ending is none of these, or the format does not move.
@@ -107,18 +129,24 @@ def save_schematic(
     """
     path = Path(path)
     check_format(path, moving=moving)
-    text = schematic(component, depth=depth, run=run, at=at, flow=flow, moving=moving)
+    text = schematic(component, depth=depth, run=run, at=at, flow=flow, moving=moving, modes=modes)
     convert = {".svg": str.encode, ".png": _png, ".pdf": _pdf}[path.suffix.lower()]
     write_bytes(path, convert(text))
 
 
-def _png(text: str) -> bytes:
-    import matplotlib
+def _png(text: str, *, alike: bool = False) -> bytes:
+    """Return an SVG as PNG, with the fonts of the machine, or `alike` on all machines."""
     import resvg_py
 
     # A machine without fonts has those of matplotlib.
-    fonts = [str(Path(matplotlib.get_data_path()) / "fonts" / "ttf")]
-    return bytes(resvg_py.svg_to_bytes(svg_string=text, zoom=_SHARP, font_dirs=fonts, sans_serif_family="DejaVu Sans"))
+    package = find_spec("matplotlib")
+    fonts = [str(Path(str(package and package.origin)).parent / "mpl-data" / "fonts" / "ttf")]
+    return bytes(
+        resvg_py.svg_to_bytes(
+            svg_string=text, zoom=1 if alike else _SHARP, skip_system_fonts=alike, font_dirs=fonts,
+            sans_serif_family="DejaVu Sans",
+        )
+    )  # fmt: skip
 
 
 def _pdf(text: str) -> bytes:

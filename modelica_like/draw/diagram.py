@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import cast
 
@@ -19,6 +19,7 @@ _USUAL: dict[str, Side] = {
 }  # fmt: skip
 _BESIDE = 9.0
 """Distance of ports at one place of a symbol, in 1/96 inch."""
+Notes = Callable[[Component], Sequence[str]]
 _OPPOSITE: dict[Side, Side] = {"W": "E", "E": "W", "N": "N", "S": "S"}
 
 
@@ -64,6 +65,7 @@ class Node:
         ports: connected ports, by name.
         border: for an outer connector, its side of the box.
         turned: whether west and east are exchanged.
+        notes: texts below the name, instead of a value.
     """
 
     name: str
@@ -73,6 +75,7 @@ class Node:
     ports: dict[str, Port] = field(default_factory=dict)
     border: Side | None = None
     turned: bool = False
+    notes: Sequence[str] | None = None
 
     def turn(self) -> None:
         """Exchange west and east; signals stay, because they are read from left to right."""
@@ -106,17 +109,21 @@ class Diagram:
     nets: list[Net]
 
 
-def diagram(component: Component, depth: int) -> Diagram:
+def diagram(component: Component, depth: int, notes: Notes | None = None) -> Diagram:
     """Collect the content of a component's schematic.
 
     Args:
         component: a drive, or a part of one.
         depth: number of levels of open assemblies.
+        notes: returns texts below the name of a part.
     """
     nodes = {
-        name: Node(name, part, part.icon, diagram(part, depth - 1) if _opens(part, depth) else None)
+        name: Node(
+            name, part, part.icon, diagram(part, depth - 1, notes) if _opens(part, depth) else None,
+            notes=notes(part) if notes else None,
+        )
         for name, part in component.parts.items()
-    }
+    }  # fmt: skip
     outer = dict[str, Node]()
     nets = [Net([_port(end, component, nodes, outer) for end in ends]) for ends in _joined(component)]
     for net in nets:

@@ -11,6 +11,8 @@ NAME, VALUE = 12.5, 11.0
 """Sizes of letters in 1/96 inch."""
 _NARROW, _WIDE = set("fijlrt.,:;|'()[]1I "), set("mwMW@%")
 _LONGEST = 24
+Box = tuple[float, float, float, float]
+"""West, north, east, south."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,11 +32,16 @@ class Text:
     anchor: Literal["start", "middle", "end"] = "middle"
 
     @property
-    def box(self) -> tuple[float, float, float, float]:
-        """West, north, east and south of its box."""
+    def box(self) -> Box:
+        """The space that it takes."""
         wide = text_width(self.text, self.size)
         west = self.at[0] - wide * {"start": 0.0, "middle": 0.5, "end": 1.0}[self.anchor]
         return west, self.at[1] - self.size, west + wide, self.at[1] + 2.0
+
+
+def meet(one: Box, other: Box) -> bool:
+    """Whether two boxes overlap."""
+    return one[0] < other[2] and other[0] < one[2] and one[1] < other[3] and other[1] < one[3]
 
 
 def text_width(text: str, size: float) -> float:
@@ -43,8 +50,10 @@ def text_width(text: str, size: float) -> float:
 
 
 def labels(node: Node) -> list[tuple[str, float]]:
-    """Return the texts below a symbol: its name and one value."""
+    """Return the texts below a symbol: its name, and one value or its notes."""
     written = [(_shortened(node.name), NAME)]
+    if node.notes is not None:
+        return written + [(note, VALUE) for note in node.notes]
     if node.icon and node.component:
         for key in node.icon.key:
             value = node.component.value(key) if key in node.component.fields else None

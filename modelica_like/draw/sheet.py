@@ -9,17 +9,15 @@ from itertools import pairwise, permutations
 import casadi as ca
 
 from modelica_like.draw.diagram import Diagram, Net, Node, Port
-from modelica_like.draw.labels import VALUE, Text, labels, text_width
+from modelica_like.draw.labels import VALUE, Box, Text, labels, text_width
 from modelica_like.draw.layers import Channel, End, Layers, Slot, layered, solve_lp
 from modelica_like.language.icon import Stroke
 
 Point = tuple[float, float]
-Box = tuple[float, float, float, float]
-"""West, north, east, south."""
 
 _GAP, _PASSING, _TRACK, _CHANNEL = 20.0, 9.0, 11.0, 26.0
 """Distances between parts, around passing lines, between vertical lines, and beside them."""
-_ELBOW, _MARK = 13.0, 18.0
+_ELBOW, MARK = 13.0, 18.0
 """Space of a line around a corner of a symbol, and of a ground."""
 FRAME, TITLE = 14.0, 24.0
 """Space inside the frame of an open assembly, and of its title."""
@@ -193,10 +191,10 @@ def _measure(node: Node) -> Placed:
         elif port.side in ("W", "E"):
             exits[port] = port.along
             if port.mark:
-                west, east = (west + _MARK, east) if port.side == "W" else (west, east + _MARK)
-                south = max(south, port.along + _MARK)
+                west, east = (west + MARK, east) if port.side == "W" else (west, east + MARK)
+                south = max(south, port.along + MARK)
     if any(port.mark and port.side == "S" for port in node.ports.values()):
-        south += _MARK
+        south += MARK
     written = [] if inner else labels(node)
     wide = max((text_width(text, size) for text, size in written), default=0.0) / 2
     name_side = 8.0 + max((text_width(port.name, VALUE) for port in node.ports.values()), default=0.0)

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from xml.sax.saxutils import escape
 
-from modelica_like.draw.labels import NAME, VALUE, Text
+from modelica_like.draw.labels import NAME, VALUE, Text, meet
 from modelica_like.draw.running import HELD, OPEN, SLIDES, Running
+from modelica_like.draw.shapes import Shape
 from modelica_like.draw.sheet import TITLE, Line, Placed, Point, Sheet, texts
 from modelica_like.language.icon import Icon, Stroke
 
@@ -16,10 +18,14 @@ _LOOKS = {HELD: ("#15803d", "#4ade80"), OPEN: ("#94a3b8", "#64748b"), SLIDES: ("
 """Colours of modes: in light, in dark."""
 _CYCLE = 'dur="8s" repeatCount="indefinite"'
 _MARGIN = 16.0
+_STRIP, _SWING = 96.0, 24.0
+"""Height of a mode shape with its heading, and largest deviation."""
 _FONT = "Helvetica, Arial, 'Liberation Sans', sans-serif"
 
 
-def svg(drawn: Sheet, title: str, *, background: bool = True, run: Running | None = None) -> str:
+def svg(
+    drawn: Sheet, title: str, *, background: bool = True, run: Running | None = None, shapes: Sequence[Shape] = ()
+) -> str:
     """Return a sheet as SVG text; the same sheet gives the same bytes.
 
     Args:
@@ -27,9 +33,11 @@ def svg(drawn: Sheet, title: str, *, background: bool = True, run: Running | Non
         title: for screen readers.
         background: whether to fill the paper.
         run: what a run adds.
+        shapes: of modes, drawn below.
     """
     run = run or Running()
-    width, height = drawn.width + 2 * _MARGIN, drawn.height + 2 * _MARGIN
+    width, below = drawn.width + 2 * _MARGIN, drawn.height + 2 * _MARGIN
+    height = below + _STRIP * len(shapes)
     strokes = {item.stroke.name: item.stroke for _, item in drawn.everything() if isinstance(item, Line)}
     parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{_n(width)}" height="{_n(height)}" '
@@ -47,6 +55,8 @@ def svg(drawn: Sheet, title: str, *, background: bool = True, run: Running | Non
     for at, item in everything:
         if isinstance(item, Placed) and not item.node.border:
             parts += _part(at, item, run)
+    for k, shape in enumerate(shapes):
+        parts += _shape(shape, below + _STRIP * k, width)
     parts += _clock(width, height, run) if run.moving else []
     return "\n".join([*parts, "</svg>", ""])
 
@@ -97,9 +107,8 @@ def _line(at: Point, line: Line, run: Running) -> Iterator[str]:
             f'<circle class="{_css(stroke)}-dot" cx="{_n(at[0] + x)}" cy="{_n(at[1] + y)}" '
             f'r="{_n(stroke.width + 1.0)}" fill="{stroke.colour}"/>'
         )
-    if said := run.said(line):
-        (x, y), text = said
-        yield _text(Text(text, (at[0] + x, at[1] + y + 16.0), VALUE))
+    for one in run.said.get(line, ()):
+        yield _text(replace(one, at=(at[0] + one.at[0], at[1] + one.at[1])))
     for (x, y), way in line.arrows:
         turn = {"E": 0, "S": 90, "W": 180, "N": 270}[way]
         yield (
@@ -128,6 +137,28 @@ def _part(at: Point, part: Placed, run: Running) -> Iterator[str]:
     for one in texts(part):
         yield _text(one)
     yield "</g>"
+
+
+def _shape(shape: Shape, top: float, width: float) -> Iterator[str]:
+    """A mode over the places of the sheet: thick where a shaft is rigid, thin across what lies between."""
+    zero = top + _STRIP - _SWING - 20.0
+    yield _text(Text(shape.title, (_MARGIN, top + 10.0), NAME, "start"))
+    yield (
+        f'<path class="grey-line" d="M{_n(_MARGIN)} {_n(zero)} H{_n(width - _MARGIN)}" stroke="{_GREY}" '
+        f'stroke-width="0.75" stroke-dasharray="2 3"/>'
+    )
+    written = list[Text]()
+    for one in shape.stretches:
+        (x1, y1), (x2, y2) = ((_MARGIN + x, zero - _SWING * y) for x, y in (one.begin, one.end))
+        yield (
+            f'<path class="{_css(one.stroke)}" d="M{_n(x1)} {_n(y1)} L{_n(x2)} {_n(y2)}" '
+            f'stroke="{one.stroke.colour}" stroke-width="{_n(3.5 if one.rigid else 1.25)}" stroke-linecap="round"/>'
+        )
+        said = Text(one.said, ((x1 + x2) / 2, y1 + (14.0 if y1 > zero else -5.0)), VALUE)
+        # Branches lie above one another: the first number stays.
+        if one.said and not any(meet(said.box, other.box) for other in written):
+            written.append(said)
+            yield _text(said)
 
 
 def _text(one: Text, look: str = "") -> str:

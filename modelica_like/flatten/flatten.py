@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import casadi as ca
 
-from modelica_like.errors import MissingValue, ModelicaLikeError, Source, raise_together_or_one
+from modelica_like.errors import (
+    MissingValue,
+    ModelicaLikeError,
+    Source,
+    UnknownName,
+    WrongConnection,
+    did_you_mean,
+    raise_together_or_one,
+)
 from modelica_like.flatten.checks import unit_of_field
 from modelica_like.flatten.discrete import Hidden
 from modelica_like.flatten.model import (
@@ -33,25 +42,28 @@ from modelica_like.units import ONE, coherent
 _WIRE = Source("")
 
 
-def flatten(root: Component, *, open_inputs: bool = False) -> FlatModel:
+def flatten(root: Component, *, open_inputs: bool = False, disturbed: str = "") -> FlatModel:
     """Write out all equations of a component tree.
 
     Args:
         root: the model; its own inputs become inputs of the flat model.
         open_inputs: whether unconnected inputs of adaptors, and of parts without a value for them, also become inputs.
+        disturbed: path of a connected signal: an input `….added` is added to what its output sends, or its input gets.
 
     Raises:
+        UnknownName: no signal of this path is connected.
         WiringErrors, WrongConnection, FreeFlange, MissingValue: all errors of the wiring, reported together.
         LanguageError, UnitMismatch: a component class is declared wrongly.
         CyclicAssembly: parameters depend on each other cyclically.
     """
-    return _Flattener(root, open_inputs).run()
+    return _Flattener(root, open_inputs, disturbed).run()
 
 
 class _Flattener:
-    def __init__(self, root: Component, open_inputs: bool) -> None:
+    def __init__(self, root: Component, open_inputs: bool, disturbed: str) -> None:
         self.root = root
         self.open_inputs = open_inputs
+        self.disturbed = disturbed
         self.wiring = Wiring()
         self.parameters = Parameters(root)
         self.variables: list[FlatVariable] = []
@@ -76,9 +88,10 @@ class _Flattener:
                 self._declare_initial(component, path, text)
             for one in template.hidden:
                 self._hide(id(component), one.path, f"{component.path}.{one.path}".lstrip("."), one)
+        added = self._disturb() if self.disturbed else None
         self.nodes = [(k, 0) for k in range(len(self.variables))]
         instances = [self._instance(component, template) for component, template in templates]
-        self._connect()
+        self._connect(added)
         for component, _ in templates:
             self._bind_inputs(component)
             self._relate_inputs(component)
@@ -141,14 +154,23 @@ class _Flattener:
                         kind = "flow" if field.is_flow else "potential"
                         self._declare_variable(connector, name, f"{prefix}{end}.{name}", kind, field)
 
+    def _disturb(self) -> int:
+        """Declare the input that is added to a signal."""
+        signals = {self.variable_of[id(one.owner), one.name] for pair in self.wiring.signals for one in pair[:2]}
+        paths = {self.variables[k].path: self.variables[k] for k in sorted(signals)}
+        if self.disturbed not in paths:
+            near = did_you_mean(self.disturbed, paths)
+            raise UnknownName(f"{self.root.label} has no connected signal '{self.disturbed}'{near or '.'}")
+        path = f"{self.disturbed}.added"
+        self.variables.append(replace(paths[self.disturbed], path=path, kind="input", description="added"))
+        self.inputs.append(len(self.variables) - 1)
+        return self.inputs[-1]
+
     def _declare_variable(self, owner: Declared, name: str, path: str, kind: str, field: Variable) -> None:
         self.variable_of[id(owner), name] = len(self.variables)
         unit = coherent(self.wiring.inferred.get((id(owner), name)) or unit_of_field(owner, name))
-        self.variables.append(
-            FlatVariable(
-                path, unit, field.description, kind, field.state, field.guess, field.nominal, field.min, field.max
-            )
-        )
+        limits = field.nominal, field.min, field.max, field.driving
+        self.variables.append(FlatVariable(path, unit, field.description, kind, field.state, field.guess, *limits))
 
     def _declare_initial(self, component: Component, name: str, text: str) -> None:
         """Declare what is left of an initial equation, which is zero at the start."""
@@ -227,7 +249,7 @@ class _Flattener:
 
     # -- equations ---------------------------------------------------------------------------------------------------
 
-    def _connect(self) -> None:
+    def _connect(self, added: int | None) -> None:
         for ends in self.wiring.sets():
             connectors = [self.wiring.connectors[end] for end in ends]
             source = self.wiring.sources[ends[0]]
@@ -249,7 +271,10 @@ class _Flattener:
         for driver, sink, source in self.wiring.signals:
             nodes = [self.variable_of[id(symbol.owner), symbol.name] for symbol in (driver, sink)]
             origin = Origin(self.variables[nodes[1]].path, "connection", source)
-            self.linear.append(LinearEquation(((nodes[0], 1.0), (nodes[1], -1.0)), 0.0, origin))
+            terms = (nodes[0], 1.0), (nodes[1], -1.0)
+            if added is not None and self.disturbed in (self.variables[node].path for node in nodes):
+                terms = (*terms, (added, 1.0))
+            self.linear.append(LinearEquation(terms, 0.0, origin))
 
     def _end_flows(self, path: str, connector: Any) -> None:
         for name, field in connector.fields.items():
@@ -259,10 +284,15 @@ class _Flattener:
 
     def _bind_inputs(self, component: Component) -> None:
         for name, field in component.fields.items():
-            if not isinstance(field, Input) or (id(component), name) in self.wiring.driven:
+            if not isinstance(field, Input):
                 continue
             node = self.variable_of[id(component), name]
             path = self.variables[node].path
+            if (id(component), name) in self.wiring.driven:
+                if name in component._values:
+                    what, advice = f"{path} has a value and a connection: only one can count.", "Remove one of the two."
+                    self.errors.append(WrongConnection(what, where=component.place_of(name), advice=advice))
+                continue
             if component is self.root or self._is_open(component, name):
                 self.inputs.append(node)
             elif component.value(name) is not None:
@@ -287,10 +317,11 @@ class _Flattener:
 
     def _read_starts(self, component: Component) -> None:
         for name, field in component.fields.items():
-            if not isinstance(field, Variable) or isinstance(field, Input):
+            if not isinstance(field, Variable):
                 continue
             given = component._starts.get(name)
-            if given is None and field.default is None:
+            # The default of an input is its value where nothing is connected.
+            if given is None and (field.default is None or isinstance(field, Input)):
                 continue
             value = field.read(field.default) if given is None else given
             node = self.variable_of[id(component), name]

@@ -12,6 +12,7 @@ from modelica_like.flatten.template import Template
 from modelica_like.language.component import Component
 from modelica_like.language.fields import StatePreference, in_range
 from modelica_like.units import Unit
+from modelica_like.upper import upper
 
 INITIAL_EQUATION = "the initial equation"
 """Begins the description of what is left of an initial equation, which is zero at the start."""
@@ -19,7 +20,10 @@ INITIAL_EQUATION = "the initial equation"
 
 @dataclass(frozen=True, slots=True)
 class FlatVariable:
-    """A continuous variable; `kind` is local, output, input, potential or flow. No user has declared a hidden one."""
+    """A continuous variable; `kind` is local, output, input, potential or flow, `driving` as of `Variable`.
+
+    No user has declared a hidden one.
+    """
 
     path: str
     unit: Unit
@@ -30,6 +34,7 @@ class FlatVariable:
     nominal: float
     min: float | None
     max: float | None
+    driving: int = 1
     hidden: bool = False
 
 
@@ -202,6 +207,9 @@ class FlatModel:
 
     def __repr__(self) -> str:
         return f"<{self}>"
+
+    def _repr_markdown_(self) -> str:
+        return upper("mathematics")(self)
 
     def __str__(self) -> str:
         unknowns = len(self.variables) - len(self.inputs)

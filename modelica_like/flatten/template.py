@@ -247,7 +247,8 @@ def _build(component: Component) -> Template:
         component, [s for s in statements if isinstance(s, Equation) and is_discrete(s)], events,
         [*zip(residuals, sources, strict=True), *((e, NOWHERE) for e in energy_terms)],
     )  # fmt: skip
-    inferred = check_units(component, [*equations, *initial], discrete.events, discrete.updates)
+    checked = [*equations, *initial], discrete.events, discrete.updates
+    inferred = check_units(component, *checked) if component.units_checked else {}
     changes = _Changes(component, discrete)
     names = Names(component)
     names.add([*residuals, *hold_terms, *changes.expressions()])

@@ -13,7 +13,7 @@ import fmpy
 import numpy as np
 from fmpy.simulation import Recorder
 
-from modelica_like.fmi.inside import DISCRETE, REAL, Job, Messages, Refused, about, savings
+from modelica_like.fmi.inside import DISCRETE, REAL, Job, Refused, about, savings
 
 Side = Literal["left", "right"]
 KINDS = {"me": "ModelExchange", "cs": "CoSimulation"}
@@ -296,10 +296,9 @@ def simulate(job: Job, description: Any, kind: str, outputs: list[str]) -> Any:
     step = output_step(asked, stop, getattr(experiment, "stepSize", None))
     inputs = {n: np.array(v if isinstance(v, list) else [[0.0, v]]) for n, v in asked["inputs"].items()}
     event_mode = bool(getattr(description.coSimulation, "hasEventMode", False))
-    job.messages[""] = Messages()
     make: Any = fmpy.instantiate_fmu
     instance = make(
-        fmu, description, KINDS[kind], logger=job.messages[""], early_return_allowed=event_mode,
+        fmu, description, KINDS[kind], logger=job.hear, early_return_allowed=event_mode,
         event_mode_used=event_mode, require_functions=False,
     )  # fmt: skip
     if any(np.ptp(series[:, 1]) for series in inputs.values()):

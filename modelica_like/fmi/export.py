@@ -27,14 +27,18 @@ from modelica_like.fmi.runtime import runtime_library
 from modelica_like.fmi.sources import LOG_CATEGORIES, licenses, runtime_sources, source_files
 from modelica_like.fmi.tables import make_tables
 from modelica_like.fmi.terminals import Takes, icon_name, terminals_and_icons, with_open_ends
+from modelica_like.language import Component
 from modelica_like.language.tunable import with_tunable_tables
 from modelica_like.simulation import Model, positive_step, seconds, without_garbage_search
 from modelica_like.solve.options import Options
 from modelica_like.solve.plot import save_plot
 from modelica_like.structure import reduce
+from modelica_like.upper import upper
 from modelica_like.writing import replacing
 
 _PICTURES = Path(__file__).parent / "pictures"
+_LEGIBLE = 100
+"""Largest number of parts of a drive that is drawn as an icon."""
 _TOKEN = "{00000000-0000-0000-0000-000000000000}"
 
 Report = Callable[[str], None]
@@ -112,11 +116,12 @@ def export_fmu(
     chosen, kinds, names = known_version(version, Version, "FMI"), _kinds(kind), chosen_platforms(platforms)
     fixed, as_what = _fixed_step(fixed_step, kinds), _modes(modes)
     tell("compiling the model")
+    drive = _loaded(drive)
     model, description, equations = compiled_open(drive, ends, takes, tables)
     variables = interface(model, outputs, as_what)
     tell("writing the model")
     about = _about(model, chosen, kinds, description, fixed)
-    files = _contents(model, variables, about, equations, embed)
+    files = _contents(model, variables, about, equations, embed, _pictures(drive))
     files |= _binaries(files, identifier(model.name), chosen, names, embed, tell)
     tell("checking")
     checked = _written(files, target, model, about, check and native_platform() in names, strict)
@@ -165,19 +170,33 @@ def compiled_open(
     drive: Model, ends: Sequence[str], takes: Takes, tables: Sequence[str] = ()
 ) -> tuple[CompiledDae, str, Listing]:
     """Return a compiled model with its ends open, its description and its equations."""
+    drive = _loaded(drive)
     if isinstance(drive, CompiledDae):
         if ends or tables:
             what = "ends that could be opened" if ends else "tables whose numbers could become parameters"
             raise ExportError(f"A compiled model has no {what}.", advice="Export its netlist instead.")
         return drive, "", ()
-    if isinstance(drive, str | Path):
-        from modelica_like.netlist import load
-
-        drive = load(drive)
     if tables:
         drive = with_tunable_tables(drive, tables)
     flat = flatten(with_open_ends(drive, ends, takes), open_inputs=True)
     return compile(reduce(flat)), str(getattr(drive, "_description", "") or ""), _equations(flat)
+
+
+def _loaded(drive: Model) -> CompiledDae | Component:
+    if isinstance(drive, str | Path):
+        from modelica_like.netlist import load
+
+        return load(drive)
+    return drive
+
+
+def _pictures(drive: CompiledDae | Component) -> tuple[bytes, bytes]:
+    """Return the icon of a drive as SVG and PNG; where nothing can be drawn, the general one."""
+    general = [(_PICTURES / f"icon.{suffix}").read_bytes() for suffix in ("svg", "png")]
+    if isinstance(drive, CompiledDae) or len(drive.parts) > _LEGIBLE:
+        return general[0], general[1]
+    svg, png = upper("icon")(drive if drive.parts else with_open_ends(drive))
+    return svg.encode(), png or general[1]
 
 
 def _equations(flat: FlatModel) -> Listing:
@@ -210,20 +229,21 @@ def tool() -> str:
 
 
 def _contents(
-    model: CompiledDae, variables: Interface, about: About, equations: Listing, embed: bool
+    model: CompiledDae, variables: Interface, about: About, equations: Listing, embed: bool, icon: tuple[bytes, bytes]
 ) -> dict[str, bytes]:
     """Return all files except the binaries, with a token from their content."""
     texts = {"modelDescription.xml": model_description(model, variables, about)}
     texts |= {f"sources/{name}": text for name, text in runtime_sources((about.version,)).items()}
     texts["documentation/index.html"] = index_page(variables, about.description, about.tool, equations)
     texts["documentation/licenses/license.txt"] = licenses(about.version)
-    pictures = {"model.png": _PICTURES / "icon.png"}
+    pictures = {"model.png": icon[1]}
     if about.version == "3.0":
         texts["sources/buildDescription.xml"] = build_description(model.name, about.sources)
-        texts["terminalsAndIcons/terminalsAndIcons.xml"] = terminals_and_icons(model.terminals)
-        icons = dict.fromkeys(("icon", *(icon_name(one.kind) for one in model.terminals)))
-        shown = [_PICTURES / f"{icon}.{suffix}" for icon in icons for suffix in ("png", "svg")]
-        pictures = {f"terminalsAndIcons/{picture.name}": picture for picture in shown}
+        texts["terminalsAndIcons/terminalsAndIcons.xml"] = terminals_and_icons(model.terminals, icon[1])
+        kinds = dict.fromkeys(icon_name(one.kind) for one in model.terminals)
+        shown = [_PICTURES / f"{kind}.{suffix}" for kind in kinds for suffix in ("png", "svg")]
+        pictures = {f"terminalsAndIcons/{picture.name}": picture.read_bytes() for picture in shown}
+        pictures |= {f"terminalsAndIcons/icon.{ending}": one for ending, one in zip(("svg", "png"), icon, strict=True)}
     seen = variables.variables + (variables.arrays if about.version == "3.0" else ())
     data = model_file(make_tables(model, variables.start), seen, _TOKEN, about.tolerance, about.fixed_step)
     token = _token(texts, data)
@@ -231,7 +251,7 @@ def _contents(
     texts |= {name: text.replace(_TOKEN, token) for name, text in texts.items()}
     texts["sources/model_data.c"] = as_c(data)
     files: dict[str, bytes] = {name: text.encode() for name, text in texts.items()}
-    files |= {name: picture.read_bytes() for name, picture in pictures.items()}
+    files |= pictures
     return files if embed else files | {MODEL: data}
 
 

@@ -9,8 +9,10 @@ from __future__ import annotations
 
 import json
 import mmap
+import os
 import struct
 import sys
+import threading
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -31,28 +33,19 @@ class Refused(Exception):
         self.detail = detail
 
 
-class Messages(list[str]):
-    """The last messages of an FMU, which calls this object."""
-
-    def __call__(self, *arguments: Any) -> None:
-        """Keep a message, the last of the arguments."""
-        text = arguments[-1]
-        self.append(text.decode(errors="replace") if isinstance(text, bytes) else str(text))
-        del self[:-_MESSAGES]
-
-
 class Job:
     """The job of a folder, and the FMU that is running.
 
     Attributes:
         asked: content of `job.json`.
-        messages: of each FMU by its name.
+        messages: the last ones of each FMU by its name.
         unit: name of the FMU that was called last.
     """
 
     def __init__(self, folder: Path) -> None:
+        threading.Thread(target=_end_with_parent, daemon=True).start()
         self.folder = folder
-        self.messages: dict[str, Messages] = {}
+        self.messages: dict[str, list[str]] = {}
         self.unit = ""
         sys.excepthook = self._report
         self.asked: dict[str, Any] = json.loads((folder / "job.json").read_text())
@@ -68,6 +61,12 @@ class Job:
         self.unit = unit
         self._place[8:] = struct.pack("q", number)
 
+    def hear(self, *arguments: Any) -> None:
+        """Keep a message, the last of the arguments, of the FMU that was called last: FMPy has one logger for all."""
+        text, heard = arguments[-1], self.messages.setdefault(self.unit, [])
+        heard.append(text.decode(errors="replace") if isinstance(text, bytes) else str(text))
+        del heard[:-_MESSAGES]
+
     def leave(self, meta: dict[str, Any], name: str = "meta.json") -> Path:
         """Write a result, completely or not at all; `meta.json` ends the job."""
         (self.folder / "draft").write_text(json.dumps(meta))
@@ -78,6 +77,12 @@ class Job:
         failed = {"kind": "failed", "unit": self.unit, "text": str(error) or kind.__name__, "messages": messages}
         detail = error.detail if isinstance(error, Refused) else failed
         (self.folder / "error.json").write_text(json.dumps(detail))
+
+
+def _end_with_parent() -> None:
+    """End where the process that asked has ended, killed perhaps: then this end of the pipe is closed."""
+    sys.stdin.buffer.read()
+    os._exit(1)
 
 
 def savings(fmu: Any, version: str) -> tuple[Any, Any, Any]:

@@ -68,10 +68,13 @@ def run_child(name: str, script: Path, folder: Path, timeout: float, environment
 
 
 def _wait(command: Sequence[str], folder: Path, timeout: float, environment: dict[str, str]) -> int | None:
-    """Return the exit code, or None at the time limit. Output of the FMU is discarded."""
-    quiet = subprocess.DEVNULL
+    """Return the exit code, or None at the time limit. Output of the FMU is discarded.
+
+    The script may watch its standard input, which ends with this process.
+    """
+    pipe, quiet = subprocess.PIPE, subprocess.DEVNULL
     with subprocess.Popen(
-        command, cwd=folder, stdin=quiet, stdout=quiet, stderr=quiet, env=environment, start_new_session=True
+        command, cwd=folder, stdin=pipe, stdout=quiet, stderr=quiet, env=environment, start_new_session=True
     ) as process:
         try:
             return process.wait(timeout)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Sequence
 from typing import Literal
 
@@ -108,14 +109,20 @@ def icon_name(kind: str) -> str:
     return next((family for family in _FAMILIES if family in kind), "terminal")
 
 
-def terminals_and_icons(terminals: Sequence[CompiledTerminal]) -> str:
-    """Write terminalsAndIcons.xml: the icon of the FMU, and its terminals along the right side."""
-    height = _WIDTH
+def terminals_and_icons(terminals: Sequence[CompiledTerminal], icon: bytes) -> str:
+    """Write terminalsAndIcons.xml: the icon of the FMU, and its terminals along the right side.
+
+    Args:
+        terminals: of the FMU.
+        icon: its picture as PNG.
+    """
+    wide, high = struct.unpack(">II", icon[16:24])
+    height = max(_WIDTH * high / wide, 1.5 * _MARGIN * (len(terminals) + 1))
     top = Element("fmiTerminalsAndIcons", {"fmiVersion": "3.0"})
     picture = element(top, "GraphicalRepresentation")
-    corners = {"x1": 0.0, "y1": 0.0, "x2": _WIDTH, "y2": height}
-    element(picture, "CoordinateSystem", **corners, suggestedScalingFactorTo_mm=0.1)
-    element(picture, "Icon", **corners)
+    element(picture, "CoordinateSystem", x1=0.0, y1=0.0, x2=_WIDTH, y2=height, suggestedScalingFactorTo_mm=0.1)
+    space = (height - _WIDTH * high / wide) / 2
+    element(picture, "Icon", x1=0.0, y1=space, x2=_WIDTH, y2=height - space)
     if terminals:
         group = element(top, "Terminals")
         for place, one in enumerate(terminals, 1):

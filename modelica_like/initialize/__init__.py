@@ -8,6 +8,7 @@ import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import InitializationError, UnknownName, did_you_mean
+from modelica_like.initialize.holds import INSTANT as INSTANT
 from modelica_like.initialize.holds import Impact as Impact
 from modelica_like.initialize.holds import Strike as Strike
 from modelica_like.initialize.holds import holding as holding

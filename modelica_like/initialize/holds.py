@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,7 @@ from modelica_like.initialize.slopes import variable_slopes
 from modelica_like.language.hold import UNLIMITED
 
 _DEPENDENT = 1e-9
-_INSTANT = 1e-9
+INSTANT = 1e-9
 """Duration of an impact in s, of the approach; finite forces cancel for any value."""
 _STIFF = 1e5
 """Reaction per motion that contradicts its being held, over the held inertia."""
@@ -40,11 +40,14 @@ class Impact:
         time: in s.
         component: path of the component that stopped a motion.
         energy: in J.
+        trials: points whose powers differ by what sources give in the impact, over its duration `INSTANT`; of one of
+            the impacts that are solved together.
     """
 
     time: float
     component: str
     energy: float
+    trials: tuple[Point, Point] | None = field(default=None, repr=False, compare=False)
 
 
 def terms(model: CompiledDae, point: Point) -> Any:
@@ -269,7 +272,7 @@ class Strike:
         limits, restitution = capacities(model, point), terms(model, point)[:, -1]
         trials = 0
         while True:
-            approaches = {k: -(1.0 + restitution[k]) * before[k] / _INSTANT for k in moving if k not in self.loose}
+            approaches = {k: -(1.0 + restitution[k]) * before[k] / INSTANT for k in moving if k not in self.loose}
             jump, impulses, reactions = self._response(approaches)
             unbearable = self._unbearable(limits, impulses, reactions) if self.hard else []
             again = [] if unbearable else self._approaching(limits, jump)
@@ -295,7 +298,8 @@ class Strike:
         for k, impulse in impulses.items():
             energy = 0.5 * (before[k] + after[k]) * impulse
             if k in approaches and energy != 0.0:
-                self.impacts.append(Impact(float(self.point.t), self.model.holds[k].component, float(energy)))
+                trials = None if self.impacts else self.trials
+                self.impacts.append(Impact(float(self.point.t), self.model.holds[k].component, float(energy), trials))
         change = np.abs(after - before)
         held = {k for k in holding(self.model, self.point) if k not in self.loose and after[k] == 0.0}
         bouncing = [k for k in approaches if after[k] != 0.0 and k not in held]
@@ -313,15 +317,17 @@ class Strike:
         share(model, trial)
         held = [k for k in holding(model, trial) if k not in self.loose and model.holds[k].reaction >= 0]
         nodes = [model.holds[k].reaction for k in held]
-        results: list[tuple[Vector, Vector]] = []
+        results: list[tuple[Point, Vector, Vector]] = []
         for asked in ({}, approaches):
             for k in approaches:
                 trial.d[model.holds[k].approach] = asked.get(k, 0.0)
             solve_implicit(model, trial)
-            results.append((call(model, model.ode, trial), call(model, model.variables, trial)[nodes]))
-        (rest, finite), (rates, asked_for) = results
-        impulses = dict(zip(held, _INSTANT * (asked_for - finite), strict=True))
-        return _INSTANT * (rates - rest), impulses, dict(zip(held, finite, strict=True))
+            rates, variables = (call(model, function, trial) for function in (model.ode, model.variables))
+            results.append((trial.copy(), rates, variables[nodes]))
+        (without, rest, finite), (struck, rates, asked_for) = results
+        self.trials = without, struck
+        impulses = dict(zip(held, INSTANT * (asked_for - finite), strict=True))
+        return INSTANT * (rates - rest), impulses, dict(zip(held, finite, strict=True))
 
     def _unbearable(self, limits: Any, impulses: dict[int, float], reactions: dict[int, float]) -> list[int]:
         """The motions whose reactions exceed the impulsive capacity of their elements."""

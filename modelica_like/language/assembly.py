@@ -47,7 +47,7 @@ class Assembly(Component):
         self.__dict__.update(_own_fields={}, _own_connectors=(), _wires={}, _chains={}, _free=(), _places={})
         super().__init__()
         self.__dict__.update(
-            _name=name, _description=description, _simulate={}, _display={}, _origin="", _made=caller()
+            _name=name, _description=description, _simulate={}, _display={}, _origin="", _sizing="", _made=caller()
         )
         for key, value in (parameters or {}).items():
             self.add_parameter(key, value)
@@ -113,7 +113,7 @@ class Assembly(Component):
     def __getattr__(self, name: str) -> Expr:
         if name in self.__dict__.get("_own_fields", {}):
             return symbol_of(self, name)
-        if name in ("description", "simulate", "display", "origin"):  # unless a part has this name
+        if name in ("description", "simulate", "display", "origin", "sizing"):  # unless a part has this name
             return self.__dict__[f"_{name}"]
         raise AttributeError(f"{type(self).__name__} '{self.__dict__.get('_name', '')}' has no '{name}'")
 

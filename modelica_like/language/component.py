@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Generator, Iterator, Mapping
 from contextlib import contextmanager
+from itertools import chain
 from types import MappingProxyType
 from typing import Any, ClassVar, Self, TypeVar, cast, dataclass_transform
 
@@ -33,6 +34,8 @@ class Component(Declared):
     outlet: ClassVar[str] = "flange_b flange"
     terminal: ClassVar[Terminal | None] = None
     icon: ClassVar[Icon | None] = None
+    units_checked: ClassVar[bool] = True
+    """Whether the units of its equations, of its connections and of the values it gives to parts must fit."""
     _partial: ClassVar[bool] = True
     _class_connectors: ClassVar[dict[str, Connector]] = {}
     _class_parts: ClassVar[dict[str, Component | list[Component]]] = {}
@@ -64,8 +67,12 @@ class Component(Declared):
         plain |= {name: table.default for name, table in tables.items()}
         cls._tables = {name: table for base in ancestors for name, table in base._tables.items()} | tables
         cls._structural = {name: value for base in ancestors for name, value in base._structural.items()} | plain
-        for name in (*cls._class_fields, *cls._class_connectors, *cls._class_modes, *cls._class_parts):
+        kinds = (cls._class_fields, cls._class_connectors, cls._class_modes, cls._class_parts, cls._structural)
+        for name in chain.from_iterable(kinds):
             require_identifier(name, cls.__name__)
+            if hasattr(Component, name):
+                what = f"{cls.__name__} declares '{name}', which every component has already."
+                raise DuplicateName(what, where=caller(), advice="Choose another name.")
         for mode in cls._class_modes.values():
             mode.check()
 
@@ -305,9 +312,9 @@ class Component(Declared):
         """Return the names of the signals that form the terminal of an adaptor."""
         return tuple(name for name, field in self.fields.items() if isinstance(field, Input | Output))
 
-    def _repr_svg_(self) -> str:
-        """Return the schematic, for notebooks."""
-        return upper("schematic")(self)
+    def _repr_html_(self) -> str:
+        """Return the schematic and the given parameters, for notebooks."""
+        return upper("html")(self)
 
     def _end(self, which: str) -> Connector:
         names = getattr(type(self), which).split()

@@ -187,9 +187,11 @@ class Variable(_Symbolic):
         bounds: as of `var`.
 
     Attributes:
+        driving: sign of the torque or force between two ends while it drives the right one; pictures show it positive.
         constant: whether it keeps its start value: a parameter that initial equations determine.
     """
 
+    driving = 1
     constant = False
 
     def __init__(
@@ -256,7 +258,7 @@ def param(
 
 def var(
     unit: str, description: str = "", *, state: StatePreference = "default", guess: float = 0.0, default: Any = None,
-    min: float | None = None, max: float | None = None, nominal: float = 1.0,
+    min: float | None = None, max: float | None = None, nominal: float = 1.0, driving: Literal[1, -1] = 1,
 ) -> Any:  # fmt: skip
     """Declare an unknown; as a keyword of the constructor it takes a fixed start value or a `guess(…)`.
 
@@ -269,8 +271,11 @@ def var(
         min: smallest sensible value, SI.
         max: largest sensible value, SI.
         nominal: order of magnitude, SI.
+        driving: sign of a torque or force while it drives what is on its right; pictures show that as positive.
     """
-    return Variable(unit, description, state=state, guess=guess, default=default, min=min, max=max, nominal=nominal)
+    made = Variable(unit, description, state=state, guess=guess, default=default, min=min, max=max, nominal=nominal)
+    made.driving = driving
+    return made
 
 
 def flow(unit: str, description: str = "", *, nominal: float = 1.0) -> Any:
@@ -346,10 +351,10 @@ def integer(description: str = "", *, start: Any = 0) -> Any:
 
 
 def require_identifier(name: str, where: str) -> None:
-    """Refuse names that would clash with the component's own methods.
+    """Refuse names that are not public identifiers.
 
     Raises:
-        LanguageError: the name is private or reserved.
+        LanguageError: the name is private, or not an identifier.
     """
     if name.startswith("_") or not name.isidentifier():
         raise LanguageError(f"{where} declares '{name}'.", advice="Names begin with a letter.")

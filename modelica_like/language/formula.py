@@ -14,7 +14,7 @@ from typing import Any, cast
 import casadi as ca
 
 from modelica_like.errors import NetlistError, UnitError, did_you_mean
-from modelica_like.units import parse_unit
+from modelica_like.units import ONE, Unit, coherent, parse_unit, read_quantity, same_dimension
 
 _MAX_LENGTH = 2000
 _MAX_DEPTH = 150
@@ -27,14 +27,15 @@ _OPERATIONS: dict[str, _Operation] = {
     "+": operator.add, "-": operator.sub, "*": operator.mul, "neg": operator.neg,
     "/": cast(_Operation, operator.truediv), "**": cast(_Operation, operator.pow),
     "sqrt": ca.sqrt, "abs": ca.fabs, "sin": ca.sin, "cos": ca.cos, "tan": ca.tan, "exp": ca.exp, "log": ca.log,
-    "tanh": ca.tanh, "min": ca.fmin, "max": ca.fmax,
+    "tanh": ca.tanh, "min": ca.fmin, "max": ca.fmax, "asin": ca.asin, "acos": ca.acos, "atan": ca.atan,
 }  # fmt: skip
-_FUNCTIONS = ("sqrt", "abs", "sin", "cos", "tan", "exp", "log", "tanh", "min", "max")
+_FUNCTIONS = ("sqrt", "abs", "sin", "cos", "tan", "asin", "acos", "atan", "exp", "log", "tanh", "min", "max")
 _CONSTANTS = {"pi": math.pi}
 _QUANTITY = re.compile(
     r"(?<![\w.])((?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?[ \t]+)((?:[^\W\d_]|[%°])[^\s+*,()-]*(?:\([\w.]+\)[\w.]*)?)"
 )
 _PLACEHOLDER = "_quantity_{}_"
+_SAME, _ALIKE = ("neg", "abs"), ("+", "-", "min", "max")
 _PRECEDENCE = {"+": 1, "-": 1, "*": 2, "/": 2, "neg": 3, "**": 4}
 
 
@@ -99,6 +100,36 @@ class Formula(Arithmetic):
         if self.operation == "name":
             return lookup(self._name())
         return _OPERATIONS[self.operation](*(operand.evaluate(lookup, quantity) for operand in self.operands))
+
+    def unit(self, lookup: Callable[[str], Unit]) -> Unit:
+        """Return its unit.
+
+        Args:
+            lookup: returns the unit of a path.
+
+        Raises:
+            UnitError: units do not fit together.
+        """
+        kind, operands = self.operation, self.operands
+        if kind in ("number", "quantity", "name"):
+            given = read_quantity(operands[0]) if kind == "quantity" else None
+            return lookup(self._name()) if kind == "name" else coherent(given[1]) if given else ONE
+        units = [operand.unit(lookup) for operand in operands]
+        if kind in _ALIKE and not same_dimension(units[0], units[1]):
+            raise UnitError(f"'{self}' mixes {units[0]} and {units[1]}.")
+        if kind in ("*", "/"):
+            return units[0] * units[1] if kind == "*" else units[0] / units[1]
+        if kind == "**" and not same_dimension(units[0], ONE):
+            return units[0] ** operands[1]._exponent(self)
+        if kind == "sqrt":
+            return units[0] ** 0.5
+        return units[0] if kind in (*_SAME, *_ALIKE) else ONE
+
+    def _exponent(self, power: Formula) -> float:
+        number = self.operands[0] if self.operation == "neg" else self
+        if number.operation != "number":
+            raise UnitError(f"'{power}': the exponent of something with a unit must be a number.")
+        return -number.operands[0] if number is not self else number.operands[0]
 
     def _name(self) -> str:
         # In a class body a parameter is used before its class and name exist: resolve it later.

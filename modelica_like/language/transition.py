@@ -12,6 +12,7 @@ from modelica_like.language.discrete import Assertion, When
 from modelica_like.language.expr import TIME, Symbol, symbols_in
 from modelica_like.language.fields import Discrete, Input, Parameter, Variable
 from modelica_like.language.mode import StartMode, Transition
+from modelica_like.language.places import NOWHERE
 
 NAME_IN_NOTICE = re.compile(r"\{([\w.]+)\}")
 """A parameter in the notice or the reason of a transition."""
@@ -37,7 +38,7 @@ def as_event(item: Any, source: Source, component: str) -> EventStatement:
         _check_transition(item, source, component)
         _check_notice(item, source, component)
     if isinstance(item, EventStatement):
-        return replace(item, source=source)
+        return item if item.source is not NOWHERE else replace(item, source=source)
     raise LanguageError(
         f"{component}.events() yields {type(item).__name__} instead of a transition.",
         where=source, advice="Yield `mode.go(…)`, `mode.initially(…)`, `when(…)` or `assert_(…)`.",

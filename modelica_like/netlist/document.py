@@ -44,6 +44,7 @@ class Document:
         expose: inner connectors by the name of the outer one.
         simulate: options of a run, as written.
         display: units in which results are shown, by path, pattern or quantity.
+        sizing: path of a sizing file, whose checks stand in reports.
     """
 
     lines: Lines
@@ -59,6 +60,7 @@ class Document:
     expose: dict[str, str] = field(default_factory=dict)
     simulate: dict[str, Any] = field(default_factory=dict)
     display: dict[str, str] = field(default_factory=dict)
+    sizing: str = ""
 
 
 def read_text(path: Path) -> str:
@@ -355,4 +357,5 @@ _READERS: Mapping[str, Reader] = {
     "expose": each(as_text),
     "simulate": options(_OPTIONS),
     "display": each(_unit_text, flat=True),
+    "sizing": whole(as_text),
 }

@@ -69,6 +69,9 @@ class _Writer:
         document.add("name", tomlkit.item(assembly._name))
         if assembly.__dict__["_description"]:
             document.add("description", tomlkit.item(assembly.__dict__["_description"]))
+        if assembly.__dict__["_sizing"]:
+            sizing = Path(os.path.relpath(assembly.__dict__["_sizing"], self.folder.resolve()))
+            document.add("sizing", tomlkit.item(sizing.as_posix()))
         if assembly.free_ends:
             document.add("free", tomlkit.item(list(assembly.free_ends)))
         for name, entries in sections.items():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
@@ -13,6 +13,7 @@ import numpy as np
 
 from modelica_like.errors import NetlistError, missing_extra
 from modelica_like.solve.display import Display
+from modelica_like.solve.signals import Signal, evaluated, named, read_signals
 from modelica_like.solve.trajectories import Trajectories
 from modelica_like.writing import check_writable, replacing
 
@@ -47,8 +48,9 @@ def check_table(path: Path) -> None:
 
 
 def write_solution(
-    solution: Trajectories, path: Path, *, units: bool = False, display: Mapping[str, str] | None = None
-) -> None:
+    solution: Trajectories, path: Path, *, units: bool = False, display: Mapping[str, str] | None = None,
+    show: Sequence[str] = (),
+) -> None:  # fmt: skip
     """Write all trajectories as a table; the ending chooses the format.
 
     A repeated time gives the values before and after an event.
@@ -60,13 +62,24 @@ def write_solution(
         units: write a second header line with the units into a .csv; its values are then in the units of the
             netlist's [display]. A netCDF file always has units, and is always in SI units.
         display: units by path, pattern or quantity, in addition to those of the netlist, such as {"speed": "rpm"}.
+        show: formulas in it (`2*pi*motor.w`) become further columns; all variables are columns anyway.
 
     Raises:
         NetlistError: no table has this ending.
         UnknownName, UnitError: a variable cannot be shown in a unit.
         OSError: the file cannot be written.
     """
-    _write(path, lambda file: _rows(solution, file, display or {}, units=units), solution.to_pandas, solution.to_xarray)
+    more = [one for one in read_signals(solution.model, show) if not one.plain]
+    columns = {one.name: one.values(solution) for one in more}
+
+    def dataset() -> xarray.Dataset:
+        named = {one.name: ("time", columns[one.name], {"units": one.unit}) for one in more}
+        return solution.to_xarray().assign(named)
+
+    _write(
+        path, lambda file: _rows(solution, file, display or {}, more, units=units),
+        lambda: solution.to_pandas().assign(**columns), dataset,
+    )  # fmt: skip
 
 
 def write_dataset(found: xarray.Dataset, path: Path) -> None:
@@ -98,15 +111,17 @@ def _write(
                     rows(file)
 
 
-def _rows(solution: Trajectories, file: TextIO, display: Mapping[str, str], *, units: bool) -> None:
-    values = solution.together(*solution.names)
-    shown = Display(solution.model, display)
-    if units:
-        values = {name: shown.values(name, column) for name, column in values.items()}
-    columns = [solution.time, *values.values()]
+def _rows(
+    solution: Trajectories, file: TextIO, display: Mapping[str, str], more: Sequence[Signal], *, units: bool
+) -> None:
+    signals = [*named(solution.model, solution.names), *more]
+    values, shown = evaluated(solution, signals), Display(solution.model, display)
+    spelled = [one.shown_in(shown) if units else one.unit for one in signals]
+    columns = [shown.converted(values[one.name], one.unit, unit) for one, unit in zip(signals, spelled, strict=True)]
+    columns.insert(0, solution.time)
     writer = csv.writer(file)
-    writer.writerow(["time", *solution.names])
+    writer.writerow(["time", *(one.name for one in signals)])
     if units:
-        writer.writerow(["s", *map(shown.of, solution.names)])
+        writer.writerow(["s", *spelled])
     for row in np.column_stack(columns).tolist():
         writer.writerow(map(repr, row))

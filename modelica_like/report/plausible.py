@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator
 
+import numpy as np
+
 from modelica_like.compile.compiled import Vector
 from modelica_like.draw.diagram import Diagram, diagram
 from modelica_like.errors import ModelicaLikeError
 from modelica_like.language.component import Component
 from modelica_like.language.fields import Input, Output, Parameter
+from modelica_like.report.driven import driven_notes
 from modelica_like.solve.solution import Solution
 from modelica_like.solve.trajectories import Trajectories
 from modelica_like.structure.holds import HeldMotion
@@ -19,6 +22,7 @@ _FAR = 1e4
 """Ratio between neighbours above which one of them probably has the wrong unit."""
 _NEAR, _DAMPED = 0.1, 0.1
 """Distance of an eigenfrequency from an excitation, and damping above which it does not matter."""
+_ROUNDING = 1e-6
 _COMPARED = {
     "kg.m2": ("inertia", "kg.cm2 for kg.m2"), "kg": ("mass", "g for kg"),
     "N.m/rad": ("stiffness", "N.m/rad for kN.m/rad"), "N/m": ("stiffness", "N/m for kN/m"),
@@ -39,14 +43,16 @@ def drive_notes(drive: Component) -> list[str]:
     return [*_neighbours(drawn), *_unread(drawn)]
 
 
-def run_notes(drive: Component, run: Solution) -> list[str]:
+def run_notes(drive: Component, run: Solution, *, energy: bool = True) -> list[str]:
     """Return notes about probable mistakes in a run.
 
-    Clutches that never engage, brakes that are never opened, and excitations near a natural frequency.
+    Clutches that never engage, brakes that are never opened, weights and loads that drive, variables beyond their
+    declared range, and excitations near a natural frequency.
 
     Args:
         drive: the drive.
         run: its run.
+        energy: also what energies tell, which takes time.
     """
     idle = [*dict.fromkeys(hold.component for hold in run.model.holds if _idle(drive, run, hold))]
     names = " and ".join(filter(None, [", ".join(idle[:-1]), *idle[-1:]]))
@@ -55,13 +61,15 @@ def run_notes(drive: Component, run: Solution) -> list[str]:
     return [
         *([f"{names} never {verb} 0 during the whole run."] if idle else []),
         *held,
+        *(driven_notes(diagram(drive, 0), run) if energy else ()),
+        *_beyond(run),
         *_resonances(drive, run),
     ]
 
 
-def notes(drive: Component, run: Trajectories) -> list[str]:
+def notes(drive: Component, run: Trajectories, *, energy: bool = True) -> list[str]:
     """Return all notes about a drive and its run; see `drive_notes` and `run_notes`."""
-    return [*drive_notes(drive), *(run_notes(drive, run) if isinstance(run, Solution) else [])]
+    return [*drive_notes(drive), *(run_notes(drive, run, energy=energy) if isinstance(run, Solution) else [])]
 
 
 def _neighbours(drawn: Diagram) -> Iterator[str]:
@@ -136,6 +144,18 @@ def _unopened(drive: Component, run: Solution, hold: HeldMotion) -> Iterator[str
     if path in free and _holding(run, hold).all():
         value = f"{run[path][0]:g}"
         yield f"{hold.component} holds during the whole run: nothing drives {path}, which is {value} by default."
+
+
+def _beyond(run: Solution) -> Iterator[str]:
+    for one in run.model.flat_variables:
+        if one.min is None and one.max is None:
+            continue
+        values = run[one.path]
+        for bound, sign, verb in ((one.max, 1.0, "exceeds"), (one.min, -1.0, "falls below")):
+            worst = int(np.argmax(sign * values))
+            if bound is not None and sign * (values[worst] - bound) > _ROUNDING * max(abs(bound), one.nominal):
+                value = f"{values[worst]:.6g} {one.unit} at {run.time[worst]:.6g} s"
+                yield f"{one.path} {verb} its declared bound {bound:g} {one.unit}: it is {value}."
 
 
 def _is_source(part: Component) -> bool:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import time
+from importlib import import_module
 from types import TracebackType
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self
 
 from rich.console import Console
 
@@ -19,12 +20,12 @@ _INTERVAL = 0.1
 
 
 class Bar:
-    """A bar on a terminal that appears after a delay, for the argument `progress` of a run or a sweep.
+    """A bar on a terminal or in a notebook that appears after a delay, for the argument `progress`.
 
     Args:
         until: end time, a number in s or a quantity; the simulation reports an invalid one. None if the end comes with
             the progress.
-        console: by default stderr; nothing is shown if it is not a terminal.
+        console: by default stderr; nothing is shown if it is neither a terminal nor a notebook.
         title: text before it.
     """
 
@@ -35,6 +36,7 @@ class Bar:
         self._console = Console(stderr=True) if console is None else console
         self._next = time.perf_counter() + _PATIENCE
         self._progress: Progress | None = None
+        self._cell: Any = None
         try:
             self._end = to_si(until, parse_unit("s"), "until")
         except ModelicaLikeError:
@@ -47,9 +49,13 @@ class Bar:
         """Show the time in s, or the number of runs, that is reached."""
         end = self._end if end is None else end
         now = time.perf_counter()
-        if now < self._next or end <= 0 or not self._console.is_terminal:
+        console = self._console
+        if now < self._next or end <= 0 or not (console.is_terminal or console.is_jupyter):
             return
         self._next = now + _INTERVAL
+        if console.is_jupyter:
+            self._in_notebook(f'{self._title} <progress value="{reached}" max="{end}"></progress> {reached / end:.0%}')
+            return
         if self._progress is None:
             from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
@@ -64,8 +70,18 @@ class Bar:
             self._progress.start()
         self._progress.update(self._progress.task_ids[0], completed=reached)
 
+    def _in_notebook(self, text: str) -> None:
+        """Show a text in the notebook, in the place of the last one."""
+        notebook = import_module("IPython.display")  # a notebook has it
+        if self._cell is None:
+            self._cell = notebook.display(notebook.HTML(text), display_id=True)
+        else:
+            self._cell.update(notebook.HTML(text))
+
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        if self._cell is not None:
+            self._in_notebook("")
         if self._progress is not None:
             self._progress.stop()

@@ -10,11 +10,8 @@ import casadi as ca
 import numpy as np
 
 from modelica_like.errors import UnitError, ValueOutOfRange
-from modelica_like.language.formula import Formula, parse_formula
-from modelica_like.units import ONE, Unit, coherent, read_quantity, same_dimension
-
-_SAME = ("neg", "abs")
-_ALIKE = ("+", "-", "min", "max")
+from modelica_like.language.formula import parse_formula
+from modelica_like.units import ONE, Unit, coherent, read_quantity
 
 
 class Value(NamedTuple):
@@ -36,7 +33,7 @@ def read_value(text: str, lookup: Lookup) -> Value:
     formula = parse_formula(text)
     if formula.operation == "name":
         return lookup(text.strip())
-    unit = _unit(formula, lookup)
+    unit = formula.unit(lambda name: coherent(lookup(name).unit))
     number = float(
         formula.evaluate(lambda name: _scalar(lookup(name), name), lambda part: ca.SX(_quantity(part).number))
     )
@@ -58,36 +55,3 @@ def _finite(value: Value, text: str) -> Value:
     if not math.isfinite(value.number):
         raise ValueOutOfRange(f"'{text}' is not a finite number.")
     return value
-
-
-def _unit(formula: Formula, lookup: Lookup) -> Unit:
-    kind, operands = formula.operation, formula.operands
-    if kind == "number":
-        return ONE
-    if kind == "quantity":
-        return coherent(_quantity(str(formula)).unit)
-    if kind == "name":
-        return coherent(lookup(str(formula)).unit)
-    units = [_unit(operand, lookup) for operand in operands]
-    if kind in _ALIKE and not same_dimension(units[0], units[1]):
-        raise UnitError(f"'{formula}' mixes {units[0]} and {units[1]}.")
-    if kind == "*":
-        return units[0] * units[1]
-    if kind == "/":
-        return units[0] / units[1]
-    if kind == "**":
-        return _power(formula, units[0])
-    if kind == "sqrt":
-        return units[0] ** 0.5
-    return units[0] if kind in (*_SAME, *_ALIKE) else ONE
-
-
-def _power(formula: Formula, base: Unit) -> Unit:
-    if same_dimension(base, ONE):
-        return ONE
-    exponent = formula.operands[1]
-    negative = exponent.operation == "neg"
-    exponent = exponent.operands[0] if negative else exponent
-    if exponent.operation != "number":
-        raise UnitError(f"'{formula}': the exponent of something with a unit must be a number.")
-    return base ** (-exponent.operands[0] if negative else exponent.operands[0])

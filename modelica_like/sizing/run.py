@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,6 +18,12 @@ from modelica_like.sizing.document import SizingDocument, placed, read_document
 from modelica_like.sizing.formulas import Value, read_value
 from modelica_like.sizing.simulated import Simulations
 from modelica_like.units import ONE, to_si
+from modelica_like.upper import Shown
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+    from modelica_like.solve.solution import Solution
 
 _OWN = ("is", "note", "limits", "published")
 _STEP = re.compile(r"([A-Za-z_]\w*)(?:\[(\d+)\])?")
@@ -54,13 +60,18 @@ class CheckedResult:
 
 
 @dataclass(frozen=True)
-class Sizing:
+class Sizing(Shown):
     """All design checks of a file in their order, and names of checks to compare, by heading."""
 
     name: str
     description: str
     checks: tuple[CheckedResult, ...]
     compare: dict[str, list[str]]
+
+    def __rich__(self) -> RenderableType:
+        from modelica_like.sizing.report import sizing_report
+
+        return sizing_report(self)
 
     @property
     def exceeded(self) -> int:
@@ -79,17 +90,18 @@ class Sizing:
         return results[name]
 
 
-def size(path: str | Path) -> Sizing:
+def size(path: str | Path, runs: Mapping[Path, Solution] | None = None) -> Sizing:
     """Run the design checks of a sizing file.
 
     Args:
         path: TOML file.
+        runs: known runs by netlist; others are made.
 
     Raises:
         ModelicaLikeError: the file has an error; the message says what, where and what to do.
     """
     document = read_document(Path(path))
-    run = _Run(document, Path(path).parent)
+    run = _Run(document, Simulations(Path(path).parent, runs))
     checks = tuple(run.checked(name) for name in document.checks)
     for heading, names in document.compare.items():
         _comparable(heading, names, run, document)
@@ -109,12 +121,12 @@ def _comparable(heading: str, names: list[str], run: _Run, document: SizingDocum
 class _Run:
     """Computes checks and parameters on demand, each once."""
 
-    def __init__(self, document: SizingDocument, folder: Path) -> None:
+    def __init__(self, document: SizingDocument, simulations: Simulations) -> None:
         self.document = document
         self.done: dict[str, CheckedResult] = {}
         self.parameters: dict[str, Value] = {}
         self.open: list[str] = []
-        self.converter = Converter(self.lookup, Simulations(folder).load, self.result)
+        self.converter = Converter(self.lookup, simulations.load, self.result)
 
     def lookup(self, path: str) -> Value:
         """Return a parameter, or a line of a check (`belt.shaft_load`, `shaft.reactions[0].radial`)."""

@@ -14,6 +14,7 @@ from modelica_like.solve.ranges import ranges
 from modelica_like.solve.recorder import Event
 from modelica_like.solve.style import COLOURS, picture, with_unit
 from modelica_like.solve.trajectories import Trajectories, fitting
+from modelica_like.upper import Shown
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -69,7 +70,7 @@ class EventDifference:
 
 
 @dataclass(frozen=True)
-class Curves:
+class Curves(Shown):
     """Two trajectories, signal by signal and event by event.
 
     Attributes:

@@ -54,6 +54,9 @@ class Display:
             same = {path: text for path in fitting if _fits(self._own[path], unit)}
             self._paths |= same if key in self._own else {path: t for path, t in same.items() if path not in wanted}
 
+    def __contains__(self, path: object) -> bool:
+        return path in self._own
+
     def of(self, path: str) -> str:
         """Return the unit in which a variable is shown."""
         return self._paths.get(path) or self.of_quantity(self._own[path])

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, Vector
-from modelica_like.initialize import Impact, Point, call, solve_implicit
+from modelica_like.initialize import INSTANT, Impact, Point, call, solve_implicit
 from modelica_like.solve.options import Options
 from modelica_like.solve.powers import POWERS, Powers, Results, results
 from modelica_like.solve.recorder import Event, Segment
-from modelica_like.upper import upper
+from modelica_like.upper import Shown, upper
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -69,7 +69,7 @@ class EnergyRow:
 
 
 @dataclass(frozen=True)
-class EnergyBalance:
+class EnergyBalance(Shown):
     """Energy balance of a run, component by component.
 
     Attributes:
@@ -110,6 +110,11 @@ class EnergyBalance:
     def delivered(self) -> float:
         """Energy that loads took away, J."""
         return -sum(row.source for row in self.rows if row.source < 0)
+
+    @property
+    def supply(self) -> float:
+        """Energy from sources and stores, component by component, J."""
+        return sum(max(row.source, 0.0) + max(-row.stored, 0.0) for row in self.rows)
 
     @property
     def efficiency(self) -> float:
@@ -211,21 +216,21 @@ def energy_balance(
         totals += powers.integrals(some)
         audit.see(some)
     lost, source, inflow, rate = totals
-    impact = np.zeros(count)
-    for one in impacts:
-        impact[model.components.index(one.component)] += one.energy
     starts, ends = (np.concatenate(parts, axis=1) for parts in (audit.starts, audit.ends))
-    jumps = starts[:, 1:] - ends[:, :-1]
-    change, at_once = ends[:, -1] - starts[:, 0], np.sum(jumps, axis=1)
+    struck, given, at_start = _impacts(model, impacts, float(audit.times[0][0]), starts[:, 0])
+    impact, work = struck.sum(axis=0), given.sum(axis=0)
+    jumps = np.column_stack([at_start, starts[:, 1:] - ends[:, :-1]])
+    change, at_once = ends[:, -1] - starts[:, 0] + at_start, np.sum(jumps, axis=1)
     columns = (
-        inflow, source, change, lost + impact, at_once, inflow + source - lost - rate, change - at_once - rate, impact,
-        *audit.found(model),
+        inflow, source + work, change, lost + impact, at_once, inflow + source - lost - rate, change - at_once - rate,
+        impact, *audit.found(model),
     )  # fmt: skip
     rows = tuple(EnergyRow(path, *map(float, values)) for path, *values in zip(model.components, *columns, strict=True))
-    throughput = max([powers.stored, *(float(np.sum(np.abs(part))) for part in (inflow, source, lost + impact))])
+    exchanged = (inflow, source + work, lost + impact)
+    throughput = max([powers.stored, *(float(np.sum(np.abs(part))) for part in exchanged)])
     reset = [event.time for event in events if event.transition >= 0 and model.transitions[event.transition].resets]
-    times = np.concatenate(audit.times)[1:]
-    at_events = _unexplained(times, np.sum(jumps, axis=0), reset, impacts)
+    told = [(one.time, one.energy - float(np.sum(work))) for one, work in zip(impacts, given, strict=True)]
+    at_events = _unexplained(np.concatenate(audit.times), np.sum(jumps, axis=0), reset, told)
     return EnergyBalance(rows, throughput, at_events, options.rtol)
 
 
@@ -296,7 +301,32 @@ def _is_rounding(model: CompiledDae, point: Point, component: int) -> bool:
     return bool(np.ptp(found) > 0.5 * np.max(np.abs(found)))
 
 
-def _unexplained(times: Vector, jumps: Vector, reset: Sequence[float], impacts: Sequence[Impact]) -> float:
+def _impacts(
+    model: CompiledDae, impacts: Sequence[Impact], start: float, stored: Vector
+) -> tuple[Vector, Vector, Vector]:
+    """Return what components lose, and what sources give, in each impact; and what is stored in those at the start.
+
+    A prescribed motion does not stop: its source pushes with an impulse, which is work.
+
+    Args:
+        model: the compiled model.
+        impacts: their losses.
+        start: of the run in s.
+        stored: energies of the components behind the start, in J.
+    """
+    struck, given = np.zeros((2, len(impacts), len(stored)))
+    at_start: Vector | None = None
+    for lost, work, one in zip(struck, given, impacts, strict=True):
+        lost[model.components.index(one.component)] = one.energy
+        if one.trials:
+            before, after = (call(model, model.energy, point).reshape(-1, len(stored)) for point in one.trials)
+            work[:] = INSTANT * (after[2] - before[2])
+            if at_start is None and one.time == start:
+                at_start = stored - before[0]
+    return struck, given, np.zeros(len(stored)) if at_start is None else at_start
+
+
+def _unexplained(times: Vector, jumps: Vector, reset: Sequence[float], told: Sequence[tuple[float, float]]) -> float:
     """Return the largest unexplained change of all stored energies together at an instant, in J."""
     instants, place = np.unique(times, return_inverse=True)
     if not len(instants):
@@ -308,9 +338,9 @@ def _unexplained(times: Vector, jumps: Vector, reset: Sequence[float], impacts: 
         k = int(np.searchsorted(instants, time - near))
         return k if k < len(instants) and instants[k] <= time + near else None
 
-    for one in impacts:
-        if (k := at(one.time)) is not None:
-            left[k] += one.energy
+    for time, lost in told:
+        if (k := at(time)) is not None:
+            left[k] += lost
     for time in reset:
         if (k := at(time)) is not None:
             left[k] = 0.0

@@ -11,47 +11,81 @@ import numpy as np
 
 from modelica_like.errors import NetlistError
 from modelica_like.solve.display import QUANTITIES, Display
-from modelica_like.solve.recorder import Event
-from modelica_like.solve.style import COLOURS, picture, with_unit
+from modelica_like.solve.panels import Panel, bands_of, draw_panels, marks_of
+from modelica_like.solve.signals import Signal, evaluated, named, read_signals
+from modelica_like.solve.style import COLOURS
 from modelica_like.solve.trajectories import Trajectories, matching
 from modelica_like.writing import check_writable, write_bytes
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_USUAL = ("rad/s", "N.m", "m/s", "N")
+_ON_PAGES = ("rad/s", "N.m", "m/s", "N")
+_USUAL = ("rad/s", "m/s", "m", "N.m", "N", "A", "W")
 _MOST = 6
-_MOST_EVENTS = 40
+_MOST_PANELS = 2, 24
+"""Panels of one quantity that nobody has asked for, and panels of a picture."""
 
 
 def plot(
     solution: Trajectories, patterns: Sequence[str] = (), *, title: str = "", display: Mapping[str, str] | None = None
 ) -> Figure:
-    """Draw trajectories over time, one panel per unit, with events as dotted lines.
+    """Draw trajectories over time: a panel per quantity, relative ones apart, modes as bands, events as numbers.
+
+    Torques and forces between two ends that drive where they are negative are drawn with the other sign; the legend
+    says `\u2212clutch.tau`. Text below the picture lists the events, and what is not drawn.
 
     Args:
         solution: the run.
-        patterns: names or patterns (`*.w`) of the curves; by default speeds, torques and forces of the parts.
+        patterns: names, patterns (`*.w`) or formulas (`2*pi*motor.w`) of the curves; modes become bands. By default
+            speeds, positions, torques, forces, currents and powers of the parts, coinciding ones once.
         title: heading; by default the name of the model.
         display: units by path, pattern or quantity, in addition to those of the netlist, such as {"speed": "rpm"}.
 
     Raises:
         UnknownName: nothing matches a pattern.
-        UnitError: a variable cannot be shown in a unit.
+        UnitError: a variable cannot be shown in a unit, or the units in a formula do not fit together.
     """
     shown = Display(solution.model, display)
-    groups: dict[str, list[str]] = {}
-    for name in chosen(solution, patterns):
-        groups.setdefault(shown.of(name), []).append(name)
-    count = max(len(groups), 1)
-    with picture(title or solution.model.name, count, 0.8 + 2.1 * count) as (figure, rows):
-        for axes, (unit, names) in zip(rows, groups.items(), strict=False):
-            _draw(axes, solution, unit, names, shown)
-        _mark_events(rows, solution.events)
-        rows[-1].set_xlabel("time in s")
-        rows[-1].set_xlim(solution.time[0], solution.time[-1])
-    return figure
+    modes = {one.path for one in solution.model.flat_discretes if one.names}
+    asked = read_signals(solution.model, patterns)
+    curves = [one for one in asked if one.name not in modes] if asked else usual(solution, _USUAL)
+    values = evaluated(solution, curves)
+    groups: dict[tuple[str, str], list[Signal]] = {}
+    for one in curves:
+        groups.setdefault((quantity_of(one), one.shown_in(shown)), []).append(one)
+    panels, left = _panels(groups, 0 if asked else _MOST_PANELS[0])
+    bands, unbanded = bands_of(solution, [one.name for one in asked if one.name in modes])
+    marks, unmarked = marks_of(solution, [band.mode for band in bands])
+    left += [] if asked else _quantities_left(solution)
+    notes = [f"Not drawn: {', '.join(left)}; name them to draw them."] if left else []
+
+    def draw(axes: Any, signals: Sequence[Signal]) -> None:
+        for k, one in enumerate(signals):
+            curve = one.driving * shown.converted(values[one.name], one.unit, one.shown_in(shown))
+            style = {"linestyle": "-" if k < len(COLOURS) else "--", "color": COLOURS[k % len(COLOURS)]}
+            axes.plot(solution.time, curve, label=one.label, **style)
+
+    made = [Panel(name, unit, [one.label for one in some], lambda axes, some=some: draw(axes, some))
+            for (name, unit), some in panels]  # fmt: skip
+    return draw_panels(title or solution.model.name, solution.time, made, bands, marks, [*notes, *unbanded, *unmarked])
+
+
+def _panels(
+    groups: Mapping[tuple[str, str], Sequence[Signal]], most: int
+) -> tuple[list[tuple[tuple[str, str], Sequence[Signal]]], list[str]]:
+    """Divide groups among panels of a few curves each; also tell which have no room."""
+    panels: list[tuple[tuple[str, str], Sequence[Signal]]] = []
+    left: list[str] = []
+    for key, signals in groups.items():
+        room = min(_MOST_PANELS[1] - len(panels), most or _MOST_PANELS[1])
+        count = -(-len(signals) // _MOST)
+        each = _MOST if count > room else -(-len(signals) // max(count, 1))
+        panels += [(key, signals[k * each : (k + 1) * each]) for k in range(min(count, room))]
+        rest = signals[each * room :]
+        if rest:
+            left.append(f"{len(rest)} more of {key[0]} ({', '.join(one.name for one in rest)})")
+    return panels, left
 
 
 def check_picture(path: Path) -> None:
@@ -100,26 +134,44 @@ def picture_bytes(figure: Figure, kind: str, **options: Any) -> bytes:
 
 
 def chosen(solution: Trajectories, patterns: Sequence[str]) -> list[str]:
-    """Return the names that match the patterns, or a default choice without patterns.
+    """Return the names that match the patterns, or without patterns a choice of a few for a page.
 
     Raises:
         UnknownName: nothing matches a pattern.
     """
-    return matching(solution.model, patterns) if patterns else _usual(solution)
+    if patterns:
+        return matching(solution.model, patterns)
+    return [one.name for unit in _ON_PAGES for one in usual(solution, [unit], slips=True)[:_MOST]]
 
 
-def _usual(solution: Trajectories) -> list[str]:
-    """Choose speeds, torques and forces of parts, without curves at rest; coinciding curves are drawn once."""
-    names: list[str] = []
-    for unit in _USUAL:
-        curves: dict[bytes, str] = {}
-        shown = (v for v in solution.model.flat_variables if v.kind in ("local", "output") and str(v.unit) == unit)
-        for path, values in solution.together(*(variable.path for variable in shown)).items():
-            if np.any(values):
+def usual(solution: Trajectories, units: Sequence[str], *, slips: bool = False) -> list[Signal]:
+    """Return what one usually wants to see: variables of parts that are not zero, coinciding ones once.
+
+    Args:
+        solution: the run.
+        units: coherent SI units.
+        slips: also relative positions and angles.
+    """
+    model, found = solution.model, dict[bytes, str]()
+    wanted = getattr(model, "settings", {}).get("display", {})
+    for unit in units:
+        some = [one.path for one in model.flat_variables if one.kind in ("local", "output") and str(one.unit) == unit]
+        signs = {one.name: one.driving for one in named(model, some)}
+        for path, values in solution.together(*some).items():
+            if np.any(values) and (slips or unit != "m" or not path.endswith("_rel")):
                 scale = float(np.abs(values).max())
-                curves.setdefault(np.round(values / scale, 6).tobytes() + f"{scale:.6g}".encode(), path)
-        names += list(curves.values())[:_MOST]
-    return names
+                curve = np.round(signs[path] * values / scale, 6) + 0.0
+                key = curve.tobytes() + f"{unit}{scale:.6g}".encode()
+                found[key] = path if key not in found or path in wanted else found[key]
+    return named(model, list(found.values()))
+
+
+def quantity_of(signal: Signal) -> str:
+    """Return the quantity of a signal for titles; that of a difference between two ends is another one."""
+    name = quantity(signal.unit)
+    if not (signal.plain and signal.name.endswith("_rel")):
+        return name
+    return "slip speed" if name == "speed" else f"relative {name}"
 
 
 def quantity(unit: str) -> str:
@@ -127,32 +179,13 @@ def quantity(unit: str) -> str:
     return QUANTITIES.get(unit, "value")
 
 
-def _draw(axes: Axes, solution: Trajectories, unit: str, names: Sequence[str], shown: Display) -> None:
-    for k, (name, values) in enumerate(solution.together(*names).items()):
-        style = "-" if k < len(COLOURS) else "--"
-        axes.plot(solution.time, shown.values(name, values), style, label=name, color=COLOURS[k % len(COLOURS)])
-    axes.set_ylabel(with_unit(shown.quantity(names[0]), unit))
-    axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
+def _quantities_left(solution: Trajectories) -> list[str]:
+    """Count the variables of parts with a unit that is not among the usual ones."""
+    units = [str(one.unit) for one in solution.model.flat_variables if one.kind in ("local", "output")]
+    names = [QUANTITIES.get(unit, "signal") for unit in units if unit not in _USUAL]
+    counts = {name: names.count(name) for name in names}
+    return [f"{count} {name if count == 1 else _plural(name)}" for name, count in counts.items()]
 
 
-def _mark_events(panels: Sequence[Axes], events: Sequence[Event]) -> None:
-    if len(events) > _MOST_EVENTS:
-        return
-    for axes in panels:
-        for event in events:
-            axes.axvline(event.time, color="#999999", linewidth=0.8, linestyle=":", zorder=0)
-    for event in _spaced(events, 0.025 * float(np.ptp(panels[0].dataLim.intervalx))):
-        text = f"{event.mode.rpartition('.')[0]} {event.after}"
-        panels[0].annotate(
-            text, (event.time, 1.0), xycoords=("data", "axes fraction"), xytext=(2, 1), textcoords="offset points",
-            rotation=25, ha="left", va="bottom", fontsize=7, color="#666666",
-        )  # fmt: skip
-
-
-def _spaced(events: Sequence[Event], gap: float) -> list[Event]:
-    """Return the last event of each instant, if there is space for a label."""
-    shown: list[Event] = []
-    for event in {event.time: event for event in events}.values():
-        if not shown or event.time - shown[-1].time > gap:
-            shown.append(event)
-    return shown
+def _plural(name: str) -> str:
+    return f"{name[:-1]}ies" if name.endswith("y") else f"{name}s"

@@ -15,7 +15,7 @@ from modelica_like.language.expr import Symbol
 from modelica_like.language.mode import BoundMode
 from modelica_like.solve.branches import member, next_names
 from modelica_like.solve.recorder import Event
-from modelica_like.upper import upper
+from modelica_like.upper import Shown, upper
 
 if TYPE_CHECKING:
     import pandas
@@ -66,7 +66,7 @@ class Values(Mapping[str, float]):
         return f"<{len(self)} values at t = {self.time:g} s>"
 
 
-class Trajectories(ABC):
+class Trajectories(Shown, ABC):
     """Trajectories of all variables, in SI units: a `Solution`, or recorded data of an FMU or a table.
 
     Attributes:
@@ -74,12 +74,14 @@ class Trajectories(ABC):
         events: mode changes.
         statistics: of the run.
         notices: messages about the run.
+        measured: whether they are a table, to be drawn as dots.
     """
 
     model: Any
     events: tuple[Event, ...]
     statistics: Statistics
     notices: tuple[str, ...] = ()
+    measured: bool = False
 
     def __getattr__(self, name: str) -> Any:
         """Return a variable, or the variables of a part: `run.clutch.tau`."""
@@ -92,10 +94,6 @@ class Trajectories(ABC):
 
     def _ipython_key_completions_(self) -> list[str]:
         return list(self.names)
-
-    def _repr_html_(self) -> str:
-        """Return curves, events and statistics, for notebooks."""
-        return upper("html")(self)
 
     @property
     @abstractmethod

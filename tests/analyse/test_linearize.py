@@ -242,10 +242,14 @@ def test_campbell_diagram_finds_critical_speeds():
     np.testing.assert_allclose(diagram.speeds, speeds)
     np.testing.assert_allclose(diagram.frequencies, np.full((1, 3), 15 / (2 * np.pi)), rtol=1e-12)
     assert [one.speed for one in diagram.crossings()] == pytest.approx([15.0, 7.5], rel=1e-12)
-    (axes,) = diagram.plot().axes
+    first_met = str(diagram.crossings()[0])
+    assert first_met == "order 1 meets mode 1 (spring, mass) at 2.387 Hz, 143.24 rpm"
+    figure = diagram.plot()
+    assert [text.get_text() for text in figure.axes[0].texts][-2:] == ["1", "2"]
+    (axes,) = figure.axes
     mode, first, second, *points = axes.lines
     np.testing.assert_allclose(mode.get_ydata(), diagram.frequencies[0])
     np.testing.assert_allclose(second.get_ydata(), 2 * first.get_ydata())
     assert [(one.get_xdata()[0], one.get_ydata()[0]) for one in points] == [
-        pytest.approx((speed * 30 / np.pi, 15 / (2 * np.pi))) for speed in (15.0, 7.5)
+        pytest.approx((speed * 30 / np.pi, 15 / (2 * np.pi))) for speed in (7.5, 15.0)
     ]

@@ -76,7 +76,7 @@ start = "rest"
 
 def test_check_tells_where_start_values_come_from(run: CliRunner, tmp_path: Path) -> None:
     (tmp_path / "drive.toml").write_text(STARTS)
-    result = run.invoke(app, ["check", "--start", str(tmp_path / "drive.toml")])
+    result = run.invoke(app, ["check", "--start-values", str(tmp_path / "drive.toml")])
     lines = result.stdout.partition("start values (rest)")[2].splitlines()[2:]
     assert [re.split(r"  +", line.strip()) for line in lines if line.strip()] == [
         ["a.phi", "3.14159265", "rad", "given in drive.toml:14"],
@@ -92,7 +92,7 @@ def test_check_tells_where_start_values_come_from(run: CliRunner, tmp_path: Path
 
 def test_check_tells_starts_that_are_missing(run: CliRunner, tmp_path: Path) -> None:
     (tmp_path / "drive.toml").write_text(STARTS.replace('start = "rest"', ""))
-    result = run.invoke(app, ["check", "--start", str(tmp_path / "drive.toml")])
+    result = run.invoke(app, ["check", "--start-values", str(tmp_path / "drive.toml")])
     assert result.exit_code == 2
     assert "Initialization (not the model) lacks" in result.output
 
@@ -157,6 +157,29 @@ def test_the_picture_is_written(run: CliRunner, pendulum: str, tmp_path: Path, e
     assert file.read_bytes()[:4] in (b"\x89PNG", b"<?xm", b"%PDF")
 
 
+def test_formulas_are_told_and_written(run: CliRunner, pendulum: str, tmp_path: Path) -> None:
+    table = tmp_path / "out.csv"
+    words = ["--show", "mass.w", "--show", "0.5*mass.J*mass.w**2", "--csv", str(table), "--units"]
+    result = run.invoke(app, ["simulate", pendulum, *words])
+    names, units, *rows = csv.reader(table.read_text().splitlines())
+    assert (names[-1], units[-1]) == ("0.5*mass.J*mass.w**2", "J")
+    speed = float(rows[-1][names.index("mass.w")])
+    told = next(line.split() for line in result.stdout.splitlines() if line.startswith("0.5*mass"))
+    assert float(rows[-1][-1]) == pytest.approx(0.5 * speed**2, rel=1e-12)
+    assert (told[1], float(told[3])) == ("J", pytest.approx(float(rows[-1][-1]), rel=1e-5))
+
+
+def test_a_measurement_and_a_family_are_drawn_beside_the_run(run: CliRunner, pendulum: str, tmp_path: Path) -> None:
+    measured, picture = tmp_path / "measured.csv", tmp_path / "both.svg"
+    measured.write_text("time [ms],mass.w [rpm]\n0,0\n50,-2\n")
+    words = ["simulate", pendulum, "--plot", str(picture), "--compare", str(measured), "--compare", "mass.J=1,2 kg.m2"]
+    result = run.invoke(app, words)
+    assert result.exit_code == 0, result.stderr
+    drawn = picture.read_text()
+    for label in ("as given", "mass.J = 1.0 kg.m2", "mass.J = 2.0 kg.m2", "measured.csv", "mass.w in rad/s"):
+        assert f"<!-- {label} -->" in drawn, label
+
+
 @pytest.mark.parametrize(
     ("arguments", "code", "message"),
     [
@@ -173,6 +196,8 @@ def test_the_picture_is_written(run: CliRunner, pendulum: str, tmp_path: Path, e
         (["simulate", "PENDULUM", "--until", "-1"], 2, "The end time -1 s is not after the start time 0 s."),
         (["simulate", "PENDULUM", "--points", "0"], 2, "points = 0 is out of range"),
         (["simulate", "PENDULUM", "--plot", "x.doc"], 2, "'x.doc': a picture can be"),
+        (["simulate", "PENDULUM", "--plot", "x.png", "--compare", "nix.csv"], 2, "nix.csv: No such file"),
+        (["simulate", "PENDULUM", "--compare", "mass.J=2"], 2, "it is drawn into the picture of --plot"),
         (
             ["simulate", "PENDULUM", "--plot", "x.png", "--show", "mas.w"],
             2,

@@ -3,6 +3,9 @@
 import os
 import signal
 import subprocess
+import sys
+import time
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from math import log2, sqrt
@@ -16,7 +19,7 @@ from modelica_like import Trajectories
 from modelica_like.cosimulation.run import cosim
 from modelica_like.cosimulation.split import Split, split
 from modelica_like.cosimulation.system import System
-from modelica_like.errors import FmuCrashed, FmuFailed, FmuTimeout
+from modelica_like.errors import FmuCrashed, FmuFailed, FmuTimeout, StepFailed
 
 M, J1, J2, C, D = 5.0, 0.02, 0.08, 400.0, 0.2
 MASTERS = pytest.mark.parametrize("master", ["jacobi", "gauss-seidel"])
@@ -146,18 +149,17 @@ def test_the_result_is_read_like_any_solution(oscillator: Split) -> None:
     assert run.steps == 100
 
 
-def killed(pressed: list[float], time: float) -> None:
+def killed(pressed: list[float], now: float) -> None:
     """Kill the process of the FMUs, once."""
-    if time > 0.01 and not pressed:
-        pressed.append(time)
-        found = subprocess.run(["pgrep", "-P", str(os.getpid()), "-f", "cosimulation/child.py"], capture_output=True)
-        os.kill(int(found.stdout), signal.SIGKILL)
+    if now > 0.01 and not pressed:
+        pressed.append(now)
+        os.kill(int(pgrep("-P", str(os.getpid()), "-f", "cosimulation/child.py")), signal.SIGKILL)
 
 
 @pytest.mark.parametrize("how", ["timeout", "killed", "failed"])
 def test_a_run_that_fails_keeps_what_it_has_come_to(how: str, oscillator: Split) -> None:
     """A step far too long for the spring: what the FMUs exchange grows until it is infinite."""
-    errors = {"timeout": FmuTimeout, "killed": FmuCrashed, "failed": FmuFailed}
+    errors = {"timeout": FmuTimeout, "killed": FmuCrashed, "failed": StepFailed}
     options: dict[str, Any] = {"step": "1 s" if how == "failed" else "10 us"}
     if how == "timeout":
         options["timeout"] = 3.0
@@ -172,3 +174,54 @@ def test_a_run_that_fails_keeps_what_it_has_come_to(how: str, oscillator: Split)
     whole = cosim(oscillator.system, until=float(kept.time[10]), step=options["step"])
     for name in ("J2.w", "shaft.power", "shaft.residual_energy"):
         assert np.array_equal(kept[name][:11], whole[name])
+
+
+@MASTERS
+def test_a_step_too_long_for_the_spring_ends_before_values_are_huge(oscillator: Split, master: str) -> None:
+    with pytest.raises(StepFailed, match="grows without bounds") as told:
+        cosim(oscillator.system, until=100.0, step=0.02, master=master)
+    # Ten decades of energy are five of speed.
+    assert np.abs(told.value.run["J2.w"]).max() < 1e9
+
+
+def test_what_a_failed_fmu_says_is_told(tmp_path: Path) -> None:
+    (tmp_path / "drive.toml").write_text("""
+[parts]
+push = { is = "Table", table = [[0, 0], [0.01, 1]], extrapolate = "error" }
+torque = { is = "Torque" }
+J1 = { is = "Inertia", J = "0.02 kg.m2" }
+shaft = { is = "SpringDamper", c = "400 N.m/rad", d = "0.2 N.m.s/rad" }
+J2 = { is = "Inertia", J = "0.08 kg.m2" }
+[series]
+line = ["torque", "J1", "shaft", "J2"]
+[connect]
+push = ["push.y", "torque.tau"]
+[simulate]
+until = "0.02 s"
+start = "rest"
+""")
+    parts = split(tmp_path / "drive.toml", "shaft", tmp_path / "parts", check=False)
+    with pytest.raises(FmuFailed, match=r"^push \(push.fmu\) failed") as told:
+        cosim(parts.system, step=1e-4)
+    assert "It reported: t = 0.01 s: " in str(told.value)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="processes are found and killed as in POSIX")
+def test_fmus_end_with_the_process_that_runs_them(oscillator: Split) -> None:
+    code = f"from modelica_like import cosim; cosim({str(oscillator.path)!r}, '100000 s', step='10 us')"
+    with subprocess.Popen([sys.executable, "-c", code], stderr=subprocess.DEVNULL) as caller:
+        child = wait_for(lambda: pgrep("-P", str(caller.pid), "-f", "cosimulation/child.py"))
+        caller.kill()
+    wait_for(lambda: not pgrep("-g", child))
+
+
+def pgrep(*arguments: str) -> str:
+    return subprocess.run(["pgrep", *arguments], capture_output=True, text=True).stdout.strip()
+
+
+def wait_for(condition: Callable[[], Any], seconds: float = 20.0) -> Any:
+    end = time.monotonic() + seconds
+    while not (found := condition()):
+        assert time.monotonic() < end
+        time.sleep(0.05)
+    return found

@@ -1,5 +1,6 @@
 """What a run adds to schematics: powers of branches, modes as looks, and what cannot be shown."""
 
+from itertools import combinations
 from pathlib import Path
 
 import pytest
@@ -8,7 +9,9 @@ from typer.testing import CliRunner
 from modelica_like import load, schematic, simulate
 from modelica_like.cli import app
 from modelica_like.draw import layout
-from modelica_like.draw.running import running, spelled
+from modelica_like.draw.labels import meet
+from modelica_like.draw.running import energy_notes, running, spelled
+from modelica_like.draw.sheet import Line, Placed, texts
 from modelica_like.errors import ValueOutOfRange
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -118,3 +121,28 @@ def test_the_command_runs_the_drive(tmp_path: Path) -> None:
         assert "stuck" in text
         assert ("animate" in text) == (words == ["--animate"])
         assert (" W<" in text) == (words != ["--animate"])
+
+
+@pytest.mark.parametrize("name", ["winch", "launch", "components/h_bridge"])
+def test_energies_stand_where_nothing_else_does(name: str) -> None:
+    drive = load(EXAMPLES / f"{name}.toml")
+    run = simulate(drive)
+    balance = run.energy()
+    drawn = layout(drive, notes=energy_notes(balance))
+    found = running(drawn, run, flow=True, balance=balance)
+    everything = list(drawn.everything())
+    told = [(at, text) for at, item in everything if isinstance(item, Line) for text in found.said.get(item, ())]
+    told += [((at[0] + item.at[0], at[1] + item.at[1]), text) for at, item in everything
+             if isinstance(item, Placed) for text in texts(item)]  # fmt: skip
+    boxes = [(text.text, tuple(side + at[k % 2] for k, side in enumerate(text.box))) for at, text in told]
+    assert len(found.said) > 3
+    for (first, a), (second, b) in combinations(boxes, 2):
+        assert not meet(a, b), (first, second)
+
+
+def test_energies_of_the_parts_are_those_of_the_balance() -> None:
+    drive = load(EXAMPLES / "lepelletier.toml")
+    balance = simulate(drive).energy()
+    told = {name: energy_notes(balance)(part) for name, part in drive.parts.items()}
+    lost = sum(row.lost for row in balance if row.component.startswith("box."))
+    assert f"lost {spelled(lost, 'J')}, {lost / balance.supply:.1%}" in told["box"], "all that is inside"

@@ -32,8 +32,9 @@ from components import (
     ThermalMass,
     VoltageToCurrentAdaptor,
 )
-from modelica_like import build, export_fmu, load, simulate
+from modelica_like import build, export_fmu, load, schematic, simulate
 from modelica_like.errors import UnknownName
+from modelica_like.fmi import export
 from modelica_like.fmi.build import PLATFORMS, native_platform
 from modelica_like.fmi.check import problems
 from modelica_like.fmi.export import Export
@@ -255,7 +256,32 @@ def test_terminal_of_an_exposed_flange(exported: Callable[[str], Export]) -> Non
     members = {one.get("memberName"): one.get("variableName") for one in terminal.iter("TerminalMemberVariable")}
     assert members == {name: f"shaft_end.{name}" for name in ("phi", "w", "a", "tau")}
     assert member(path, "terminalsAndIcons/rotational.png").startswith(b"\x89PNG")
-    assert member(path, "terminalsAndIcons/icon.png").startswith(b"\x89PNG")
+
+
+def test_the_icon_is_the_schematic(tmp_path: Path) -> None:
+    drive = load(EXAMPLES / "machine_table_direct.toml")
+    paths = {version: export_fmu(drive, tmp_path / f"{version}.fmu", version, check=False).path for version in VERSIONS}
+    picture = member(paths["2.0"], "model.png")
+    svg = member(paths["3.0"], "terminalsAndIcons/icon.svg")
+    assert svg.decode() == schematic(drive, depth=0)
+    assert member(paths["3.0"], "terminalsAndIcons/icon.png") == picture
+    top = etree.fromstring(member(paths["3.0"], "terminalsAndIcons/terminalsAndIcons.xml"))
+    (icon,) = top.iter("Icon")
+    wide, high = (float(icon.get(f"{way}2")) - float(icon.get(f"{way}1")) for way in "xy")
+    size = etree.fromstring(svg)
+    assert high / wide == pytest.approx(float(size.get("height")) / float(size.get("width")), rel=2e-3), "whole pixels"
+    export_fmu(drive, tmp_path / "again.fmu", check=False)
+    assert (tmp_path / "again.fmu").read_bytes() == paths["2.0"].read_bytes()
+
+
+def test_what_cannot_be_drawn_has_the_general_icon(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    drive = load(EXAMPLES / "two_mass.toml")
+    general = (Path(export.__file__).parent / "pictures/icon.png").read_bytes()
+    export_fmu(build(drive), tmp_path / "compiled.fmu", platforms=())
+    assert member(tmp_path / "compiled.fmu", "model.png") == general
+    monkeypatch.setattr("modelica_like.draw.find_spec", lambda _: None)
+    export_fmu(drive, tmp_path / "no_extra.fmu", platforms=())
+    assert member(tmp_path / "no_extra.fmu", "model.png") == general
 
 
 ENDS = [

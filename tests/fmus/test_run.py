@@ -99,7 +99,7 @@ def test_unknown_variable(reference_fmus: Built) -> None:
 def test_plots_and_tables(reference_fmus: Built) -> None:
     run = run_fmu(reference_fmus["dc_bench", "3.0"])
     figure = run.plot("*.w", "clutch.tau")
-    speeds, torques = figure.axes
+    speeds, torques, _ = figure.axes
     assert speeds.get_ylabel() == "speed in rad/s"
     assert len(torques.get_lines()) == 1 + len(run.events)
     frame = run.to_pandas()

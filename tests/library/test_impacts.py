@@ -7,6 +7,7 @@ from components import (
     Brake,
     Clutch,
     ConstantForce,
+    ConstantSpeed,
     ConstantTorque,
     DogClutch,
     Fixed,
@@ -186,3 +187,15 @@ def test_dogs_that_are_pulled_out_carry_nothing() -> None:
     drive = simulate(Assembly("d", parts={**parts, "out": out}, series={"s": [*parts]}, connect=wired), 2.0)
     np.testing.assert_allclose([drive.final["a.w"], drive.final["b.w"]], [5.0, 1.0], rtol=1e-8)
     assert drive.impacts == ()
+
+
+@pytest.mark.parametrize("gap", [0.0, 1.0])
+def test_a_prescribed_motion_works_in_an_impact(gap: float) -> None:
+    """1 kg.m2 is taken from rest to 5 rad/s at once: an impulse of 5 N.m.s, 25 J from the source, half of them lost."""
+    coupling = RigidBacklash(b=2 * gap, phi_rel=0.0) if gap else Freewheel()
+    drive = run({"source": ConstantSpeed(w_fixed=5.0), "coupling": coupling, "b": Inertia(J=1.0, w=0.0)}, 1.0)
+    balance = drive.energy()
+    assert balance["source"].source == pytest.approx(25.0, rel=1e-9)
+    assert balance["coupling"].impact == pytest.approx(12.5, rel=1e-9)
+    assert balance["b"].stored == pytest.approx(12.5, rel=1e-9)
+    assert balance.notices == ()

@@ -192,8 +192,8 @@ def test_a_folder_that_is_no_checkpoint(tmp_path):
 def test_a_table_that_is_none(tmp_path):
     file = tmp_path / "measured.csv"
     for text, told in (
-        ("time,mass.w\n0,abc\n", "measured.csv is not a table of numbers: could not convert string to float: 'abc'."),
-        ("time,mass.w\n0,1,2\n", "measured.csv: the rows and the title line differ in their number of columns."),
+        ("time,mass.w\n0,abc\n", "measured.csv:2: 'abc' is not a number."),
+        ("time,mass.w\n0,1,2\n", "measured.csv:2: 3 values under 2 names."),
     ):
         file.write_text(text)
         with pytest.raises(NetlistError) as caught:

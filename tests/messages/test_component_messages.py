@@ -216,6 +216,15 @@ TorqueSource.torque: Return the torque on the connected part.
 Write it in Unfinished: def torque(self).""",
 )
 case(
+    errors.DuplicateName,
+    "a field named like a method",
+    lambda: type("Named", (Component,), {"start": var("rad/s", "speed")}),  # named
+    """\
+Named declares 'start', which every component has already.
+  in test_component_messages.py:{named} `type("Named", (Component,), {"start": var("rad/s", "speed")})`
+Choose another name.""",
+)
+case(
     errors.LanguageError,
     "a mode holds what is no variable",
     lambda: flatten(Nothing()),

@@ -309,6 +309,12 @@ FAILURES: dict[str, tuple[dict[str, Any], str]] = {
         "a (a.fmu): tau is not finite at t = 0.25 s.\n"
         "If the values before it grow without bounds, choose a shorter step.",
     ),
+    "unstable": (
+        {"kind": "unstable", "bond": "shaft", "time": 0.25, "size": 0.03},
+        "bench: at t = 0.25 s the energy that the coupling shaft makes grows without bounds.\n"
+        "The values that the FMUs exchange swing against each other: the step of 0.03 s is too long.\n"
+        "Choose a shorter step, or give a tolerance.",
+    ),
     "step": (
         {"kind": "step", "time": 0.25},
         "bench: after t = 0.25 s no step is short enough for the tolerance of the coupling.\n"

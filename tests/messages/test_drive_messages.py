@@ -11,6 +11,7 @@ import pytest
 import modelica_like.errors as errors
 from components import (
     Clutch,
+    Constant,
     ConstantSpeed,
     ConstantTorque,
     Fixed,
@@ -232,6 +233,22 @@ case(
 motor.w_ref is an input without a value.
   in test_drive_messages.py:{no signal} `parts.motor`
 Connect it or give it a value.""",
+)
+
+case(
+    errors.WrongConnection,
+    "an input with a value and a connection",
+    lambda: flatten(
+        Assembly(  # both
+            parts={"motor": Speed(w_ref=2.0), "j": Inertia(J=1.0), "wanted": Constant(k=3.0)},
+            series={"s": ["motor", "j"]},
+            connect={"c": ["wanted.y", "motor.w_ref"]},
+        )
+    ),
+    """\
+motor.w_ref has a value and a connection: only one can count.
+  in test_drive_messages.py:{both} `parts.motor`
+Remove one of the two.""",
 )
 
 

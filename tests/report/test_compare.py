@@ -11,7 +11,8 @@ from modelica_like.errors import ModelicaLikeError, NetlistError
 from modelica_like.report.compare import Comparison, compare
 from modelica_like.report.files import write_solution
 from modelica_like.report.run import reasons
-from modelica_like.report.sources import read_csv, trajectories
+from modelica_like.report.sources import trajectories
+from modelica_like.solve.measured import read_csv
 from modelica_like.solve.recorded import RecordedModel, RecordedSolution, RecordedVariable
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -114,8 +115,8 @@ def test_report_and_picture() -> None:
     comparison = compare(first, second)
     assert shown(comparison) == (
         "first and second\n"
-        "signal  largest deviation     of the range  at time in s\n"
-        "x               1.000e+00  m       1.0e+00             2\n"
+        "signal  largest deviation  unit  of the range  at time in s\n"
+        "x               1.000e+00  m          1.0e+00             2\n"
         "\n"
         "events\n"
         "mode         to     first at s  second at s  difference in s\n"
@@ -150,7 +151,7 @@ MESSAGES = {
         ("0,0", "1,1"),
         ("time,x", "0,0"),
         (),
-        "a.csv: a table must begin with a line of names; the first one is `time`.",
+        "a.csv: the first column of a table of trajectories is `time`.",
     ),
     "times that fall": (("time,x", "1,0", "0,1"), ("time,x", "0,0"), (), "a.csv: the times must increase."),
     "a word": (("time,x", "0,0", "1,fast"), ("time,x", "0,0"), (), "a.csv:3: 'fast' is not a number."),

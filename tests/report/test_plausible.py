@@ -5,10 +5,25 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from components import Brake, Clutch, Constant, ConstantTorque, Fixed, Inertia, Ramp, Sine, Spring, Torque
-from modelica_like import simulate
+from components import (
+    Brake,
+    Clutch,
+    Constant,
+    ConstantForce,
+    ConstantSpeed,
+    ConstantTorque,
+    Fixed,
+    IdealGear,
+    Inertia,
+    Mass,
+    Ramp,
+    Sine,
+    Spring,
+    Torque,
+)
+from modelica_like import load, simulate
 from modelica_like.cli import app
-from modelica_like.language import Assembly
+from modelica_like.language import Assembly, Equations, Variable, var
 from modelica_like.report.plausible import drive_notes, run_notes
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -79,6 +94,52 @@ def test_an_excitation_near_an_eigenfrequency_is_noticed(frequency: float, notes
     assert [one.partition(" is ")[2] for one in found] == [
         "near the natural frequency 5 Hz, whose damping is 0: expect resonance."
     ] * notes
+
+
+def hoist(force: float) -> Assembly:
+    parts = {"pull": ConstantForce(f_constant=force), "load": Mass(m=10.0, angle="90 deg", s=0.0, v=0.0)}
+    return Assembly("drive", parts=parts, connect={"a": ["pull.flange", "load.flange_a"]})
+
+
+def test_a_weight_that_drives_is_noticed() -> None:
+    # a = 80/10 - g, and after one second s = a/2
+    fallen = 10 * 9.80665 * (9.80665 - 8.0) / 2
+    found = run_notes(hoist(80.0), simulate(hoist(80.0), 1.0))
+    assert found == [
+        f"The weight of load (98.07 N) falls and brings in {fallen:.4g} J, all sources together 0 J: gravity drives. "
+        f"If it should be lifted, look at the signs."
+    ]
+    assert run_notes(hoist(120.0), simulate(hoist(120.0), 1.0)) == [], "it is lifted"
+
+
+def test_a_load_that_pushes_is_noticed() -> None:
+    drive = load(EXAMPLES / "machine_table_direct.toml")
+    assert run_notes(drive, simulate(drive)) == []
+    drive.set("load_torque", "-15 N.m")
+    drive.set("clutch_torque", "80 N.m")
+    assert run_notes(drive, simulate(drive)) == [
+        "motor and load bring energy into one chain of shafts, and nothing takes it out: is the sign of one of them "
+        "wrong?"
+    ]
+
+
+class Grinder(Inertia):
+    """A wheel that bursts at 100 rad/s."""
+
+    rim: Variable = var("rad/s", "speed of the rim", max=100.0)
+
+    def equations(self) -> Equations:
+        yield from super().equations()
+        yield self.rim == self.w
+
+
+@pytest.mark.parametrize(("ratio", "notes"), [(1.0, 0), (0.25, 1)])
+def test_a_gear_that_makes_a_load_too_fast_is_noticed(ratio: float, notes: int) -> None:
+    parts = {"motor": ConstantSpeed(w_fixed=50.0), "gear": IdealGear(ratio=ratio), "wheel": Grinder(J=1.0)}
+    drive = Assembly("drive", parts=parts, series={"drive": [*parts]})
+    found = run_notes(drive, simulate(drive, 1.0, start="rest"))
+    told = "wheel.rim exceeds its declared bound 100 rad/s: it is 200 rad/s at 0 s."
+    assert found == [told] * notes
 
 
 def test_commands_tell_them_and_go_on() -> None:

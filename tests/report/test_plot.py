@@ -2,16 +2,22 @@
 
 import subprocess
 import sys
+from collections.abc import Iterator
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.text import Text
 
 from components import Fixed, Inertia, SpringDamper
 from modelica_like import Solution, simulate
-from modelica_like.errors import NetlistError, UnknownName
+from modelica_like.errors import ModelicaLikeError, NetlistError, UnitError, UnknownName
 from modelica_like.language import Assembly
 from modelica_like.solve.plot import chosen, plot, save_plot
+from modelica_like.solve.signals import read_signals
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -36,15 +42,104 @@ def test_patterns_choose(start_up: Solution) -> None:
         chosen(start_up, ["tabel.v"])
 
 
-def test_one_panel_per_unit_with_labels_and_events(start_up: Solution) -> None:
-    figure = plot(start_up, ["motor.w", "hub.w", "clutch.tau", "clutch.mode"], title="Start-up")
+def test_one_panel_per_quantity_with_bands_and_events(start_up: Solution) -> None:
+    figure = plot(start_up, ["motor.w", "hub.w", "clutch.tau", "clutch.w_rel", "clutch.mode"], title="Start-up")
     panels = figure.axes
-    assert [axes.get_ylabel() for axes in panels] == ["speed in rad/s", "torque in N\u00b7m", "value"]
+    assert [axes.get_ylabel() for axes in panels] == [
+        "speed in rad/s", "torque in N\u00b7m", "slip speed in rad/s", "",
+    ]  # fmt: skip
     assert panels[-1].get_xlabel() == "time in s"
     assert [line.get_label() for line in panels[0].lines[:2]] == ["motor.w", "hub.w"]
-    assert np.array_equal(panels[1].lines[0].get_ydata(), start_up["clutch.tau"])
     assert [line.get_xdata()[0] for line in panels[1].lines[1:]] == [event.time for event in start_up.events]
-    assert [text.get_text() for text in panels[0].texts] == ["clutch stuck"]
+    assert [text.get_text() for text in panels[0].texts] == ["1"]
+    assert "1  0.2 s  clutch: stuck" in [text.get_text() for text in figure.texts]
+    sliding, stuck = (bar.get_bbox().intervalx for bar in panels[-1].patches)
+    assert [*sliding, *stuck] == pytest.approx([0, 0.2, 0.2, start_up.time[-1]])
+
+
+def test_what_drives_is_positive_and_says_its_sign(start_up: Solution) -> None:
+    (axes,) = plot(start_up, ["clutch.tau", "-clutch.tau", "clutch.flange_a.tau"]).axes[:-1]
+    curves = {line.get_label(): line.get_ydata() for line in axes.lines[:3]}
+    assert list(curves) == ["\u2212clutch.tau", "-clutch.tau", "clutch.flange_a.tau"]
+    for values in curves.values():
+        assert values == pytest.approx(start_up["clutch.flange_a.tau"])
+
+
+def test_formulas_have_units_of_their_own(start_up: Solution) -> None:
+    words = ["clutch.tau*clutch.w_rel", "60*motor.w/(2*pi)", "motor.w*time", "sqrt(table.v**2)", "clutch.loss_power"]
+    found = {one.name: (one.unit, one.values(start_up)) for one in read_signals(start_up.model, words)}
+    t, w = start_up.time, start_up["motor.w"]
+    assert found[words[0]][0] == "W"
+    assert found[words[0]][1] == pytest.approx(start_up["clutch.loss_power"], abs=1e-9)
+    assert found[words[1]][1] == pytest.approx(30 / np.pi * w)
+    assert (found[words[2]][0], found[words[3]][0], found[words[4]][0]) == ("rad", "m/s", "W")
+    assert found[words[2]][1] == pytest.approx(w * t)
+    labels = [axes.get_ylabel() for axes in plot(start_up, words[:1], display={"power": "kW"}).axes]
+    assert labels[0] == "power in kW"
+
+
+@pytest.mark.parametrize(
+    ("word", "kind", "told"),
+    [
+        ("2*motr.w", UnknownName, "'2.0 * motr.w': machine_table_direct has no variable 'motr.w'; did you mean"),
+        ("motor.w + table.s", UnitError, "'motor.w + table.s' mixes rad/s and m."),
+        ("1 s/(2*pi)*motor.w", NetlistError, "'1 s/(2*pi)*motor.w' is neither a quantity nor a formula."),
+        ("2*3", UnknownName, "machine_table_direct has no variable '2*3'."),
+        ("clutch.lost_power", UnknownName, "machine_table_direct has no variable 'clutch.lost_power'"),
+    ],
+)
+def test_wrong_formulas_are_told(start_up: Solution, word: str, kind: type[ModelicaLikeError], told: str) -> None:
+    with pytest.raises(kind) as caught:
+        plot(start_up, [word])
+    assert told in caught.value.what
+
+
+def _texts(figure: Figure) -> Iterator[Text]:
+    """Yield all texts that are drawn."""
+    yield from figure.texts
+    for axes in figure.axes:
+        yield from axes.texts
+        yield from axes.get_legend().get_texts() if axes.get_legend() else []
+        for axis, reach in ((axes.xaxis, axes.get_xlim()), (axes.yaxis, axes.get_ylim())):
+            yield axis.label
+            yield from (one.label1 for one in axis.get_major_ticks() if min(reach) <= one.get_loc() <= max(reach))
+
+
+def clashes(figure: Figure) -> list[tuple[str, str]]:
+    """Return texts that overlap, and those beyond the edge."""
+    figure.dpi = 100
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    boxes = [(one.get_text(), one.get_window_extent(canvas.get_renderer())) for one in _texts(figure)]
+    boxes = [(text, box) for text, box in boxes if text.strip()]
+    edge = figure.bbox.padded(1)
+    outside = [(text, "edge") for text, box in boxes if not edge.x0 <= box.x0 <= box.x1 <= edge.x1
+               or not edge.y0 <= box.y0 <= box.y1 <= edge.y1]  # fmt: skip
+    return outside + [
+        (one, two) for (one, a), (two, b) in combinations(boxes, 2)
+        if min(a.x1, b.x1) - max(a.x0, b.x0) > 1 and min(a.y1, b.y1) - max(a.y0, b.y0) > 1
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "drive", ["launch", "winch", "dc_bench_speed_control", "msl/rotational/Backlash", "msl/translational/PreLoad"]
+)
+def test_no_label_overlaps_another(drive: str) -> None:
+    run = simulate(EXAMPLES / f"{drive}.toml", points=50)
+    assert clashes(run.plot()) == []
+
+
+def test_nothing_is_left_out_without_a_word() -> None:
+    """Every curve, mode and event is drawn, or named or counted below."""
+    run = simulate(EXAMPLES / "lepelletier.toml", points=50)
+    figure = run.plot()
+    said = " ".join(text.get_text() for text in figure.texts)
+    assert "12 angles, 6 signals" in said
+    listed = sum(len(line.split(": ")) - 1 for line in said.split("Not ")[0].splitlines())
+    assert listed >= 24
+    speeds = run.plot("*.w", "*.w_rel")
+    drawn = {line.get_label().lstrip("\u2212") for axes in speeds.axes for line in axes.lines}
+    assert drawn >= {name for name in run.names if name.endswith((".w", ".w_rel"))}
 
 
 def test_a_run_at_rest_is_an_empty_picture(tmp_path: Path) -> None:

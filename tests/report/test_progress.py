@@ -1,6 +1,8 @@
 """The progress bar appears late, and only where the end is known."""
 
 import io
+import sys
+from types import SimpleNamespace
 
 import pytest
 from rich.console import Console
@@ -23,6 +25,25 @@ def test_a_long_run_shows_a_bar(monkeypatch: pytest.MonkeyPatch) -> None:
         bar(0.5)
     assert "simulating" in terminal.getvalue()
     assert "25 %" in terminal.getvalue()
+
+
+def test_a_notebook_shows_a_bar_in_one_place(monkeypatch: pytest.MonkeyPatch) -> None:
+    told: list[str] = []
+    cell = SimpleNamespace(update=told.append)
+    notebook = SimpleNamespace(HTML=str, display=lambda text, display_id: told.append(text) or cell)
+    monkeypatch.setitem(sys.modules, "IPython.display", notebook)
+    monkeypatch.setattr(progress, "_PATIENCE", 0.0)
+    monkeypatch.setattr(progress, "_INTERVAL", 0.0)
+    file = io.StringIO()
+    with Bar("2 s", Console(file=file, force_jupyter=True)) as bar:
+        bar(0.5)
+        bar(1.0)
+    assert told == [
+        'simulating <progress value="0.5" max="2.0"></progress> 25%',
+        'simulating <progress value="1.0" max="2.0"></progress> 50%',
+        "",
+    ]
+    assert file.getvalue() == ""
 
 
 def test_a_file_gets_no_bar(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -66,6 +66,11 @@ def test_sign_of_the_law_of_cosines() -> None:
     assert wrong == pytest.approx(25.42145, rel=1e-6)
 
 
+def test_a_belt_of_unknown_section_or_density_has_no_centrifugal_tension() -> None:
+    for given in ({}, {"section": 2e-5}, {"density": 1200.0}):
+        assert belt_forces(25.0, BELT.wrap_angle, 0.5, 10.0, **given).centrifugal_force == 0.0
+
+
 def test_the_load_is_the_sum_of_both_strands() -> None:
     assert math.hypot(LOAD.along_centres, LOAD.across_centres) == pytest.approx(LOAD.shaft_load, rel=1e-12)
     assert LOAD.doubled_load == pytest.approx(math.hypot(LOAD.shaft_load, 25.0))

@@ -15,6 +15,7 @@ from components.sizing import (
     ravigneaux_assembly,
     ravigneaux_gear,
 )
+from components.sizing.ravigneaux_shafts import lossy_ratios
 
 RPM = math.pi / 30
 TEETH = RavigneauxTeeth(small_sun=21, large_sun=39, short_planet=13, long_planet=10, ring=60)
@@ -212,3 +213,10 @@ def test_efficiency_agrees_with_the_losses_to_first_order() -> None:
 def test_gear_that_does_not_exist() -> None:
     with pytest.raises(ValueError, match="There is no gear '7'; there are 1, 2, 3, 4, 5, 6, R"):
         lepelletier_gear("7", 1.0, 1.0, -1.917, 2.74, -2.24)
+
+
+def test_rolling_powers_that_cancel_but_for_rounding_lose_nothing_at_the_ring() -> None:
+    """What the suns send is their own two meshes and one; the ring's mesh passes 1e-14 of it, whose sign is chance."""
+    for left in (-1e-14, 1e-14):
+        small, large = lossy_ratios(3.0, -2.0, (1.0, -1.0 + left), 0.9)
+        assert (small, large) == (pytest.approx(3.0 * 0.9**2, rel=1e-12), pytest.approx(-2.0 / 0.9, rel=1e-12))

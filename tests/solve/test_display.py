@@ -77,14 +77,14 @@ def test_a_picture_is_in_the_units_of_the_netlist(run: Solution) -> None:
     }
     assert curves["motor.w"] == (pytest.approx(1500), "speed in rpm")
     assert curves["feed.y"] == (pytest.approx(10), "position in mm")
-    assert curves["motor.phi"] == (pytest.approx(18000, rel=1e-6), "angle in deg")
-    assert curves["oil.phi_rel"] == (pytest.approx(-100 * np.pi, rel=1e-6), "angle in rad")
+    assert curves["motor.phi"] == (pytest.approx(18000, rel=1e-6), "angle in \u00b0")
+    assert curves["oil.phi_rel"] == (pytest.approx(-100 * np.pi, rel=1e-6), "relative angle in rad")
     assert curves["motor.flange.tau"] == (pytest.approx(-0.1 * np.pi, rel=1e-6), "torque in kN·m")
     assert curves["wall.flange.tau"] == (pytest.approx(100 * np.pi, rel=1e-6), "torque in N·m")
 
 
 def test_an_argument_wins_over_the_netlist(run: Solution) -> None:
-    (axes,) = run.plot("motor.w", display={"speed": "rad/s"}).axes
+    axes, _ = run.plot("motor.w", display={"speed": "rad/s"}).axes
     assert axes.get_ylabel() == "speed in rad/s"
     assert axes.lines[0].get_ydata()[-1] == pytest.approx(50 * np.pi)
 

@@ -1,6 +1,6 @@
 """Energies are integrated along the run's own results: how precisely, and from how few."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -231,22 +231,13 @@ def test_a_reset_explains_what_changes_with_it() -> None:
     assert [row.at_events for row in balance] == [-12.0]
 
 
-@dataclass
-class Known:
-    """An impact."""
-
-    time: float
-    energy: float
-    component: str = ""
-
-
 def test_energy_at_events_that_nothing_explains() -> None:
     """Jumps of 1 J and 2 J at 1 s and of -5 J at 2 s: what explains one counts at its own time only."""
     times, jumps = np.array([1.0, 1.0, 2.0]), np.array([1.0, 2.0, -5.0])
     near = 2.0 + 1e-12
     assert _unexplained(times, jumps, [], []) == 5.0
     assert _unexplained(times, jumps, [2.0], []) == 3.0
-    assert _unexplained(times, jumps, [near], [Known(1.0, -3.0)]) == 0.0
-    assert _unexplained(times, jumps, [], [Known(near, 5.0)]) == 3.0
-    assert _unexplained(times, jumps, [2.1, 0.9], [Known(1.5, 7.0), Known(9.0, 7.0)]) == 5.0
-    assert _unexplained(times[:0], jumps[:0], [1.0], [Known(1.0, 1.0)]) == 0.0
+    assert _unexplained(times, jumps, [near], [(1.0, -3.0)]) == 0.0
+    assert _unexplained(times, jumps, [], [(near, 5.0)]) == 3.0
+    assert _unexplained(times, jumps, [2.1, 0.9], [(1.5, 7.0), (9.0, 7.0)]) == 5.0
+    assert _unexplained(times[:0], jumps[:0], [1.0], [(1.0, 1.0)]) == 0.0

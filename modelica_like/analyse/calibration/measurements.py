@@ -15,7 +15,8 @@ from modelica_like.analyse.sensitivity.derivatives import sensitivities
 from modelica_like.analyse.sensitivity.outputs import read_output
 from modelica_like.analyse.sensitivity.readings import quick_run
 from modelica_like.compile.compiled import CompiledDae
-from modelica_like.errors import NetlistError, UnknownName, ValueOutOfRange, did_you_mean
+from modelica_like.errors import UnknownName, ValueOutOfRange, did_you_mean
+from modelica_like.solve.measured import read_columns, title_and_unit
 from modelica_like.units import Unit, parse_unit, to_si
 
 _SECOND = parse_unit("s")
@@ -138,29 +139,16 @@ def read_table(table: Any) -> Columns:
         ValueOutOfRange: columns differ in length, or there are none.
     """
     if isinstance(table, str | Path):
-        table = _csv(Path(table))
-    pairs = [(str(name), table[name]) for name in (getattr(table, "variables", None) or table)]
+        return dict(read_columns(Path(table)))
     columns: Columns = {}
-    for title, values in pairs:
-        name, _, unit = title.partition("[")
-        own = getattr(values, "attrs", {}).get("units", "")
-        columns[name.strip()] = np.asarray(values, float).ravel(), unit.rstrip("] ") or own
+    for title in getattr(table, "variables", None) or table:
+        name, unit = title_and_unit(str(title))
+        values = table[title]
+        columns[name] = np.asarray(values, float).ravel(), unit or getattr(values, "attrs", {}).get("units", "")
     lengths = {len(values) for values, _ in columns.values()}
     if len(lengths) != 1 or 0 in lengths:
         raise ValueOutOfRange("Measured columns must have the same length, and at least one row.")
     return columns
-
-
-def _csv(path: Path) -> Mapping[str, Any]:
-    lines = [line for line in path.read_text(encoding="utf-8").splitlines() if line.strip() and line[0] != "#"]
-    titles = [title.strip().strip('"') for title in lines[0].split(",")] if lines else []
-    try:
-        rows = np.array([[float(cell) for cell in line.split(",")] for line in lines[1:]])
-    except ValueError as error:
-        raise NetlistError(f"{path.name} is not a table of numbers: {error}.") from None
-    if rows.ndim != 2 or rows.shape[1] != len(titles):
-        raise NetlistError(f"{path.name}: the rows and the title line differ in their number of columns.")
-    return dict(zip(titles, rows.T, strict=True))
 
 
 def _in_si(model: CompiledDae, columns: Columns) -> dict[str, Matrix]:

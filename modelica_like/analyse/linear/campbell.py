@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from modelica_like.analyse.linear.linearize import At, linearize
+from modelica_like.analyse.linear.pictures import mode_name
 from modelica_like.errors import ValueOutOfRange
 from modelica_like.initialize import call
 from modelica_like.simulation import Model, build
-from modelica_like.solve.style import COLOURS, picture
+from modelica_like.solve.style import COLOURS, numbered, picture, text_width
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -29,16 +30,18 @@ class Crossing:
         mode: number of the curve.
         speed: in rad/s.
         frequency: in Hz.
+        name: components that store most of the energy of the mode.
     """
 
     order: float
     mode: int
     speed: float
     frequency: float
+    name: str = ""
 
     def __str__(self) -> str:
         where = f"{self.frequency:.4g} Hz, {self.speed * _RPM:.5g} rpm"
-        return f"order {self.order:g} meets mode {self.mode + 1} at {where}"
+        return f"order {self.order:g} meets mode {self.mode + 1}{self.name and f' ({self.name})'} at {where}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +54,7 @@ class Campbell:
         speeds: in rad/s, shape (points,).
         eigenvalues: of each mode at each speed in rad/s, complex, shape (modes, points).
         orders: excitations per revolution.
+        modes: for each mode, the components that store most of its energy at the lowest speed.
     """
 
     name: str
@@ -58,6 +62,7 @@ class Campbell:
     speeds: Any = field(repr=False)
     eigenvalues: Any = field(repr=False)
     orders: tuple[float, ...] = (1.0,)
+    modes: tuple[str, ...] = ()
 
     @property
     def frequencies(self) -> Any:
@@ -79,24 +84,31 @@ class Campbell:
                 for k in np.flatnonzero(gap[:-1] * gap[1:] <= 0):
                     share = gap[k] / (gap[k] - gap[k + 1]) if gap[k] != gap[k + 1] else 0.0
                     speed = float(self.speeds[k] + share * (self.speeds[k + 1] - self.speeds[k]))
-                    found.append(Crossing(order, mode, speed, order * speed / (2 * np.pi)))
+                    name = self.modes[mode] if self.modes else ""
+                    found.append(Crossing(order, mode, speed, order * speed / (2 * np.pi), name))
         return tuple(found)
 
     def plot(self) -> Figure:
-        """Draw frequencies over speed with the lines of the orders and their crossings."""
+        """Draw frequencies over speed with the lines of the orders; crossings have numbers, with their text below."""
         rpm, top = self.speeds * _RPM, 1.1 * float(np.nanmax(self.frequencies, initial=1.0))
-        with picture(f"Campbell diagram of {self.name}", 1, 4.2) as (figure, (axes,)):
+        met = sorted(self.crossings(), key=lambda one: one.speed)
+        labels = [f"{k}: {name}" for k, name in enumerate(self.modes or [""] * len(self.frequencies), 1)]
+        legend = 0.5 + max((text_width(label, 8.0) for label in labels), default=0.0)
+        width, below = max(8.0, 5.0 + legend), [[f"{k}  {one}" for k, one in enumerate(met, 1)]]
+        with picture(f"Campbell diagram of {self.name}", 1, 4.2, width=width, below=below) as (figure, (axes,)):
             for mode, curve in enumerate(self.frequencies):
-                axes.plot(rpm, curve, color=COLOURS[mode % len(COLOURS)], label=f"mode {mode + 1}")
+                axes.plot(rpm, curve, color=COLOURS[mode % len(COLOURS)], label=labels[mode])
             for order in self.orders:
                 axes.plot(rpm, order * rpm / 60, color="#888888", linewidth=0.9, linestyle="--")
                 place = 0.97 * min(rpm[-1], 60 * top / order)
                 at = {"xytext": (-4, 2), "textcoords": "offset points", "fontsize": 8, "ha": "right"}
-                axes.annotate(f"{order:g}×", (place, order * place / 60), **at)
-            for one in self.crossings():
+                axes.annotate(f"{order:g}\u00d7", (place, order * place / 60), **at)
+            for one in met:
                 axes.plot(one.speed * _RPM, one.frequency, "o", color="#000000", markersize=4)
+                axes.vlines(one.speed * _RPM, one.frequency, top, color="#999999", linewidth=0.7, linestyle=":")
             axes.set(xlabel=f"{self.speed} in rpm", ylabel="frequency in Hz", ylim=(0, top), xlim=(rpm[0], rpm[-1]))
-            axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
+            axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), title="modes", title_fontsize=8)
+            numbered(axes, [(one.speed * _RPM - rpm[0]) / (rpm[-1] - rpm[0]) for one in met], width - 1.0 - legend)
         return figure
 
     def __str__(self) -> str:
@@ -137,7 +149,9 @@ def campbell(
     curves = [ahead[0][np.argsort(ahead[0].imag, kind="stable")]]
     for values in ahead[1:]:
         curves.append(_nearest(curves[-1], values))
-    return Campbell(model.name, speed, speeds[order], np.array(curves).T, tuple(float(one) for one in orders))
+    known = {one.eigenvalue: mode_name(one) for one in linear[order[0]].modes() if one.oscillates}
+    names = tuple(known[min(known, key=lambda value, mode=mode: abs(value - mode))] for mode in curves[0])
+    return Campbell(model.name, speed, speeds[order], np.array(curves).T, tuple(map(float, orders)), names)
 
 
 def _nearest(before: Any, after: Any) -> Any:

@@ -26,7 +26,7 @@ def point_of(drive: Drive, at: At = None) -> tuple[CompiledDae, Point]:
 
     Args:
         drive: a component, a netlist file, a compiled model, or a solution.
-        at: a time in s, or a kind of start; by default the end of a solution, otherwise the given start.
+        at: a time in s, or a kind of start; by default the end of a solution, otherwise the netlist's start.
 
     Raises:
         ValueOutOfRange: the time is not within the run.
@@ -38,7 +38,8 @@ def point_of(drive: Drive, at: At = None) -> tuple[CompiledDae, Point]:
         return drive.model, drive.point(float(drive.time[-1]) if at is None else float(at))
     model = build(drive)
     if at is None or isinstance(at, str) or at == 0.0:
-        return model, initialize(model, 0.0, _kind(at) if isinstance(at, str) else "given")
+        start = at if isinstance(at, str) else model.settings.get("start", "given")
+        return model, initialize(model, 0.0, _kind(start))
     run = simulate(model, float(at))
     return model, run.point(float(at))
 
@@ -67,9 +68,10 @@ def linearize(
     Args:
         drive: a component, a netlist file, a compiled model, or a solution.
         at: a time in s (of the solution; other drives are simulated up to there), or a start: `given`, `rest`,
-            `steady`. By default the end of a solution, otherwise the given start.
+            `steady`. By default the end of a solution, otherwise the netlist's start.
         inputs: names of inputs and parameters; by default the inputs of the model.
-        outputs: names of variables; by default the outputs of the model, or its states if it has none.
+        outputs: names of variables; by default the outputs of the model, or the variables among its states
+            if it has none.
 
     Raises:
         UnknownName: a name is not known.
@@ -78,7 +80,9 @@ def linearize(
     model, point = point_of(drive, at)
     u_names = tuple(model.flat_variables[k].path for k in model.inputs) if inputs is None else tuple(inputs)
     top = (one.path for one in model.flat_variables if one.kind == "output" and "." not in one.path)
-    y_names = (tuple(top) or model.states) if outputs is None else tuple(outputs)
+    # A state such as der(spring.phi_rel) is the rate of a variable, and no variable itself.
+    states = tuple(name for name in model.states if name in model.position)
+    y_names = (tuple(top) or states) if outputs is None else tuple(outputs)
     columns, nodes = columns_of(model, u_names), nodes_of(model, y_names)
     rates, found = slopes(model, point, "ode"), slopes(model, point, "variables", nodes)
     a, b, c, d = rates.x, rates.theta[:, columns], found.x, found.theta[:, columns]

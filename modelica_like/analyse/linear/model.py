@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Any
 import casadi as ca
 import numpy as np
 
+from modelica_like.analyse.linear.pictures import bode, nyquist
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import extra_module
 from modelica_like.initialize import Point, variable_slopes
 from modelica_like.initialize.slopes import implicit_slopes, nodes_of
 from modelica_like.solve.style import COLOURS, picture
-from modelica_like.upper import upper
+from modelica_like.upper import Shown
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -23,13 +24,10 @@ _STILL = 1e-9
 """Eigenvalues below this share of the largest are zero: motions without a restoring force."""
 _DEFECTIVE = 1e-13
 _SHOWN = 12
-_POINTS = 600
-_DECADES = 1.0
-"""Decades beyond the lowest and highest frequency of the modes."""
 
 
 @dataclass(frozen=True, eq=False)
-class LinearModel:
+class LinearModel(Shown):
     """Small motions about a point: der(x) = A x + B u, y = C x + D u, in deviations from x0, u0, y0.
 
     Attributes:
@@ -86,44 +84,41 @@ class LinearModel:
         Args:
             frequencies: in Hz.
         """
-        s = 2j * np.pi * np.atleast_1d(np.asarray(frequencies, float))
-        eye = np.eye(len(self.states))
-        gains = [self.C @ np.linalg.solve(one * eye - self.A, self.B.astype(complex)) + self.D for one in s]
-        return np.stack(gains, axis=-1)
+        s = 2j * np.pi * np.atleast_1d(np.asarray(frequencies, float))[:, None, None]
+        gains = self.C @ np.linalg.solve(s * np.eye(len(self.states)) - self.A, self.B.astype(complex)) + self.D
+        return np.moveaxis(gains, 0, -1)
 
     def bode(self, frequencies: Any = None) -> Figure:
-        """Draw magnitude and phase of every output by every input.
+        """Draw gain in dB and phase of every output by every input, with the modes by number; of a loop its margins.
 
         Args:
-            frequencies: in Hz; by default around the frequencies of the modes.
+            frequencies: in Hz; by default around those of the modes and margins.
         """
-        from matplotlib.ticker import MultipleLocator
+        return bode(self, None if frequencies is None else np.asarray(frequencies, float))
 
-        oscillations = [mode.frequency for mode in self.modes() if mode.oscillates]
-        f = self._around() if frequencies is None else np.asarray(frequencies, float)
-        gains = self.response(f)
-        curves = [(o, i) for o, i in np.ndindex(gains.shape[:2]) if np.any(gains[o, i])]
-        with picture(f"{self.model.name} at t = {self.time:g} s", 2, 4.6) as (figure, (size, phase)):
-            for k, (o, i) in enumerate(curves):
-                label, colour = f"{self.outputs[o]} by {self.inputs[i]}", COLOURS[k % len(COLOURS)]
-                size.loglog(f, np.abs(gains[o, i]), color=colour, label=label)
-                phase.semilogx(f, np.degrees(np.unwrap(np.angle(gains[o, i]))), color=colour)
-            for one in oscillations:
-                if f[0] <= one <= f[-1]:
-                    size.axvline(one, color="#999999", linewidth=0.8, linestyle=":", zorder=0)
-            units = {f"{self.units[self.outputs[o]]} / ({self.units[self.inputs[i]]})" for o, i in curves}
-            size.set_ylabel(f"gain in {units.pop()}" if len(units) == 1 else "gain")
-            size.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
-            phase.set(ylabel="phase in °", xlabel="frequency in Hz")
-            phase.yaxis.set_major_locator(MultipleLocator(90))
-        return figure
+    def nyquist(self, frequencies: Any = None) -> Figure:
+        """Draw the frequency responses in the complex plane, with the unit circle and the point -1.
 
-    def _around(self) -> Any:
-        """Frequencies around those of the modes, in Hz."""
-        found = np.abs(self.eigenvalues()) / (2 * np.pi)
-        found = found[found > 1e-9 * found.max(initial=1.0)]
+        Args:
+            frequencies: in Hz; by default around those of the modes.
+        """
+        return nyquist(self, self.around(3.0, 3000) if frequencies is None else np.asarray(frequencies, float))
+
+    def around(self, decades: float = 1.0, points: int = 600) -> Any:
+        """Return frequencies around those of the modes in Hz, closer where a mode has little damping.
+
+        Args:
+            decades: below the lowest and above the highest mode.
+            points: number of those that are evenly spread.
+        """
+        values = self.eigenvalues()
+        found = np.abs(values) / (2 * np.pi)
+        found = found[found > _STILL * found.max(initial=1.0)]
         low, high = (found.min(), found.max()) if len(found) else (0.1, 10.0)
-        return np.logspace(np.log10(low) - _DECADES, np.log10(high) + _DECADES, _POINTS)
+        low, high = low / 10**decades, high * 10**decades
+        swings = values[values.imag > 0] / (2 * np.pi)
+        near = (swings.imag[:, None] + swings.real[:, None] * np.linspace(-4, 4, 33)).ravel()
+        return np.unique([*np.geomspace(low, high, points), *near[(near > low) & (near < high)]])
 
     def to_scipy(self) -> Any:
         """Return a scipy.signal.StateSpace.
@@ -215,14 +210,11 @@ class Mode:
 
 
 @dataclass(frozen=True, eq=False)
-class Modes(Sequence[Mode]):
+class Modes(Shown, Sequence[Mode]):
     """All modes of a linear model: oscillations, the slowest first, then real eigenvalues."""
 
     linear: LinearModel = field(repr=False)
     modes: tuple[Mode, ...]
-
-    def _repr_html_(self) -> str:
-        return upper("html")(self)
 
     def __getitem__(self, index: Any) -> Any:
         return self.modes[index]

@@ -13,13 +13,14 @@ from modelica_like.errors import InitializationError, UnknownName, ValueOutOfRan
 from modelica_like.simulation import Model, build
 from modelica_like.solve.solution import Solution
 from modelica_like.solve.style import COLOURS, picture, with_unit
+from modelica_like.upper import Shown
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True, eq=False)
-class Curves:
+class Curves(Shown):
     """Operating points along a curve.
 
     Attributes:

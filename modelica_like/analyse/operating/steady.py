@@ -16,7 +16,7 @@ from modelica_like.initialize.steady import check_modes_hold, solve_steady, stea
 from modelica_like.simulation import Model, build
 from modelica_like.solve.trajectories import Trajectories
 from modelica_like.units import to_si
-from modelica_like.upper import upper
+from modelica_like.upper import Shown
 
 _MAX_NEWTON = 40
 _HALVINGS = 20
@@ -25,7 +25,7 @@ _ENERGY_LOSS, _ENERGY_SOURCE = 1, 2
 
 
 @dataclass(frozen=True, eq=False)
-class OperatingPoint(Mapping[str, float]):
+class OperatingPoint(Shown, Mapping[str, float]):
     """A steady state: all variables, modes and parameters by path, in SI units.
 
     Attributes:
@@ -36,9 +36,6 @@ class OperatingPoint(Mapping[str, float]):
     model: CompiledDae = field(repr=False)
     point: Point = field(repr=False)
     _values: dict[str, float] = field(repr=False)
-
-    def _repr_html_(self) -> str:
-        return upper("html")(self)
 
     def __getitem__(self, path: str) -> float:
         if path not in self._values:

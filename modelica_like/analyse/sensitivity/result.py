@@ -12,7 +12,7 @@ from modelica_like.compile.buffers import Vector
 from modelica_like.errors import UnknownName, did_you_mean, extra_module
 from modelica_like.solve.style import COLOURS, picture
 from modelica_like.units import Unit
-from modelica_like.upper import upper
+from modelica_like.upper import Shown
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -38,7 +38,7 @@ class Quantity:
 
 
 @dataclass(frozen=True, eq=False)
-class Sensitivities:
+class Sensitivities(Shown):
     """Derivatives of outputs by parameters, in SI units.
 
     Attributes:
@@ -60,9 +60,6 @@ class Sensitivities:
     time: Vector = field(default_factory=lambda: np.zeros(0))
     series: Mapping[str, Vector] = field(default_factory=dict)
     left_out: Mapping[str, str] = field(default_factory=dict)
-
-    def _repr_html_(self) -> str:
-        return upper("html")(self)
 
     def __getitem__(self, key: tuple[str, str]) -> float:
         """Derivative of an output by a parameter.
@@ -110,10 +107,12 @@ class Sensitivities:
             most: largest number of parameters.
         """
         quantity = self.outputs[_position(self.outputs, output, "output")]
-        ranking = [(one, derivative) for one, derivative, _ in self.ranking(output) if one.value * derivative][:most]
+        ranking = [(one, derivative) for one, derivative, _ in self.ranking(output) if one.value * derivative]
+        rest = f"Not drawn: {len(ranking) - most} parameters with less effect." if len(ranking) > most else ""
+        ranking = ranking[:most]
         places, unit = np.arange(len(ranking))[::-1], quantity.unit_text
         title = f"{output} = {quantity.value:.6g} {unit}".rstrip()
-        with picture(title, 1, 1.5 + 0.32 * len(ranking)) as (figure, (axes,)):
+        with picture(title, 1, 1.5 + 0.32 * len(ranking), below=[[rest]] if rest else []) as (figure, (axes,)):
             for sign, mark, colour in ((1, "+", COLOURS[0]), (-1, "−", COLOURS[4])):
                 widths = [sign * change * abs(p.value) * d for p, d in ranking]
                 axes.barh(places, widths, height=0.66, color=colour, label=f"parameter {mark}{change:.0%}")

@@ -222,6 +222,7 @@ Result stop_motions(Instance *c, const double *before, Impacts *impacts);
 int guard_active(const Instance *c, int guard);
 double next_moment(Instance *c);
 int find_wanting(Instance *c, unsigned char *wanting, int guards_too);
+void drop_balanced(Instance *c, double *soon);
 Result iterate_events(Instance *c, unsigned char *wanting, int located);
 Result update_discrete(Instance *c, int *restart, double *next);
 double number_or_false(double guard);

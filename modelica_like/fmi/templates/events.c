@@ -65,15 +65,17 @@ int find_wanting(Instance *c, unsigned char *wanting, int guards_too) {
     return any;
 }
 
-/* After a switch, drop state events whose guard is as good as zero at the end of the time resolution: an importer that
-   stops there has them balanced on that edge, and would see them switch back and forth. They come a little later. */
-static void drop_balanced(Instance *c, unsigned char *wanting) {
-    double *soon = c->work.guards /* from find_wanting */, *now = c->work.guards_before;
-    if (c->model->n_guards == 0) return;
+/* Guards as good as zero at the end of the time resolution: an importer that stops there has them balanced on that
+   edge, and would see them switch back and forth. They come a little later: after a switch nobody wants them, and
+   indicators have to agree. `soon` has the guards at that end, and gets those of now instead. */
+void drop_balanced(Instance *c, double *soon) {
+    double *now = c->work.guards_before;
+    int any = 0;
+    for (int k = 0; k < c->model->n_guards; k++) any |= number_or_false(soon[k]) > 0 && guard_active(c, k);
+    if (!any) return;
     evaluate_now(c, &c->model->tapes.guards, now);
     for (int k = 0; k < c->model->n_guards; k++)
-        if (number_or_false(now[k]) < 0 && number_or_false(soon[k]) <= BALANCED * fabs(now[k]))
-            wanting[c->model->guard_transition[k]] = 0;
+        if (number_or_false(now[k]) < 0 && soon[k] > 0 && soon[k] <= BALANCED * fabs(now[k])) soon[k] = now[k];
 }
 
 /* Move the states as little as possible, so that variables that follow from them take new values, or vanish. */
@@ -180,16 +182,21 @@ static Result crowded(Instance *c) {
         c, "Events follow each other ever faster at t = %.12g s. Give the switching a hysteresis, or smooth it.", s->t);
 }
 
+/* Of state events that want to fire, keep those whose guards are positive. */
+static void keep_wanting(Instance *c, const double *soon, unsigned char *wanting) {
+    for (int k = 0; k < c->model->n_guards; k++)
+        if (!(number_or_false(soon[k]) > 0)) wanting[c->model->guard_transition[k]] = 0;
+}
+
 /* Before one of several that hold a motion gives way, let the others take more. */
 static Result share_anew(Instance *c, unsigned char *wanting) {
     double *soon = c->work.guards;
-    if (c->model->n_circuits == 0 || (c->bounded && !anything_shared(c))) return RESULT_OK;
+    if (!anything_shared(c)) return RESULT_OK;
     share(c);
     c->variables_valid = 0;
     if (solve_now(c, 0) != RESULT_OK) return RESULT_ERROR;
     evaluate_now(c, &c->model->tapes.guards_soon, soon);
-    for (int k = 0; k < c->model->n_guards; k++)
-        if (!(number_or_false(soon[k]) > 0)) wanting[c->model->guard_transition[k]] = 0;
+    keep_wanting(c, soon, wanting);
     return RESULT_OK;
 }
 
@@ -227,7 +234,10 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
             return RESULT_ERROR;
         if (update_once(c, impacts, &changes) != RESULT_OK) return RESULT_ERROR;
         memset(wanting, 0, m->n_transitions);
-        if (find_wanting(c, wanting, 1) && !c->bounded) drop_balanced(c, wanting);
+        if (find_wanting(c, wanting, 1) && !c->bounded) {
+            drop_balanced(c, c->work.guards);
+            keep_wanting(c, c->work.guards, wanting);
+        }
     }
     if (changes) return fail(c, "Discrete variables do not settle at t = %.12g s.", s->t);
     return fail(c,

@@ -57,8 +57,10 @@ class Panel {
     const bottom = this.height - BOTTOM, steps = ticks(view.low, view.high, this.width / 110);
     for (const t of steps) this.line(c, t, bottom, "rule");
     c.fillStyle = colour("grey");
-    c.textAlign = "center";
-    for (const t of steps) c.fillText(`${short(t)} s`, this.x(t), this.height - 6);
+    for (const t of steps) {
+      c.textAlign = this.x(t) > this.width - 2 * RIGHT ? "right" : "center";
+      c.fillText(`${short(t)} s`, this.x(t), this.height - 6);
+    }
     this.inside(c, bottom);
     const marks = DATA.events.filter((t) => t >= view.low && t <= view.high);
     if (marks.length <= MOST_MARKS) for (const t of marks) this.line(c, t, bottom, "grey", [2, 4]);

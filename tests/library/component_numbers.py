@@ -1,37 +1,18 @@
-"""The small netlists of examples/components: each runs, keeps its energy, and gives the numbers of its closed forms."""
+"""Closed forms of the netlists of examples/components."""
 
-from collections.abc import Callable
-from functools import lru_cache
 from math import atan, cos, exp, log, pi, sin, sqrt, tan, tanh
-from pathlib import Path
 
+import closed_forms
 import numpy as np
 import pytest
+from closed_forms import close
 from scipy.integrate import quad
 from scipy.linalg import expm
 from scipy.special import sici
 
-from modelica_like import simulate
 from modelica_like.solve.solution import Solution
 
-ROOT = Path(__file__).parents[2]
-FOLDER = ROOT / "examples" / "components"
-PAGE = ROOT / "docs" / "examples" / "components.md"
-NUMBERS: dict[str, Callable[[Solution], None]] = {}
-
-
-def numbers(check: Callable[[Solution], None]) -> Callable[[Solution], None]:
-    NUMBERS[check.__name__] = check
-    return check
-
-
-@lru_cache
-def run_of(name: str) -> Solution:
-    return simulate(FOLDER / f"{name}.toml", rtol=1e-9)
-
-
-def close(value: object) -> object:
-    return pytest.approx(value, rel=1e-6, abs=1e-9)
+numbers = closed_forms.numbers("components")
 
 
 @numbers
@@ -370,23 +351,3 @@ def commutation(run: Solution) -> None:
     assert run.energy()["motor"].source == close(voltage**2 / 8 * square * 0.06)
     induced = run["generator.v_induced"]
     assert [np.max(induced), np.min(induced)] == close([voltage * half / sin(half), voltage * half / tan(half)])
-
-
-def test_every_netlist_has_numbers_and_a_line_on_the_page() -> None:
-    names = {path.stem for path in FOLDER.glob("*.toml")}
-    others = (Path(__file__).parent / "test_mover_examples.py").read_text(encoding="utf-8")
-    assert {name for name in names if f"def {name}(run" not in others} == NUMBERS.keys()
-    text = PAGE.read_text(encoding="utf-8")
-    assert [name for name in sorted(names) if f"../../examples/components/{name}.toml" not in text] == []
-
-
-@pytest.mark.parametrize("name", NUMBERS)
-def test_closed_form(name: str) -> None:
-    NUMBERS[name](run_of(name))
-
-
-@pytest.mark.parametrize("name", NUMBERS)
-def test_energy_closes(name: str) -> None:
-    energy = run_of(name).energy()
-    assert energy.throughput > 0
-    assert energy.closure < 1e-8

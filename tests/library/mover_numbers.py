@@ -1,33 +1,16 @@
-"""The netlists of examples/components with controls, batteries, engines, vehicles and electrical machines."""
+"""Closed forms of examples/components with controls, batteries, engines, vehicles and electrical machines."""
 
-from collections.abc import Callable
-from functools import lru_cache
 from math import asin, cos, exp, log, pi, sin, sqrt
-from pathlib import Path
 
+import closed_forms
 import numpy as np
 import pytest
+from closed_forms import close
 from scipy.integrate import quad
 
-from modelica_like import simulate
 from modelica_like.solve.solution import Solution
 
-FOLDER = Path(__file__).parents[2] / "examples" / "components"
-NUMBERS: dict[str, Callable[[Solution], None]] = {}
-
-
-def numbers(check: Callable[[Solution], None]) -> Callable[[Solution], None]:
-    NUMBERS[check.__name__] = check
-    return check
-
-
-@lru_cache
-def run_of(name: str) -> Solution:
-    return simulate(FOLDER / f"{name}.toml", rtol=1e-9)
-
-
-def close(value: object) -> object:
-    return pytest.approx(value, rel=1e-6, abs=1e-9)
+numbers = closed_forms.numbers("components")
 
 
 @numbers
@@ -151,15 +134,3 @@ def electric_drives(run: Solution) -> None:
     assert [run.final["shorted.i_d"], run.final["shorted.i_q"]] == close([i_d, i_q])
     assert run.final["spindle.w"] == pytest.approx(1200, rel=1e-6)
     assert run.final["servo.i_d"] < -50
-
-
-@pytest.mark.parametrize("name", NUMBERS)
-def test_closed_form(name: str) -> None:
-    NUMBERS[name](run_of(name))
-
-
-@pytest.mark.parametrize("name", NUMBERS)
-def test_energy_closes(name: str) -> None:
-    energy = run_of(name).energy()
-    assert energy.throughput > 0
-    assert energy.closure < 1e-8

@@ -1,38 +1,19 @@
-"""The netlists of examples/elements: each runs, keeps its energy, and gives the numbers of its closed forms."""
+"""Closed forms of the netlists of examples/elements."""
 
-from collections.abc import Callable
-from functools import lru_cache
 from math import acos, atan, cos, cosh, exp, log, pi, radians, sin, sqrt, tan
-from pathlib import Path
 
+import closed_forms
 import numpy as np
 import pytest
+from closed_forms import close
 from scipy.integrate import quad
 from scipy.linalg import expm
 from scipy.optimize import brentq
 from scipy.special import ellipk
 
-from modelica_like import simulate
 from modelica_like.solve.solution import Solution
 
-ROOT = Path(__file__).parents[2]
-FOLDER = ROOT / "examples" / "elements"
-PAGE = ROOT / "docs" / "examples" / "elements.md"
-NUMBERS: dict[str, Callable[[Solution], None]] = {}
-
-
-def numbers(check: Callable[[Solution], None]) -> Callable[[Solution], None]:
-    NUMBERS[check.__name__] = check
-    return check
-
-
-@lru_cache
-def run_of(name: str) -> Solution:
-    return simulate(FOLDER / f"{name}.toml", rtol=1e-9)
-
-
-def close(value: object) -> object:
-    return pytest.approx(value, rel=1e-6, abs=1e-9)
+numbers = closed_forms.numbers("elements")
 
 
 def moment(run: Solution, mode: str, after: str) -> float:
@@ -255,22 +236,3 @@ def machine_loads(run: Solution) -> None:
     pressing = 15 + (24 + 50) * cos(radians(10))
     torque = 3500 - 0.4 * 60 * 9.80665 * (1.6 * 0.025 * pressing + 50 * sin(radians(10)))
     assert run.final["conveyor.w"] == close(torque / (60 * (24 + 15 + 50) * 0.16) * 0.5)
-
-
-def test_every_netlist_has_numbers_and_a_line_on_the_page() -> None:
-    names = {path.stem for path in FOLDER.glob("*.toml")}
-    assert names == NUMBERS.keys()
-    text = PAGE.read_text(encoding="utf-8")
-    assert [name for name in sorted(names) if f"../../examples/elements/{name}.toml" not in text] == []
-
-
-@pytest.mark.parametrize("name", NUMBERS)
-def test_closed_form(name: str) -> None:
-    NUMBERS[name](run_of(name))
-
-
-@pytest.mark.parametrize("name", NUMBERS)
-def test_energy_closes(name: str) -> None:
-    energy = run_of(name).energy()
-    assert energy.throughput > 0
-    assert energy.closure < 1e-8
