@@ -20,7 +20,7 @@ INITIAL_EQUATION = "the initial equation"
 
 @dataclass(frozen=True, slots=True)
 class FlatVariable:
-    """A continuous variable.
+    """A continuous variable; no user has declared a hidden one.
 
     `kind` is local, output, input, potential or flow; `driving` and `difference` are those of `Variable`.
     """
@@ -36,6 +36,7 @@ class FlatVariable:
     max: float | None
     driving: int = 1
     difference: bool = False
+    hidden: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -139,8 +139,9 @@ class Trajectories(Shown, ABC):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Paths of all variables, modes and discrete values."""
-        return (*self.model.position, *self.model.discrete_position)
+        """Paths of all variables, modes and discrete values that somebody has declared."""
+        every = (*self.model.flat_variables, *self.model.flat_discretes)
+        return tuple(one.path for one in every if not one.hidden)
 
     def unit_of(self, name: str) -> str:
         """Return the coherent SI unit of a variable; that of a mode is `1`."""

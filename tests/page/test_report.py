@@ -137,6 +137,7 @@ def test_a_gradient_that_does_not_exist_is_told() -> None:
     drive = load(EXAMPLES / "components" / "h_bridge.toml")
     told = report(drive, simulate(drive)).partition("What matters</h2>")[2].partition("</section>")[0]
     assert told.startswith("<p>No gradient at t = 0.28 s: load.load changes from empty to reversed where its condition")
+    assert ".py:" not in told
 
 
 def test_parameters_are_listed_with_units(page: Path) -> None:
