@@ -79,7 +79,7 @@ def bands_of(run: Trajectories, wanted: Sequence[str] = ()) -> tuple[list[Bands]
     for one in holds:
         mode = run.model.flat_discretes[one.mode]
         held.setdefault(mode.path, set()).add(mode.names[one.number])
-    paths = list(wanted) or list(dict.fromkeys(event.mode for event in run.events))
+    paths = list(wanted) or list(dict.fromkeys(event.mode for event in _declared(run)))
     if not wanted and len(paths) > _MOST_BANDS and any(path in held for path in paths):
         paths = [path for path in paths if path in held]
     most = len(paths) if wanted else _MOST_HELD
@@ -88,6 +88,12 @@ def bands_of(run: Trajectories, wanted: Sequence[str] = ()) -> tuple[list[Bands]
     least = _SHORT * float(run.time[-1] - run.time[0])
     spans = {path: tuple(one for one in mode_spans(run, path) if one[1] - one[0] > least) for path in paths[:most]}
     return [Bands(p, some, names.get(p, ()), frozenset(held.get(p, ()))) for p, some in spans.items()], left
+
+
+def _declared(run: Trajectories) -> list[Event]:
+    """Return the changes of modes that a user has declared."""
+    hidden = {one.path for one in run.model.flat_discretes if one.hidden}
+    return [event for event in run.events if event.mode not in hidden]
 
 
 def mode_spans(run: Trajectories, mode: str) -> tuple[tuple[float, float, str], ...]:
@@ -111,7 +117,7 @@ def marks_of(run: Trajectories, banded: Sequence[str]) -> tuple[list[Mark], list
         banded: modes that are drawn as bands; with many events they come first, and of them those that change seldom.
     """
     by_mode: dict[str, list[Event]] = {}
-    for event in run.events:
+    for event in _declared(run):
         by_mode.setdefault(event.mode, []).append(event)
     seen, left = set[str](), dict[str, int]()
     kept: list[Event] = []

@@ -155,7 +155,7 @@ def usual(solution: Trajectories, units: Sequence[str], *, slips: bool = False) 
     model, found = solution.model, dict[bytes, str]()
     wanted = getattr(model, "settings", {}).get("display", {})
     for unit in units:
-        some = [one.path for one in model.flat_variables if one.kind in ("local", "output") and str(one.unit) == unit]
+        some = [one.path for one in _of_parts(solution) if str(one.unit) == unit]
         signs = {one.name: one.driving for one in named(model, some)}
         for path, values in solution.together(*some).items():
             if np.any(values) and (slips or unit != "m" or not path.endswith("_rel")):
@@ -179,9 +179,14 @@ def quantity(unit: str) -> str:
     return QUANTITIES.get(unit, "value")
 
 
+def _of_parts(solution: Trajectories) -> list[Any]:
+    """Return the variables of parts without their connectors and inputs."""
+    return [one for one in solution.model.flat_variables if one.kind in ("local", "output") and not one.hidden]
+
+
 def _quantities_left(solution: Trajectories) -> list[str]:
     """Count the variables of parts with a unit that is not among the usual ones."""
-    units = [str(one.unit) for one in solution.model.flat_variables if one.kind in ("local", "output")]
+    units = [str(one.unit) for one in _of_parts(solution)]
     names = [QUANTITIES.get(unit, "signal") for unit in units if unit not in _USUAL]
     counts = {name: names.count(name) for name in names}
     return [f"{count} {name if count == 1 else _plural(name)}" for name, count in counts.items()]

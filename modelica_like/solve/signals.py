@@ -80,7 +80,7 @@ def read_signals(model: Any, words: Iterable[str]) -> list[Signal]:
     """
     known = _units(model)
     terms = {f"{one}.{term}" for one in getattr(model, "components", ()) for term in ENERGY_TERMS}
-    names = [one.path for one in (*model.flat_variables, *model.flat_discretes)]
+    names = [one.path for one in (*model.flat_variables, *model.flat_discretes) if not one.hidden]
     signs = {one.path: getattr(one, "driving", 1) for one in model.flat_variables}
     found: dict[str, Signal] = {}
     for word in words:
