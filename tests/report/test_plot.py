@@ -15,7 +15,21 @@ from matplotlib.text import Text
 from components import Fixed, Inertia, SpringDamper
 from modelica_like import Solution, build, simulate
 from modelica_like.errors import ModelicaLikeError, NetlistError, UnitError, UnknownName
-from modelica_like.language import Assembly
+from modelica_like.language import (
+    Assembly,
+    Component,
+    Discrete,
+    Equations,
+    Events,
+    Parameter,
+    Variable,
+    der,
+    integer,
+    param,
+    pre,
+    var,
+    when,
+)
 from modelica_like.solve.plot import chosen, plot, save_plot
 from modelica_like.solve.signals import read_signals
 
@@ -162,6 +176,31 @@ def test_nothing_is_left_out_without_a_word() -> None:
     speeds = run.plot("*.w", "*.w_rel")
     drawn = {line.get_label().lstrip("\u2212") for axes in speeds.axes for line in axes.lines}
     assert drawn >= {name for name in run.names if name.endswith((".w", ".w_rel"))}
+
+
+class Counted(Component):
+    """Counts when it has turned once, by a relation that only the solver knows."""
+
+    phi: Variable = var("1", "turns", state="always", default=0.0)
+    rate: Parameter = param("1/s", "turns a second", default=2.0)
+    passed: Discrete = integer("passes", start=0)
+
+    def equations(self) -> Equations:
+        yield der(self.phi) == self.rate
+
+    def events(self) -> Events:
+        yield when(self.phi > 1.0, {self.passed: pre(self.passed) + 1})
+
+
+def test_what_no_user_has_declared_is_not_drawn() -> None:
+    run = simulate(Assembly("counter", parts={"counted": Counted()}), 1.0)
+    hidden = {one.path for one in run.model.flat_discretes if one.hidden}
+    assert hidden
+    figure = run.plot("counted.*")
+    said = [text.get_text() for text in _texts(figure)]
+    assert not [text for text in said for path in hidden if path in text]
+    drawn = {line.get_label(): line.get_ydata() for axes in figure.axes for line in axes.lines}
+    assert drawn["counted.passed"][-1] == 1
 
 
 def test_a_run_at_rest_is_an_empty_picture(tmp_path: Path) -> None:
