@@ -169,6 +169,15 @@ class Component(Declared):
         store[field.name] = understood
 
     @classmethod
+    def _hint(cls, name: str) -> str:
+        return next(str(_annotated(base)[name]) for base in cls.__mro__ if name in _annotated(base))
+
+    @classmethod
+    def choices(cls, name: str) -> list[str]:
+        """Return the texts that a structural field can be; empty if it can be any."""
+        return hint[9:-2].split("', '") if (hint := cls._hint(name)).startswith("Literal[") else []
+
+    @classmethod
     def check_structural(cls, name: str, value: Any) -> None:
         """Check that the value for a structural field has the type of its default.
 
@@ -181,10 +190,9 @@ class Component(Declared):
             return
         if type(value) is int and abs(value) > _MOST:  # it may be a number of parts to create
             raise NetlistError(f"{cls.__name__}.{name} is larger than {_MOST}; no drive has that many parts.")
-        hint = next(str(_annotated(base)[name]) for base in cls.__mro__ if name in _annotated(base))
-        if hint.startswith("Literal[") and value not in (choices := hint[9:-2].split("', '")):
+        default, hint = cls._structural[name], cls._hint(name)
+        if (choices := cls.choices(name)) and value not in choices:
             raise NetlistError(f"{cls.__name__}.{name} = {value!r} must be {' or '.join(choices)}.")
-        default: Any = cls._structural[name]
         wanted: Any = next((k for k in _PLAIN if hint == k.__name__), object) if default is REQUIRED else type(default)
         fits = isinstance(value, wanted) and isinstance(value, bool) == (wanted is bool)
         if wanted in _PLAIN and not fits and not (wanted is float and type(value) is int):

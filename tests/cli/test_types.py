@@ -109,7 +109,7 @@ def test_the_library_is_filtered(run: CliRunner, words: list[str]) -> None:
 
 def test_a_group_or_a_word_that_is_not_there_is_told(run: CliRunner) -> None:
     assert "There is no group 'gear'; did you mean 'gears'?" in run.invoke(app, ["library", "--group", "gear"]).stderr
-    assert "No component type has 'gearz' in its text." in run.invoke(app, ["library", "gearz"]).stderr
+    assert "No component type has 'gearz' in its name or text." in run.invoke(app, ["library", "gearz"]).stderr
 
 
 def test_the_schema_is_a_schema(run: CliRunner) -> None:
@@ -140,6 +140,9 @@ def test_the_schema_is_a_schema(run: CliRunner) -> None:
         ({"is": "Inertia", "J": 1, "w": "50 Hz"}, False),
         ({"is": "Clutch", "mu_pos": [["50 rpm", 0.1], ["1 N.m", 0.2]]}, False),
         ({"is": "Clutch", "mode": "stuk"}, False),
+        ({"is": "Clutch", "extrapolate": "error", "smooth": True}, True),
+        ({"is": "Clutch", "extrapolate": "quadratic"}, False),
+        ({"is": "Clutch", "smooth": 1}, False),
     ],
 )
 def test_the_schema_knows_right_from_wrong(run: CliRunner, part: dict[str, object], is_right: bool) -> None:
