@@ -12,18 +12,20 @@ from modelica_like.language import (
     Events,
     Expr,
     Input,
-    Mode,
     Output,
     Parameter,
+    clock,
     cos,
     discrete,
     floor,
+    integer,
     log,
-    maximum,
     param,
+    pre,
     signal_in,
     signal_out,
     sqrt,
+    when,
     where,
 )
 
@@ -36,8 +38,7 @@ class Sampled(Component, partial=True):
     period: Parameter = param("s", "time between two samples", min=1e-12)
     start_time: Parameter = param("s", "time of the first sample", default=0.0)
     y: Output = signal_out("*", "signal")
-    number: Discrete = discrete("1", "number of samples so far")
-    clock = Mode("running", description="each sample is an event")
+    number: Discrete = integer("number of samples so far")
 
     def held(self) -> Expr:
         """Return the value since the last sample."""
@@ -51,11 +52,7 @@ class Sampled(Component, partial=True):
         yield self.y == where(self.number > 0, self.held(), 0)
 
     def events(self) -> Events:
-        # A run may start late: then all earlier samples count as taken at once.
-        passed = floor((self.time - self.start_time) / self.period) + 1
-        taken = {self.number: maximum(self.number + 1, passed)}
-        following = self.start_time + self.number * self.period
-        yield self.clock.go("running", "running", at=following, reset={**taken, **self.sample()})
+        yield when(clock(self.period, self.start_time), {self.number: pre(self.number) + 1, **self.sample()})
 
 
 class ZeroOrderHold(Sampled):
@@ -86,7 +83,7 @@ class FrequencyMeter(ZeroOrderHold):
         return self.k * (self.last - self.before) / self.period
 
     def sample(self) -> dict[Expr, Expr]:
-        return {self.last: self.u, self.before: self.last}
+        return {self.last: self.u, self.before: pre(self.last)}
 
 
 class Noise(Sampled, partial=True):
@@ -116,7 +113,7 @@ class UniformNoise(Noise):
         return self.y_min + (self.y_max - self.y_min) * self.state / _MODULUS
 
     def sample(self) -> dict[Expr, Expr]:
-        return {self.state: self.next_state(self.state)}
+        return {self.state: self.next_state(pre(self.state))}
 
 
 class NormalNoise(Noise):
@@ -130,4 +127,4 @@ class NormalNoise(Noise):
         return self.mu + self.sigma * radius * cos(2 * pi * self.next_state(self.state) / _MODULUS)
 
     def sample(self) -> dict[Expr, Expr]:
-        return {self.state: self.next_state(self.next_state(self.state))}
+        return {self.state: self.next_state(self.next_state(pre(self.state)))}

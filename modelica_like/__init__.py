@@ -114,6 +114,7 @@ _OFFERED |= {
     "NativeLoop": "modelica_like.native.run",
     "html": "modelica_like.report.notebook",
     "icon": "modelica_like.draw",
+    "load_modelica": "modelica_like.modelica_text.read",
     "mathematics": "modelica_like.report.mathematics",
     "plot": "modelica_like.solve.plot",
     "sankey": "modelica_like.solve.sankey",

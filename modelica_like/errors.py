@@ -106,6 +106,10 @@ class NetlistError(ModelicaLikeError):
     """A netlist file cannot be read, or does not have the form of a netlist."""
 
 
+class ModelicaTextError(NetlistError):
+    """A Modelica text cannot be read, or uses what is not supported."""
+
+
 class CyclicAssembly(NetlistError):
     """A netlist contains itself, or parameters depend on each other cyclically."""
 

@@ -27,7 +27,7 @@ TASKS = {
     },
     "Give it to other tools": {
         "export": "export", "runtimes": "export", "validate": "validation", "split": "cosimulation",
-        "cosim": "cosimulation",
+        "cosim": "cosimulation", "from-modelica": "modelica", "to-modelica": "modelica",
     },
 }  # fmt: skip
 _HOME = {name: home for commands in TASKS.values() for name, home in commands.items()}
@@ -35,7 +35,7 @@ _HOME = {name: home for commands in TASKS.values() for name, home in commands.it
 
 def command(name: str) -> Callable[..., None]:
     """Return the function of a command."""
-    return getattr(import_module(f"modelica_like.cli.{_HOME[name]}"), name)
+    return getattr(import_module(f"modelica_like.cli.{_HOME[name]}"), name.replace("-", "_"))
 
 
 def __getattr__(name: str) -> Any:

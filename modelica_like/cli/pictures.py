@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from modelica_like.cli.declare import Option
+from modelica_like.cli.declare import Argument, Option
 from modelica_like.cli.shared import Assignments, Debug, Netlist, Show, Until, load_netlist, say, told
+from modelica_like.errors import NetlistError
 
 
 def draw(
@@ -33,19 +34,28 @@ def draw(
 
 
 def report(
-    netlist: Netlist, assignments: Assignments = None, *,
+    source: Annotated[Path, Argument(metavar="NETLIST", help="Netlist, FMU, system or CSV file.", show_default=False)],
+    assignments: Assignments = None, *,
     output: Annotated[Path | None, Option("--output", "-o", metavar="FILE", help="By default DRIVE.html.")] = None,
     until: Until = None, show: Show = None, debug: Debug = False,
 ) -> None:  # fmt: skip
     """Simulate a netlist and write a page about it: schematic, events, curves, energies, numbers."""
-    path = output or Path(f"{netlist.stem}.html")
+    path = output or Path(f"{source.stem}.html")
     with told(debug, files=[path]):
-        drive = load_netlist(netlist, assignments)
+        from modelica_like.cosimulation.files import describes_system
         from modelica_like.report.page import save_report
         from modelica_like.report.progress import Bar
-        from modelica_like.simulation import build, simulate
+        from modelica_like.report.sources import trajectories
+        from modelica_like.simulation import build, seconds, simulate
         from modelica_like.solve.trajectories import matching
 
+        if source.suffix.lower() != ".toml" or describes_system(source):
+            if assignments:
+                raise NetlistError(f"--set changes netlists; '{source.name}' is none.")
+            save_report(None, trajectories(source, seconds(until) if until else None), path, show=show or ())
+            say(str(path))
+            return
+        drive = load_netlist(source, assignments)
         model = build(drive)
         matching(model, show or ())
         with Bar(until or model.settings.get("until")) as bar:

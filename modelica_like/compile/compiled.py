@@ -36,6 +36,18 @@ class Reset:
     target: int
 
 
+@dataclass(frozen=True)
+class CompiledUpdate:
+    """What gets the value of a row of `CompiledDae.updates`, and whether it also does so when start values are found.
+
+    `source` is the place of its equation or `when`.
+    """
+
+    reset: Reset
+    at_start: bool
+    source: Source
+
+
 CompiledTransition = TransitionForm[int, Reset]
 """A transition as numbers."""
 
@@ -71,6 +83,8 @@ class CompiledDae:
         guards_soon: guards one time resolution later.
         moments: times of the time events.
         resets: new values at events.
+        updates: what discrete variables, and variables in a `when`, become in one iteration of an event; as many as
+            `update_rows`.
         reset_nodes: variables with a reset that are neither states nor discrete.
         start_conditions: one per choice of a start mode.
         hold_terms: gain (zero where nothing is held), capacities forward and backward, and restitution of every held
@@ -107,6 +121,8 @@ class CompiledDae:
     guards_soon: ca.Function
     moments: ca.Function
     resets: ca.Function
+    updates: ca.Function
+    update_rows: tuple[CompiledUpdate, ...]
     reset_nodes: tuple[int, ...]
     start_conditions: ca.Function
     hold_terms: ca.Function

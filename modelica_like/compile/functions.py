@@ -19,6 +19,7 @@ from modelica_like.compile.compiled import (
 from modelica_like.compile.energy import energy_terms
 from modelica_like.compile.soon import guards_soon
 from modelica_like.compile.start_system import start_system
+from modelica_like.compile.updates import updates
 from modelica_like.errors import Source
 from modelica_like.flatten.model import FlatDiscrete, FlatModel, evaluate
 from modelica_like.language.fields import Input
@@ -38,7 +39,7 @@ def compile(reduced: ReducedDae) -> CompiledDae:
     """Build the functions of a reduced system."""
     flat = reduced.flat
     build = _Builder(reduced)
-    functions, transitions, targets, start_modes = build.functions()
+    functions, tables = build.functions()
     return CompiledDae(
         name=flat.name,
         states=reduced.states,
@@ -50,9 +51,7 @@ def compile(reduced: ReducedDae) -> CompiledDae:
         inputs=tuple(flat.inputs),
         **functions,
         derived=ca.Function("derived", [flat.p], [ca.densify(ca.SX(flat.formulas))], ["p"], ["derived"]),
-        reset_nodes=tuple(targets),
-        transitions=transitions,
-        start_modes=start_modes,
+        **tables,
         starts=tuple(StartEntry(s.node, reduced.node_states[s.node], s.strength) for s in flat.starts),
         holds=reduced.holds,
         circuits=reduced.circuits,
@@ -140,10 +139,11 @@ class _Builder:
         result = expression if name == "alg_jacobian" else ca.densify(ca.SX(expression))
         return ca.Function(name, self.arguments, [result], ["t", "x", "z", "p", "u", "d"], [name])
 
-    def functions(self) -> tuple[dict[str, ca.Function], tuple[CompiledTransition, ...], list[int], StartModes]:
+    def functions(self) -> tuple[dict[str, ca.Function], dict[str, Any]]:
         """Return the functions of (t, x, z, p, u, d) by name, and the tables of events."""
         reduced, flat = self.reduced, self.reduced.flat
         guards, moments, transitions, resets, targets = self.transitions()
+        news, update_rows = updates(reduced, lambda path, number: self._reset(path, number, targets))
         conditions, start_modes = self.start_modes()
         expressions = {
             "ode": reduced.ode,
@@ -155,6 +155,7 @@ class _Builder:
             "guards_soon": guards_soon(reduced, guards),
             "moments": moments,
             "resets": resets,
+            "updates": news,
             "start_conditions": conditions,
             "hold_terms": ca.vec(hold_terms(flat, reduced.values).T),
             "start_values": ca.vertcat(*(ca.SX(s.value) for s in flat.starts)),
@@ -162,7 +163,8 @@ class _Builder:
             "determinants": ca.vertcat(*(expression for _, _, expression in reduced.determinants)),
         }
         functions = {name: self.function(name, expression) for name, expression in expressions.items()}
-        return functions, transitions, targets, start_modes
+        tables = {"transitions": transitions, "update_rows": update_rows, "reset_nodes": tuple(targets)}
+        return functions, tables | {"start_modes": start_modes}
 
     def transitions(self) -> tuple[Any, Any, tuple[CompiledTransition, ...], Any, list[int]]:
         """Return guards, moments, transitions, reset values and reset nodes of all instances."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
 from typing import Any, cast
 
@@ -11,6 +12,7 @@ from modelica_like.errors import ComponentUnbalanced, ModelicaLikeError, raise_t
 from modelica_like.flatten.dimensions import Dimensions, check_equation, check_expression
 from modelica_like.language.component import Component
 from modelica_like.language.declared import Declared
+from modelica_like.language.discrete import Pre
 from modelica_like.language.equation import Equation
 from modelica_like.language.expr import TIME, symbols_in
 from modelica_like.language.fields import Field, Input, Parameter, Variable
@@ -81,13 +83,16 @@ def _driven_input(component: Component, equations: list[Equation]) -> str:
     return next((path.removeprefix(f"{own}.") for path in paths), "")
 
 
-def check_units(component: Component, equations: list[Equation], events: list[Any]) -> dict[str, Unit]:
+def check_units(
+    component: Component, equations: list[Equation], events: Sequence[Any], updates: Sequence[Any]
+) -> dict[str, Unit]:
     """Check every equation; return the units that `*` outputs take from their equations.
 
     Args:
         component: of the class to check.
         equations: its own.
         events: its transitions and start modes.
+        updates: new values at events.
 
     Raises:
         UnitMismatch, LanguageError: all errors, reported together.
@@ -102,7 +107,8 @@ def check_units(component: Component, equations: list[Equation], events: list[An
         try:
             check(*arguments)
         except ModelicaLikeError as error:
-            errors.append(error)
+            if str(error) not in map(str, errors):  # both directions of a relation have the same one
+                errors.append(error)
 
     for equation in equations:
         attempt(_infer, component, equation, dimensions, inferred)
@@ -114,6 +120,9 @@ def check_units(component: Component, equations: list[Equation], events: list[An
             attempt(check_expression, event.at, _SECOND, dimensions, f"{kind}, time of an event", event.source)
         for target, value in getattr(event, "reset", {}).items():
             attempt(check_equation, target, ca.SX(value), dimensions, kind, event.source)
+    for one in updates:
+        attempt(check_expression, one.active, ONE, dimensions, f"{kind}, condition", one.source)
+        attempt(check_equation, ca.SX(one.target), ca.SX(one.value), dimensions, kind, one.source)
     for label, term, unit in (
         ("stored_energy", component.stored_energy(), _JOULE),
         ("loss_power", component.loss_power(), _WATT),
@@ -127,9 +136,10 @@ def check_units(component: Component, equations: list[Equation], events: list[An
 
 def _unit_of_leaf(component: Component, inferred: dict[str, Unit], leaf: Any) -> Unit:
     symbol = symbols_in(leaf)[0]
+    symbol = symbol.of if isinstance(symbol, Pre) else symbol
     if symbol is TIME:
         return _SECOND
-    if not isinstance(symbol.owner.fields.get(symbol.name), Field):
+    if symbol.owner is None or not isinstance(symbol.owner.fields.get(symbol.name), Field):
         return ONE
     unit = unit_of_field(symbol.owner, symbol.name)
     if unit == ANY and symbol.owner is component:

@@ -7,6 +7,7 @@ from typing import Any
 import casadi as ca
 
 from modelica_like.errors import LanguageError, Source
+from modelica_like.language.discrete import moves
 
 JUST_TRUE = 1e-300
 """Guard of a relation with equality, where both sides are equal."""
@@ -40,6 +41,8 @@ def guard_of(condition: Any, source: Source, *, negated: bool = False) -> Any:
     if operation in (ca.OP_EQ, ca.OP_NE):
         # Between events a mode is constant: its conditions are plainly on or off.
         return ca.if_else(condition, -1.0, 1.0) if negated else ca.if_else(condition, 1.0, -1.0)
+    if operation == ca.OP_PARAMETER and not moves(condition):
+        return guard_of(condition != 0, source, negated=negated)
     raise LanguageError(
         "The condition of a transition is not a relation.",
         where=source,

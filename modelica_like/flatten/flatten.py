@@ -17,7 +17,9 @@ from modelica_like.errors import (
     raise_together_or_one,
 )
 from modelica_like.flatten.checks import unit_of_field
+from modelica_like.flatten.discrete import Hidden
 from modelica_like.flatten.model import (
+    INITIAL_EQUATION,
     Coefficient,
     FlatDiscrete,
     FlatModel,
@@ -32,6 +34,7 @@ from modelica_like.flatten.template import Template, template_of
 from modelica_like.flatten.wiring import Wiring
 from modelica_like.language.component import Component
 from modelica_like.language.declared import Declared
+from modelica_like.language.discrete import INITIAL
 from modelica_like.language.expr import TIME, flagged_motion
 from modelica_like.language.fields import Discrete, Input, Output, Parameter, Variable
 from modelica_like.units import ONE, coherent
@@ -73,13 +76,18 @@ class _Flattener:
         self.starts: list[StartValue] = []
         self.inputs: list[int] = []
         self.flags: list[tuple[Any, int]] = []
+        self.pres: dict[int, int] = {}
         self.errors: list[ModelicaLikeError] = []
 
     def run(self) -> FlatModel:
         templates = self._elaborate()
-        used = {self._owner(component, name) for component, template in templates for name in template.discretes}
-        for component, _ in templates:
+        used = {self._owner(one, _plain(name)) for one, template in templates for name in template.discretes}
+        for component, template in templates:
             self._declare(component, used)
+            for path, text in template.initial:
+                self._declare_initial(component, path, text)
+            for one in template.hidden:
+                self._hide(id(component), one.path, f"{component.path}.{one.path}".lstrip("."), one)
         added = self._disturb() if self.disturbed else None
         self.nodes = [(k, 0) for k in range(len(self.variables))]
         instances = [self._instance(component, template) for component, template in templates]
@@ -103,6 +111,7 @@ class _Flattener:
             discretes=self.discretes, d=d, time=ca.SX(TIME), instances=instances, linear=self.linear,
             general=general, starts=self.starts, inputs=self.inputs,
             components={component.path: component for component, _ in templates}, flags=tuple(self.flags),
+            pres=self.pres,
         )  # fmt: skip
 
     def _elaborate(self) -> list[tuple[Component, Template]]:
@@ -163,20 +172,48 @@ class _Flattener:
         limits = field.nominal, field.min, field.max, field.driving
         self.variables.append(FlatVariable(path, unit, field.description, kind, field.state, field.guess, *limits))
 
+    def _declare_initial(self, component: Component, name: str, text: str) -> None:
+        """Declare what is left of an initial equation, which is zero at the start."""
+        path, node = f"{component.path}.{name}".lstrip("."), len(self.variables)
+        self.variable_of[id(component), name] = node
+        told = f"{INITIAL_EQUATION} `{text}`"
+        self.variables.append(FlatVariable(path, ONE, told, "local", "avoid", 0.0, 1.0, None, None))
+        self.starts.append(StartValue(node, 0.0, "fixed"))
+
     def _declare_discrete(self, component: Component, name: str, path: str, field: Discrete) -> None:
         value = component.start(name)
         scope = component._owner if name in component._starts else component
         with component.at_its_place(name):
             start = 0.0 if value is None else self.parameters.evaluate(value, scope or component, path)
         self.discrete_of[id(component), name] = len(self.discretes)
-        self.discretes.append(FlatDiscrete(path, coherent(field.unit), field.description, start))
+        self.discretes.append(FlatDiscrete(path, coherent(field.unit), field.description, start, (), field.kind))
+
+    def _hide(self, owner: int, name: str, path: str, one: Hidden, start: Any = 0.0) -> int:
+        """Declare a discrete value that no user has declared."""
+        self.discrete_of[owner, name] = len(self.discretes)
+        self.discretes.append(FlatDiscrete(path, ONE, one.description, start, one.names, hidden=True))
+        return len(self.discretes) - 1
+
+    def _discrete(self, component: Component, path: str) -> int:
+        """Return the position of a mode, a discrete value, a `pre`, or `initial()`."""
+        key = (0, path) if path == INITIAL.name else self._owner(component, _plain(path))
+        if path != _plain(path):
+            of = self.discrete_of[key]
+            key = key[0], f"pre({key[1]})"
+            if key not in self.discrete_of:
+                flat = self.discretes[of]
+                self.pres[self._hide(*key, f"pre({flat.path})", Hidden("", ""), flat.start)] = of
+        elif key not in self.discrete_of:
+            first = self._hide(*key, path, Hidden("", "whether a run begins"), 1.0)
+            self.pres[first] = first
+        return self.discrete_of[key]
 
     # -- instances ---------------------------------------------------------------------------------------------------
 
     def _instance(self, component: Component, template: Template) -> Instance:
         nodes = [self._node(self._variable(component, slot.path), slot.order) for slot in template.slots]
         parameters = [self._parameter(component, name) for name in template.parameters]
-        discretes = [self.discrete_of[self._owner(component, name)] for name in template.discretes]
+        discretes = [self._discrete(component, name) for name in template.discretes]
         return Instance(component.path, template, tuple(nodes), tuple(parameters), tuple(discretes))
 
     def _owner(self, component: Component, path: str) -> tuple[int, str]:
@@ -310,3 +347,8 @@ class _Flattener:
                 origin = Origin(instance.path, template.component, template.sources[row])
                 self.linear.append(LinearEquation(terms, values[-1], origin, (number, row)))
         return general
+
+
+def _plain(path: str) -> str:
+    """Return the path of what a path is the `pre` of, or the path itself."""
+    return path[4:-1] if path.startswith("pre(") else path

@@ -14,6 +14,9 @@ from modelica_like.language.fields import StatePreference, in_range
 from modelica_like.units import Unit
 from modelica_like.upper import upper
 
+INITIAL_EQUATION = "the initial equation"
+"""Begins the description of what is left of an initial equation, which is zero at the start."""
+
 
 @dataclass(frozen=True, slots=True)
 class FlatVariable:
@@ -59,13 +62,18 @@ class FlatParameter:
 
 @dataclass(frozen=True, slots=True)
 class FlatDiscrete:
-    """A mode (with `names`) or a discrete value (without); `start` is a number or an expression of parameters."""
+    """A mode (with `names`) or a discrete value (without); `start` is a number or an expression of parameters.
+
+    `kind` is number, boolean or integer; a hidden one belongs to a relation or an edge, and no user has declared it.
+    """
 
     path: str
     unit: Unit
     description: str
     start: Any
     names: tuple[str, ...] = ()
+    kind: str = "number"
+    hidden: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,6 +158,7 @@ class FlatModel:
         general: (instance, row) of the remaining equations.
         inputs: variables given from outside.
         components: the tree of the model.
+        pres: discrete value -> the one that it is the `pre` of; and `initial()` -> itself.
         flags: symbols in q for "the motion is prescribed", with the variable; none once the structure is
             known.
     """
@@ -173,6 +182,7 @@ class FlatModel:
     inputs: list[int]
     components: dict[str, Component] = field(repr=False)
     flags: tuple[tuple[Any, int], ...] = ()
+    pres: dict[int, int] = field(default_factory=dict[int, int])
 
     def node_name(self, node: int) -> str:
         """Return the name of a node: `motor.phi`, `der(motor.phi)`."""

@@ -84,5 +84,7 @@ def _side(expression: Any, path: Callable[[Symbol], str]) -> str:
 
 def _field(symbol: Symbol) -> Any:
     """Return what a symbol was declared as."""
-    declared = {} if symbol.owner is None else {**symbol.owner.fields, **getattr(symbol.owner, "modes", {})}
+    declared: dict[str, Any] = (
+        {} if symbol.owner is None else {**symbol.owner.fields, **getattr(symbol.owner, "modes", {})}
+    )
     return declared.get(symbol.name)

@@ -11,17 +11,20 @@ import casadi as ca
 from modelica_like.errors import LanguageError, Source
 from modelica_like.flatten.checks import check_balance, check_units, unit_of_field
 from modelica_like.flatten.conditions import guard_of
+from modelica_like.flatten.discrete import DiscreteEquations, Hidden, UpdateForm, between_events, is_discrete
 from modelica_like.flatten.holds import HoldForm, hold_forms
 from modelica_like.flatten.reasons import reason
 from modelica_like.flatten.wiring import taken
 from modelica_like.language.component import Component
 from modelica_like.language.declared import Declared
-from modelica_like.language.equation import Connection, Equation, FreeEnd, as_statement
+from modelica_like.language.discrete import INITIAL, Marker, Pre
+from modelica_like.language.equation import Connection, Equation, FreeEnd, as_equation, as_statement
 from modelica_like.language.expr import TIME, Symbol, flagged_motion, is_expression, symbol_of, symbols_in
 from modelica_like.language.fields import Parameter, Variable
+from modelica_like.language.functions import der
 from modelica_like.language.mode import StartMode, Transition
-from modelica_like.language.places import located
-from modelica_like.language.transition import EventStatement, as_event
+from modelica_like.language.places import NOWHERE, located
+from modelica_like.language.transition import as_event
 from modelica_like.language.tunable import symbols_in_tables
 from modelica_like.units import ANY, Unit
 
@@ -89,7 +92,8 @@ ClassTransition = TransitionForm[str, tuple[str, int]]
 class Template:
     """The equations of a component, as CasADi functions of (v, p, d, t).
 
-    v are the slots, p the parameters, d modes and discrete values, t time.
+    v are the slots, p the parameters, d modes and discrete values, t time. `updates` has two rows per update: whether
+    its target gets a new value, and the value.
     """
 
     component: str
@@ -98,6 +102,7 @@ class Template:
     discretes: tuple[str, ...]
     residual: ca.Function
     sources: tuple[Source, ...]
+    initial: tuple[tuple[str, str], ...]
     incidence: tuple[tuple[int, ...], ...]
     linear: tuple[LinearForm | None, ...]
     coefficients: ca.Function
@@ -107,12 +112,19 @@ class Template:
     resets: ca.Function
     start_modes: tuple[tuple[str, int, Source], ...]
     start_conditions: ca.Function
+    hidden: tuple[Hidden, ...]
+    updates: ca.Function
+    update_forms: tuple[UpdateForm, ...]
     holds: tuple[HoldForm, ...]
     hold_terms: ca.Function
     energy_slots: tuple[Slot, ...]
     energy: ca.Function
     connections: tuple[Connection | FreeEnd, ...] = field(compare=False)
     inferred: dict[str, Unit] = field(compare=False)
+
+
+class InitialResidual(Symbol):
+    """What is left of an initial equation: zero at the start."""
 
 
 class Names:
@@ -134,9 +146,9 @@ class Names:
                     self._add(symbol)
 
     def _add(self, symbol: Symbol) -> None:
-        path = relative_path(symbol.owner, self.root, symbol.name)
-        kind = symbol.owner.fields.get(symbol.name)
-        if isinstance(kind, Variable):
+        path = path_of(symbol, self.root)
+        kind = None if symbol.owner is None or isinstance(symbol, Pre) else symbol.owner.fields.get(symbol.name)
+        if isinstance(kind, Variable) or isinstance(symbol, InitialResidual):
             self.variables.setdefault(Slot(path, symbol.order), symbol)
         elif isinstance(kind, Parameter) or flagged_motion(symbol.name):
             self.parameters.setdefault(path, symbol)
@@ -170,6 +182,14 @@ def relative_path(owner: Declared, root: Component, name: str) -> str:
         names.append(node._name)
         node = node._owner
     return ".".join(reversed(names))
+
+
+def path_of(symbol: Symbol, root: Component) -> str:
+    """Return the path of a symbol, seen from a component: `n`, `clutch.n`, `pre(n)`, `relation[1]`, `time`."""
+    if isinstance(symbol, Pre):
+        return f"pre({path_of(symbol.of, root)})"
+    global_one = isinstance(symbol, Marker) or symbol is TIME or symbol is INITIAL
+    return symbol.name if global_one else relative_path(symbol.owner, root, symbol.name)
 
 
 def template_of(component: Component) -> Template:
@@ -208,18 +228,32 @@ def _build(component: Component) -> Template:
         as_statement(item, source, kind) for item, source in located(component.equations(), f"{kind}.equations()")
     ]
     events = [as_event(item, source, kind) for item, source in located(component.events(), f"{kind}.events()")]
-    equations = [s for s in statements if isinstance(s, Equation)]
+    equations = [s for s in statements if isinstance(s, Equation) and not is_discrete(s)]
+    equations += _constants(component)
+    initial = [
+        as_equation(item, source, kind)
+        for item, source in located(component.initial_equations(), f"{kind}.initial_equations()")
+    ]
     wiring = tuple(s for s in statements if isinstance(s, Connection | FreeEnd))
     joined = {name for one in wiring if isinstance(one, Connection) for name in taken(component, one)}
     check_balance(component, equations, joined)
-    inferred = check_units(component, equations, events)
-    residuals = [e.left - e.right for e in equations]
-    changes = _Changes(component, events)
+    starts = [InitialResidual(component, f"initial[{k}]") for k in range(1, len(initial) + 1)]
+    residuals = [between_events(e.left - e.right) for e in equations]
+    sources = tuple(e.source for e in (*equations, *initial))
+    residuals += [one - (e.left - e.right) for one, e in zip(starts, initial, strict=True)]
     holds, hold_terms = hold_forms(component, residuals)
+    energy, energy_terms = Names(component), _energy_terms(component, wiring)
+    discrete = DiscreteEquations(
+        component, [s for s in statements if isinstance(s, Equation) and is_discrete(s)], events,
+        [*zip(residuals, sources, strict=True), *((e, NOWHERE) for e in energy_terms)],
+    )  # fmt: skip
+    checked = [*equations, *initial], discrete.events, discrete.updates
+    inferred = check_units(component, *checked) if component.units_checked else {}
+    changes = _Changes(component, discrete)
     names = Names(component)
     names.add([*residuals, *hold_terms, *changes.expressions()])
     names.add(ca.SX(symbol_of(component, name)) for one in holds for name in (one.motion, one.reaction) if name)
-    energy, energy_terms = Names(component), _energy_terms(component, wiring)
+    discrete.check_determined(names.discretes)
     energy.parameters, energy.discretes = names.parameters, names.discretes
     energy.add(energy_terms)
     residual = names.function("residual", residuals)
@@ -230,13 +264,16 @@ def _build(component: Component) -> Template:
         parameters=tuple(names.parameters),
         discretes=tuple(names.discretes),
         residual=residual,
-        sources=tuple(e.source for e in equations),
+        sources=sources,
+        initial=tuple((one.name, e.source.text.removeprefix("yield ")) for one, e in zip(starts, initial, strict=True)),
         incidence=_rows(residual.jac_sparsity(0, 0)),
         linear=linear,
         coefficients=coefficients,
         **changes.functions(names),
         transitions=changes.transition_forms(),
         start_modes=changes.start_modes(),
+        hidden=tuple(discrete.hidden),
+        update_forms=discrete.forms(lambda symbol: path_of(symbol, component)),
         holds=holds,
         hold_terms=names.function("hold_terms", hold_terms),
         energy_slots=tuple(energy.variables),
@@ -246,20 +283,28 @@ def _build(component: Component) -> Template:
     )
 
 
+def _constants(component: Component) -> list[Equation]:
+    """Equations of parameters that initial equations determine: they do not change."""
+    kept = (name for name, field in component.fields.items() if isinstance(field, Variable) and field.constant)
+    return [Equation(der(symbol_of(component, name)), ca.SX(0)) for name in kept]
+
+
 class _Changes:
     """Events of a component: conditions and changes."""
 
-    def __init__(self, component: Component, events: list[EventStatement]) -> None:
+    def __init__(self, component: Component, discrete: DiscreteEquations) -> None:
         self.component = component
-        self.transitions = [e for e in events if isinstance(e, Transition)]
-        self.starts = [e for e in events if isinstance(e, StartMode)]
+        self.transitions = [e for e in discrete.events if isinstance(e, Transition)]
+        self.starts = [e for e in discrete.events if isinstance(e, StartMode)]
+        self.updates = [part for one in discrete.updates for part in (one.active, one.value)]
+        self.targets = [one.target for one in discrete.updates]
         self.guards = [ca.SX(0) if t.when is None else guard_of(t.when, t.source) for t in self.transitions]
         self.moments = [ca.SX(0) if t.at is None else t.at for t in self.transitions]
         self.resets = [pair for t in self.transitions for pair in t.reset.items()]
 
     def expressions(self) -> Iterator[Any]:
         """Yield all expressions, and the symbols of the modes."""
-        yield from (*self.guards, *self.moments)
+        yield from (*self.guards, *self.moments, *self.updates, *(ca.SX(one) for one in self.targets))
         for pair in self.resets:
             yield from pair
         yield from (s.when for s in self.starts)
@@ -272,6 +317,7 @@ class _Changes:
             "moments": self.moments,
             "resets": [value for _, value in self.resets],
             "start_conditions": [s.when for s in self.starts],
+            "updates": self.updates,
         }
         return {name: names.function(name, output) for name, output in outputs.items()}
 
@@ -296,7 +342,7 @@ class _Changes:
         return self._path(statement.mode.symbol)
 
     def _path(self, symbol: Symbol) -> str:
-        return symbol.name if symbol is TIME else relative_path(symbol.owner, self.component, symbol.name)
+        return path_of(symbol, self.component)
 
 
 def _energy_terms(component: Component, wiring: Iterable[Connection | FreeEnd]) -> list[Any]:

@@ -121,6 +121,8 @@ class Wiring:
     def check_signal_units(self) -> None:
         """Compare the units along signal connections, after all templates are known."""
         for driver, sink, source in self.signals:
+            if not all((one.owner._owner or one.owner).units_checked for one in (driver, sink)):
+                continue
             units = [self._unit(symbol) for symbol in (driver, sink)]
             if not same_dimension(*units):
                 what = f"{_name(driver)} is in {units[0]}, {_name(sink)} expects {units[1]}."

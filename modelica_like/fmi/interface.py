@@ -13,7 +13,7 @@ import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import UnknownName, did_you_mean
-from modelica_like.flatten.model import FlatDiscrete, FlatParameter, FlatVariable
+from modelica_like.flatten.model import INITIAL_EQUATION, FlatDiscrete, FlatParameter, FlatVariable
 from modelica_like.fmi.reach import Reach
 from modelica_like.fmi.start_tables import StartTables, start_tables
 from modelica_like.units import ONE, Unit, parse_unit
@@ -168,6 +168,8 @@ class _Builder:
         inputs = {variable: k for k, variable in enumerate(model.inputs)}
         states = {name: k for k, name in enumerate(model.states)}
         for k, one in enumerate(model.flat_variables):
+            if one.description.startswith(INITIAL_EQUATION):
+                continue
             about, causality = _about(one), "output" if self.wanted(one) else "local"
             if k in inputs:
                 start = float(model.u[inputs[k]])
@@ -203,14 +205,17 @@ class _Builder:
                 self.derivatives[k] = self.add(name, ("der", k), unit=unit, derivative_of=self.states[k])
 
     def discretes(self, modes: ModesAs) -> None:
-        """Modes, and other discrete values, which are local."""
-        for k, one in enumerate(self.model.flat_discretes):
+        """Modes, and other discrete values, which are local; equations determine some at the start, too."""
+        determined = {row.reset.index for row in self.model.update_rows if row.at_start}
+        for k, one in ((k, one) for k, one in enumerate(self.model.flat_discretes) if not one.hidden):
             slot, about = ("discrete", k), {"unit": one.unit, "description": _mode_text(one)}
             if one.names:
                 kind, names = ("Int64", ()) if modes == "integer" else ("Enumeration", one.names)
                 causality = "local" if modes == "local" else "output"
                 about |= {"min": 0, "max": len(one.names) - 1, "modes": names}
                 self.add(one.path, slot, causality, "discrete", kind=kind, **about)
+            elif k in determined:
+                self.add(one.path, slot, "local", "discrete", **about)
             else:
                 self.add(one.path, slot, "local", "discrete", "exact", start=self.starts.discrete[k], **about)
 

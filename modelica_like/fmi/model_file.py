@@ -29,7 +29,7 @@ ABSOLUTE_TO_RELATIVE = 1e-2
 DEFAULT_TOLERANCE = 1e-7
 MODEL = "resources/model.bin"
 """Path of the file in an FMU."""
-FORMAT = 2
+FORMAT = 3
 _MAGIC = b"MLMODEL\0"
 _HEADER = struct.Struct("<8siiII")
 _ENTRY = struct.Struct("<4i")
@@ -48,7 +48,7 @@ _START_ROW = _record("start node row")
 _QR = ("colind", "row", "v_colind", "v_row", "r_colind", "r_row", "row_place", "column_order")
 _TAPES = (
     "rates", "jacobian", "alg", "alg_jacobian", "variables", "guards", "guards_soon", "moments", "resets",
-    "start_conditions", "start_values", "discrete_starts", "hold_terms", "determinants", "start_system",
+    "updates", "start_conditions", "start_values", "discrete_starts", "hold_terms", "determinants", "start_system",
     "start_jacobian", "derived",
 )  # fmt: skip
 SECTIONS: dict[str, Any] = {
@@ -70,6 +70,7 @@ SECTIONS: dict[str, Any] = {
     "guard_transition": _INTEGER,
     "resets": _record("kind index value target", "factor"),
     "reset_nodes": _INTEGER,
+    "updates": _record("kind index target at_start", "factor"),
     "modes": _record("first_name n_names"),
     "mode_names": _INTEGER,
     "holds": _record("mode number loose motion state reaction approach moved name unused", "factor nominal"),
@@ -215,6 +216,10 @@ def _events(model: CompiledDae, text: _Text) -> dict[str, Any]:
         "guard_transition": [guards[k] for k in range(len(guards))],
         "resets": resets,
         "reset_nodes": model.reset_nodes,
+        "updates": [
+            (_RESETS.index(r.kind), r.index, r.target, int(one.at_start), r.factor)
+            for one, r in ((one, one.reset) for one in model.update_rows)
+        ],
         "modes": _counted(len(one.names) for one in model.flat_discretes),
         "mode_names": names,
         "start_modes": [(mode, target) for mode, target, _ in model.start_modes],

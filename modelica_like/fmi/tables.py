@@ -104,8 +104,8 @@ def _functions(model: CompiledDae, start: StartTables) -> tuple[dict[str, Any], 
         for name, expression in written.items()
     }
     plain = (
-        "alg", "variables", "guards_soon", "moments", "resets", "start_conditions", "start_values", "discrete_starts",
-        "determinants", "hold_terms", "derived",
+        "alg", "variables", "guards_soon", "moments", "resets", "updates", "start_conditions", "start_values",
+        "discrete_starts", "determinants", "hold_terms", "derived",
     )  # fmt: skip
     functions |= {name: getattr(model, name) for name in plain}
     y = ca.SX.sym("y", start.system.size1_out(0))

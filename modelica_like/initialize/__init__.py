@@ -63,7 +63,7 @@ def initialize(model: CompiledDae, t0: float = 0.0, start: StartKind = "given") 
     problem = StartProblem(model, point)
     if start == "steady":
         problem.apply(point)
-        point.d = chosen_modes(model, point)
+        point.d = started(model, point)
         share(model, point)
     _settle(model, point, problem, start)
     rest(model, point)
@@ -81,10 +81,10 @@ def _settle(model: CompiledDae, point: Point, problem: StartProblem, start: Star
             problem.apply(point)
             before = point.copy()
             solve_steady(model, point)
-            modes = modes_between(model, before, point, chosen_modes(model, point))
+            modes = modes_between(model, before, point, started(model, point))
         else:
             problem.solve(point, start)
-            modes = chosen_modes(model, point)
+            modes = started(model, point)
         if np.array_equal(modes, point.d):
             return
         point.d = modes
@@ -93,7 +93,7 @@ def _settle(model: CompiledDae, point: Point, problem: StartProblem, start: Star
 
 
 def _unsettled(model: CompiledDae, point: Point) -> InitializationError:
-    pairs = zip(model.flat_discretes, point.d, chosen_modes(model, point), strict=False)
+    pairs = zip(model.flat_discretes, point.d, started(model, point), strict=False)
     changing = [one.path for one, old, new in pairs if old != new]
     names = changing or [one.path for one in model.flat_discretes if one.names]
     return InitializationError(
@@ -110,4 +110,15 @@ def chosen_modes(model: CompiledDae, point: Point) -> Vector:
         if holds and mode not in decided:
             decided.add(mode)
             d[mode] = target
+    return d
+
+
+def started(model: CompiledDae, point: Point) -> Vector:
+    """Choose modes, and evaluate the equations of discrete variables, whose `pre` are their start values."""
+    d = chosen_modes(model, point)
+    places = [(k, one.reset.index) for k, one in enumerate(model.update_rows) if one.at_start]
+    if places:
+        rows, own = map(list, zip(*places, strict=True))
+        d[own] = call(model, model.discrete_starts, point)[own]
+        d[own] = call(model, model.updates, Point(point.t, point.x, point.z, d))[rows]
     return d

@@ -10,6 +10,7 @@ import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, StartEntry, Vector
 from modelica_like.errors import ContradictingStart, InitializationError
+from modelica_like.flatten.model import INITIAL_EQUATION
 from modelica_like.initialize.plan import StartKind, StartPlan, direct_starts, start_name, start_plan
 from modelica_like.initialize.point import Point, call, check_singular, solve_implicit
 
@@ -76,7 +77,12 @@ class StartProblem:
             self._compare(*pair)
 
     def _told(self, number: int) -> str:
-        return f"{start_name(self.model, self.model.starts[number])} = {self.given[number]:g}"
+        return self._valued(self.model.starts[number], self.given[number])
+
+    def _valued(self, entry: StartEntry, value: float) -> str:
+        """Tell a start value, or the initial equation that asks for it."""
+        told = self.model.flat_variables[entry.node].description
+        return told if told.startswith(INITIAL_EQUATION) else f"{start_name(self.model, entry)} = {value:g}"
 
     def _compare(self, number: int, earlier: int) -> None:
         """Compare a start value with the earlier one of the same motion."""
@@ -158,11 +164,13 @@ class StartProblem:
         if abs(actual - value) <= _CONSISTENT * (1.0 + abs(value)):
             return
         fixed = [e for e in starts if e.strength == "fixed" and e is not entry and self._coupled(entry, e)]
-        partners = [f"{start_name(self.model, e)} = {present[e.node]:g}" for e in fixed[:2]]
+        partners = [self._valued(e, present[e.node]) for e in fixed[:2]]
         wrong = "contradict each other" if partners else "cannot be met"
+        of_equation = self._told(number).startswith(INITIAL_EQUATION)
+        sides = f"left minus right{' of the last one' * bool(partners)}"
+        name = sides if of_equation else start_name(self.model, entry)
         raise ContradictingStart(
-            f"{' and '.join([*partners, self._told(number)])} {wrong}: {start_name(self.model, entry)} "
-            f"would be {actual:g}.",
+            f"{' and '.join([*partners, self._told(number)])} {wrong}: {name} would be {actual:g}.",
             where=[o.source for o in self.model.differentiated if o.source.file][:3],
             advice="Remove one of the start values, or make one a guess.",
         )

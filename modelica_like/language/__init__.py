@@ -5,6 +5,14 @@ from modelica_like.language.assembly import Assembly as Assembly
 from modelica_like.language.component import Component as Component
 from modelica_like.language.declared import Connector as Connector
 from modelica_like.language.declared import Domain as Domain
+from modelica_like.language.discrete import assert_ as assert_
+from modelica_like.language.discrete import change as change
+from modelica_like.language.discrete import clock as clock
+from modelica_like.language.discrete import edge as edge
+from modelica_like.language.discrete import if_ as if_
+from modelica_like.language.discrete import initial as initial
+from modelica_like.language.discrete import pre as pre
+from modelica_like.language.discrete import when as when
 from modelica_like.language.equation import Equations as Equations
 from modelica_like.language.equation import connect as connect
 from modelica_like.language.equation import free as free
@@ -17,9 +25,11 @@ from modelica_like.language.fields import Input as Input
 from modelica_like.language.fields import Output as Output
 from modelica_like.language.fields import Parameter as Parameter
 from modelica_like.language.fields import Variable as Variable
+from modelica_like.language.fields import boolean as boolean
 from modelica_like.language.fields import discrete as discrete
 from modelica_like.language.fields import flow as flow
 from modelica_like.language.fields import guess as guess
+from modelica_like.language.fields import integer as integer
 from modelica_like.language.fields import param as param
 from modelica_like.language.fields import signal_in as signal_in
 from modelica_like.language.fields import signal_out as signal_out
@@ -37,6 +47,7 @@ from modelica_like.language.functions import interpolate as interpolate
 from modelica_like.language.functions import log as log
 from modelica_like.language.functions import maximum as maximum
 from modelica_like.language.functions import minimum as minimum
+from modelica_like.language.functions import mod as mod
 from modelica_like.language.functions import negate as negate
 from modelica_like.language.functions import prescribed as prescribed
 from modelica_like.language.functions import sign as sign

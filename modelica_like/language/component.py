@@ -34,6 +34,8 @@ class Component(Declared):
     outlet: ClassVar[str] = "flange_b flange"
     terminal: ClassVar[Terminal | None] = None
     icon: ClassVar[Icon | None] = None
+    units_checked: ClassVar[bool] = True
+    """Whether the units of its equations, of its connections and of the values it gives to parts must fit."""
     _partial: ClassVar[bool] = True
     _class_connectors: ClassVar[dict[str, Connector]] = {}
     _class_parts: ClassVar[dict[str, Component | list[Component]]] = {}
@@ -100,6 +102,10 @@ class Component(Declared):
 
     def equations(self) -> Equations:
         """Yield the equations and connections."""
+        return iter(())
+
+    def initial_equations(self) -> Equations:
+        """Yield equations that hold at the start only: they take the place of start values."""
         return iter(())
 
     def events(self) -> Events:
@@ -314,9 +320,9 @@ class Component(Declared):
         """Return the names of the signals that form the terminal of an adaptor."""
         return tuple(name for name, field in self.fields.items() if isinstance(field, Input | Output))
 
-    def _repr_svg_(self) -> str:
-        """Return the schematic, for notebooks."""
-        return upper("schematic")(self)
+    def _repr_html_(self) -> str:
+        """Return the schematic and the given parameters, for notebooks."""
+        return upper("html")(self)
 
     def _end(self, which: str) -> Connector:
         names = getattr(type(self), which).split()

@@ -80,7 +80,7 @@ class Declared:
 
     def __getstate__(self) -> dict[str, Any]:
         # Symbols are valid in one process only, and the parts by name follow from the parts.
-        return {key: value for key, value in self.__dict__.items() if key not in ("_symbols", "_named")}
+        return {key: value for key, value in self.__dict__.items() if key not in ("_symbols", "_markers", "_named")}
 
     def _detached_copy(self) -> Self:
         twin = object.__new__(type(self))

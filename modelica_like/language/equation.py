@@ -42,7 +42,7 @@ class Equation:
 
 
 Statement = Equation | Connection | FreeEnd
-Equations = Iterator["Expr | Connection | FreeEnd"]
+Equations = Iterator["Expr | Connection | FreeEnd | Equation"]
 """Return type of `equations()`."""
 
 
@@ -150,6 +150,6 @@ def _is_turned(left: Any, right: Any, text: str) -> bool:
 
 def as_statement(item: Any, source: Source, component: str) -> Statement:
     """Read an item yielded by `equations()`; the arguments are those of `as_equation`."""
-    if isinstance(item, Connection | FreeEnd):
+    if isinstance(item, Connection | FreeEnd | Equation):
         return item if item.source is not NOWHERE else replace(item, source=source)
     return as_equation(item, source, component)

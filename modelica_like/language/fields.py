@@ -188,9 +188,11 @@ class Variable(_Symbolic):
 
     Attributes:
         driving: sign of the torque or force between two ends while it drives the right one; pictures show it positive.
+        constant: whether it keeps its start value: a parameter that initial equations determine.
     """
 
     driving = 1
+    constant = False
 
     def __init__(
         self, unit: str, description: str = "", *, state: StatePreference = "default", guess: float = 0.0,
@@ -211,12 +213,26 @@ class Output(Variable):
 
 
 class Discrete(_Symbolic):
-    """Number that changes only at events."""
+    """Number that changes only at events; `boolean` and `integer` also say which numbers it can be."""
+
+    kind: Literal["number", "boolean", "integer"] = "number"
+
+    def read(self, given: Any) -> Value:
+        """Read a start value, as `Field.read`; that of a Boolean is true or false.
+
+        Raises:
+            ValueOutOfRange: also, it is not a whole number where it should be one.
+        """
+        value = super().read(float(given) if self.kind == "boolean" and isinstance(given, bool) else given)
+        if self.kind != "number" and value.number is not None and value.number % 1:
+            wanted = "true or false" if self.kind == "boolean" else "a whole number"
+            raise ValueOutOfRange(f"{self.label} = {given} must be {wanted}.")
+        return value
 
 
 def param(
     unit: str, description: str = "", *, default: Any = None,
-    min: float | None = None, max: float | None = None, nominal: float = 1.0, tunable: bool = True,
+    min: float | None = None, max: float | None = None, nominal: float = 1.0, tunable: bool = True, fixed: bool = True,
 ) -> Any:  # fmt: skip
     """Declare a parameter.
 
@@ -229,7 +245,12 @@ def param(
         max: largest allowed value, SI.
         nominal: order of magnitude, SI.
         tunable: whether it can change after compilation.
+        fixed: False: initial equations determine it, otherwise its default; it is a variable that keeps its value.
     """
+    if not fixed:
+        kept = Variable(unit, description, state="always", default=default, min=min, max=max, nominal=nominal)
+        kept.constant = True
+        return kept
     parameter = Parameter(unit, description, default=default, min=min, max=max, nominal=nominal)
     parameter.tunable = tunable
     return parameter
@@ -303,6 +324,30 @@ def discrete(unit: str, description: str = "", *, start: Any = 0.0) -> Any:
         start: a number, a quantity or a formula of the component's parameters.
     """
     return Discrete(unit, description, default=start)
+
+
+def boolean(description: str = "", *, start: bool = False) -> Any:
+    """Declare a Boolean variable: 1 or 0, changed only at events, by its equation or a `when`.
+
+    Args:
+        description: one phrase.
+        start: its `pre` at the start.
+    """
+    declared = Discrete("1", description, default=float(start), min=0.0, max=1.0)
+    declared.kind = "boolean"
+    return declared
+
+
+def integer(description: str = "", *, start: Any = 0) -> Any:
+    """Declare a whole number that is changed only at events, by its equation or a `when`.
+
+    Args:
+        description: one phrase.
+        start: its `pre` at the start: a number or a formula of the component's parameters.
+    """
+    declared = Discrete("1", description, default=start)
+    declared.kind = "integer"
+    return declared
 
 
 def require_identifier(name: str, where: str) -> None:

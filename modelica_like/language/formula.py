@@ -27,9 +27,9 @@ _OPERATIONS: dict[str, _Operation] = {
     "+": operator.add, "-": operator.sub, "*": operator.mul, "neg": operator.neg,
     "/": cast(_Operation, operator.truediv), "**": cast(_Operation, operator.pow),
     "sqrt": ca.sqrt, "abs": ca.fabs, "sin": ca.sin, "cos": ca.cos, "tan": ca.tan, "exp": ca.exp, "log": ca.log,
-    "tanh": ca.tanh, "min": ca.fmin, "max": ca.fmax,
+    "tanh": ca.tanh, "min": ca.fmin, "max": ca.fmax, "asin": ca.asin, "acos": ca.acos, "atan": ca.atan,
 }  # fmt: skip
-_FUNCTIONS = ("sqrt", "abs", "sin", "cos", "tan", "exp", "log", "tanh", "min", "max")
+_FUNCTIONS = ("sqrt", "abs", "sin", "cos", "tan", "asin", "acos", "atan", "exp", "log", "tanh", "min", "max")
 _CONSTANTS = {"pi": math.pi}
 _QUANTITY = re.compile(
     r"(?<![\w.])((?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?[ \t]+)((?:[^\W\d_]|[%°])[^\s+*,()-]*(?:\([\w.]+\)[\w.]*)?)"

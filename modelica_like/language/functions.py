@@ -10,6 +10,7 @@ from typing import Any, cast
 import casadi as ca
 
 from modelica_like.errors import LanguageError
+from modelica_like.language.discrete import if_, marker
 from modelica_like.language.expr import (
     TIME,
     Expr,
@@ -79,11 +80,47 @@ exp = _elementary(ca.exp, "Exponential function.")
 log = _elementary(ca.log, "Natural logarithm.")
 sqrt = _elementary(ca.sqrt, "Square root.")
 tanh = _elementary(ca.tanh, "Hyperbolic tangent.")
-absolute = _elementary(ca.fabs, "Absolute value.")
-sign = _elementary(ca.sign, "Sign: -1, 0 or 1.")
-floor = _elementary(
-    ca.floor, "Return the largest whole number that is not above a value, without an event: for what changes at events."
-)
+
+
+def absolute(x: Scalar, *, events: bool = False) -> Expr:
+    """Return the absolute value.
+
+    Args:
+        x: an expression or a number.
+        events: whether the instants are located at which its branch changes; the integrator begins anew there.
+    """
+    return if_(_sx(x) < 0, -_sx(x), x) if events else ca.fabs(_sx(x))
+
+
+def sign(x: Scalar, *, events: bool = False) -> Expr:
+    """Return the sign: -1, 0 or 1.
+
+    Args:
+        x: an expression or a number.
+        events: as of `absolute`.
+    """
+    return if_(_sx(x) > 0, 1, 0) - if_(_sx(x) < 0, 1, 0) if events else ca.sign(_sx(x))
+
+
+def floor(x: Scalar, *, events: bool = False) -> Expr:
+    """Return the largest whole number that is not above a value.
+
+    Args:
+        x: an expression or a number.
+        events: as of `absolute`; without, it belongs into what changes at events.
+    """
+    return marker("floor", _sx(x)) if events else ca.floor(_sx(x))
+
+
+def mod(x: Scalar, y: Scalar, *, events: bool = False) -> Expr:
+    """Return what is left of a value after subtracting a whole multiple of another one: `x - y * floor(x / y)`.
+
+    Args:
+        x: an expression or a number.
+        y: another one.
+        events: as of `absolute`; without, it belongs into what changes at events.
+    """
+    return _sx(x) - _sx(y) * floor(_sx(x) / _sx(y), events=events)
 
 
 def atan2(y: Scalar, x: Scalar) -> Expr:
@@ -96,28 +133,30 @@ def atan2(y: Scalar, x: Scalar) -> Expr:
     return ca.atan2(_sx(y), _sx(x))
 
 
-def minimum(x: Scalar, y: Scalar) -> Expr:
-    """Return the smaller of two values, without an event.
+def minimum(x: Scalar, y: Scalar, *, events: bool = False) -> Expr:
+    """Return the smaller of two values.
 
     Args:
         x: an expression or a number.
         y: another one.
+        events: as of `absolute`.
     """
-    return ca.fmin(_sx(x), _sx(y))
+    return if_(_sx(x) < _sx(y), x, y) if events else ca.fmin(_sx(x), _sx(y))
 
 
-def maximum(x: Scalar, y: Scalar) -> Expr:
-    """Return the larger of two values, without an event.
+def maximum(x: Scalar, y: Scalar, *, events: bool = False) -> Expr:
+    """Return the larger of two values.
 
     Args:
         x: an expression or a number.
         y: another one.
+        events: as of `absolute`.
     """
-    return ca.fmax(_sx(x), _sx(y))
+    return if_(_sx(x) > _sx(y), x, y) if events else ca.fmax(_sx(x), _sx(y))
 
 
 def where(condition: Expr | bool, then: Scalar, otherwise: Scalar) -> Expr:
-    """Choose by a condition, without an event; the branch not taken may be undefined.
+    """Choose by a condition, without an event (`if_` is the form with events); the branch not taken may be undefined.
 
     Args:
         condition: a relation, or several joined with `all_of` and the like.

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Self, cast, overload
 import casadi as ca
 
 from modelica_like.errors import LanguageError, Source, UnknownName, did_you_mean
+from modelica_like.language.discrete import eventful, marker
 from modelica_like.language.expr import Expr, Scalar, Symbol, symbol_of
 from modelica_like.language.hold import Hold
 from modelica_like.language.places import NOWHERE
@@ -140,6 +141,7 @@ class BoundMode:
     def go(
         self, source: str | tuple[str, ...], target: str, *, when: Expr | None = None, at: Scalar | None = None,
         reset: Mapping[Expr, Scalar] | None = None, notice: str = "", because: str = "", fails: bool = False,
+        once: bool = False,
     ) -> Transition:  # fmt: skip
         """Declare a transition: a state event (`when`) or a time event (`at`).
 
@@ -154,6 +156,7 @@ class BoundMode:
             because: why it happens, in a few words, such as "slip reached zero" or "is beyond {limit}" (the report
                 adds the value of the parameter); without it the report puts the condition into words.
             fails: whether the run ends there, with the notice as an error.
+            once: fire where the condition becomes true, not while it is true in the source mode.
 
         Raises:
             UnknownName: a mode does not exist.
@@ -164,6 +167,8 @@ class BoundMode:
             self.mode.number(name)
         if (when is None) == (at is None):
             raise LanguageError(f"{self.mode.label}.go(…, '{target}') needs either `when=` or `at=`.")
+        if once and when is not None:
+            when = marker("once", eventful(when))
         moment = None if at is None else cast(Expr, ca.SX(cast(Any, at)))
         return Transition(self, sources, target, when, moment, dict(reset or {}), NOWHERE, notice, because, fails)
 

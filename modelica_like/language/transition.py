@@ -1,4 +1,4 @@
-"""What `events()` may yield: transitions of modes, and choices of the mode at the start."""
+"""What `events()` may yield: transitions of modes, choices of the mode at the start, and whens."""
 
 from __future__ import annotations
 
@@ -8,15 +8,17 @@ from dataclasses import replace
 from typing import Any
 
 from modelica_like.errors import LanguageError, Source, did_you_mean
+from modelica_like.language.discrete import Assertion, When
 from modelica_like.language.expr import TIME, Symbol, symbols_in
 from modelica_like.language.fields import Discrete, Input, Parameter, Variable
 from modelica_like.language.mode import StartMode, Transition
+from modelica_like.language.places import NOWHERE
 
 NAME_IN_NOTICE = re.compile(r"\{([\w.]+)\}")
 """A parameter in the notice or the reason of a transition."""
 
 
-EventStatement = Transition | StartMode
+EventStatement = Transition | StartMode | When | Assertion
 Events = Iterator[EventStatement]
 """Return type of `events()`."""
 
@@ -35,11 +37,11 @@ def as_event(item: Any, source: Source, component: str) -> EventStatement:
     if isinstance(item, Transition):
         _check_transition(item, source, component)
         _check_notice(item, source, component)
-    if isinstance(item, Transition | StartMode):
-        return replace(item, source=source)
+    if isinstance(item, EventStatement):
+        return item if item.source is not NOWHERE else replace(item, source=source)
     raise LanguageError(
         f"{component}.events() yields {type(item).__name__} instead of a transition.",
-        where=source, advice="Yield `mode.go(…)` or `mode.initially(…)`.",
+        where=source, advice="Yield `mode.go(…)`, `mode.initially(…)`, `when(…)` or `assert_(…)`.",
     )  # fmt: skip
 
 

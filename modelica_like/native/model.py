@@ -15,6 +15,7 @@ from modelica_like.errors import (
     Chattering,
     ContradictingStart,
     InitializationError,
+    LimitPassed,
     ModelicaLikeError,
     NoGradient,
     SingularAtStart,
@@ -32,8 +33,9 @@ from modelica_like.solve.options import Options
 
 _ERRORS: tuple[tuple[str, type[ModelicaLikeError]], ...] = (
     ("The integrator gave up|The step from", StepFailed),
-    ("Modes still switch|Events follow each other", Chattering),
+    ("Modes still switch|Discrete variables do not|Events follow each other", Chattering),
     ("The Jacobian is singular|The derivative of .* is not finite", SingularAtStart),
+    (r"t = \S+ s: ", LimitPassed),
     ("Two start values|A start value of", ContradictingStart),
     ("There are no derivatives", NoGradient),
     ("The equations for|No start|No steady|The modes at the start", InitializationError),

@@ -162,6 +162,7 @@ def page_content(model: CompiledDae, names: Sequence[str], until: float, options
                 "unit": units.number(ONE),
             }
             for one in model.flat_discretes
+            if not one.hidden
         ],
         "units": units.rows,
     }  # fmt: skip

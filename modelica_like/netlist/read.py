@@ -20,6 +20,7 @@ from modelica_like.language import Assembly, Component, Variable, guess
 from modelica_like.language.fields import Discrete
 from modelica_like.netlist.document import Document, check_part, parse, read_text
 from modelica_like.netlist.registry import find_type
+from modelica_like.upper import upper
 
 _MAX_PARTS = 200_000
 FMU_PART = "FMU"
@@ -30,13 +31,15 @@ def load(path: str | Path) -> Assembly:
     """Read a netlist file and the netlists it uses.
 
     Args:
-        path: a TOML file.
+        path: a TOML file, or a Modelica text: `drive.mo`, with a class `drive.mo:Rotor`.
 
     Raises:
         NetlistError: the file cannot be read, or is not a netlist.
         CyclicAssembly: it contains itself.
         ModelicaLikeError: types, values or paths in it are wrong; several errors come as `WiringErrors`.
     """
+    if is_modelica(path):
+        return upper("load_modelica")(path)
     return _Loader().load(Path(path), ())
 
 
@@ -154,8 +157,10 @@ class _Task:
         kind = table["is"]
         if kind == FMU_PART:
             raise _among_equations(name)
-        if kind.endswith(".toml"):
-            part: Component = self.loader.load(Path(self.document.lines.file).parent / kind, self.chain).copy()
+        if is_modelica(kind):
+            part: Component = upper("load_modelica")(Path(self.document.lines.file).parent / kind).copy()
+        elif kind.endswith(".toml"):
+            part = self.loader.load(Path(self.document.lines.file).parent / kind, self.chain).copy()
         else:
             part = new_component(find_type(kind, Path(self.document.lines.file).parent), values)
         for key, value in values.items():
@@ -182,6 +187,11 @@ class _Task:
                 f"{path} is a parameter, not a variable.", advice="Give its value where the part is declared."
             )
         owner.give(name, value)
+
+
+def is_modelica(path: str | Path) -> bool:
+    """Tell whether a path names a Modelica text, or a class in one: `drive.mo`, `drive.mo:Rotor`."""
+    return str(path).endswith(".mo") or ".mo:" in str(path)
 
 
 def _among_equations(name: str) -> NetlistError:

@@ -83,7 +83,7 @@ class EventLoop:
         return self.record
 
     def _go(self) -> None:
-        self.instants.settle(self.now, self._wanting())
+        self.instants.settle(self.now, self._wanting(), begins=True)
         note_sharing(self.record, self.model, self.now)
         self.record.begin(self.now)
         while self.now.t < self.end:

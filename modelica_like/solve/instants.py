@@ -83,18 +83,20 @@ class Instants:
         moments = call(self.model, self.model.moments, now)
         return [t for t in self._timed if _is_source(now, t) and moments[t.index] <= just_after(now.t)]
 
-    def settle(self, now: Point, wanting: list[CompiledTransition]) -> None:
-        """Fire transitions until none is left; `now` becomes the point after.
+    def settle(self, now: Point, wanting: list[CompiledTransition], *, begins: bool = False) -> None:
+        """Fire transitions until none is left and no discrete variable changes; `now` becomes the point after.
 
-        All of them fire together. Surfaces that hold each other may then cycle, so after some rounds only the first one
-        fires (K. G. Murty's least-index rule, which ends if the solution is unique).
+        Without transitions, nothing happens unless the run `begins`. All of them fire together. Surfaces that hold each
+        other may then cycle, so after some rounds only the first one fires (K. G. Murty's least-index rule, which
+        ends if the solution is unique).
 
         Raises:
             Chattering: transitions do not end, or events follow each other ever faster.
             LimitPassed: a transition ends the run.
             SingularAtStart: the equations have no unique solution after it.
         """
-        if not wanting:
+        changes = bool(self.model.update_rows)
+        if not (wanting or (begins and changes)):
             return
         noted = len(self.record.events)
         self._struck, self._entered = None, set()
@@ -102,17 +104,17 @@ class Instants:
         alone = self.options.iterations + _ALONE * len(self.model.holds)
         for number in range(alone):
             self._round = number
-            if not wanting:
+            if not (wanting or changes):
                 break
             before = now.d
-            self._fire(now, wanting if number < _TOGETHER else [min(wanting, key=self._number)])
-            share(self.model, now)
-            solve_implicit(self.model, now)
-            check_singular(self.model, now)
-            self._stop_motions(now, before)
+            if wanting:
+                self._fire(now, wanting if number < _TOGETHER else [min(wanting, key=self._number)])
+                self._solve(now)
+                self._stop_motions(now, before)
+            changes = self._update(now)
             wanting = [*self.due(now), *self.guards.wanting(now)]
         else:
-            raise self._chattering(f"Modes still switch after {alone} rounds at one instant")
+            raise self._endless(now, alone, changes=changes)
         note_sharing(self.record, self.model, now)
         if len(self.record.events) > noted:
             self._instants.append(now.t)
@@ -144,9 +146,7 @@ class Instants:
         for transition in chosen.values():
             self._note(now, transition.mode, transition.target, self._number(transition))
             if transition.fails:
-                owner = self.record.events[-1].mode.rpartition(".")[0] or self.model.name
-                told = NAME_IN_NOTICE.sub(r"\1", transition.notice)
-                raise LimitPassed(f"At {now.t:.9g} s {owner} {told}.")
+                raise self._passed(now, transition.notice)
             d[transition.mode] = transition.target
             for reset in transition.resets:
                 if reset.kind == "state":
@@ -159,6 +159,67 @@ class Instants:
         now.x, now.d = x, d
         if targets:
             self._project(now, targets)
+
+    def _passed(self, now: Point, notice: str) -> LimitPassed:
+        owner, dot, _ = self.record.events[-1].mode.rpartition(".")
+        told = NAME_IN_NOTICE.sub(lambda name: self._told(now, owner + dot + name[1]), notice)
+        return LimitPassed(f"At {now.t:.9g} s {owner or self.model.name} {told}.")
+
+    def _told(self, now: Point, path: str) -> str:
+        """Return a parameter, variable or discrete value as a number."""
+        model = self.model
+        if path in model.position:
+            return f"{call(model, model.variables, now)[model.position[path]]:g}"
+        if path in model.discrete_position:
+            return f"{now.d[model.discrete_position[path]]:g}"
+        if path in model.derived_position:
+            return f"{float(model.derived(model.p)[model.derived_position[path]]):g}"
+        return f"{model.p[model.parameter_position[path]]:g}"
+
+    def _solve(self, now: Point) -> None:
+        share(self.model, now)
+        solve_implicit(self.model, now)
+        check_singular(self.model, now)
+
+    def _update(self, now: Point) -> bool:
+        """Evaluate the discrete equations once; return whether something changes."""
+        rows = self.model.update_rows
+        if not rows:
+            return False
+        values, targets = call(self.model, self.model.updates, now), list[tuple[int, float]]()
+        x, d = now.x.copy(), now.d.copy()
+        for value, row in zip(values.tolist(), rows, strict=True):
+            reset = row.reset
+            if reset.kind == "discrete":
+                d[reset.index] = value
+            elif value != np.inf:
+                self._struck = None
+                if reset.kind == "state":
+                    x[reset.index] = value / reset.factor
+                else:
+                    targets.append((reset.target, value))
+        if not (targets or (d != now.d).any() or (x != now.x).any()):
+            return False
+        now.x, now.d = x, d
+        if targets:
+            self._project(now, targets)
+        self._solve(now)
+        return True
+
+    def _endless(self, now: Point, rounds: int, *, changes: bool) -> Chattering:
+        """Return the error of an instant whose iteration does not end."""
+        if not changes:
+            return self._chattering(f"Modes still switch after {rounds} rounds at one instant")
+        values = call(self.model, self.model.updates, now)
+        rows = [row for row, value in zip(self.model.update_rows, values, strict=True)
+                if row.reset.kind == "discrete" and value != now.d[row.reset.index]]  # fmt: skip
+        names = ", ".join(self.model.flat_discretes[row.reset.index].path for row in rows)
+        change = "changes" if len(rows) == 1 else "change"
+        return Chattering(
+            f"Discrete variables do not settle at t = {now.t:.9g} s: {names} still {change} after {rounds} rounds.",
+            where=[row.source for row in rows if row.source.file][:3],
+            advice="An equation like n == pre(n) + 1 never equals its pre(…): count in a `when`.",
+        )
 
     def _stop_motions(self, now: Point, before: Vector) -> None:
         """Stop newly held motions; friction that breaks away in the impact takes the mode of a start."""

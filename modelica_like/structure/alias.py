@@ -189,12 +189,21 @@ class _Elimination:
     def _may_merge(self, first: int, second: int) -> bool:
         if first in self.inputs and second in self.inputs:
             return False
+        # der(x) = -x remains an equation: a class is not its own derivative.
+        if second in self._integrals(first) or first in self._integrals(second):
+            return False
         # A class that is the derivative of two unknowns would have two integrals; such an equation stays.
         both = first in self.integral and second in self.integral
         return not both or self._integral_root(first) == self._integral_root(second)
 
     def _integral_root(self, root: int) -> int:
         return self.find(self.integral[root])[0]
+
+    def _integrals(self, root: int) -> set[int]:
+        found: set[int] = set()
+        while root in self.integral and (root := self._integral_root(root)) not in found:
+            found.add(root)
+        return found
 
     def _merge(self, first: int, second: int, ratio: float) -> set[int]:
         """First = ratio * second."""

@@ -6,6 +6,7 @@ from components import Constant, FirstOrder, Force, Inertia, MassWithStopAndFric
 from modelica_like import Assembly, simulate
 from modelica_like.fmi.export import export_fmu
 from modelica_like.fmi.run import run_fmu
+from tests.solve.test_discrete import Ball, Counter
 
 
 @pytest.mark.parametrize("kind", ["me", "cs"])
@@ -46,3 +47,17 @@ def test_a_mass_leaves_its_stop_at_once(tmp_path, side, sign, kind):
     assert [one.after for one in later if one.mode == "mass.mode"] == ["stuck", way]
     assert [one.after for one in later if one.mode == "mass.stop"] == [side, "none"]
     assert run.final["mass.s"] == pytest.approx(sign * (-1.0 + 0.5 * 2.5 * 0.7**2), abs=1e-7)
+
+
+@pytest.mark.parametrize("version", ["2.0", "3.0"])
+@pytest.mark.parametrize("kind", ["me", "cs"])
+def test_discrete_equations_at_the_edges_of_a_sine(tmp_path, version, kind):
+    """Three rises above one quarter, three edges, six changes, and one priority of 100 at 2.6 s."""
+    drive = Assembly("counting", parts={"counter": Counter(), "ball": Ball(h=1.0, v=0.0)})
+    drive.simulate.update(until=2.9)
+    exported = export_fmu(drive, tmp_path / "counting.fmu", version, check=False)
+    run = run_fmu(exported.path, kind=kind, tolerance=1e-9)
+    names = ("ups", "both", "changes", "firsts", "latched", "high")
+    assert [run.final[f"counter.{name}"] for name in names] == [13, 103, 6, 1, 1, 0]
+    assert run.final["ball.n"] == 6  # bounces at 0.4515236 s times 1, 2.6, 3.88, 4.904, 5.7232, 6.37856 = 2.8801 s
+    assert not [name for name in run.names if "relation" in name or "pre(" in name]

@@ -140,6 +140,16 @@ def test_an_equation_between_two_derivatives_is_no_alias_of_one_node():
     assert found.remaining == [0]
 
 
+@pytest.mark.parametrize("order", [1, 2])
+def test_an_unknown_is_not_its_own_derivative(order):
+    """der(x0) = -x0 is an equation, not an alias; nor is der(der(x0)) = -x0, nor with x1 = x0 in between."""
+    made = model([order, 0], [{0: 1.0, 1: -1.0}, {1: 1.0, 1 + order: 1.0}])
+    found = find_aliases(made)
+    assert found.root[0] == found.root[1]
+    assert found.root[1 + order] != found.root[0]
+    assert found.remaining == [1]
+
+
 def test_an_input_that_is_the_derivative_of_one_unknown_is_not_that_of_another():
     """der(x0) = u and der(x1) = u: the integrals differ by a constant, so the second equation stays."""
     made = replace(model([1, 1, 0], [{3: 1.0, 2: -1.0}, {4: 1.0, 2: -1.0}]), inputs=[2])

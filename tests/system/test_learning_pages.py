@@ -15,7 +15,12 @@ from modelica_like.explore import Explorer
 from modelica_like.netlist import library_types
 
 DOCS = Path(__file__).parents[2] / "docs"
-PAGES = [DOCS / "tutorial.md", DOCS / "cookbook.md", *sorted([*DOCS.glob("how_to/*.md"), *DOCS.glob("theory/*.md")])]
+PAGES = [
+    DOCS / "tutorial.md",
+    DOCS / "cookbook.md",
+    DOCS / "modelica_text.md",
+    *sorted([*DOCS.glob("how_to/*.md"), *DOCS.glob("theory/*.md")]),
+]
 
 
 def command(line: str) -> None:
@@ -38,8 +43,8 @@ def test_a_page_runs(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
         if language == "sh":
             for line in block.splitlines():
                 command(line)
-        elif language == "toml":
-            (name,) = re.findall(r"`(\w+\.toml)`", before)
+        elif language in ("toml", "modelica"):
+            (name,) = re.findall(r"`(\w+\.(?:toml|mo))`", before)
             Path(name).write_text(block, encoding="utf-8")
         elif language == "python":
             with contextlib.redirect_stdout(io.StringIO()) as stream:

@@ -249,7 +249,8 @@ class _Maker:
         """The first node and its derivatives by the parameters."""
         size = Sizes.of(self.model)
         t0 = float(self.solution.segments[0].times[0])
-        point = initialize(self.model, t0, kind) if self.events[0] else self.solution.segments[0].start
+        changes = self.events[0] or self.model.update_rows
+        point = initialize(self.model, t0, kind) if changes else self.solution.segments[0].start
         begin_x, begin_d = start_slopes(self.model, point, kind)
         whole = np.concatenate([begin_x, np.eye(size.fixed), begin_d])
         work = Work.at(self.model, point)
@@ -257,7 +258,7 @@ class _Maker:
         work.share()
         chances = work.chances()
         start_x, start_d = begin_x, work.d @ whole
-        if self.events[0]:
+        if changes:
             integrands = self.chain.functions.integrands
             jump = make_jump(self.model, point, tuple(self.events[0]), point, integrands, first=True)
             chances += jump.chances

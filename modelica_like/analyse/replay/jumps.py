@@ -109,8 +109,13 @@ def make_jump(
         work.point.x = before.x + rate_before * trigger.shift
         work.time = trigger.by
     work.share()
-    for number in sorted({event.round for event in events}):
-        work.fire([event for event in events if event.round == number])
+    for number in range(1 + max((event.round for event in events), default=0)):
+        now = [event for event in events if event.round == number]
+        if now:
+            work.fire(now)
+        work.update()
+    while work.update():
+        pass  # it ended in the run
     chances = work.chances()
     rate_after = slopes(model, work.point, "ode").value
     gain = integrands(before) - integrands(work.point)
@@ -199,6 +204,30 @@ class Work:
             self.share()
             modes = {model.discrete_position[event.mode] for event in knocked}
             self.resting.update(k for k in holding(model, self.point) if model.holds[k].mode in modes)
+
+    def update(self) -> bool:
+        """Evaluate the discrete equations once; return whether something changes. See solve.instants."""
+        model, rows = self.model, self.model.update_rows
+        if not rows:
+            return False
+        values, total = self._total("updates")
+        x, d, projected = self.point.x.copy(), self.point.d.copy(), list[int]()
+        for k, row in enumerate(rows):
+            reset = row.reset
+            if reset.kind == "discrete":
+                d[reset.index], self.d[reset.index] = values[k], total[k]
+            elif values[k] != np.inf and reset.kind == "state":
+                x[reset.index], self.x[reset.index] = values[k] / reset.factor, total[k] / reset.factor
+            elif values[k] != np.inf:
+                projected.append(k)
+        if not (projected or (x != self.point.x).any() or (d != self.point.d).any()):
+            return False
+        self.point = replace(self.point, x=x, d=d)
+        self.share()
+        if projected:
+            self._project([rows[k].reset.target for k in projected], [(values[k], total[k]) for k in projected])
+            solve_implicit(model, self.point)
+        return True
 
     def share(self) -> None:
         """Let elements share what they hold together, and solve the implicit equations."""

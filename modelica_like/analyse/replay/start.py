@@ -10,8 +10,8 @@ import numpy as np
 
 from modelica_like.compile.buffers import Vector
 from modelica_like.compile.compiled import CompiledDae
-from modelica_like.initialize import Point, StartKind, StartPlan, start_plan
-from modelica_like.initialize.slopes import Sizes
+from modelica_like.initialize import Point, StartKind, StartPlan, call, start_plan
+from modelica_like.initialize.slopes import Sizes, slopes
 from modelica_like.initialize.steady import steady_change
 
 _MAX_NEWTON = 50
@@ -55,7 +55,20 @@ def start_slopes(model: CompiledDae, point: Point, kind: StartKind) -> tuple[Vec
         _follow(plan, system, moved, states, starts, values)
     x, d = np.zeros((size.x, size.fixed)), np.zeros((size.d, size.fixed))
     x[:, moved], d[:, moved] = states, starts
-    return x, d
+    return x, _determined(model, point, x, d)
+
+
+def _determined(model: CompiledDae, point: Point, x: Vector, d: Vector) -> Vector:
+    """Derivatives of discrete values, those with an equation by it; see initialize.started."""
+    places = [(k, one.reset.index) for k, one in enumerate(model.update_rows) if one.at_start]
+    if not places:
+        return d
+    (rows, own), before = map(list, zip(*places, strict=True)), point.copy()
+    before.d[own] = call(model, model.discrete_starts, point)[own]
+    part, fixed = slopes(model, before, "updates"), x.shape[1]
+    total = part.x @ x + part.theta[:, :fixed] + part.theta[:, fixed:] @ d
+    d[own] = total[rows]
+    return d
 
 
 def _by_parameters(model: CompiledDae, name: str) -> ca.Function:

@@ -137,6 +137,40 @@ static Result fire(Instance *c, const unsigned char *wanting, Impacts *impacts) 
     return RESULT_OK;
 }
 
+/* Evaluate the discrete equations once; tells whether something changes. */
+static Result update_once(Instance *c, Impacts *impacts, int *changes) {
+    const Model *m = c->model;
+    Work *w = &c->work;
+    double *values = w->reset_values;
+    int count = 0;
+    *changes = 0;
+    if (m->n_updates == 0) return RESULT_OK;
+    evaluate_now(c, &m->tapes.updates, values);
+    for (int k = 0; k < m->n_updates; k++) {
+        const Update *one = &m->updates[k];
+        double *place =
+            one->kind == RESET_DISCRETE ? &c->d[one->index] : &c->x[one->kind == RESET_STATE ? one->index : 0];
+        double value = values[k] / one->factor;
+        if (one->kind != RESET_DISCRETE && isinf(value)) continue; /* nothing sets it now */
+        if (one->kind != RESET_DISCRETE) impacts->struck = 0;
+        if (one->kind == RESET_VALUE) {
+            w->targets[count] = m->reset_nodes[one->target];
+            w->target_values[count++] = value;
+        } else if (*place != value) {
+            *place = value;
+            *changes = 1;
+        }
+    }
+    if (count == 0 && !*changes) return RESULT_OK;
+    *changes = 1;
+    c->state.n_events++;
+    if (count > 0) move_states(c, w->targets, w->target_values, count);
+    share(c);
+    c->variables_valid = 0;
+    if (solve_now(c, 0) != RESULT_OK) return RESULT_ERROR;
+    return check_singular(c);
+}
+
 /* Notes an instant; an error where the last ones came ever faster. */
 static Result crowded(Instance *c) {
     State *s = &c->state;
@@ -172,6 +206,7 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
     State *s = &c->state;
     Impacts *impacts = &c->work.impacts;
     double *before = c->work.d_before;
+    int changes = m->n_updates > 0;
     impacts->struck = 0;
     memset(impacts->entered, 0, (size_t)m->n_holds);
     if (find_wanting(c, wanting, !located)) {
@@ -183,25 +218,28 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
             if (any && round >= TOGETHER) wanting[k] = 0;
             any |= wanting[k];
         }
-        if (!gradient_round(c, round, wanting, any)) return RESULT_OK;
+        if (!gradient_round(c, round, wanting, any | changes)) return RESULT_OK;
+        any = any_of(wanting, m->n_transitions); /* it may have told others to fire */
         if (c->bounded && --c->budget < 1) {
             s->at_event = 1; /* the rest comes at the beginning of the next step */
             return RESULT_OK;
         }
         c->round = round;
         memcpy(before, c->d, (size_t)m->n_d * sizeof(double));
-        if (fire(c, wanting, impacts) != RESULT_OK) return RESULT_ERROR;
-        share(c);
+        if (any && fire(c, wanting, impacts) != RESULT_OK) return RESULT_ERROR;
+        if (any) share(c);
         c->variables_valid = 0;
-        if (solve_now(c, 0) != RESULT_OK || stop_motions(c, before, impacts) != RESULT_OK ||
-            check_singular(c) != RESULT_OK)
+        if (any && (solve_now(c, 0) != RESULT_OK || stop_motions(c, before, impacts) != RESULT_OK ||
+                       check_singular(c) != RESULT_OK))
             return RESULT_ERROR;
+        if (update_once(c, impacts, &changes) != RESULT_OK) return RESULT_ERROR;
         memset(wanting, 0, m->n_transitions);
         if (find_wanting(c, wanting, 1) && !c->bounded) {
             drop_balanced(c, c->work.guards);
             keep_wanting(c, c->work.guards, wanting);
         }
     }
+    if (changes) return fail(c, "Discrete variables do not settle at t = %.12g s.", s->t);
     return fail(c,
         "Modes still switch after %d rounds at t = %.12g s. Give the switching a hysteresis, or smooth what drives it.",
         ROUNDS + ALONE * m->n_holds, s->t);

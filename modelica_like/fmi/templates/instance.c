@@ -106,7 +106,7 @@ static void share_out_specials(Instance *c) {
 static uint64_t place_work(const Model *m, Work *w, double *memory) {
     uint64_t n = m->n_unknowns, n_z = m->n_z, steady = m->n_steady;
     uint64_t members = m->most_members, n_guards = m->n_guards, n_x = m->n_x;
-    uint64_t resets = larger(larger(m->n_resets, m->n_reset_values), m->n_holds);
+    uint64_t resets = larger(larger(m->n_resets, m->n_reset_values), larger(m->n_updates, m->n_holds));
     uint64_t small = larger(larger(n_guards, m->n_moments), larger(larger(m->n_start_modes, m->n_d), m->n_derived));
     uint64_t left = special_size(m, N_SPECIALS, 0);
     uint64_t square =

@@ -66,6 +66,10 @@ typedef struct {
     double factor;
 } Reset;
 typedef struct {
+    int kind, index, target, at_start;
+    double factor;
+} Update; /* what gets a new value at events, and whether it does when start values are found */
+typedef struct {
     int mode, target;
     short timed, fails;
     int index, first_reset, n_resets, name, notice;
@@ -107,12 +111,13 @@ typedef struct Model { /* tables lie in the bytes of the file; texts are offsets
     const Variable *variables;
     const Rising *rising;
 
-    int n_transitions, n_guards, n_resets, n_reset_nodes, n_modes, n_mode_names;
+    int n_transitions, n_guards, n_resets, n_reset_nodes, n_updates, n_modes, n_mode_names;
     const Transition *transitions; /* in the order in which they are declared */
     const int *guard_transition;   /* transition of every guard */
     const Reset *resets;
     const int *reset_nodes;
-    const Mode *modes; /* by position in d */
+    const Update *updates; /* results of the tape `updates` */
+    const Mode *modes;     /* by position in d */
     const int *mode_names;
 
     int n_holds, n_circuits, n_members, n_units;
@@ -134,8 +139,9 @@ typedef struct Model { /* tables lie in the bytes of the file; texts are offsets
     const int *step_diagonal;    /* nonzero of the step matrix on the diagonal of state k */
     QrPattern step, start;
     struct {
-        Tape rates, jacobian, alg, alg_jacobian, variables, guards, guards_soon, moments, resets, start_conditions,
-            start_values, discrete_starts, hold_terms, determinants, start_system, start_jacobian, derived;
+        Tape rates, jacobian, alg, alg_jacobian, variables, guards, guards_soon, moments, resets, updates,
+            start_conditions, start_values, discrete_starts, hold_terms, determinants, start_system, start_jacobian,
+            derived;
     } tapes;
 
     /* What follows from the sizes of the tables. */

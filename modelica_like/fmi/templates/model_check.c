@@ -31,10 +31,10 @@ static int check_indices(const Model *m, char *message) {
         INDEX(modes, n_names, m->n_mode_names + 1), INDEX(transitions, mode, m->n_modes),
         INDEX(transitions, name, m->n_text), INDEX(transitions, notice, m->n_text),
         ARRAY(guard_transition, m->n_guards, m->n_transitions), ARRAY(reset_nodes, m->n_reset_nodes, m->n_nodes),
-        INDEX(resets, kind, N_RESET_KINDS), INDEX(resets, value, m->n_reset_values), INDEX(holds, mode, m->n_modes),
-        INDEX(holds, motion, m->n_nodes), COLUMN(holds, state, m->n_holds, -1, m->n_x),
-        COLUMN(holds, reaction, m->n_holds, -1, m->n_nodes), INDEX(holds, approach, m->n_d),
-        INDEX(holds, name, m->n_text), ARRAY(members, m->n_members, m->n_holds),
+        INDEX(resets, kind, N_RESET_KINDS), INDEX(updates, kind, N_RESET_KINDS),
+        INDEX(resets, value, m->n_reset_values), INDEX(holds, mode, m->n_modes), INDEX(holds, motion, m->n_nodes),
+        COLUMN(holds, state, m->n_holds, -1, m->n_x), COLUMN(holds, reaction, m->n_holds, -1, m->n_nodes),
+        INDEX(holds, approach, m->n_d), INDEX(holds, name, m->n_text), ARRAY(members, m->n_members, m->n_holds),
         INDEX(circuits, first_member, m->n_members + 1), INDEX(circuits, n_members, m->n_members + 1),
         INDEX(circuits, first, m->n_d + 1), INDEX(start_modes, mode, m->n_modes), INDEX(start_direct, position, m->n_x),
         INDEX(start_direct, start, m->n_starts), INDEX(start_default, position, m->n_x),
@@ -53,6 +53,12 @@ static int check_indices(const Model *m, char *message) {
     return 1;
 }
 
+/* What gets a new value at events exists. */
+static int check_target(const Model *m, int kind, int index, int target) {
+    int place = kind == RESET_VALUE ? target : index;
+    return place >= 0 && place < (kind == RESET_VALUE ? m->n_reset_nodes : kind == RESET_STATE ? m->n_x : m->n_d);
+}
+
 static int check_events(const Model *m, char *message) {
     for (int k = 0; k < m->n_modes; k++)
         if (m->modes[k].n_names > m->n_mode_names - m->modes[k].first_name) return damaged(message, "modes.n_names");
@@ -60,12 +66,12 @@ static int check_events(const Model *m, char *message) {
         if (m->transitions[k].index < 0 ||
             m->transitions[k].index >= (m->transitions[k].timed ? m->n_moments : m->n_guards))
             return damaged(message, "transitions.index");
-    for (int k = 0; k < m->n_resets; k++) {
-        const Reset *one = &m->resets[k];
-        int index = one->kind == RESET_VALUE ? one->target : one->index;
-        int end = one->kind == RESET_VALUE ? m->n_reset_nodes : one->kind == RESET_STATE ? m->n_x : m->n_d;
-        if (index < 0 || index >= end) return damaged(message, "resets.index");
-    }
+    for (int k = 0; k < m->n_resets; k++)
+        if (!check_target(m, m->resets[k].kind, m->resets[k].index, m->resets[k].target))
+            return damaged(message, "resets.index");
+    for (int k = 0; k < m->n_updates; k++)
+        if (!check_target(m, m->updates[k].kind, m->updates[k].index, m->updates[k].target))
+            return damaged(message, "updates.index");
     for (int k = 0; k < m->n_circuits; k++) {
         const Circuit *one = &m->circuits[k];
         int64_t n = one->n_members;

@@ -132,6 +132,19 @@ static Result solve_steady(Instance *c) {
     return fail(c, "No steady state was found at t = %.9g s.", c->state.t);
 }
 
+/* Equations of discrete variables, whose values before the start are their start values. */
+static void start_equations(Instance *c) {
+    const Model *m = c->model;
+    double *values = c->work.reset_values, *starts = c->work.guards;
+    if (m->n_updates == 0) return;
+    evaluate_now(c, &m->tapes.discrete_starts, starts);
+    for (int k = 0; k < m->n_updates; k++)
+        if (m->updates[k].at_start) c->d[m->updates[k].index] = starts[m->updates[k].index];
+    evaluate_now(c, &m->tapes.updates, values);
+    for (int k = 0; k < m->n_updates; k++)
+        if (m->updates[k].at_start) c->d[m->updates[k].index] = values[k];
+}
+
 /* Choose modes that are not decided by their start conditions: the first that holds wins. */
 void choose_modes(Instance *c, unsigned char *decided) {
     double *holds = c->work.guards;
@@ -158,6 +171,7 @@ static int choose_start_modes(Instance *c, const double *begun) {
         if (begun[k] * w->variables[one->motion] < 0 && c->d[one->mode] != w->d_before[one->mode])
             c->d[one->mode] = one->number;
     }
+    start_equations(c);
     return memcmp(w->d_before, c->d, (size_t)m->n_d * sizeof(double)) != 0;
 }
 

@@ -19,10 +19,10 @@ from modelica_like.upper import upper
 
 _PATIENCE = 3.0
 """Seconds of a run whose derivatives a page waits for; they take two to four times as long."""
-_RANKED, _MOST_ENDS = 12, 3
+_RANKED, _MOST_ENDS, _MOST_MODES = 12, 3, 20
 _MATTERS = 5e-4
 """Percent per percent below which a parameter does not matter."""
-_ZERO = 1e-6
+_ZERO = 0.01
 """Part of the largest value below which an end value has no percents."""
 
 
@@ -79,7 +79,8 @@ def ranking(run: Solution, ends: Sequence[str]) -> str:
     ]  # fmt: skip
     at_the_end = ", ".join(f"{one.name} = {one.value:.5g} {one.unit_text}".rstrip() for one in found.outputs)
     said = f"<p>Change in percent of what the run ends with: {escape(at_the_end)}.</p>"
-    return (said + table(heads, rows) if rows else "") + "".join(f"<p>{escape(note)}</p>" for note in found.notes())
+    left = "".join(f"<p>{escape(note)}</p>" for note in found.notes())
+    return (said + table(heads, rows) if rows else "") + details(left, f"{len(found.left_out)} without a derivative")
 
 
 def small_motions(drive: Component, run: Solution) -> str:
@@ -95,4 +96,5 @@ def small_motions(drive: Component, run: Solution) -> str:
         if mode.oscillates
     ]
     drawn = f'<div class="wide">{schematic(drive, background=False, modes=modes)}</div>' if rows else ""
-    return drawn + table(("mode", "frequency in Hz>", "damping>", "energy in", "lost in"), rows)
+    more = f"<p>… and {len(rows) - _MOST_MODES} more.</p>" if len(rows) > _MOST_MODES else ""
+    return drawn + table(("mode", "frequency in Hz>", "damping>", "energy in", "lost in"), rows[:_MOST_MODES]) + more

@@ -1,0 +1,49 @@
+"""Commands between netlists and Modelica text."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from modelica_like.cli.declare import Argument, Option
+from modelica_like.cli.shared import Assignments, Debug, Netlist, load_netlist, note, say, told
+from modelica_like.writing import write_text
+
+
+def from_modelica(
+    text: Annotated[Path, Argument(metavar="FILE", help="Modelica text (.mo)", show_default=False)],
+    output: Annotated[
+        Path | None, Option("-o", "--output", metavar="FILE", help="Netlist; default: FILE.toml.")
+    ] = None,
+    *,
+    name: Annotated[
+        str, Option("--class", metavar="NAME", help="Model to read; default: the last one of the file.")
+    ] = "",
+    debug: Debug = False,
+) -> None:  # fmt: skip
+    """Write a model of Modelica text as a netlist."""
+    made = output or text.with_suffix(".toml")
+    with told(debug, files=[made]):
+        from modelica_like.modelica_text.netlist_form import netlist_text
+        from modelica_like.modelica_text.read import read_modelica
+
+        model, notes = read_modelica(text, name)
+        write_text(made, netlist_text(model, made.parent, notes))
+        note(*notes)
+        say(f"{made}: {len(model.parts)} parts; next, modelica-like simulate {made}")
+
+
+def to_modelica(
+    netlist: Netlist, assignments: Assignments = None, *,
+    output: Annotated[
+        Path | None, Option("-o", "--output", metavar="FILE", help="Modelica text; default: NETLIST.mo.")
+    ] = None,
+    debug: Debug = False,
+) -> None:  # fmt: skip
+    """Write a netlist as Modelica text on classes of the Modelica Standard Library."""
+    made = output or netlist.with_suffix(".mo")
+    with told(debug, files=[made]):
+        from modelica_like.modelica_text.write import modelica_text
+
+        write_text(made, modelica_text(load_netlist(netlist, assignments)))
+        say(str(made))

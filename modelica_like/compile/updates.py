@@ -1,0 +1,124 @@
+"""Discrete equations of a whole model, in an order in which each uses the new values of the others."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from modelica_like.compile.compiled import CompiledUpdate, Reset
+from modelica_like.errors import Source, StructureError
+from modelica_like.flatten.model import evaluate
+from modelica_like.structure.reduce import ReducedDae
+
+
+@dataclass(eq=False)
+class _Row:
+    """A new value: what gets it, whether it does, the value, what it keeps otherwise, and the entry in d, if any."""
+
+    update: CompiledUpdate
+    path: str
+    active: Any
+    value: Any
+    kept: Any
+    entry: int | None
+
+
+def updates(reduced: ReducedDae, reset: Callable[[str, int], Reset]) -> tuple[Any, tuple[CompiledUpdate, ...]]:
+    """Return what discrete variables, and variables set by a `when`, become in one iteration of an event.
+
+    Discrete variables in it are the new ones, except in `pre(…)`. What is not set keeps its value; for variables that
+    are not discrete, infinity says so.
+
+    Args:
+        reduced: the reduced system.
+        reset: gives the target for its path and the number of the update.
+
+    Raises:
+        StructureError: discrete variables depend on each other in a loop.
+    """
+    flat = reduced.flat
+    rows = _rows(reduced, reset)
+    own = [row for row in rows if row.entry is not None]
+    old = {row.entry: row.kept for row in own}
+    before = [(flat.d[k], old[of if of in old else k]) for k, of in flat.pres.items()]
+    values = _replaced([ca.if_else(row.active, row.value, row.kept) for row in (*own, *rows)], before)
+    values, results = values[: len(own)], values[len(own) :]
+    symbols = [flat.d[row.entry] for row in own]
+    order = _order(own, symbols, values)
+    if order:
+        _, results = ca.substitute_inplace([symbols[k] for k in order], [values[k] for k in order], results, False)
+    results = _replaced(results, [(symbol, flat.d[entry]) for entry, symbol in old.items()])
+    return ca.vertcat(*results), tuple(row.update for row in rows)
+
+
+def _rows(reduced: ReducedDae, reset: Callable[[str, int], Reset]) -> list[_Row]:
+    """All updates, those of `pre` without an equation and of `initial()` last."""
+    flat = reduced.flat
+    columns = evaluate(flat, "updates", reduced.values)
+    found: list[_Row] = []
+
+    def add(path: str, active: Any, value: Any, source: Source, at_start: bool) -> None:
+        target = reset(path, len(found))
+        entry = target.index if target.kind == "discrete" else None
+        kept = ca.SX(np.inf) if entry is None else ca.SX.sym("old")
+        found.append(_Row(CompiledUpdate(target, at_start, source), path, active, value, kept, entry))
+
+    for number, instance in enumerate(flat.instances):
+        prefix = f"{instance.path}." if instance.path else ""
+        for row, form in enumerate(instance.template.update_forms):
+            parts = columns[number][2 * row : 2 * row + 2]
+            add(prefix + form.target, parts[0], parts[1], form.source, form.at_start)
+    determined = {row.entry for row in found}
+    for k, of in flat.pres.items():
+        if k == of or of not in determined:
+            add(flat.discretes[k].path, ca.SX(1), ca.SX(0) if k == of else flat.d[of], Source(""), False)
+    return found
+
+
+def _replaced(expressions: Sequence[Any], pairs: Sequence[tuple[Any, Any]]) -> list[Any]:
+    if not expressions or not pairs:
+        return [*expressions]
+    olds, news = zip(*pairs, strict=True)
+    return ca.vertsplit(ca.substitute(ca.vertcat(*expressions), ca.vertcat(*olds), ca.vertcat(*news)))
+
+
+def _order(rows: list[_Row], symbols: list[Any], values: list[Any]) -> list[int]:
+    """Return an order in which every row comes after those that it depends on.
+
+    Raises:
+        StructureError: there is none.
+    """
+    if not rows:
+        return []
+    needs: list[set[int]] = [set() for _ in rows]
+    for row, column in zip(*ca.jacobian_sparsity(ca.vertcat(*values), ca.vertcat(*symbols)).get_triplet(), strict=True):
+        needs[row].add(column)
+    order: list[int] = []
+    left = set(range(len(rows)))
+    while left:
+        ready = sorted(k for k in left if not needs[k] & left)
+        if not ready:
+            raise _loop(rows, needs, left)
+        order += ready
+        left -= {*ready}
+    return order
+
+
+def _loop(rows: list[_Row], needs: list[set[int]], left: set[int]) -> StructureError:
+    """Return the error of discrete variables that depend on each other."""
+    way = [min(left)]
+    while way[-1] not in way[:-1]:
+        way.append(min(needs[way[-1]] & left))
+    way = way[way.index(way[-1]) :]
+    names = " → ".join(rows[k].path for k in reversed(way))
+    alone = len(way) == 2
+    return StructureError(
+        f"{rows[way[0]].path} determines itself at an event." if alone
+        else f"Discrete variables determine each other in a loop: {names}.",
+        where=[rows[k].update.source for k in dict.fromkeys(way) if rows[k].update.source.file],
+        advice="Use a value from before the event, pre(…), at one place of the loop.",
+    )  # fmt: skip

@@ -1,0 +1,273 @@
+"""Discrete equations of a component: what its discrete variables become at events, and what its relations need."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import Any, cast
+
+import casadi as ca
+
+from modelica_like.errors import LanguageError, Source, did_you_mean
+from modelica_like.language.component import Component
+from modelica_like.language.discrete import INITIAL, Assertion, Marker, Pre, When, edge, eventful, is_a, moves
+from modelica_like.language.equation import Equation
+from modelica_like.language.expr import TIME, Expr, Symbol, is_expression, symbols_in
+from modelica_like.language.fields import Discrete, Input, Variable
+from modelica_like.language.mode import BoundMode, Mode, StartMode, Transition
+from modelica_like.language.transition import NAME_IN_NOTICE
+
+Located = tuple[Any, Source]
+_ONE: Any = ca.SX(1)
+
+
+@dataclass(frozen=True)
+class Hidden:
+    """A discrete value that relations and edges need: a mode if it has names."""
+
+    path: str
+    description: str
+    names: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Update:
+    """A new value at events.
+
+    Attributes:
+        target: a discrete variable, or a variable that a `when` sets.
+        active: whether it gets the value.
+        value: the value.
+        at_start: whether it is also determined when start values are: equations are, a `when` is not.
+    """
+
+    target: Symbol
+    active: Any
+    value: Any
+    source: Source
+    at_start: bool
+
+
+@dataclass(frozen=True)
+class UpdateForm:
+    """An update without its expressions: path of the target from the component."""
+
+    target: str
+    source: Source
+    at_start: bool
+
+
+class DiscreteEquations:
+    """The discrete equations of a component, written out.
+
+    Args:
+        component: of the class.
+        equations: those of discrete variables.
+        events: transitions, start modes and whens.
+        others: other expressions of the component with their places.
+
+    Attributes:
+        updates: new values at events.
+        events: transitions and start modes, with those of relations.
+        hidden: discrete values that these need.
+
+    Raises:
+        LanguageError: an equation of a discrete variable changes between events, or `pre(…)` is in the wrong place.
+    """
+
+    def __init__(
+        self, component: Component, equations: list[Equation], events: list[Any], others: Iterable[Located]
+    ) -> None:
+        self._component, self._kind = component, type(component).__name__
+        self.updates = [self._of_equation(one) for one in equations]
+        self.events: list[Transition | StartMode] = [one for one in events if isinstance(one, Transition | StartMode)]
+        self.hidden: list[Hidden] = []
+        self._kept: list[Symbol] = []
+        for number, one in enumerate(events, 1):
+            if isinstance(one, When):
+                self.updates += self._of_when(one)
+            elif isinstance(one, Assertion):
+                self._write_assertion(one, f"assertion[{number}]")
+        told = [(expression, one.source) for one in self.events for expression in _expressions(one)]
+        for expression, source in told:
+            self._check_pre(expression, source)
+        self._write_markers([*others, *told, *((e, u.source) for u in self.updates for e in (u.active, u.value))])
+
+    def forms(self, path: Any) -> tuple[UpdateForm, ...]:
+        """Return the updates without their expressions; `path` names a symbol from the component."""
+        return tuple(UpdateForm(path(one.target), one.source, one.at_start) for one in self.updates)
+
+    def _of_equation(self, equation: Equation) -> Update:
+        target = symbols_in(equation.left)[0]
+        field = target.owner.fields[target.name]
+        value = eventful(equation.right) if field.kind == "boolean" else equation.right
+        if moves(value):
+            raise LanguageError(
+                f"{self._kind}: {target.name} changes at events only, but its equation follows "
+                f"{next(one.name for one in symbols_in(value) if one is TIME or moves(ca.SX(one)))} all the time.",
+                where=equation.source,
+                advice="Take the value in a `when`, or choose with if_(…): its relations make events.",
+            )
+        return Update(target, _ONE, value, equation.source, at_start=True)
+
+    def _of_when(self, one: When) -> list[Update]:
+        found: dict[int, tuple[Symbol, Any, Any]] = {}
+        for active, values in reversed(one.branches):
+            for key, value in values.items():
+                target = _target(key)
+                if target is None:
+                    what = f"{self._kind}: a `when` gives {key} a value, which is neither a variable nor discrete."
+                    raise LanguageError(what, where=one.source, advice="Name variables, as in {self.n: pre(self.n)}.")
+                _, before, later = found.get(id(target), (target, 0, 0))
+                flag: Any = active
+                chosen = ca.SX(value) if id(target) not in found else ca.if_else(flag, ca.SX(value), later)
+                found[id(target)] = target, ca.logic_or(flag, before), chosen
+        return [Update(*parts, one.source, at_start=False) for parts in found.values()]
+
+    def check_determined(self, used: Iterable[str]) -> None:
+        """Check that every discrete variable of the component is determined once; a number by its start value at least.
+
+        Args:
+            used: paths of the discrete values in its expressions.
+
+        Raises:
+            LanguageError: it is not, or twice.
+        """
+        places: dict[int, Source] = {}
+        for one in self.updates:
+            if id(one.target) in places:
+                what = f"{self._kind}: {one.target.name} is determined twice."
+                advice = "Join them: when(…).elsewhen(…), or one equation."
+                raise LanguageError(what, where=[places[id(one.target)], one.source], advice=advice)
+            places[id(one.target)] = one.source
+        resets = [(symbols_in(key)[0], t) for t in self.events if isinstance(t, Transition) for key in t.reset]
+        for target, transition in resets:
+            if id(target) in places and not isinstance(target, Marker) and is_a(target, Discrete):
+                what = f"{self._kind}: {target.name} is set by a transition and determined by an equation or a `when`."
+                raise LanguageError(what, where=[places[id(target)], transition.source], advice="Keep one of the two.")
+        known = {id(target) for target, _ in resets} | {*places}
+        for name, field in self._component.fields.items():
+            if not isinstance(field, Discrete) or id(getattr(self._component, name)) in known:
+                continue
+            if field.kind != "number" or (name in used and field.default == 0.0):
+                what = f"{self._kind}: nothing determines the discrete variable {name}."
+                raise LanguageError(what, advice=f"Yield self.{name} == …, or set it in a `when` or a reset.")
+
+    def _check_pre(self, expression: Any, source: Source) -> None:
+        for one in symbols_in(expression) if is_expression(expression) else ():
+            if isinstance(one, Pre):
+                raise LanguageError(
+                    f"{self._kind}: {one.name} is in a transition, where it never differs from {one.of.name}.",
+                    where=source,
+                    advice=f"Write {one.of.name}: in a reset it is the value before. For an edge, write once=True.",
+                )
+
+    def _write_markers(self, pending: list[Located]) -> None:
+        """Name the markers in expressions, and write what determines them."""
+        seen: set[int] = set()
+        counts: dict[str, int] = {}
+        while pending:
+            expression, source = pending.pop(0)
+            for symbol in symbols_in(expression) if is_expression(expression) else ():
+                one = symbol.of if isinstance(symbol, Pre) else symbol
+                if not isinstance(one, Marker) or id(one) in seen:
+                    continue
+                seen.add(id(one))
+                counts[one.kind] = counts.get(one.kind, 0) + 1
+                counts_up = one.kind in ("floor", "clock")
+                one.name = f"{'count of ' * counts_up}{one.kind}[{counts[one.kind]}]"
+                pending += [(one.of, source), *((e, source) for e in self._write_marker(one, source))]
+
+    def _write_marker(self, one: Marker, source: Source) -> Iterable[Any]:
+        """Write what determines a marker; return further expressions."""
+        own: Any = one.of
+        if one.kind == "relation":
+            self._write_relation(one, source)
+            return ()
+        self.hidden.append(Hidden(one.name, f"{one.kind} {own}"))
+        if one.kind in ("floor", "clock"):
+            (self._write_floor if one.kind == "floor" else self._write_clock)(one, source)
+            return ()
+        value = own if one.kind == "was" else edge(own)
+        self.updates.append(Update(one, _ONE, value, source, at_start=one.kind == "was"))
+        return (value,)
+
+    def _write_relation(self, one: Marker, source: Source) -> None:
+        mode, opposite = self._mode(one.name, str(one.of), one, ("false", "true")), cast(Expr, ca.logic_not(one.of))
+        self.events += [
+            replace(mode.go("false", "true", when=one.of), source=source),
+            replace(mode.go("true", "false", when=opposite), source=source),
+            replace(mode.initially("true", when=one.of), source=source),
+        ]
+
+    def _write_floor(self, one: Marker, source: Source) -> None:
+        """Count up and down by what is passed; the value itself may still be on the other side by rounding."""
+        value, number = cast(Any, one.of), cast(Any, one)
+        mode = self._counting(one, f"floor({value})")
+        up, down = ca.fmax(number + 1, ca.floor(value)), ca.fmin(number - 1, ca.floor(value))
+        self.events += [
+            replace(mode.go("counting", "counting", when=value >= number + 1, reset={one: up}), source=source),
+            replace(mode.go("counting", "counting", when=value < number, reset={one: down}), source=source),
+        ]
+        self.updates.append(Update(one, INITIAL, ca.floor(value), source, at_start=True))
+
+    def _write_assertion(self, one: Assertion, path: str) -> None:
+        for name in NAME_IN_NOTICE.findall(one.text):
+            if name not in self._component.fields:
+                what = f"{self._kind}: the text of an assertion names {name}, which is not declared"
+                raise LanguageError(f"{what}{did_you_mean(name, self._component.fields) or '.'}", where=one.source)
+        symbol = Marker("relation", one.condition)
+        symbol.name = path
+        self._kept.append(symbol)
+        mode = self._mode(path, str(one.condition), symbol, ("holds", "broken"))
+        broken = cast(Expr, ca.logic_not(cast(Any, one.condition)))
+        self.events.append(
+            replace(mode.go("holds", "broken", when=broken, notice=one.text, fails=True), source=one.source)
+        )
+
+    def _write_clock(self, one: Marker, source: Source) -> None:
+        """Count ticks; where a run starts late, all earlier ones at once."""
+        number, period, offset = cast(Any, one), cast(Any, one.of), cast(Any, one.offset)
+        mode = self._counting(one, f"clock({period}, {offset})")
+        ticks = ca.fmax(number + 1, ca.floor((cast(Any, TIME) - offset) / period) + 1)
+        tick = mode.go("counting", "counting", at=offset + number * period, reset={one: ticks})
+        self.events.append(replace(tick, source=source))
+
+    def _counting(self, one: Marker, description: str) -> BoundMode:
+        """Declare the mode whose transitions count."""
+        self._kept.append(symbol := Marker(one.kind, one.of))
+        symbol.name = one.name.removeprefix("count of ")
+        return self._mode(symbol.name, description, symbol, ("counting",))
+
+    def _mode(self, path: str, description: str, symbol: Symbol, names: tuple[str, ...]) -> BoundMode:
+        mode = Mode(*names, description=description)
+        mode.name, mode.owner = path, self._kind
+        self.hidden.append(Hidden(path, description, names))
+        return BoundMode(mode, symbol)
+
+
+def between_events(expression: Any) -> Any:
+    """Return an expression as it is between events, where the `pre` of a discrete variable is the variable."""
+    pres = [one for one in symbols_in(expression) if isinstance(one, Pre)]
+    if not pres:
+        return expression
+    return ca.substitute(ca.SX(expression), ca.vertcat(*pres), ca.vertcat(*(one.of for one in pres)))
+
+
+def is_discrete(equation: Equation) -> bool:
+    """Return whether an equation determines a discrete variable: it stands alone on the left."""
+    if not cast(Any, equation.left).is_symbolic():
+        return False
+    symbol = symbols_in(equation.left)[0]
+    return symbol.owner is not None and is_a(symbol, Discrete)
+
+
+def _target(key: Any) -> Symbol | None:
+    """Return what a `when` may set, or None."""
+    plain = isinstance(key, Symbol) and key.owner is not None and key.order == 0
+    return key if plain and is_a(key, (Variable, Discrete)) and not is_a(key, Input) else None
+
+
+def _expressions(event: Transition | StartMode) -> Iterable[Any]:
+    resets = event.reset.values() if isinstance(event, Transition) else ()
+    return (one for one in (event.when, getattr(event, "at", None), *resets) if one is not None)

@@ -1,0 +1,276 @@
+"""Discrete equations: relations that make events, `when`, `pre`, `edge`, `change`, `initial`."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Literal, cast
+
+import casadi as ca
+
+from modelica_like.errors import LanguageError, Source
+from modelica_like.language.expr import TIME, Expr, Scalar, Symbol, symbols_in
+from modelica_like.language.fields import Discrete, Variable
+from modelica_like.language.places import NOWHERE, caller
+
+MarkerKind = Literal["relation", "floor", "was", "once", "clock"]
+
+
+class Marker(Symbol):
+    """A discrete value that an expression stands for, until the component's equations are read.
+
+    Attributes:
+        kind: `relation`: whether `of` is true, changed by events; `floor`: the whole number below `of`, changed by
+            events; `was`: the condition `of` at the present instant; `once`: 1 where `of` has just become true;
+            `clock`: number of ticks, `of` is their period.
+        of: the condition or value.
+        offset: time of the first tick of a clock.
+        name: path from the component, given when its template is made.
+    """
+
+    kind: MarkerKind
+    of: Expr
+    offset: Expr
+
+    def __init__(self, kind: MarkerKind, of: Expr, offset: Scalar = 0.0) -> None:
+        super().__init__(None, kind)
+        self.kind, self.of, self.offset = kind, of, ca.SX(cast(Any, offset))
+
+
+class Pre(Symbol):
+    """The value of a discrete value before the present iteration of an event."""
+
+    of: Symbol
+
+    def __init__(self, of: Symbol) -> None:
+        super().__init__(of.owner, f"pre({of.name})")
+        self.of = of
+
+
+INITIAL = Symbol(None, "initial()")
+_timed: list[Marker] = []
+"""Markers of expressions of time alone, which no component owns."""
+
+
+def marker(kind: MarkerKind, of: Expr, offset: Scalar = 0.0) -> Marker:
+    """Return the marker for an expression, the same one for equal expressions."""
+    wanted: Any = ca.vertcat(of, offset)
+    owner = _owner_in(of)
+    known: list[Marker] = _timed if owner is None else owner.__dict__.setdefault("_markers", [])
+    same = (one for one in known if one.kind == kind and ca.is_equal(ca.vertcat(one.of, one.offset), wanted, 99))
+    found = next(same, None)
+    if found is None:
+        known.append(found := Marker(kind, of, offset))
+    return found
+
+
+def _owner_in(expression: Expr) -> Any:
+    """Return the owner of a symbol in an expression, or None where time decides alone."""
+    found = (_owner_in(one.of) if isinstance(one, Marker) else one.owner for one in symbols_in(expression))
+    return next((owner for owner in found if owner is not None), None)
+
+
+def moves(expression: Expr) -> bool:
+    """Return whether an expression changes between events: it has time or a variable in it."""
+    return any(one is TIME or (one.owner is not None and is_a(one, Variable)) for one in symbols_in(expression))
+
+
+def is_a(symbol: Symbol, kind: type | tuple[type, ...]) -> bool:
+    """Return whether a symbol stands for a field of a kind itself."""
+    return not isinstance(symbol, Pre) and isinstance(symbol.owner.fields.get(symbol.name), kind)
+
+
+_JOINS = {ca.OP_AND: ca.logic_and, ca.OP_OR: ca.logic_or}
+
+
+def eventful(condition: Expr | bool) -> Expr:
+    """Return a condition whose relations change at events only, each located exactly.
+
+    Args:
+        condition: relations and Boolean variables, joined with `all_of`, `any_of`, `negate`.
+
+    Raises:
+        LanguageError: it compares values that change continuously by `==`, or is no condition.
+    """
+    one: Any = ca.SX(cast(Any, condition))
+    operation = one.op()
+    if operation in _JOINS:
+        return _JOINS[operation](*(cast(Any, eventful(one.dep(k))) for k in (0, 1)))
+    if operation == ca.OP_NOT:
+        return ca.logic_not(cast(Any, eventful(one.dep(0))))
+    if not moves(one):
+        return one
+    if operation in (ca.OP_LT, ca.OP_LE):
+        return marker("relation", one)
+    if operation in (ca.OP_EQ, ca.OP_NE):
+        what = f"{one} compares values that change continuously: they are equal at single instants only."
+        raise LanguageError(what, where=caller(), advice="Write a relation with < or >.")
+    what = f"{one} is not a condition: it changes continuously."
+    raise LanguageError(what, where=caller(), advice="Write a relation, as in `self.w > 0`, or a Boolean variable.")
+
+
+def if_(condition: Expr | bool, then: Scalar, otherwise: Scalar) -> Expr:
+    """Choose by a condition whose relations make events; `where` is the form without an event.
+
+    Args:
+        condition: a relation, or several joined with `all_of` and the like. The instants at which its relations change
+            are located, and the integrator begins anew there.
+        then: value if it is true.
+        otherwise: value if it is false; the branch not taken may be undefined.
+
+    Raises:
+        LanguageError: it is no condition.
+    """
+    return ca.if_else(cast(Any, eventful(condition)), ca.SX(cast(Any, then)), ca.SX(cast(Any, otherwise)))
+
+
+def pre(value: Expr) -> Expr:
+    """Return a discrete value as it was before the present event, or before the present iteration of it.
+
+    It belongs in equations of discrete variables and in `when`; in equations of variables it is the value itself.
+
+    Args:
+        value: a discrete, Boolean or integer variable.
+
+    Raises:
+        LanguageError: it is something else.
+    """
+    if not isinstance(value, Marker) and not (
+        isinstance(value, Symbol) and value.owner is not None and is_a(value, Discrete)
+    ):
+        what = f"pre({value}): only a discrete, Boolean or integer variable has a value before an event."
+        raise LanguageError(what, where=caller(), advice="For a mode, declare boolean(…) and set it by an equation.")
+    symbol = cast(Symbol, value)
+    if "_pre" not in symbol.__dict__:
+        symbol.__dict__["_pre"] = Pre(symbol)
+    return symbol.__dict__["_pre"]
+
+
+def edge(condition: Expr) -> Expr:
+    """Return a condition that is true where another one has just become true.
+
+    Args:
+        condition: a Boolean variable or a relation, or several joined.
+
+    Raises:
+        LanguageError: it is no condition.
+    """
+    plain = isinstance(condition, Symbol) and condition.owner is not None and not moves(condition)
+    known = condition if plain else marker("was", eventful(condition))
+    return ca.logic_and(cast(Any, known), ca.logic_not(cast(Any, pre(known))))
+
+
+def change(value: Expr) -> Expr:
+    """Return a condition that is true where a discrete value has just changed.
+
+    Args:
+        value: a discrete, Boolean or integer variable.
+
+    Raises:
+        LanguageError: it is something else.
+    """
+    return value != pre(value)
+
+
+def clock(period: Expr, offset: Scalar = 0.0) -> Expr:
+    """Return a condition that becomes true every period, exactly at `offset + k * period`; for `when`.
+
+    Where a run starts later, earlier ticks count as one at the start. Clocks whose ticks fall together tick at one
+    instant, and their whens use each other's new values.
+
+    Args:
+        period: time between two ticks in s: a parameter, or an expression of parameters and discrete variables.
+        offset: time of the first tick in s.
+
+    Raises:
+        LanguageError: the period changes between events.
+    """
+    if moves(period) or moves(ca.SX(cast(Any, offset))):
+        what = f"The ticks of clock({period}) are not known in advance, because they move between events."
+        raise LanguageError(what, where=caller(), advice="Use parameters or discrete variables.")
+    return change(marker("clock", ca.SX(cast(Any, period)), offset))
+
+
+def initial() -> Expr:
+    """Return a condition that is true at the start of a run."""
+    return INITIAL
+
+
+@dataclass(frozen=True, eq=False)
+class When:
+    """New values of discrete variables, and of states, where conditions become true; the first one counts.
+
+    Attributes:
+        branches: pairs of an active condition, true at one instant, and the new values.
+        conditions: as they were written.
+    """
+
+    branches: tuple[tuple[Expr, Mapping[Expr, Any]], ...]
+    conditions: tuple[Expr, ...]
+    source: Source = NOWHERE
+
+    def elsewhen(self, condition: Expr | tuple[Expr, ...], values: Mapping[Expr, Scalar]) -> When:
+        """Add a condition that counts only where no earlier one becomes true at the same instant.
+
+        Args:
+            condition: as of `when`.
+            values: as of `when`.
+
+        Raises:
+            LanguageError: as of `when`.
+        """
+        other = when(condition, values)
+        before = functools.reduce(ca.logic_or, [cast(Any, active) for active, _ in self.branches])
+        active = ca.logic_and(cast(Any, other.branches[0][0]), ca.logic_not(before))
+        branches = (*self.branches, (cast(Expr, active), dict(values)))
+        return replace(self, branches=branches, conditions=self.conditions + other.conditions)
+
+
+def when(condition: Expr | tuple[Expr, ...], values: Mapping[Expr, Scalar]) -> When:
+    """Set values at the instant at which a condition becomes true: not while it is true, nor if it is from the start.
+
+    Args:
+        condition: a relation, a Boolean variable, or several joined with `all_of`, `any_of`, `negate`; `initial()`
+            is true at the start. Of a tuple, any condition that becomes true counts, whether others are true or not.
+        values: new values by variable: discrete variables, which are determined by this alone, and states. A discrete
+            variable in a new value is the one after the event; `pre(n)` is the one before.
+
+    Raises:
+        LanguageError: it is no condition, or has no edge because it is constant during a run.
+    """
+    conditions = condition if isinstance(condition, tuple) else (condition,)
+    edges: list[Any] = []
+    for one in conditions:
+        symbols = symbols_in(one)
+        if not any(symbol is TIME or symbol.owner is None or not _is_fixed(symbol) for symbol in symbols):
+            what = f"when({one}, …) has no edge: its condition is the same during the whole run."
+            raise LanguageError(what, where=caller(), advice="Compare what changes, such as a variable or time.")
+        ticks = any(isinstance(symbol, Marker) and symbol.kind == "clock" for symbol in symbols)
+        edges.append(one if one is INITIAL or (ticks and cast(Any, one).op() == ca.OP_NE) else edge(one))
+    active = cast(Expr, functools.reduce(ca.logic_or, edges))
+    return When(((active, dict(values)),), conditions)
+
+
+@dataclass(frozen=True, eq=False)
+class Assertion:
+    """A condition that must hold, and what to say where it does not."""
+
+    condition: Expr
+    text: str
+    source: Source = NOWHERE
+
+
+def assert_(condition: Expr, text: str) -> Assertion:
+    """End the run with an error where a condition becomes false, or is false at the start.
+
+    Args:
+        condition: relations and Boolean variables, joined with `all_of`, `any_of`, `negate`.
+        text: goes on after the name of the component, such as "turns with {w} rad/s, more than its {w_max} rad/s";
+            names in braces become numbers in SI units.
+    """
+    return Assertion(condition, text)
+
+
+def _is_fixed(symbol: Symbol) -> bool:
+    return symbol.order == 0 and not is_a(symbol, (Variable, Discrete)) and symbol.name in symbol.owner.fields

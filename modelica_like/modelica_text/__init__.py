@@ -1,0 +1,1 @@
+"""Modelica text: read as components, and written from them."""

@@ -1,0 +1,114 @@
+"""Tokens of Modelica text."""
+
+from __future__ import annotations
+
+import re
+from typing import NoReturn
+
+from modelica_like.errors import ModelicaTextError, Source
+
+_TOKEN = re.compile(
+    r"""(?P<skip>\s+|//[^\n]*|/\*.*?\*/)|(?P<number>\d+(?:\.\d*)?(?:[eE][+-]?\d+)?)
+    |(?P<string>"(?:[^"\\]|\\.)*")|(?P<name>[^\W\d]\w*|'(?:[^'\\]|\\.)*')
+    |(?P<sign>:=|<=|>=|==|<>|\.\*|\.\+|\.-|\./|\.\^|[-+*/^<>=(){}\[\],;:.])""",
+    re.VERBOSE | re.DOTALL,
+)
+KINDS = {"model", "block", "connector", "record", "function", "package", "type", "class", "operator"}
+SECTIONS = {"public", "protected", "equation", "algorithm", "initial", "end", "annotation", "external"}
+_KEYWORDS = SECTIONS | {
+    "then", "else", "elseif", "elsewhen", "loop", "for", "if", "when", "while", "connect", "or", "and",
+}  # fmt: skip
+Token = tuple[str, str, int]
+"""Kind (a sign and a keyword are their own kind), text, line."""
+
+
+class Tokens:
+    """A text as tokens, and the place that is read.
+
+    Args:
+        text: Modelica.
+        file: its path, for messages.
+    """
+
+    def __init__(self, text: str, file: str) -> None:
+        self.file = file
+        self.lines = text.split("\n")
+        self.tokens = self._tokens(text)
+        self.at = 0
+        self.depth = 0
+
+    def _tokens(self, text: str) -> list[Token]:
+        tokens: list[Token] = []
+        position, line = 0, 1
+        while position < len(text):
+            match = _TOKEN.match(text, position)
+            if match is None:
+                self.refuse(f"{text[position]!r} has no meaning in Modelica.", line)
+            kind, found = match.lastgroup or "", match.group()
+            if (kind == "name" and (found in _KEYWORDS or found in KINDS)) or kind == "sign":
+                tokens.append((found, found, line))
+            elif kind != "skip":
+                tokens.append((kind, found, line))
+            line += found.count("\n")
+            position = match.end()
+        tokens.append(("end of file", "", line))
+        return tokens
+
+    def error(self, what: str, line: int) -> ModelicaTextError:
+        """Return an error with its line."""
+        text = self.lines[line - 1] if line <= len(self.lines) else ""
+        return ModelicaTextError(what, where=Source(self.file, line, " ".join(text.split())))
+
+    def refuse(self, what: str, line: int) -> NoReturn:
+        """Raise an error with its line."""
+        raise self.error(what, line)
+
+    @property
+    def kind(self) -> str:
+        """Kind of the next token."""
+        return self.tokens[self.at][0]
+
+    @property
+    def text(self) -> str:
+        """Text of the next token."""
+        return self.tokens[self.at][1]
+
+    @property
+    def line(self) -> int:
+        """Line of the next token."""
+        return self.tokens[self.at][2]
+
+    def take(self, *kinds: str) -> str:
+        """Return the text of the next token and go on if it is of one of these kinds, else an empty text."""
+        kind, text, _ = self.tokens[self.at]
+        if kind in kinds or (kind == "name" and text in kinds):
+            self.at += 1
+            return text
+        return ""
+
+    def need(self, kind: str) -> str:
+        """Return the text of the next token, which must be of this kind."""
+        found = self.take(kind)
+        if not found:
+            wanted = f"a {kind}" if kind == "name" else f"'{kind}'"
+            told = f"'{self.text}'" if self.text else "the end of the file"
+            self.refuse(f"Expected {wanted} before {told}.", self.line)
+        return found
+
+    def dotted(self) -> str:
+        """Read a name with dots; one from the outermost level begins with a dot."""
+        names = ["", self.need("name")] if self.take(".") else [self.need("name")]
+        while self.kind == "." and self.tokens[self.at + 1][0] == "name":
+            self.at += 1
+            names.append(self.need("name"))
+        return ".".join(names)
+
+    def strings(self) -> str:
+        """Return the description, if there is one."""
+        texts = []
+        while self.kind == "string":
+            texts.append(self.take("string")[1:-1])
+            if not (self.kind == "+" and self.tokens[self.at + 1][0] == "string"):
+                break
+            self.take("+")
+        return "".join(texts)

@@ -1,0 +1,246 @@
+"""Errors of discrete equations.
+
+Lines of this file are written as {marker}, the line that ends in `# marker`.
+"""
+
+from collections.abc import Callable
+
+import pytest
+
+from modelica_like import build, simulate
+from modelica_like.errors import Chattering, LanguageError, ModelicaLikeError, StructureError, UnitMismatch
+from modelica_like.language import (
+    Component,
+    Discrete,
+    Equations,
+    Events,
+    Mode,
+    Parameter,
+    Variable,
+    boolean,
+    clock,
+    der,
+    edge,
+    integer,
+    negate,
+    param,
+    pre,
+    var,
+    when,
+)
+
+
+class Basis(Component, partial=True):
+    x: Variable = var("1", "moves", default=0)
+    T: Parameter = param("s", "time", default=0.1)
+    n: Discrete = integer("count")
+    on: Discrete = boolean("switch")
+
+    def equations(self) -> Equations:
+        yield self.T * der(self.x) == 1 - self.x
+
+    def events(self) -> Events:
+        yield when(self.x > 0.5, {self.n: pre(self.n) + 1})  # basis
+
+
+class Undetermined(Basis):
+    pass
+
+
+class Twice(Basis):
+    def equations(self) -> Equations:
+        yield from super().equations()
+        yield self.on == (self.x > 0.5)
+        yield self.n == 3  # twice
+
+
+class Reset(Basis):
+    gate = Mode("open")
+
+    def equations(self) -> Equations:
+        yield from super().equations()
+        yield self.on == (self.x > 0.5)
+
+    def events(self) -> Events:
+        yield from super().events()
+        yield self.gate.go("open", "open", when=self.x > 0.2, reset={self.n: 0})  # reset
+
+
+class Loop(Basis):
+    off: Discrete = boolean("opposite")
+
+    def equations(self) -> Equations:
+        yield from super().equations()
+        yield self.on == negate(self.off)  # loop on
+        yield self.off == negate(self.on)  # loop off
+
+
+class Itself(Basis):
+    def equations(self) -> Equations:
+        yield from super().equations()
+        yield self.on == negate(self.on)  # itself
+
+
+class Endless(Basis):
+    def equations(self) -> Equations:
+        yield from super().equations()
+        yield self.on == negate(pre(self.on))  # endless
+
+
+class Follows(Basis):
+    twin: Discrete = integer("twin")
+
+    def equations(self) -> Equations:
+        yield from super().equations()
+        yield self.on == (self.x > 0.5)
+        yield self.twin == 2 * self.x  # follows
+
+
+class Constant(Basis):
+    def events(self) -> Events:
+        yield when(self.T > 0, {self.n: 1})  # constant
+
+
+class NoCondition(Basis):
+    def events(self) -> Events:
+        yield when(self.x, {self.n: 1})  # no condition
+
+
+class Equal(Basis):
+    def events(self) -> Events:
+        yield when(self.x == 0.5, {self.n: 1})  # equal
+
+
+class Parameters(Basis):
+    def events(self) -> Events:
+        yield when(self.x > 0.5, {self.T: 1})  # parameters
+
+
+class Units(Basis):
+    def events(self) -> Events:
+        yield when(self.x > 0.5, {self.n: self.T})  # units
+
+
+class Outside(Basis):
+    gate = Mode("open")
+
+    def equations(self) -> Equations:
+        yield from super().equations()
+        yield self.on == (self.x > 0.5)
+
+    def events(self) -> Events:
+        yield from super().events()
+        yield self.gate.go("open", "open", when=edge(self.on))  # outside
+
+
+class Varying(Basis):
+    def events(self) -> Events:
+        yield when(clock(self.T * self.x), {self.n: 1})  # varying
+
+
+class PreOfVariable(Basis):
+    def events(self) -> Events:
+        yield when(self.x > 0.5, {self.n: pre(self.x)})  # pre
+
+
+HERE = "test_discrete_messages.py"
+BASIS = "`when(self.x > 0.5, {self.n: pre(self.n) + 1})`"
+CASES: dict[type[Component], tuple[type[ModelicaLikeError], str]] = {
+    Undetermined: (
+        LanguageError,
+        "Undetermined: nothing determines the discrete variable on.\n"
+        "Yield self.on == …, or set it in a `when` or a reset.",
+    ),
+    Twice: (
+        LanguageError,
+        "Twice: n is determined twice.\n"
+        f"  in {HERE}:{{twice}} `yield self.n == 3`\n"
+        f"  in {HERE}:{{basis}} `yield {BASIS[1:]}\n"
+        "Join them: when(…).elsewhen(…), or one equation.",
+    ),
+    Reset: (
+        LanguageError,
+        "Reset: n is set by a transition and determined by an equation or a `when`.\n"
+        f"  in {HERE}:{{basis}} `yield {BASIS[1:]}\n"
+        f'  in {HERE}:{{reset}} `yield self.gate.go("open", "open", when=self.x > 0.2, reset={{self.n: 0}})`\n'
+        "Keep one of the two.",
+    ),
+    Loop: (
+        StructureError,
+        "Discrete variables determine each other in a loop: on → off → on.\n"
+        f"  in {HERE}:{{loop on}} `yield self.on == negate(self.off)`\n"
+        f"  in {HERE}:{{loop off}} `yield self.off == negate(self.on)`\n"
+        "Use a value from before the event, pre(…), at one place of the loop.",
+    ),
+    Itself: (
+        StructureError,
+        "on determines itself at an event.\n"
+        f"  in {HERE}:{{itself}} `yield self.on == negate(self.on)`\n"
+        "Use a value from before the event, pre(…), at one place of the loop.",
+    ),
+    Endless: (
+        Chattering,
+        "Discrete variables do not settle at t = 0 s: on still changes after 20 rounds.\n"
+        f"  in {HERE}:{{endless}} `yield self.on == negate(pre(self.on))`\n"
+        "An equation like n == pre(n) + 1 never equals its pre(…): count in a `when`.",
+    ),
+    Follows: (
+        LanguageError,
+        "Follows: twin changes at events only, but its equation follows x all the time.\n"
+        f"  in {HERE}:{{follows}} `yield self.twin == 2 * self.x`\n"
+        "Take the value in a `when`, or choose with if_(…): its relations make events.",
+    ),
+    Constant: (
+        LanguageError,
+        "when((0<T), …) has no edge: its condition is the same during the whole run.\n"
+        f"  in {HERE}:{{constant}} `when(self.T > 0, {{self.n: 1}})`\n"
+        "Compare what changes, such as a variable or time.",
+    ),
+    NoCondition: (
+        LanguageError,
+        "x is not a condition: it changes continuously.\n"
+        f"  in {HERE}:{{no condition}} `when(self.x, {{self.n: 1}})`\n"
+        "Write a relation, as in `self.w > 0`, or a Boolean variable.",
+    ),
+    Equal: (
+        LanguageError,
+        "(x==0.5) compares values that change continuously: they are equal at single instants only.\n"
+        f"  in {HERE}:{{equal}} `when(self.x == 0.5, {{self.n: 1}})`\n"
+        "Write a relation with < or >.",
+    ),
+    Parameters: (
+        LanguageError,
+        "Parameters: a `when` gives T a value, which is neither a variable nor discrete.\n"
+        f"  in {HERE}:{{parameters}} `yield when(self.x > 0.5, {{self.T: 1}})`\n"
+        "Name variables, as in {self.n: pre(self.n)}.",
+    ),
+    Units: (
+        UnitMismatch,
+        f"Units, {HERE}:{{units}} `yield when(self.x > 0.5, {{self.n: self.T}})`: left 1, right s.",
+    ),
+    Outside: (
+        LanguageError,
+        "Outside: pre(on) is in a transition, where it never differs from on.\n"
+        f'  in {HERE}:{{outside}} `yield self.gate.go("open", "open", when=edge(self.on))`\n'
+        "Write on: in a reset it is the value before. For an edge, write once=True.",
+    ),
+    Varying: (
+        LanguageError,
+        "The ticks of clock((T*x)) are not known in advance, because they move between events.\n"
+        f"  in {HERE}:{{varying}} `clock(self.T * self.x)`\n"
+        "Use parameters or discrete variables.",
+    ),
+    PreOfVariable: (
+        LanguageError,
+        "pre(x): only a discrete, Boolean or integer variable has a value before an event.\n"
+        f"  in {HERE}:{{pre}} `pre(self.x)`\n"
+        "For a mode, declare boolean(…) and set it by an equation.",
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", CASES, ids=lambda kind: kind.__name__)
+def test_messages_of_discrete_equations(
+    kind: type[Component], check_message: Callable[[type[ModelicaLikeError], Callable[[], object], str], None]
+) -> None:
+    check_message(CASES[kind][0], lambda: simulate(build(kind()), 1.0), CASES[kind][1])

@@ -1,0 +1,139 @@
+"""Classes of the user: their equations, events, arrays, functions and records, against closed forms."""
+
+import pickle
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from modelica_like import build, load, simulate
+from modelica_like.netlist import loads
+
+DRIVES = Path(__file__).with_name("drives.mo")
+
+
+def drive(name: str):
+    return load(f"{DRIVES}:{name}")
+
+
+def run(name: str, until: float, **options):
+    return simulate(drive(name), until, rtol=1e-10, atol=1e-12, **options)
+
+
+def test_own_connectors_with_flows_make_a_circuit() -> None:
+    # v = 3·exp(-t/(R·C)) with R = 4, C = 0.5; the start value is an initial equation
+    result = run("Discharge", 2.0)
+    assert result["store.v"] == pytest.approx(3 * np.exp(-result.time / 2), rel=1e-8)
+
+
+def test_a_when_reinitializes_and_counts() -> None:
+    result = run("Ball", 1.2)
+    fall = np.sqrt(2 / 9.80665)
+    # impacts at fall, fall + 2·e·fall = 1.084 s
+    assert result["n"][-1] == 2
+    assert result["last"][-1] == pytest.approx(fall * (1 + 2 * 0.7), rel=1e-8)
+    assert result["fastest"][-1] == pytest.approx(9.80665 * fall, rel=1e-8)
+    rest = 1.2 - result["last"][-1]
+    speed = 9.80665 * fall * 0.7**2
+    assert result["h"][-1] == pytest.approx(speed * rest - 9.80665 / 2 * rest**2, rel=1e-7)
+
+
+def test_two_whens_of_one_variable_switch_a_thermostat() -> None:
+    result = run("Thermostat", 40.0)
+    assert set(np.round(result["on"])) == {0.0, 1.0}
+    late = result.time > 15
+    assert result["T"][late].min() == pytest.approx(292, abs=1e-6)
+    assert result["T"][late].max() == pytest.approx(294, abs=1e-6)
+    # heating from 292 to 294 towards 300 and cooling back towards 280: T = 10 s
+    period = 10 * np.log(8 / 6) + 10 * np.log(14 / 12)
+    switched = result.time[1:][np.diff(result["on"]) > 0.5]
+    assert np.diff(switched) == pytest.approx(period, rel=1e-7)
+
+
+def test_cold_is_a_condition_with_an_event() -> None:
+    result = run("Thermostat", 1.0)
+    # 290 to 291 towards 300
+    event = 10 * np.log(10 / 9)
+    assert set(result["signal"][result.time < event - 1e-6]) == {2.0}
+    assert set(result["signal"][result.time > event + 1e-6]) == set()  # it ends before
+    later = run("Thermostat", 3.0)
+    assert set(later["signal"][later.time > event + 1e-6]) == {1.0}
+
+
+def test_samples_branches_and_functions() -> None:
+    result = run("Sampled", 1.0)
+    x = np.exp(-result.time)
+    ticks = np.floor((result.time + 1e-12) / 0.25) * 0.25
+    inside = np.abs(result.time / 0.25 - np.round(result.time / 0.25)) > 1e-9
+    assert result["held"][inside] == pytest.approx(np.exp(-ticks[inside]), rel=1e-8)
+    away = np.abs(x - 0.5) > 1e-7
+    assert np.array_equal(result["y"][away], np.where(x > 0.5, 1.0, -1.0)[away])
+    assert result["smoothed"] == pytest.approx(np.maximum(x, 0.5), rel=1e-8)
+    assert result["table[3]"] == pytest.approx(x**3, rel=1e-7)
+    assert result["limited"] == pytest.approx(np.minimum(3 * x, 0.75), rel=1e-8)
+
+
+def test_own_masses_obey_their_laws_of_drag() -> None:
+    result = run("Coupled", 1.0)
+    for k in (1, 2):
+        w = result[f"rotor[{k}].w"]
+        law = w if k == 1 else w * np.abs(w)
+        assert result[f"rotor[{k}].drag[1]"] == pytest.approx(0.1 * law)
+        assert result[f"rotor[{k}].drag[2]"] == pytest.approx(0.2 * law)
+    assert str(drive("Coupled").find("rotor[1]").value("J").formula) == "data.J"
+    assert drive("Coupled").data.value("J").number == 4
+    # The spring between them is internal: momentum changes by the drags alone.
+    momentum = 4 * (result["rotor[1].w"] + result["rotor[2].w"])
+    drags = sum(result[f"rotor[{k}].drag[{n}]"] for k in (1, 2) for n in (1, 2))
+    lost = np.concatenate([[0], np.cumsum(np.diff(result.time) * (drags[1:] + drags[:-1]) / 2)])
+    assert momentum == pytest.approx(momentum[0] - lost, abs=1e-5)
+
+
+def test_a_redeclared_coupling_damps() -> None:
+    assert type(drive("Redeclared").find("coupling")).__name__ == "SpringDamper"
+    assert drive("Redeclared").find("coupling").value("d").number == 20
+
+
+def test_a_block_between_signals() -> None:
+    result = run("Signals", 1.0)
+    y = 1 - np.exp(-result.time / 0.2)
+    assert result["gain.y"] == pytest.approx(np.pi * y, abs=1e-8)
+    away = np.abs(y - 0.5) > 1e-7
+    assert np.array_equal(result["filter.high"][away], (y > 0.5)[away].astype(float))
+
+
+def test_the_energy_balance_closes_with_own_classes() -> None:
+    assert run("Coupled", 1.0).energy().drift < 1e-7
+
+
+def test_a_part_of_a_netlist_is_a_class_of_a_text(tmp_path: Path) -> None:
+    netlist = f"""
+    [parts]
+    left = {{ is = "{DRIVES}:Rotor", J = "2 kg.m2" }}
+    right = {{ is = "Inertia", J = "1 kg.m2" }}
+    [series]
+    shaft = ["left", "right"]
+    [start]
+    "left.phi" = 0
+    "left.w" = 1
+    """
+    result = simulate(loads(netlist, str(tmp_path / "drive.toml")), 1.0, rtol=1e-10)
+    # (2 + 1)·dw/dt = -0.3·w
+    assert result["left.w"] == pytest.approx(np.exp(-0.1 * result.time), rel=1e-8)
+
+
+def test_another_process_gets_the_model() -> None:
+    twin = pickle.loads(pickle.dumps(drive("Thermostat")))
+    assert simulate(twin, 5.0)["T"][-1] == pytest.approx(simulate(drive("Thermostat"), 5.0)["T"][-1], abs=1e-9)
+
+
+def test_a_broken_assertion_ends_the_run(tmp_path: Path) -> None:
+    text = DRIVES.read_text().replace("n < 1000", "n < 2")
+    (tmp_path / "drives.mo").write_text(text)
+    with pytest.raises(Exception, match="too many bounces"):
+        simulate(load(f"{tmp_path / 'drives.mo'}:Ball"), 2.0)
+
+
+def test_derivatives_by_parameters_exist() -> None:
+    model = build(drive("Discharge"))
+    assert {one.path for one in model.flat_parameters} >= {"store.C", "wire.R"}
