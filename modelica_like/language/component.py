@@ -9,7 +9,7 @@ from types import MappingProxyType
 from typing import Any, ClassVar, Self, TypeVar, cast, dataclass_transform
 
 from modelica_like.errors import DuplicateName, LanguageError, ModelicaLikeError, NetlistError, Source
-from modelica_like.language.declared import Connector, Declared, unknown
+from modelica_like.language.declared import Connector, Declared, annotated, unknown
 from modelica_like.language.equation import Equations
 from modelica_like.language.expr import TIME, Expr
 from modelica_like.language.fields import Discrete, Field, Input, Output, Parameter, Value, param, require_identifier
@@ -50,7 +50,7 @@ class Component(Declared):
         super().__init_subclass__(**options)
         cls._partial = partial
         own = {name: value for name, value in vars(cls).items() if not name.startswith("_")}
-        hints = {name: str(text) for name, text in _annotated(cls).items() if not name.startswith("_")}
+        hints = {name: str(text) for name, text in annotated(cls).items() if not name.startswith("_")}
         annotations = [name for name, text in hints.items() if not text.startswith(("ClassVar", "typing.ClassVar"))]
         # A class may extend several bases, as in Modelica: declarations are collected along all ancestors.
         ancestors = [base for base in reversed(cls.__mro__[1:]) if issubclass(base, Component)]
@@ -173,15 +173,6 @@ class Component(Declared):
             raise both_given(self._measured[field.name], field.name)
         store = self._values if isinstance(field, Parameter | Input) else self._starts
         store[field.name] = understood
-
-    @classmethod
-    def _hint(cls, name: str) -> str:
-        return next(str(_annotated(base)[name]) for base in cls.__mro__ if name in _annotated(base))
-
-    @classmethod
-    def choices(cls, name: str) -> list[str]:
-        """Return the texts that a structural field can be; empty if it can be any."""
-        return hint[9:-2].split("', '") if (hint := cls._hint(name)).startswith("Literal[") else []
 
     @classmethod
     def check_structural(cls, name: str, value: Any) -> None:
@@ -395,10 +386,6 @@ def _is_part(value: object) -> bool:
         elements = cast("list[object]", value)
         return bool(elements) and all(isinstance(element, Component) for element in elements)
     return isinstance(value, Component)
-
-
-def _annotated(cls: type) -> Mapping[str, Any]:
-    return vars(cls).get("__annotations__", {})
 
 
 def _of_kind(cls: type, kind: type[_Kind]) -> dict[str, _Kind]:

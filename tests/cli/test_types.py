@@ -11,6 +11,20 @@ from typer.testing import CliRunner
 
 from modelica_like.cli import app
 from modelica_like.errors import UnitError
+from modelica_like.language import (
+    Component,
+    Discrete,
+    Equations,
+    Events,
+    Parameter,
+    Variable,
+    clock,
+    der,
+    discrete,
+    param,
+    var,
+    when,
+)
 from modelica_like.netlist import library_types, load, schema
 from modelica_like.netlist.json_units import Quantities
 from modelica_like.report.component_pages.source import Source
@@ -95,6 +109,33 @@ def test_a_netlist_is_described_with_the_parts_of_its_assemblies(run: CliRunner)
     assert "clutch_a: selector.a = box.pressure_a" in tables["connections"]
     startup = run.invoke(app, ["describe", str(file.with_name("machine_tool_startup.toml"))]).stdout
     assert re.search(r"^h1 +10 N.m.s/rad *$", startup, re.MULTILINE)
+
+
+class Heater(Component):
+    warm: Variable = var("K", "temperature")
+    limit: Parameter = param("K", "limit")
+    held: Discrete = discrete("K", "temperature at the last instant")
+
+    def equations(self) -> Equations:
+        yield der(self.warm) * self.tau() == self.limit - self.warm
+
+    def tau(self) -> float:
+        return 3.0
+
+    def initial_equations(self) -> Equations:
+        yield self.warm == self.limit / 2
+
+    def events(self) -> Events:
+        yield when(clock("1 s"), {self.held: self.warm})
+
+
+def test_equations_of_the_start_and_at_instants_are_told() -> None:
+    assert statements(Heater) == {
+        "equations": ["der(warm) * tau() == limit - warm"],
+        "initial equations": ["warm == limit / 2"],
+        "events": ["when(clock('1 s'), {held: warm})"],
+        "where": ["tau() = 3.0"],
+    }
 
 
 @pytest.mark.parametrize("words", [["worm"], ["gear", "--group", "gears"], ["FRICTION", "clutch"]])
