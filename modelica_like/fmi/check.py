@@ -124,7 +124,8 @@ def compare_with_idas(path: Path, model: CompiledDae, kind: Literal["me", "cs"],
     fails, unknown = f"The FMU fails in the first {end:g} s of its run.", "The FMU runs, but nothing was compared"
     if fixed_step:
         fails, unknown = (f"{text} of {fixed_step:g} s {rest}" for text, rest in _FIXED)
-    modes = (one.path for one in model.flat_discretes if one.names)  # modes, whose changes match the curves
+    # Modes, whose changes match the curves; an FMU has only those that are declared.
+    modes = (one.path for one in model.flat_discretes if one.names and not one.hidden)
     try:
         run = run_fmu(path, stop=end, kind=kind, step=step, outputs=[*nominals, *modes])
         truth = _idas(model, end, points, _TRUTH, rtol)

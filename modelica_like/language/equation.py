@@ -118,6 +118,8 @@ def as_equation(item: Any, source: Source, component: str) -> Equation:
     Raises:
         LanguageError: the item is not an equation, or both sides are the same.
     """
+    if isinstance(item, Equation):
+        return item
     if isinstance(item, ca.SX) and item.is_scalar():
         if item.op() == ca.OP_EQ:
             sides = cast(Expr, item.dep(0)), cast(Expr, item.dep(1))
@@ -150,6 +152,6 @@ def _is_turned(left: Any, right: Any, text: str) -> bool:
 
 def as_statement(item: Any, source: Source, component: str) -> Statement:
     """Read an item yielded by `equations()`; the arguments are those of `as_equation`."""
-    if isinstance(item, Connection | FreeEnd | Equation):
+    if isinstance(item, Connection | FreeEnd):
         return item if item.source is not NOWHERE else replace(item, source=source)
     return as_equation(item, source, component)

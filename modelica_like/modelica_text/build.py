@@ -10,9 +10,11 @@ from modelica_like.language import (
     Assembly,
     Component,
     Connector,
+    boolean,
     discrete,
     flow,
     guess,
+    integer,
     param,
     signal_in,
     signal_out,
@@ -69,7 +71,7 @@ class _Builder:
         if self.errors:
             raise raise_together_or_one(self.errors)
         text = self.instance.text
-        kind: Any = written_class(text.name, self.statements.modes)
+        kind: Any = written_class(text.name)
         component: Written = kind(text.name, description=text.description)
         self.component = component
         self.wires = groups(self.statements.connections, self.instance)
@@ -153,9 +155,6 @@ class _Builder:
             if basic.kind == "Real" and not declared.dimensions:
                 self._parameter(name, member, basic)
             return
-        inner = basic.kind == "Boolean" and name in self.statements.conditions
-        if inner and not basic.prefixes & {"input", "output"}:
-            return
         for path, index in _elements(name, sizes(self.instance, member)):
             given = element(basic.given, index) if index else basic.given
             self._variable(path, name, member, Basic(basic.kind, given, basic.prefixes))
@@ -166,7 +165,8 @@ class _Builder:
             given = given.inner["start"]
             self.notes.tell(f"{self._label(name)} has no value; its start value is taken.")
         low, high = (self._number(basic.given.inner.get(one)) for one in ("min", "max"))
-        made = param(self._unit(basic), member.declaration.description, min=low, max=high)
+        fixed = self._known(basic.given.inner.get("fixed")) is not False
+        made = param(self._unit(basic), member.declaration.description, min=low, max=high, fixed=fixed)
         outside = given.scope is not None and given.scope[0] is not self.instance
         if given.value is not None and not outside:
             made.default = self._value(given, self.instance, "")
@@ -198,7 +198,11 @@ class _Builder:
         signal = bool(basic.prefixes & {"input", "output"}) and (
             not {"input", "output"} & member.declaration.prefixes or member.text.kind == "block"
         )
-        if path in self.statements.assigned or (basic.kind == "Integer" and not signal):
+        if basic.kind == "Boolean" and not signal:
+            field_made = boolean(description)
+        elif basic.kind == "Integer" and not signal:
+            field_made = integer(description)
+        elif path in self.statements.assigned or "discrete" in basic.prefixes:
             field_made = discrete(self._unit(basic), description, start=0.0)
         elif "input" in basic.prefixes and signal:
             field_made = signal_in(self._unit(basic), description)
@@ -214,16 +218,16 @@ class _Builder:
     def _start(self, path: str, basic: Basic, made: Field) -> None:
         """Give the start value; it is fixed, or a first guess."""
         prefix = f"{self.instance.name}." if self.instance.owner is not None else ""
-        if path in self.statements.starts:
-            node = self.statements.starts[path]
-            self.component.give(path, as_formula(node, prefix))
-            return
         given = basic.given.inner.get("start")
         fixed = self._known(basic.given.inner.get("fixed")) is True
         if isinstance(made, Discrete):
-            if given is not None and given.value is not None:
-                known = self._known(given)
-                made.default = float(known) if isinstance(known, bool | int | float) else 0.0
+            before = self.statements.memory.get(path)
+            known = (
+                self._known(given)
+                if before is None
+                else Resolver(self.instance, self.instance.text).known()(before).args[0]
+            )
+            made.default = float(known) if isinstance(known, bool | int | float) else 0.0
             return
         if isinstance(made, Input) or (given is None and not fixed):
             return
@@ -271,12 +275,10 @@ class _Builder:
     # -- equations and connections -----------------------------------------------------------------------------------
 
     def _equations(self) -> None:
-        self.component.__dict__["_statements"] = tuple(self.statements.equations)
-        self.component.__dict__["_happenings"] = tuple(self.statements.happenings)
-        for one in self.statements.happenings:
-            if one.moments is not None:
-                start = as_formula(one.moments[0])
-                self.component._declare(f"{one.mode}_next", discrete("s", "next time of the event", start=start))
+        self.component.__dict__.update(
+            _statements=tuple(self.statements.equations), _initial=tuple(self.statements.initial),
+            _happenings=tuple(self.statements.happenings),
+        )  # fmt: skip
 
     def _connect(self) -> None:
         component = self.component

@@ -135,6 +135,57 @@ package Modelica
   end Constants;
   package Electrical
     package Machines
+      package Losses
+        record FrictionParameters
+          parameter Units.SI.Power PRef = 0;
+          parameter Units.SI.AngularVelocity wRef = 1;
+          parameter Real power_w = 2;
+        end FrictionParameters;
+        record StrayLoadParameters
+          parameter Units.SI.Power PRef = 0;
+          parameter Units.SI.Current IRef = 1;
+          parameter Units.SI.AngularVelocity wRef = 1;
+          parameter Real power_w = 1;
+        end StrayLoadParameters;
+        record BrushParameters
+          parameter Units.SI.Voltage V = 0;
+          parameter Units.SI.Current ILinear = 1;
+        end BrushParameters;
+        record CoreParameters
+          parameter Units.SI.Power PRef = 0;
+          parameter Units.SI.Voltage VRef = 1;
+          parameter Units.SI.AngularVelocity wRef = 1;
+        end CoreParameters;
+      end Losses;
+      package Utilities
+        package ParameterRecords
+          record DcPermanentMagnetData
+            parameter Units.SI.Inertia Jr = 0.15;
+            parameter Units.SI.Inertia Js = Jr;
+            parameter Units.SI.Voltage VaNominal = 100;
+            parameter Units.SI.Current IaNominal = 100;
+            parameter Units.SI.AngularVelocity wNominal = 1425*2*3.14159265358979323846/60;
+            parameter Units.SI.Temperature TaNominal = 293.15;
+            parameter Units.SI.Resistance Ra = 0.05;
+            parameter Units.SI.Temperature TaRef = 293.15;
+            parameter Thermal.LinearTemperatureCoefficient20 alpha20a = 0;
+            parameter Units.SI.Inductance La = 0.0015;
+            parameter Losses.FrictionParameters frictionParameters(wRef = wNominal);
+            parameter Losses.CoreParameters coreParameters(VRef = VaNominal - Ra*IaNominal, wRef = wNominal);
+            parameter Losses.StrayLoadParameters strayLoadParameters(IRef = IaNominal, wRef = wNominal);
+            parameter Losses.BrushParameters brushParameters(ILinear = 0.01*IaNominal);
+          end DcPermanentMagnetData;
+          record DcElectricalExcitedData
+            extends DcPermanentMagnetData;
+            parameter Units.SI.Current IeNominal = 1;
+            parameter Units.SI.Resistance Re = 100;
+            parameter Units.SI.Temperature TeRef = 293.15;
+            parameter Thermal.LinearTemperatureCoefficient20 alpha20e = 0;
+            parameter Units.SI.Inductance Le = 1;
+            parameter Real sigmae = 0;
+          end DcElectricalExcitedData;
+        end ParameterRecords;
+      end Utilities;
       package Thermal
         type LinearTemperatureCoefficient20 = Real(unit = "1/K");
         package Constants

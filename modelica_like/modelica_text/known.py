@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from modelica_like.errors import UnknownName, did_you_mean
@@ -10,11 +11,13 @@ from modelica_like.language.fields import Input, Output
 from modelica_like.modelica_text import fold
 from modelica_like.modelica_text.instance import Given, Instance, Member, refused
 from modelica_like.modelica_text.library import Known, table
+from modelica_like.modelica_text.members import record_of
 from modelica_like.modelica_text.parse import parse_expression
 from modelica_like.modelica_text.resolve import Resolver
 from modelica_like.modelica_text.tree import Expr, names_in, substituted
 from modelica_like.modelica_text.written import as_formula
 from modelica_like.netlist.read import new_component
+from modelica_like.netlist.registry import find_type
 
 if TYPE_CHECKING:
     from modelica_like.modelica_text.build import Notes
@@ -52,14 +55,18 @@ class _Part:
             given,
             notes,
         )
-        self.kind = known.type
+        self.entries = dict(self._entries())
+        self.kind = self._kind()
         self.fields = self.kind._class_fields
         self.values: dict[str, Expr] = {}
+        self.used: set[str] = set()
 
     def make(self, driven: set[str]) -> Component:
-        used = {one.path for text in self.known.set.values() for one in names_in(parse_expression(str(text)))}
+        self.used = used = {
+            one.path for text in self.known.set.values() for one in names_in(parse_expression(str(text)))
+        }
         starts: list[tuple[str, Given]] = []
-        for name, one in self.given.inner.items():
+        for name, one in self.entries.items():
             here = self.known.here(name)
             if name in self.known.only:
                 self._demand(name, one)
@@ -87,6 +94,38 @@ class _Part:
             self._start(part, here, one)
         return part
 
+    def _entries(self) -> Iterator[tuple[str, Given]]:
+        """Yield names and modifications; those of a record are taken apart, as `losses.P`."""
+        records = {name.partition(".")[0] for name in self.known.names.values() if "." in name}
+        for name, one in self.given.inner.items():
+            if name not in records:
+                yield name, one
+                continue
+            yield from ((f"{name}.{key}", inner) for key, inner in one.inner.items())
+            if one.value is not None and one.value.kind == "name" and one.scope is not None:
+                record = record_of(one.scope[0], one.value)
+                if record is None:
+                    raise refused(f"this value for {self.name}.{name}", one.scope[1], one.value.line)
+                for key in record.members:
+                    path = Expr("name", (*one.value.args, (key, ())), one.value.line)
+                    yield f"{name}.{key}", Given(path, one.scope, line=one.line)
+
+    def _kind(self) -> type[Component]:
+        """Return the component type; a parameter may choose it."""
+        if not self.known.by:
+            return self.known.type
+        parameter, choices = self.known.by["parameter"], self.known.by
+        one = self.entries.pop(parameter, None)
+        value = Resolver(*one.scope, numeric=True)(one.value).args[0] if one and one.scope and one.value else "default"
+        name = str(value).rpartition(".")[2]
+        if name not in choices:
+            raise refused(
+                f"{self.known.path.rpartition('.')[2]} with {parameter} = {name}",
+                self.member.text,
+                one.line if one else 0,
+            )
+        return find_type(choices[name])
+
     def _owners(self) -> Resolver:
         return Resolver(self.owner, self.member.text)
 
@@ -105,11 +144,16 @@ class _Part:
             if known != node:
                 self.notes.tell(f"{self.name}.{name} is a number now: a formula cannot have '{_words(one)}'.")
             node = known
-        self.values[name] = node
+        if node.kind == "name" and name in self.known.omit:
+            node = Resolver(*one.scope, numeric=True)(one.value)
+        if node.kind != "number" or self.known.omit.get(name) != node.args[0]:
+            self.values[name] = node
 
     def _defaults(self) -> None:
         for name, value in self.known.default.items():
-            if name not in self.values:
+            here = self.known.here(name)
+            has = here in self.fields or here in self.kind._structural or name in (*self.known.only, *self.used)
+            if name not in self.values and has:
                 text = str(value).lower() if isinstance(value, bool) else str(value)
                 node = substituted(parse_expression(text), self.values)
                 self.values[name] = self._owners()(node)
@@ -125,14 +169,13 @@ class _Part:
             self.values.pop(name)
 
     def _equal(self, name: str, value: Expr, line: int) -> None:
-        wanted = self.known.only[name]
-        found = value.args[0]
-        if isinstance(found, str):
-            found = found.rpartition(".")[2]
-        if found != wanted:
+        only = self.known.only[name]
+        wanted = only if isinstance(only, list) else [only]
+        found = value.args[0].rpartition(".")[2] if isinstance(value.args[0], str) else value.args[0]
+        if found not in wanted:
             raise refused(
                 f"{self.known.path.rpartition('.')[2]}.{name} = {found}", self.member.text, line,
-                f"The component {self.known.component} has {name} = {wanted} only.",
+                f"The component {self.known.component} has {name} = {' or '.join(map(str, wanted))} only.",
             )  # fmt: skip
 
     def _plain(self, here: str, value: Expr) -> Any:

@@ -33,6 +33,8 @@ class Known:
         fix: values of the component's fields.
         starts: start values of variables where none is given.
         only: the one value that is supported, by the class's parameter.
+        omit: values that stand for none, by the class's parameter.
+        by: the component types by the value of a `parameter`, and the `default` one.
         ignore: names of the class's parameters without a meaning here.
         absent: fields of the component that the class does not have.
         instead: the class's parameters that stand for such a field, as expressions of it.
@@ -47,6 +49,8 @@ class Known:
     fix: Mapping[str, Any] = field(default_factory=dict[str, Any])
     starts: Mapping[str, float] = field(default_factory=dict[str, float])
     only: Mapping[str, Any] = field(default_factory=dict[str, Any])
+    omit: Mapping[str, float] = field(default_factory=dict[str, float])
+    by: Mapping[str, str] = field(default_factory=dict[str, str])
     ignore: frozenset[str] = frozenset()
     absent: frozenset[str] = frozenset()
     instead: Mapping[str, Mapping[str, str]] = field(default_factory=dict[str, Mapping[str, str]])
@@ -102,7 +106,8 @@ def by_component() -> dict[str, Known]:
     """Return the class that a component is written as, by the component's name: the first of the table."""
     found: dict[str, Known] = {}
     for known in known_classes().values():
-        found.setdefault(known.component, known)
+        if not known.by:
+            found.setdefault(known.component, known)
     return found
 
 

@@ -9,6 +9,7 @@ from modelica_like.modelica_text import resolve
 from modelica_like.modelica_text.instance import Given, Instance, Member, given, refused, unknown_class
 from modelica_like.modelica_text.library import Known
 from modelica_like.modelica_text.tree import ClassText, Expr
+from modelica_like.modelica_text.types import basic_type
 
 
 def named_array(path: str, shape: tuple[int, ...], kind: str) -> Expr:
@@ -129,14 +130,23 @@ def _instance(owner: Instance, member: Member, text: ClassText, name: str, given
             arguments = {key: Given(one, given.scope, line=value.line) for key, one in value.args[2]}
             given = Given(inner=given.inner).over(Given(inner=arguments))
         elif value.kind == "name":
-            made: Instance = scope
-            for one, _ in value.args:
-                found = part_of(made, made.members[one]) if one in made.members else None
-                if not isinstance(found, Instance):
-                    raise unknown_name(f"{value.path} is not a record.", inside, value.line)
-                made = found
+            made = record_of(scope, value)
+            if made is None:
+                raise unknown_name(f"{value.path} is not a record.", inside, value.line)
             return made
     return Instance(owner.classes, text, given, owner, name)
+
+
+def record_of(scope: Instance, name: Expr) -> Instance | None:
+    """Return the record that a name means in an instance, None if it is none."""
+    made = scope
+    for one, _ in name.args:
+        member = made.members.get(one)
+        found = part_of(made, member) if member is not None and basic_type(made, member) is None else None
+        if not isinstance(found, Instance):
+            return None
+        made = found
+    return made if made.text.kind == "record" else None
 
 
 def element(given: Given, index: int) -> Given:

@@ -22,7 +22,7 @@ ELEMENTARY = {
 KEPT = {"der", "pre", "noEvent", "smooth", "initial", "sample", "edge", "change", "reinit", "terminal"}
 _REFUSED = {
     "delay": "a delay", "spatialDistribution": "spatialDistribution", "cardinality": "cardinality(…)",
-    "terminal": "terminal()", "change": "change(…)",
+    "terminal": "terminal()",
     "inStream": "a stream connector", "actualStream": "a stream connector",
     "previous": "a clocked partition", "hold": "a clocked partition", "Clock": "a clocked partition",
     "transition": "a state machine", "initialState": "a state machine",
@@ -279,4 +279,5 @@ class Resolver:
             return self._told(lambda: functions.OF_ARRAYS[short](values, line), line)
         if short in ELEMENTARY:
             return self._told(lambda: fold.function(short, values, line), line)
-        return functions.called(self, expression, values, {key: self(one) for key, one in named})
+        others = {key: self(one) for key, one in named}
+        return self._told(lambda: functions.called(self, expression, values, others), line)

@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from modelica_like.errors import ModelicaTextError, Source
-from modelica_like.language import Mode
 from modelica_like.modelica_text import fold
 from modelica_like.modelica_text.instance import Instance, refused
 from modelica_like.modelica_text.resolve import Resolver
-from modelica_like.modelica_text.tree import ClassText, Expr, Statement
+from modelica_like.modelica_text.tree import ClassText, Expr, Statement, calls_in
 from modelica_like.modelica_text.types import basic_type
-from modelica_like.modelica_text.written import NO, YES, Happening
-
-_RELATIONS = ("<", "<=", ">", ">=")
-_STEPPED = ("floor", "ceil", "integer", "mod", "div", "rem")
+from modelica_like.modelica_text.written import Happening
 
 
 @dataclass
@@ -27,23 +22,20 @@ class Statements:
 
     Attributes:
         equations: sides and place.
+        initial: the same, of the start.
         connections: two ends each, with the place.
-        happenings: relations, whens, assertions.
+        happenings: whens and assertions.
         assigned: names that only events change.
-        starts: start values from initial equations.
-        conditions: definitions of Boolean variables.
+        memory: values of discrete variables before the start, from initial equations of `pre(…)`.
     """
 
     instance: Instance
     equations: list[tuple[Expr, Expr, Source]] = field(default_factory=list)
+    initial: list[tuple[Expr, Expr, Source]] = field(default_factory=list)
     connections: list[tuple[Expr, Expr, Source]] = field(default_factory=list)
     happenings: list[Happening] = field(default_factory=list)
     assigned: set[str] = field(default_factory=set)
-    starts: dict[str, Expr] = field(default_factory=dict)
-    conditions: dict[str, Expr] = field(default_factory=dict)
-    parameters: set[str] = field(default_factory=set)
-    _relations: dict[str, str] = field(default_factory=dict)
-    _whens: list[tuple[Statement, ClassText, dict[str, Expr]]] = field(default_factory=list)
+    memory: dict[str, Expr] = field(default_factory=dict)
 
     def read(self) -> None:
         """Go through declarations with values, then all equations.
@@ -54,33 +46,53 @@ class Statements:
         self._bindings()
         for one, text in self.instance.equations:
             self._statement(one, text, {})
-        for when, text, local in self._whens:
-            self._when(when, text, local)
-        self.equations = [self._eventful_equation(*one) for one in (*self.equations, *self._outputs())]
+        start = Statements(self.instance)
         for one, text in self.instance.initial_equations:
-            self._initial(one, text, {})
+            start._statement(one, text, {})
+        if start.connections or any(not one.text for one in start.happenings):
+            one, text = self.instance.initial_equations[0]
+            raise refused("a connection or a 'when' among initial equations", text, one.line)
+        for left, right, source in start.equations:
+            if left.kind == "call" and left.args[0] == "pre":
+                self.memory[left.args[1][0].args[0][0]] = right
+            else:
+                self.initial.append((left, right, source))
+        for left, right, source in self.equations:
+            for call in (*calls_in(left), *calls_in(right)):
+                self._check_memory(call, source)
+        values = [side for left, right, _ in (*self.equations, *self.initial) for side in (left, right)]
+        sources = [source for _, _, source in (*self.equations, *self.initial) for _ in (0, 1)]
+        for one in self.happenings:
+            for conditions, new in one.branches:
+                values += [*conditions, *new.values()]
+                sources += [one.source] * (len(conditions) + len(new))
+        for value, source in zip(values, sources, strict=True):
+            if not _is_numeric(value):
+                raise ModelicaTextError("A text, an array or a choice stands where a number belongs.", where=source)
 
-    def _outputs(self) -> Iterator[tuple[Expr, Expr, Source]]:
-        """Yield the equations of Boolean outputs, which are 1 or 0."""
-        for name, node in self.conditions.items():
-            member = self.instance.members.get(name)
-            basic = basic_type(self.instance, member) if member is not None else None
-            if member is not None and basic is not None and basic.prefixes & {"input", "output"}:
-                chosen = Expr("if", (node, fold.number(1), fold.number(0)), member.declaration.line)
-                yield Expr("name", ((name, ()),)), chosen, member.text.place(member.declaration.line)
-
-    @property
-    def modes(self) -> dict[str, Mode]:
-        """The modes of all happenings."""
-        return {one.mode: Mode(NO, YES, description=one.source.text) for one in self.happenings}
+    def _check_memory(self, call: Expr, source: Source) -> None:
+        """Refuse `pre` and `change` of a variable that changes all the time."""
+        one = call.args[1][0] if call.args[0] in ("pre", "change") else None
+        name = one.args[0][0] if one is not None and one.kind == "name" else ""
+        member = self.instance.members.get(name)
+        basic = basic_type(self.instance, member) if member is not None else None
+        if (
+            basic is not None
+            and basic.kind == "Real"
+            and "discrete" not in basic.prefixes
+            and name not in self.assigned
+        ):
+            raise ModelicaTextError(
+                f"{call.args[0]}({name}): only what changes at events has a value before them.", where=source
+            )
 
     def _bindings(self) -> None:
-        """Collect declarations `Real x = …`, and the names of parameters."""
+        """Collect declarations `Real x = …`."""
         for name, member in self.instance.members.items():
             declared, basic = member.declaration, basic_type(self.instance, member)
-            if {"parameter", "constant"} & declared.prefixes:
-                self.parameters.add(name)
-            elif basic is not None and member.given.value is not None and member.given.scope is not None:
+            if {"parameter", "constant"} & declared.prefixes or basic is None:
+                continue
+            if member.given.value is not None and member.given.scope is not None:
                 scope, text = member.given.scope
                 if scope is not self.instance:
                     raise refused(f"an equation for {name} in the modification of its component", text, declared.line)
@@ -99,11 +111,7 @@ class Statements:
         elif one.kind == "if":
             self._branches(one, text, local)
         elif one.kind == "when":
-            self._whens.append((one, text, local))
-            made = set[str]().union(*(self._targets(body, text, local) for _, body in one.parts))
-            for name in made & self.assigned:
-                raise ModelicaTextError(f"Two whens determine {name}.", where=text.place(one.line))
-            self.assigned |= made
+            self._when(one, text, local)
         elif one.kind == "call":
             self._demand(one.parts[0], resolver, text)
         else:
@@ -139,12 +147,11 @@ class Statements:
             if known.kind == "boolean" and not known.args[0]:
                 continue
             target = Statements(self.instance) if open_branches or known.kind != "boolean" else self
-            target.parameters = self.parameters
             for inner in body:
                 target._statement(inner, text, local)
             if target is self:
                 return
-            if target.connections or target._whens or target.happenings:
+            if target.connections or target.happenings:
                 raise refused("a connection or an event in a branch that changes during a run", text, one.line)
             open_branches.append((None if known.kind == "boolean" else known, target))
             if known.kind == "boolean":
@@ -157,8 +164,6 @@ class Statements:
         counts = {len(one.equations) for _, one in branches}
         if len(counts) > 1 or branches[-1][0] is not None:
             raise refused("an 'if' whose branches have different numbers of equations", text, line)
-        for name in branches[0][1].conditions:
-            self.conditions[name] = _choice([(c, one.conditions[name]) for c, one in branches], line)
         for k in range(counts.pop()):
             rows = [(condition, *one.equations[k]) for condition, one in branches]
             left = rows[0][1]
@@ -175,7 +180,12 @@ class Statements:
             for one, other in zip(left.args, right.args, strict=True):
                 self._equate(one, other, text, line)
         elif left.kind == "condition":
-            self.conditions[left.args[0][0]] = right
+            right = _condition(right)
+            basic = basic_type(self.instance, self.instance.members[left.args[0][0].partition("[")[0]])
+            if basic is not None and basic.prefixes & {"input", "output"}:
+                right = Expr("if", (right, fold.number(1), fold.number(0)), line)
+                left = Expr("name", left.args, line)
+            self.equations.append((left, right, text.place(line)))
         else:
             if left.kind == "number" and right.kind == "name":
                 left, right = right, left
@@ -183,127 +193,54 @@ class Statements:
 
     # -- events ------------------------------------------------------------------------------------------------------
 
-    def _eventful_equation(self, left: Expr, right: Expr, source: Source) -> tuple[Expr, Expr, Source]:
-        return self.eventful(left, source), self.eventful(right, source), source
-
-    def eventful(self, node: Expr, source: Source, silent: bool = False) -> Expr:
-        """Return an expression in which relations are modes that change at events.
-
-        Args:
-            node: resolved expression.
-            source: its place.
-            silent: whether relations make no events here.
-        """
-        if node.kind == "condition" and node.args[0][0] in self.conditions:
-            return self.eventful(self._definition(node, source), source, silent)
-        if node.kind == "call":
-            name, given, named = node.args
-            if name in ("initial", "terminal", "edge", "change", "sample") or (name == "pre" and not silent):
-                raise ModelicaTextError(f"{name}(…) outside a 'when': that is not supported here.", where=source)
-            if name in _STEPPED and not silent:
-                raise ModelicaTextError(
-                    f"{name}(…) makes events of its own: that is not supported here.", where=source,
-                    advice="Write noEvent(…) around it, or compute it in a 'when'.",
-                )  # fmt: skip
-            if name == "sign" and not silent:
-                zero = fold.number(0, node.line)
-                relations = [Expr(sign, (given[0], zero), node.line) for sign in (">", "<")]
-                parts = (relations[0], fold.number(1), relations[1], fold.number(-1), zero)
-                return self.eventful(Expr("if", parts, node.line), source)
-            given = tuple(self.eventful(one, source, silent or name == "noEvent") for one in given)
-            return Expr("call", (name, given, named), node.line)
-        if node.kind == "name":
-            return node
-        args = tuple(self.eventful(one, source, silent) if isinstance(one, Expr) else one for one in node.args)
-        made = Expr(node.kind, args, node.line)
-        if node.kind in _RELATIONS and not silent and not self._is_constant(made):
-            return Expr("mode", (self._relation(made, source),), node.line)
-        return made
-
-    def _definition(self, node: Expr, source: Source) -> Expr:
-        name = node.args[0][0]
-        made = self.conditions.pop(name)
-        try:
-            # Its own definition is out of sight: a Boolean that depends on itself remains as a condition.
-            inner = self.eventful(made, source, silent=True)
-            if name in _conditions(inner):
-                raise ModelicaTextError(
-                    f"The Boolean {name} depends on itself: that is not supported here.", where=source
-                )
-        finally:
-            self.conditions[name] = made
-        return made
-
-    def _is_constant(self, node: Expr) -> bool:
-        if node.kind in ("name", "condition"):
-            return node.args[0][0].partition("[")[0] in self.parameters or node.args[0][0] in self.assigned
-        if node.kind == "call":
-            return all(map(self._is_constant, node.args[1]))
-        return all(self._is_constant(one) for one in node.args if isinstance(one, Expr))
-
-    def _relation(self, node: Expr, source: Source) -> str:
-        key = _text(node)
-        if key not in self._relations:
-            self._relations[key] = f"relation_{len(self._relations) + 1}"
-            self.happenings.append(Happening(self._relations[key], node, source))
-        return self._relations[key]
-
-    def _targets(self, body: list[Statement], text: ClassText, local: dict[str, Expr]) -> set[str]:
-        """Return the names that a branch of a when determines."""
-        made: set[str] = set()
-        for one in body:
-            if one.kind == "=":
-                target = Resolver(self.instance, text, local)(one.parts[0])
-                if target.kind not in ("name", "condition"):
-                    raise refused("a 'when' with an equation that is not solved for a variable", text, one.line)
-                made.add(target.args[0][0])
-            elif one.kind == "for":
-                raise refused("'for' in a 'when'", text, one.line)
-        return made
-
     def _when(self, one: Statement, text: ClassText, local: dict[str, Expr]) -> None:
+        resolver, source = Resolver(self.instance, text, local), text.place(one.line)
+        branches: list[tuple[tuple[Expr, ...], dict[str, Expr]]] = []
+        made: set[str] = set()
         for condition, body in one.parts:
             if condition is None:
                 raise refused("'else' of a 'when'", text, one.line)
-            notice, resets = self._changes(body, text, local)
-            each = condition.args if condition.kind == "array" else (condition,)
-            for single in each:
-                known = Resolver(self.instance, text, local)(single)
-                name, source = (
-                    f"when_{sum(h.mode.startswith('when') for h in self.happenings) + 1}",
-                    text.place(one.line),
-                )
-                if known.kind == "call" and known.args[0] == "sample":
-                    self.happenings.append(Happening(name, None, source, known.args[1], resets, notice))
-                    continue
-                if known.kind == "call" and known.args[0] == "edge":
-                    known = known.args[1][0]
-                if known.kind in ("boolean", "number"):
-                    raise ModelicaTextError("The condition of this 'when' never changes.", where=source)
-                self.happenings.append(
-                    Happening(name, self.eventful(known, source, silent=True), source, None, resets, notice)
-                )
+            known = resolver(condition)
+            conditions = known.args if known.kind == "array" else (known,)
+            if any(each.kind in ("boolean", "number") for each in conditions):
+                raise ModelicaTextError("The condition of this 'when' never changes.", where=source)
+            values = self._changes(body, conditions, text, local)
+            made |= {name for name in values if name not in self._states(body, resolver)}
+            branches.append((conditions, values))
+        for name in made & self.assigned:
+            raise ModelicaTextError(f"Two whens determine {name}.", where=source)
+        self.assigned |= made
+        self.happenings.append(Happening(tuple(branches), source))
 
-    def _changes(self, body: list[Statement], text: ClassText, local: dict[str, Expr]) -> tuple[str, dict[str, Expr]]:
-        """Return what a when changes; its equations may use each other's new values."""
-        resolver, notice = Resolver(self.instance, text, local), ""
-        new: dict[str, Expr] = {}
-        states: dict[str, Expr] = {}
+    def _states(self, body: list[Statement], resolver: Resolver) -> set[str]:
+        """Return the names that `reinit` sets."""
+        calls = (one.parts[0] for one in body if one.kind == "call" and one.parts[0].args[0] == "reinit")
+        return {resolver(call.args[1][0]).args[0][0] for call in calls}
+
+    def _changes(
+        self, body: list[Statement], conditions: tuple[Expr, ...], text: ClassText, local: dict[str, Expr]
+    ) -> dict[str, Expr]:
+        """Return the new values of a branch of a when."""
+        resolver = Resolver(self.instance, text, local)
+        values: dict[str, Expr] = {}
         for one in body:
+            call = one.parts[0] if one.kind == "call" else None
             if one.kind == "=":
-                new[resolver(one.parts[0]).args[0][0]] = resolver(one.parts[1])
-            elif one.kind == "call" and one.parts[0].args[0] == "reinit" and len(one.parts[0].args[1]) == 2:
-                target, value = one.parts[0].args[1]
-                states[resolver(target).args[0][0]] = resolver(value)
-            elif one.kind == "call" and one.parts[0].args[0] in ("terminate", "assert"):
-                notice = _words(one.parts[0].args[1][-1 if one.parts[0].args[0] == "terminate" else 1])
-            else:
+                target, value = resolver(one.parts[0]), resolver(one.parts[1])
+                if target.kind not in ("name", "condition"):
+                    raise refused("a 'when' with an equation that is not solved for a variable", text, one.line)
+                values[target.args[0][0]] = _condition(value) if target.kind == "condition" else value
+            elif call is not None and call.args[0] == "reinit" and len(call.args[1]) == 2:
+                target, value = (resolver(side) for side in call.args[1])
+                values[target.args[0][0]] = value
+            elif call is not None and call.args[0] == "terminate":
+                for each in conditions:
+                    holds = fold.operation("not", (each,), one.line)
+                    words = _words(call.args[1][0])
+                    self.happenings.append(Happening((((holds,), {}),), text.place(one.line), words))
+            elif call is None or call.args[0] != "assert":
                 raise refused(f"'{one.kind}' in a 'when'", text, one.line)
-        source = text.place(body[0].line if body else text.line)
-        made = {name: self.eventful(_ordered(one, new, (name,)), source, silent=True) for name, one in new.items()}
-        return notice, made | {
-            name: self.eventful(_ordered(one, new, ()), source, silent=True) for name, one in states.items()
-        }
+        return values
 
     def _demand(self, call: Expr, resolver: Resolver, text: ClassText) -> None:
         """Read an assertion: it ends the run where it is broken."""
@@ -314,36 +251,26 @@ class Statements:
             return  # a warning
         condition = resolver(given[0])
         words = _words(given[1]) if len(given) > 1 else "an assertion is broken"
-        if condition.kind == "boolean":
-            if not condition.args[0]:
-                raise ModelicaTextError(f"An assertion is broken: {words}.", where=text.place(call.line))
-            return
-        broken = self.eventful(fold.operation("not", (condition,), call.line), text.place(call.line), silent=True)
-        number = sum(one.mode.startswith("assertion") for one in self.happenings) + 1
-        self.happenings.append(Happening(f"assertion_{number}", broken, text.place(call.line), notice=words))
+        if condition.kind != "boolean":
+            self.happenings.append(Happening((((condition,), {}),), text.place(call.line), words))
+        elif not condition.args[0]:
+            raise ModelicaTextError(f"An assertion is broken: {words}.", where=text.place(call.line))
 
-    def _initial(self, one: Statement, text: ClassText, local: dict[str, Expr]) -> None:
-        resolver = Resolver(self.instance, text, local)
-        if one.kind == "if":
-            for condition, body in one.parts:
-                known = Expr("boolean", (True,)) if condition is None else resolver.known()(condition)
-                if known.kind != "boolean":
-                    raise refused("an initial equation under a condition that is not known", text, one.line)
-                if known.args[0]:
-                    for inner in body:
-                        self._initial(inner, text, local)
-                    return
-            return
-        if one.kind == "call":
-            self._demand(one.parts[0], resolver, text)
-            return
-        left, right = (resolver(side) for side in one.parts) if one.kind == "=" else (None, None)
-        if left is None or right is None or left.kind != "name" or not self._is_constant(right):
-            raise refused(
-                "an initial equation other than 'variable = expression of parameters'", text, one.line,
-                "Give start values with start = … and fixed = true.",
-            )  # fmt: skip
-        self.starts[left.args[0][0]] = right
+
+def _condition(node: Expr) -> Expr:
+    """Return a choice between conditions as one condition."""
+    if node.kind != "if":
+        return node
+    condition, value, *rest = node.args
+    other = _condition(rest[0] if len(rest) == 1 else Expr("if", tuple(rest), node.line))
+    taken = fold.operation("and", (condition, _condition(value)), node.line)
+    left = fold.operation("and", (fold.operation("not", (condition,), node.line), other), node.line)
+    return fold.operation("or", (taken, left), node.line)
+
+
+def _is_numeric(node: Expr) -> bool:
+    inner = node.args[1] if node.kind == "call" else [one for one in node.args if isinstance(one, Expr)]
+    return node.kind not in ("string", "array", "literal") and all(map(_is_numeric, inner))
 
 
 def _choice(branches: list[tuple[Expr | None, Expr]], line: int) -> Expr:
@@ -362,31 +289,6 @@ def _text(node: Expr) -> str:
 
 def _same(one: Expr, other: Expr) -> bool:
     return one.kind == "name" and _text(one) == _text(other)
-
-
-def _conditions(node: Expr) -> set[str]:
-    if node.kind == "condition":
-        return {node.args[0][0]}
-    inner = node.args[1] if node.kind == "call" else [one for one in node.args if isinstance(one, Expr)]
-    return set[str]().union(*map(_conditions, inner)) if node.kind != "name" else set()
-
-
-def _ordered(node: Expr, new: dict[str, Expr], open_names: tuple[str, ...]) -> Expr:
-    """Replace variables of a when by their new values; `pre` keeps the old one."""
-    if node.kind in ("name", "condition"):
-        name = node.args[0][0]
-        if name not in new or name in open_names:
-            return node
-        return _ordered(new[name], new, (*open_names, name))
-    if node.kind == "call":
-        name, given, named = node.args
-        return (
-            node
-            if name == "pre"
-            else Expr("call", (name, tuple(_ordered(one, new, open_names) for one in given), named))
-        )
-    args = tuple(_ordered(one, new, open_names) if isinstance(one, Expr) else one for one in node.args)
-    return Expr(node.kind, args, node.line)
 
 
 def _words(node: Expr) -> str:

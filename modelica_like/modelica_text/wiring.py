@@ -79,7 +79,7 @@ def _ends(end: Expr, instance: Instance) -> list[str]:
         return [f"{head}.{inner}" for head in heads]
     if len(rest) > 1:
         raise refused("a connection with the inside of a component", instance.text, end.line)
-    last, index = next(iter(rest))
+    last, index = end.args[-1]
     outer = part.members.get(last)
     shape = sizes(part, outer) if outer is not None and not index else ()
     if len(heads) == 1 and shape:

@@ -175,6 +175,7 @@ class _Arguments:
 
     def read(self) -> dict[str, str]:
         replaced = {name for text in self.known.put.values() for name in _fields(text)}
+        replaced |= {scale for name in self.part._tables for scale in self._scales(name)}
         for name, value in self.part._values.items():
             if name in self.known.instead:
                 for there, text in self.known.instead[name].items():
@@ -199,10 +200,16 @@ class _Arguments:
         if name in self.known.fix:
             if value != self.known.fix[name]:
                 self._held(name, value)
-        elif value != self.part._structural[name]:
+        elif value != self.part._structural[name] or any(self._scales(name)):
             if name in self.known.absent:
                 raise self._refused(name, value)
             self.done.setdefault(self.known.there(name), self._plain(name, value))
+
+    def _scales(self, name: str) -> list[str]:
+        """Return the parameters that scale the columns of a table, empty where none is given."""
+        columns = self.part._tables[name].columns if name in self.part._tables else ()
+        given = (one.scale in self.part._values and one.scale not in self.known.names for one in columns)
+        return [one.scale if scaled else "" for one, scaled in zip(columns, given, strict=True)]
 
     def _held(self, name: str, value: Any) -> None:
         """Write a table whose last value holds: a row more makes the last slope zero."""
@@ -275,7 +282,10 @@ class _Arguments:
                         return f"Modelica.Blocks.Types.{kind}.{choice}"
             raise self._refused(name, value)
         if value and isinstance(value[0], tuple):
-            return "[" + "; ".join(", ".join(_number(one) for one in row) for row in value) + "]"
+            factors = [f"*{self._expression(scale)}" if scale else "" for scale in self._scales(name)]
+            factors += [factors[-1] if factors else ""] * len(value[0])
+            rows = (", ".join(f"{_number(one)}{by}" for one, by in zip(row, factors, strict=False)) for row in value)
+            return f"[{'; '.join(rows)}]"
         return "{" + ", ".join(self._plain(name, one) for one in value) + "}"
 
     def _refused(self, name: str, value: Any) -> ModelicaTextError:
@@ -347,6 +357,8 @@ def _name(name: str) -> str:
 
 def _arguments(values: Mapping[str, str]) -> str:
     texts = [f"{key} = {value}" if value else key for key, value in values.items()]
+    # A modification has no dots: record.P = 1 is record(P = 1).
+    texts = [re.sub(r"^(each )?(\w+)\.(\w+ = .*)$", r"\1\2(\3)", one) for one in texts]
     return f"({', '.join(texts)})" if texts else ""
 
 

@@ -2,42 +2,54 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 import casadi as ca
 
 from modelica_like.errors import LanguageError, Source
-from modelica_like.language import TIME, Assembly, Connector, Equations, Events, Expr, Mode, der, where
+from modelica_like.language import (
+    TIME,
+    Assembly,
+    Connector,
+    Equations,
+    Events,
+    Expr,
+    assert_,
+    change,
+    clock,
+    der,
+    edge,
+    floor,
+    if_,
+    initial,
+    mod,
+    pre,
+    when,
+    where,
+)
+from modelica_like.language.discrete import is_a
 from modelica_like.language.equation import Equation
-from modelica_like.language.expr import symbol_of
-from modelica_like.language.fields import Field
+from modelica_like.language.expr import Symbol, symbol_of
+from modelica_like.language.fields import Discrete, Field
 from modelica_like.language.formula import Formula
 from modelica_like.modelica_text.tree import Expr as Node
-
-YES, NO = "yes", "no"
 
 
 @dataclass
 class Happening:
-    """A `when`, an `assert` or a relation, as transitions of one mode.
+    """A `when` with its branches, or an assertion.
 
     Attributes:
-        mode: name of the mode; it is `yes` while the condition holds.
-        condition: of a state event.
-        moments: start and period of a time event; the discrete value `mode_next` has its next time.
-        resets: new values by name.
-        notice: text of a run that ends here; empty: it goes on.
+        branches: conditions and new values by name; of an assertion one condition without values.
         source: place in the text.
+        text: of an assertion.
     """
 
-    mode: str
-    condition: Node | None
+    branches: tuple[tuple[tuple[Node, ...], Mapping[str, Node]], ...]
     source: Source
-    moments: tuple[Node, Node] | None = None
-    resets: Mapping[str, Node] = field(default_factory=dict[str, Node])
-    notice: str = ""
+    text: str = ""
 
 
 class Written(Assembly):
@@ -49,11 +61,12 @@ class Written(Assembly):
 
     units_checked = False
     _statements: tuple[tuple[Node, Node, Source], ...] = ()
+    _initial: tuple[tuple[Node, Node, Source], ...] = ()
     _happenings: tuple[Happening, ...] = ()
 
     def __reduce__(self) -> Any:
         # The class is made for one text; another process makes it again.
-        return _revived, (type(self).__name__, dict(self._class_modes)), self.__getstate__()
+        return _revived, (type(self).__name__,), self.__getstate__()
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
@@ -66,33 +79,29 @@ class Written(Assembly):
     def equations(self) -> Equations:
         """Yield the connections and the equations, each with its place in the text."""
         yield from super().equations()
-        for left, right, source in self._statements:
-            yield Equation(self.symbolic(left), self.symbolic(right), source)  # type: ignore[misc]
+        yield from self._equations(self._statements)
+
+    def initial_equations(self) -> Equations:
+        """Yield the equations of the start."""
+        yield from self._equations(self._initial)
+
+    def _equations(self, statements: Iterable[tuple[Node, Node, Source]]) -> Equations:
+        for left, right, source in statements:
+            yield Equation(self.symbolic(left), self.symbolic(right), source)
 
     def events(self) -> Events:
-        """Yield the transitions of relations, whens and assertions."""
+        """Yield the whens and the assertions."""
         for one in self._happenings:
-            yield from (replace(event, source=one.source) for event in self._transitions(one))
-
-    def _transitions(self, one: Happening) -> Events:
-        mode = getattr(self, one.mode)
-        resets = {
-            symbol_of(self._owner_of(path), path.rpartition(".")[2]): self.symbolic(new)
-            for path, new in one.resets.items()
-        }
-        if one.moments is not None:
-            following = symbol_of(self, f"{one.mode}_next")
-            resets[following] = following + self.symbolic(one.moments[1])
-            yield mode.go(NO, NO, at=following, reset=resets)
-            return
-        assert one.condition is not None
-        condition = self.symbolic(one.condition)
-        yield mode.initially(YES, when=condition)
-        if one.notice:
-            yield mode.go(NO, YES, when=condition, notice=one.notice, fails=True)
-            return
-        yield mode.go(NO, YES, when=condition, reset=resets)
-        yield mode.go(YES, NO, when=ca.logic_not(condition))
+            if one.text:
+                yield replace(assert_(self.symbolic(one.branches[0][0][0]), one.text), source=one.source)
+                continue
+            made = None
+            for conditions, values in one.branches:
+                active = tuple(self.symbolic(condition) for condition in conditions)
+                new = {self._symbol(path): self.symbolic(value, silent=True) for path, value in values.items()}
+                made = when(active, new) if made is None else made.elsewhen(active, new)
+            if made is not None:
+                yield replace(made, source=one.source)
 
     def source_power(self) -> Expr | float:
         """Return minus the power that enters at own connectors, unless parts take it on."""
@@ -103,8 +112,13 @@ class Written(Assembly):
             total = total - one.power()
         return total
 
-    def symbolic(self, node: Node) -> Any:
-        """Return a resolved expression in symbols."""
+    def symbolic(self, node: Node, silent: bool = False) -> Any:
+        """Return a resolved expression in symbols.
+
+        Args:
+            node: the expression.
+            silent: whether its relations make no events.
+        """
         kind, args = node.kind, node.args
         if kind == "number":
             return ca.SX(args[0])
@@ -113,39 +127,38 @@ class Written(Assembly):
         if kind == "name":
             return self._symbol(args[0][0])
         if kind == "condition":
-            return ca.SX(self._symbol(args[0][0])) > 0.5
-        if kind == "mode":
-            return getattr(self, args[0]).is_(YES)
+            symbol = self._symbol(args[0][0])
+            discrete = isinstance(symbol.owner.fields[symbol.name], Discrete)
+            return symbol if discrete else ca.SX(symbol) > 0.5
         if kind == "if":
-            made = self.symbolic(args[-1])
+            choose = where if silent else if_
+            made = self.symbolic(args[-1], silent)
             for condition, value in reversed(list(zip(args[:-1:2], args[1::2], strict=True))):
-                made = where(self.symbolic(condition), self.symbolic(value), made)
+                made = choose(self.symbolic(condition, silent), self.symbolic(value, silent), made)
             return made
         if kind == "call":
-            return self._called(args[0], [self.symbolic(one) for one in args[1]])
-        return _OPERATIONS[kind](*(self.symbolic(one) for one in args))
+            silent = silent or args[0] == "noEvent"
+            return self._called(args[0], [self.symbolic(one, silent) for one in args[1]], silent)
+        return _OPERATIONS[kind](*(self.symbolic(one, silent) for one in args))
 
-    def _called(self, name: str, values: list[Any]) -> Any:
-        if name == "der":
-            return der(values[0])
-        return values[0] if name in ("noEvent", "pre") else FUNCTIONS[name](*values)
+    def _called(self, name: str, values: list[Any], silent: bool) -> Any:
+        if name == "pre" and not (isinstance(values[0], Symbol) and is_a(values[0], Discrete)):
+            return values[0]  # of a state: the value before the event, as in all new values
+        return _STEPPED[name](*values, not silent) if name in _STEPPED else FUNCTIONS[name](*values)
 
     def _symbol(self, path: str) -> Any:
-        return TIME if path == "time" else symbol_of(self._owner_of(path), path.rpartition(".")[2])
-
-    def _owner_of(self, path: str) -> Any:
+        if path == "time":
+            return TIME
         owner: Any = self
         *steps, last = path.split(".")
         for step in steps:
-            following = owner.connectors.get(step) if not isinstance(owner, Connector) else None
-            if following is None and not isinstance(owner, Connector):
-                following = owner.parts.get(step)
-            if following is None:
+            inside = {} if isinstance(owner, Connector) else {**owner.parts, **owner.connectors}
+            if step not in inside:
                 raise LanguageError(f"{self.label} uses {path}, but there is no '{step}'.")
-            owner = following
+            owner = inside[step]
         if last not in owner.fields:
             raise LanguageError(f"{self.label} uses {path}, but {owner.label} has no variable '{last}'.")
-        return owner
+        return symbol_of(owner, last)
 
 
 class WrittenConnector(Connector):
@@ -163,28 +176,34 @@ _OPERATIONS: dict[str, Callable[..., Any]] = {
 }  # fmt: skip
 FUNCTIONS: dict[str, Callable[..., Any]] = {
     **{name: getattr(ca, name) for name in ("sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh")},
-    **{name: getattr(ca, name) for name in ("tanh", "exp", "log", "log10", "sqrt", "floor", "ceil", "sign")},
-    "abs": ca.fabs, "min": ca.fmin, "max": ca.fmax, "integer": ca.floor,
-    "mod": lambda x, y: x - ca.floor(x / y) * y,
-    "div": lambda x, y: ca.sign(x / y) * ca.floor(ca.fabs(x / y)),
-    "rem": lambda x, y: x - y * ca.sign(x / y) * ca.floor(ca.fabs(x / y)),
+    **{name: getattr(ca, name) for name in ("tanh", "exp", "log", "log10", "sqrt", "sign")},
+    "abs": ca.fabs, "min": ca.fmin, "max": ca.fmax, "noEvent": lambda x: x,
+    "der": der, "pre": pre, "edge": edge, "change": change, "initial": initial,
+    "sample": lambda start, period: clock(period, start),
 }  # fmt: skip
+_STEPPED: dict[str, Callable[..., Any]] = {
+    "floor": lambda x, events: floor(x, events=events), "integer": lambda x, events: floor(x, events=events),
+    "ceil": lambda x, events: -floor(-x, events=events),
+    "mod": lambda x, y, events: mod(x, y, events=events),
+    "div": lambda x, y, events: ca.sign(x / y) * floor(ca.fabs(x / y), events=events),
+    "rem": lambda x, y, events: x - y * ca.sign(x / y) * floor(ca.fabs(x / y), events=events),
+}  # fmt: skip
+"""Functions that jump, by their arguments and whether the jumps are events."""
 _IN_FORMULAS = {"sqrt", "abs", "sin", "cos", "tan", "asin", "acos", "atan", "exp", "log", "tanh", "min", "max"}
 
 
-_classes: dict[tuple[str, tuple[str, ...]], type[Written]] = {}
+_classes: dict[str, type[Written]] = {}
 
 
-def written_class(name: str, modes: Mapping[str, Mode]) -> type[Written]:
-    """Return the class for a name and modes, always the same one."""
-    key = name, tuple(modes)
-    if key not in _classes:
-        _classes[key] = type(name, (Written,), dict(modes))
-    return _classes[key]
+def written_class(name: str) -> type[Written]:
+    """Return the class for a name, always the same one."""
+    if name not in _classes:
+        _classes[name] = type(name, (Written,), {})
+    return _classes[name]
 
 
-def _revived(name: str, modes: Mapping[str, Mode]) -> Written:
-    kind = written_class(name, modes)
+def _revived(name: str) -> Written:
+    kind = written_class(name)
     return kind.__new__(kind)
 
 

@@ -78,28 +78,17 @@ MESSAGES: dict[str, tuple[str, str]] = {
         "model A\n  Real x;\nalgorithm\n  x := 1;\nend A;\n",
         "An algorithm outside a function: that is not supported here.\n  in a.mo:3 `algorithm`",
     ),
+    "a text as a number": (
+        model("Real x;", 'x = 2*"two";'),
+        'A text, an array or a choice stands where a number belongs.\n  in a.mo:5 `x = 2*"two";`',
+    ),
     "two results": (
         model("Real x;", "(x, y) = f(1);"),
         "Functions with several results are not supported.\n  in a.mo:5 `(x, y) = f(1);`",
     ),
-    "initial equation with a derivative": (
-        "model A\n  Real x;\nequation\n  der(x) = 1;\ninitial equation\n  der(x) = 0;\nend A;\n",
-        "An initial equation other than 'variable = expression of parameters': that is not supported here.\n"
-        "  in a.mo:6 `der(x) = 0;`\nGive start values with start = … and fixed = true.",
-    ),
-    "a Boolean with a memory": (
-        model("Real x; Boolean b;", "der(x) = if b then 1 else -1; b = x > 1 or pre(b) and x > 0;"),
-        "The Boolean b depends on itself: that is not supported here.\n"
-        "  in a.mo:5 `der(x) = if b then 1 else -1; b = x > 1 or pre(b) and x > 0;`",
-    ),
-    "pre outside a when": (
+    "pre of what changes all the time": (
         model("Real x;", "x = pre(x) + 1;"),
-        "pre(…) outside a 'when': that is not supported here.\n  in a.mo:5 `x = pre(x) + 1;`",
-    ),
-    "steps": (
-        model("Real x;", "x = floor(time);"),
-        "floor(…) makes events of its own: that is not supported here.\n"
-        "  in a.mo:5 `x = floor(time);`\nWrite noEvent(…) around it, or compute it in a 'when'.",
+        "pre(x): only what changes at events has a value before them.\n  in a.mo:5 `x = pre(x) + 1;`",
     ),
     "two whens": (
         model("discrete Real x;", "when time > 1 then x = 1; end when; when time > 2 then x = 2; end when;"),

@@ -223,6 +223,54 @@ package Drives "Texts that use every construct that is read"
     end if;
   end Sampled;
 
+  partial model Friction "after Otter, Elmqvist, Mattsson: a path parameter, and Booleans with a memory"
+    parameter Real slide = 2 "friction that slides";
+    parameter Real stick = 3 "friction that sticks";
+    SI.Velocity v(start = 0, fixed = true);
+    SI.Acceleration a;
+    SI.Force f;
+    Real q "friction while it sticks, acceleration and friction while it slides";
+    Integer mode(start = 0) "1: forward, 0: sticks, -1: backward";
+    Boolean starts(start = false);
+    Boolean backs(start = false);
+    Boolean locked(start = true);
+  equation
+    der(v) = a;
+    starts = pre(mode) == 0 and (q > stick or pre(starts) and q > slide) or pre(mode) == -1 and v > 0;
+    backs = pre(mode) == 0 and (q < -stick or pre(backs) and q < -slide) or pre(mode) == 1 and v < 0;
+    locked = not (pre(mode) <> 0 or starts or backs);
+    a = if locked then 0 elseif starts or pre(mode) == 1 and not backs then q - slide else q + slide;
+    f = if locked then q elseif starts or pre(mode) == 1 and not backs then slide else -slide;
+    mode = if (pre(mode) == 1 or starts) and v > 0 then 1 elseif (pre(mode) == -1 or backs) and v < 0 then -1 else 0;
+  end Friction;
+
+  model Sledge
+    extends Friction;
+    parameter SI.Mass m = 1;
+    Integer turns(start = 0);
+  equation
+    m*a = 5*sin(pi/2*time) - f;
+    when {edge(starts), change(backs)} then
+      turns = pre(turns) + 1;
+    end when;
+  end Sledge;
+
+  model Steady "starts where its acceleration is zero, under a preload that holds it where it is wanted"
+    parameter Real wanted = 2;
+    parameter Real preload(fixed = false);
+    Real x;
+    Real v;
+    Real steps;
+  equation
+    der(x) = v;
+    der(v) = preload - 3*x - v + (if time > 1 then 1 else 0);
+    steps = floor(4*time);
+  initial equation
+    der(x) = 0;
+    der(v) = 0;
+    x = wanted;
+  end Steady;
+
   block Filter "a block between signals"
     extends Modelica.Blocks.Interfaces.SISO;
     parameter SI.Time T = 0.1;

@@ -171,3 +171,23 @@ def test_the_commands(tmp_path: Path) -> None:
         result = CliRunner().invoke(app, words)
         assert result.exit_code == 0, result.output
     assert "model Drive" in (tmp_path / "drive.mo").read_text()
+
+
+MACHINES = Path(__file__).with_name("machines.mo")
+
+
+def test_a_machine_with_a_record_of_its_data_is_the_netlist() -> None:
+    drive = load(f"{MACHINES}:Start")
+    assert drive.dcpm.value("P_friction").number is None  # a formula: the record can be tuned
+    run, reference = simulate(drive), simulate(load(EXAMPLES / "msl" / "dcmachines" / "DCPM_Start.toml"))
+    for name in ("dcpm.ia", "dcpm.w", "dcpm.tau_electrical"):
+        size = np.abs(reference[name]).max()
+        assert np.interp(reference.time, run.time, run[name]) == pytest.approx(reference[name], abs=1e-6 * size), name
+
+
+def test_a_parameter_chooses_the_kind_of_controller() -> None:
+    drive = load(f"{MACHINES}:Controlled")
+    assert type(drive.control).__name__ == "PI"
+    assert drive.control.value("y_min").formula is None
+    assert drive.control.value("y_min").number == -12
+    assert simulate(drive).final["inertia.w"] == pytest.approx(10, abs=0.1)

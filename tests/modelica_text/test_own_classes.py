@@ -5,8 +5,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
-from modelica_like import build, load, simulate
+from modelica_like import build, export_fmu, load, simulate
 from modelica_like.netlist import loads
 
 DRIVES = Path(__file__).with_name("drives.mo")
@@ -102,6 +103,34 @@ def test_a_block_between_signals() -> None:
     assert np.array_equal(result["filter.high"][away], (y > 0.5)[away].astype(float))
 
 
+def test_friction_by_booleans_with_a_memory() -> None:
+    result = run("Sledge", 4.0)
+    w, leaves = np.pi / 2, np.arcsin(0.6) / (np.pi / 2)  # 5·sin(w·t) = 3
+
+    def speed(t: float, begin: float, friction: float) -> float:
+        return 5 / w * (np.cos(w * begin) - np.cos(w * t)) - friction * (t - begin)
+
+    turns = brentq(lambda t: speed(t, leaves, 2), 1.5, 3.0)  # the force is -4.07 N then: it goes back at once
+    changes = np.flatnonzero(np.diff(result["mode"]))
+    assert result.time[changes] == pytest.approx([leaves, turns], abs=1e-8)
+    assert result["mode"][[0, changes[0] + 1, -1]].tolist() == [0, 1, -1]
+    assert result.final["v"] == pytest.approx(speed(4.0, turns, -2), abs=1e-7)
+    assert result.final["turns"] >= 2
+
+
+def test_initial_equations_determine_a_preload() -> None:
+    result = run("Steady", 3.0)
+    assert result["preload"][0] == pytest.approx(6.0)
+    before = result.time < 1
+    assert result["x"][before] == pytest.approx(2.0)
+    # x'' + x' + 3·x = 6 + 1 from time 1
+    t, w = np.maximum(result.time - 1, 0), np.sqrt(3 - 0.25)
+    step = (1 - np.exp(-t / 2) * (np.cos(w * t) + np.sin(w * t) / (2 * w))) / 3
+    assert result["x"] == pytest.approx(2 + step, abs=1e-8)
+    inside = np.abs(4 * result.time - np.round(4 * result.time)) > 1e-9
+    assert np.array_equal(result["steps"][inside], np.floor(4 * result.time)[inside])
+
+
 def test_the_energy_balance_closes_with_own_classes() -> None:
     assert run("Coupled", 1.0).energy().drift < 1e-7
 
@@ -132,6 +161,11 @@ def test_a_broken_assertion_ends_the_run(tmp_path: Path) -> None:
     (tmp_path / "drives.mo").write_text(text)
     with pytest.raises(Exception, match="too many bounces"):
         simulate(load(f"{tmp_path / 'drives.mo'}:Ball"), 2.0)
+
+
+def test_an_fmu_of_a_text_agrees_with_idas(tmp_path: Path) -> None:
+    done = export_fmu(drive("Thermostat"), tmp_path / "thermostat.fmu", "2.0", ("me",))
+    assert not done.check.differs
 
 
 def test_derivatives_by_parameters_exist() -> None:

@@ -11,6 +11,7 @@ import numpy as np
 from modelica_like.analyse.linear.linearize import linearize
 from modelica_like.analyse.sensitivity.derivatives import sensitivities
 from modelica_like.draw import schematic
+from modelica_like.errors import NoGradient
 from modelica_like.language import Component
 from modelica_like.report.analysis import shares
 from modelica_like.report.page.tables import details, table
@@ -41,6 +42,7 @@ def design_checks(drive: Component, run: Solution) -> str:
          if bool(one.verdict) is limited]
         for limited in (True, False)
     )  # fmt: skip
+    judged.sort(key=lambda row: row[3] == "ok")
     missed, heads = sizing.exceeded, ("line", "value>", "unit", "verdict!", "what it is")
     verdict = f"{len(judged)} limits, {missed or 'none'} missed: {escape(Path(path).name)}."
     said = f'<p class="notice">{verdict}</p>' if missed else f"<p>{verdict}</p>"
@@ -53,9 +55,6 @@ def ranking(run: Solution, ends: Sequence[str]) -> str:
     Args:
         run: the run.
         ends: variables, the first ones of which that do not end at zero are taken; the lost energy is added.
-
-    Raises:
-        NoGradient: a derivative does not exist.
     """
     if run.statistics.seconds > _PATIENCE:
         command = f"<code>modelica-like sensitivity … --of {escape(next(iter(ends), 'loss_energy'))}</code>"
@@ -68,7 +67,10 @@ def ranking(run: Solution, ends: Sequence[str]) -> str:
     names = [*moving[:_MOST_ENDS], *(["loss_energy"] if lossy else [])]
     if not names or not len(run.model.p):
         return ""
-    found = sensitivities(run, names)
+    try:
+        found = sensitivities(run, names)
+    except NoGradient as error:
+        return f"<p>{escape(' '.join(filter(None, (error.what, error.why, error.advice))))}</p>"
     percents = np.nan_to_num(found.normalised)
     largest = np.max(np.abs(percents), axis=0)
     order = [int(k) for k in np.argsort(-largest)[:_RANKED] if largest[k] > _MATTERS]

@@ -27,7 +27,8 @@ from modelica_like.solve.solution import Solution
 from modelica_like.solve.trajectories import Trajectories
 from modelica_like.writing import write_text
 
-_MOST_EVENTS = 60
+_FIRST, _MOST_EVENTS = 25, 400
+"""Instants that are told at once, and after a click."""
 _READ = "Move over a curve to read it, drag to zoom, double-click to see all."
 _NO_CURVES = "Nothing here is a speed, a torque or a force: choose curves by <code>--show</code>, such as '*.i'."
 _KILO = 1e3
@@ -57,15 +58,15 @@ def report(drive: Component | None, run: Trajectories, *, show: Sequence[str] = 
     Args:
         drive: the drive; None if only results are known, those of an FMU or a table.
         run: its run.
-        show: patterns of the curves; by default speeds, torques and forces of the parts.
+        show: names, patterns or formulas of the curves; by default speeds, torques and forces of the parts.
 
     Raises:
         UnknownName: nothing matches a pattern.
     """
     folder, drawn = Path(__file__).parent, curves(run, show)
     # Of the parts that are not inside of others, the last one is closest to the load.
-    ends = [min(reversed([one["name"] for one in panel["curves"]]), key=lambda name: name.count("."))
-            for panel in drawn["panels"]]  # fmt: skip
+    paths = ([one["path"] for one in panel["curves"] if one["path"]] for panel in drawn["panels"])
+    ends = [min(reversed(some), key=lambda path: path.count(".")) for some in paths if some]
     sections = [
         ("Schematic", f'<div class="wide">{schematic(drive, background=False)}</div>' if drive else ""),
         ("What happens", _happens(drive, run)),
@@ -117,6 +118,9 @@ def _happens(drive: Component | None, run: Trajectories) -> str:
     lines += [f"<li>… {len(instants) - _MOST_EVENTS} more instants</li>"] if len(instants) > _MOST_EVENTS else []
     told = (*notices(run), *(plausible(drive, run) if drive else ()))
     said = "".join(f'<p class="notice">{escape(sentence)}</p>' for sentence in told)
+    if len(lines) > _FIRST + 5:
+        rest = details(f"<ul>{''.join(lines[_FIRST:])}</ul>", f"{len(instants) - _FIRST} more instants")
+        return f"{said}<ul>{''.join(lines[:_FIRST])}</ul>{rest}"
     return said + (f"<ul>{''.join(lines)}</ul>" if lines else "<p>No mode changes.</p>")
 
 
