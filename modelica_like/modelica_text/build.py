@@ -239,6 +239,10 @@ class _Builder:
         )
         if fixed:
             self.component.give(path, value)
+        elif not outside and path in self.statements.states:
+            made.default = (
+                self._value(given, self.instance, "") if given is not None and given.value is not None else value
+            )
         elif value != 0.0:
             self.component.give(path, guess(value))
 

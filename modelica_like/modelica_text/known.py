@@ -216,7 +216,8 @@ class _Part:
         if "displayUnit" in attributes:
             self.notes.display[f"{self.owner.path}.{self.name}.{here}".lstrip(".")] = attributes["displayUnit"].args[0]
         path, _, last = here.rpartition(".")
-        if isinstance(part.find(path).fields[last], Output):
+        fixed = "fixed" in attributes and attributes["fixed"].args == (True,)
+        if isinstance(part.find(path).fields[last], Output) and not fixed:
             return
         start = one.inner.get("start")
         value: Any = self.known.starts.get(here, 0.0)
@@ -224,9 +225,7 @@ class _Part:
             outside = start.scope[0] is not self.owner
             node = Resolver(*start.scope, numeric=outside)(start.value)
             value = self._value(node)
-        if attributes.get("fixed") == Expr(
-            "boolean", (True,), attributes["fixed"].line if "fixed" in attributes else 0
-        ):
+        if fixed:
             part.set(here, value)
         elif value != 0.0:
             part.set(here, guess(value))
