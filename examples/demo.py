@@ -7,15 +7,17 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
-from rich.console import Console, Group, RenderableType
+from rich.console import Group, RenderableType
 from rich.table import Table
 
+from modelica_like.cli.shared import Page
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import NetlistError
 from modelica_like.netlist import load
 from modelica_like.report.run import closure_line, energy_table, events_table, statistics_line
-from modelica_like.report.types import table
+from modelica_like.report.tables import Shown, table
 from modelica_like.simulation import build, simulate
 from modelica_like.solve.plot import plot, save_plot
 from modelica_like.solve.solution import Solution
@@ -171,13 +173,13 @@ def run_case(case: Case, examples: Path) -> tuple[Runs, float]:
 
 def comparison(case: Case, runs: Runs) -> Table:
     """Return computed values beside expected and published ones."""
-    rows: list[tuple[str, ...]] = []
+    rows: list[tuple[Any, ...]] = []
     for number in case.numbers:
         value = number.computed(runs)
-        published = "" if number.published is None else f"{number.published:g}"
-        deviation = f"{value / number.expected - 1:+.1e}"
-        rows.append((number.name, f"{value:.7g}", f"{number.expected:.7g}", deviation, published, number.unit))
-    return table(case.title, "", "computed>", "expected>", "deviation>", "published>", "unit", rows=rows)
+        published = Shown("", None) if number.published is None else number.published
+        rows.append((number.name, value, number.expected, value / number.expected - 1, published, number.unit))
+    heads = "quantity", "computed>.7g", "expected>.7g", "deviation>+.1e", "published>g", "unit"
+    return table(case.title, *heads, rows=rows)
 
 
 def pages(examples: Path, pictures: Path) -> Iterator[RenderableType]:
@@ -193,10 +195,9 @@ def pages(examples: Path, pictures: Path) -> Iterator[RenderableType]:
         yield Group(comparison(case, runs), source, "", events_table(run), "", *energy, "", taken, "")
 
 
-def run_demo(console: Console, pictures: Path) -> None:
+def run_demo(output: Page, pictures: Path) -> None:
     """Print all pages."""
     begin = time.perf_counter()
     for page in pages(EXAMPLES, pictures):
-        console.rule(style="dim")
-        console.print(page)
-    console.print(f"All in {time.perf_counter() - begin:.1f} s.")
+        output.print(page)
+    output.print(f"All in {time.perf_counter() - begin:.1f} s.")

@@ -130,12 +130,13 @@ def simulate(
     end, chosen = plan(model, until, t0=t0, rtol=rtol, atol=atol, points=points, options=options)
     make = _loop(solver or "idas")
     begin = time.perf_counter()
-    first = initialize(model, t0, start or model.settings.get("start", "given"))
+    kind: StartKind = start or model.settings.get("start", "given")
+    first = initialize(model, t0, kind)
     loop = make(model, chosen, first, end, progress)
     try:
         loop.run()
     except (SolveError, KeyboardInterrupt) as error:
-        vars(error)["run"] = _solution(loop, begin) if loop.record.segments else None
+        vars(error)["run"] = _solution(loop, begin, kind) if loop.record.segments else None
         if solver is None and isinstance(error, StepFailed):
             # Without a run-time, or if it also fails, the error of IDAS is raised.
             with suppress(SolveError, ExportError, LanguageError, MissingExtra):
@@ -143,7 +144,7 @@ def simulate(
                 told = f"{error.what} The whole run was done by the compiled run-time instead (solver native)."
                 return replace(run, notices=(told, *run.notices))
         raise
-    return _solution(loop, begin)
+    return _solution(loop, begin, kind)
 
 
 def plan(
@@ -176,14 +177,14 @@ def _loop(solver: str) -> Any:
     )
 
 
-def _solution(loop: Any, begin: float) -> Solution:
+def _solution(loop: Any, begin: float, start: StartKind) -> Solution:
     """Return the results of a loop so far."""
     record, elapsed = loop.record, time.perf_counter() - begin
     steps, evaluations, integrations = loop.counts
     statistics = Statistics(steps, evaluations, integrations, len(record.events), elapsed)
     return Solution(
         loop.model, loop.options, tuple(record.segments), tuple(record.events), statistics, tuple(record.impacts),
-        tuple(record.notices),
+        tuple(record.notices), start,
     )  # fmt: skip
 
 

@@ -5,11 +5,13 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shutil
 import subprocess
 import sys
+from base64 import b64decode
 from pathlib import Path
 
 from links import broken
@@ -37,6 +39,8 @@ def main() -> None:
     shutil.copy(HERE / "zensical.toml", work)
     shutil.copy(HERE / "site.css", pages)
     outside: set[Path] = set()
+    for file in pages.glob("notebooks/*.ipynb"):
+        _write_notebook(file)
     for page in pages.rglob("*.md"):
         page.write_text(_inside(page, pages, outside), encoding="utf-8")
     for file in outside:
@@ -46,6 +50,26 @@ def main() -> None:
     subprocess.run(command, check=True, cwd=work, env=os.environ | {"PYTHONPATH": paths})
     if found := broken(work / "html"):
         raise SystemExit("\n".join(found))
+
+
+def _write_notebook(file: Path) -> None:
+    """Write a notebook as a page, with its pictures beside it."""
+    parts: list[str] = []
+    for k, cell in enumerate(json.loads(file.read_text(encoding="utf-8"))["cells"]):
+        source = "".join(cell["source"])
+        parts.append(source if cell["cell_type"] == "markdown" else f"```python\n{source}\n```")
+        for output in cell.get("outputs", ()):
+            data = output.get("data", {})
+            if "text" in output:
+                parts.append(f"```text\n{''.join(output['text'])}```")
+            for kind, ending in (("image/svg+xml", "svg"), ("image/png", "png")):
+                if kind in data:
+                    picture = file.with_name(f"{file.stem}_{k}.{ending}")
+                    content = "".join(data[kind]).encode()
+                    picture.write_bytes(b64decode(content) if ending == "png" else content)
+                    parts.append(f"![what the cell shows]({picture.name})")
+    parts.append(f"[The notebook as a file]({file.name})")
+    file.with_suffix(".md").write_text("\n\n".join(parts) + "\n", encoding="utf-8")
 
 
 def _inside(page: Path, pages: Path, outside: set[Path]) -> str:

@@ -12,19 +12,25 @@ if TYPE_CHECKING:
 
     app: typer.Typer
 
-# Modules and their commands, in the order in which the help lists them.
-_GROUPS = {
-    "starters": ("new",),
-    "models": ("check", "simulate"),
-    "pictures": ("draw", "report", "explore"),
-    "analysis": ("modes", "steady", "sweep", "sensitivity"),
-    "export": ("export", "runtimes"),
-    "modelica": ("from-modelica", "to-modelica"),
-    "cosimulation": ("split", "cosim"),
-    "types": ("describe", "schema", "library", "docs"),
-    "validation": ("validate", "compare", "size", "demo"),
-}
-_HOME = {name: group for group, names in _GROUPS.items() for name in names}
+# Tasks with their commands and the modules of these, in the order in which the help lists them.
+TASKS = {
+    "Write a drive": {
+        "new": "starters", "check": "models", "draw": "pictures", "library": "types", "describe": "types",
+        "schema": "types", "docs": "types",
+    },
+    "Run it": {
+        "simulate": "models", "report": "pictures", "explore": "pictures", "compare": "validation",
+        "demo": "validation",
+    },
+    "Analyse and size it": {
+        "modes": "analysis", "steady": "analysis", "sweep": "analysis", "sensitivity": "analysis", "size": "validation",
+    },
+    "Give it to other tools": {
+        "export": "export", "runtimes": "export", "validate": "validation", "split": "cosimulation",
+        "cosim": "cosimulation", "from-modelica": "modelica", "to-modelica": "modelica",
+    },
+}  # fmt: skip
+_HOME = {name: home for commands in TASKS.values() for name, home in commands.items()}
 
 
 def command(name: str) -> Callable[..., None]:
@@ -37,7 +43,7 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
     from modelica_like.cli.complete import application
 
-    globals()["app"] = application({one: command(one) for one in _HOME})
+    globals()["app"] = application({task: {one: command(one) for one in names} for task, names in TASKS.items()})
     return globals()["app"]
 
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
+
+from rich.markup import escape
 
 from modelica_like.cli.declare import Option
-from modelica_like.cli.models import Solver, Start
-from modelica_like.cli.shared import Assignments, Debug, Netlist, load_netlist, out, say, told
+from modelica_like.cli.models import Start
+from modelica_like.cli.shared import TABLE, Assignments, Debug, Json, Netlist, Plot, Until, load_netlist, told
 
 
 def modes(
@@ -24,11 +26,11 @@ def modes(
         str | None, Option("--open", metavar="SIGNAL", help="Open a loop there: its response, its margins.")
     ] = None,
     inputs: Annotated[list[str] | None, Option("--input", metavar="NAME", help="Input or parameter.")] = None,
-    outputs: Annotated[list[str] | None, Option("--output", metavar="NAME", help="Variable.")] = None,
-    debug: Debug = False,
+    outputs: Annotated[list[str] | None, Option("--response", metavar="NAME", help="Variable that answers.")] = None,
+    json: Json = False, debug: Debug = False,
 ) -> None:  # fmt: skip
     """Linearize a netlist at a point: eigenvalues, damping, energy shares of each mode."""
-    with told(debug, pictures=[shapes, bode, nyquist]):
+    with told(debug, json=json, pictures=[shapes, bode, nyquist]) as page:
         assembly = load_netlist(netlist, assignments)
         from modelica_like.analyse.linear.linearize import linearize, when
         from modelica_like.analyse.linear.loop import open_loop
@@ -42,9 +44,9 @@ def modes(
         loop = open_loop(assembly, opened, start) if opened else None
         linear = loop or linearize(assembly, start, inputs=inputs, outputs=outputs)
         found = linear.modes()
-        out().print(modes_report(found))
+        page.print(modes_report(found))
         if loop:
-            say(f"\n{loop.margins()}")
+            page.print("", escape(str(loop.margins())))
         if shapes:
             speeds = [one.path for one in linear.model.flat_variables if _is_speed(one.path, str(one.unit))]
             save_plot(found.plot(show or speeds), shapes)
@@ -71,11 +73,10 @@ def steady(
     ] = None,
     after: Annotated[str | None, Option(metavar="TIME", help="Start from the end of a run, e.g. 2s.")] = None,
     show: Annotated[list[str] | None, Option(metavar="NAME", help="Variables of the table and the plot.")] = None,
-    plot: Annotated[Path | None, Option(metavar="FILE", help="Draw the curve.")] = None,
-    debug: Debug = False,
+    plot: Plot = None, json: Json = False, debug: Debug = False,
 ) -> None:  # fmt: skip
     """Find operating points of a netlist: powers, losses and efficiency, or a characteristic curve."""
-    with told(debug, pictures=[plot]):
+    with told(debug, json=json, pictures=[plot]) as page:
         assembly = load_netlist(netlist, assignments)
         from modelica_like.analyse.operating.curves import characteristic
         from modelica_like.analyse.operating.steady import steady as find
@@ -87,10 +88,10 @@ def steady(
         near = simulate(assembly, after) if after else None
         if over is None:
             held = dict(read_assignment(text) for text in hold or ())
-            out().print(point_report(find(assembly, held, by or (), near=near), show or ()))
+            page.print(point_report(find(assembly, held, by or (), near=near), show or ()))
             return
         curves = characteristic(assembly, dict([read_range(over)]), by=(by or [""])[0], near=near)
-        out().print(curves_report(curves, show or ()))
+        page.print(curves_report(curves, show or ()))
         if plot:
             save_plot(curves.plot(*(show or ("efficiency",))), plot)
 
@@ -100,22 +101,23 @@ def sweep(
     over: Annotated[list[str], Option(metavar="NAME=VALUES", help="E.g. 'gear.ratio=2:4:21' or 'mu=0.1,0.3'.")],
     of: Annotated[list[str], Option(metavar="OUTPUT", help="Output of each run, e.g. 'max(shaft.tau)'.")],
     assignments: Assignments = None, *,
-    until: Annotated[str | None, Option(metavar="TIME", help="End time, e.g. 2s; default: the netlist's.")] = None,
+    until: Until = None,
     checkpoint: Annotated[Path | None, Option(metavar="FOLDER", help="Store finished runs here.")] = None,
     processes: Annotated[int | None, Option(metavar="N", help="Parallel runs; default: one per core.")] = None,
     scheduler: Annotated[str | None, Option(metavar="ADDRESS", help="Dask scheduler, e.g. tcp://host:8786.")] = None,
-    solver: Annotated[Solver, Option(help="The compiled run-time of FMUs, or IDAS.")] = "native",
-    output: Annotated[Path | None, Option("--output", "-o", metavar="FILE", help=".csv, .parquet, .nc.")] = None,
+    solver: Annotated[Literal["native", "idas"], Option(help="The compiled run-time of FMUs, or IDAS.")] = "native",
+    output: Annotated[Path | None, Option("--output", "-o", metavar="FILE", help=TABLE)] = None,
     plot: Annotated[Path | None, Option(metavar="FILE", help="Draw lines, a map, or parallel coordinates.")] = None,
-    debug: Debug = False,
+    json: Json = False, debug: Debug = False,
 ) -> None:  # fmt: skip
     """Simulate a netlist over a grid of parameter values."""
-    with told(debug, tables=[output], pictures=[plot], files=[checkpoint / "zarr.json" if checkpoint else None]):
+    finished = checkpoint / "zarr.json" if checkpoint else None
+    with told(debug, json=json, tables=[output], pictures=[plot], files=[finished]) as page:
         assembly = load_netlist(netlist, assignments)
         from modelica_like.analyse.sweeps.ranges import read_range
         from modelica_like.analyse.sweeps.sweep import sweep as run
         from modelica_like.report.analysis import sweep_report
-        from modelica_like.report.files import STDOUT, write_dataset
+        from modelica_like.report.files import write_dataset
         from modelica_like.report.progress import Bar
 
         with Bar(title="runs") as bar:
@@ -123,7 +125,7 @@ def sweep(
                 assembly, dict(read_range(text) for text in over), of, until=until, checkpoint=checkpoint,
                 processes=processes, scheduler=scheduler, progress=bar, solver=solver,
             )  # fmt: skip
-        out(stderr=output == STDOUT).print(sweep_report(found))
+        page.print(sweep_report(found))
         if output:
             write_dataset(found, output)
         if plot:
@@ -138,19 +140,18 @@ def sensitivity(
     of: Annotated[list[str], Option(metavar="OUTPUT", help="Output to differentiate, e.g. 'max(shaft.tau)'.")],
     to: Annotated[list[str] | None, Option(metavar="PARAMETER", help="Parameter or input; default: all.")] = None,
     assignments: Assignments = None, *,
-    until: Annotated[str | None, Option(metavar="TIME", help="End time, e.g. 2s; default: the netlist's.")] = None,
-    start: Annotated[Start | None, Option(help="Start values: as given, from rest, or the steady state.")] = None,
+    until: Until = None, start: Start = None,
     tornado: Annotated[Path | None, Option(metavar="FILE", help="Draw a tornado plot of the first output.")] = None,
-    debug: Debug = False,
+    json: Json = False, debug: Debug = False,
 ) -> None:  # fmt: skip
     """Differentiate a run exactly, through its events: ranking tables, tornado plot."""
-    with told(debug, pictures=[tornado]):
+    with told(debug, json=json, pictures=[tornado]) as page:
         assembly = load_netlist(netlist, assignments)
         from modelica_like.analyse.sensitivity.derivatives import sensitivities
         from modelica_like.report.analysis import sensitivity_report
         from modelica_like.solve.plot import save_plot
 
         result = sensitivities(assembly, of, to or (), until=until, start=start)
-        out().print(sensitivity_report(result))
+        page.print(sensitivity_report(result))
         if tornado:
             save_plot(result.tornado(of[0]), tornado)

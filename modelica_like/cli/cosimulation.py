@@ -6,7 +6,22 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 from modelica_like.cli.declare import Argument, Option, WrongUse
-from modelica_like.cli.shared import Assignments, Debug, Netlist, load_netlist, say, told
+from modelica_like.cli.export import Fmi
+from modelica_like.cli.shared import (
+    Assignments,
+    Csv,
+    Curves,
+    Debug,
+    Json,
+    Netlist,
+    Plot,
+    Timeout,
+    Units,
+    Until,
+    load_netlist,
+    say,
+    told,
+)
 
 Master = Literal["jacobi", "gauss-seidel"]
 """Order in which FMUs step."""
@@ -18,17 +33,15 @@ def split(
     netlist: Netlist, assignments: Assignments = None, *,
     at: Annotated[
         list[str],
-        Option("--at", metavar="PLACE", help="A part (the cut is behind it), an end such as shaft.flange_a, or "
-                     "an entry of [connect]; several are possible.", show_default=False),
+        Option("--at", metavar="PLACE", help="A part (the cut is behind it), one of its ends, or a name in [connect]."),
     ],
     output: Annotated[
-        Path, Option("-o", "--output", metavar="FOLDER", help="Where to write: a folder, or an SSP (….ssp).")
+        Path, Option("--output", "-o", metavar="FOLDER", help="Where to write: a folder, or an SSP (….ssp).")
     ],
     names: Annotated[
         list[str] | None, Option("--name", metavar="NAME", help="Name of an FMU, in the order of the netlist.")
     ] = None,
-    fmi: Annotated[str, Option(metavar="VERSION", help="FMI version: 2.0 or 3.0.")] = "2.0",
-    ssp: Annotated[str, Option(metavar="VERSION", help="SSP version: 1.0 or 2.0.")] = "1.0",
+    fmi: Fmi = "2.0", ssp: Annotated[Literal["1.0", "2.0"], Option(help="Version of SSP.")] = "1.0",
     check: Annotated[bool, Option(help="Compare every FMU with IDAS.")] = True,
     debug: Debug = False,
 ) -> None:  # fmt: skip
@@ -52,33 +65,30 @@ def split(
 
 def cosim(
     system: Annotated[
-        Path, Argument(metavar="SYSTEM", help="system or netlist with FMUs (TOML), or SSP", show_default=False)
+        Path, Argument(metavar="SYSTEM", help="System or netlist with FMUs (TOML), or SSP.", show_default=False)
     ],
     assignments: Annotated[
         list[str] | None, Option("--set", metavar="FMU.PATH=VALUE", help="Set a value in an FMU, in its units.")
     ] = None, *,
-    until: Annotated[str | None, Option(metavar="TIME", help="End time, e.g. 2s; default: the system's.")] = None,
+    until: Until = None,
     step: Annotated[str | None, Option(metavar="TIME", help="Communication step, e.g. 0.1ms.")] = None,
-    tolerance: Annotated[
-        float | None, Option(metavar="RTOL", help="Relative tolerance of the coupling, for a variable step.")
+    rtol: Annotated[
+        float | None, Option(metavar="NUMBER", help="Relative tolerance of the coupling, for a variable step.")
     ] = None,
-    master: Annotated[Master | None, Option(help="All at once, or one after the other.")] = None,
+    master: Annotated[Master | None, Option(help="All FMUs at once, or one after the other.")] = None,
     inputs: Annotated[Inputs | None, Option(help="Interpolate inputs linearly, or hold them.")] = None,
-    csv: Annotated[Path | None, Option(metavar="FILE", help="Write a table: .csv, .parquet, .nc.")] = None,
-    units: Annotated[bool, Option("--units", help="Units in a second header line of the table.")] = False,
-    plot: Annotated[Path | None, Option(metavar="FILE", help="Draw the results: .png, .svg or .pdf.")] = None,
-    show: Annotated[list[str] | None, Option(metavar="PATTERN", help="Curves: '*.w', '2*pi*motor.w'.")] = None,
-    timeout: Annotated[float, Option(metavar="SECONDS", help="Time limit.")] = 600.0,
-    debug: Debug = False,
+    csv: Csv = None, units: Units = False, plot: Plot = None, show: Curves = None, timeout: Timeout = "600s",
+    json: Json = False, debug: Debug = False,
 ) -> None:  # fmt: skip
     """Run a system of FMUs together: mode changes, energies at the couplings, results as table and picture."""
-    with told(debug, tables=[csv], pictures=[plot]):
+    with told(debug, json=json, tables=[csv], pictures=[plot]) as page:
         from modelica_like.cli.outcome import Outcome
         from modelica_like.cosimulation.files import opened
         from modelica_like.cosimulation.run import cosim as run
         from modelica_like.cosimulation.solution import described_model
         from modelica_like.report.progress import Bar
         from modelica_like.report.run import cosimulation_report
+        from modelica_like.simulation import seconds
         from modelica_like.solve.plot import plot as draw
         from modelica_like.solve.signals import read_signals
 
@@ -88,11 +98,11 @@ def cosim(
                 read_signals(described_model(known), show)
             made = Outcome(
                 lambda: run(
-                    known, until, step=step, master=master, inputs=inputs, tolerance=tolerance,
-                    parameters=values, timeout=timeout, progress=bar,
+                    known, until, step=step, master=master, inputs=inputs, tolerance=rtol,
+                    parameters=values, timeout=seconds(timeout, "timeout"), progress=bar,
                 ), debug=debug,
             )  # fmt: skip
-        made.tell(cosimulation_report, csv)
+        made.tell(cosimulation_report, page)
         made.write(csv, units=units, show=show or (), pictures=[(plot, lambda one: draw(one, show or ()))])
 
 

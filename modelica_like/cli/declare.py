@@ -5,6 +5,8 @@ Typer shows help and errors, but it loads a validation framework; an ordinary ca
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
+
 
 class Argument:
     """A value by its position.
@@ -14,15 +16,18 @@ class Argument:
         metavar: name of the value in the help.
         help: description.
         show_default: whether the help shows its default.
+        choices: returns the values that a shell completes.
     """
 
     def __init__(
-        self, *names: str, metavar: str | None = None, help: str | None = None, show_default: bool = True
-    ) -> None:
+        self, *names: str, metavar: str | None = None, help: str | None = None, show_default: bool = True,
+        choices: Callable[[], Iterable[str]] | None = None,
+    ) -> None:  # fmt: skip
         self.names = names
         self.metavar = metavar
         self.help = help
         self.show_default = show_default
+        self.choices = choices
 
 
 class Option(Argument):

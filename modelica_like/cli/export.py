@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from modelica_like.cli.declare import Option
-from modelica_like.cli.shared import Assignments, Debug, Netlist, load_netlist, say, told
+from modelica_like.cli.shared import Assignments, Debug, Json, Netlist, load_netlist, say, told
 
+Fmi = Annotated[Literal["2.0", "3.0"], Option(help="Version of FMI.")]
 Takes = Literal["flow", "potential"]
 """Quantity that open ends take from outside."""
 Modes = Literal["output", "local", "integer"]
@@ -17,15 +18,16 @@ Modes = Literal["output", "local", "integer"]
 
 def export(
     netlist: Netlist, assignments: Assignments = None, *,
-    output: Annotated[Path | None, Option("-o", "--output", metavar="FILE", help="Default: NETLIST.fmu.")] = None,
+    output: Annotated[Path | None, Option("--output", "-o", metavar="FILE", help="By default DRIVE.fmu.")] = None,
     html: Annotated[
         Path | None, Option(metavar="FILE", help="Write a page that simulates in a browser; with -o also an FMU.")
     ] = None,
-    fmi: Annotated[str, Option(metavar="VERSION", help="FMI version: 2.0 or 3.0.")] = "2.0",
-    kind: Annotated[str, Option(metavar="KINDS", help="me, cs, or both: me,cs.")] = "me,cs",
+    fmi: Fmi = "2.0",
+    kind: Annotated[Literal["both", "me", "cs"], Option(help="Model Exchange, Co-Simulation, or both.")] = "both",
     platforms: Annotated[
-        str, Option(metavar="NAMES", help="native, all, none, or names such as x86_64-windows, with commas.")
-    ] = "native",
+        list[str] | None,
+        Option("--platform", metavar="NAME", help="E.g. x86_64-windows, all, or none; by default native: this one."),
+    ] = None,
     outputs: Annotated[
         list[str] | None, Option("--show", metavar="PATTERN", help="Additional outputs, e.g. '*.w'; in a page: curves.")
     ] = None,
@@ -36,12 +38,12 @@ def export(
     embed: Annotated[
         bool, Option("--embed", help="Compile the model into the binary, for importers that do not locate resources.")
     ] = False,
-    modes: Annotated[Modes, Option(help="Modes as enumeration outputs, local ones, or integer outputs.")] = "output",
+    modes: Annotated[Modes, Option(help="Modes as outputs, local variables, or integer outputs.")] = "output",
     fixed_step: Annotated[
         str | None, Option(metavar="TIME", help="Co-Simulation with fixed steps and bounded work, e.g. 1ms.")
     ] = None,
     tables: Annotated[
-        list[str] | None, Option(metavar="PATTERN", help="Tables whose numbers are tunable, e.g. '*.mu_pos'.")
+        list[str] | None, Option("--table", metavar="PATTERN", help="Tables with tunable numbers, e.g. '*.mu_pos'.")
     ] = None,
     check: Annotated[bool, Option(help="Compare the FMU with IDAS.")] = True,
     strict: Annotated[bool, Option("--strict", help="Do not write an FMU that differs from IDAS.")] = False,
@@ -60,7 +62,8 @@ def export(
             if html is not None and output is None:
                 return
             done = export_fmu(
-                assembly, output or Path(f"{netlist.stem}.fmu"), fmi, _listed(kind), _listed(platforms),
+                assembly, output or Path(f"{netlist.stem}.fmu"), fmi, ("me", "cs") if kind == "both" else (kind,),
+                () if platforms == ["none"] else platforms or ("native",),
                 outputs=outputs or (), ends=ends or (), takes=takes, embed=embed, modes=modes,
                 fixed_step=fixed_step, tables=tables or (), check=check, strict=strict, report=status.update,
             )  # fmt: skip
@@ -75,25 +78,20 @@ def _page(assembly: Any, file: Path, show: Sequence[str], report: Callable[[str]
 
 def runtimes(
     *, platforms: Annotated[
-        str, Option(metavar="NAMES", help="Platforms to compile for: native, all, or names with commas.")
-    ] = "none",
-    debug: Debug = False,
+        list[str] | None, Option("--platform", metavar="NAME", help="Compile for a platform, native, or all.")
+    ] = None,
+    json: Json = False, debug: Debug = False,
 ) -> None:  # fmt: skip
     """List the platforms for which the run-time of FMUs is available; compile it for others."""
-    with told(debug):
+    with told(debug, json=json) as page:
         from rich.console import Console
 
         from modelica_like.fmi.build import RUNTIMES, chosen_platforms
         from modelica_like.fmi.runtime import found_runtime, runtime_library
+        from modelica_like.report.tables import table
 
         with Console(stderr=True).status("loading") as status:
-            for name in chosen_platforms(_listed(platforms), RUNTIMES):
+            for name in chosen_platforms(platforms or (), RUNTIMES):
                 runtime_library(name, status.update)
-        for name in RUNTIMES:
-            library = found_runtime(name)
-            say(f"{name:16}{library or 'not compiled'}")
-
-
-def _listed(text: str) -> tuple[str, ...]:
-    names = tuple(name.strip() for name in text.split(",") if name.strip())
-    return () if names == ("none",) else names
+        found = ((name, str(found_runtime(name) or "not compiled")) for name in RUNTIMES)
+        page.print(table("run-times", "platform", "library", rows=found))

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from modelica_like.cli.shared import DEFECTS, out, warn
+from modelica_like.cli.shared import DEFECTS, Page, warn
 from modelica_like.errors import ModelicaLikeError, SolveError
 
 if TYPE_CHECKING:
@@ -83,8 +83,6 @@ class Outcome:
 
         save_plot(draw(self.solution), file)
 
-    def tell(self, report: Callable[[Any], Any], table: Path | None) -> None:
-        """Print a report, unless the table goes to standard output."""
-        from modelica_like.report.files import STDOUT
-
-        self.attempt("The report", lambda: out(stderr=table == STDOUT).print(report(self.solution)))
+    def tell(self, report: Callable[[Any], Any], page: Page) -> None:
+        """Print a report."""
+        self.attempt("The report", lambda: page.print(report(self.solution)))

@@ -5,19 +5,19 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from modelica_like.cli.declare import Option
-from modelica_like.cli.shared import Assignments, Debug, Netlist, load_netlist, say, told
+from modelica_like.cli.declare import Argument, Option
+from modelica_like.cli.shared import Assignments, Debug, Netlist, Show, Until, load_netlist, say, told
+from modelica_like.errors import NetlistError
 
 
 def draw(
     netlist: Netlist, assignments: Assignments = None, *,
-    output: Annotated[Path | None, Option("--output", "-o", metavar="FILE", help="A .svg, .png or .pdf file.")] = None,
+    output: Annotated[Path | None, Option("--output", "-o", metavar="FILE", help="By default DRIVE.svg.")] = None,
     depth: Annotated[int, Option(metavar="N", help="Levels of assemblies to open.")] = 1,
     at: Annotated[str | None, Option(metavar="TIME", help="Run the drive; show modes and powers at a time.")] = None,
     flow: Annotated[bool, Option("--flow", help="Run the drive; show mean powers as line widths.")] = False,
     animate: Annotated[bool, Option("--animate", help="Run the drive; show its modes one by one.")] = False,
-    until: Annotated[str | None, Option(metavar="TIME", help="End of the run; else the netlist's.")] = None,
-    debug: Debug = False,
+    until: Until = None, debug: Debug = False,
 ) -> None:  # fmt: skip
     """Draw the schematic of a netlist: power from left to right."""
     with told(debug):
@@ -34,21 +34,28 @@ def draw(
 
 
 def report(
-    netlist: Netlist, assignments: Assignments = None, *,
-    output: Annotated[Path | None, Option("--output", "-o", metavar="FILE", help="The page, .html.")] = None,
-    until: Annotated[str | None, Option(metavar="TIME", help="End time, e.g. 2s; default: the netlist's.")] = None,
-    show: Annotated[list[str] | None, Option(metavar="PATTERN", help="Variables to draw, e.g. '*.w'.")] = None,
-    debug: Debug = False,
+    source: Annotated[Path, Argument(metavar="NETLIST", help="Netlist, FMU, system or CSV file.", show_default=False)],
+    assignments: Assignments = None, *,
+    output: Annotated[Path | None, Option("--output", "-o", metavar="FILE", help="By default DRIVE.html.")] = None,
+    until: Until = None, show: Show = None, debug: Debug = False,
 ) -> None:  # fmt: skip
     """Simulate a netlist and write a page about it: schematic, events, curves, energies, numbers."""
-    path = output or Path(f"{netlist.stem}.html")
+    path = output or Path(f"{source.stem}.html")
     with told(debug, files=[path]):
-        drive = load_netlist(netlist, assignments)
+        from modelica_like.cosimulation.files import describes_system
         from modelica_like.report.page import save_report
         from modelica_like.report.progress import Bar
-        from modelica_like.simulation import build, simulate
+        from modelica_like.report.sources import trajectories
+        from modelica_like.simulation import build, seconds, simulate
         from modelica_like.solve.trajectories import matching
 
+        if source.suffix.lower() != ".toml" or describes_system(source):
+            if assignments:
+                raise NetlistError(f"--set changes netlists; '{source.name}' is none.")
+            save_report(None, trajectories(source, seconds(until) if until else None), path, show=show or ())
+            say(str(path))
+            return
+        drive = load_netlist(source, assignments)
         model = build(drive)
         matching(model, show or ())
         with Bar(until or model.settings.get("until")) as bar:
@@ -59,8 +66,7 @@ def report(
 
 def explore(
     netlist: Netlist, assignments: Assignments = None, *,
-    until: Annotated[str | None, Option(metavar="TIME", help="End time, e.g. 2s; default: the netlist's.")] = None,
-    show: Annotated[list[str] | None, Option(metavar="PATTERN", help="Variables to draw, e.g. '*.w'.")] = None,
+    until: Until = None, show: Show = None,
     output: Annotated[Path, Option("--output", "-o", metavar="FOLDER", help="Where the page saves files.")] = Path(),
     browser: Annotated[bool, Option(help="Open the browser.")] = True,
     debug: Debug = False,

@@ -27,29 +27,74 @@ DEFECTS = (
     SyntaxError, TypeError, ValueError,
 )  # fmt: skip
 
-Netlist = Annotated[Path, Argument(metavar="NETLIST", help="TOML file", show_default=False)]
+Netlist = Annotated[Path, Argument(metavar="NETLIST", help="Netlist, a TOML file.", show_default=False)]
 Debug = Annotated[bool, Option("--debug", help="Show where in the code errors are raised and events declared.")]
 Assignments = Annotated[
-    list[str] | None, Option("--set", metavar="PATH=VALUE", help='Set a value, e.g. --set clutch.mu="0.3".')
+    list[str] | None, Option("--set", metavar="PATH=VALUE", help="Set a value, e.g. 'clutch.mu=0.3'.")
 ]
+Until = Annotated[str | None, Option(metavar="TIME", help="End time, e.g. 2s; by default that of the file.")]
+Points = Annotated[int | None, Option(metavar="N", help="Number of equal intervals of the results.")]
+Tolerance = Annotated[float | None, Option("--rtol", metavar="NUMBER", help="Relative tolerance, e.g. 1e-8.")]
+TABLE = "Write a table: .csv, .parquet, .nc, or - for the screen."
+Csv = Annotated[Path | None, Option(metavar="FILE", help=TABLE)]
+Units = Annotated[bool, Option("--units", help="Write the units of [display], named in a second header line.")]
+Plot = Annotated[Path | None, Option(metavar="FILE", help="Draw a picture: .png, .svg or .pdf.")]
+Show = Annotated[list[str] | None, Option(metavar="PATTERN", help="Variables to show, e.g. '*.w'.")]
+Curves = Annotated[
+    list[str] | None, Option("--show", metavar="PATTERN", help="Curves, also formulas: '*.w', '2*pi*motor.w'.")
+]
+Timeout = Annotated[str, Option(metavar="TIME", help="Time limit of a run.")]
+Json = Annotated[bool, Option("--json", help="Print the tables as JSON, with all digits and rows.")]
+
+
+class Page:
+    """What a command prints: at once, or as JSON when it is complete; on stderr if stdout gets a table."""
+
+    def __init__(self, *, json: bool, stderr: bool) -> None:
+        self._stderr = stderr
+        self._parts: list[Any] | None = [] if json else None
+
+    def print(self, *parts: Any) -> None:
+        """Print reports, or keep them."""
+        if self._parts is None:
+            for part in parts:
+                out(stderr=self._stderr).print(part)
+        else:
+            self._parts += parts
+
+    def close(self) -> None:
+        """Print what is kept as JSON."""
+        if self._parts:
+            from json import dumps
+
+            from modelica_like.report.tables import as_data
+
+            text = dumps(as_data(*self._parts), indent=1, ensure_ascii=False, allow_nan=False)
+            (sys.stderr if self._stderr else sys.stdout).write(f"{text}\n")
 
 
 @contextmanager
 def told(
-    debug: bool, *, tables: Iterable[Path | None] = (), pictures: Iterable[Path | None] = (),
+    debug: bool, *, json: bool = False, tables: Iterable[Path | None] = (), pictures: Iterable[Path | None] = (),
     files: Iterable[Path | None] = (),
-) -> Iterator[None]:  # fmt: skip
+) -> Iterator[Page]:  # fmt: skip
     """Turn errors into one block of text on stderr and an exit code.
 
     Args:
         debug: raise them instead.
+        json: whether the page is JSON.
         tables: to be written; checked before the run.
         pictures: to be written.
         files: of any kind, to be written.
     """
+    tables = [one for one in tables if one is not None]
     try:
-        _check(filter(None, tables), filter(None, pictures), filter(None, files))
-        yield
+        _check(tables, filter(None, pictures), filter(None, files))
+        page = Page(json=json, stderr=Path("-") in tables)
+        try:
+            yield page
+        finally:
+            page.close()
     except BrokenPipeError:
         # The reader of the results has closed the pipe.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

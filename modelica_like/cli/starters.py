@@ -15,9 +15,9 @@ _FILES = {"servo": "servo_axis"}
 
 
 def new(
-    drive: Annotated[Drive, Argument(help="worked drive to begin with; blank: motor and load", show_default=False)],
+    drive: Annotated[Drive, Argument(help="Worked drive, or blank: a motor and a load.", show_default=False)],
     output: Annotated[
-        Path | None, Option("--output", "-o", metavar="FILE", help="Netlist; default: DRIVE.toml.")
+        Path | None, Option("--output", "-o", metavar="FILE", help="The netlist; by default DRIVE.toml.")
     ] = None,
     *, debug: Debug = False,
 ) -> None:  # fmt: skip

@@ -8,7 +8,7 @@ async function post(what, content) {
   const answer = await fetch(what, { method: "POST", headers, body }).catch(() => {
     throw new Error("nobody answers. Start `modelica-like explore` again.");
   });
-  if (!answer.ok) throw new Error(await answer.text());
+  if (!answer.ok || answer.headers.has("X-Refused")) throw new Error(await answer.text());
   return answer;
 }
 
@@ -38,6 +38,18 @@ const present = () => ({
     .map((one) => [one.reference, one.now * one.factor + one.offset]),
 });
 
+/* A click on a part in the schematic opens its parameters. */
+function parts() {
+  const groups = [...document.querySelectorAll("aside details")];
+  for (const { textContent, parentNode: part } of document.querySelectorAll("#schematic g > title")) {
+    const name = textContent.split(":")[0];
+    const group = groups.find(({ firstChild: { textContent: path } }) => path === name || path.endsWith(`.${name}`));
+    if (group === undefined) continue;
+    part.style = "cursor: pointer; pointer-events: bounding-box";
+    part.onclick = () => { group.open = true; group.scrollIntoView({ block: "nearest" }); };
+  }
+}
+
 function files() {
   at("files").onclick = async ({ target: { value } }) => {
     if (!value) return;
@@ -55,8 +67,8 @@ function bars() {
     const answer = await post("/ranking", { output: select.value, ...present() }).catch((error) => error);
     if (mine !== number) return;
     if (answer instanceof Error) return void table.replaceChildren(element("caption", {}, answer.message));
-    const rows = await answer.json(), most = Math.max(...rows.map((row) => Math.abs(row[1])));
-    table.replaceChildren(element("caption", {}, "percent of change for one percent of the parameter"),
+    const { caption, rows } = await answer.json(), most = Math.max(...rows.map((row) => Math.abs(row[1])));
+    table.replaceChildren(element("caption", {}, caption),
       ...rows.map(([name, value]) => {
         const bar = element("i", { className: value < 0 ? "negative" : "" });
         bar.style.width = `${(100 * Math.abs(value)) / most}%`;
@@ -76,4 +88,4 @@ function bars() {
   at("bars").ontoggle = select.onchange = later;
 }
 
-document.addEventListener("drawn", () => (files(), bars()), { once: true });
+document.addEventListener("drawn", () => (parts(), files(), bars()), { once: true });

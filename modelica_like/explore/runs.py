@@ -105,16 +105,28 @@ class Runs:
             drive.set(self._names[reference], value)
         return drive
 
-    def ranking(self, values: Sequence[tuple[int, float]], until: float, output: str) -> list[tuple[str, float]]:
-        """Return by what percentage the final value of an output changes with one percent of each parameter.
+    def ranking(self, values: Sequence[tuple[int, float]], until: float, output: str) -> dict[str, Any]:
+        """Return by how much the final value of an output changes with one percent of each parameter.
+
+        Returns:
+            Rows of names and changes, in percent, or in the unit of an output that ends at zero; a caption.
 
         Raises:
             NoGradient, ModelicaLikeError: there are no derivatives.
         """
         given = {self._names[reference]: value for reference, value in values}
         found = sensitivities(self._model, [output], until=until, parameters=given)
-        rows = [(one.name, relative) for one, _, relative in found.ranking(output) if np.isfinite(relative)]
-        return [row for row in rows if row[1]][:_MOST_BARS]
+        (end,) = found.outputs
+        rows = [
+            (one.name, relative if end.value else 0.01 * one.value * derivative)
+            for one, derivative, relative in found.ranking(output)
+        ]
+        rows = [row for row in rows if row[1]][:_MOST_BARS]
+        caption = (
+            f"change in {'percent' if end.value else end.unit_text or 'its value'} for one percent of the parameter"
+        )
+        ends = f"{output} ends at {end.value:.5g} {end.unit_text}".rstrip()
+        return {"caption": caption if rows else f"{ends}, and no parameter changes that.", "rows": rows}
 
     def save(self, what: str, values: Sequence[tuple[int, float]], until: float, folder: Path) -> Path:
         """Write the changed drive into a folder, without overwriting files.

@@ -128,8 +128,12 @@ class _Handler(BaseHTTPRequestHandler):
             return
         try:
             getattr(self, self._kinds[self.path])(json.loads(self.rfile.read(int(size))))
-        except (ModelicaLikeError, OSError) as error:
-            self._answer(HTTPStatus.UNPROCESSABLE_ENTITY, str(error).encode())
+        except ModelicaLikeError as error:
+            # Told in the page, with an answer that browsers do not report as a failure.
+            told = " ".join(filter(None, (error.what, error.why, error.advice)))
+            self._answer(HTTPStatus.OK, told.encode(), refused=True)
+        except OSError as error:
+            self._answer(HTTPStatus.OK, str(error).encode(), refused=True)
         except (KeyError, TypeError, ValueError) as error:
             self._answer(HTTPStatus.BAD_REQUEST, f"The request is wrong: {error!r}.".encode())
 
@@ -162,11 +166,14 @@ class _Handler(BaseHTTPRequestHandler):
         path = self.server.runs.save(str(asked["what"]), pairs(asked), float(asked["until"]), self.server.folder)
         self._answer(HTTPStatus.OK, str(path).encode())
 
-    def _answer(self, code: HTTPStatus, body: bytes, kind: str = "application/octet-stream") -> None:
+    def _answer(
+        self, code: HTTPStatus, body: bytes, kind: str = "application/octet-stream", *, refused: bool = False
+    ) -> None:
         self.send_response(code)
         for name, value in (
             ("Content-Type", kind), ("Content-Length", str(len(body))), ("Cache-Control", "no-store"),
             ("X-Content-Type-Options", "nosniff"), ("Referrer-Policy", "no-referrer"),
+            *([("X-Refused", "yes")] if refused else []),
         ):  # fmt: skip
             self.send_header(name, value)
         self.end_headers()

@@ -312,9 +312,9 @@ class Component(Declared):
         """Return the names of the signals that form the terminal of an adaptor."""
         return tuple(name for name, field in self.fields.items() if isinstance(field, Input | Output))
 
-    def _repr_svg_(self) -> str:
-        """Return the schematic, for notebooks."""
-        return upper("schematic")(self)
+    def _repr_html_(self) -> str:
+        """Return the schematic and the given parameters, for notebooks."""
+        return upper("html")(self)
 
     def _end(self, which: str) -> Connector:
         names = getattr(type(self), which).split()

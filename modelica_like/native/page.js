@@ -126,10 +126,11 @@ class Picture {
     return made;
   }
 
-  /* Modes as bands, one row each. */
+  /* Modes that change as bands, one row each. */
   bands() {
-    const rows = MODES.map((mode, row) => {
-      const curve = values(this.result, mode), top = TOP + row * ROW + 14;
+    const curves = MODES.map((mode) => [mode, values(this.result, mode)]);
+    const rows = curves.filter(([, curve]) => curve.some((one) => one !== curve[0])).map(([mode, curve], row) => {
+      const top = TOP + row * ROW + 14;
       let pieces = "", first = 0;
       for (let k = 1; k < curve.length; k++) {
         const [x, next] = [this.x(this.times[first]), this.x(this.times[k])], last = k + 1 === curve.length;

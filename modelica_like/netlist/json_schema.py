@@ -3,57 +3,103 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, get_args
 
 from modelica_like.language import Component, Input, Parameter, Variable
 from modelica_like.language.fields import Discrete, Field
 from modelica_like.language.tables import REQUIRED, Column, Rows
 from modelica_like.netlist.document import StartKind
+from modelica_like.netlist.json_units import Quantities
+from modelica_like.netlist.read import FMU_PART
 from modelica_like.netlist.registry import library_types
-from modelica_like.units import ANY
+from modelica_like.units import ANY, parse_unit
 
 _QUANTITY = {"type": ["number", "string"]}
+_TIME = {"anyOf": [{"type": "number", "exclusiveMinimum": 0}, {"$ref": "#/definitions/quantity_in_s"}]}
 _JSON_TYPES: dict[type, str] = {bool: "boolean", int: "integer", float: "number", str: "string"}
+DRAFT = "http://json-schema.org/draft-07/schema#"
+"""The draft that the language servers for TOML know."""
+_VALUE = {"type": ["number", "string", "object"]}
+_ANY_PART = {"$ref": "#/definitions/part"}
 _ENDS = {"type": "array", "items": {"type": "string"}, "minItems": 2}
 
 
 def schema() -> dict[str, Any]:
-    """Return the JSON schema (draft 2020-12) of a netlist with all installed component types.
+    """Return the JSON schema (draft 7) of a netlist with all installed component types.
 
     Raises:
         NetlistError: a library cannot be imported.
     """
     types = library_types()
+    quantities = Quantities(_units(types.values()))
+    quantities.text(parse_unit("s"))
+    components = {name: _component(kind, quantities) for name, kind in types.items()}
     return {
-        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "$schema": DRAFT,
         "title": "modelica-like netlist",
         "type": "object",
         "additionalProperties": False,
         "required": ["parts"],
         "properties": _sections(),
-        "$defs": {"part": _part(list(types)), **{name: _component(kind) for name, kind in types.items()}},
+        "definitions": {"part": chosen(components, _others()), **components, **quantities.definitions()},
     }
+
+
+def chosen(known: Iterable[str], others: Iterable[dict[str, Any]] = ()) -> dict[str, Any]:
+    """Return the schema of a table whose `is` chooses a definition, in the form that language servers complete."""
+    return {"anyOf": [*({"$ref": f"#/definitions/{name}"} for name in known), *others]}
+
+
+def _units(types: Iterable[type[Component]]) -> set[str]:
+    fields = {field.unit_text for kind in types for field in kind._class_fields.values()}
+    columns = {
+        str(one.unit_in(kind._class_fields)) for kind in types for table in kind._tables.values()
+        for one in table.columns if not one.text
+    }  # fmt: skip
+    return fields | columns
 
 
 def _sections() -> dict[str, Any]:
     return {
-        "name": {"type": "string", "description": "name of the model"},
+        "name": {"type": "string", "description": "name of the model; default: that of the file"},
         "description": {"type": "string", "description": "one phrase"},
-        "parameters": _map(_QUANTITY, "parameters of the assembly: numbers, quantities or formulas"),
-        "parts": _map(
-            {"anyOf": [{"$ref": "#/$defs/part"}, {"type": "array", "items": {"$ref": "#/$defs/part"}, "minItems": 1}]},
-            "components by name",
+        "parameters": _map(
+            _QUANTITY,
+            "parameters of the drive: numbers, quantities or formulas of earlier ones",
+            {"n": "1500 rpm", "w": "n / 10"},
         ),
-        "series": _map(_ENDS, "chains of parts: outlet to inlet"),
-        "connect": _map(_ENDS, "connectors or signals that are joined"),
-        "start": _map({"type": ["number", "string", "object"]}, "fixed start values, and start modes, by path"),
-        "guess": _map({"type": ["number", "string", "object"]}, "guessed start values by path"),
-        "free": {"type": "array", "items": {"type": "string"}, "description": "connectors left free on purpose"},
-        "expose": _map({"type": "string"}, "outer connectors: name and inner connector"),
-        "simulate": _simulate(),
+        "parts": _map(
+            {"anyOf": [_ANY_PART, {"type": "array", "items": _ANY_PART, "minItems": 1}]},
+            "components by name; `is` names the type",
+            {"hub": {"is": "Inertia", "J": "0.02 kg.m2"}},
+        ),
+        "series": _map(
+            _ENDS,
+            "chains of parts: the outlet of each is joined to the inlet of the next",
+            {"drive": ["motor", "clutch", "hub"]},
+        ),
+        "connect": _map(
+            _ENDS,
+            "connectors that are joined, or an output with inputs",
+            {"command": ["ramp.y", "clutch.f"]},
+        ),
+        "start": _map(_VALUE, "fixed start values, and start modes, by path", {"hub.w": "10 rad/s"}),
+        "guess": _map(_VALUE, "start values that the initialization may change, by path", {"clutch.tau": "10 N.m"}),
+        "free": {
+            "type": "array",
+            "items": {"type": "string"},
+            "description": "connectors left free on purpose",
+            "examples": [["gear.support"]],
+        },
+        "expose": _map({"type": "string"}, "outer connectors and signals", {"input": "hub.flange_a"}),
+        "simulate": {"description": "how the drive is run", **_simulate()},
         "sizing": {"type": "string", "description": "sizing file, whose checks stand in reports"},
-        "display": _map({"type": "string"}, "units in which results are shown, by path, pattern or quantity"),
+        "display": _map(
+            {"type": "string"},
+            "units in which results are shown, by quantity, path or pattern",
+            {"speed": "rpm", "*.phi": "deg"},
+        ),
     }
 
 
@@ -62,46 +108,71 @@ def _simulate() -> dict[str, Any]:
         "type": "object",
         "additionalProperties": False,
         "properties": {
-            "until": {**_QUANTITY, "description": "end time [s]"},
-            "start": {"enum": list(get_args(StartKind)), "description": "how the start values are found"},
-            "rtol": {"type": "number", "minimum": 1e-14, "maximum": 0.1, "description": "relative tolerance"},
-            "points": {"type": "integer", "minimum": 1, "description": "number of output intervals"},
+            "until": {"description": "end time [s]", **_TIME, "examples": ["0.5 s"]},
+            "start": {
+                "enum": list(get_args(StartKind)),
+                "description": "start values that are missing: none (given), zero (rest), or those of the steady state",
+            },
+            "rtol": {
+                "type": "number",
+                "minimum": 1e-14,
+                "maximum": 0.1,
+                "description": "relative tolerance",
+                "examples": [1e-7],
+            },
+            "points": {
+                "type": "integer",
+                "minimum": 1,
+                "maximum": 1_000_000,
+                "description": "number of output intervals",
+                "default": 500,
+            },
         },
     }
 
 
-def _map(entries: dict[str, Any], description: str) -> dict[str, Any]:
-    return {"type": "object", "description": description, "additionalProperties": entries}
+def _map(entries: dict[str, Any], description: str, example: dict[str, Any]) -> dict[str, Any]:
+    return {
+        "type": "object", "description": description, "additionalProperties": entries, "examples": [example],
+    }  # fmt: skip
 
 
-def _part(names: list[str]) -> dict[str, Any]:
-    choices = [
-        {"enum": names},
-        {"pattern": r"^[\w.]+:\w+$", "description": "class of a Python module"},
-        {"pattern": r"\.toml$", "description": "another netlist"},
-    ]
+def _others() -> list[dict[str, Any]]:
+    """Return the schemas of parts that are no component of a library."""
+    known = {
+        r"^[\w.]+:\w+$": "class of a Python module",
+        r"\.toml$": "another netlist",
+        f"^{FMU_PART}$": "FMU, coupled by its inputs and outputs; run by `modelica-like cosim`",
+    }
+    return [
+        {
+            "type": "object", "description": text, "required": ["is"], "additionalProperties": True,
+            "properties": {"is": {"type": "string", "pattern": pattern}},
+        }
+        for pattern, text in known.items()
+    ]  # fmt: skip
+
+
+def _component(kind: type[Component], quantities: Quantities) -> dict[str, Any]:
+    described = Parameter | Input | Variable | Discrete
+    count = {"type": "integer", "minimum": 1, "description": "number of parts in an array"}
+    properties: dict[str, Any] = {"is": {"const": kind.__name__}, "count": count}
+    properties |= {
+        name: _field(field, quantities) for name, field in kind._class_fields.items() if isinstance(field, described)
+    }
+    properties |= {
+        name: {"enum": list(mode.names), "description": f"{mode.description}, at the start"}
+        for name, mode in kind._class_modes.items()
+    }
+    properties |= {name: _structural(default) for name, default in kind._structural.items() if name not in kind._tables}
+    properties |= {name: _table(table, kind._class_fields, quantities) for name, table in kind._tables.items()}
+    properties |= {
+        name: {"type": "object", "description": "values of a part", "additionalProperties": True}
+        for name in kind._class_parts
+    }
     return {
         "type": "object",
         "required": ["is"],
-        "properties": {
-            "is": {"type": "string", "anyOf": choices},
-            "count": {"type": "integer", "minimum": 1, "description": "number of parts in an array"},
-        },
-        "allOf": [
-            {"if": {"properties": {"is": {"const": name}}}, "then": {"$ref": f"#/$defs/{name}"}} for name in names
-        ],
-    }
-
-
-def _component(kind: type[Component]) -> dict[str, Any]:
-    described = Parameter | Input | Variable | Discrete
-    properties: dict[str, Any] = {"is": {"const": kind.__name__}, "count": {"type": "integer"}}
-    properties |= {name: _field(field) for name, field in kind._class_fields.items() if isinstance(field, described)}
-    properties |= {name: {"enum": list(mode.names)} for name, mode in kind._class_modes.items()}
-    properties |= {name: _structural(default) for name, default in kind._structural.items() if name not in kind._tables}
-    properties |= {name: _table(table, kind._class_fields) for name, table in kind._tables.items()}
-    properties |= {name: {"type": "object"} for name in kind._class_parts}
-    return {
         "description": inspect.cleandoc(kind.__doc__ or "").partition("\n")[0],
         "properties": properties,
         "patternProperties": {r"[.\[]": True},
@@ -109,29 +180,35 @@ def _component(kind: type[Component]) -> dict[str, Any]:
     }
 
 
-def _field(field: Field) -> dict[str, Any]:
+def _field(field: Field, quantities: Quantities) -> dict[str, Any]:
     number: dict[str, Any] = {"type": "number"}
     if field.unit.factor == 1.0 and field.unit.offset == 0.0:
         number |= {key: bound for key, bound in (("minimum", field.min), ("maximum", field.max)) if bound is not None}
     unit = "" if field.unit_text == "1" else f" [{field.unit_text}]"
-    described: dict[str, Any] = {"description": field.description + unit, "anyOf": [number, {"type": "string"}]}
+    described: dict[str, Any] = {
+        "description": field.description + unit,
+        "anyOf": [number, quantities.text(field.unit)],
+    }
+    if unit and field.unit != ANY:
+        described["examples"] = [f"1 {field.unit_text}"]
     if isinstance(field.default, int | float | str):
         described["default"] = field.default
     return described
 
 
-def _table(table: Rows, fields: Mapping[str, Field]) -> dict[str, Any]:
-    cells = [{"type": _cell_types(one, fields), "description": one.described(fields)} for one in table.columns]
-    size = {"minItems": len(cells)} | ({"items": cells[-1]} if table.more else {"items": False})
-    row = cells[0] if table.flat else {"type": "array", "prefixItems": cells, **size}
+def _table(table: Rows, fields: Mapping[str, Field], quantities: Quantities) -> dict[str, Any]:
+    cells = [{"description": one.described(fields), **_cell(one, fields, quantities)} for one in table.columns]
+    size = {"minItems": len(cells), "additionalItems": cells[-1] if table.more else False}
+    row = cells[0] if table.flat else {"type": "array", "items": cells, **size}
     found: dict[str, Any] = {"type": "array", "description": table.description, "minItems": 1, "items": row}
     return found if table.default is REQUIRED else found | {"default": table.default}
 
 
-def _cell_types(column: Column, fields: Mapping[str, Field]) -> str | list[str]:
+def _cell(column: Column, fields: Mapping[str, Field], quantities: Quantities) -> dict[str, Any]:
     if column.text:
-        return "string"
-    return "number" if column.unit_in(fields) == ANY else ["number", "string"]
+        return {"type": "string"}
+    unit = column.unit_in(fields)
+    return {"type": "number"} if unit == ANY else {"anyOf": [{"type": "number"}, quantities.text(unit)]}
 
 
 def _structural(default: object) -> dict[str, Any]:

@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from rich.console import Group, RenderableType
 from rich.markup import escape
-from rich.table import Table
 
 from modelica_like.analyse.sensitivity.result import COLUMNS, SHOWN
-from modelica_like.report.types import table
+from modelica_like.report.tables import Listed, Shown, table
 
 if TYPE_CHECKING:
     import xarray
@@ -34,11 +33,11 @@ def point_report(point: OperatingPoint, names: Sequence[str] = ()) -> Renderable
     powers = point.powers
     largest = max((abs(one) for pair in powers.values() for one in pair), default=0.0)
     rows = [
-        (path or model.name, f"{source:.6g}", f"{loss:.6g}")
+        (path or model.name, source, loss)
         for path, (source, loss) in powers.items()
         if max(abs(source), abs(loss)) > _SMALL * largest
     ]
-    made = table("powers in W", "component", "from outside>", "lost>", rows=rows)
+    made = table("powers in W", "component", "from outside>.6g", "lost>.6g", rows=rows)
     parts: list[RenderableType] = [f"[bold]{escape(model.name)}[/]  steady state", "", made]
     if np.isfinite(point.efficiency):
         parts.append(f"Efficiency {100 * point.efficiency:.4g} %.")
@@ -47,19 +46,19 @@ def point_report(point: OperatingPoint, names: Sequence[str] = ()) -> Renderable
     return Group(*parts, "", _values(point, names or model.states))
 
 
-def _values(point: OperatingPoint, names: Sequence[str]) -> Table:
+def _values(point: OperatingPoint, names: Sequence[str]) -> Listed:
     units = {one.path: str(one.unit) for one in (*point.model.flat_variables, *point.model.flat_parameters)}
-    rows = ((name, f"{point[name]:.8g}", units.get(name, "")) for name in names)
-    return table("values", "name", "value>", "unit", rows=rows)
+    rows = ((name, point[name], units.get(name, "")) for name in names)
+    return table("values", "name", "value>.8g", "unit", rows=rows)
 
 
-def curves_report(curves: Curves, names: Sequence[str] = ()) -> Table:
+def curves_report(curves: Curves, names: Sequence[str] = ()) -> Listed:
     """Return a characteristic curve, one row per operating point."""
     columns = [curves.over, *(name for name in names if name != curves.over), "efficiency"]
     columns = list(dict.fromkeys(columns))
-    titles = [f"{name} in {curves.unit(name)}>" if curves.unit(name) != "1" else f"{name}>" for name in columns]
-    rows = ([f"{value:.6g}" for value in row] for row in zip(*(curves[name] for name in columns), strict=True))
-    return table(curves.points[0].model.name, *titles, rows=rows)
+    titles = [f"{name}{'' if (unit := curves.unit(name)) == '1' else f' in {unit}'}>.6g" for name in columns]
+    rows = zip(*(map(float, curves[name]) for name in columns), strict=True)
+    return table(curves.points[0].model.name, *titles, rows=rows, name="curve")
 
 
 def modes_report(modes: Modes) -> RenderableType:
@@ -67,9 +66,9 @@ def modes_report(modes: Modes) -> RenderableType:
     linear = modes.linear
     head = f"[bold]{escape(linear.model.name)}[/]  {len(linear.states)} states at t = {linear.time:g} s"
     made = table(
-        "modes", ">", "eigenvalue in rad/s>", "frequency in Hz>", "damping>", "time constant in s>", "energy in",
-        "lost in",
-        rows=[(str(k), *_numbers(mode), shares(mode.stored), shares(mode.lost)) for k, mode in enumerate(modes, 1)],
+        "modes", "mode>", "eigenvalue in rad/s>.5g", "frequency in Hz>.4g", "damping>.3g", "time constant in s>.3g",
+        "energy in", "lost in",
+        rows=[(k, *_numbers(mode), _shares(mode.stored), _shares(mode.lost)) for k, mode in enumerate(modes, 1)],
     )  # fmt: skip
     parts: list[RenderableType] = [head, "", made]
     if linear.held:
@@ -77,12 +76,16 @@ def modes_report(modes: Modes) -> RenderableType:
     return Group(*parts)
 
 
-def _numbers(mode: Mode) -> tuple[str, str, str, str]:
-    value = mode.eigenvalue
+def _numbers(mode: Mode) -> tuple[Any, ...]:
+    value, nothing = mode.eigenvalue, Shown("", None)
     if mode.oscillates:
         text = f"{value.real:.5g} ± {value.imag:.5g}j"
-        return text, f"{mode.frequency:.4g}", f"{mode.damping:.3g}", f"{mode.time_constant:.3g}"
-    return f"{value.real:.5g}", "", "", f"{mode.time_constant:.3g}" if value else ""
+        return Shown(text, [value.real, value.imag]), mode.frequency, mode.damping, mode.time_constant
+    return Shown(f"{value.real:.5g}", [value.real, 0.0]), nothing, nothing, mode.time_constant if value else nothing
+
+
+def _shares(found: dict[str, float]) -> Shown:
+    return Shown(shares(found), found)
 
 
 def shares(found: dict[str, float]) -> str:
@@ -95,8 +98,14 @@ def sensitivity_report(result: Sensitivities) -> RenderableType:
     """Return one ranking table per output, the most important parameters first."""
     parts: list[RenderableType] = []
     for output in result.outputs:
-        title, rows = result.table(output.name)
-        parts += [table(title, *COLUMNS, rows=rows, most=SHOWN), ""]
+        title, texts = result.table(output.name)
+        rows = (
+            (name, Shown(value, one.value), unit, Shown(text, derivative), Shown(per_cent, relative))
+            for (name, value, unit, text, per_cent), (one, derivative, relative) in zip(
+                texts, result.ranking(output.name), strict=True
+            )
+        )
+        parts += [table(title, *COLUMNS, rows=rows, name=output.name, most=SHOWN), ""]
     parts += [
         f"{escape(name)}: {rows.shape[0]} times, see Sensitivities.series" for name, rows in result.series.items()
     ]
@@ -110,16 +119,16 @@ def sweep_report(found: xarray.Dataset) -> RenderableType:
     names = [str(name) for name in found.data_vars if name != "failure"]
     told = found["failure"].to_numpy().ravel()
     failed = int(np.sum(told != ""))
-    rows: list[tuple[str, ...]] = []
+    rows: list[tuple[Any, ...]] = []
     for name in names:
         values = found[name]
         if not np.any(np.isfinite(values.to_numpy())):
             rows.append((name, values.attrs["units"], "none"))
             continue
         low, high = values.argmin(...), values.argmax(...)
-        smallest, largest = (f"{value.item():.6g}" for value in (values.min(), values.max()))
+        smallest, largest = float(values.min()), float(values.max())
         rows.append((name, values.attrs["units"], smallest, _where(found, low), largest, _where(found, high)))
-    made = table("extremes", "output", "unit", "smallest>", "at", "largest>", "at", rows=rows)
+    made = table("extremes", "output", "unit", "smallest>.6g", "smallest at", "largest>.6g", "largest at", rows=rows)
     parts: list[RenderableType] = [f"[bold]{escape(found.attrs['model'])}[/]  {told.size} runs", "", made]
     if failed:
         parts.append(f"{failed} runs failed:")
@@ -129,6 +138,7 @@ def sweep_report(found: xarray.Dataset) -> RenderableType:
     return Group(*parts)
 
 
-def _where(found: xarray.Dataset, place: Mapping[Any, xarray.DataArray]) -> str:
+def _where(found: xarray.Dataset, place: Mapping[Any, xarray.DataArray]) -> Shown:
     point = found.isel({str(key): value.item() for key, value in place.items()})
-    return ", ".join(f"{name} = {point[name].item():.6g}" for name in point.coords)
+    values = {str(name): point[name].item() for name in point.coords}
+    return Shown(", ".join(f"{name} = {value:.6g}" for name, value in values.items()), values)

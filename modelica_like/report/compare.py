@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from rich.console import Group, RenderableType
-from rich.table import Table
 
 from modelica_like.report.sources import trajectories
-from modelica_like.report.types import table
+from modelica_like.report.tables import Listed, Shown, table
 from modelica_like.solve.curves import Curves, compare_solutions
 from modelica_like.solve.trajectories import Trajectories
 
@@ -67,25 +67,21 @@ def comparison_report(comparison: Comparison) -> RenderableType:
     return Group(*parts)
 
 
-def _deviation_table(comparison: Comparison) -> Table:
+def _deviation_table(comparison: Comparison) -> Listed:
     rows = [
-        (
-            row.signal,
-            f"{row.largest:.3e}",
-            "" if row.unit == "1" else row.unit,
-            f"{row.relative:.1e}",
-            f"{row.time:.6g}",
-        )
+        (row.signal, float(row.largest), "" if row.unit == "1" else row.unit, float(row.relative), float(row.time))
         for row in comparison.deviations
     ]
-    columns = "signal", "largest deviation>", "", "of the range>", "at time in s>"
-    return table(" and ".join(comparison.labels), *columns, rows=rows, most=_SHOWN, rest=", that deviate less")
+    return table(
+        " and ".join(comparison.labels), "signal", "largest deviation>.3e", "unit", "of the range>.1e",
+        "at time in s>.6g", rows=rows, name="deviations", most=_SHOWN, rest=", that deviate less",
+    )  # fmt: skip
 
 
-def _event_table(comparison: Comparison) -> Table:
-    rows: list[tuple[str, ...]] = []
+def _event_table(comparison: Comparison) -> Listed:
+    rows: list[tuple[Any, ...]] = []
     for event in comparison.events:
-        times = ("never" if t is None else f"{t:.9g}" for t in (event.first, event.second))
-        rows.append((event.mode, event.after, *times, "" if event.difference is None else f"{event.difference:.1e}"))
-    columns = "mode", "to", "first at s>", "second at s>", "difference in s>"
+        times = (Shown("never", None) if t is None else float(t) for t in (event.first, event.second))
+        rows.append((event.mode, event.after, *times, Shown("", None) if (d := event.difference) is None else float(d)))
+    columns = "mode", "to", "first at s>.9g", "second at s>.9g", "difference in s>.1e"
     return table("events", *columns, rows=rows, most=_SHOWN)

@@ -54,7 +54,7 @@ def declared(kind: type[Component], notation: Notation) -> list[Listing]:
     code, text = notation.code, notation.text
     made = [
         filled(
-            "connectors", ("name", "type", "potential, flow", "", "description"),
+            "connectors", ("name", "type", "potential, flow", "may be", "description"),
             (_connector_row(name, connector, notation) for name, connector in kind._class_connectors.items()),
         )
     ]  # fmt: skip
@@ -70,10 +70,10 @@ def declared(kind: type[Component], notation: Notation) -> list[Listing]:
     )
     made.append(filled("structure", ("name", "default", "description"), structure))
     modes = (
-        (code(name), ", ".join(mode.names), mode.start, text(mode.description))
+        (code(name), ", ".join(f"{one} ({k})" for k, one in enumerate(mode.names)), mode.start, text(mode.description))
         for name, mode in kind._class_modes.items()
     )
-    made.append(filled("modes", ("name", "one of", "start", "description"), modes))
+    made.append(filled("modes", ("name", "one of (number)", "start", "description"), modes))
     return [one for one in made if one.rows]
 
 
@@ -87,7 +87,7 @@ def _sort_of(field: Field) -> type[Field]:
 
 
 def _connector_row(name: str, connector: Connector, notation: Notation) -> tuple[str, ...]:
-    free = "optional" if connector.optional else "may be free" if connector.may_be_free else ""
+    free = "optional" if connector.optional else "free" if connector.may_be_free else ""
     flows = ", ".join(notation.flow(f"{name}.{one.name}", one.unit_text) for one in connector.fields.values())
     return notation.code(name), type(connector).__name__, flows, free, notation.text(connector.description)
 

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich.console import Group, RenderableType
 from rich.markup import escape
-from rich.table import Table
 
 from modelica_like.language.transition import NAME_IN_NOTICE
-from modelica_like.report.types import table
+from modelica_like.report.tables import Listed, Shown, table
 from modelica_like.solve.display import Display
 from modelica_like.solve.signals import evaluated, read_signals
 from modelica_like.solve.trajectories import Trajectories
@@ -52,37 +51,33 @@ def _head(solution: Trajectories, notices: Iterable[str], *, debug: bool = False
     return parts + [f"[bold]{escape(notice)}[/]" for notice in notices]
 
 
-def events_table(solution: Trajectories, *, debug: bool = False) -> Table:
+def events_table(solution: Trajectories, *, debug: bool = False) -> Listed:
     """Return the mode changes; of many only the first and the last. `debug` shows the lines of their transitions."""
     columns = 6 if debug else 5
     told = reasons(solution)
     rows = [
-        (f"{one.time:.9g}", one.mode, one.before, one.after, why, f"{one.source}".partition(" `")[0])[:columns]
+        (float(one.time), one.mode, one.before, one.after, why, f"{one.source}".partition(" `")[0])[:columns]
         for one, why in zip(solution.events, told, strict=True)
     ]
-    if len(rows) > _SHOWN:
-        rows[_SHOWN // 2 : -_SHOWN // 2] = [("…", *[""] * (len(rows[0]) - 1))]
-    heads = ("time in s>", "mode", "from", "to", "because", "declared in")[:columns]
-    return table(_mode_changes(len(solution.events)), *heads, rows=rows)
+    heads = ("time in s>.9g", "mode", "from", "to", "because", "declared in")[:columns]
+    return table(_mode_changes(len(solution.events)), *heads, rows=rows, name="events", most=_SHOWN, ends=True)
 
 
-def values_table(solution: Trajectories, words: Sequence[str], display: Mapping[str, str] | None = None) -> Table:
+def values_table(solution: Trajectories, words: Sequence[str], display: Mapping[str, str] | None = None) -> Listed:
     """Return first and last value and extremes of what names, patterns and formulas stand for.
 
     Raises:
         UnknownName: nothing matches.
     """
     shown, signals = Display(solution.model, display), read_signals(solution.model, words)
-    values, rows = evaluated(solution, signals), list[tuple[str, ...]]()
+    values, rows = evaluated(solution, signals), list[tuple[Any, ...]]()
     for one in signals:
         unit = one.shown_in(shown)
         curve = shown.converted(values[one.name], one.unit, unit)
-        told = [f"{curve[k]:.6g}" for k in (0, -1)]
-        for k in (np.argmin(curve), np.argmax(curve)):
-            told += [f"{curve[k]:.6g}", f"{solution.time[k]:.6g}"]
-        rows.append((one.name, "" if unit in ("1", "*") else unit, *told))
-    heads = "name", "unit", "first>", "last>", "smallest>", "at s>", "largest>", "at s>"
-    return table("values", *heads, rows=rows, most=_SHOWN, rest=", which --csv writes")
+        told = [float(value[k]) for k in (np.argmin(curve), np.argmax(curve)) for value in (curve, solution.time)]
+        rows.append((one.name, "" if unit in ("1", "*") else unit, float(curve[0]), float(curve[-1]), *told))
+    heads = "first>.6g", "last>.6g", "smallest>.6g", "smallest at s>.6g", "largest>.6g", "largest at s>.6g"
+    return table("values", "name", "unit", *heads, rows=rows, most=_SHOWN, rest=", which --csv writes")
 
 
 def reasons(solution: Trajectories) -> list[str]:
@@ -113,7 +108,7 @@ def notices(solution: Trajectories) -> list[str]:
     return [*solution.notices, *told.values()]
 
 
-def energy_table(solution: Trajectories, display: Mapping[str, str] | None = None) -> Table:
+def energy_table(solution: Trajectories, display: Mapping[str, str] | None = None) -> Listed:
     """Return the energy balance; of many components only those with the largest exchange."""
     balance = solution.energy()
     # Without impacts there is no column for them.
@@ -128,15 +123,15 @@ def energy_table(solution: Trajectories, display: Mapping[str, str] | None = Non
         for row in balance
     }
     active = [name for name, values in rows.items() if any(values)]
-    largest = set(sorted(active, key=lambda name: max(map(abs, rows[name])), reverse=True)[:_SHOWN])
-    shown = [(name or solution.model.name, *map(_energy, rows[name])) for name in active if name in largest]
-    shown += [(f"… {len(active) - _SHOWN} more",)] if len(active) > _SHOWN else []
-    made = table(f"energy balance in {unit}", *columns, rows=shown)
-    made.add_section()
-    totals = [balance.source, balance.stored, balance.lost]
-    totals += [sum(row.impact for row in balance)] if collides else []
-    made.add_row("total", "", *(_energy(value / size) for value in totals), style="bold")
-    return made
+    largest = sorted(active, key=lambda name: max(map(abs, rows[name])), reverse=True)
+    # Those shown keep the order of the drive, and stand before those that are not.
+    active = [one for some in (largest[:_SHOWN], largest[_SHOWN:]) for one in active if one in some]
+    totals = [balance.source, balance.stored, balance.lost, *[sum(row.impact for row in balance)][: int(collides)]]
+    return table(
+        f"energy balance in {unit}", *columns, most=_SHOWN,
+        rows=[(name or solution.model.name, *map(_energy, rows[name])) for name in active],
+        total=("total", Shown("", None), *(_energy(value / size) for value in totals)),
+    )  # fmt: skip
 
 
 def closure_line(solution: Trajectories) -> str:
@@ -145,8 +140,8 @@ def closure_line(solution: Trajectories) -> str:
     return f"The energy balance closes to {balance.closure:.1e} of {balance.throughput:.6g} J."
 
 
-def _energy(value: float) -> str:
-    return f"{value:.4f}" if abs(value) < 1e7 else f"{value:.6g}"
+def _energy(value: float) -> Shown:
+    return Shown(f"{value:.4f}" if abs(value) < 1e7 else f"{value:.6g}", float(value))
 
 
 def statistics_line(solution: Trajectories) -> str:
@@ -171,14 +166,15 @@ def cosimulation_report(solution: CosimSolution) -> RenderableType:
     return Group(*parts)
 
 
-def couplings_table(solution: CosimSolution) -> Table:
+def couplings_table(solution: CosimSolution) -> Listed:
     """Return the energies at the couplings; the difference of sent and received energy is lost in the coupling."""
     rows = [
-        (one.name, f"{one.throughput:.6g}", f"{one.residual:.3g}",
-         f"{one.residual / one.throughput:.1e}" if one.throughput else "", f"{one.mismatch:.3g}")
+        (one.name, float(one.throughput), float(one.residual),
+         float(one.residual / one.throughput) if one.throughput else Shown("", None), float(one.mismatch))
         for one in solution.couplings
     ]  # fmt: skip
-    return table("energy at the couplings in J", "coupling", "through>", "created>", "share>", "mismatch>", rows=rows)
+    heads = "coupling", "through>.6g", "created>.3g", "share>.1e", "mismatch>.3g"
+    return table("energy at the couplings in J", *heads, rows=rows)
 
 
 def steps_line(solution: CosimSolution) -> str:

@@ -1,4 +1,4 @@
-"""Output of `check --start`: the start values with their origin."""
+"""Output of `check --start-values`: the start values with their origin."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from modelica_like.compile import CompiledDae
 from modelica_like.initialize import Point, StartKind, StartPlan, call, initialize, start_plan
 from modelica_like.initialize.plan import matrix_and_values, start_name
 from modelica_like.language import Component
-from modelica_like.report.types import table
+from modelica_like.report.tables import table
 
 _AT_ONCE = 64
 _NOTHING = 1e-9
@@ -34,8 +34,10 @@ class StartValueRow:
 def start_report(drive: Component, model: CompiledDae) -> RenderableType:
     """Return the start values of a model as a table."""
     kind: StartKind = model.settings.get("start", "given")
-    rows = ((row.path, f"{row.value:.9g}", row.unit, row.origin) for row in start_values(drive, model, kind))
-    return table(f"start values ({kind})", "variable", "value>", "unit", "where from", rows=rows)
+    rows = ((row.path, float(row.value), row.unit, row.origin) for row in start_values(drive, model, kind))
+    return table(
+        f"start values ({kind})", "variable", "value>.9g", "unit", "where from", rows=rows, name="start values"
+    )
 
 
 def start_values(drive: Component, model: CompiledDae, kind: StartKind = "given") -> list[StartValueRow]:

@@ -7,11 +7,10 @@ from collections.abc import Iterable
 
 from rich.console import Group, RenderableType
 from rich.markup import escape
-from rich.table import Table
 
 from modelica_like.flatten import FlatModel, flatten
 from modelica_like.language import Component, Expr
-from modelica_like.report.types import table
+from modelica_like.report.tables import Listed, table
 from modelica_like.structure import ReducedDae, reduce
 
 _SHOWN = 12
@@ -26,7 +25,7 @@ def structure_report(component: Component) -> RenderableType:
     return Group(*parts)
 
 
-def _sizes(flat: FlatModel, reduced: ReducedDae) -> Table:
+def _sizes(flat: FlatModel, reduced: ReducedDae) -> Listed:
     kinds = Counter(type(component).__name__ for component in flat.components.values() if not component.parts)
     equations = len(flat.linear) + len(flat.general)
     modes = [discrete.path for discrete in flat.discretes if discrete.names]
@@ -47,8 +46,7 @@ def _sizes(flat: FlatModel, reduced: ReducedDae) -> Table:
         ("index", reduced.index, ""),
         ("blocks", len(reduced.blocks), _block_sizes(reduced)),
     ]
-    rows = ((what, str(number), which) for what, number, which in sizes)
-    return table(f"{flat.name} can be simulated", "what", "number>", "which", rows=rows)
+    return table(f"{flat.name} can be simulated", "what", "number>", "which", rows=sizes, name="sizes")
 
 
 def listed(names: Iterable[str]) -> str:
@@ -63,7 +61,7 @@ def _block_sizes(reduced: ReducedDae) -> str:
     return ", ".join(f"{count} of size {size} ({kind})" for (size, kind), count in sorted(kinds.items()))
 
 
-def _energy(flat: FlatModel) -> Table:
+def _energy(flat: FlatModel) -> Listed:
     terms = (("stored", "stored_energy"), ("dissipated", "loss_power"), ("from outside", "source_power"))
     rows: list[tuple[str, str]] = []
     for what, term in terms:

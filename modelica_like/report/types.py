@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
+import ast
 import inspect
-import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 from rich.console import Group, RenderableType
-from rich.markup import escape
 from rich.padding import Padding
-from rich.table import Table
 from rich.text import Text
 
-from modelica_like.errors import ModelicaLikeError
-from modelica_like.language import Component
-from modelica_like.language.places import located
-from modelica_like.report.declared import Listing, Notation, declared
+from modelica_like.errors import UnknownName, did_you_mean
+from modelica_like.language import Assembly, Component, Parameter
+from modelica_like.report.component_pages.source import Source
+from modelica_like.report.declared import Notation, declared, filled
+from modelica_like.report.statements import statements
+from modelica_like.report.tables import Lines, Listed, table
 
 _TERMINAL = Notation(
     code=str,
@@ -26,85 +26,87 @@ _TERMINAL = Notation(
 )
 
 
-def table(
-    title: str, *columns: str, rows: Iterable[Sequence[str | Text]] = (), most: int = 10**9, rest: str = ""
-) -> Table:
-    """Return a table in the style of all reports.
-
-    Args:
-        title: above it.
-        columns: headings; a trailing `>` marks numbers (right-aligned), `*` bold text.
-        rows: cells without markup; there may be fewer than columns.
-        most: largest number of rows; a last one then gives the number of others.
-        rest: text after this number.
-    """
-    made = Table(
-        title=escape(title), title_justify="left", title_style="bold", box=None, pad_edge=False, header_style="dim"
-    )
-    for column in columns:
-        justify = "right" if column.endswith(">") else "left"
-        made.add_column(Text(column.rstrip(">*")), justify=justify, style="bold" if column.endswith("*") else "")
-    known = list(rows)
-    for row in known[:most]:
-        made.add_row(*map(Text.assemble, row))
-    if len(known) > most:
-        made.add_row(f"… {len(known) - most} more{rest}")
-    return made
-
-
 def summary(kind: type[Component]) -> str:
     """Return the first sentence of a type's docstring."""
     return inspect.cleandoc(kind.__doc__ or "").partition("\n")[0]
 
 
-def library_table(types: Mapping[str, type[Component]]) -> Table:
-    """Return all component types with their first sentence, sorted by module."""
-    known = sorted(types.items(), key=lambda item: (item[1].__module__, item[0]))
-    rows = ((name, kind.__module__.rpartition(".")[2], summary(kind)) for name, kind in known)
-    made = table(f"{len(types)} component types", "type*", "module", "what it is", rows=rows)
+def library_table(types: Mapping[str, type[Component]], words: Sequence[str] = (), group: str | None = None) -> Listed:
+    """Return component types with their first sentence, sorted by module.
+
+    Args:
+        types: by name.
+        words: that the name or the text of a type must have, in any case of letters.
+        group: name of a module; all by default.
+
+    Raises:
+        UnknownName: there is no such group, or no such type.
+    """
+    groups = {name: kind.__module__.rpartition(".")[2] for name, kind in types.items()}
+    if group is not None and group not in groups.values():
+        known = sorted(set(groups.values()))
+        raise UnknownName(
+            f"There is no group '{group}'{did_you_mean(group, known) or '.'}", advice=f"There are {', '.join(known)}."
+        )
+    chosen = sorted((groups[name], name) for name, kind in types.items() if group in (None, groups[name])
+                    and all(word.lower() in f"{name} {kind.__doc__}".lower() for word in words))  # fmt: skip
+    if not chosen:
+        raise UnknownName(f"No component type has {' and '.join(map(repr, words))} in its text.")
+    rows = ((name, home, summary(types[name])) for home, name in chosen)
+    made = table(f"{len(chosen)} component types", "type*", "group", "what it is", rows=rows, name="types")
     # One line per type, so that the list can be searched; `describe` has the whole text.
     for column in made.columns:
         column.no_wrap = True
-        column.min_width = max(map(len, types), default=0) if column is made.columns[0] else None
+        column.min_width = max(len(name) for _, name in chosen) if column is made.columns[0] else None
     return made
 
 
 def describe(kind: type[Component]) -> RenderableType:
-    """Return a page about one component type: text, declarations, equations and events."""
+    """Return a page about one component type: text, declarations, parts, equations, events and energies."""
     text = inspect.cleandoc(kind.__doc__ or "")
     bases = [base.__name__ for base in kind.__mro__[1:] if issubclass(base, Component) and base is not Component]
     heading = Text.assemble((kind.__name__, "bold"), f"  {kind.__module__}", f"  ({', '.join(bases)})" if bases else "")
     tables = declared(kind, _TERMINAL)
-    if kind._class_parts:
-        tables.append(Listing("parts", ("name", "type", ""), [_part_row(kind, name) for name in kind._class_parts]))
+    parts = [row for name in kind._class_parts for row in _part_rows(kind, name)]
+    tables += [filled("parts", ("name", "type", "values", "description"), parts)] if parts else []
     made = [table(title, f"{first}*", *others, rows=rows) for title, (first, *others), rows in tables]
-    sections: list[RenderableType] = [heading, Text(text), *made, _statements(kind)]
+    lists = [Lines(title, lines) for title, lines in _lines(kind).items()]
+    sections: list[RenderableType] = [heading, Text(text), *made, *lists]
     return Group(*(Padding(section, (0, 0, 1, 0), expand=False) for section in sections))
 
 
-def _part_row(kind: type[Component], name: str) -> tuple[str, ...]:
+def describe_netlist(drive: Assembly) -> RenderableType:
+    """Return a page about a netlist: its parameters, all parts of it and of its assemblies, and its connections."""
+    own = (name for name, field in drive.fields.items() if isinstance(field, Parameter))
+    parameters = [(name, str(value.given)) for name in own if (value := drive.value(name)) is not None]
+    inner = [part for part in drive.walk() if part is not drive]
+    parts = ((part.path, type(part).__name__, _given(part), summary(type(part))) for part in inner)
+    joined = {**{name: " - ".join(ends) for name, ends in drive.chains.items()},
+              **{name: " = ".join(ends) for name, ends in drive.wires.items()}}  # fmt: skip
+    sections: list[RenderableType] = [
+        Text.assemble((drive._name, "bold"), f"  {drive._description}"),
+        *([table("parameters", "name*", "value", rows=parameters)] if parameters else []),
+        table("parts", "name*", "type", "values", "what it is", rows=parts),
+        Lines("connections", [f"{name}: {ends}" for name, ends in joined.items()]),
+        *([Lines("outer connectors", [" = ".join(pair) for pair in drive.exposed])] if drive.exposed else []),
+    ]
+    return Group(*(Padding(section, (0, 0, 1, 0), expand=False) for section in sections))
+
+
+def _part_rows(kind: type[Component], name: str) -> list[tuple[str, ...]]:
     part = kind._class_parts[name]
-    what = f"{len(part)} {type(part[0]).__name__}" if isinstance(part, list) else type(part).__name__
-    return name, what, "replaceable" if name in kind._replaceable else ""
+    which = "replaceable" if name in kind._replaceable else ""
+    if isinstance(part, list):
+        return [(f"{name}[{k}]", type(one).__name__, _given(one), which) for k, one in enumerate(part, 1)]
+    return [(name, type(part).__name__, _given(part), which)]
 
 
-def _statements(kind: type[Component]) -> RenderableType:
-    try:
-        component = kind()
-        equations = [source.text for _, source in located(component.equations())]
-        events = [source.text for _, source in located(component.events())]
-    except ModelicaLikeError as error:
-        return Text(f"equations depend on structural values: {error.what}", style="dim")
-    lines = Text()
-    for title, texts in (("equations", equations), ("events", events)):
-        if texts:
-            lines.append(f"{title}\n", style="bold").append("".join(f"  {_plain(text)}\n" for text in texts))
-    return lines
+def _given(part: Component) -> str:
+    return ", ".join(f"{name} = {value.given}" for name, value in part._values.items())
 
 
-def _plain(text: str) -> str:
-    text = text.removeprefix("yield from ").removeprefix("yield ").replace("self.", "")
-    if text.startswith("( ") and text.endswith(" )"):
-        text = text[2:-2]
-    # Join broken lines.
-    return re.sub(r",? \)", ")", text.replace("( ", "("))
+def _lines(kind: type[Component]) -> dict[str, list[str]]:
+    """Return statements by title, and how the class makes parts that depend on its fields."""
+    build = Source(kind).method("build")
+    code = [] if build is None else ast.unparse(build.code).replace("self.", "").splitlines()
+    return {"built of": code[1:], **statements(kind)} if code else statements(kind)

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from rich.table import Table
 from rich.text import Text
 
 from modelica_like.fmi.validate import FAILED, PASSED, Validation
-from modelica_like.report.types import table
+from modelica_like.report.tables import Listed, table
 
 _STYLES = {PASSED: "green", FAILED: "bold red"}
 
 
-def validation_table(validation: Validation) -> Table:
+def validation_table(validation: Validation) -> Listed:
     """Return one row per check."""
     rows = (
         (check.name, Text(check.verdict, _STYLES.get(check.verdict, "dim")), check.sentence)
         for check in validation.checks
     )
-    return table(validation.fmu, "check", "verdict", "", rows=rows)
+    return table(validation.fmu, "check", "verdict", "because", rows=rows, name="checks")

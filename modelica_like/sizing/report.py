@@ -9,11 +9,10 @@ from typing import Any, get_args, get_origin
 
 from rich.console import Group, RenderableType
 from rich.markup import escape
-from rich.table import Table
 from rich.text import Text
 
 from modelica_like.language.results import Line, beside, titled
-from modelica_like.report.types import table
+from modelica_like.report.tables import Listed, table
 from modelica_like.sizing.checks import (
     Argument,
     Check,
@@ -51,7 +50,9 @@ def _check_tables(check: CheckedResult) -> Iterator[RenderableType]:
         yield f"[dim]{escape(check.note)}[/]"
     for title, rows in check.result.tables().items():
         yield ""
-        yield _rows(title, rows)
+        made = _rows(title, rows)
+        made.name = f"{check.name}: {title}"
+        yield made
 
 
 def _published(check: CheckedResult, line: str) -> list[str]:
@@ -66,7 +67,7 @@ def _as_shown(result: Any, line: str, value: float) -> str:
     return next(other.value for other in changed.lines() if other.name == line)
 
 
-def _rows(title: str, rows: tuple[Any, ...]) -> Table:
+def _rows(title: str, rows: tuple[Any, ...]) -> Listed:
     """Return results of one kind as rows, or as columns if they have many lines."""
     lines = [row.lines() for row in rows]
     if len(lines[0]) > _WIDE and len(rows) <= _WIDE:
@@ -75,7 +76,7 @@ def _rows(title: str, rows: tuple[Any, ...]) -> Table:
     return table(title, first, *(f"{name}>" for name in others), rows=([line.value for line in each] for each in lines))
 
 
-def _side_by_side(heading: str, corner: str, columns: Mapping[str, Sequence[Line]]) -> Table:
+def _side_by_side(heading: str, corner: str, columns: Mapping[str, Sequence[Line]]) -> Listed:
     titles = f"{corner}*", *(f"{name}>" for name in columns), "unit", "what it is"
     return table(heading, *titles, rows=beside(columns.values()))
 
@@ -94,28 +95,29 @@ def checks_report(name: str = "") -> RenderableType:
     return check_page(name, find_check(name)) if name else checks_table(design_checks())
 
 
-def checks_table(checks: Mapping[str, Check]) -> Table:
+def checks_table(checks: Mapping[str, Check]) -> Listed:
     """Return all design checks with their first sentence."""
     rows = (
         (name, check.__module__.rpartition(".")[2], inspect.cleandoc(check.__doc__ or "").partition("\n")[0])
         for name, check in sorted(checks.items(), key=lambda item: (item[1].__module__, item[0]))
     )
-    return table(f"{len(checks)} design checks", "check*", "module", "what it does", rows=rows)
+    return table(f"{len(checks)} design checks", "check*", "module", "what it does", rows=rows, name="design checks")
 
 
 def check_page(name: str, check: Check) -> RenderableType:
     """Return a page about one design check: text and arguments."""
     text = inspect.cleandoc(check.__doc__ or "").partition("\nArgs:")[0].rstrip()
-    meanings = dict(_meanings(inspect.cleandoc(check.__doc__ or "")))
+    described = dict(meanings(inspect.cleandoc(check.__doc__ or "")))
     rows = (
-        (one.name, _kind(one), "" if one.required else str(one.default), meanings.get(one.name, ""))
+        (one.name, _kind(one), "" if one.required else str(one.default), described.get(one.name, ""))
         for one in arguments_of(check).values()
     )
-    made = table("arguments", "name*", "unit", "default", "", rows=rows)
+    made = table("arguments", "name*", "unit", "default", "meaning", rows=rows)
     return Group(f"[bold]{name}[/]", escape(text), "", made)
 
 
-def _meanings(text: str) -> Iterator[tuple[str, str]]:
+def meanings(text: str) -> Iterator[tuple[str, str]]:
+    """Yield the arguments that a docstring describes, with their descriptions."""
     inside = False
     for line in text.splitlines():
         if line.startswith("    ") and inside:

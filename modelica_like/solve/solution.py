@@ -10,7 +10,7 @@ import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import UnknownName, did_you_mean
-from modelica_like.initialize import Impact, Point
+from modelica_like.initialize import Impact, Point, StartKind
 from modelica_like.solve.energy import EnergyBalance, energy_balance
 from modelica_like.solve.idas import Integrator
 from modelica_like.solve.options import Options
@@ -32,6 +32,7 @@ class Solution(Trajectories):
         statistics: of the run.
         impacts: losses in impacts.
         notices: messages about the run.
+        start: kind of its start.
     """
 
     model: CompiledDae
@@ -41,6 +42,7 @@ class Solution(Trajectories):
     statistics: Statistics
     impacts: tuple[Impact, ...] = ()
     notices: tuple[str, ...] = ()
+    start: StartKind = "given"
     _cache: dict[Any, Any] = field(default_factory=dict, repr=False)
 
     @property

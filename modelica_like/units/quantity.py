@@ -51,7 +51,7 @@ def to_si(value: object, unit: Unit, name: str) -> float:
     number, given = _quantity(value, unit, name)
     if not same_dimension(given, unit):
         raise UnitError(f"{name} expects {unit}; '{value}' is {coherent(given)}.")
-    if _counts_turns(given, unit):
+    if counts_turns(given, unit):
         raise UnitError(f"{name} expects {unit}; '{value}' does not say whether it counts turns or radians.",
                         advice="Write rpm or rad/s for a speed, Hz for a frequency.")  # fmt: skip
     result = number * given.factor + given.offset
@@ -60,8 +60,8 @@ def to_si(value: object, unit: Unit, name: str) -> float:
     return result
 
 
-def _counts_turns(given: Unit, unit: Unit) -> bool:
-    """50 Hz, 6000 1/min and 314 rad/s have the same dimension, but a turn is 2 pi radians."""
+def counts_turns(given: Unit, unit: Unit) -> bool:
+    """Return whether one counts turns: 50 Hz and 314 rad/s have the same dimension, but a turn is 2 pi radians."""
     rate = tuple(-1 if name == "s" else 0 for name in BASE[:-1])
     if ANY in (given, unit) or given == unit or unit.dimension != rate:
         return False

@@ -38,7 +38,7 @@ def test_cosim_prints_the_energies_and_the_steps(parts: Path) -> None:
 
 
 def test_cosim_writes_a_table_and_a_picture(parts: Path, tmp_path: Path) -> None:
-    options = ["--tolerance", "1e-3", "--master", "gauss-seidel", "--until", "20ms", "--set", "motor.motor.tau=0"]
+    options = ["--rtol", "1e-3", "--master", "gauss-seidel", "--until", "20ms", "--set", "motor.motor.tau=0"]
     files = ["--csv", str(tmp_path / "run.csv"), "--units", "--plot", str(tmp_path / "run.svg"), "--show", "J*.w"]
     result = CliRunner().invoke(app, ["cosim", str(parts / "system.toml"), *options, *files])
     assert result.exit_code == 0, result.stderr

@@ -76,7 +76,7 @@ start = "rest"
 
 def test_check_tells_where_start_values_come_from(run: CliRunner, tmp_path: Path) -> None:
     (tmp_path / "drive.toml").write_text(STARTS)
-    result = run.invoke(app, ["check", "--start", str(tmp_path / "drive.toml")])
+    result = run.invoke(app, ["check", "--start-values", str(tmp_path / "drive.toml")])
     lines = result.stdout.partition("start values (rest)")[2].splitlines()[2:]
     assert [re.split(r"  +", line.strip()) for line in lines if line.strip()] == [
         ["a.phi", "3.14159265", "rad", "given in drive.toml:14"],
@@ -92,7 +92,7 @@ def test_check_tells_where_start_values_come_from(run: CliRunner, tmp_path: Path
 
 def test_check_tells_starts_that_are_missing(run: CliRunner, tmp_path: Path) -> None:
     (tmp_path / "drive.toml").write_text(STARTS.replace('start = "rest"', ""))
-    result = run.invoke(app, ["check", "--start", str(tmp_path / "drive.toml")])
+    result = run.invoke(app, ["check", "--start-values", str(tmp_path / "drive.toml")])
     assert result.exit_code == 2
     assert "Initialization (not the model) lacks" in result.output
 

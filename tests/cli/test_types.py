@@ -1,13 +1,22 @@
 """The commands about component types: describe, schema, library."""
 
 import json
+import re
+import tomllib
+from pathlib import Path
 
 import jsonschema
 import pytest
 from typer.testing import CliRunner
 
 from modelica_like.cli import app
-from modelica_like.netlist import library_types
+from modelica_like.errors import UnitError
+from modelica_like.netlist import library_types, load, schema
+from modelica_like.netlist.json_units import Quantities
+from modelica_like.report.component_pages.source import Source
+from modelica_like.report.statements import statements
+from modelica_like.sizing.json_schema import schema as sizing_schema
+from modelica_like.units import parse_unit, to_si
 
 
 @pytest.fixture
@@ -46,12 +55,69 @@ def test_equations_of_several_lines_are_told_in_one(run: CliRunner) -> None:
     assert "v == resistance(Ra) * ia + brush_voltage(ia) + v_core + series_voltage()" in lines
 
 
+@pytest.mark.parametrize("name", sorted(library_types()))
+def test_nothing_in_equations_is_left_undefined(name: str) -> None:
+    """Methods of the class that occur in a line are defined below it, and no line is Python about classes."""
+    source = Source(library_types()[name])
+    lines = [line.strip() for some in statements(source.kind).values() for line in some]
+    defined = {re.split(r"[(:= ]", line)[0] for line in lines}
+    for line in lines:
+        words = set(re.findall(r"(?<![\w.'])[A-Za-z_]\w*\b(?!=[^=])", line))
+        methods = {word for word in words if source.method(word)} - set(source.kind._class_fields)
+        assert methods <= defined, line
+        assert not re.search(r"\bself\.|\bsuper\(|\byield\b", line)
+
+
+def test_conditions_parts_and_codes_are_told(run: CliRunner) -> None:
+    def lines(name: str) -> list[str]:
+        return [line.rstrip() for line in run.invoke(app, ["describe", name]).stdout.splitlines()]
+
+    clutch = lines("Clutch")
+    assert "    heat_port.Q_flow == -heat()" in clutch
+    assert clutch[clutch.index("    heat_port.Q_flow == -heat()") - 1] == "  if heat_port.used:"
+    assert {"  dissipation() = friction * slip", "  slip = w_rel", "  friction = tau"} <= set(clutch)
+    assert "free (0), stuck (1), start_forward (2)" in "\n".join(clutch)
+    servo = library_types()["ServoMotor"]
+    begin = lines("ServoMotor").index("parts")
+    told = {line.split()[0]: line.split()[1] for line in lines("ServoMotor")[begin + 2 :][: len(servo._class_parts)]}
+    assert told == {name: type(part).__name__ for name, part in servo._class_parts.items()}
+
+
+def test_a_netlist_is_described_with_the_parts_of_its_assemblies(run: CliRunner) -> None:
+    file = Path(__file__).parents[2] / "examples" / "lepelletier.toml"
+    tables = json.loads(run.invoke(app, ["describe", str(file), "--json"]).stdout)["tables"]
+    drive = load(file)
+    assert [(row["name"], row["type"]) for row in tables["parts"]] == [
+        (part.path, type(part).__name__) for part in drive.walk() if part is not drive
+    ]
+    (clutch,) = (row for row in tables["parts"] if row["name"] == "box.clutch_a")
+    assert clutch["values"] == "capacity = 500 N.m"
+    assert "clutch_a: selector.a = box.pressure_a" in tables["connections"]
+    startup = run.invoke(app, ["describe", str(file.with_name("machine_tool_startup.toml"))]).stdout
+    assert re.search(r"^h1 +10 N.m.s/rad *$", startup, re.MULTILINE)
+
+
+@pytest.mark.parametrize("words", [["worm"], ["gear", "--group", "gears"], ["FRICTION", "clutch"]])
+def test_the_library_is_filtered(run: CliRunner, words: list[str]) -> None:
+    found = {line.split()[0] for line in run.invoke(app, ["library", *words]).stdout.splitlines()[2:]}
+    asked = [one.lower() for one in words if one not in ("--group", "gears")]
+    for name, kind in library_types().items():
+        wanted = all(one in f"{name} {kind.__doc__}".lower() for one in asked)
+        assert (name in found) is (wanted and ("--group" not in words or kind.__module__.endswith(".gears")))
+    assert found
+
+
+def test_a_group_or_a_word_that_is_not_there_is_told(run: CliRunner) -> None:
+    assert "There is no group 'gear'; did you mean 'gears'?" in run.invoke(app, ["library", "--group", "gear"]).stderr
+    assert "No component type has 'gearz' in its text." in run.invoke(app, ["library", "gearz"]).stderr
+
+
 def test_the_schema_is_a_schema(run: CliRunner) -> None:
     result = run.invoke(app, ["schema"])
     assert result.exit_code == 0
     schema = json.loads(result.stdout)
-    jsonschema.Draft202012Validator.check_schema(schema)
-    assert schema["$defs"]["Inertia"]["properties"]["J"]["anyOf"][0] == {"type": "number", "minimum": 0}
+    jsonschema.Draft7Validator.check_schema(schema)
+    assert schema["definitions"]["Inertia"]["properties"]["J"]["anyOf"][0] == {"type": "number", "minimum": 0}
 
 
 @pytest.mark.parametrize(
@@ -65,12 +131,81 @@ def test_the_schema_is_a_schema(run: CliRunner) -> None:
         ({"J": 1}, False),
         ({"is": "parts:Coupling", "anything": 1}, True),
         ({"is": "./gearbox.toml", "shaft": {"J": 2}}, True),
+        ({"is": "FMU", "file": "drive.fmu", "J.J": 2}, True),
+        ({"is": "Inertia", "J": "15 kg"}, False),
+        ({"is": "Inertia", "J": "15 kg.m"}, False),
+        ({"is": "Inertia", "J": "15 Nm"}, False),
+        ({"is": "Inertia", "J": "2*motor.J + 15 kg.cm2"}, True),
+        ({"is": "Inertia", "J": "3 lb.ft2", "w": "1500 rpm"}, True),
+        ({"is": "Inertia", "J": 1, "w": "50 Hz"}, False),
+        ({"is": "Clutch", "mu_pos": [["50 rpm", 0.1], ["1 N.m", 0.2]]}, False),
+        ({"is": "Clutch", "mode": "stuk"}, False),
     ],
 )
 def test_the_schema_knows_right_from_wrong(run: CliRunner, part: dict[str, object], is_right: bool) -> None:
     schema = json.loads(run.invoke(app, ["schema"]).stdout)
-    validator = jsonschema.Draft202012Validator(schema)
+    validator = jsonschema.Draft7Validator(schema)
     assert validator.is_valid({"parts": {"a": part}}) is is_right
+
+
+def test_a_quantity_passes_the_schema_if_and_only_if_a_netlist_takes_it() -> None:
+    """For the units of all declarations, against the units of all declarations."""
+    known = schema()["definitions"]
+    units = sorted(
+        {field.unit_text for kind in library_types().values() for field in kind._class_fields.values()} - {"*", "1"}
+    )
+    told = 0
+    for unit in units:
+        name = next(iter(Quantities(units).text(parse_unit(unit)).values()))
+        validator = jsonschema.Draft7Validator({"definitions": known, "$ref": name})
+        for other in units:
+            try:
+                to_si(f"2.5e-3 {other}", parse_unit(unit), "x")
+            except UnitError:
+                told += 1
+                assert not validator.is_valid(f"2.5e-3 {other}"), (unit, other)
+            else:
+                assert validator.is_valid(f"2.5e-3 {other}"), (unit, other)
+    assert told > 1000
+
+
+def test_every_entry_is_explained() -> None:
+    known = schema()
+    assert all("description" in one for one in known["properties"].values())
+    assert all(
+        "examples" in known["properties"][name] for name in ("parameters", "parts", "series", "connect", "start")
+    )
+    for name, kind in library_types().items():
+        properties = known["definitions"][name]["properties"]
+        for field in kind._class_fields.values():
+            if field.name in properties:
+                unit = "" if field.unit_text == "1" else f" [{field.unit_text}]"
+                assert properties[field.name]["description"] == field.description + unit
+
+
+def test_a_schema_is_written_to_a_file(run: CliRunner, tmp_path: Path) -> None:
+    for of, generate in (("netlist", schema), ("sizing", sizing_schema)):
+        file = tmp_path / f"{of}.json"
+        result = run.invoke(app, ["schema", of, "-o", str(file)])
+        assert f"#:schema ./{of}.json" in result.stdout
+        assert json.loads(file.read_text(encoding="utf-8")) == json.loads(json.dumps(generate()))
+
+
+@pytest.mark.parametrize("folder", ["sizing", "cosim"])
+def test_sizing_files_and_netlists_with_fmus_fit_their_schemas(folder: str) -> None:
+    validator = jsonschema.Draft7Validator(sizing_schema() if folder == "sizing" else schema())
+    files = sorted((Path(__file__).parents[2] / "examples" / folder).glob("*.toml"))
+    assert files
+    for file in files:
+        validator.validate(tomllib.loads(file.read_text(encoding="utf-8")))
+
+
+def test_a_sizing_file_with_a_wrong_unit_does_not_fit() -> None:
+    validator = jsonschema.Draft7Validator(sizing_schema())
+    heat = {"is": "clutch_heat", "work": "200 J", "heat_capacity": "90 J/K", "frequency": "300 1/h"}
+    assert validator.is_valid({"checks": {"heat": heat}})
+    assert not validator.is_valid({"checks": {"heat": heat | {"heat_capacity": "90 kg"}}})
+    assert not validator.is_valid({"checks": {"heat": heat | {"capacity": 3}}})
 
 
 def test_unknown_types_are_told_on_stderr(run: CliRunner) -> None:

@@ -50,7 +50,9 @@ def test_a_netlist_keeps_quantities(tmp_path: Path) -> None:
 
 def test_the_schema_knows_rows() -> None:
     known = schema()
-    rows = known["$defs"]["Clutch"]["properties"]["mu_pos"] | {"$schema": known["$schema"]}
+    rows = known["definitions"]["Clutch"]["properties"]["mu_pos"] | {
+        key: known[key] for key in ("$schema", "definitions")
+    }
     json.dumps(known)
     for right in ([[0, 0.1]], [["0 rad/s", 0.1], ["5 rad/s", "10 %"]]):
         jsonschema.validate(right, rows)

@@ -88,12 +88,12 @@ class Endless(Basis):
 
 
 class Follows(Basis):
-    copy: Discrete = integer("copy")
+    twin: Discrete = integer("twin")
 
     def equations(self) -> Equations:
         yield from super().equations()
         yield self.on == (self.x > 0.5)
-        yield self.copy == 2 * self.x  # follows
+        yield self.twin == 2 * self.x  # follows
 
 
 class Constant(Basis):
@@ -186,8 +186,8 @@ CASES: dict[type[Component], tuple[type[ModelicaLikeError], str]] = {
     ),
     Follows: (
         LanguageError,
-        "Follows: copy changes at events only, but its equation follows x all the time.\n"
-        f"  in {HERE}:{{follows}} `yield self.copy == 2 * self.x`\n"
+        "Follows: twin changes at events only, but its equation follows x all the time.\n"
+        f"  in {HERE}:{{follows}} `yield self.twin == 2 * self.x`\n"
         "Take the value in a `when`, or choose with if_(…): its relations make events.",
     ),
     Constant: (

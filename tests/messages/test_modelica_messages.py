@@ -170,7 +170,7 @@ NAMES = ("unknown parameter", "unknown name", "unknown variable of a part", "unk
 def test_every_refusal_has_its_sentence(case: str, tmp_path: Path, check_message) -> None:
     text, message = MESSAGES[case]
     (tmp_path / "a.mo").write_text(text)
-    kind = UnknownName if case in NAMES else ModelicaTextError
+    kind = (ModelicaTextError, UnknownName)[case in NAMES]
     check_message(kind, lambda: load(tmp_path / "a.mo"), message)
 
 

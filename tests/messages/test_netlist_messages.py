@@ -51,7 +51,8 @@ MESSAGES = {
         '[part]\na = { is = "Inertia" }\n',
         "A netlist has no entry 'part'; did you mean 'parts'? "
         "It has name, description, "
-        "parameters, parts, series, connect, start, guess, free, expose, simulate, display.\n  in bad.toml:1 `[part]`",
+        "parameters, parts, series, connect, start, guess, free, expose, simulate, display, sizing.\n"
+        "  in bad.toml:1 `[part]`",
     ),
     "no type": (
         "[parts]\na = { J = 1 }\n",

@@ -309,4 +309,4 @@ def test_brackets_in_paths_are_no_markup(grip: str, tmp_path: Path) -> None:
 
 def test_brackets_in_help_are_no_markup() -> None:
     text = " ".join(CliRunner().invoke(app, ["split", "--help"]).stdout.replace("│", " ").split())
-    assert "an entry of [connect]; several are possible" in text
+    assert "or a name in [connect]." in text

@@ -197,3 +197,11 @@ def test_what_no_netlist_can_hold_is_told() -> None:
 
     with pytest.raises(NetlistError, match=r"Local is not at the top level of its module"):
         dumps(Assembly("a", parts={"m": Local()}))
+
+
+def test_a_sizing_file_is_found_from_another_folder(tmp_path: Path) -> None:
+    examples = Path(__file__).parents[2] / "examples"
+    drive = load(examples / "machine_table_direct.toml")
+    save(drive, tmp_path / "saved.toml")
+    found = [Path(one.sizing).resolve() for one in (drive, load(tmp_path / "saved.toml"))]
+    assert found == [examples / "sizing" / "machine_table.toml"] * 2

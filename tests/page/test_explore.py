@@ -125,7 +125,8 @@ def test_an_old_request_is_dropped(explorer: Explorer) -> None:
 def test_sensitivities_follow_the_values(explorer: Explorer) -> None:
     code, body = ask(explorer, "/ranking", {"output": "J1.phi", **request(explorer, [], h1=5.0)})
     assert code == 200
-    found = dict(json.loads(body))
+    assert json.loads(body)["caption"] == "change in percent for one percent of the parameter"
+    found = dict(json.loads(body)["rows"])
     changed = load(EXAMPLES / "machine_tool_startup.toml")
     changed.set("h1", 5.0)
     expected = sensitivities(changed, ["J1.phi"], until=1.0).ranking("J1.phi")
@@ -176,3 +177,43 @@ def test_bars_and_files_answer(browser: Any, explorer: Explorer, tmp_path: Path)
     said = browser.run(f"{WAIT}(() => document.getElementById('saved').textContent.replace('…', ''))")
     assert Path(said) == tmp_path / "machine_tool_startup_explored.toml"
     assert browser.run("document.querySelectorAll('#schematic svg').length") == 1
+
+
+@pytest.mark.browser
+@pytest.mark.parametrize("name", ["winch", "servo_axis", "launch"])
+def test_larger_drives_are_explored_without_complaint(browser: Any, tmp_path: Path, name: str) -> None:
+    with served(name, tmp_path) as explorer:
+        browser.open(explorer.address)
+        assert browser.run("document.documentElement.scrollWidth <= innerWidth")
+        labels = browser.run(
+            "[...document.querySelectorAll('figure:last-child svg text')].map((one) => one.textContent)"
+        )
+        run = simulate(EXAMPLES / f"{name}.toml")
+        modes = {one.path: np.ptp(run[one.path]) > 0 for one in run.model.flat_discretes if one.names}
+        assert {path for path, changes in modes.items() if changes} == modes.keys() & {*labels}
+        # A click on a part opens its parameters.
+        part = {"winch": "worm", "servo_axis": "table", "launch": "clutch_a"}[name]
+        browser.run(f"[...document.querySelectorAll('#schematic g > title')]"
+                    f".find((one) => one.textContent.startsWith('{part}:')).parentNode.onclick()")  # fmt: skip
+        opened = "[...document.querySelectorAll('aside details[open] summary')].map((one) => one.textContent)"
+        assert [one.rpartition(".")[2] for one in browser.run(opened)] == [part]
+        browser.run("document.querySelector('#bars summary').click()")
+        end = {
+            "winch": "motor.w ends at 0 rad/s, and no parameter",
+            "servo_axis": "forth.qd ends at 0 rad/s, and no parameter",
+            "launch": "change in percent",
+        }
+        found = browser.run(f"{WAIT}(() => document.querySelector('#bars caption')?.textContent)")
+        assert found.startswith(end[name])
+        assert [one for one in browser.complaints if not one.startswith(explorer.address[:20])] == []
+
+
+@pytest.mark.browser
+def test_what_has_no_gradient_is_told_in_the_page(browser: Any, tmp_path: Path) -> None:
+    with served("components/h_bridge", tmp_path) as explorer:
+        browser.open(explorer.address)
+        browser.run("shown.add(PAGE.variables[0]); ask(); document.querySelector('#bars summary').click()")
+        found = browser.run(f"{WAIT}(() => document.querySelector('#bars table').textContent)")
+        assert found.startswith("No gradient at t = 0.28 s: load.load changes from empty to reversed")
+        assert ".py:" not in found
+        assert [one for one in browser.complaints if not one.startswith(explorer.address[:20])] == []

@@ -86,7 +86,7 @@ def test_the_command_writes_a_page_alone_or_with_an_fmu(tmp_path: Path, monkeypa
     page = content(tmp_path / "two.html")
     assert [one["name"] for one in page["variables"] if one["shown"]] == ["J1.w", "J2.w"]
     assert next(one["value"] for one in page["sliders"] if one["name"] == "J1.J") == 2.0
-    result = CliRunner().invoke(app, [*command, "-o", "two.fmu", "--platforms", "none"])
+    result = CliRunner().invoke(app, [*command, "-o", "two.fmu", "--platform", "none"])
     assert [line.partition(":")[0] for line in result.stdout.splitlines()[:2]] == ["two.html", "two.fmu"]
 
 

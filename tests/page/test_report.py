@@ -9,9 +9,12 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from modelica_like import load, simulate
+from components import ConstantTorque, Inertia
+from modelica_like import export_fmu, load, sensitivities, simulate
 from modelica_like.cli import app
 from modelica_like.errors import UnknownName
+from modelica_like.language import Assembly
+from modelica_like.report.files import write_solution
 from modelica_like.report.page import report, save_report
 from modelica_like.report.page.curves import curves
 
@@ -69,7 +72,9 @@ def test_it_is_one_file_that_asks_for_nothing(page: Path) -> None:
 
 def test_what_happens_is_told_in_words(page: Path) -> None:
     text = page.read_text("utf-8")
-    assert "<b>0.265473 s</b> clutch becomes stuck (slip reached zero)." in text
+    assert "<b>0.265473 s</b> clutch becomes stuck (slip reached zero, 537.7 J of friction work)." in text, (
+        "document 003"
+    )
     assert "load becomes forward (friction limit exceeded, slip begins)." in text
 
 
@@ -132,6 +137,7 @@ def test_a_gradient_that_does_not_exist_is_told() -> None:
     drive = load(EXAMPLES / "components" / "h_bridge.toml")
     told = report(drive, simulate(drive)).partition("What matters</h2>")[2].partition("</section>")[0]
     assert told.startswith("<p>No gradient at t = 0.28 s: load.load changes from empty to reversed where its condition")
+    assert ".py:" not in told
 
 
 def test_parameters_are_listed_with_units(page: Path) -> None:
@@ -167,9 +173,6 @@ def test_modes_are_bands_without_gaps() -> None:
 
 
 def test_names_from_outside_are_text() -> None:
-    from components import ConstantTorque, Inertia
-    from modelica_like.language import Assembly
-
     parts = {"motor": ConstantTorque(tau_constant=1), "J": Inertia(J=1)}
     wires = {"a": ["motor.flange", "J.flange_a"]}
     drive = Assembly("</script><b>", parts=parts, connect=wires, description="<i>")
@@ -235,3 +238,42 @@ def test_it_has_dark_colours_and_prints(browser: Any, page: Path) -> None:
     assert browser.run(INK) != light
     browser.call("Emulation.setEmulatedMedia", features=[])
     assert len(json.dumps(browser.call("Page.printToPDF"))) > 20_000
+
+
+@pytest.mark.browser
+def test_a_long_drive_fits_a_narrow_window(browser: Any, tmp_path: Path) -> None:
+    drive = load(EXAMPLES / "winch.toml")
+    save_report(drive, simulate(drive), tmp_path / "winch.html")
+    browser.open(tmp_path / "winch.html", 420)
+    assert browser.complaints == []
+    assert browser.run("[document.documentElement.scrollWidth, innerWidth]") == [420, 420]
+
+
+def test_results_without_equations_have_a_report(tmp_path: Path) -> None:
+    drive = load(EXAMPLES / "machine_table_direct.toml")
+    export_fmu(drive, tmp_path / "table.fmu", check=False)
+    write_solution(simulate(drive), tmp_path / "table.csv")
+    for source, curve in (("table.fmu", "clutch.tau"), ("table.csv", "table.v")):
+        words = ["report", str(tmp_path / source), "-o", str(tmp_path / "page.html"), "--show", curve]
+        result = CliRunner().invoke(app, words)
+        assert result.exit_code == 0, result.output
+        text = (tmp_path / "page.html").read_text("utf-8")
+        assert re.findall(r"<h2>(.*?)</h2>", text) == ["What happens", "Curves"]
+        assert f'"name":"{curve}"' in text
+    result = CliRunner().invoke(app, ["report", str(tmp_path / "table.csv"), "--set", "k=1"])
+    assert (result.exit_code, result.stderr) == (2, "--set changes netlists; 'table.csv' is none.\n")
+
+
+def test_a_circuit_says_how_to_choose_curves() -> None:
+    drive = load(EXAMPLES / "components" / "circuits.toml")
+    text = report(drive, simulate(drive))
+    assert ("choose curves by <code>--show</code>" in text) == ('"panels":[]' in text)
+
+
+def test_a_run_knows_how_it_has_started() -> None:
+    drive = Assembly("drive", parts={"motor": ConstantTorque(tau_constant=2.0), "J": Inertia(J=4.0)},
+                     connect={"a": ["motor.flange", "J.flange_a"]})  # fmt: skip
+    run = simulate(drive, 3.0, start="rest")
+    assert sensitivities(run, ["J.w"])["J.w", "J.J"] == pytest.approx(-2.0 / 4.0**2 * 3.0, rel=1e-9)
+    text = report(drive, run)
+    assert "<td>J.w</td>" in text.partition("<h2>Start</h2>")[2].partition("</section>")[0]

@@ -115,8 +115,8 @@ def test_report_and_picture() -> None:
     comparison = compare(first, second)
     assert shown(comparison) == (
         "first and second\n"
-        "signal  largest deviation     of the range  at time in s\n"
-        "x               1.000e+00  m       1.0e+00             2\n"
+        "signal  largest deviation  unit  of the range  at time in s\n"
+        "x               1.000e+00  m          1.0e+00             2\n"
         "\n"
         "events\n"
         "mode         to     first at s  second at s  difference in s\n"

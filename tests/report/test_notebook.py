@@ -73,3 +73,10 @@ def test_a_flat_model_is_mathematics() -> None:
     series = next(k for k, one in enumerate(netlist, 1) if one.startswith("drive = ["))
     assert f"| J4.flange_b – load.flange | machine_tool_startup.toml:{series} |" in text
     assert "if" not in text.partition("### Damper")[2].partition("where")[0], "nothing is connected to the heat port"
+
+
+def test_a_drive_is_its_schematic_and_its_parameters() -> None:
+    text = load(EXAMPLES / "machine_table_direct.toml")._repr_html_()
+    assert text.startswith("<svg ")
+    assert "<td>motor_speed</td><td>6000 rpm</td>" in text
+    assert "<td>hub.J</td><td>hub_inertia</td><td>moment of inertia</td>" in text

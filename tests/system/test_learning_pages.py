@@ -1,4 +1,4 @@
-"""The tutorial and the how-to pages are run from top to bottom; what they print stands there."""
+"""Tutorial, cookbook, how-to pages and theory are run from top to bottom; what they print stands there."""
 
 import contextlib
 import io
@@ -15,7 +15,12 @@ from modelica_like.explore import Explorer
 from modelica_like.netlist import library_types
 
 DOCS = Path(__file__).parents[2] / "docs"
-PAGES = [DOCS / "tutorial.md", DOCS / "modelica_text.md", *sorted((DOCS / "how_to").glob("*.md"))]
+PAGES = [
+    DOCS / "tutorial.md",
+    DOCS / "cookbook.md",
+    DOCS / "modelica_text.md",
+    *sorted([*DOCS.glob("how_to/*.md"), *DOCS.glob("theory/*.md")]),
+]
 
 
 def command(line: str) -> None:

@@ -134,7 +134,7 @@ def test_the_platforms_in_it(run, wheel: Path, examples: Path, tmp_path: Path) -
         assert system != "linux" or wheel.stem.endswith(f"-py3-none-manylinux_2_17_{machine}")
         return
     assert platforms == {*RUNTIMES}
-    run("modelica-like", "export", examples / "two_mass.toml", "-o", "drive.fmu", "--platforms", "all")
+    run("modelica-like", "export", examples / "two_mass.toml", "-o", "drive.fmu", "--platform", "all")
     with zipfile.ZipFile(tmp_path / "drive.fmu") as archive:
         assert len([name for name in archive.namelist() if name.startswith("binaries/")]) == 6
     run("modelica-like", "export", examples / "two_mass.toml", "--html", "drive.html")

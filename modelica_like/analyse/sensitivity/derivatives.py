@@ -46,7 +46,7 @@ def sensitivities(
         until: end time, as in `simulate`.
         parameters: other values of parameters, as in `simulate`.
         method: `forward` (cost grows with the parameters), `adjoint` (with the outputs), or `auto` (the cheaper one).
-        start: kind of start, as in `simulate`; for a run, that of the run.
+        start: kind of start, as in `simulate`; by default, that of the run or of the netlist.
         options: as in `simulate`.
         precision: relative tolerance of the steps of the replay.
 
@@ -65,6 +65,7 @@ def sensitivities(
         )
     if isinstance(drive, Solution):
         freed, solution = Freed(drive.model, {}), drive
+        start = start or drive.start
     else:
         freed = free_formulas(drive, to, parameters)
         solution = simulate(freed.model, until, parameters=freed.values, start=start, options=options)

@@ -56,7 +56,7 @@ Said = Term | Event | str
 """An equation, an event, or a paragraph in Markdown."""
 
 
-class _Function(NamedTuple):
+class Function(NamedTuple):
     """A function of a class (`owner`), or of a module."""
 
     name: str
@@ -78,7 +78,7 @@ class Source:
     kind: type[Component]
     asked: dict[str, None] = field(default_factory=dict[str, None])
     uses: dict[str, list[dict[str, bool]]] = field(default_factory=dict[str, list[dict[str, bool]]])
-    found: dict[str, _Function] = field(default_factory=dict[str, _Function])
+    found: dict[str, Function] = field(default_factory=dict[str, Function])
     conditions: dict[str, bool] = field(default_factory=dict[str, bool])
 
     def says(self, name: str) -> list[Said]:
@@ -108,21 +108,23 @@ class Source:
         ends = (f"{end}.{one}" for end, connector in self.kind._class_connectors.items() for one in connector.fields)
         return names.text(name) if made in map(names.name, ends) else made
 
-    def method(self, name: str, after: type | None = None) -> _Function | None:
+    def method(self, name: str, after: type | None = None) -> Function | None:
         """Return a method or property of the class from a library, or the next one after a base."""
         line = self.kind.__mro__[self.kind.__mro__.index(after) + 1 if after else 0 :]
         base = next((one for one in line if name in vars(one)), Component)
-        return None if base in Component.__mro__ else _in_class(base, name)
+        return None if base in Component.__mro__ else in_class(base, name)
 
 
-def _in_class(base: type, name: str) -> _Function | None:
+def in_class(base: type, name: str) -> Function | None:
+    """Return a method or property that a class itself has."""
     member = vars(base).get(name)
     member = member.fget if isinstance(member, property) else member
-    return _Function(name, _parsed(member), member.__globals__, base) if isinstance(member, FunctionType) else None
+    return Function(name, _parsed(member), member.__globals__, base) if isinstance(member, FunctionType) else None
 
 
-def _plain(name: str, function: FunctionType) -> _Function:
-    return _Function(name, _parsed(function), function.__globals__)
+def plain_function(name: str, function: FunctionType) -> Function:
+    """Return a function of a module."""
+    return Function(name, _parsed(function), function.__globals__)
 
 
 @lru_cache(maxsize=1024)
@@ -137,7 +139,7 @@ class _Reader(Writer):
     """Reads one function."""
 
     source: Source
-    of: _Function
+    of: Function
 
     # -- what occurs ---------------------------------------------------------------------------------------------------
 
@@ -153,7 +155,7 @@ class _Reader(Writer):
         member = self.of.constants.get(name)
         if not isinstance(member, FunctionType) or member.__module__.startswith(_LANGUAGE):
             return False
-        self.source.found.setdefault(name, _plain(name, member))
+        self.source.found.setdefault(name, plain_function(name, member))
         return True
 
     def which_mode(self, path: str) -> str:
@@ -227,9 +229,9 @@ class _Reader(Writer):
             case ast.Attribute(value=ast.Name(id="self"), attr=name):
                 found = self.source.method(name)
             case ast.Attribute(value=ast.Name(id=base), attr=name):
-                found, arguments = _in_class(self.constants[base], name), arguments[1:]
+                found, arguments = in_class(self.constants[base], name), arguments[1:]
             case ast.Name(id=name) if name in self.constants and name != "series":
-                found = _plain(name, self.constants[name])
+                found = plain_function(name, self.constants[name])
             case _:
                 raise Unwritable
         if found is not None:
@@ -291,7 +293,7 @@ class _Reader(Writer):
 
     def sentence(self) -> str:
         """Return the first sentence of the docstring, or of the overridden method's."""
-        function: _Function | None = self.of
+        function: Function | None = self.of
         while function is not None:
             if text := ast.get_docstring(function.code):
                 sentence = text.partition("\n")[0].removeprefix("Return ").removesuffix(".")
@@ -360,7 +362,7 @@ class _Reader(Writer):
         return Event(mode, "any" if source == "*" else source, target, when, resets, said)
 
 
-def _reader(source: Source, of: _Function, local: dict[str, Meaning] | None = None) -> _Reader:
+def _reader(source: Source, of: Function, local: dict[str, Meaning] | None = None) -> _Reader:
     """Return a reader of a function; without meanings, its arguments are symbols."""
     formal = [one.arg for one in of.code.args.args if one.arg != "self"]
     return _Reader(of.constants, {one: Path(one, own=False) for one in formal} if local is None else local, source, of)

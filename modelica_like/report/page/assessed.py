@@ -11,6 +11,7 @@ import numpy as np
 from modelica_like.analyse.linear.linearize import linearize
 from modelica_like.analyse.sensitivity.derivatives import sensitivities
 from modelica_like.draw import schematic
+from modelica_like.errors import NoGradient
 from modelica_like.language import Component
 from modelica_like.report.analysis import shares
 from modelica_like.report.page.tables import details, table
@@ -19,10 +20,10 @@ from modelica_like.upper import upper
 
 _PATIENCE = 3.0
 """Seconds of a run whose derivatives a page waits for; they take two to four times as long."""
-_RANKED, _MOST_ENDS = 12, 3
+_RANKED, _MOST_ENDS, _MOST_MODES = 12, 3, 20
 _MATTERS = 5e-4
 """Percent per percent below which a parameter does not matter."""
-_ZERO = 1e-6
+_ZERO = 0.01
 """Part of the largest value below which an end value has no percents."""
 
 
@@ -41,6 +42,7 @@ def design_checks(drive: Component, run: Solution) -> str:
          if bool(one.verdict) is limited]
         for limited in (True, False)
     )  # fmt: skip
+    judged.sort(key=lambda row: row[3] == "ok")
     missed, heads = sizing.exceeded, ("line", "value>", "unit", "verdict!", "what it is")
     verdict = f"{len(judged)} limits, {missed or 'none'} missed: {escape(Path(path).name)}."
     said = f'<p class="notice">{verdict}</p>' if missed else f"<p>{verdict}</p>"
@@ -53,9 +55,6 @@ def ranking(run: Solution, ends: Sequence[str]) -> str:
     Args:
         run: the run.
         ends: variables, the first ones of which that do not end at zero are taken; the lost energy is added.
-
-    Raises:
-        NoGradient: a derivative does not exist.
     """
     if run.statistics.seconds > _PATIENCE:
         command = f"<code>modelica-like sensitivity … --of {escape(next(iter(ends), 'loss_energy'))}</code>"
@@ -68,7 +67,10 @@ def ranking(run: Solution, ends: Sequence[str]) -> str:
     names = [*moving[:_MOST_ENDS], *(["loss_energy"] if lossy else [])]
     if not names or not len(run.model.p):
         return ""
-    found = sensitivities(run, names)
+    try:
+        found = sensitivities(run, names)
+    except NoGradient as error:
+        return f"<p>{escape(' '.join(filter(None, (error.what, error.why, error.advice))))}</p>"
     percents = np.nan_to_num(found.normalised)
     largest = np.max(np.abs(percents), axis=0)
     order = [int(k) for k in np.argsort(-largest)[:_RANKED] if largest[k] > _MATTERS]
@@ -79,7 +81,8 @@ def ranking(run: Solution, ends: Sequence[str]) -> str:
     ]  # fmt: skip
     at_the_end = ", ".join(f"{one.name} = {one.value:.5g} {one.unit_text}".rstrip() for one in found.outputs)
     said = f"<p>Change in percent of what the run ends with: {escape(at_the_end)}.</p>"
-    return (said + table(heads, rows) if rows else "") + "".join(f"<p>{escape(note)}</p>" for note in found.notes())
+    left = "".join(f"<p>{escape(note)}</p>" for note in found.notes())
+    return (said + table(heads, rows) if rows else "") + details(left, f"{len(found.left_out)} without a derivative")
 
 
 def small_motions(drive: Component, run: Solution) -> str:
@@ -95,4 +98,5 @@ def small_motions(drive: Component, run: Solution) -> str:
         if mode.oscillates
     ]
     drawn = f'<div class="wide">{schematic(drive, background=False, modes=modes)}</div>' if rows else ""
-    return drawn + table(("mode", "frequency in Hz>", "damping>", "energy in", "lost in"), rows)
+    more = f"<p>… and {len(rows) - _MOST_MODES} more.</p>" if len(rows) > _MOST_MODES else ""
+    return drawn + table(("mode", "frequency in Hz>", "damping>", "energy in", "lost in"), rows[:_MOST_MODES]) + more

@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 from modelica_like.solve.panels import mode_spans
 from modelica_like.solve.plot import chosen
 from modelica_like.solve.plot import quantity as quantity_of
-from modelica_like.solve.solution import Solution
+from modelica_like.solve.trajectories import Trajectories
 
 _POINTS = 1200
 """Number of drawn results, including those at events."""
 _MOST_BANDS = 400
 
 
-def curves(run: Solution, patterns: Sequence[str] = ()) -> dict[str, Any]:
+def curves(run: Trajectories, patterns: Sequence[str] = ()) -> dict[str, Any]:
     """Return times, panels of curves by unit, modes as bands and events.
 
     Args:
@@ -43,7 +43,7 @@ def curves(run: Solution, patterns: Sequence[str] = ()) -> dict[str, Any]:
     }
 
 
-def _thinned(run: Solution) -> NDArray[np.intp]:
+def _thinned(run: Trajectories) -> NDArray[np.intp]:
     """Positions of the drawn results: evenly spread ones, and both sides of every event."""
     count = len(run.time)
     spread = np.unique(np.linspace(0, count - 1, min(count, _POINTS)).round().astype(int))
@@ -53,7 +53,7 @@ def _thinned(run: Solution) -> NDArray[np.intp]:
     return np.unique(np.concatenate([spread, beside])).astype(np.intp)
 
 
-def _bands(run: Solution) -> list[dict[str, Any]]:
+def _bands(run: Trajectories) -> list[dict[str, Any]]:
     """Time spans of the values of each mode that changes."""
     modes = dict.fromkeys(event.mode for event in run.events)
     return [{"name": mode, "bands": mode_spans(run, mode)[:_MOST_BANDS]} for mode in modes]

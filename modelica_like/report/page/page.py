@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import platform
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from html import escape
 from pathlib import Path
 
@@ -24,19 +24,23 @@ from modelica_like.report.run import notices, reasons, statistics_line
 from modelica_like.report.start import start_values
 from modelica_like.solve.recorder import Event
 from modelica_like.solve.solution import Solution
+from modelica_like.solve.trajectories import Trajectories
 from modelica_like.writing import write_text
 
-_MOST_EVENTS = 60
+_FIRST, _MOST_EVENTS = 25, 400
+"""Instants that are told at once, and after a click."""
+_READ = "Move over a curve to read it, drag to zoom, double-click to see all."
+_NO_CURVES = "Nothing here is a speed, a torque or a force: choose curves by <code>--show</code>, such as '*.i'."
 _KILO = 1e3
 _SMALL = 5e-4
 """Share of the supply below which an energy is not listed."""
 
 
-def save_report(drive: Component, run: Solution, path: str | Path, *, show: Sequence[str] = ()) -> None:
+def save_report(drive: Component | None, run: Trajectories, path: str | Path, *, show: Sequence[str] = ()) -> None:
     """Write the report of a run as a page.
 
     Args:
-        drive: the drive.
+        drive: the drive; None if only results are known.
         run: its run.
         path: the file.
         show: patterns of the curves, such as `*.w`; by default speeds, torques and forces of the parts.
@@ -48,11 +52,11 @@ def save_report(drive: Component, run: Solution, path: str | Path, *, show: Sequ
     write_text(path, report(drive, run, show=show))
 
 
-def report(drive: Component, run: Solution, *, show: Sequence[str] = ()) -> str:
+def report(drive: Component | None, run: Trajectories, *, show: Sequence[str] = ()) -> str:
     """Return the report of a run as HTML: one file that loads nothing else.
 
     Args:
-        drive: the drive.
+        drive: the drive; None if only results are known, those of an FMU or a table.
         run: its run.
         show: patterns of the curves; by default speeds, torques and forces of the parts.
 
@@ -60,21 +64,15 @@ def report(drive: Component, run: Solution, *, show: Sequence[str] = ()) -> str:
         UnknownName: nothing matches a pattern.
     """
     folder, drawn = Path(__file__).parent, curves(run, show)
-    # The last curves of a panel are closest to the load.
-    ends = [panel["curves"][-1]["name"] for panel in drawn["panels"]]
+    # Of the parts that are not inside of others, the last one is closest to the load.
+    ends = [min(reversed([one["name"] for one in panel["curves"]]), key=lambda name: name.count("."))
+            for panel in drawn["panels"]]  # fmt: skip
     sections = [
-        ("Schematic", f'<div class="wide">{schematic(drive, background=False)}</div>'),
+        ("Schematic", f'<div class="wide">{schematic(drive, background=False)}</div>' if drive else ""),
         ("What happens", _happens(drive, run)),
-        ("Curves", '<div id="curves"></div><p class="hint">Move over a curve to read it, drag to zoom, double-click to '
-                   "see all.</p>"),
-        ("Energy", _attempt(lambda: _energy(drive, run))),
-        ("Design checks", _attempt(lambda: design_checks(drive, run))),
-        ("What matters", _attempt(lambda: ranking(run, ends))),
-        ("Small motions at the end", _attempt(lambda: small_motions(drive, run))),
-        ("Parameters", _parameters(run)),
-        ("Start", _attempt(lambda: _start(drive, run))),
-        ("How it was computed", _computed(run)),
-        ("Netlist", _netlist(drive)),
+        ("Curves", f'<div id="curves"></div><p class="hint">{_READ if drawn["panels"] else _NO_CURVES}</p>'),
+        ("Energy", _attempt(lambda: _energy(drive, run)) if run.model.components else ""),
+        *(_of_equations(drive, run, ends) if drive and isinstance(run, Solution) else ()),
     ]  # fmt: skip
     data = json.dumps(drawn, ensure_ascii=False, separators=(",", ":")).replace("<", "\\u003c")
     parts = {
@@ -87,6 +85,17 @@ def report(drive: Component, run: Solution, *, show: Sequence[str] = ()) -> str:
     return re.sub(r"\{\{(\w+)\}\}", lambda found: parts[found[1]], page)
 
 
+def _of_equations(drive: Component, run: Solution, ends: Sequence[str]) -> Iterator[tuple[str, str]]:
+    """Yield the sections of a run whose equations are known."""
+    yield "Design checks", _attempt(lambda: design_checks(drive, run))
+    yield "What matters", _attempt(lambda: ranking(run, ends))
+    yield "Small motions at the end", _attempt(lambda: small_motions(drive, run))
+    yield "Parameters", _parameters(run)
+    yield "Start", _attempt(lambda: _start(drive, run))
+    yield "How it was computed", _computed(run)
+    yield "Netlist", _netlist(drive)
+
+
 def _attempt(make: Callable[[], str]) -> str:
     """If a section cannot be made, it shows why; the others are not affected."""
     try:
@@ -95,33 +104,55 @@ def _attempt(make: Callable[[], str]) -> str:
         return f"<p>{escape(str(error))}</p>"
 
 
-def _happens(drive: Component, run: Solution) -> str:
+def _happens(drive: Component | None, run: Trajectories) -> str:
     """Events in words, grouped by time, and the notices of the run."""
     instants: dict[float, dict[str, list[tuple[Event, str]]]] = {}
     for event, why in zip(run.events, reasons(run), strict=True):
+        if event.before == event.after:  # a kink of a curve
+            continue
         instants.setdefault(event.time, {}).setdefault(event.mode, []).append((event, why))
     lines = [
         f"<li><b>{time:.6g} s</b> {'; '.join(escape(_told(run, events)) for events in modes.values())}.</li>"
         for time, modes in list(instants.items())[:_MOST_EVENTS]
     ]
     lines += [f"<li>… {len(instants) - _MOST_EVENTS} more instants</li>"] if len(instants) > _MOST_EVENTS else []
-    said = "".join(f'<p class="notice">{escape(sentence)}</p>' for sentence in (*notices(run), *plausible(drive, run)))
+    told = (*notices(run), *(plausible(drive, run) if drive else ()))
+    said = "".join(f'<p class="notice">{escape(sentence)}</p>' for sentence in told)
+    if len(lines) > _FIRST + 5:
+        rest = details(f"<ul>{''.join(lines[_FIRST:])}</ul>", f"{len(instants) - _FIRST} more instants")
+        return f"{said}<ul>{''.join(lines[:_FIRST])}</ul>{rest}"
     return said + (f"<ul>{''.join(lines)}</ul>" if lines else "<p>No mode changes.</p>")
 
 
-def _told(run: Solution, events: Sequence[tuple[Event, str]]) -> str:
+def _told(run: Trajectories, events: Sequence[tuple[Event, str]]) -> str:
     """Return the change of a mode at an instant: `clutch becomes stuck (slip reached zero)`."""
     last = events[-1][0]
     component = last.mode.rpartition(".")[0] or run.model.name
-    told = ", ".join(dict.fromkeys(why for _, why in events))
-    return f"{component} becomes {last.after.replace('_', ' ')} ({told})"
+    told = ", ".join(dict.fromkeys(filter(None, (*(why for _, why in events), _slid(run, last)))))
+    return f"{component} becomes {last.after.replace('_', ' ')}{f' ({told})' if told else ''}"
 
 
-def _energy(drive: Component, run: Solution) -> str:
+def _slid(run: Trajectories, event: Event) -> str:
+    """Return the friction work of surfaces that begin to hold, since they held last."""
+    if not isinstance(run, Solution):
+        return ""
+    modes = [(run.model.flat_discretes[hold.mode], hold.number) for hold in run.model.holds]
+    held = {(mode.path, mode.names[number]) for mode, number in modes}
+    if (event.mode, event.after) not in held:
+        return ""
+    left = (one.time for one in run.events if one.time < event.time and (one.mode, one.before) in held and
+            one.mode == event.mode)  # fmt: skip
+    begin, owner = max(left, default=float(run.time[0])), event.mode.rpartition(".")[0]
+    lost = run.energy(begin, event.time)[owner].lost if event.time > begin else 0.0
+    size, unit = (_KILO, "kJ") if lost >= 10.0 * _KILO else (1.0, "J")
+    return f"{lost / size:.4g} {unit} of friction work" if lost > _SMALL * run.energy().supply else ""
+
+
+def _energy(drive: Component | None, run: Trajectories) -> str:
     """Energy along the drive, and of each part, in kJ and percent of the supply."""
     balance = run.energy()
     total = balance.supply or 1.0
-    flow = schematic(drive, background=False, run=run, flow=True, balance=balance) if balance.supply else ""
+    flow = schematic(drive, background=False, run=run, flow=True, balance=balance) if drive and balance.supply else ""
     rows = [
         (row.component or "the drive", what, value)
         for row in balance
@@ -158,7 +189,7 @@ def _parameters(run: Solution) -> str:
 
 
 def _start(drive: Component, run: Solution) -> str:
-    rows = start_values(drive, run.model, run.model.settings.get("start", "given"))
+    rows = start_values(drive, run.model, run.start)
     cells = [(row.path, f"{row.value:.6g}", row.unit, row.origin) for row in rows]
     return details(table(("variable", "value>", "unit", "where from"), cells))
 
