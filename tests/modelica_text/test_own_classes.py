@@ -95,6 +95,18 @@ def test_a_redeclared_coupling_damps() -> None:
     assert drive("Redeclared").find("coupling").value("d").number == 20
 
 
+def test_a_redeclared_part_and_what_follows_it() -> None:
+    assert [type(drive(name).k).__name__ for name in ("Chain", "Rearranged")] == ["Spring", "SpringDamper"]
+    assert ["damper" in drive(name).parts for name in ("Chain", "Rearranged")] == [True, False]
+    result = run("Rearranged", 2.0)
+    # x = phi_rel: 1·x'' + 0.5·x' + 50·x = 0 with the reduced inertia 1, x(0) = -0.1
+    t, w = result.time, np.sqrt(50 - 0.25**2)
+    x = -0.1 * np.exp(-0.25 * t) * (np.cos(w * t) + 0.25 / w * np.sin(w * t))
+    assert result["k.phi_rel"] == pytest.approx(x, abs=1e-8)
+    speed = result["k.w_rel"]
+    assert result["energy"] == pytest.approx(0.5 * speed**2 + 25 * x**2, abs=1e-8)
+
+
 def test_a_block_between_signals() -> None:
     result = run("Signals", 1.0)
     y = 1 - np.exp(-result.time / 0.2)
