@@ -245,21 +245,21 @@ def readings() -> Figure:
 def release() -> Figure:
     """The bench's clutch is switched off again after 2 s."""
     run = simulate(EXAMPLES / "dc_bench.toml", "4.5 s", parameters={"on_time": 2.0})
-    return run.plot("motor.w", "generator.w", "motor.ia", "clutch.tau")
+    return run.plot("motor.w", "generator.w", "motor.ia", "clutch.tau", display=TURNING)
 
 
 def overload() -> Figure:
     """The bench's generator is loaded until the clutch slips."""
     drive = {"overload": 4.0, "overload_start": 1.0, "overload_time": 4.0}
     run = simulate(EXAMPLES / "dc_bench.toml", "4.6 s", parameters=drive)
-    return run.plot("motor.w", "generator.w", "motor.ia", "sink.i", "clutch.tau")
+    return run.plot("motor.w", "generator.w", "motor.ia", "sink.i", "clutch.tau", display=TURNING)
 
 
 def direct_switch_on() -> Figure:
     """The bench's motor is switched on from rest."""
     values = {"motor_start": 0.0, "switch_on": 10.0}
     run = simulate(EXAMPLES / "dc_bench.toml", "0.3 s", parameters=values)
-    return run.plot("motor.w", "motor.ia", "motor.tau_electrical")
+    return run.plot("motor.w", "motor.ia", "motor.tau_electrical", display=TURNING)
 
 
 def sections() -> Figure:

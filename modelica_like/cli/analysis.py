@@ -59,7 +59,7 @@ def modes(
 
 
 def _is_speed(path: str, unit: str) -> bool:
-    return unit == "rad/s" and path.endswith(".w")
+    return (unit, path.rpartition(".")[2]) in (("rad/s", "w"), ("m/s", "v"))
 
 
 def steady(

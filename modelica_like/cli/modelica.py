@@ -11,13 +11,13 @@ from modelica_like.writing import write_text
 
 
 def from_modelica(
-    text: Annotated[Path, Argument(metavar="FILE", help="Modelica text (.mo)", show_default=False)],
+    text: Annotated[Path, Argument(metavar="FILE", help="Modelica text (.mo).", show_default=False)],
     output: Annotated[
-        Path | None, Option("-o", "--output", metavar="FILE", help="Netlist; default: FILE.toml.")
+        Path | None, Option("--output", "-o", metavar="FILE", help="Netlist; by default FILE.toml.")
     ] = None,
     *,
     name: Annotated[
-        str, Option("--class", metavar="NAME", help="Model to read; default: the last one of the file.")
+        str, Option("--class", metavar="NAME", help="Model to read; by default the last one of the file.")
     ] = "",
     debug: Debug = False,
 ) -> None:  # fmt: skip
@@ -36,7 +36,7 @@ def from_modelica(
 def to_modelica(
     netlist: Netlist, assignments: Assignments = None, *,
     output: Annotated[
-        Path | None, Option("-o", "--output", metavar="FILE", help="Modelica text; default: NETLIST.mo.")
+        Path | None, Option("--output", "-o", metavar="FILE", help="Modelica text; by default NETLIST.mo.")
     ] = None,
     debug: Debug = False,
 ) -> None:  # fmt: skip

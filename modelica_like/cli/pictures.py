@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Annotated
 
 from modelica_like.cli.declare import Argument, Option
-from modelica_like.cli.shared import Assignments, Debug, Netlist, Show, Until, load_netlist, say, told
+from modelica_like.cli.shared import Assignments, Curves, Debug, Netlist, Show, Until, load_netlist, say, told
 from modelica_like.errors import NetlistError
 
 
@@ -37,7 +37,7 @@ def report(
     source: Annotated[Path, Argument(metavar="NETLIST", help="Netlist, FMU, system or CSV file.", show_default=False)],
     assignments: Assignments = None, *,
     output: Annotated[Path | None, Option("--output", "-o", metavar="FILE", help="By default DRIVE.html.")] = None,
-    until: Until = None, show: Show = None, debug: Debug = False,
+    until: Until = None, show: Curves = None, debug: Debug = False,
 ) -> None:  # fmt: skip
     """Simulate a netlist and write a page about it: schematic, events, curves, energies, numbers."""
     path = output or Path(f"{source.stem}.html")
@@ -48,7 +48,7 @@ def report(
         from modelica_like.report.progress import Bar
         from modelica_like.report.sources import trajectories
         from modelica_like.simulation import build, seconds, simulate
-        from modelica_like.solve.trajectories import matching
+        from modelica_like.solve.signals import read_signals
 
         if not is_modelica(source) and (source.suffix.lower() != ".toml" or describes_system(source)):
             if assignments:
@@ -58,7 +58,7 @@ def report(
             return
         drive = load_netlist(source, assignments)
         model = build(drive)
-        matching(model, show or ())
+        read_signals(model, show or ())
         with Bar(until or model.settings.get("until")) as bar:
             run = simulate(model, until, progress=bar)
         save_report(drive, run, path, show=show or ())

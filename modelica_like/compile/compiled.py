@@ -23,6 +23,8 @@ from modelica_like.units import Unit, to_si
 from modelica_like.upper import upper
 
 Made = TypeVar("Made")
+TERMINAL = "terminal()"
+"""Discrete value that becomes 1 at the end of a run."""
 
 
 @dataclass(frozen=True)

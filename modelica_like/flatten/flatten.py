@@ -34,7 +34,7 @@ from modelica_like.flatten.template import Template, template_of
 from modelica_like.flatten.wiring import Wiring
 from modelica_like.language.component import Component
 from modelica_like.language.declared import Declared
-from modelica_like.language.discrete import INITIAL
+from modelica_like.language.discrete import INITIAL, TERMINAL
 from modelica_like.language.expr import TIME, flagged_motion
 from modelica_like.language.fields import Discrete, Input, Output, Parameter, Variable
 from modelica_like.units import ONE, coherent
@@ -177,7 +177,7 @@ class _Flattener:
         path, node = f"{component.path}.{name}".lstrip("."), len(self.variables)
         self.variable_of[id(component), name] = node
         told = f"{INITIAL_EQUATION} `{text}`"
-        self.variables.append(FlatVariable(path, ONE, told, "local", "avoid", 0.0, 1.0, None, None))
+        self.variables.append(FlatVariable(path, ONE, told, "local", "avoid", 0.0, 1.0, None, None, hidden=True))
         self.starts.append(StartValue(node, 0.0, "fixed"))
 
     def _declare_discrete(self, component: Component, name: str, path: str, field: Discrete) -> None:
@@ -196,13 +196,15 @@ class _Flattener:
 
     def _discrete(self, component: Component, path: str) -> int:
         """Return the position of a mode, a discrete value, a `pre`, or `initial()`."""
-        key = (0, path) if path == INITIAL.name else self._owner(component, _plain(path))
+        key = (0, path) if path in (INITIAL.name, TERMINAL.name) else self._owner(component, _plain(path))
         if path != _plain(path):
             of = self.discrete_of[key]
             key = key[0], f"pre({key[1]})"
             if key not in self.discrete_of:
                 flat = self.discretes[of]
                 self.pres[self._hide(*key, f"pre({flat.path})", Hidden("", ""), flat.start)] = of
+        elif path == TERMINAL.name and key not in self.discrete_of:
+            self._hide(*key, path, Hidden("", "whether a run ends"))
         elif key not in self.discrete_of:
             first = self._hide(*key, path, Hidden("", "whether a run begins"), 1.0)
             self.pres[first] = first

@@ -20,7 +20,10 @@ INITIAL_EQUATION = "the initial equation"
 
 @dataclass(frozen=True, slots=True)
 class FlatVariable:
-    """A continuous variable; `kind` is local, output, input, potential or flow, `driving` as of `Variable`."""
+    """A continuous variable; `kind` is local, output, input, potential or flow, `driving` as of `Variable`.
+
+    No user has declared a hidden one.
+    """
 
     path: str
     unit: Unit
@@ -32,6 +35,7 @@ class FlatVariable:
     min: float | None
     max: float | None
     driving: int = 1
+    hidden: bool = False
 
 
 @dataclass(frozen=True, slots=True)

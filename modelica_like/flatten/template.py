@@ -17,7 +17,7 @@ from modelica_like.flatten.reasons import reason
 from modelica_like.flatten.wiring import taken
 from modelica_like.language.component import Component
 from modelica_like.language.declared import Declared
-from modelica_like.language.discrete import INITIAL, Marker, Pre
+from modelica_like.language.discrete import INITIAL, TERMINAL, Marker, Pre
 from modelica_like.language.equation import Connection, Equation, FreeEnd, as_equation, as_statement
 from modelica_like.language.expr import TIME, Symbol, flagged_motion, is_expression, symbol_of, symbols_in
 from modelica_like.language.fields import Parameter, Variable
@@ -188,7 +188,7 @@ def path_of(symbol: Symbol, root: Component) -> str:
     """Return the path of a symbol, seen from a component: `n`, `clutch.n`, `pre(n)`, `relation[1]`, `time`."""
     if isinstance(symbol, Pre):
         return f"pre({path_of(symbol.of, root)})"
-    global_one = isinstance(symbol, Marker) or symbol is TIME or symbol is INITIAL
+    global_one = isinstance(symbol, Marker) or any(symbol is one for one in (TIME, INITIAL, TERMINAL))
     return symbol.name if global_one else relative_path(symbol.owner, root, symbol.name)
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae
 from modelica_like.errors import UnknownName, did_you_mean
-from modelica_like.flatten.model import INITIAL_EQUATION, FlatDiscrete, FlatParameter, FlatVariable
+from modelica_like.flatten.model import FlatDiscrete, FlatParameter, FlatVariable
 from modelica_like.fmi.reach import Reach
 from modelica_like.fmi.start_tables import StartTables, start_tables
 from modelica_like.units import ONE, Unit, parse_unit
@@ -168,7 +168,7 @@ class _Builder:
         inputs = {variable: k for k, variable in enumerate(model.inputs)}
         states = {name: k for k, name in enumerate(model.states)}
         for k, one in enumerate(model.flat_variables):
-            if one.description.startswith(INITIAL_EQUATION):
+            if one.hidden:
                 continue
             about, causality = _about(one), "output" if self.wanted(one) else "local"
             if k in inputs:

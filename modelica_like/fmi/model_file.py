@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from modelica_like.compile.compiled import CompiledDae
+from modelica_like.compile.compiled import TERMINAL, CompiledDae
 from modelica_like.fmi.interface import FmuVariable, Interface
 from modelica_like.fmi.sources import Version, runtime_sources
 from modelica_like.fmi.start_tables import StartTables
@@ -53,7 +53,7 @@ _TAPES = (
 )  # fmt: skip
 SECTIONS: dict[str, Any] = {
     "settings": _record(
-        "n_d n_y steady rates_depend_on_time implicit_linear unused",
+        "n_d n_y steady rates_depend_on_time implicit_linear terminal",
         "absolute_to_relative default_tolerance fixed_step",
     ),
     "text": _TEXT,
@@ -174,9 +174,19 @@ def _contents(
     tables: Tables, variables: Sequence[FmuVariable], tolerance: float, fixed_step: float, text: _Text
 ) -> dict[str, Any]:
     model, start, sizes = tables.model, tables.start, tables.slots.sizes
-    flags = (int(start.steady is not None), int(tables.rates_depend_on_time), int(tables.implicit_linear), 0)
+    flags = (int(start.steady is not None), int(tables.rates_depend_on_time), int(tables.implicit_linear))
     contents: dict[str, Any] = {
-        "settings": [(sizes["d"], sizes["y"], *flags, ABSOLUTE_TO_RELATIVE, tolerance, fixed_step)],
+        "settings": [
+            (
+                sizes["d"],
+                sizes["y"],
+                *flags,
+                model.discrete_position.get(TERMINAL, -1),
+                ABSOLUTE_TO_RELATIVE,
+                tolerance,
+                fixed_step,
+            )
+        ],
         "constants": tables.slots.constants,
         "parameters": model.p,
         "parameter_min": [-math.inf if one.min is None else one.min for one in model.flat_parameters],

@@ -12,6 +12,7 @@ from modelica_like.language.discrete import edge as edge
 from modelica_like.language.discrete import if_ as if_
 from modelica_like.language.discrete import initial as initial
 from modelica_like.language.discrete import pre as pre
+from modelica_like.language.discrete import terminal as terminal
 from modelica_like.language.discrete import when as when
 from modelica_like.language.equation import Equations as Equations
 from modelica_like.language.equation import connect as connect

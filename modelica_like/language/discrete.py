@@ -48,7 +48,7 @@ class Pre(Symbol):
         self.of = of
 
 
-INITIAL = Symbol(None, "initial()")
+INITIAL, TERMINAL = Symbol(None, "initial()"), Symbol(None, "terminal()")
 _timed: list[Marker] = []
 """Markers of expressions of time alone, which no component owns."""
 
@@ -195,6 +195,11 @@ def clock(period: Expr, offset: Scalar = 0.0) -> Expr:
 def initial() -> Expr:
     """Return a condition that is true at the start of a run."""
     return INITIAL
+
+
+def terminal() -> Expr:
+    """Return a condition that becomes true at the end of a run: for `when`."""
+    return TERMINAL
 
 
 @dataclass(frozen=True, eq=False)

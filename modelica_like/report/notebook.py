@@ -58,5 +58,5 @@ def _given(drive: Component) -> Iterator[tuple[str, str, str]]:
 
 
 def _picture(run: Trajectories) -> str:
-    data = base64.b64encode(picture_bytes(plot(run, ()), "png")).decode()
+    data = base64.b64encode(picture_bytes(plot(run, ()), "png", dpi=100)).decode()
     return f'<img alt="curves" style="max-width:100%" src="data:image/png;base64,{data}">'

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from modelica_like.errors import UnknownName
 from modelica_like.report.sources import trajectories
 from modelica_like.solve.display import Display
-from modelica_like.solve.panels import Panel, bands_of, draw_panels, marks_of
+from modelica_like.solve.panels import Panel, bands_of, draw_panels, listed, marks_of
 from modelica_like.solve.plot import usual
 from modelica_like.solve.signals import Signal, named, read_signals
 from modelica_like.solve.style import COLOURS
@@ -60,7 +60,7 @@ def overlay(
     bands, notes = ([], []) if others else bands_of(first)
     marks, more = ([], []) if others else marks_of(first, [band.mode for band in bands])
     told = ["Events differ from run to run; they are not drawn."] if others and first.events else []
-    told += [f"Not drawn: {', '.join(left)}; name them to draw them."] if left else []
+    told += [f"Not drawn: {listed(left)}; name them to draw them."] if left else []
     return draw_panels(title or first.model.name, first.time, panels, bands, marks, [*told, *notes, *more])
 
 

@@ -28,8 +28,9 @@ def structure_report(component: Component) -> RenderableType:
 def _sizes(flat: FlatModel, reduced: ReducedDae) -> Listed:
     kinds = Counter(type(component).__name__ for component in flat.components.values() if not component.parts)
     equations = len(flat.linear) + len(flat.general)
-    modes = [discrete.path for discrete in flat.discretes if discrete.names]
-    numbers = [discrete.path for discrete in flat.discretes if not discrete.names]
+    declared = [discrete for discrete in flat.discretes if not discrete.hidden]
+    modes = [discrete.path for discrete in declared if discrete.names]
+    numbers = [discrete.path for discrete in declared if not discrete.names]
     sizes: list[tuple[str, int, str]] = [
         (
             "components",

@@ -10,9 +10,10 @@ import numpy as np
 
 from modelica_like.compile.compiled import Vector
 from modelica_like.errors import UnknownName, ValueOutOfRange
+from modelica_like.solve.display import Display
 from modelica_like.solve.ranges import ranges
 from modelica_like.solve.recorder import Event
-from modelica_like.solve.style import COLOURS, picture, with_unit
+from modelica_like.solve.style import COLOURS, picture, text_width, with_unit
 from modelica_like.solve.trajectories import Trajectories, fitting
 from modelica_like.upper import Shown
 
@@ -108,7 +109,7 @@ class Curves(Shown):
         return grid.times, _difference(self.first, self.second, signal, grid)
 
     def plot(self, *patterns: str) -> Figure:
-        """Draw signals of both, and below each the difference relative to its range.
+        """Draw signals of both in the units of the first's netlist, and below each the difference over its range.
 
         Args:
             patterns: of the signals; by default those that deviate most.
@@ -117,17 +118,21 @@ class Curves(Shown):
             UnknownName: nothing matches a pattern.
         """
         names = [row.signal for row in self.deviations]
+        rest = 0 if patterns else len(names) - _MOST_CURVES
         names = fitting(names, patterns, "Neither has a signal") if patterns else names[:_MOST_CURVES]
-        first, second, count = self.first, self.second, len(names)
-        with picture("", 2 * count, 0.8 + 2.6 * count, height_ratios=[2.0, 1.0] * count) as (figure, rows):
+        first, second, count, shown = self.first, self.second, len(names), Display(self.first.model)
+        below = [[f"Not drawn: {rest} signals that deviate less."]] if rest > 0 else []
+        title, ratios, height = " and ".join(self.labels), [2.0, 1.0] * count, 0.8 + 2.4 * count
+        with picture(title, 2 * count, height, below=below, height_ratios=ratios) as (figure, rows):
             for name, upper, lower in zip(names, rows[::2], rows[1::2], strict=True):
-                upper.plot(first.time, first[name], color=COLOURS[0], label=self.labels[0])
-                upper.plot(second.time, second[name], "--", color=COLOURS[1], label=self.labels[1])
-                upper.set_ylabel(with_unit(name, self[name].unit))
+                upper.plot(first.time, shown.values(name, first[name]), color=COLOURS[0], label=self.labels[0])
+                upper.plot(second.time, shown.values(name, second[name]), "--", color=COLOURS[1], label=self.labels[1])
+                label = with_unit(name, shown.of(name))
+                upper.set_ylabel(label if text_width(label, 9.0) < 1.4 else label.replace(" in ", "\nin "))
                 scale = self[name].largest / self[name].relative if self[name].relative else 1.0
                 times, difference = self.difference(name)
                 lower.plot(times, difference / scale, color="#444444", linewidth=1.0)
-                lower.set_ylabel("difference\n/ range")
+                lower.set_ylabel("difference\nover range", fontsize=7)
             rows[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)
             rows[-1].set_xlabel("time in s")
             figure.align_ylabels(rows)

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from modelica_like.compile.compiled import CompiledDae, CompiledTransition, Vector
+from modelica_like.compile.compiled import TERMINAL, CompiledDae, CompiledTransition, Vector
 from modelica_like.compile.soon import time_resolution
 from modelica_like.errors import StepFailed
 from modelica_like.initialize import Point
@@ -92,6 +92,13 @@ class EventLoop:
                 self._write()
             if self.progress is not None:
                 self.progress(self.now.t)
+        terminal = self.model.discrete_position.get(TERMINAL)
+        if terminal is not None:
+            self.record.end(self.now.d)
+            self.now = self.now.copy()
+            self.now.d[terminal] = 1.0
+            self.instants.settle(self.now, [], begins=True)
+            self.record.begin(self.now)
         self.record.end(self.now.d)
         self._write()
 

@@ -35,11 +35,12 @@ class Guards:
         self.count = len(self.state_events)
         self.positions = {id(one): k for k, one in enumerate(self.state_events)}
         self._at = model.fast("guards at", lambda: _clean(model, self.state_events))
+        self._modes = sorted({one.mode for one in self.state_events})
         self._active: dict[bytes, Any] = {}
 
     def active(self, d: Vector) -> Any:
         """Return the numbers of the guards that are active in the modes."""
-        key = d[: len(self.model.flat_discretes)].tobytes()
+        key = d[self._modes].tobytes()  # counters and samples change at every event, modes have few values
         if key not in self._active:
             may = [k for k, one in enumerate(self.state_events) if int(d[one.mode]) in one.sources]
             self._active[key] = np.array(may, int)

@@ -10,15 +10,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from modelica_like.compile.compiled import Vector
+from modelica_like.solve.recorder import Event
 from modelica_like.solve.style import numbered, picture, text_width, with_unit
 from modelica_like.solve.trajectories import Trajectories
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_MOST_EVENTS, _MOST_BANDS, _MOST_HELD = 24, 8, 16
+_MOST_EVENTS, _MOST_BANDS, _MOST_HELD = 30, 8, 16
 _HELD, _FIRST, _OTHERS = "#7fc097", "#dbe1e8", ("#f4b183", "#9dc3e6", "#ffe08a", "#cdb5e6", "#e8a9b8", "#c9b79c")
 _HATCHES = ("", "////", "....", "xxxx")
+_MOST_NAMES = 12
 _HEIGHT, _ROW = 1.5, 0.19
 _BESIDE = 1.25
 """Inches that the labels of the vertical axis and the margins take."""
@@ -81,7 +83,7 @@ def bands_of(run: Trajectories, wanted: Sequence[str] = ()) -> tuple[list[Bands]
     if not wanted and len(paths) > _MOST_BANDS and any(path in held for path in paths):
         paths = [path for path in paths if path in held]
     most = len(paths) if wanted else _MOST_HELD
-    left = [f"No bands: {', '.join(paths[most:])}."] if paths[most:] else []
+    left = [f"No bands: {listed(paths[most:])}."] if paths[most:] else []
     names = {one.path: tuple(one.names) for one in run.model.flat_discretes}
     least = _SHORT * float(run.time[-1] - run.time[0])
     spans = {path: tuple(one for one in mode_spans(run, path) if one[1] - one[0] > least) for path in paths[:most]}
@@ -106,24 +108,33 @@ def marks_of(run: Trajectories, banded: Sequence[str]) -> tuple[list[Mark], list
 
     Args:
         run: the run.
-        banded: modes that are drawn as bands; if there are many events, only theirs are listed.
+        banded: modes that are drawn as bands; with many events they come first, and of them those that change seldom.
     """
-    for modes in (None, set(banded)):
-        instants: dict[str, tuple[float, dict[str, str]]] = {}
-        for event in run.events:
-            if modes is None or event.mode in modes:
-                changes = instants.setdefault(_told(event.time), (event.time, {}))[1]
-                changes[event.mode.removesuffix(".mode")] = event.after
-        if len(instants) <= _MOST_EVENTS:
-            break
-    listed = dict(list(instants.items())[:_MOST_EVENTS])
-    marks = [(time, ", ".join(f"{mode}: {name}" for mode, name in what.items())) for time, what in listed.values()]
-    rest: dict[str, int] = {}
+    by_mode: dict[str, list[Event]] = {}
     for event in run.events:
-        if event.mode.removesuffix(".mode") not in listed.get(_told(event.time), (0.0, {}))[1]:
-            rest[event.mode] = rest.get(event.mode, 0) + 1
-    counts = ", ".join(f"{mode} {count}\u00d7" for mode, count in rest.items())
-    return marks, [f"Not numbered: {counts}."] if rest else []
+        by_mode.setdefault(event.mode, []).append(event)
+    seen, left = set[str](), dict[str, int]()
+    kept: list[Event] = []
+    for mode, events in sorted(by_mode.items(), key=lambda item: (item[0] not in banded, len(item[1]))):
+        times = seen | {_told(event.time) for event in events}
+        if len(times) <= _MOST_EVENTS:
+            seen = times
+            kept += events
+        else:
+            left[mode] = len(events)
+    instants: dict[str, tuple[float, dict[str, str]]] = {}
+    for event in sorted(kept, key=lambda event: event.time):
+        changes = instants.setdefault(_told(event.time), (event.time, {}))[1]
+        changes[event.mode.removesuffix(".mode")] = event.after
+    marks = [(time, ", ".join(f"{mode}: {name}" for mode, name in what.items())) for time, what in instants.values()]
+    counts = listed([f"{mode} {count}\u00d7" for mode, count in left.items()])
+    return marks, [f"Not numbered: {counts}."] if left else []
+
+
+def listed(names: Sequence[str]) -> str:
+    """Return names as a text; of many only the first, and the number of the others."""
+    shown = [*names[:_MOST_NAMES], *([f"{len(names) - _MOST_NAMES} others"] if len(names) > _MOST_NAMES else [])]
+    return ", ".join(shown)
 
 
 def _told(time: float) -> str:
@@ -204,8 +215,10 @@ def _draw_bands(axes: Any, bands: Sequence[Bands], looks: dict[str, tuple[str, s
 
     made = {n: {"facecolor": c, "hatch": h, "linewidth": 0.0, "edgecolor": "#ffffff"} for n, (c, h) in looks.items()}
     for row, band in enumerate(bands):
-        for begin, end, name in band.spans:
-            axes.barh(row, end - begin, left=begin, height=0.72, **made[name])
+        for name in dict.fromkeys(span[2] for span in band.spans):
+            # One collection for all spans of a name: a chopper has thousands.
+            places = [(begin, end - begin) for begin, end, other in band.spans if other == name]
+            axes.broken_barh(places, (row - 0.36, 0.72), label=name, **made[name])
     axes.set_yticks(np.arange(len(bands)), [band.mode.removesuffix(".mode") for band in bands], fontsize=8)
     axes.set_ylim(len(bands) - 0.5, -0.5)
     axes.grid(visible=False)

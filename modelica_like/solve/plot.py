@@ -11,7 +11,7 @@ import numpy as np
 
 from modelica_like.errors import NetlistError
 from modelica_like.solve.display import QUANTITIES, Display
-from modelica_like.solve.panels import Panel, bands_of, draw_panels, marks_of
+from modelica_like.solve.panels import Panel, bands_of, draw_panels, listed, marks_of
 from modelica_like.solve.signals import Signal, evaluated, named, read_signals
 from modelica_like.solve.style import COLOURS
 from modelica_like.solve.trajectories import Trajectories, matching
@@ -84,7 +84,7 @@ def _panels(
         panels += [(key, signals[k * each : (k + 1) * each]) for k in range(min(count, room))]
         rest = signals[each * room :]
         if rest:
-            left.append(f"{len(rest)} more of {key[0]} ({', '.join(one.name for one in rest)})")
+            left.append(f"{len(rest)} more of {key[0]} ({listed([one.name for one in rest])})")
     return panels, left
 
 
@@ -133,7 +133,7 @@ def picture_bytes(figure: Figure, kind: str, **options: Any) -> bytes:
     return content.getvalue()
 
 
-def chosen(solution: Trajectories, patterns: Sequence[str]) -> list[str]:
+def chosen(solution: Trajectories, patterns: Sequence[str] = ()) -> list[str]:
     """Return the names that match the patterns, or without patterns a choice of a few for a page.
 
     Raises:

@@ -26,6 +26,7 @@ class RecordedVariable:
         description: from its source.
         kind: `output`, `local`, `input`, `discrete`.
         names: of the values of a mode; empty otherwise.
+        hidden: always false: what stands in a file has been declared.
     """
 
     path: str
@@ -33,6 +34,7 @@ class RecordedVariable:
     description: str = ""
     kind: str = "output"
     names: Mapping[int, str] = field(default_factory=dict)
+    hidden: bool = False
 
 
 @dataclass(frozen=True)

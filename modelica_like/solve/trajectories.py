@@ -139,8 +139,9 @@ class Trajectories(Shown, ABC):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Paths of all variables, modes and discrete values."""
-        return (*self.model.position, *self.model.discrete_position)
+        """Paths of all variables, modes and discrete values that somebody has declared."""
+        every = (*self.model.flat_variables, *self.model.flat_discretes)
+        return tuple(one.path for one in every if not one.hidden)
 
     def unit_of(self, name: str) -> str:
         """Return the coherent SI unit of a variable; that of a mode is `1`."""
@@ -163,16 +164,17 @@ class Trajectories(Shown, ABC):
             raise ValueOutOfRange(f"t = {t:g} s is not within the run, {first:g} s to {last:g} s.")
 
     def plot(self, *patterns: str, title: str = "", display: Mapping[str, str] | None = None) -> Figure:
-        """Draw trajectories over time, one panel per unit, with events as dotted lines.
+        """Draw trajectories over time: a panel per quantity, modes as bands, events as numbers.
 
         Args:
-            patterns: names or patterns (`*.w`) of the curves; by default speeds, torques and forces of the parts.
+            patterns: names, patterns (`*.w`) or formulas (`2*pi*motor.w`) of the curves; by default what one usually
+                wants to see: speeds, positions, torques, forces, currents and powers of the parts.
             title: heading; by default the name of the model.
             display: units by path, pattern or quantity, in addition to those of the netlist, such as {"speed": "rpm"}.
 
         Raises:
             UnknownName: nothing matches a pattern.
-            UnitError: a variable cannot be shown in a unit.
+            UnitError: a variable cannot be shown in a unit, or the units in a formula do not fit together.
         """
         return upper("plot")(self, patterns, title=title, display=display)
 

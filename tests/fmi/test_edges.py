@@ -55,7 +55,8 @@ def test_discrete_equations_at_the_edges_of_a_sine(tmp_path, version, kind):
     """Three rises above one quarter, three edges, six changes, and one priority of 100 at 2.6 s."""
     drive = Assembly("counting", parts={"counter": Counter(), "ball": Ball(h=1.0, v=0.0)})
     drive.simulate.update(until=2.9)
-    exported = export_fmu(drive, tmp_path / "counting.fmu", version, check=False)
+    exported = export_fmu(drive, tmp_path / "counting.fmu", version, check=kind == "cs")
+    assert not exported.check.sentence
     run = run_fmu(exported.path, kind=kind, tolerance=1e-9)
     names = ("ups", "both", "changes", "firsts", "latched", "high")
     assert [run.final[f"counter.{name}"] for name in names] == [13, 103, 6, 1, 1, 0]

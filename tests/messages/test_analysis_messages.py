@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from components import ConstantTorque, Inertia
-from modelica_like import build
+from modelica_like import build, open_loop, overlay, simulate
 from modelica_like.analyse.calibration.calibrate import Numbers, OperatingPoints, Trajectories, calibrate
 from modelica_like.analyse.calibration.measurements import read_table
 from modelica_like.analyse.linear.campbell import campbell
@@ -198,6 +198,26 @@ def test_a_table_that_is_none(tmp_path):
         file.write_text(text)
         with pytest.raises(NetlistError) as caught:
             read_table(file)
+        assert str(caught.value) == told
+
+
+def test_pictures_that_cannot_be_drawn(tmp_path):
+    run = simulate(model(), 0.1, points=5)
+    measured = tmp_path / "bench.csv"
+    measured.write_text("time,mass.w [mm]\n0,1\n")
+    for draw, told in (
+        (lambda: run.plot("2*mas.w"), "'2.0 * mas.w': Accelerated has no variable 'mas.w'; did you mean 'mass.w'?"),
+        (lambda: run.plot("mass.w + mass.phi"), "'mass.w + mass.phi' mixes rad/s and rad."),
+        (lambda: overlay({"run": run, "bench": measured}), "mass.w expects rad/s; '0 m' is m."),
+        (lambda: overlay({"bench": measured}, "mass.a"), "bench has no variable 'mass.a'; did you mean 'mass.w'?"),
+        (
+            lambda: open_loop(model(), "mass.w"),
+            "A compiled drive has no loop to open.\nGive the component or the netlist.",
+        ),
+        (lambda: open_loop(Accelerated(), "mass.w"), "Accelerated has no connected signal 'mass.w'."),
+    ):
+        with pytest.raises(ModelicaLikeError) as caught:
+            draw()
         assert str(caught.value) == told
 
 

@@ -157,9 +157,17 @@ def test_curves_keep_both_sides_of_events() -> None:
     for event in run.events:
         assert drawn["times"].count(float(f"{event.time:.9g}")) >= 2
     (panel,) = drawn["panels"]
-    values = np.interp(drawn["times"], run.time, run["clutch.tau"])
+    values = np.interp(drawn["times"], run.time, -run["clutch.tau"])  # it drives where it is negative
     inside = np.diff(drawn["times"], prepend=-1.0) > 0
     assert np.array(panel["curves"][0]["values"])[inside] == pytest.approx(values[inside], rel=1e-3, abs=1.0)
+
+
+def test_curves_are_in_the_units_of_the_netlist_and_may_be_formulas() -> None:
+    run = simulate(EXAMPLES / "launch.toml", points=20)
+    first, second = curves(run, ["engine.w", "clutch.tau*clutch.w_rel"])["panels"]
+    assert (first["title"], second["title"]) == ("speed in rpm", "power in W")
+    assert first["curves"][0]["values"][-1] == pytest.approx(run["engine.w"][-1] * 30 / np.pi, rel=1e-5)
+    assert second["curves"][0]["values"][0] == pytest.approx(run["clutch.loss_power"][0], abs=1e-6)
 
 
 def test_modes_are_bands_without_gaps() -> None:
@@ -204,7 +212,7 @@ def test_all_panels_are_drawn_without_complaint(browser: Any, page: Path, width:
     browser.open(page, width)
     assert browser.complaints == []
     drawn = browser.run(DRAWN)
-    assert len(drawn) == 3
+    assert len(drawn) == 4
     assert min(drawn) > 1000
     assert browser.run("document.documentElement.scrollWidth <= innerWidth"), "nothing is wider than the page"
 

@@ -34,7 +34,7 @@ def test_a_measurement_is_drawn_as_dots_in_the_units_of_the_run(run: Solution, t
     assert np.asarray(dots.get_ydata()) == pytest.approx([0, 3000])
     assert np.asarray(torques.lines[1].get_ydata()) == pytest.approx([80, 90])
     assert [text.get_text() for text in speeds.get_legend().get_texts()] == ["model", "bench"]
-    assert len(bands.patches) == 2
+    assert len(bands.collections) == 2
 
 
 def test_units_may_stand_in_a_second_line_and_brackets_of_places_stay(tmp_path: Path) -> None:

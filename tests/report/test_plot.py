@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from components import Fixed, Inertia, SpringDamper
-from modelica_like import Solution, simulate
+from modelica_like import Solution, build, simulate
 from modelica_like.errors import ModelicaLikeError, NetlistError, UnitError, UnknownName
 from modelica_like.language import Assembly
 from modelica_like.solve.plot import chosen, plot, save_plot
@@ -53,8 +53,9 @@ def test_one_panel_per_quantity_with_bands_and_events(start_up: Solution) -> Non
     assert [line.get_xdata()[0] for line in panels[1].lines[1:]] == [event.time for event in start_up.events]
     assert [text.get_text() for text in panels[0].texts] == ["1"]
     assert "1  0.2 s  clutch: stuck" in [text.get_text() for text in figure.texts]
-    sliding, stuck = (bar.get_bbox().intervalx for bar in panels[-1].patches)
-    assert [*sliding, *stuck] == pytest.approx([0, 0.2, 0.2, start_up.time[-1]])
+    bands = {one.get_label(): one.get_paths()[0].get_extents().intervalx for one in panels[-1].collections}
+    assert bands["backward"] == pytest.approx([0, 0.2])
+    assert bands["stuck"] == pytest.approx([0.2, start_up.time[-1]])
 
 
 def test_what_drives_is_positive_and_says_its_sign(start_up: Solution) -> None:
@@ -127,6 +128,27 @@ def clashes(figure: Figure) -> list[tuple[str, str]]:
 def test_no_label_overlaps_another(drive: str) -> None:
     run = simulate(EXAMPLES / f"{drive}.toml", points=50)
     assert clashes(run.plot()) == []
+
+
+@pytest.mark.slow
+def test_no_label_overlaps_another_in_any_example() -> None:
+    for netlist in sorted(path for kind in ("*", "components/*", "elements/*", "msl/*/*", "dc_machines/*")
+                          for path in EXAMPLES.glob(f"{kind}.toml")):  # fmt: skip
+        model = build(netlist)
+        run = simulate(model, model.settings.get("until", 1.0), points=40)
+        assert clashes(run.plot()) == [], netlist.name
+
+
+def test_a_long_chain_has_a_picture_of_a_page_that_counts_the_rest() -> None:
+    parts = {f"mass{k}": Inertia(J=1, w=float(k), phi=0) for k in range(40)}
+    run = simulate(Assembly("many", parts=parts, free=[f"mass{k}.flange_{e}" for k in range(40) for e in "ab"]), 1.0)
+    figure = run.plot()
+    assert figure.get_size_inches()[1] < 8
+    said = " ".join(text.get_text() for text in figure.texts)
+    assert "Not drawn: 27 more of speed (mass13.w, " in said
+    assert "15 others)" in said
+    every = {line.get_label() for axes in run.plot("*.w").axes for line in axes.lines}
+    assert every == {f"mass{k}.w" for k in range(40)}
 
 
 def test_nothing_is_left_out_without_a_word() -> None:

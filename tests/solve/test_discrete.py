@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from modelica_like import Assembly, build, sensitivities, simulate
-from modelica_like.errors import Chattering, LimitPassed
+from modelica_like.errors import Chattering, LimitPassed, NoGradient
 from modelica_like.language import (
     Component,
     Discrete,
@@ -42,6 +42,7 @@ from modelica_like.language import (
     signal_in,
     signal_out,
     sin,
+    terminal,
     var,
     when,
 )
@@ -315,6 +316,7 @@ def test_what_does_not_settle_is_told(solver):
 def test_discrete_parts_in_an_assembly_have_their_paths(solver):
     found = run(Assembly("two", parts={"a": Ball(h=1.0, v=0.0), "b": Ball(h=2.0, v=0.0)}), 1.0, solver)
     assert (found.final["a.n"], found.final["b.n"]) == (1, 1)
+    assert sorted(found.names) == sorted(f"{part}.{name}" for part in "ab" for name in ("h", "v", "y", "n", "top"))
     assert times(found, "b.relation[1]")[0] == pytest.approx(np.sqrt(4 / 9.81), abs=CLOSE)
 
 
@@ -489,3 +491,82 @@ def test_friction_by_boolean_equations(solver):
     assert found.time[changes] == pytest.approx([leaves, low], abs=CLOSE)
     assert found["mode"][[0, changes[0] + 1, -1]].tolist() == [0, 1, -1]
     assert found.final["v"] == pytest.approx(speed(4.0, low, -2), abs=1e-8)
+
+
+class Ending(Component):
+    """Tells at the end how far it got, and starts anew."""
+
+    x: Variable = var("m", "way", default=0)
+    v: Parameter = param("m/s", "speed", default=2)
+    far: Discrete = discrete("m", "way at the end", start=-1.0)
+    n: Discrete = integer("ends")
+
+    def equations(self) -> Equations:
+        yield der(self.x) == self.v
+
+    def events(self) -> Events:
+        yield when(terminal(), {self.far: self.x, self.x: 0, self.n: pre(self.n) + 1})
+
+
+def test_the_end_is_an_event(solver):
+    found = run(Ending(), 1.5, solver)
+    assert [found.final[name] for name in ("far", "x", "n")] == pytest.approx([3.0, 0.0, 1.0], abs=CLOSE)
+    assert found["far"][-2] == -1.0
+    assert found["x"][-2] == pytest.approx(3.0, abs=CLOSE)
+    with pytest.raises(NoGradient, match="No gradient: Ending changes at the end of a run"):
+        sensitivities(build(Ending()), "x", "v", until=1.0)
+
+
+class Relay(Component):
+    """A mode that follows a Boolean variable, and one that counts its edges."""
+
+    x: Variable = var("1", "swings")
+    f: Parameter = param("Hz", "frequency", default=1.0)
+    on: Discrete = boolean("positive half wave")
+    contact = Mode("open", "closed")
+    tooth = Mode("even", "odd")
+    closed_for: Variable = var("s", "time closed", default=0)
+
+    def equations(self) -> Equations:
+        yield self.x == sin(2 * np.pi * self.f * self.time)
+        yield self.on == (self.x > 0.5)
+        yield der(self.closed_for) == self.contact.choose(open=0, closed=1)
+
+    def events(self) -> Events:
+        yield self.contact.go("open", "closed", when=self.on)
+        yield self.contact.go("closed", "open", when=negate(self.on))
+        yield self.tooth.go("even", "odd", when=self.on, once=True)
+        yield self.tooth.go("odd", "even", when=self.on, once=True)
+
+
+def test_modes_follow_boolean_variables(solver):
+    found = run(Relay(), 2.9, solver)
+    assert found.final["closed_for"] == pytest.approx(3 / 3, abs=1e-8)
+    assert times(found, "contact") == pytest.approx([k + s / 12 for k in range(3) for s in (1, 5)], abs=CLOSE)
+    assert times(found, "tooth") == pytest.approx([k + 1 / 12 for k in range(3)], abs=CLOSE)
+
+
+class Measured(Component):
+    """A machine at a voltage that swings; its speed is only sampled."""
+
+    A: Parameter = param("V", "voltage", default=5.0)
+    f: Parameter = param("rad/s", "frequency", default=3.0)
+    T: Parameter = param("s", "period", default=1e-2)
+    v: Output = signal_out("V", "voltage")
+    held: Discrete = discrete("rad/s", "speed at the last tick")
+    machine = Machine()
+
+    def equations(self) -> Equations:
+        yield self.v == self.A * (1 + sin(self.f * self.time))
+        yield connect(self.v, self.machine.u)
+
+    def events(self) -> Events:
+        yield when(clock(self.T), {self.held: self.machine.w})
+
+
+def test_ticks_that_move_nothing_do_not_begin_the_steps_anew(solver):
+    found = simulate(Measured(), 3.0, solver=solver)
+    assert len(found.events) == 301
+    assert found.final["held"] == pytest.approx(found.final["machine.w"], rel=1e-12)
+    if solver == "native":  # IDAS begins anew at every event
+        assert found.statistics.steps < 1.2 * 301

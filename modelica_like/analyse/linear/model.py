@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 import casadi as ca
 import numpy as np
 
-from modelica_like.analyse.linear.pictures import bode, nyquist
+from modelica_like.analyse.linear.pictures import bode, mode_name, nyquist
 from modelica_like.compile.compiled import CompiledDae, Vector
 from modelica_like.errors import extra_module
 from modelica_like.initialize import Point, variable_slopes
 from modelica_like.initialize.slopes import implicit_slopes, nodes_of
-from modelica_like.solve.style import COLOURS, picture
+from modelica_like.solve.style import COLOURS, picture, text_width
 from modelica_like.upper import Shown
 
 if TYPE_CHECKING:
@@ -24,6 +24,8 @@ _STILL = 1e-9
 """Eigenvalues below this share of the largest are zero: motions without a restoring force."""
 _DEFECTIVE = 1e-13
 _SHOWN = 12
+_ROOM = 7.0
+"""Inches for names side by side."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -235,20 +237,27 @@ class Modes(Shown, Sequence[Mode]):
         """Draw variables along the drive in the first oscillating modes, at the time of the largest deviation.
 
         Args:
-            names: variables of one unit, such as speeds.
+            names: variables, such as speeds and velocities; the largest of each unit is one.
             count: largest number of modes.
         """
-        chosen = [k for k, mode in enumerate(self.modes) if mode.oscillates][:count]
-        number = max(len(chosen), 1)
-        with picture(f"Modes of {self.linear.model.name}", number, 0.8 + 1.4 * number) as (figure, rows):
+        all_modes = [k for k, mode in enumerate(self.modes) if mode.oscillates]
+        chosen, rest = all_modes[:count], all_modes[count:]
+        number, units = max(len(chosen), 1), np.array([str(self.linear.model.units[name]) for name in names])
+        below = [[f"Not drawn: {len(rest)} faster modes."]] if rest else []
+        with picture(f"Modes of {self.linear.model.name}", number, 0.9 + 1.3 * number, below=below) as (figure, rows):
             for row, k in enumerate(chosen):
                 shape, axes, mode = self.shape(k, names), rows[row], self.modes[k]
                 values = np.real(shape / (shape[np.argmax(np.abs(shape))] or 1.0))
+                for unit in dict.fromkeys(units):
+                    values[units == unit] /= np.max(np.abs(values[units == unit])) or 1.0
                 axes.axhline(0.0, color="#666666", linewidth=0.8)
                 axes.plot(range(len(names)), values, "o-", color=COLOURS[row % len(COLOURS)])
                 axes.set(ylim=(-1.2, 1.2), ylabel="relative")
-                axes.set_title(f"{mode.frequency:.4g} Hz, damping {mode.damping:.3g}", loc="left", fontsize=9)
-            rows[-1].set_xticks(range(len(names)), names)
+                title = f"{mode.frequency:.4g} Hz, damping {mode.damping:.3g}: {mode_name(mode)}"
+                axes.set_title(title, loc="left", fontsize=9)
+            long = sum(text_width(name, 9.0) + 0.15 for name in names) > _ROOM
+            turned = {"rotation": 30, "ha": "right", "rotation_mode": "anchor"} if long else {}
+            rows[-1].set_xticks(range(len(names)), names, **turned)
         return figure
 
     def __str__(self) -> str:

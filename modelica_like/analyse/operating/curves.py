@@ -11,8 +11,9 @@ import numpy as np
 from modelica_like.analyse.operating.steady import OperatingPoint, steady
 from modelica_like.errors import InitializationError, UnknownName, ValueOutOfRange, did_you_mean
 from modelica_like.simulation import Model, build
+from modelica_like.solve.display import Display
 from modelica_like.solve.solution import Solution
-from modelica_like.solve.style import COLOURS, picture, with_unit
+from modelica_like.solve.style import COLOURS, picture, text_width, with_unit
 from modelica_like.upper import Shown
 
 if TYPE_CHECKING:
@@ -39,19 +40,33 @@ class Curves(Shown):
             return np.array([sum(one.losses.values()) for one in self.points])
         return np.array([one[path] for one in self.points])
 
-    def plot(self, *paths: str, over: str = "") -> Figure:
+    def plot(self, *paths: str, over: str = "", display: Mapping[str, str] | None = None) -> Figure:
         """Draw columns, one panel each.
 
         Args:
             paths: columns to draw.
             over: the horizontal axis; by default the varied quantity.
+            display: units by path, pattern or quantity, in addition to those of the netlist.
+
+        Raises:
+            UnknownName: there is no such column.
+            UnitError: it cannot be shown in a unit.
         """
-        over, number = over or self.over, max(len(paths), 1)
-        with picture(self.points[0].model.name, number, 0.8 + 1.9 * number) as (figure, rows):
+        over, number, shown = over or self.over, max(len(paths), 1), Display(self.points[0].model, display)
+
+        def column(path: str) -> tuple[Any, str]:
+            own = self.unit(path)
+            unit = shown.of(path) if path in shown else shown.of_quantity(own)
+            return shown.converted(self[path], own, unit), with_unit(path, unit)
+
+        along, label = column(over)
+        with picture(self.points[0].model.name, number, 0.8 + 1.7 * number) as (figure, rows):
             for k, path in enumerate(paths):
-                rows[k].plot(self[over], self[path], color=COLOURS[k % len(COLOURS)])
-                rows[k].set_ylabel(with_unit(path, self.unit(path)))
-            rows[-1].set_xlabel(with_unit(over, self.unit(over)))
+                values, name = column(path)
+                rows[k].plot(along, values, color=COLOURS[k % len(COLOURS)])
+                rows[k].set_ylabel(name if text_width(name, 9.0) < 1.5 else name.replace(" in ", "\nin "))
+            rows[-1].set_xlabel(label)
+            figure.align_ylabels(rows)
         return figure
 
     def unit(self, path: str) -> str:

@@ -22,8 +22,8 @@ from modelica_like.analyse.replay.step import CLOSE, Step, shortened, stuck, try
 from modelica_like.analyse.replay.steps import StepFunctions, Tolerances
 from modelica_like.analyse.replay.when import Coincidence, event_time
 from modelica_like.compile.buffers import Vector
-from modelica_like.compile.compiled import CompiledDae
-from modelica_like.errors import LanguageError
+from modelica_like.compile.compiled import TERMINAL, CompiledDae
+from modelica_like.errors import LanguageError, NoGradient
 from modelica_like.initialize import Point, StartKind, holding, initialize
 from modelica_like.initialize.slopes import Sizes
 from modelica_like.solve.recorder import Event, Segment
@@ -212,7 +212,7 @@ def replay(
         tolerances: of the steps.
 
     Raises:
-        NoGradient: an event of the run has no derivative.
+        NoGradient: an event of the run has no derivative, or its end is an event.
         StepFailed: a step did not converge.
         LanguageError: the model has no states.
     """
@@ -222,6 +222,8 @@ def replay(
             f"{model.name} has no states, so there is no run to differentiate.",
             advice="Compare runs with other parameter values instead.",
         )
+    if TERMINAL in model.discrete_position:
+        raise NoGradient(f"No gradient: {model.name} changes at the end of a run, by terminal().")
     integrands = ca.SX(0, 1) if quadratures is None else quadratures
     chain = Replay(StepFunctions(model, integrands, name, tolerances or Tolerances()))
     maker = _Maker(solution, chain, stops)

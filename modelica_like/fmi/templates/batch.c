@@ -220,7 +220,7 @@ EXPORTED int64_t native_batch(const Model *m, const NativeBatch *asked) {
     if (begin_batch(&b, m))
         for (run = 0; run < asked->n_runs && !*asked->stop; run++) {
             begin_readings(&b, run);
-            asked->failed[run] = !start_run(&b, run) || !run_to_end(&b);
+            asked->failed[run] = !start_run(&b, run) || !run_to_end(&b) || finish(b.c) != RESULT_OK;
             if (!asked->failed[run] && !*asked->stop) read_end(&b);
             if (*asked->stop) break;
         }

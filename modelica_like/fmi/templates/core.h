@@ -245,6 +245,7 @@ int search_events(Instance *c);
 typedef enum { REACHED, AT_EVENT, FAILED } Arrival;
 Arrival integrate_to(Instance *c, double target, int stop_at_events);
 Result handle_event(Instance *c);
+Result finish(Instance *c);
 Result check_whole(Instance *c, double size);
 Result check_step(Instance *c, double point, double size, double *target);
 Result move_to(Instance *c, double t);

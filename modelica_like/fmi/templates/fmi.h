@@ -113,7 +113,8 @@ Status FMI(ExitInitializationMode)(void *instance) {
     return FMI(OK);
 }
 
-CHANGE_PHASE(Terminate, PHASE_EVENT | PHASE_CONTINUOUS | PHASE_STEP | PHASE_FAILED, PHASE_TERMINATED, 0, "")
+CHANGE_PHASE(Terminate, PHASE_EVENT | PHASE_CONTINUOUS | PHASE_STEP | PHASE_FAILED, PHASE_TERMINATED,
+    c->state.phase != PHASE_FAILED && finish(c) != RESULT_OK, ": its last event failed.")
 
 Status FMI(Reset)(void *instance) {
     ENTER(Reset, ANY_PHASE);

@@ -95,19 +95,35 @@ Result take_changes(Instance *c, int *event) {
 static Result pass_event(Instance *c) {
     State *s = &c->state;
     unsigned char *wanting = nothing_wanting(c);
-    int located = s->event_pending;
+    int located = s->event_pending, ticks = c->model->n_moments > 0 && !located;
+    size_t size = (size_t)c->model->n_x * sizeof(double);
+    double *x = c->work.first, *rates = c->work.first_rates, step = s->step;
     if (located) memcpy(wanting, c->wanting, c->model->n_transitions);
     leave_piece(c);
     s->at_event = 0;
     s->step = 0;
     s->z_valid = 0;
-    if (settle(c) != RESULT_OK || iterate_events(c, wanting, located) != RESULT_OK) return RESULT_ERROR;
+    if (settle(c) != RESULT_OK) return RESULT_ERROR;
+    if (ticks) evaluate_now(c, &c->model->tapes.rates, rates);
+    memcpy(x, c->x, size);
+    if (iterate_events(c, wanting, located) != RESULT_OK) return RESULT_ERROR;
     s->z_valid = 1;
+    if (!ticks || memcmp(x, c->x, size) != 0) return RESULT_OK;
+    evaluate_now(c, &c->model->tapes.rates, c->work.rhs);
+    if (memcmp(rates, c->work.rhs, size) == 0) s->step = step; /* a tick without effect on what moves */
     return RESULT_OK;
 }
 
 /* Fires what was located at the present point, or what wants to fire. */
 Result handle_event(Instance *c) { return gradient_through(c, pass_event, 0); }
+
+/* The end of a run is an event where discrete equations ask for it. */
+Result finish(Instance *c) {
+    int terminal = c->model->settings->terminal;
+    if (terminal < 0 || c->d[terminal] != 0) return RESULT_OK;
+    c->d[terminal] = 1;
+    return handle_event(c);
+}
 
 int is_due(Instance *c) { return c->model->n_moments > 0 && find_wanting(c, nothing_wanting(c), 0); }
 

@@ -97,7 +97,8 @@ typedef struct {
 } StartRow;
 typedef struct {
     int n_d, n_y, steady, rates_depend_on_time;
-    int implicit_linear, unused; /* the implicit equations are linear in z */
+    int implicit_linear; /* the implicit equations are linear in z */
+    int terminal;        /* entry of d that becomes 1 at the end of a run, or -1 */
     double absolute_to_relative, default_tolerance;
     double fixed_step; /* 0: as accuracy asks for */
 } Settings;

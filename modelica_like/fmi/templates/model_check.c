@@ -60,6 +60,7 @@ static int check_target(const Model *m, int kind, int index, int target) {
 }
 
 static int check_events(const Model *m, char *message) {
+    if (m->settings->terminal < -1 || m->settings->terminal >= m->n_modes) return damaged(message, "settings.terminal");
     for (int k = 0; k < m->n_modes; k++)
         if (m->modes[k].n_names > m->n_mode_names - m->modes[k].first_name) return damaged(message, "modes.n_names");
     for (int k = 0; k < m->n_transitions; k++)

@@ -236,6 +236,15 @@ static double pause_after(Instance *c) {
     return c->state.n_steps >= ((Native *)c->environment)->pause ? c->state.t : INFINITY;
 }
 
+static int last_instant(Native *n, NativeRun *r, double width) {
+    int terminal = n->c->model->settings->terminal, result;
+    if (terminal < 0 || n->c->d[terminal] != 0) return NATIVE_OK;
+    n->c->d[terminal] = 1;
+    result = instant(n, r, width);
+    if (result == NATIVE_MORE) n->c->d[terminal] = 0;
+    return result;
+}
+
 static int run_on(Native *n, double end, int64_t results, NativeRun *r) {
     State *s = &n->c->state;
     double width = (end - r->begin) / (double)results;
@@ -258,7 +267,7 @@ static int run_on(Native *n, double end, int64_t results, NativeRun *r) {
         if (s->t < t) return NATIVE_PAUSED;
         if (write_point(n, r) != NATIVE_OK) return NATIVE_FAILED;
     }
-    return NATIVE_OK;
+    return last_instant(n, r, width);
 }
 
 /* Runs to `end`, with results at `results` equal distances. All counts of `run` are zero at first. */

@@ -8,9 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from modelica_like.solve.display import Display
 from modelica_like.solve.panels import mode_spans
-from modelica_like.solve.plot import chosen
-from modelica_like.solve.plot import quantity as quantity_of
+from modelica_like.solve.plot import chosen, quantity_of
+from modelica_like.solve.signals import evaluated, named, read_signals
+from modelica_like.solve.style import with_unit
 from modelica_like.solve.trajectories import Trajectories
 
 _POINTS = 1200
@@ -23,18 +25,22 @@ def curves(run: Trajectories, patterns: Sequence[str] = ()) -> dict[str, Any]:
 
     Args:
         run: the run.
-        patterns: of the curves; by default speeds, torques and forces of the parts.
+        patterns: names, patterns or formulas of the curves; by default speeds, torques and forces of the parts.
 
     Raises:
         UnknownName: nothing matches a pattern.
+        UnitError: the units in a formula do not fit together.
     """
-    names = [name for name in chosen(run, patterns) if name in run.model.position]
-    rows = _thinned(run)
+    signals = read_signals(run.model, patterns) if patterns else named(run.model, chosen(run))
+    signals = [one for one in signals if one.name not in run.model.discrete_position]
+    rows, shown, curve = _thinned(run), Display(run.model), evaluated(run, signals)
     panels: dict[str, dict[str, Any]] = {}
-    for name, values in run.together(*names).items():
-        unit = run.unit_of(name)
-        panel = panels.setdefault(unit, {"title": quantity_of(unit), "unit": unit, "curves": []})
-        panel["curves"].append({"name": name, "values": [float(f"{value:.6g}") for value in values[rows]]})
+    for one in signals:
+        unit = one.shown_in(shown)
+        title = with_unit(quantity_of(one), unit)
+        values = one.driving * shown.converted(curve[one.name][rows], one.unit, unit)
+        told = {"name": one.label, "path": one.name if one.plain else "", "values": [float(f"{v:.6g}") for v in values]}
+        panels.setdefault(title, {"title": title, "curves": []})["curves"].append(told)
     return {
         "times": [float(f"{t:.9g}") for t in run.time[rows]],
         "panels": list(panels.values()),

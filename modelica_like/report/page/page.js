@@ -94,7 +94,7 @@ class Curves extends Panel {
       this.legend.append(element("span", {}, name, curve.name, " ", output));
       return output;
     });
-    this.legend.prepend(element("b", {}, `${panel.title} in ${panel.unit}`));
+    this.legend.prepend(element("b", {}, panel.title));
   }
 
   inside(c, bottom) {

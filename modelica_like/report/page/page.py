@@ -58,15 +58,15 @@ def report(drive: Component | None, run: Trajectories, *, show: Sequence[str] = 
     Args:
         drive: the drive; None if only results are known, those of an FMU or a table.
         run: its run.
-        show: patterns of the curves; by default speeds, torques and forces of the parts.
+        show: names, patterns or formulas of the curves; by default speeds, torques and forces of the parts.
 
     Raises:
         UnknownName: nothing matches a pattern.
     """
     folder, drawn = Path(__file__).parent, curves(run, show)
     # Of the parts that are not inside of others, the last one is closest to the load.
-    ends = [min(reversed([one["name"] for one in panel["curves"]]), key=lambda name: name.count("."))
-            for panel in drawn["panels"]]  # fmt: skip
+    paths = ([one["path"] for one in panel["curves"] if one["path"]] for panel in drawn["panels"])
+    ends = [min(reversed(some), key=lambda path: path.count(".")) for some in paths if some]
     sections = [
         ("Schematic", f'<div class="wide">{schematic(drive, background=False)}</div>' if drive else ""),
         ("What happens", _happens(drive, run)),
