@@ -137,7 +137,7 @@ class _Builder:
             driven = {
                 end.rpartition(".")[2] for wire in self.wires for end in wire.ends if end.rpartition(".")[0] == name
             }
-            return library_part(self.instance, name, member, part, given, driven, self.notes)
+            return library_part(self.instance, name, member, part, given, driven, self.notes, self.statements.initial)
         if isinstance(part, str):
             kind = connector_type(part)
             if kind is None:

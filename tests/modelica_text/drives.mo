@@ -111,6 +111,15 @@ package Drives "Texts that use every construct that is read"
     Real energy = sum(0.5*load[i].J*load[i].w^2 for i in 1:size(load, 1)) + 0.5*k.c*k.phi_rel^2;
   end Rearranged;
 
+  model Accelerated "starts with an acceleration"
+    Inertia mass(J = 2, w(fixed = true), a(fixed = true, start = 3));
+    Rotational.Components.Spring spring(c = 60);
+    Fixed fixed;
+  equation
+    connect(fixed.flange, spring.flange_a);
+    connect(spring.flange_b, mass.flange_a);
+  end Accelerated;
+
   partial model Shaft
     extends Rotational.Interfaces.PartialTwoFlanges;
     SI.Angle phi(start = 0);

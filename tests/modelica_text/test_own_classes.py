@@ -8,6 +8,8 @@ import pytest
 from scipy.optimize import brentq
 
 from modelica_like import build, export_fmu, load, simulate
+from modelica_like.errors import ModelicaTextError
+from modelica_like.modelica_text.netlist_form import netlist_text
 from modelica_like.netlist import loads
 
 DRIVES = Path(__file__).with_name("drives.mo")
@@ -105,6 +107,13 @@ def test_a_redeclared_part_and_what_follows_it() -> None:
     assert result["k.phi_rel"] == pytest.approx(x, abs=1e-8)
     speed = result["k.w_rel"]
     assert result["energy"] == pytest.approx(0.5 * speed**2 + 25 * x**2, abs=1e-8)
+
+
+def test_an_acceleration_at_the_start_is_an_initial_equation() -> None:
+    result = run("Accelerated", 1.0)  # 2·3 = -60·phi
+    assert result["mass.phi"] == pytest.approx(-0.1 * np.cos(np.sqrt(30) * result.time), abs=1e-8)
+    with pytest.raises(ModelicaTextError, match="Accelerated has equations of its own"):
+        netlist_text(drive("Accelerated"), DRIVES.parent, [])
 
 
 def test_a_block_between_signals() -> None:
