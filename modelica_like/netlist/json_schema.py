@@ -108,6 +108,7 @@ def _others() -> list[dict[str, Any]]:
     known = {
         r"^[\w.]+:\w+$": "class of a Python module",
         r"\.toml$": "another netlist",
+        r"\.mo(:[\w.]+)?$": "class of a Modelica text",
         f"^{FMU_PART}$": "FMU, coupled by its inputs and outputs; run by `modelica-like cosim`",
     }
     return [
