@@ -18,6 +18,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
+from modelica_like import schematic
 from modelica_like.language import Component
 from modelica_like.solve.plot import picture_bytes
 from modelica_like.writing import write_text
@@ -69,7 +70,7 @@ def _data(shown: Any, count: int) -> dict[str, Any]:
             "text/plain": ["<Figure>"],
         }
     elif isinstance(shown, Component):
-        data = {"image/svg+xml": shown._repr_svg_().splitlines(keepends=True), "text/plain": [type(shown).__name__]}
+        data = {"image/svg+xml": schematic(shown).splitlines(keepends=True), "text/plain": [type(shown).__name__]}
     return {"data": data, "execution_count": count, "metadata": {}, "output_type": "execute_result"}
 
 

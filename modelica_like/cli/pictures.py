@@ -43,13 +43,14 @@ def report(
     path = output or Path(f"{source.stem}.html")
     with told(debug, files=[path]):
         from modelica_like.cosimulation.files import describes_system
+        from modelica_like.netlist.read import is_modelica
         from modelica_like.report.page import save_report
         from modelica_like.report.progress import Bar
         from modelica_like.report.sources import trajectories
         from modelica_like.simulation import build, seconds, simulate
         from modelica_like.solve.signals import read_signals
 
-        if source.suffix.lower() != ".toml" or describes_system(source):
+        if not is_modelica(source) and (source.suffix.lower() != ".toml" or describes_system(source)):
             if assignments:
                 raise NetlistError(f"--set changes netlists; '{source.name}' is none.")
             save_report(None, trajectories(source, seconds(until) if until else None), path, show=show or ())

@@ -28,10 +28,12 @@ def describe(
     """
     with told(debug, json=json) as page:
         from modelica_like.netlist import find_type, load
+        from modelica_like.netlist.read import is_modelica
         from modelica_like.report.types import describe as described
         from modelica_like.report.types import describe_netlist
 
-        page.print(describe_netlist(load(kind)) if kind.endswith(".toml") else described(find_type(kind)))
+        is_netlist = kind.endswith(".toml") or is_modelica(kind)
+        page.print(describe_netlist(load(kind)) if is_netlist else described(find_type(kind)))
 
 
 def library(

@@ -10,7 +10,6 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
-from modelica_like.analyse.linear.model import Modes
 from modelica_like.draw.diagram import Notes, diagram
 from modelica_like.draw.running import energy_notes, running
 from modelica_like.draw.shapes import shapes
@@ -24,6 +23,8 @@ from modelica_like.writing import check_writable, write_bytes
 
 if TYPE_CHECKING:
     from reportlab.graphics.shapes import Drawing
+
+    from modelica_like.analyse.linear.model import Modes
 
 _PACKAGES = {".pdf": "svglib", ".png": "resvg_py"}
 FORMATS = (".pdf", ".png", ".svg")

@@ -5,15 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from modelica_like.analyse.linear.model import Mode, Modes
 from modelica_like.draw.diagram import Port
 from modelica_like.draw.labels import VALUE, text_width
 from modelica_like.draw.running import path_of, used_connector
 from modelica_like.draw.sheet import Line, Placed, Point, Sheet
 from modelica_like.language.icon import Stroke
+
+if TYPE_CHECKING:
+    from modelica_like.analyse.linear.model import Mode, Modes
 
 _MOTIONS = ("rad", "m")
 """Units of what moves."""

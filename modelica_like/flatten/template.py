@@ -224,29 +224,16 @@ def _structural_key(component: Component) -> tuple[Any, ...]:
 
 def _build(component: Component) -> Template:
     kind = type(component).__name__
-    statements = [
-        as_statement(item, source, kind) for item, source in located(component.equations(), f"{kind}.equations()")
-    ]
+    equations, determined, initial, wiring = _statements(component)
     events = [as_event(item, source, kind) for item, source in located(component.events(), f"{kind}.events()")]
-    equations = [s for s in statements if isinstance(s, Equation) and not is_discrete(s)]
-    equations += _constants(component)
-    initial = [
-        as_equation(item, source, kind)
-        for item, source in located(component.initial_equations(), f"{kind}.initial_equations()")
-    ]
-    wiring = tuple(s for s in statements if isinstance(s, Connection | FreeEnd))
-    joined = {name for one in wiring if isinstance(one, Connection) for name in taken(component, one)}
-    check_balance(component, equations, joined)
     starts = [InitialResidual(component, f"initial[{k}]") for k in range(1, len(initial) + 1)]
     residuals = [between_events(e.left - e.right) for e in equations]
     sources = tuple(e.source for e in (*equations, *initial))
     residuals += [one - (e.left - e.right) for one, e in zip(starts, initial, strict=True)]
     holds, hold_terms = hold_forms(component, residuals)
     energy, energy_terms = Names(component), _energy_terms(component, wiring)
-    discrete = DiscreteEquations(
-        component, [s for s in statements if isinstance(s, Equation) and is_discrete(s)], events,
-        [*zip(residuals, sources, strict=True), *((e, NOWHERE) for e in energy_terms)],
-    )  # fmt: skip
+    others = [*zip(residuals, sources, strict=True), *((term, NOWHERE) for term in energy_terms)]
+    discrete = DiscreteEquations(component, determined, events, others)
     checked = [*equations, *initial], discrete.events, discrete.updates
     inferred = check_units(component, *checked) if component.units_checked else {}
     changes = _Changes(component, discrete)
@@ -281,6 +268,23 @@ def _build(component: Component) -> Template:
         connections=wiring,
         inferred=inferred,
     )
+
+
+def _statements(
+    component: Component,
+) -> tuple[list[Equation], list[Equation], list[Equation], tuple[Connection | FreeEnd, ...]]:
+    """Return equations, those of discrete variables, those at the start, and connections, with their number checked."""
+    kind = type(component).__name__
+    written = located(component.equations(), f"{kind}.equations()")
+    statements = [as_statement(item, source, kind) for item, source in written]
+    every = [s for s in statements if isinstance(s, Equation)]
+    equations = [s for s in every if not is_discrete(s)] + _constants(component)
+    at_start = located(component.initial_equations(), f"{kind}.initial_equations()")
+    initial = [as_equation(item, source, kind) for item, source in at_start]
+    wiring = tuple(s for s in statements if isinstance(s, Connection | FreeEnd))
+    joined = {name for one in wiring if isinstance(one, Connection) for name in taken(component, one)}
+    check_balance(component, equations, joined)
+    return equations, [s for s in every if is_discrete(s)], initial, wiring
 
 
 def _constants(component: Component) -> list[Equation]:

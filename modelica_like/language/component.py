@@ -9,7 +9,7 @@ from types import MappingProxyType
 from typing import Any, ClassVar, Self, TypeVar, cast, dataclass_transform
 
 from modelica_like.errors import DuplicateName, LanguageError, ModelicaLikeError, NetlistError, Source
-from modelica_like.language.declared import Connector, Declared, unknown
+from modelica_like.language.declared import Connector, Declared, annotated, unknown
 from modelica_like.language.equation import Equations
 from modelica_like.language.expr import TIME, Expr
 from modelica_like.language.fields import Discrete, Field, Input, Output, Parameter, Value, param, require_identifier
@@ -50,7 +50,7 @@ class Component(Declared):
         super().__init_subclass__(**options)
         cls._partial = partial
         own = {name: value for name, value in vars(cls).items() if not name.startswith("_")}
-        hints = {name: str(text) for name, text in _annotated(cls).items() if not name.startswith("_")}
+        hints = {name: str(text) for name, text in annotated(cls).items() if not name.startswith("_")}
         annotations = [name for name, text in hints.items() if not text.startswith(("ClassVar", "typing.ClassVar"))]
         # A class may extend several bases, as in Modelica: declarations are collected along all ancestors.
         ancestors = [base for base in reversed(cls.__mro__[1:]) if issubclass(base, Component)]
@@ -187,10 +187,9 @@ class Component(Declared):
             return
         if type(value) is int and abs(value) > _MOST:  # it may be a number of parts to create
             raise NetlistError(f"{cls.__name__}.{name} is larger than {_MOST}; no drive has that many parts.")
-        hint = next(str(_annotated(base)[name]) for base in cls.__mro__ if name in _annotated(base))
-        if hint.startswith("Literal[") and value not in (choices := hint[9:-2].split("', '")):
+        default, hint = cls._structural[name], cls._hint(name)
+        if (choices := cls.choices(name)) and value not in choices:
             raise NetlistError(f"{cls.__name__}.{name} = {value!r} must be {' or '.join(choices)}.")
-        default: Any = cls._structural[name]
         wanted: Any = next((k for k in _PLAIN if hint == k.__name__), object) if default is REQUIRED else type(default)
         fits = isinstance(value, wanted) and isinstance(value, bool) == (wanted is bool)
         if wanted in _PLAIN and not fits and not (wanted is float and type(value) is int):
@@ -387,10 +386,6 @@ def _is_part(value: object) -> bool:
         elements = cast("list[object]", value)
         return bool(elements) and all(isinstance(element, Component) for element in elements)
     return isinstance(value, Component)
-
-
-def _annotated(cls: type) -> Mapping[str, Any]:
-    return vars(cls).get("__annotations__", {})
 
 
 def _of_kind(cls: type, kind: type[_Kind]) -> dict[str, _Kind]:

@@ -13,6 +13,11 @@ from modelica_like.language.fields import Field
 from modelica_like.language.icon import Stroke
 
 
+def annotated(cls: type) -> Mapping[str, Any]:
+    """Return the annotations in the body of a class."""
+    return vars(cls).get("__annotations__", {})
+
+
 class Declared:
     """An object with declared fields, an owner and a name there."""
 
@@ -25,6 +30,15 @@ class Declared:
         super().__init_subclass__(**options)
         lineage = reversed(cls.__mro__)
         cls._class_fields = {name: f for base in lineage for name, f in vars(base).items() if isinstance(f, Field)}
+
+    @classmethod
+    def _hint(cls, name: str) -> str:
+        return next(str(annotated(base)[name]) for base in cls.__mro__ if name in annotated(base))
+
+    @classmethod
+    def choices(cls, name: str) -> list[str]:
+        """Return the texts that a structural field can be; empty if it can be any."""
+        return hint[9:-2].split("', '") if (hint := cls._hint(name)).startswith("Literal[") else []
 
     @property
     def fields(self) -> dict[str, Field]:

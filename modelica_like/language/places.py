@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import ast
 import inspect
 import linecache
 from collections.abc import Iterable, Iterator
 from itertools import islice
 from pathlib import Path
+from textwrap import dedent
 from tokenize import COMMENT, TokenError, generate_tokens
 from types import CodeType, GeneratorType
 from typing import Any, cast
@@ -139,3 +141,23 @@ def _without_comments(lines: list[str]) -> str:
     except (TokenError, SyntaxError):
         pass
     return " ".join(kept)
+
+
+def texts_of_fields(kind: type) -> dict[str, str]:
+    """Return the texts below the annotated fields in the bodies of a component class and its bases."""
+    found: dict[str, str] = {}
+    for base in reversed(kind.__mro__):
+        if not (base is object or base.__module__.startswith("modelica_like.language")):
+            body = ast.parse(dedent(inspect.getsource(base))).body[0]
+            assert isinstance(body, ast.ClassDef)
+            for field, below in zip(body.body, body.body[1:], strict=False):
+                if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name):
+                    found[field.target.id] = _text_of(below)
+    return found
+
+
+def _text_of(statement: ast.stmt) -> str:
+    """Return the text of a statement that is a text."""
+    value = statement.value if isinstance(statement, ast.Expr) else None
+    words = value.value if isinstance(value, ast.Constant) else ""
+    return inspect.cleandoc(words) if isinstance(words, str) else ""

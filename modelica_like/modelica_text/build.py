@@ -137,7 +137,7 @@ class _Builder:
             driven = {
                 end.rpartition(".")[2] for wire in self.wires for end in wire.ends if end.rpartition(".")[0] == name
             }
-            return library_part(self.instance, name, member, part, given, driven, self.notes)
+            return library_part(self.instance, name, member, part, given, driven, self.notes, self.statements.initial)
         if isinstance(part, str):
             kind = connector_type(part)
             if kind is None:
@@ -239,6 +239,10 @@ class _Builder:
         )
         if fixed:
             self.component.give(path, value)
+        elif not outside and path in self.statements.states:
+            made.default = (
+                self._value(given, self.instance, "") if given is not None and given.value is not None else value
+            )
         elif value != 0.0:
             self.component.give(path, guess(value))
 

@@ -69,14 +69,8 @@ package Modelica
       type ElectricalTorqueConstant = Real(unit = "N.m/A");
       type CoefficientOfFriction = Real(min = 0);
       type Efficiency = Real(min = 0);
-      type DimensionlessRatio = Real;
       type PerUnit = Real;
     end SI;
-    package NonSI
-      type Temperature_degC = Real;
-      type Angle_deg = Real;
-      type AngularVelocity_rpm = Real;
-    end NonSI;
     package Conversions
       function from_deg
         input Real degree;

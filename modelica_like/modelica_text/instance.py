@@ -170,7 +170,9 @@ class Instance:
 
 def refused(what: str, text: ClassText, line: int, advice: str = "") -> ModelicaTextError:
     """Return the error about a construct that is not supported."""
-    sentence = f"{what[0].upper()}{what[1:]}" if what[:1] != "'" else what
+    # A name at the beginning stays as it is.
+    words = ("a", "an", "the", "this", "these", "external", "overloaded")
+    sentence = f"{what[0].upper()}{what[1:]}" if what.split()[0] in words else what
     return ModelicaTextError(f"{sentence}: that is not supported here.", where=text.place(line), advice=advice)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
-from modelica_like.errors import UnknownName, did_you_mean
+from modelica_like.errors import Source, UnknownName, did_you_mean
 from modelica_like.language import Component, Parameter, Variable, guess
 from modelica_like.language.fields import Input, Output
 from modelica_like.modelica_text import fold
@@ -26,7 +26,14 @@ _ATTRIBUTES = ("start", "fixed", "min", "max", "nominal", "displayUnit", "unit",
 
 
 def library_part(
-    owner: Instance, name: str, member: Member, known: Known, given: Given, driven: set[str], notes: Notes
+    owner: Instance,
+    name: str,
+    member: Member,
+    known: Known,
+    given: Given,
+    driven: set[str],
+    notes: Notes,
+    initial: list[tuple[Expr, Expr, Source]],
 ) -> Component:
     """Return the component of a declaration.
 
@@ -38,11 +45,15 @@ def library_part(
         given: its modification.
         driven: its connected signals.
         notes: collects remarks.
+        initial: collects initial equations, of accelerations.
 
     Raises:
         ModelicaTextError, UnknownName: a parameter does not exist here, or has a value that is not supported.
     """
-    return _Part(owner, name, member, known, given, notes).make(driven)
+    part = _Part(owner, name, member, known, given, notes)
+    made = part.make(driven)
+    initial += part.initial
+    return made
 
 
 class _Part:
@@ -60,6 +71,7 @@ class _Part:
         self.fields = self.kind._class_fields
         self.values: dict[str, Expr] = {}
         self.used: set[str] = set()
+        self.initial: list[tuple[Expr, Expr, Source]] = []
 
     def make(self, driven: set[str]) -> Component:
         self.used = used = {
@@ -216,7 +228,8 @@ class _Part:
         if "displayUnit" in attributes:
             self.notes.display[f"{self.owner.path}.{self.name}.{here}".lstrip(".")] = attributes["displayUnit"].args[0]
         path, _, last = here.rpartition(".")
-        if isinstance(part.find(path).fields[last], Output):
+        fixed = "fixed" in attributes and attributes["fixed"].args == (True,)
+        if isinstance(part.find(path).fields[last], Output) and not fixed:
             return
         start = one.inner.get("start")
         value: Any = self.known.starts.get(here, 0.0)
@@ -224,15 +237,23 @@ class _Part:
             outside = start.scope[0] is not self.owner
             node = Resolver(*start.scope, numeric=outside)(start.value)
             value = self._value(node)
-        if attributes.get("fixed") == Expr(
-            "boolean", (True,), attributes["fixed"].line if "fixed" in attributes else 0
-        ):
+        if fixed:
             part.set(here, value)
         elif value != 0.0:
             part.set(here, guess(value))
 
     def _unknown(self, name: str, one: Given) -> None:
-        fixed = one.inner.get("fixed")
+        fixed, start = one.inner.get("fixed"), one.inner.get("start")
+        rate = next((below for below in table()["rates"].get(name, "").split() if below in self.fields), "")
+        if rate and fixed is not None and fixed.value is not None and fixed.value.args == (True,):
+            value: Expr = fold.number(0)
+            if start is not None and start.value is not None and start.scope is not None:
+                value = Resolver(*start.scope)(start.value)
+            speed = Expr("name", ((f"{self.name}.{rate}", ()),), one.line)
+            self.initial.append(
+                (Expr("call", ("der", (speed,), ()), one.line), value, self.member.text.place(one.line))
+            )
+            return
         if name in table()["ignored"]["variables"].split():
             return
         if one.value is None and one.inner and (fixed is None or fixed.value is None or not fixed.value.args[0]):

@@ -70,10 +70,10 @@ class _Form:
         own = {name for name, one in self.model.fields.items() if not isinstance(one, Parameter)}
         joined = {end for ends in self.wires for end in ends}
         defined = {left.args[0][0] for left, _, _ in self.model._statements if left.kind == "name"}
-        if defined != own or own & joined or self.model._happenings:
+        if defined != own or own & joined or self.model._happenings or self.model._initial:
             raise ModelicaTextError(
                 f"{self.model._name} has equations of its own; a netlist contains only parts and connections.",
-                where=[source for _, _, source in self.model._statements[:1]],
+                where=[source for _, _, source in (*self.model._initial, *self.model._statements)[:1]],
                 advice="Load the text itself: load and all commands read it like a netlist.",
             )  # fmt: skip
         if own:

@@ -11,9 +11,10 @@ from modelica_like.errors import ModelicaTextError
 from modelica_like.flatten.template import relative_path
 from modelica_like.language import Component, Connector, Input, Output, Parameter, Variable
 from modelica_like.language.equation import Equation, as_statement
-from modelica_like.language.expr import TIME, symbols_in
+from modelica_like.language.expr import TIME, Symbol, symbols_in
 from modelica_like.language.fields import Discrete
 from modelica_like.language.formula import Formula
+from modelica_like.language.mode import StartMode, Transition
 from modelica_like.language.places import located
 from modelica_like.modelica_text.library import connector_type, table
 from modelica_like.units.unit import coherent
@@ -34,38 +35,95 @@ _SINGLE: dict[int, Callable[[str], str]] = {
 }  # fmt: skip
 
 
-def class_of_equations(component: Component, name: str, write_formula: Callable[[Formula], str]) -> str:
+def class_of_equations(
+    component: Component, name: str, write_formula: Callable[[Formula], str], driven: frozenset[str]
+) -> str:
     """Return the text of a class with the equations of a component, its values as defaults.
 
     Args:
-        component: without parts and modes.
+        component: without parts.
         name: of the class.
         write_formula: writes the formula of a default.
+        driven: names of the connected signals; other inputs become parameters.
 
     Raises:
-        ModelicaTextError: it has parts, modes or discrete values.
+        ModelicaTextError: it has parts, or a mode that holds a motion.
     """
-    discrete = [key for key, one in component.fields.items() if isinstance(one, Discrete)]
-    if component.parts or component.modes or discrete:
-        what = "parts of its own" if component.parts else f"the modes {', '.join([*component.modes, *discrete])}"
+    held = [key for key, mode in component.modes.items() if mode.holds]
+    if component.parts or held:
+        what = "parts of its own" if component.parts else f"the mode {held[0]}, which holds a motion"
         raise ModelicaTextError(
             f"{component.label} is a {type(component).__name__}, for which the Modelica Standard Library has no class, "
             f"and it has {what}.",
             where=component.place_of(),
-            advice="Only components whose equations are smooth are written out as classes.",
+            advice="Impacts and shared loads are not equations, so Modelica text cannot say them.",
         )
-    lines = [f"model {name}", *_declarations(component, write_formula), "equation"]
+    lines = [f"model {name}", *_declarations(component, write_formula, driven), "equation"]
     for item, source in located(component.equations()):
         statement = as_statement(item, source, type(component).__name__)
         if isinstance(statement, Equation):
             lines.append(f"  {_text(statement.left, component)} = {_text(statement.right, component)};")
-    return "\n".join([*lines, f"end {name};"])
+    return "\n".join([*lines, *_events(component), f"end {name};"])
 
 
-def _declarations(component: Component, write_formula: Callable[[Formula], str]) -> list[str]:
+def _events(component: Component) -> list[str]:
+    """Return the equations of the modes: a mode changes where a transition from its value before has its condition."""
+    events = [one for one, _ in located(component.events())]
+    other = [one for one in events if not isinstance(one, Transition | StartMode)]
+    if other:
+        raise ModelicaTextError(f"{component.label} has a 'when' or an assertion of Python, which is not written.")
+    lines: list[str] = []
+    for name, mode in component.modes.items():
+        goes = [one for one in events if isinstance(one, Transition) and one.mode.mode is mode and not one.fails]
+        begins = [one for one in events if isinstance(one, StartMode) and one.mode.mode is mode]
+        chosen = " else".join(f"if {_text(one.when, component, True)} then {mode.number(one.target)}" for one in begins)
+        first = str(mode.number(component.start_mode(name)))
+        first = f"{chosen} else {first}" if chosen else first
+        rest = "".join(f" elseif {_due(one, component)} then {mode.number(one.target)}" for one in goes)
+        lines.append(f"  {name} = if initial() then ({first}){rest} else pre({name});")
+    resets = [one for one in events if isinstance(one, Transition) and one.reset]
+    for k, one in enumerate(resets):
+        lines.append(f"  {'elsewhen' if k else 'when'} {_due(one, component)} then")
+        for target, value in one.reset.items():
+            symbol, new = symbols_in(target)[0], _text(value, component, True)
+            field = symbol.owner.fields[symbol.name]
+            _check_reset(component, symbol, value)
+            path = relative_path(symbol.owner, component, symbol.name)
+            lines.append(f"    {path} = {new};" if isinstance(field, Discrete) else f"    reinit({path}, {new});")
+    lines += ["  end when;"] if resets else []
+    for one in events:
+        if isinstance(one, Transition) and one.fails:
+            words = one.notice.replace('"', "'")
+            lines.append(f'  assert(not ({_due(one, component, False)}), "{words}");')
+    return lines
+
+
+def _due(one: Transition, component: Component, before: bool = True) -> str:
+    """Return the condition of a transition, with modes and discrete values before the event or after it."""
+    name = f"pre({one.mode.mode.name})" if before else one.mode.mode.name
+    sources = " or ".join(f"{name} == {one.mode.mode.number(source)}" for source in one.sources)
+    when = f"time >= {_text(one.at, component, before)}" if one.when is None else _text(one.when, component, before)
+    return f"({sources}) and {when}"
+
+
+def _check_reset(component: Component, target: Symbol, value: Any) -> None:
+    """Refuse a new value that follows from what it sets: Modelica takes variables after the event."""
+    if not isinstance(component.fields.get(target.name), Discrete):
+        return
+    equations = (as_statement(item, source, "") for item, source in located(component.equations()))
+    sides = [side for one in equations if isinstance(one, Equation) for side in (one.left, one.right)]
+    states = {one.name for side in sides for one in symbols_in(side) if one.order}
+    for one in symbols_in(ca.SX(value)):
+        if one is not TIME and isinstance(one.owner.fields.get(one.name), Variable) and one.name not in states:
+            raise ModelicaTextError(
+                f"{component.label} sets {target.name} at an event by {one.name} before it, which has no Modelica text."
+            )
+
+
+def _declarations(component: Component, write_formula: Callable[[Formula], str], driven: frozenset[str]) -> list[str]:
     lines = [f"  {connector_class(one)} {key};" for key, one in component.connectors.items() if one.used]
     for key, field in component.fields.items():
-        if isinstance(field, Parameter):
+        if isinstance(field, Parameter) or (isinstance(field, Input) and key not in driven):
             value = component.value(key)
             if value is None:
                 continue
@@ -77,8 +135,17 @@ def _declarations(component: Component, write_formula: Callable[[Formula], str])
             kind = "RealInput" if isinstance(field, Input) else "RealOutput"
             lines.append(f"  Modelica.Blocks.Interfaces.{kind} {key}{_attributes(field.unit_text)};")
         elif isinstance(field, Variable):
+            begin = f"start = {field.default!r}" if isinstance(field.default, int | float) else ""
             chosen = "" if field.state == "default" else f"stateSelect = StateSelect.{field.state}"
-            lines.append(f"  Real {key}{_attributes(field.unit_text, chosen)};")
+            lines.append(f"  Real {key}{_attributes(field.unit_text, begin, chosen)};")
+        elif isinstance(field, Discrete):
+            start = component.start(key)
+            number = 0.0 if start is None else start.number
+            text = write_formula(start.formula) if start is not None and start.formula is not None else repr(number)
+            lines.append(f"  discrete Real {key}(start = {text});")
+    for key, mode in component.modes.items():
+        told = ", ".join(f"{number}: {one}" for number, one in enumerate(mode.names))
+        lines.append(f'  Integer {key}(start = {mode.number(component.start_mode(key))}) "{told}";')
     return lines
 
 
@@ -100,15 +167,23 @@ def connector_class(connector: Connector) -> str:
     raise ModelicaTextError(f"{connector.label} is a {type(connector).__name__}, which has no counterpart in Modelica.")
 
 
-def _text(expression: Any, component: Component) -> str:
+def _text(expression: Any, component: Component, before: bool = False) -> str:
+    """Return an expression as text; `before` takes modes and discrete values before an event."""
     node = ca.SX(expression)
     if node.is_constant():
         return repr(float(node))
     if node.is_symbolic():
         symbol = symbols_in(node)[0]
-        path = "time" if symbol is TIME else relative_path(symbol.owner, component, symbol.name)
+        if symbol is TIME:
+            return "time"
+        path = relative_path(symbol.owner, component, symbol.name)
+        field = symbol.owner.fields.get(symbol.name)
+        if field is None and symbol.name not in getattr(symbol.owner, "modes", {}):
+            raise ModelicaTextError(f"{component.label} asks for {symbol.name}, which Modelica text cannot say.")
+        if before and (field is None or isinstance(field, Discrete)):
+            return f"pre({path})"
         return "der(" * symbol.order + path + ")" * symbol.order
-    operation, args = node.op(), [_text(node.dep(k), component) for k in range(node.n_dep())]
+    operation, args = node.op(), [_text(node.dep(k), component, before) for k in range(node.n_dep())]
     if operation in _SIGNS:
         return f"({args[0]} {_SIGNS[operation]} {args[1]})"
     if operation in _SINGLE:

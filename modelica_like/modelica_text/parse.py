@@ -210,15 +210,15 @@ class _Parser(Expressions):
         self.need("}")
         return tuple(names)
 
-    def declarations(self, hidden: bool = False) -> list[Declaration]:
-        """Read one clause of declarations, `parameter Real a = 1, b = 2`."""
+    def declarations(self, hidden: bool = False, single: bool = False) -> list[Declaration]:
+        """Read one clause of declarations, `parameter Real a = 1, b = 2`; in a modification it has a single one."""
         prefixes = {"protected"} if hidden else set[str]()
         while self.text in _PREFIXES or self.text in _BEFORE:
             prefixes.add(self.take(self.kind))
         type_name = self.dotted()
         common = self.subscripts() if self.kind == "[" else ()
         made = [self._declared(frozenset(prefixes), type_name, common)]
-        while self.take(","):
+        while not single and self.take(","):
             made.append(self._declared(frozenset(prefixes), type_name, common))
         self._constrained()
         return made
@@ -254,7 +254,7 @@ class _Parser(Expressions):
             made = Argument(name, self.modification(), line, each)
             self.strings()
             return made
-        redeclared = self._element_class(None) if self.is_class() else self.declarations()[0]
+        redeclared = self._element_class(None) if self.is_class() else self.declarations(single=True)[0]
         return Argument(redeclared.name, Modification(), line, each, redeclared)
 
     def annotation(self, made: ClassText | None) -> None:

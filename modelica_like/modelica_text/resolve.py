@@ -272,7 +272,7 @@ class Resolver:
         if short in KEPT:
             return Expr("call", (short, tuple(self(one) for one in given), ()), line)
         if short == "size":
-            items = self(given[0])
+            items = self._sized(given[0])
             return functions.size(items, int(self.number(given[1])) if len(given) > 1 else 0, line)
         values = tuple(self(one) for one in given)
         if short in functions.OF_ARRAYS:
@@ -281,3 +281,11 @@ class Resolver:
             return self._told(lambda: fold.function(short, values, line), line)
         others = {key: self(one) for key, one in named}
         return self._told(lambda: functions.called(self, expression, values, others), line)
+
+    def _sized(self, expression: Expr) -> Expr:
+        """Resolve an array for its size; one of components counts, too."""
+        simple = expression.kind == "name" and len(expression.args) == 1 and not expression.args[0][1]
+        member = self.instance.members.get(expression.path) if simple and self.instance is not None else None
+        if self.instance is None or member is None or basic_type(self.instance, member) is not None:
+            return self(expression)
+        return members.named_array(expression.path, members.sizes(self.instance, member), "")

@@ -86,6 +86,13 @@ class Statements:
                 f"{call.args[0]}({name}): only what changes at events has a value before them.", where=source
             )
 
+    @property
+    def states(self) -> set[str]:
+        """Names whose derivatives are in the equations."""
+        sides = [side for left, right, _ in self.equations for side in (left, right)]
+        calls = [call for side in sides for call in calls_in(side) if call.args[0] == "der"]
+        return {call.args[1][0].args[0][0] for call in calls if call.args[1][0].kind == "name"}
+
     def _bindings(self) -> None:
         """Collect declarations `Real x = …`."""
         for name, member in self.instance.members.items():

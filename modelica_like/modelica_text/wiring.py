@@ -60,7 +60,7 @@ def _pairs(left: Expr, right: Expr, instance: Instance, source: Source) -> list[
 
 def _ends(end: Expr, instance: Instance) -> list[str]:
     """Return the paths of an end; several for an array."""
-    (name, subscripts), *rest = end.args
+    (name, subscripts), rest = end.args[0], end.args[1:]
     member = instance.members.get(name)
     if member is None:
         raise unknown_name(f"{instance.text.name} has no '{name}'.", instance.text, end.line)

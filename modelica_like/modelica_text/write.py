@@ -114,7 +114,8 @@ class _Writer:
             for key, one in part.connectors.items():
                 one.__dict__["_used"] = not one.optional or f"{path}.{key}" in joined
             name = f"{type(part).__name__}_{re.sub('[^a-zA-Z0-9]', '_', path)}"
-            text = class_of_equations(part, name, lambda formula: formula_text(formula, part))
+            driven = frozenset(key for key in part.fields if f"{path}.{key}" in joined)
+            text = class_of_equations(part, name, lambda formula: formula_text(formula, part), driven)
             self.made[name] = text
             given = {key: self._value(value, owner) for key, value in part._values.items()}
             return name, {**given, **self._starts(part, None, owner)}
@@ -191,6 +192,10 @@ class _Arguments:
         for there, text in self.known.put.items():
             self._put(there, text)
         self._defaults()
+        for name, field in self.part.fields.items():
+            value = self.part.value(name) if isinstance(field, Input) else None
+            if value is not None and name not in replaced and f"{self.path}.{name}" not in self.joined:
+                self.done.setdefault(self.known.there(name), self.writer._value(value, self.owner))
         for name, flag in (("support", "useSupport"), ("heat_port", "useHeatPort")):
             if f"{self.path}.{name}" in self.joined:
                 self.done[flag] = "true"

@@ -8,6 +8,7 @@ from typing import Any, get_args
 
 from modelica_like.language import Component, Input, Parameter, Variable
 from modelica_like.language.fields import Discrete, Field
+from modelica_like.language.places import texts_of_fields
 from modelica_like.language.tables import REQUIRED, Column, Rows
 from modelica_like.netlist.document import StartKind
 from modelica_like.netlist.json_units import Quantities
@@ -21,8 +22,11 @@ _JSON_TYPES: dict[type, str] = {bool: "boolean", int: "integer", float: "number"
 DRAFT = "http://json-schema.org/draft-07/schema#"
 """The draft that the language servers for TOML know."""
 _VALUE = {"type": ["number", "string", "object"]}
+_RUN = "how the drive is run"
 _ANY_PART = {"$ref": "#/definitions/part"}
-_ENDS = {"type": "array", "items": {"type": "string"}, "minItems": 2}
+_TEXT = {"type": "string"}
+_COUNT = {"type": "integer", "minimum": 1}
+_ENDS = {"type": "array", "items": _TEXT, "minItems": 2}
 
 
 def schema() -> dict[str, Any]:
@@ -61,80 +65,42 @@ def _units(types: Iterable[type[Component]]) -> set[str]:
 
 
 def _sections() -> dict[str, Any]:
+    parts = {"anyOf": [_ANY_PART, {"type": "array", "items": _ANY_PART, "minItems": 1}]}
+    free = {"type": "array", "items": _TEXT, "description": "connectors left free on purpose"}
+    chain = "chains of parts: the outlet of each is joined to the inlet of the next"
+    values = "parameters of the drive: numbers, quantities or formulas of earlier ones"
+    units = "units in which results are shown, by quantity, path or pattern"
     return {
-        "name": {"type": "string", "description": "name of the model; default: that of the file"},
-        "description": {"type": "string", "description": "one phrase"},
-        "parameters": _map(
-            _QUANTITY,
-            "parameters of the drive: numbers, quantities or formulas of earlier ones",
-            {"n": "1500 rpm", "w": "n / 10"},
-        ),
-        "parts": _map(
-            {"anyOf": [_ANY_PART, {"type": "array", "items": _ANY_PART, "minItems": 1}]},
-            "components by name; `is` names the type",
-            {"hub": {"is": "Inertia", "J": "0.02 kg.m2"}},
-        ),
-        "series": _map(
-            _ENDS,
-            "chains of parts: the outlet of each is joined to the inlet of the next",
-            {"drive": ["motor", "clutch", "hub"]},
-        ),
-        "connect": _map(
-            _ENDS,
-            "connectors that are joined, or an output with inputs",
-            {"command": ["ramp.y", "clutch.f"]},
-        ),
+        "name": {**_TEXT, "description": "name of the model; default: that of the file"},
+        "description": {**_TEXT, "description": "one phrase"},
+        "parameters": _map(_QUANTITY, values, {"n": "1500 rpm", "w": "n / 10"}),
+        "parts": _map(parts, "components by name; `is` names the type", {"hub": {"is": "Inertia", "J": "0.02 kg.m2"}}),
+        "series": _map(_ENDS, chain, {"drive": ["motor", "clutch", "hub"]}),
+        "connect": _map(_ENDS, "connectors that are joined, or an output with inputs", {"f": ["ramp.y", "clutch.f"]}),
         "start": _map(_VALUE, "fixed start values, and start modes, by path", {"hub.w": "10 rad/s"}),
         "guess": _map(_VALUE, "start values that the initialization may change, by path", {"clutch.tau": "10 N.m"}),
-        "free": {
-            "type": "array",
-            "items": {"type": "string"},
-            "description": "connectors left free on purpose",
-            "examples": [["gear.support"]],
-        },
-        "expose": _map({"type": "string"}, "outer connectors and signals", {"input": "hub.flange_a"}),
-        "simulate": {"description": "how the drive is run", **_simulate()},
-        "sizing": {"type": "string", "description": "sizing file, whose checks stand in reports"},
-        "display": _map(
-            {"type": "string"},
-            "units in which results are shown, by quantity, path or pattern",
-            {"speed": "rpm", "*.phi": "deg"},
-        ),
+        "free": {**free, "examples": [["gear.support"]]},
+        "expose": _map(_TEXT, "outer connectors and signals", {"input": "hub.flange_a"}),
+        "simulate": _simulate(),
+        "sizing": {**_TEXT, "description": "sizing file, whose checks stand in reports"},
+        "display": _map(_TEXT, units, {"speed": "rpm", "*.phi": "deg"}),
     }
 
 
 def _simulate() -> dict[str, Any]:
-    return {
-        "type": "object",
-        "additionalProperties": False,
-        "properties": {
-            "until": {"description": "end time [s]", **_TIME, "examples": ["0.5 s"]},
-            "start": {
-                "enum": list(get_args(StartKind)),
-                "description": "start values that are missing: none (given), zero (rest), or those of the steady state",
-            },
-            "rtol": {
-                "type": "number",
-                "minimum": 1e-14,
-                "maximum": 0.1,
-                "description": "relative tolerance",
-                "examples": [1e-7],
-            },
-            "points": {
-                "type": "integer",
-                "minimum": 1,
-                "maximum": 1_000_000,
-                "description": "number of output intervals",
-                "default": 500,
-            },
-        },
+    rtol = {"type": "number", "minimum": 1e-14, "maximum": 0.1, "description": "relative tolerance", "examples": [1e-7]}
+    start = "start values that are missing: none (given), zero (rest), or those of the steady state"
+    properties = {
+        "until": {"description": "end time [s]", **_TIME, "examples": ["0.5 s"]},
+        "start": {"enum": list(get_args(StartKind)), "description": start},
+        "rtol": rtol,
+        "points": {**_COUNT, "maximum": 1_000_000, "description": "number of output intervals", "default": 500},
     }
+    return {"type": "object", "description": _RUN, "additionalProperties": False, "properties": properties}
 
 
 def _map(entries: dict[str, Any], description: str, example: dict[str, Any]) -> dict[str, Any]:
-    return {
-        "type": "object", "description": description, "additionalProperties": entries, "examples": [example],
-    }  # fmt: skip
+    return {"type": "object", "description": description, "additionalProperties": entries, "examples": [example]}
 
 
 def _others() -> list[dict[str, Any]]:
@@ -142,6 +108,7 @@ def _others() -> list[dict[str, Any]]:
     known = {
         r"^[\w.]+:\w+$": "class of a Python module",
         r"\.toml$": "another netlist",
+        r"\.mo(:[\w.]+)?$": "class of a Modelica text",
         f"^{FMU_PART}$": "FMU, coupled by its inputs and outputs; run by `modelica-like cosim`",
     }
     return [
@@ -155,7 +122,7 @@ def _others() -> list[dict[str, Any]]:
 
 def _component(kind: type[Component], quantities: Quantities) -> dict[str, Any]:
     described = Parameter | Input | Variable | Discrete
-    count = {"type": "integer", "minimum": 1, "description": "number of parts in an array"}
+    count = {**_COUNT, "description": "number of parts in an array"}
     properties: dict[str, Any] = {"is": {"const": kind.__name__}, "count": count}
     properties |= {
         name: _field(field, quantities) for name, field in kind._class_fields.items() if isinstance(field, described)
@@ -164,7 +131,11 @@ def _component(kind: type[Component], quantities: Quantities) -> dict[str, Any]:
         name: {"enum": list(mode.names), "description": f"{mode.description}, at the start"}
         for name, mode in kind._class_modes.items()
     }
-    properties |= {name: _structural(default) for name, default in kind._structural.items() if name not in kind._tables}
+    texts = texts_of_fields(kind)
+    properties |= {
+        name: {"description": texts.get(name, ""), **_structural(kind, name)}
+        for name in kind._structural if name not in kind._tables
+    }  # fmt: skip
     properties |= {name: _table(table, kind._class_fields, quantities) for name, table in kind._tables.items()}
     properties |= {
         name: {"type": "object", "description": "values of a part", "additionalProperties": True}
@@ -211,6 +182,7 @@ def _cell(column: Column, fields: Mapping[str, Field], quantities: Quantities) -
     return {"type": "number"} if unit == ANY else {"anyOf": [{"type": "number"}, quantities.text(unit)]}
 
 
-def _structural(default: object) -> dict[str, Any]:
-    kind = _JSON_TYPES.get(type(default))
-    return {"type": kind, "default": default} if kind else {}
+def _structural(kind: type[Component], name: str) -> dict[str, Any]:
+    default = kind._structural[name]
+    made: dict[str, Any] = {"type": known, "default": default} if (known := _JSON_TYPES.get(type(default))) else {}
+    return made | ({"enum": choices} if (choices := kind.choices(name)) else {})

@@ -135,7 +135,7 @@ class _Task:
             self.errors.extend(error.errors)
             return
         # An error from an inner netlist keeps its place; the place on Python's stack is of no use here.
-        if not any(place.file.endswith(".toml") for place in error.where):
+        if not any(place.file.endswith((".toml", ".mo")) for place in error.where):
             error.where = (source,)
         self.errors.append(error)
 

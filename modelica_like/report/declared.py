@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import ast
-import inspect
 from collections.abc import Callable, Iterable, Sequence
-from textwrap import dedent
 from typing import Any, NamedTuple
 
 from modelica_like.language import Component, Connector, Discrete, Input, Output, Parameter, Variable
 from modelica_like.language.fields import Field
+from modelica_like.language.places import texts_of_fields
 
 _SORTS = {
     "parameters": Parameter, "inputs": Input, "outputs": Output, "variables": Variable, "discrete values": Discrete,
@@ -63,7 +61,7 @@ def declared(kind: type[Component], notation: Notation) -> list[Listing]:
         head = ("name", "symbol", "unit", "default", "range", "description")
         made.append(filled(title, head, (_field_row(field, notation) for field in fields)))
     described = {name: one.description for name, one in kind._tables.items()}
-    described |= {name: words for name, words in _structure_descriptions(kind).items() if words}
+    described |= {name: words for name, words in texts_of_fields(kind).items() if words}
     structure = (
         (code(name), code(str(default)) if has_default(default) else "required", text(described.get(name, "")))
         for name, default in kind._structural.items()
@@ -102,23 +100,3 @@ def _field_row(field: Field, notation: Notation) -> tuple[str, ...]:
         notation.code(field.name), notation.symbol(field.name), notation.text(field.unit_text), notation.text(default),
         f"{low} … {high}".strip() if low or high else "", notation.text(field.description),
     )  # fmt: skip
-
-
-def _structure_descriptions(kind: type[Component]) -> dict[str, str]:
-    """Return the texts below the structural fields in the class bodies."""
-    found: dict[str, str] = {}
-    for base in reversed(kind.__mro__):
-        if issubclass(base, Component) and base is not Component:
-            body = ast.parse(dedent(inspect.getsource(base))).body[0]
-            assert isinstance(body, ast.ClassDef)
-            for field, below in zip(body.body, body.body[1:], strict=False):
-                if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name):
-                    found[field.target.id] = _text_of(below)
-    return found
-
-
-def _text_of(statement: ast.stmt) -> str:
-    """Return the text of a statement that is a text."""
-    value = statement.value if isinstance(statement, ast.Expr) else None
-    words = value.value if isinstance(value, ast.Constant) else ""
-    return inspect.cleandoc(words) if isinstance(words, str) else ""

@@ -79,7 +79,7 @@ def _given(drive: Component, path: str) -> str:
         first, _, inner = rest.partition(".")
         for key in (f"start.{rest}", f"parts.{first.partition('[')[0]}{'.' if inner else ''}{inner}"):
             source = component.source_of(key)
-            if source.file.endswith(".toml"):
+            if source.file.endswith((".toml", ".mo")):
                 return f"given in {Path(source.file).name}:{source.line}"
         if not inner:
             break

@@ -23,7 +23,11 @@ Names = Mapping[str, ast.expr]
 def statements(kind: type[Component]) -> dict[str, list[str]]:
     """Return lines by title: equations, events, energy, and the definitions of what occurs in them."""
     reader = _Reader(kind)
-    said = {name: of for name in ("equations", "events", *_ENERGY) if (of := reader.source.method(name))}
+    said = {
+        name: of
+        for name in ("equations", "initial_equations", "events", *_ENERGY)
+        if (of := reader.source.method(name))
+    }
     made = {name: list(reader.body(of, of.code.body, {})) for name, of in said.items() if name not in _ENERGY}
     made["energy"] = [line for name, of in said.items() if name in _ENERGY for line in reader.defined(of)]
     done: set[str] = set(_ENERGY)
@@ -33,7 +37,7 @@ def statements(kind: type[Component]) -> dict[str, list[str]]:
             done.add(name)
             where += reader.defined(reader.found[name], name)
     where += [f"{name} = {value:g}" for name, value in reader.numbers.items()]
-    return {title: lines for title, lines in {**made, "where": where}.items() if lines}
+    return {title.replace("_", " "): lines for title, lines in {**made, "where": where}.items() if lines}
 
 
 class _Reader:

@@ -50,14 +50,19 @@ def library_table(types: Mapping[str, type[Component]], words: Sequence[str] = (
         )
     chosen = sorted((groups[name], name) for name, kind in types.items() if group in (None, groups[name])
                     and all(word.lower() in f"{name} {kind.__doc__}".lower() for word in words))  # fmt: skip
-    if not chosen:
-        raise UnknownName(f"No component type has {' and '.join(map(repr, words))} in its text.")
+    if words and not chosen:
+        where = f" of the group {group}" if group else ""
+        raise UnknownName(
+            f"No component type{where} has {' and '.join(map(repr, words))} in its name or text.",
+            advice="Search for fewer or shorter words; `modelica-like library` lists all types.",
+        )
     rows = ((name, home, summary(types[name])) for home, name in chosen)
-    made = table(f"{len(chosen)} component types", "type*", "group", "what it is", rows=rows, name="types")
+    title = "1 component type" if len(chosen) == 1 else f"{len(chosen)} component types"
+    made = table(title, "type*", "group", "what it is", rows=rows, name="types")
     # One line per type, so that the list can be searched; `describe` has the whole text.
     for column in made.columns:
         column.no_wrap = True
-        column.min_width = max(len(name) for _, name in chosen) if column is made.columns[0] else None
+        column.min_width = max((len(name) for _, name in chosen), default=0) if column is made.columns[0] else None
     return made
 
 

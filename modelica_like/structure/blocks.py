@@ -73,7 +73,8 @@ class BlockSolver:
         self.jacobian = ca.jacobian(residual, unknowns)
         self.rows = _places_by_row(self.jacobian.sparsity())
         self.safe = self._safe_entries(volatile)
-        self.first = set(rates) - {c for r, row in enumerate(self.rows) for c in row if (r, c) not in self.safe}
+        self.rates = set(rates)
+        self.first = self.rates - {c for r, row in enumerate(self.rows) for c in row if (r, c) not in self.safe}
         self.solved = Solved()
 
     def _safe_entries(self, volatile: Any) -> set[tuple[int, int]]:
@@ -170,13 +171,15 @@ class BlockSolver:
         """Choose the unknown of the shortest open equations, most used and least safe to solve for.
 
         The rate of a state that nothing holds comes first. Behind a chain it would follow from the torque that is left
-        for its inertia: between a light one and a heavy one, half of its digits are rounding.
+        for its inertia: between a light one and a heavy one, half of its digits are rounding. An equation that is
+        waiting for one unknown, but cannot give it in every mode, says nothing: a switch whose voltage is taken from
+        there gets the rounding of all other currents, over the conductance of its open contacts.
         """
-        shortest = min((len(open_unknowns[r]) for r in rows if r not in used and open_unknowns[r]), default=0)
+        telling = [r for r in rows if r not in used and (len(open_unknowns[r]) > 1 or open_unknowns[r] & self.rates)]
+        telling = telling or [r for r in rows if r not in used and open_unknowns[r]]
+        shortest = min(len(open_unknowns[r]) for r in telling)
         scores: dict[int, tuple[bool, int, int, int]] = {}
-        for row in rows:
-            if row in used or not open_unknowns[row]:
-                continue
+        for row in telling:
             for column in open_unknowns[row]:
                 near = scores.get(column, (False, 0, 0, 0))[1]
                 near += len(open_unknowns[row]) == shortest

@@ -11,6 +11,20 @@ from typer.testing import CliRunner
 
 from modelica_like.cli import app
 from modelica_like.errors import UnitError
+from modelica_like.language import (
+    Component,
+    Discrete,
+    Equations,
+    Events,
+    Parameter,
+    Variable,
+    clock,
+    der,
+    discrete,
+    param,
+    var,
+    when,
+)
 from modelica_like.netlist import library_types, load, schema
 from modelica_like.netlist.json_units import Quantities
 from modelica_like.report.component_pages.source import Source
@@ -97,6 +111,33 @@ def test_a_netlist_is_described_with_the_parts_of_its_assemblies(run: CliRunner)
     assert re.search(r"^h1 +10 N.m.s/rad *$", startup, re.MULTILINE)
 
 
+class Heater(Component):
+    warm: Variable = var("K", "temperature")
+    limit: Parameter = param("K", "limit")
+    held: Discrete = discrete("K", "temperature at the last instant")
+
+    def equations(self) -> Equations:
+        yield der(self.warm) * self.tau() == self.limit - self.warm
+
+    def tau(self) -> float:
+        return 3.0
+
+    def initial_equations(self) -> Equations:
+        yield self.warm == self.limit / 2
+
+    def events(self) -> Events:
+        yield when(clock("1 s"), {self.held: self.warm})
+
+
+def test_equations_of_the_start_and_at_instants_are_told() -> None:
+    assert statements(Heater) == {
+        "equations": ["der(warm) * tau() == limit - warm"],
+        "initial equations": ["warm == limit / 2"],
+        "events": ["when(clock('1 s'), {held: warm})"],
+        "where": ["tau() = 3.0"],
+    }
+
+
 @pytest.mark.parametrize("words", [["worm"], ["gear", "--group", "gears"], ["FRICTION", "clutch"]])
 def test_the_library_is_filtered(run: CliRunner, words: list[str]) -> None:
     found = {line.split()[0] for line in run.invoke(app, ["library", *words]).stdout.splitlines()[2:]}
@@ -109,7 +150,7 @@ def test_the_library_is_filtered(run: CliRunner, words: list[str]) -> None:
 
 def test_a_group_or_a_word_that_is_not_there_is_told(run: CliRunner) -> None:
     assert "There is no group 'gear'; did you mean 'gears'?" in run.invoke(app, ["library", "--group", "gear"]).stderr
-    assert "No component type has 'gearz' in its text." in run.invoke(app, ["library", "gearz"]).stderr
+    assert "No component type has 'gearz' in its name or text." in run.invoke(app, ["library", "gearz"]).stderr
 
 
 def test_the_schema_is_a_schema(run: CliRunner) -> None:
@@ -140,6 +181,9 @@ def test_the_schema_is_a_schema(run: CliRunner) -> None:
         ({"is": "Inertia", "J": 1, "w": "50 Hz"}, False),
         ({"is": "Clutch", "mu_pos": [["50 rpm", 0.1], ["1 N.m", 0.2]]}, False),
         ({"is": "Clutch", "mode": "stuk"}, False),
+        ({"is": "Clutch", "extrapolate": "error", "smooth": True}, True),
+        ({"is": "Clutch", "extrapolate": "quadratic"}, False),
+        ({"is": "Clutch", "smooth": 1}, False),
     ],
 )
 def test_the_schema_knows_right_from_wrong(run: CliRunner, part: dict[str, object], is_right: bool) -> None:

@@ -28,6 +28,7 @@ from modelica_like.initialize import initialize
 from modelica_like.language import Assembly, Component, Equations, Events, Mode, Parameter, Variable, der, param, var
 from modelica_like.language.formula import parse_formula
 from modelica_like.report.run import notices
+from modelica_like.report.types import library_table
 
 
 class Twist(Component, partial=True):
@@ -375,6 +376,22 @@ case(
     "an optional package is not installed",
     lambda: without("pandas"),
     'pandas is not installed.\nInstall it with: pip install "modelica-like[data]"',
+)
+case(
+    errors.UnknownName,
+    "a group that no component type has",
+    lambda: library_table({"Wheel": Turning}, group="test_component_message"),
+    """\
+There is no group 'test_component_message'; did you mean 'test_component_messages'?
+There are test_component_messages.""",
+)
+case(
+    errors.UnknownName,
+    "words that no component type has",
+    lambda: library_table({"Wheel": Turning}, ["worm", "gear"]),
+    """\
+No component type has 'worm' and 'gear' in its name or text.
+Search for fewer or shorter words; `modelica-like library` lists all types.""",
 )
 
 

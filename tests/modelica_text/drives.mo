@@ -93,6 +93,33 @@ package Drives "Texts that use every construct that is read"
     extends TwoMasses(ratio = 1, damper(d = 5), load(each J = 2), tau = 4);
   end Modified;
 
+  model Chain
+    replaceable Rotational.Components.Spring k(c = 100) constrainedby Rotational.Interfaces.PartialCompliant;
+    parameter Boolean damped = true annotation(Evaluate = true);
+    Inertia load[3](each J = 2, phi(start = {0.1, 0, 0}, each fixed = true), w(each fixed = true));
+    Damper damper(d = 1) if damped and size(load, 1) > 2;
+    Fixed fixed;
+  equation
+    connect(load[1].flange_b, k.flange_a);
+    connect(k.flange_b, load[2].flange_a);
+    connect(damper.flange_a, load[2].flange_b) "with a text" annotation(Line(points = {{0, 0}}));
+    connect(damper.flange_b, fixed.flange);
+  end Chain;
+
+  model Rearranged
+    extends Chain(redeclare SpringDamper k(c = 50, d = 0.5), final damped = false);
+    Real energy = sum(0.5*load[i].J*load[i].w^2 for i in 1:size(load, 1)) + 0.5*k.c*k.phi_rel^2;
+  end Rearranged;
+
+  model Accelerated "starts with an acceleration"
+    Inertia mass(J = 2, w(fixed = true), a(fixed = true, start = 3));
+    Rotational.Components.Spring spring(c = 60);
+    Fixed fixed;
+  equation
+    connect(fixed.flange, spring.flange_a);
+    connect(spring.flange_b, mass.flange_a);
+  end Accelerated;
+
   partial model Shaft
     extends Rotational.Interfaces.PartialTwoFlanges;
     SI.Angle phi(start = 0);

@@ -24,6 +24,7 @@ WRITTEN = [
     )),
     *(f"msl/translational/{name}" for name in ("Accelerate", "Brake", "ElastoGap", "HeatLosses", "Sensors", "Vehicle")),
     "machine_table_geared", "dc_machines/shunt", "elements/absorbers",
+    "msl/dcmachines/DCPM_CurrentControlled", "dc_machines/series_runaway",
 ]  # fmt: skip
 
 
@@ -134,7 +135,8 @@ def test_a_clutch_with_a_capacity_is_one_with_a_force() -> None:
     [series]
     shaft = ["a", "k", "b"]
     """)
-    assert "Components.Clutch k(fn_max = 80, cgeo = 1, mu_pos = [0, 1], peak = 1.2)" in modelica_text(drive)
+    clutch = "Components.Clutch k(fn_max = 80, cgeo = 1, mu_pos = [0, 1], peak = 1.2, f_normalized = 1)"
+    assert clutch in modelica_text(drive)
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,8 @@ import pytest
 from scipy.optimize import brentq
 
 from modelica_like import build, export_fmu, load, simulate
+from modelica_like.errors import ModelicaTextError
+from modelica_like.modelica_text.netlist_form import netlist_text
 from modelica_like.netlist import loads
 
 DRIVES = Path(__file__).with_name("drives.mo")
@@ -93,6 +95,25 @@ def test_own_masses_obey_their_laws_of_drag() -> None:
 def test_a_redeclared_coupling_damps() -> None:
     assert type(drive("Redeclared").find("coupling")).__name__ == "SpringDamper"
     assert drive("Redeclared").find("coupling").value("d").number == 20
+
+
+def test_a_redeclared_part_and_what_follows_it() -> None:
+    assert [type(drive(name).k).__name__ for name in ("Chain", "Rearranged")] == ["Spring", "SpringDamper"]
+    assert ["damper" in drive(name).parts for name in ("Chain", "Rearranged")] == [True, False]
+    result = run("Rearranged", 2.0)
+    # x = phi_rel: 1·x'' + 0.5·x' + 50·x = 0 with the reduced inertia 1, x(0) = -0.1
+    t, w = result.time, np.sqrt(50 - 0.25**2)
+    x = -0.1 * np.exp(-0.25 * t) * (np.cos(w * t) + 0.25 / w * np.sin(w * t))
+    assert result["k.phi_rel"] == pytest.approx(x, abs=1e-8)
+    speed = result["k.w_rel"]
+    assert result["energy"] == pytest.approx(0.5 * speed**2 + 25 * x**2, abs=1e-8)
+
+
+def test_an_acceleration_at_the_start_is_an_initial_equation() -> None:
+    result = run("Accelerated", 1.0)  # 2·3 = -60·phi
+    assert result["mass.phi"] == pytest.approx(-0.1 * np.cos(np.sqrt(30) * result.time), abs=1e-8)
+    with pytest.raises(ModelicaTextError, match="Accelerated has equations of its own"):
+        netlist_text(drive("Accelerated"), DRIVES.parent, [])
 
 
 def test_a_block_between_signals() -> None:
