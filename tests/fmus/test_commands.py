@@ -39,7 +39,7 @@ def test_validate_of_no_file(run: CliRunner, tmp_path: Path) -> None:
 def test_compare_prints_deviations_and_draws(run: CliRunner, reference_fmus: Built, tmp_path: Path) -> None:
     netlist, picture = str(EXAMPLES / "machine_table_direct.toml"), tmp_path / "both.png"
     fmu = str(reference_fmus["machine_table", "3.0"])
-    result = run.invoke(app, ["compare", netlist, fmu, "--signals", "table.*", "--plot", str(picture)])
+    result = run.invoke(app, ["compare", netlist, fmu, "--signal", "table.*", "--plot", str(picture)])
     assert result.exit_code == 0
     rows = {line.split()[0]: line.split() for line in result.stdout.splitlines() if line}
     assert rows["table.v"][2] == "m/s"
