@@ -164,6 +164,7 @@ def _address(file) -> str:
     raise AssertionError("The Dask scheduler did not start.")
 
 
+@pytest.mark.slow
 def test_a_cluster_that_loses_a_worker_loses_and_doubles_nothing(model, cluster, tmp_path):
     from distributed import Client
 

@@ -44,6 +44,7 @@ def test_has_every_drive_in_both_versions() -> None:
     assert listed == [[drive, version] for drive in page.drives() for version in page.VERSIONS], REGENERATE
 
 
+@pytest.mark.slow
 def test_reference_fmus(tmp_path: Path) -> None:
     assert page.reference_rows(tmp_path) == page.rows("reference"), REGENERATE
 
