@@ -183,9 +183,9 @@ def _looks(part: Component, run: Trajectories) -> Iterator[tuple[float, str, str
         return
     path, mode = path_of(part), part.modes[name]
     values = run[f"{path}.{name}"].astype(int)
-    # A hold knows its reaction only by the node of the flat system.
-    held = next(one for one in run.model.holds if one.component == path and one.reaction >= 0)
-    carried = np.abs(run[run.model.flat_variables[held.reaction].path])
+    # A hold knows its reaction only by the node of the flat system, and some have none.
+    held = next((one for one in getattr(run.model, "holds", ()) if one.component == path and one.reaction >= 0), None)
+    carried = np.abs(run[run.model.flat_variables[held.reaction].path]) if held else np.ones(len(values))
     changes = [0, *(np.flatnonzero(np.diff(values)) + 1), len(values)]
     for k, end in pairwise(changes):
         now = mode.names[values[k]]

@@ -317,11 +317,10 @@ class _Flattener:
 
     def _read_starts(self, component: Component) -> None:
         for name, field in component.fields.items():
-            if not isinstance(field, Variable):
+            if not isinstance(field, Variable) or isinstance(field, Input):
                 continue
             given = component._starts.get(name)
-            # The default of an input is its value where nothing is connected.
-            if given is None and (field.default is None or isinstance(field, Input)):
+            if given is None and field.default is None:
                 continue
             value = field.read(field.default) if given is None else given
             node = self.variable_of[id(component), name]

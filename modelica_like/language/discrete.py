@@ -184,8 +184,13 @@ def clock(period: Expr, offset: Scalar = 0.0) -> Expr:
         offset: time of the first tick in s.
 
     Raises:
-        LanguageError: the period changes between events.
+        LanguageError: a time is a text, or changes between events.
     """
+    text = next((one for one in (period, offset) if isinstance(one, str)), None)
+    if text is not None:
+        what = f"A time of a clock is an expression of parameters, not the text '{text}'."
+        advice = f'Declare it, T = param("s", "period", default="{text}"), and use self.T.'
+        raise LanguageError(what, where=caller(), advice=advice)
     if moves(period) or moves(ca.SX(cast(Any, offset))):
         what = f"The ticks of clock({period}) are not known in advance, because they move between events."
         raise LanguageError(what, where=caller(), advice="Use parameters or discrete variables.")

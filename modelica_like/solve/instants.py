@@ -208,11 +208,11 @@ class Instants:
 
     def _endless(self, now: Point, rounds: int, *, changes: bool) -> Chattering:
         """Return the error of an instant whose iteration does not end."""
-        if not changes:
-            return self._chattering(f"Modes still switch after {rounds} rounds at one instant")
-        values = call(self.model, self.model.updates, now)
-        rows = [row for row, value in zip(self.model.update_rows, values, strict=True)
+        values = call(self.model, self.model.updates, now) if changes else ()
+        rows = [row for row, value in zip(self.model.update_rows, values, strict=False)
                 if row.reset.kind == "discrete" and value != now.d[row.reset.index]]  # fmt: skip
+        if not rows:  # what changes follows the modes
+            return self._chattering(f"Modes still switch after {rounds} rounds at one instant")
         names = ", ".join(self.model.flat_discretes[row.reset.index].path for row in rows)
         change = "changes" if len(rows) == 1 else "change"
         return Chattering(

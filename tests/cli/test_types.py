@@ -114,6 +114,7 @@ def test_a_netlist_is_described_with_the_parts_of_its_assemblies(run: CliRunner)
 class Heater(Component):
     warm: Variable = var("K", "temperature")
     limit: Parameter = param("K", "limit")
+    period: Parameter = param("s", "time between two instants", default=1.0)
     held: Discrete = discrete("K", "temperature at the last instant")
 
     def equations(self) -> Equations:
@@ -126,14 +127,14 @@ class Heater(Component):
         yield self.warm == self.limit / 2
 
     def events(self) -> Events:
-        yield when(clock("1 s"), {self.held: self.warm})
+        yield when(clock(self.period), {self.held: self.warm})
 
 
 def test_equations_of_the_start_and_at_instants_are_told() -> None:
     assert statements(Heater) == {
         "equations": ["der(warm) * tau() == limit - warm"],
         "initial equations": ["warm == limit / 2"],
-        "events": ["when(clock('1 s'), {held: warm})"],
+        "events": ["when(clock(period), {held: warm})"],
         "where": ["tau() = 3.0"],
     }
 

@@ -138,6 +138,20 @@ class Varying(Basis):
         yield when(clock(self.T * self.x), {self.n: 1})  # varying
 
 
+class Written(Basis):
+    def events(self) -> Events:
+        yield when(clock("0.2 s"), {self.n: 1})  # written
+
+
+class Backwards(Basis):
+    def equations(self) -> Equations:
+        yield from super().equations()
+        yield self.on == (self.x > 0.5)
+
+    def events(self) -> Events:
+        yield when(clock(-self.T), {self.n: pre(self.n) + 1})  # backwards
+
+
 class PreOfVariable(Basis):
     def events(self) -> Events:
         yield when(self.x > 0.5, {self.n: pre(self.x)})  # pre
@@ -229,6 +243,19 @@ CASES: dict[type[Component], tuple[type[ModelicaLikeError], str]] = {
         "The ticks of clock((T*x)) are not known in advance, because they move between events.\n"
         f"  in {HERE}:{{varying}} `clock(self.T * self.x)`\n"
         "Use parameters or discrete variables.",
+    ),
+    Written: (
+        LanguageError,
+        "A time of a clock is an expression of parameters, not the text '0.2 s'.\n"
+        f'  in {HERE}:{{written}} `clock("0.2 s")`\n'
+        'Declare it, T = param("s", "period", default="0.2 s"), and use self.T.',
+    ),
+    Backwards: (
+        Chattering,
+        "clock[1] switched 20 times at t = 0 s (counting).\n"
+        f"  in {HERE}:{{backwards}} `yield when(clock(-self.T), {{self.n: pre(self.n) + 1}})`\n"
+        "Modes still switch after 20 rounds at one instant.\n"
+        "Give the switching a hysteresis (a peak above 1 in friction), or smooth what drives it.",
     ),
     PreOfVariable: (
         LanguageError,
