@@ -181,7 +181,7 @@ int lu_factor(int n, double *matrix, int *order);
 void lu_solve(int n, const double *matrix, const int *order, double *x);
 void lu_solve_transposed(int n, const double *matrix, const int *order, double *x);
 double dot(int n, const double *p, const double *q);
-void make_orthogonal(int rows, int columns, double *a, double *turns, double *b);
+double make_orthogonal(int rows, int columns, double *a, double *turns, double *b);
 void least_squares(int rows, int columns, double *a, double *b, double *x);
 void keeping_least_squares(int n, int states, double *a, double *turns, double *b, double *x);
 /* special.c */
@@ -278,6 +278,9 @@ void tangent_of_implicit(Instance *c, const int *order);
 void read_tangents(Instance *c, const uint32_t *unknowns, size_t n, double *result, size_t stride);
 void slope_of_node(Instance *c, int node, int again, double *by_state);
 Result factor_implicit(Instance *c, int *order);
+/* native.c */
+Result instance_prepare(Instance *c, double start, double stop, double rtol, double atol);
+Result instance_begin(Instance *c);
 /* gradient.c */
 void gradient_move(Instance *c, double t);
 int gradient_round(Instance *c, int round, unsigned char *wanting, int any);

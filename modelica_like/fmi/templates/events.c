@@ -1,6 +1,4 @@
 /* Events at one instant: which transitions want to fire, and firing them until nothing does. */
-#include <math.h>
-#include <string.h>
 #include "core.h"
 
 #define ROUNDS 20
@@ -45,13 +43,12 @@ double next_moment(Instance *c) {
 /* Adds time events that are due and, unless they were found already, state events that are positive or about to be. */
 int find_wanting(Instance *c, unsigned char *wanting, int guards_too) {
     const Model *m = c->model;
-    State *s = &c->state;
     double *values = c->work.guards;
     int any = 0;
     if (m->n_moments > 0) {
         evaluate_now(c, &m->tapes.moments, values);
         for (int k = 0; k < m->n_transitions; k++)
-            if (m->transitions[k].timed && values[m->transitions[k].index] <= just_after(s)) wanting[k] = 1;
+            if (m->transitions[k].timed && values[m->transitions[k].index] <= just_after(&c->state)) wanting[k] = 1;
     }
     if (m->n_guards > 0 && guards_too) {
         evaluate_now(c, &m->tapes.guards_soon, values);

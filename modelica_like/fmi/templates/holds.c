@@ -1,6 +1,4 @@
 /* Motions that modes hold, as in initialize/holds.py: which they are, and how elements share what they hold. */
-#include <math.h>
-#include <string.h>
 #include "core.h"
 
 #define DEPENDENT 1e-9

@@ -1,9 +1,5 @@
 /* Instances: memory, logging, copies of their state. */
-#include <math.h>
 #include <stdarg.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include "core.h"
 
 static const char *const categories[] = {
@@ -132,8 +128,7 @@ static uint64_t place_work(const Model *m, Work *w, double *memory) {
 
 /* Events, and what modes hold. */
 static uint64_t place_events(const Model *m, Work *w, double *memory) {
-    uint64_t n_x = m->n_x, n_d = m->n_d, n_holds = m->n_holds;
-    uint64_t members = m->most_members + 1;
+    uint64_t n_x = m->n_x, n_d = m->n_d, n_holds = m->n_holds, members = m->most_members + 1;
     const Room rooms[] = {{n_x, 8, {&w->strike.jump, &w->impacts.x, &w->rates, &w->x_kept}}, {n_x, 1, {&w->known}},
         {n_d, 8, {&w->d_before, &w->d_fired, &w->best, &w->respond_d}}, {n_d, 1, {&w->decided, &w->changed}},
         {m->n_transitions, 1, {&w->wanting}}, {n_holds, sizeof(Terms), {&w->terms, &w->strike_terms}},

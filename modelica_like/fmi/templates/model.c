@@ -1,6 +1,5 @@
 /* Reads a model from the bytes of its file (model_file.py), and checks everything that the run-time relies on: whatever
  * stands in a file, nothing is read or written outside of the tables. */
-#include <string.h>
 #include "model.h"
 
 #define FORMAT 3

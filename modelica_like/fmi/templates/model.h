@@ -2,9 +2,13 @@
 #ifndef MODEL_H
 #define MODEL_H
 
+#include <float.h>
+#include <math.h>
 #include <stddef.h>
 #include <stdint.h>
 #include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
 
 #define OPERATION(name, value, by_a, by_b) OPERATION_##name,
 typedef enum {

@@ -1,5 +1,4 @@
 /* Checks the tables of a model: every index is one of the table that it points into. */
-#include <string.h>
 #include "model.h"
 
 /* Tells that a file is no model; returns 0. */
