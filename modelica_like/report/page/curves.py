@@ -61,5 +61,6 @@ def _thinned(run: Trajectories) -> NDArray[np.intp]:
 
 def _bands(run: Trajectories) -> list[dict[str, Any]]:
     """Time spans of the values of each mode that changes."""
-    modes = dict.fromkeys(event.mode for event in run.events)
+    hidden = {one.path for one in run.model.flat_discretes if one.hidden}
+    modes = dict.fromkeys(event.mode for event in run.events if event.mode not in hidden)
     return [{"name": mode, "bands": mode_spans(run, mode)[:_MOST_BANDS]} for mode in modes]
