@@ -224,6 +224,7 @@ BRIDGE = Icon(56, 52, paper=_rect(28, 26), lines="M-10 -14 v28 M10 -14 v28 M-10 
 MOTOR = Icon(52, 50, paper=_circle(0, 0, 24), lines="M-26 -14 h6.5 M-26 14 h6.5 M24 0 h2", text="M", ports={
     "ap": ("W", -14), "an": ("W", 14), "ep": "N", "en": "S", "flange": "E",
 })  # fmt: skip
+EMF = replace(MOTOR, key=("k",), ports={"p": ("W", -14), "n": ("W", 14), "flange": "E"})
 VOLTMETER = Icon(36, 36, paper=_circle(0, 0, 17), text="V", ports={"v": "S"})
 AMMETER = Icon(40, 36, paper=_circle(0, 0, 17), lines="M-20 0 h3 M17 0 h3", text="A", ports={"i": "S"})
 

@@ -90,7 +90,7 @@ def _visible(run: Trajectories, behind: Sequence[Change], *, timed: bool) -> lis
             owner = one.path.rpartition(".")[0]
             own = [change for change in behind if change.owner == owner] or behind
             why = ", ".join(dict.fromkeys(change.because for change in own if change.because))
-            told = Change(at, one.path, *(_value(one.kind, v) for v in (before, after)), why, own[0].source)
+            told = Change(at, one.path, _value(one.kind, before), _value(one.kind, after), why, own[0].source)
             (numbers if one.kind == "number" else found).append(told)
     if timed or found:  # numbers change at every tick
         return found

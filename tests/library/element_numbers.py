@@ -220,6 +220,15 @@ def variable_drives(run: Solution) -> None:
 
 
 @numbers
+def converters(run: Solution) -> None:
+    speed, rate = 12 / 0.05, 0.05**2 / (0.6 * 1e-4)
+    assert run.at(0.03)["rotor.w"] == close(speed * (1 - exp(-0.03 * rate)))
+    assert run.at(0.03)["armature.i"] == close(12 / 0.6 * exp(-0.03 * rate))
+    assert run.final["slide.s"] == close(10 * 2 / 200 * (1 - cos(20 * 0.1)))
+    assert run.final["coil.v"] == close(10 * 10 * 2 / 200 * 20 * sin(20 * 0.1))
+
+
+@numbers
 def machine_loads(run: Solution) -> None:
     thickness = 0.3 * sin(radians(75))
     force = 1700 * 3 / sin(radians(75)) * thickness**0.75

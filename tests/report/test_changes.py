@@ -65,7 +65,7 @@ class Watch(Relay):
 
 
 class Drive(Assembly):
-    def __init__(self, control: Component) -> None:
+    def __init__(self, control: Relay) -> None:
         super().__init__("drive")
         self.control = control
         self.J, self.sensor, self.motor = Inertia(J=1.0, phi=0.0, w=0.0), SpeedSensor(), Torque()
