@@ -9,6 +9,7 @@ from scipy.integrate import solve_ivp
 
 from modelica_like.fmi.export import export_fmu
 from modelica_like.language import guess
+from modelica_like.netlist import loads
 from modelica_like.netlist.registry import find_type
 
 PARTS = Path(__file__).parents[2] / "examples" / "elements"
@@ -52,3 +53,22 @@ def test_the_pendulum_starts_elsewhere(fmu: Path, kind: str) -> None:
     energy = (run["vx"] ** 2 + run["vy"] ** 2) / 2 + G * run["y"]
     assert run["x"][0] == pytest.approx(1.4999, rel=1e-12)
     assert np.ptp(energy) < 1e-6 * np.max(np.abs(energy) + run["vx"] ** 2 + run["vy"] ** 2)
+
+
+def test_a_steady_start_may_need_other_weights(tmp_path: Path) -> None:
+    text = """
+    [parts]
+    p = { is = "full_turns:Pendulum", m = "2 kg", L = "1.5 m" }
+    [guess]
+    "p.x" = "1.45 m"
+    "p.y" = "-0.3 m"
+    "p.vx" = "0 m/s"
+    [simulate]
+    until = "1 s"
+    start = "steady"
+    """
+    path = tmp_path / "hanging.fmu"
+    export_fmu(loads(text, str(PARTS / "hanging.toml")), path, strict=True)
+    run = simulate_fmu(str(path), stop_time=1.0, fmi_type="ModelExchange", output=["p.x", "p.y"])
+    assert run["p.x"] == pytest.approx(0.0, abs=1e-9)
+    assert run["p.y"] == pytest.approx(-L, rel=1e-9)
