@@ -186,6 +186,14 @@ class _Builder:
                     resets.append(columns["resets"][number][position])
                 numbers = {"mode": self.place[prefix + form.mode], "index": len(store) - 1, "resets": tuple(changes)}
                 found.append(CompiledTransition(**{**vars(form), **numbers}))
+        for one in reduced.choices:
+            changes = [Reset(kind, place, 1.0, k, 0) for k, (kind, place, _) in enumerate(one.resets, len(resets))]
+            resets += [value for *_, value in one.resets]
+            why, source = f"the states of {one.told} would become singular", one.origin.source
+            found.append(
+                CompiledTransition(one.mode, (0,), 0, False, len(guards), tuple(changes), source, "", why, fails=False)
+            )
+            guards.append(one.guard)
         return ca.vertcat(*guards), ca.vertcat(*moments), tuple(found), ca.vertcat(*resets), targets
 
     def _reset(self, path: str, value: int, targets: list[int]) -> Reset:

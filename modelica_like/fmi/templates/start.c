@@ -205,7 +205,7 @@ static Result check_modes_hold(Instance *c) {
     evaluate_now(c, &m->tapes.guards, guards);
     for (int k = 0; k < m->n_guards; k++) {
         const Transition *one = &m->transitions[m->guard_transition[k]];
-        if (guard_active(c, k) && guards[k] > 0)
+        if (guard_active(c, k) && guards[k] > 0 && one->target != (int)c->d[one->mode])
             return fail(c, "No steady state was found at t = %.9g s: %s does not stay in its mode.", c->state.t,
                 text_of(m, one->name));
     }
