@@ -30,7 +30,7 @@ from modelica_like.writing import write_text
 _FIRST, _MOST_EVENTS = 25, 400
 """Instants that are told at once, and after a click."""
 _READ = "Move over a curve to read it, drag to zoom, double-click to see all."
-_NO_CURVES = "Nothing here is a speed, a torque or a force: choose curves by <code>--show</code>, such as '*.i'."
+_NO_CURVES = "Nothing moves here: choose curves by <code>--show</code>, such as '*.i'."
 _KILO = 1e3
 _SMALL = 5e-4
 """Share of the supply below which an energy is not listed."""
@@ -43,7 +43,8 @@ def save_report(drive: Component | None, run: Trajectories, path: str | Path, *,
         drive: the drive; None if only results are known.
         run: its run.
         path: the file.
-        show: patterns of the curves, such as `*.w`; by default speeds, torques and forces of the parts.
+        show: names, patterns or formulas of the curves; by default speeds, torques and forces of the parts, or what a
+            circuit has.
 
     Raises:
         UnknownName: nothing matches a pattern.
@@ -58,7 +59,7 @@ def report(drive: Component | None, run: Trajectories, *, show: Sequence[str] = 
     Args:
         drive: the drive; None if only results are known, those of an FMU or a table.
         run: its run.
-        show: names, patterns or formulas of the curves; by default speeds, torques and forces of the parts.
+        show: as of `save_report`.
 
     Raises:
         UnknownName: nothing matches a pattern.
@@ -67,10 +68,11 @@ def report(drive: Component | None, run: Trajectories, *, show: Sequence[str] = 
     # Of the parts that are not inside of others, the last one is closest to the load.
     paths = ([one["path"] for one in panel["curves"] if one["path"]] for panel in drawn["panels"])
     ends = [min(reversed(some), key=lambda path: path.count(".")) for some in paths if some]
+    hint = f"{_READ} {escape(drawn.pop('left'))}" if drawn["panels"] else _NO_CURVES
     sections = [
         ("Schematic", f'<div class="wide">{schematic(drive, background=False)}</div>' if drive else ""),
         ("What happens", _happens(drive, run)),
-        ("Curves", f'<div id="curves"></div><p class="hint">{_READ if drawn["panels"] else _NO_CURVES}</p>'),
+        ("Curves", f'<div id="curves"></div><p class="hint">{hint}</p>'),
         ("Energy", _attempt(lambda: _energy(drive, run)) if run.model.components else ""),
         *(_of_equations(drive, run, ends) if drive and isinstance(run, Solution) else ()),
     ]  # fmt: skip
