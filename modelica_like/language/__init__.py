@@ -5,6 +5,7 @@ from modelica_like.language.assembly import Assembly as Assembly
 from modelica_like.language.component import Component as Component
 from modelica_like.language.declared import Connector as Connector
 from modelica_like.language.declared import Domain as Domain
+from modelica_like.language.delay import delay as delay
 from modelica_like.language.discrete import assert_ as assert_
 from modelica_like.language.discrete import change as change
 from modelica_like.language.discrete import clock as clock

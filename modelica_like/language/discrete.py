@@ -14,7 +14,7 @@ from modelica_like.language.expr import TIME, Expr, Scalar, Symbol, symbols_in
 from modelica_like.language.fields import Discrete, Variable
 from modelica_like.language.places import NOWHERE, caller
 
-MarkerKind = Literal["relation", "floor", "was", "once", "clock"]
+MarkerKind = Literal["relation", "floor", "was", "once", "clock", "delay"]
 
 
 class Marker(Symbol):
@@ -23,9 +23,9 @@ class Marker(Symbol):
     Attributes:
         kind: `relation`: whether `of` is true, changed by events; `floor`: the whole number below `of`, changed by
             events; `was`: the condition `of` at the present instant; `once`: 1 where `of` has just become true;
-            `clock`: number of ticks, `of` is their period.
+            `clock`: number of ticks, `of` is their period; `delay`: see `delay.Part`.
         of: the condition or value.
-        offset: time of the first tick of a clock.
+        offset: time of the first tick of a clock, or a delay, in s.
         name: path from the component, given when its template is made.
     """
 
@@ -253,7 +253,7 @@ def when(condition: Expr | tuple[Expr, ...], values: Mapping[Expr, Scalar]) -> W
     edges: list[Any] = []
     for one in conditions:
         symbols = symbols_in(one)
-        if not any(symbol is TIME or symbol.owner is None or not _is_fixed(symbol) for symbol in symbols):
+        if not any(symbol is TIME or symbol.owner is None or not is_fixed(symbol) for symbol in symbols):
             what = f"when({one}, …) has no edge: its condition is the same during the whole run."
             raise LanguageError(what, where=caller(), advice="Compare what changes, such as a variable or time.")
         ticks = any(isinstance(symbol, Marker) and symbol.kind == "clock" for symbol in symbols)
@@ -282,5 +282,6 @@ def assert_(condition: Expr, text: str) -> Assertion:
     return Assertion(condition, text)
 
 
-def _is_fixed(symbol: Symbol) -> bool:
+def is_fixed(symbol: Symbol) -> bool:
+    """Return whether the symbol of a field keeps its value during a run."""
     return symbol.order == 0 and not is_a(symbol, (Variable, Discrete)) and symbol.name in symbol.owner.fields

@@ -11,6 +11,7 @@ from modelica_like.compile.soon import time_resolution
 from modelica_like.errors import StepFailed
 from modelica_like.initialize import Point
 from modelica_like.solve.between import Between, Piece
+from modelica_like.solve.delays import Delays
 from modelica_like.solve.guards import Candidate, Ends, Guards, Located, candidates, locate
 from modelica_like.solve.idas import Integrator
 from modelica_like.solve.instants import Instants, just_after, note_sharing
@@ -57,12 +58,13 @@ class EventLoop:
         self.progress = progress
         self.guards = Guards(model)
         self.record = Recorder()
-        timed = len(model.transitions) > self.guards.count
+        timed = len(model.transitions) > self.guards.count or bool(model.delay_parts)
         self.pace = Pace(start.t, end, options, guarded=bool(self.guards.count), timed=timed)
         self.integrator = Integrator(model, options, whole=self.pace.on_grid)
         self.between = Between(self.integrator, self._closer)
         self.instants = Instants(model, options, self.guards, self.record, end - start.t)
         self.ticks = Ticks(model, self.instants)
+        self.delays = Delays(model, options, start, self.between)
 
     @property
     def counts(self) -> tuple[int, int, int]:
@@ -89,7 +91,8 @@ class EventLoop:
         note_sharing(self.record, self.model, self.now)
         self.record.begin(self.now)
         while self.now.t < self.end:
-            self._advance(min(self.ticks.stop(self.now), self.end))
+            known = self._known()
+            self._advance(min(self.ticks.stop(self.now), known, self.end))
             if self.between.many:
                 self._write()
             if self.progress is not None:
@@ -108,6 +111,16 @@ class EventLoop:
         """Interpolate results, and build the finished segments."""
         self.between.fill(precisely=precisely)
         self.record.build()
+
+    def _known(self) -> float:
+        """Return the time up to which delayed values are known, renewed where they end."""
+        if just_after(self.now.t) >= self.delays.until:
+            self._close()
+            self.now, again = self.delays.renewed(self.now, self.end)
+            self.record.begin(self.now)
+            if again and (wanting := self.guards.wanting(self.now)):
+                self._event(wanting)
+        return self.delays.until
 
     # -- smooth pieces -----------------------------------------------------------------------------------------------
 
@@ -152,6 +165,7 @@ class EventLoop:
             piece = Piece(looks, times, last, looks.x[:, numbers], looks.z[:, numbers])
         else:
             piece = self.between.ask(looks, times, last)
+        self.delays.keep(first, looks, last, self.now.d)
         while just_after(tick := self.instants.next_moment(self.now)) < end:
             self._add(piece, first, self.pace.before(tick))
             self._move(self.ticks.point(looks, tick, last, self._closer))
@@ -327,17 +341,23 @@ class EventLoop:
     def _wanting(self) -> list[CompiledTransition]:
         return [*self.instants.due(self.now), *self.guards.wanting(self.now)]
 
+    def _close(self) -> None:
+        """Close the segment, unless it has just begun: two things happen at one instant."""
+        if not self.record.fresh:
+            self.record.end(self.now.d)
+
     def _event(self, wanting: list[CompiledTransition]) -> bool:
         """Handle an event: close the segment, change modes until nothing fires, begin the next segment.
 
         Returns:
             Whether anything that moves has changed.
         """
-        self.record.end(self.now.d)
+        self._close()
         before, self.now = self.now, self.now.copy()
         self.instants.settle(self.now, wanting)
         moved = self.ticks.moved(before, self.now, wanting)
         if moved:
+            self.delays.broken(self.now.t)
             self._failures, self._failed_before = 0, self.now.t
             lasted, self._since = self.now.t - self._since, self.now.t
             self.pace.anew(before.d, lasted, self.now.d)

@@ -66,8 +66,8 @@ class Ticks:
 
 
 def _felt(model: CompiledDae) -> Any:
-    """Entries of d that the continuous equations and the conditions of state events read, and the modes of those."""
+    """Entries of d that continuous equations, state events and delays read, and the modes of these events."""
     found = {one.mode for one in model.transitions if not one.timed}
-    for function in (model.ode, model.alg, model.guards):
+    for function in (model.ode, model.alg, model.guards, model.delays):
         found.update(function.jac_sparsity(0, function.index_in("d")).get_triplet()[1])
     return sorted(found)
