@@ -20,6 +20,7 @@ from modelica_like.language.transition import NAME_IN_NOTICE
 
 Located = tuple[Any, Source]
 _ONE: Any = ca.SX(1)
+_PLAIN = {"sample": "{} itself", "previous": "pre({}), the value before an event"}
 
 
 @dataclass(frozen=True)
@@ -179,6 +180,10 @@ class DiscreteEquations:
                     seen.update(map(id, parts(one.whole)))
                     pending += self._write_delay(one.whole, source)
                     continue
+                if one.kind in ("sample", "previous"):
+                    what = f"{self._kind}: {one.kind}({one.of}) is outside of the new values of a when(clock(…), …)."
+                    advice = f"Elsewhere write {_PLAIN[one.kind].format(one.of)}."
+                    raise LanguageError(what, where=source, advice=advice)
                 seen.add(id(one))
                 counts[one.kind] = counts.get(one.kind, 0) + 1
                 counts_up = one.kind in ("floor", "clock")

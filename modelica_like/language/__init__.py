@@ -10,9 +10,12 @@ from modelica_like.language.discrete import assert_ as assert_
 from modelica_like.language.discrete import change as change
 from modelica_like.language.discrete import clock as clock
 from modelica_like.language.discrete import edge as edge
+from modelica_like.language.discrete import hold as hold
 from modelica_like.language.discrete import if_ as if_
 from modelica_like.language.discrete import initial as initial
 from modelica_like.language.discrete import pre as pre
+from modelica_like.language.discrete import previous as previous
+from modelica_like.language.discrete import sample as sample
 from modelica_like.language.discrete import terminal as terminal
 from modelica_like.language.discrete import when as when
 from modelica_like.language.equation import Equations as Equations
@@ -58,8 +61,8 @@ from modelica_like.language.functions import sqrt as sqrt
 from modelica_like.language.functions import tan as tan
 from modelica_like.language.functions import tanh as tanh
 from modelica_like.language.functions import where as where
-from modelica_like.language.hold import UNLIMITED as UNLIMITED
-from modelica_like.language.hold import Hold as Hold
+from modelica_like.language.holding import UNLIMITED as UNLIMITED
+from modelica_like.language.holding import Hold as Hold
 from modelica_like.language.icon import Icon as Icon
 from modelica_like.language.icon import Stroke as Stroke
 from modelica_like.language.mode import BoundMode as BoundMode
