@@ -27,7 +27,9 @@ class _Row:
     entry: int | None
 
 
-def updates(reduced: ReducedDae, reset: Callable[[str, int], Reset]) -> tuple[Any, tuple[CompiledUpdate, ...]]:
+def updates(
+    reduced: ReducedDae, reset: Callable[[str, int], Reset], delayed: Sequence[int] = ()
+) -> tuple[Any, tuple[CompiledUpdate, ...]]:
     """Return what discrete variables, and variables set by a `when`, become in one iteration of an event.
 
     Discrete variables in it are the new ones, except in `pre(…)`. What is not set keeps its value; for variables that
@@ -36,6 +38,7 @@ def updates(reduced: ReducedDae, reset: Callable[[str, int], Reset]) -> tuple[An
     Args:
         reduced: the reduced system.
         reset: gives the target for its path and the number of the update.
+        delayed: entries of d that are delayed values at the start.
 
     Raises:
         StructureError: discrete variables depend on each other in a loop.
@@ -48,11 +51,23 @@ def updates(reduced: ReducedDae, reset: Callable[[str, int], Reset]) -> tuple[An
     values = _replaced([ca.if_else(row.active, row.value, row.kept) for row in (*own, *rows)], before)
     values, results = values[: len(own)], values[len(own) :]
     symbols = [flat.d[row.entry] for row in own]
+    _solve_delays([k for k, row in enumerate(own) if row.entry in delayed], symbols, values)
     order = _order(flat, own, symbols, values)
     if order:
         _, results = ca.substitute_inplace([symbols[k] for k in order], [values[k] for k in order], results, False)
     results = _replaced(results, [(symbol, flat.d[entry]) for entry, symbol in old.items()])
     return ca.vertcat(*results), tuple(row.update for row in rows)
+
+
+def _solve_delays(those: list[int], symbols: list[Any], values: list[Any]) -> None:
+    """Solve for delayed values at the start that depend on each other linearly, as in z == u + a * delay(z, T)."""
+    own, new = ca.vertcat(*(symbols[k] for k in those)), ca.vertcat(*(values[k] for k in those))
+    if not those or not ca.depends_on(new, own) or any(ca.which_depends(new, own, 2, True)):
+        return
+    others = ca.substitute(new, own, ca.SX.zeros(own.shape))
+    solved = ca.solve(ca.SX.eye(len(those)) - ca.jacobian(new, own), others)
+    for k, one in zip(those, ca.vertsplit(solved), strict=True):
+        values[k] = one
 
 
 def _rows(reduced: ReducedDae, reset: Callable[[str, int], Reset]) -> list[_Row]:
@@ -114,10 +129,15 @@ def _loop(flat: FlatModel, rows: list[_Row], needs: list[set[int]], left: set[in
     while way[-1] not in way[:-1]:
         way.append(min(needs[way[-1]] & left))
     way = way[way.index(way[-1]) :]
+    where = [*dict.fromkeys(rows[k].update.source for k in way if rows[k].update.source.file)]
+    if any("delay[" in rows[k].path for k in way):
+        what = "Before the start, a delayed value is the one at the start, which depends on itself here."
+        advice = "Delay a state, or what follows from the delayed value linearly."
+        return StructureError(what, where=where, advice=advice)
     own = [rows[k].path for k in reversed(way[1:]) if not flat.discretes[cast(int, rows[k].entry)].hidden]
     return StructureError(
         f"{own[0]} determines itself at an event." if len(own) == 1
         else f"Discrete variables determine each other in a loop: {' → '.join([*own, own[0]])}.",
-        where=[*dict.fromkeys(rows[k].update.source for k in way if rows[k].update.source.file)],
+        where=where,
         advice="Use a value from before the event, pre(…), at one place of the loop.",
     )  # fmt: skip

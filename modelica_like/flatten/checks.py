@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
 from typing import Any, cast
 
 import casadi as ca
@@ -12,6 +11,7 @@ from modelica_like.errors import ComponentUnbalanced, ModelicaLikeError, raise_t
 from modelica_like.flatten.dimensions import Dimensions, check_equation, check_expression
 from modelica_like.language.component import Component
 from modelica_like.language.declared import Declared
+from modelica_like.language.delay import Part
 from modelica_like.language.discrete import Pre
 from modelica_like.language.equation import Equation
 from modelica_like.language.expr import TIME, symbols_in
@@ -84,8 +84,9 @@ def _driven_input(component: Component, equations: list[Equation]) -> str:
 
 
 def check_units(
-    component: Component, equations: list[Equation], events: Sequence[Any], updates: Sequence[Any]
-) -> dict[str, Unit]:
+    component: Component, equations: list[Equation], events: Sequence[Any], updates: Sequence[Any],
+    delays: Sequence[Any],
+) -> dict[str, Unit]:  # fmt: skip
     """Check every equation; return the units that `*` outputs take from their equations.
 
     Args:
@@ -93,13 +94,14 @@ def check_units(
         equations: its own.
         events: its transitions and start modes.
         updates: new values at events.
+        delays: delayed values, with their places.
 
     Raises:
         UnitMismatch, LanguageError: all errors, reported together.
     """
     inferred: dict[str, Unit] = {}
 
-    dimensions = Dimensions(partial(_unit_of_leaf, component, inferred))
+    dimensions = Dimensions(lambda leaf: _unit_of_leaf(component, inferred, leaf, dimensions))
     kind = type(component).__name__
     errors: list[ModelicaLikeError] = []
 
@@ -123,6 +125,8 @@ def check_units(
     for one in updates:
         attempt(check_expression, one.active, ONE, dimensions, f"{kind}, condition", one.source)
         attempt(check_equation, ca.SX(one.target), ca.SX(one.value), dimensions, kind, one.source)
+    for one, source in delays:
+        attempt(check_expression, one.offset, _SECOND, dimensions, f"{kind}, delay", source)
     for label, term, unit in (
         ("stored_energy", component.stored_energy(), _JOULE),
         ("loss_power", component.loss_power(), _WATT),
@@ -134,11 +138,13 @@ def check_units(
     return inferred
 
 
-def _unit_of_leaf(component: Component, inferred: dict[str, Unit], leaf: Any) -> Unit:
+def _unit_of_leaf(component: Component, inferred: dict[str, Unit], leaf: Any, dimensions: Dimensions) -> Unit:
     symbol = symbols_in(leaf)[0]
     symbol = symbol.of if isinstance(symbol, Pre) else symbol
     if symbol is TIME:
         return _SECOND
+    if isinstance(symbol, Part):
+        return dimensions.unit_or_any(symbol.of)
     if symbol.owner is None or not isinstance(symbol.owner.fields.get(symbol.name), Field):
         return ONE
     unit = unit_of_field(symbol.owner, symbol.name)

@@ -12,7 +12,7 @@ from modelica_like.errors import LanguageError
 from modelica_like.language.component import Component
 from modelica_like.language.expr import TIME, Symbol, flagged_motion, is_expression, symbol_of, symbols_in
 from modelica_like.language.fields import Variable
-from modelica_like.language.hold import UNLIMITED, Hold
+from modelica_like.language.holding import UNLIMITED, Hold
 from modelica_like.language.mode import Mode
 
 TERMS = 4

@@ -57,6 +57,8 @@ def initialize(model: CompiledDae, t0: float = 0.0, start: StartKind = "given") 
             f"There is no start '{start}'{did_you_mean(start, get_args(StartKind)) or '.'}",
             advice="A run can start as given, at rest or in the steady state: given, rest, steady.",
         )
+    if start == "steady":
+        model.refuse_delays(InitializationError, f"{model.name} cannot start in the steady state")
     point = Point(t0, model.guesses.copy(), model.z_guesses.copy(), np.zeros(model.discrete_size))
     point.d = call(model, model.discrete_starts, point)
     share(model, point)

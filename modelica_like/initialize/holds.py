@@ -14,7 +14,7 @@ from modelica_like.compile.soon import time_resolution
 from modelica_like.flatten.holds import TERMS
 from modelica_like.initialize.point import Point, call, solve_implicit
 from modelica_like.initialize.slopes import variable_slopes
-from modelica_like.language.hold import UNLIMITED
+from modelica_like.language.holding import UNLIMITED
 
 _DEPENDENT = 1e-9
 INSTANT = 1e-9

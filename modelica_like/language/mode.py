@@ -11,7 +11,7 @@ import casadi as ca
 from modelica_like.errors import LanguageError, Source, UnknownName, did_you_mean
 from modelica_like.language.discrete import eventful, marker
 from modelica_like.language.expr import Expr, Scalar, Symbol, symbol_of
-from modelica_like.language.hold import Hold
+from modelica_like.language.holding import Hold
 from modelica_like.language.places import NOWHERE
 
 

@@ -64,24 +64,27 @@ class Instants:
         self._impacts = 0
         self._instants: deque[float] = deque(maxlen=_CHATTER_INSTANTS)
         self._round = 0
-        self._timed = [t for t in model.transitions if t.timed]
+        self.timed = [t for t in model.transitions if t.timed]
         self._numbers = {id(transition): k for k, transition in enumerate(model.transitions)}
 
     def next_moment(self, now: Point) -> float:
         """Time of the next time event, or infinity."""
-        if not self._timed:
-            return np.inf
-        moments = call(self.model, self.model.moments, now)
+        return min((t for _, t in self.ahead(now)), default=np.inf)
+
+    def ahead(self, now: Point) -> list[tuple[CompiledTransition, float]]:
+        """Time events that come, with their times."""
+        if not self.timed:
+            return []
+        moments = call(self.model, self.model.moments, now).tolist()
         here = just_after(now.t)
-        ahead = [moments[t.index] for t in self._timed if _is_source(now, t) and moments[t.index] > here]
-        return float(min(ahead, default=np.inf))
+        return [(t, moments[t.index]) for t in self.timed if moments[t.index] > here and _is_source(now, t)]
 
     def due(self, now: Point) -> list[CompiledTransition]:
         """Time events whose time is reached."""
-        if not self._timed:
+        if not self.timed:
             return []
         moments = call(self.model, self.model.moments, now)
-        return [t for t in self._timed if _is_source(now, t) and moments[t.index] <= just_after(now.t)]
+        return [t for t in self.timed if _is_source(now, t) and moments[t.index] <= just_after(now.t)]
 
     def settle(self, now: Point, wanting: list[CompiledTransition], *, begins: bool = False) -> None:
         """Fire transitions until none is left and no discrete variable changes; `now` becomes the point after.
