@@ -12,7 +12,7 @@ from modelica_like.errors import LanguageError, Source
 from modelica_like.flatten.checks import check_balance, check_units, unit_of_field
 from modelica_like.flatten.conditions import guard_of
 from modelica_like.flatten.discrete import DiscreteEquations, Hidden, UpdateForm, between_events, is_discrete
-from modelica_like.flatten.holds import HoldForm, hold_forms
+from modelica_like.flatten.holds import HoldForm, IdealForm, hold_forms, ideal_forms
 from modelica_like.flatten.reasons import reason
 from modelica_like.flatten.wiring import taken
 from modelica_like.language.component import Component
@@ -117,6 +117,7 @@ class Template:
     update_forms: tuple[UpdateForm, ...]
     holds: tuple[HoldForm, ...]
     hold_terms: ca.Function
+    ideals: tuple[IdealForm, ...]
     energy_slots: tuple[Slot, ...]
     energy: ca.Function
     connections: tuple[Connection | FreeEnd, ...] = field(compare=False)
@@ -263,6 +264,7 @@ def _build(component: Component) -> Template:
         update_forms=discrete.forms(lambda symbol: path_of(symbol, component)),
         holds=holds,
         hold_terms=names.function("hold_terms", hold_terms),
+        ideals=ideal_forms(component, residuals),
         energy_slots=tuple(energy.variables),
         energy=energy.function("energy", energy_terms),
         connections=wiring,

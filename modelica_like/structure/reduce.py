@@ -20,6 +20,7 @@ from modelica_like.structure.holds import (
     held_rates,
     share_reactions,
 )
+from modelica_like.structure.ideal import IdealNetwork, complete, find_ideals
 from modelica_like.structure.index import Pantelides, prefer_relative_states
 from modelica_like.structure.motion import Motion
 from modelica_like.structure.prescribed import Flags
@@ -50,6 +51,7 @@ class ReducedDae:
         differentiated: origins of the differentiated equations.
         holds: motions that modes hold.
         circuits: held motions that depend on each other.
+        ideal: the ideal elements, if there are any.
     """
 
     flat: FlatModel
@@ -75,6 +77,7 @@ class ReducedDae:
     explicit: tuple[tuple[int, Any], ...] = field(repr=False)
     holds: tuple[HeldMotion, ...] = ()
     circuits: tuple[Circuit, ...] = ()
+    ideal: IdealNetwork | None = None
 
     def rate(self, variable: int) -> Any:
         """Return the time derivative of a flat variable, in x, z, inputs, p, d and t."""
@@ -135,16 +138,19 @@ def reduce(flat: FlatModel) -> ReducedDae:
         residual, origins = _differentiate(system, counts)
     derivatives = {system.derivative(state) for state in states}
     rates = [k for k, unknown in enumerate(unknowns) if unknown in derivatives]
-    solved = BlockSolver(residual, system.column(unknowns), _volatile(system), rates).run()
+    ideals = find_ideals(flat)
+    kept = [one.row for one in ideals]
+    solved = BlockSolver(residual, system.column(unknowns), _volatile(system), rates, kept).run()
     order = [(system.symbols[unknowns[k]], expression) for k, expression in solved.order]
     circuits = find_circuits(system, holds, order, states)
     if circuits:
         residual = share_reactions(system, holds, circuits, residual)
-        solved = BlockSolver(residual, system.column(unknowns), _volatile(system), rates).run()
+        solved = BlockSolver(residual, system.column(unknowns), _volatile(system), rates, kept).run()
     reduced = _assemble(system, counts, states, unknowns, origins, solved)
     held = tuple(replace(one, state=reduced.node_states[one.motion]) for one in holds)
     ode = held_rates(reduced.flat, reduced.ode, reduced.values, held, circuits)
-    return replace(reduced, ode=ode, holds=held, circuits=tuple(circuits))
+    reduced = replace(reduced, ode=ode, holds=held, circuits=tuple(circuits))
+    return complete(reduced, ideals, solved.rows) if ideals else reduced
 
 
 def _check_input_rates(system: System) -> None:
