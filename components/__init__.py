@@ -77,7 +77,7 @@ _NAMES = {
         "TranslationalSpringDamper"
     ),
     "stepped_signals": "BooleanPulse BooleanStep BooleanTable StepTable",
-    "switching": "Contactor Diode",
+    "switching": "Contactor Diode IdealDiode IdealSwitch IdealThyristor",
     "synchronisers": "Synchroniser",
     "synchronous_machines": "MappedDrive PMSynchronousDrive PMSynchronousMachine",
     "thermal": (

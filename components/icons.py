@@ -212,6 +212,8 @@ CURRENT = Icon(44, 44, paper=_circle(0, 0, 18), lines="M22 -16 h-22 v-2 M22 16 h
 SWITCH = Icon(48, 24, lines="M-24 0 h12 L10 -11 M12 0 h12", solid=f"{_circle(-12, 0, 2.5)} {_circle(12, 0, 2.5)}",
               ports={"closed": "N"})  # fmt: skip
 DIODE = Icon(40, 22, lines="M-20 0 h12 M8 0 h12", solid="M-8 -9 L8 0 L-8 9 Z", heavy="M8 -10 v20")
+THYRISTOR = Icon(40, 26, lines="M-20 0 h12 M8 0 h12 M8 0 L14 -12", solid="M-8 -9 L8 0 L-8 9 Z", heavy="M8 -10 v20",
+                 ports={"fire": "N"})  # fmt: skip
 CONTACTOR = Icon(
     52, 44, paper=_rect(14, 8, 0, -11), lines="M-26 12 h14 L8 2 M12 12 h14 M-2 6 v-8",
     solid=f"{_circle(-12, 12, 2.5)} {_circle(12, 12, 2.5)}",

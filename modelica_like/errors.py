@@ -191,6 +191,10 @@ class Chattering(SolveError):
     """Modes switch without end."""
 
 
+class NoValidModes(SolveError):
+    """No combination of the modes of ideal elements is possible."""
+
+
 class LimitPassed(SolveError):
     """A component has ended the run, because a limit was passed."""
 

@@ -56,6 +56,7 @@ def compile(reduced: ReducedDae) -> CompiledDae:
         starts=tuple(StartEntry(s.node, reduced.node_states[s.node], s.strength) for s in flat.starts),
         holds=reduced.holds,
         circuits=reduced.circuits,
+        ideal=reduced.ideal,
         singular=tuple((names, origins) for names, origins, _ in reduced.determinants),
         differentiated=reduced.differentiated,
         guesses=np.array(reduced.guesses, float),

@@ -16,6 +16,7 @@ from modelica_like.initialize import (
     check_singular,
     chosen_modes,
     holding,
+    meet,
     share,
     sharing,
     solve_implicit,
@@ -96,17 +97,23 @@ class Instants:
         Raises:
             Chattering: transitions do not end, or events follow each other ever faster.
             LimitPassed: a transition ends the run.
+            NoValidModes: ideal elements have no valid combination of modes.
             SingularAtStart: the equations have no unique solution after it.
         """
         changes = bool(self.model.update_rows)
-        if not (wanting or (begins and changes)):
+        ideal = self.model.ideal.elements if self.model.ideal else ()
+        if not (wanting or (begins and (changes or ideal))):
             return
         noted = len(self.record.events)
+        if not begins:
+            meet(self.model, now)  # the integration leaves the conditions of ideal elements within its tolerances
         self._struck, self._entered = None, set()
         wanting = self._share_anew(now, wanting)
-        alone = self.options.iterations + _ALONE * len(self.model.holds)
+        alone = self.options.iterations + _ALONE * (len(self.model.holds) + len(ideal))
         for number in range(alone):
             self._round = number
+            if ideal and not (wanting or changes) and meet(self.model, now):
+                wanting = self.guards.wanting(now)
             if not (wanting or changes):
                 break
             before = now.d

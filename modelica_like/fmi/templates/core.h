@@ -120,6 +120,7 @@ typedef struct {
     int *order; /* pivots of the implicit equations */
     int *targets, *standing, *places, *member, *pivots, *same, *places_of_slots, *special_outputs;
     unsigned char *known, *decided, *wanting, *changed, *kinds, *held, *other, *known_slots, *needed_slots;
+    unsigned char *open_rows;     /* implicit equations that depend on others */
     unsigned char *asked, *tuned; /* variables that somebody reads; parameters that have changed in a run */
     Piece *whole;
     Terms *terms, *strike_terms;
@@ -216,6 +217,10 @@ int anything_shared(const Instance *c);
 void share(Instance *c);
 void rest(Instance *c);
 void rest_rates(Instance *c, double *rates);
+/* ideal.c */
+void replace_dependent(Instance *c);
+int pushed(Instance *c);
+Result meet(Instance *c, int *any);
 /* impacts.c */
 Result stop_motions(Instance *c, const double *before, Impacts *impacts);
 /* events.c */

@@ -203,14 +203,19 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
     State *s = &c->state;
     Impacts *impacts = &c->work.impacts;
     double *before = c->work.d_before;
-    int changes = m->n_updates > 0;
+    int changes = m->n_updates > 0, met;
     impacts->struck = 0;
     memset(impacts->entered, 0, (size_t)m->n_holds);
     if (find_wanting(c, wanting, !located)) {
+        if (m->n_ideals > 0 && !pushed(c) && meet(c, &met) != RESULT_OK) return RESULT_ERROR;
         if (crowded(c) != RESULT_OK || share_anew(c, wanting) != RESULT_OK) return RESULT_ERROR;
     }
-    for (int round = 0; round < ROUNDS + ALONE * m->n_holds; round++) {
+    for (int round = 0; round < ROUNDS + ALONE * (m->n_holds + m->n_ideals); round++) {
         int any = 0;
+        if (!changes && (round > 0 || pushed(c)) && !any_of(wanting, m->n_transitions)) {
+            if (meet(c, &met) != RESULT_OK) return RESULT_ERROR;
+            if (met) find_wanting(c, wanting, 1);
+        }
         for (int k = 0; k < m->n_transitions; k++) {
             if (any && round >= TOGETHER) wanting[k] = 0;
             any |= wanting[k];
@@ -239,7 +244,7 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
     if (changes) return fail(c, "Discrete variables do not settle at t = %.12g s.", s->t);
     return fail(c,
         "Modes still switch after %d rounds at t = %.12g s. Give the switching a hysteresis, or smooth what drives it.",
-        ROUNDS + ALONE * m->n_holds, s->t);
+        ROUNDS + ALONE * (m->n_holds + m->n_ideals), s->t);
 }
 
 /* One event iteration for an importer's event mode. Where anything fired or was set, its solver must begin anew even if

@@ -212,6 +212,7 @@ void share(Instance *c) {
     Terms *terms = c->work.terms;
     double *weights = c->work.weights, *base = c->work.base_weights, *use = c->work.use;
     double *best = c->work.best, least = INFINITY;
+    replace_dependent(c);
     if (m->n_circuits == 0) return;
     find_held(c, terms, c->work.held);
     weigh(m, terms, base);

@@ -237,6 +237,7 @@ static Result pass_start(Instance *c) {
     if (round == MODE_ROUNDS)
         return fail(c, "The modes at the start do not settle: they and the start values keep changing each other.");
     rest(c);
+    replace_dependent(c);
     if (solve_now(c, 0) != RESULT_OK || check_singular(c) != RESULT_OK) return RESULT_ERROR;
     if (m->settings->steady && check_modes_hold(c) != RESULT_OK) return RESULT_ERROR;
     c->state.z_valid = c->state.solved = 1;
