@@ -53,7 +53,7 @@ _TAPES = (
 )  # fmt: skip
 SECTIONS: dict[str, Any] = {
     "settings": _record(
-        "n_d n_y steady rates_depend_on_time implicit_linear terminal",
+        "n_d n_y steady rates_depend_on_time implicit_linear terminal rests unused",
         "absolute_to_relative default_tolerance fixed_step",
     ),
     "text": _TEXT,
@@ -182,6 +182,8 @@ def _contents(
                 sizes["y"],
                 *flags,
                 model.discrete_position.get(TERMINAL, -1),
+                int(model.settings.get("on_chattering") == "rest"),
+                0,
                 ABSOLUTE_TO_RELATIVE,
                 tolerance,
                 fixed_step,

@@ -99,6 +99,7 @@ typedef struct {
     int n_d, n_y, steady, rates_depend_on_time;
     int implicit_linear; /* the implicit equations are linear in z */
     int terminal;        /* entry of d that becomes 1 at the end of a run, or -1 */
+    int rests, unused;   /* where impacts follow each other ever faster, they end in contact */
     double absolute_to_relative, default_tolerance;
     double fixed_step; /* 0: as accuracy asks for */
 } Settings;
