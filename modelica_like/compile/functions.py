@@ -156,7 +156,7 @@ class _Builder:
             "variables": reduced.values[: len(flat.variables)],
             "guards": guards,
             "guard_rates": reduced.total_derivative(guards),
-            "guards_soon": guards_soon(reduced, guards),
+            "guards_soon": guards_soon(flat.time, reduced.total_derivative, guards),
             "moments": moments,
             "resets": resets,
             "updates": news,

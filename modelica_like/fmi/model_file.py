@@ -53,7 +53,7 @@ _TAPES = (
 )  # fmt: skip
 SECTIONS: dict[str, Any] = {
     "settings": _record(
-        "n_d n_y steady rates_depend_on_time implicit_linear terminal ideal unused",
+        "n_d n_y steady rates_depend_on_time implicit_linear terminal ideal rests",
         "absolute_to_relative default_tolerance fixed_step",
     ),
     "text": _TEXT,
@@ -184,7 +184,7 @@ def _contents(
                 *flags,
                 model.discrete_position.get(TERMINAL, -1),
                 model.ideal.first if model.ideal else 0,
-                0,
+                int(model.settings.get("on_chattering") == "rest"),
                 ABSOLUTE_TO_RELATIVE,
                 tolerance,
                 fixed_step,

@@ -248,9 +248,10 @@ class Strike:
         model: the compiled model.
         point: the point with the new modes and the speeds before; it becomes the point after the impact.
         entering: positions of the held motions whose modes have just begun.
+        resting: whether nothing rebounds, whatever its restitution; nor does a motion that is rounding.
     """
 
-    def __init__(self, model: CompiledDae, point: Point, entering: Collection[int]) -> None:
+    def __init__(self, model: CompiledDae, point: Point, entering: Collection[int], *, resting: bool = False) -> None:
         self.model = model
         self.point = point
         self.entering = set(entering)
@@ -261,6 +262,7 @@ class Strike:
         limits = capacities(model, point)
         moving = [k for k in self.entering if before[k] != 0.0 and max(limits[k]) >= UNLIMITED]
         self.hard = self._stops(before, moving)
+        self._rebound = 1.0 if self.hard and not resting else 0.0
         self.knocked: list[int] = []
 
     def run(self) -> None:
@@ -271,7 +273,7 @@ class Strike:
         model, point = self.model, self.point
         before = self._motions()
         moving = [k for k in sorted(self.entering) if before[k] != 0.0]
-        limits, restitution = capacities(model, point), terms(model, point)[:, -1]
+        limits, restitution = capacities(model, point), self._rebound * terms(model, point)[:, -1]
         trials = 0
         while True:
             approaches = {k: -(1.0 + restitution[k]) * before[k] / INSTANT for k in moving if k not in self.loose}

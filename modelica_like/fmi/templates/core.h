@@ -56,9 +56,9 @@ typedef struct { /* what changes; arrays of the model's sizes stand behind it, s
     int looked;                                        /* the guards are known from the end of the last fixed step */
     double tolerance, absolute, start_time, stop_time; /* absolute: in nominal values */
     int stop_time_defined;
-    double step;            /* next step size, 0: choose one */
-    double instants[CROWD]; /* of the last events, in a circle */
-    int n_instants;
+    double step;             /* next step size, 0: choose one */
+    double instants[CROWD];  /* of the last events, in a circle */
+    int n_instants, resting; /* resting: impacts end in contact */
     double n_steps, n_rejected, n_evaluations, n_events;
 } State;
 

@@ -168,13 +168,21 @@ static Result update_once(Instance *c, Impacts *impacts, int *changes) {
     return check_singular(c);
 }
 
-/* Notes an instant; an error where the last ones came ever faster. */
+/* Notes an instant. Where the last ones came ever faster, impacts end in contact if the model asks for it; an error
+   otherwise, and if that does not help. */
 static Result crowded(Instance *c) {
     State *s = &c->state;
     double span = s->stop_time_defined ? s->stop_time - s->start_time : 1;
     double first = s->instants[s->n_instants % CROWD]; /* CROWD instants ago, once there were so many */
+    double last = s->n_instants > 0 ? s->instants[(s->n_instants - 1) % CROWD] : s->t;
+    if (s->t - last >= CROWDED * span) s->resting = 0;
     s->instants[s->n_instants % CROWD] = s->t;
     if (++s->n_instants <= CROWD || s->t - first >= CROWDED * span) return RESULT_OK;
+    if (c->model->settings->rests && !s->resting) {
+        s->resting = 1;
+        s->n_instants = 0;
+        return RESULT_OK;
+    }
     return fail(
         c, "Events follow each other ever faster at t = %.12g s. Give the switching a hysteresis, or smooth it.", s->t);
 }

@@ -108,7 +108,7 @@ typedef struct {
     int implicit_linear; /* the implicit equations are linear in z */
     int terminal;        /* entry of d that becomes 1 at the end of a run, or -1 */
     int ideal;           /* entry of d where the rows of ideal elements begin */
-    int unused;
+    int rests;           /* where impacts follow each other ever faster, they end in contact */
     double absolute_to_relative, default_tolerance;
     double fixed_step; /* 0: as accuracy asks for */
 } Settings;
