@@ -7,7 +7,7 @@ from typing import Any, cast
 
 import casadi as ca
 
-from modelica_like.errors import ComponentUnbalanced, ModelicaLikeError, raise_together_or_one
+from modelica_like.errors import ComponentUnbalanced, ModelicaLikeError, UnitMismatch, raise_together_or_one
 from modelica_like.flatten.dimensions import Dimensions, check_equation, check_expression
 from modelica_like.language.component import Component
 from modelica_like.language.declared import Declared
@@ -19,6 +19,8 @@ from modelica_like.language.fields import Field, Input, Parameter, Variable
 from modelica_like.units import ANY, ONE, Unit, parse_unit
 
 _SECOND = parse_unit("s")
+_PAIR = 2
+"""Fewer values cannot disagree."""
 _WATT, _JOULE = parse_unit("W"), parse_unit("J")
 
 
@@ -134,8 +136,19 @@ def check_units(
     ):
         attempt(check_expression, term, unit, dimensions, f"{kind}.{label}")
     if errors:
-        raise raise_together_or_one(errors)
+        raise _by_any_units(component, errors) or raise_together_or_one(errors)
     return inferred
+
+
+def _by_any_units(component: Component, errors: Sequence[ModelicaLikeError]) -> UnitMismatch | None:
+    """Say which units of `*` parameters do not fit together; the equations of a library do not tell that."""
+    given = [(name, unit_of_field(component, name)) for name, field in component.fields.items()
+             if isinstance(field, Parameter) and field.unit_text == "*" and name in component._values]  # fmt: skip
+    if len(given) < _PAIR or not all(isinstance(one, UnitMismatch) for one in errors):
+        return None
+    told = ", ".join(f"{name} in {unit}" for name, unit in given)
+    return UnitMismatch(f"{component.label} ({type(component).__name__}): its units do not fit together: {told}.",
+                        where=component.place_of(), why=errors[0].what)  # fmt: skip
 
 
 def _unit_of_leaf(component: Component, inferred: dict[str, Unit], leaf: Any, dimensions: Dimensions) -> Unit:
