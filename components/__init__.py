@@ -22,7 +22,7 @@ _NAMES = {
     "control": "PI PID ClutchActuator Feedback FirstOrder Gain Integrator Limiter P Sum",
     "couplings": "ArcSpring DualMassFlywheel ElasticCoupling HystereticCoupling OldhamCoupling RuptureCoupling",
     "dc_machines": "PermanentMagnetDCMachine SeparatelyExcitedDCMachine SeriesDCMachine ShuntDCMachine",
-    "drag_losses": "ChurningGear DeepGrooveBearing",
+    "drag_losses": "ChurningGear DeepGrooveBearing OpenPlates",
     "drivers": "Driver",
     "eddy_current_brakes": "EddyCurrentForce EddyCurrentTorque",
     "electrical": (

@@ -328,5 +328,5 @@ def test_the_balance_would_notice_a_wrong_sign() -> None:
 
 
 def test_a_component_that_is_not_there() -> None:
-    with pytest.raises(UnknownName, match="no component 'sip'; did you mean 'slip'?"):
+    with pytest.raises(UnknownName, match=r"no component 'sip'; did you mean 'slip'\?"):
         simulate(through(Spring(c=30.0)), 0.1).energy()["sip"]
