@@ -23,7 +23,7 @@ _NAMES = {
     "converters": "RotationalEMF TranslationalEMF",
     "couplings": "ArcSpring DualMassFlywheel ElasticCoupling HystereticCoupling OldhamCoupling RuptureCoupling",
     "dc_machines": "PermanentMagnetDCMachine SeparatelyExcitedDCMachine SeriesDCMachine ShuntDCMachine",
-    "drag_losses": "ChurningGear DeepGrooveBearing",
+    "drag_losses": "ChurningGear DeepGrooveBearing OpenPlates",
     "drivers": "Driver",
     "eddy_current_brakes": "EddyCurrentForce EddyCurrentTorque",
     "electrical": (

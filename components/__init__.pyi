@@ -42,6 +42,7 @@ from components.dc_machines import SeriesDCMachine as SeriesDCMachine
 from components.dc_machines import ShuntDCMachine as ShuntDCMachine
 from components.drag_losses import ChurningGear as ChurningGear
 from components.drag_losses import DeepGrooveBearing as DeepGrooveBearing
+from components.drag_losses import OpenPlates as OpenPlates
 from components.drivers import Driver as Driver
 from components.eddy_current_brakes import EddyCurrentForce as EddyCurrentForce
 from components.eddy_current_brakes import EddyCurrentTorque as EddyCurrentTorque

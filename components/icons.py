@@ -76,6 +76,7 @@ CENTRIFUGAL = replace(CLUTCH, heavy="M-6 -10 v20 M6 -23 v46", ports={},
                       solid=f"{_circle(-6, -15, 5)} {_circle(-6, 15, 5)}", key=("m",))  # fmt: skip
 VISCOUS = replace(CLUTCH, lines="M-15 0 h9 M6 0 h9 M-3 -16 h6 M-3 -8 h6 M-3 8 h6 M-3 16 h6", ports={"fill": "N"},
                   key=("tau_nominal",))  # fmt: skip
+OPEN_PLATES = replace(VISCOUS, key=("n", "h"))
 SYNCHRO = replace(CLUTCH, heavy="M-6 -23 l-4 46 M2 -23 l-4 46 M8 -12 v24", lines="M-15 0 h5 M8 0 h7")
 ABSORBER = Icon(40, 48, solid=_rect(6, 22, 10), lines="M-20 0 h6 l3 -7 l5 14 l5 -14 l3 7 h2", key=("f",))
 PENDULUM = Icon(44, 52, paper=_circle(0, 6, 18), lines="M-22 6 h22 M0 6 v-16 l6 -10",

@@ -205,6 +205,19 @@ def linkages(run: Solution) -> None:
 
 
 @numbers
+def press(run: Solution) -> None:
+    # A trapezoid of 20 kN, 20 mm wide below and 12 mm above, and the velocity of the slide over the speed of the crank.
+    phi = run.final["flywheel.phi"]
+    rod = sqrt(0.3**2 - (0.06 * sin(phi)) ** 2)
+    slope = -0.06 * sin(phi) * (1 + 0.06 * cos(phi) / rod)
+    assert 0.355 < run.final["slide.s"] == close(0.06 * cos(phi) + rod)
+    left = 0.5 * 20 * 12**2 - 20e3 * 0.5 * (20e-3 + 12e-3)
+    assert run.final["flywheel.w"] == close(sqrt(2 * left / (20 + 80 * slope**2)))
+    drag = 8 * pi * 0.04 * (0.09**4 - 0.06**4) / (2 * 0.2e-3)
+    assert run.final["wheel.w"] == close(50 * exp(-drag / 0.4 * 0.25))
+
+
+@numbers
 def variable_drives(run: Solution) -> None:
     ratio = 1 + exp(-0.4 / 0.2)
     at, slower = run.at(0.5), -(1 - ratio) / 0.2
