@@ -18,6 +18,7 @@ from modelica_like.flatten.model import FlatDiscrete, FlatParameter, FlatVariabl
 from modelica_like.flatten.template import TransitionForm
 from modelica_like.structure.holds import Circuit as Circuit
 from modelica_like.structure.holds import HeldMotion as HeldMotion
+from modelica_like.structure.ideal import IdealNetwork as IdealNetwork
 from modelica_like.structure.motion import Motion
 from modelica_like.units import Unit, to_si
 from modelica_like.upper import upper
@@ -94,7 +95,7 @@ class CompiledDae:
         hold_terms: gain (zero where nothing is held), capacities forward and backward, and restitution of every held
             motion, one row each, row by row.
         start_values: as many as `starts`.
-        discrete_starts: start of d: modes and discrete values, then the entries of `holds` and `circuits`.
+        discrete_starts: start of d: modes and discrete values, then the entries of `holds`, `circuits` and `ideal`.
         derived: parameters that follow from others, of p only.
         determinants: relative determinants; zero where a block is singular.
         p: parameter values.
@@ -105,6 +106,7 @@ class CompiledDae:
         implicit_blocks: names and origins of the blocks of `alg`.
         holds: motions that modes hold.
         circuits: held motions that depend on each other.
+        ideal: the ideal elements, if there are any.
         motion_sources: paths of the components that prescribe a motion, whatever torque or force it takes.
     """
 
@@ -141,6 +143,7 @@ class CompiledDae:
     starts: tuple[StartEntry, ...]
     holds: tuple[HeldMotion, ...]
     circuits: tuple[Circuit, ...]
+    ideal: IdealNetwork | None
     singular: tuple[tuple[tuple[str, ...], tuple[Origin, ...]], ...]
     differentiated: tuple[Origin, ...]
     guesses: Vector
@@ -167,7 +170,7 @@ class CompiledDae:
 
     @property
     def discrete_size(self) -> int:
-        """Length of d: modes and discrete values, approaches, switches and shares."""
+        """Length of d: modes and discrete values, approaches, switches and shares, rows of ideal elements."""
         return self.ode.size1_in("d")
 
     @cached_property

@@ -56,6 +56,7 @@ def compile(reduced: ReducedDae) -> CompiledDae:
         starts=tuple(StartEntry(s.node, reduced.node_states[s.node], s.strength) for s in flat.starts),
         holds=reduced.holds,
         circuits=reduced.circuits,
+        ideal=reduced.ideal,
         singular=tuple((names, origins) for names, origins, _ in reduced.determinants),
         differentiated=reduced.differentiated,
         guesses=np.array(reduced.guesses, float),
@@ -155,7 +156,7 @@ class _Builder:
             "variables": reduced.values[: len(flat.variables)],
             "guards": guards,
             "guard_rates": reduced.total_derivative(guards),
-            "guards_soon": guards_soon(reduced, guards),
+            "guards_soon": guards_soon(flat.time, reduced.total_derivative, guards),
             "moments": moments,
             "resets": resets,
             "updates": news,
@@ -191,6 +192,14 @@ class _Builder:
                     resets.append(columns["resets"][number][position])
                 numbers = {"mode": self.place[prefix + form.mode], "index": len(store) - 1, "resets": tuple(changes)}
                 found.append(CompiledTransition(**{**vars(form), **numbers}))
+        for one in reduced.choices:
+            changes = [Reset(kind, place, 1.0, k, 0) for k, (kind, place, _) in enumerate(one.resets, len(resets))]
+            resets += [value for *_, value in one.resets]
+            why, source = f"the states of {one.told} would become singular", one.origin.source
+            found.append(
+                CompiledTransition(one.mode, (0,), 0, False, len(guards), tuple(changes), source, "", why, fails=False)
+            )
+            guards.append(one.guard)
         return ca.vertcat(*guards), ca.vertcat(*moments), tuple(found), ca.vertcat(*resets), targets
 
     def delays(self) -> tuple[Any, tuple[tuple[int, ...], ...]]:

@@ -12,7 +12,7 @@ from modelica_like.errors import LanguageError, Source
 from modelica_like.flatten.checks import check_balance, check_units, unit_of_field
 from modelica_like.flatten.conditions import guard_of
 from modelica_like.flatten.discrete import DiscreteEquations, Hidden, UpdateForm, between_events, is_discrete
-from modelica_like.flatten.holds import HoldForm, hold_forms
+from modelica_like.flatten.holds import HoldForm, IdealForm, hold_forms, ideal_forms
 from modelica_like.flatten.reasons import reason
 from modelica_like.flatten.wiring import taken
 from modelica_like.language.component import Component
@@ -120,6 +120,7 @@ class Template:
     delay_parts: tuple[tuple[str, ...], ...]
     holds: tuple[HoldForm, ...]
     hold_terms: ca.Function
+    ideals: tuple[IdealForm, ...]
     energy_slots: tuple[Slot, ...]
     energy: ca.Function
     connections: tuple[Connection | FreeEnd, ...] = field(compare=False)
@@ -267,6 +268,7 @@ def _build(component: Component) -> Template:
         delay_parts=tuple(tuple(part.name for part in parts(one)) for one, _ in discrete.delays),
         holds=holds,
         hold_terms=names.function("hold_terms", hold_terms),
+        ideals=ideal_forms(component, residuals),
         energy_slots=tuple(energy.variables),
         energy=energy.function("energy", energy_terms),
         connections=wiring,

@@ -15,6 +15,8 @@ from modelica_like.initialize.holds import holding as holding
 from modelica_like.initialize.holds import rest as rest
 from modelica_like.initialize.holds import share as share
 from modelica_like.initialize.holds import sharing as sharing
+from modelica_like.initialize.ideal import meet as meet
+from modelica_like.initialize.ideal import replace_dependent
 from modelica_like.initialize.plan import StartKind as StartKind
 from modelica_like.initialize.plan import StartPlan as StartPlan
 from modelica_like.initialize.plan import start_plan as start_plan
@@ -69,6 +71,7 @@ def initialize(model: CompiledDae, t0: float = 0.0, start: StartKind = "given") 
         share(model, point)
     _settle(model, point, problem, start)
     rest(model, point)
+    replace_dependent(model, point)
     solve_implicit(model, point)
     check_singular(model, point)
     if start == "steady":

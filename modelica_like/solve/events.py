@@ -14,7 +14,7 @@ from modelica_like.solve.between import Between, Piece
 from modelica_like.solve.delays import Delays
 from modelica_like.solve.guards import Candidate, Ends, Guards, Located, candidates, locate
 from modelica_like.solve.idas import Integrator
-from modelica_like.solve.instants import Instants, just_after, note_sharing
+from modelica_like.solve.instants import Instants, just_after, note_rest, note_sharing
 from modelica_like.solve.looks import Cell, Looks
 from modelica_like.solve.options import Options
 from modelica_like.solve.pace import Pace
@@ -105,6 +105,7 @@ class EventLoop:
             self.instants.settle(self.now, [], begins=True)
             self.record.begin(self.now)
         self.record.end(self.now.d)
+        note_rest(self.record, self.options, self.instants.span)
         self._write()
 
     def _write(self, *, precisely: bool = True) -> None:

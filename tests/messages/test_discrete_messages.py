@@ -275,7 +275,8 @@ CASES: dict[type[Component], tuple[type[ModelicaLikeError], str]] = {
         "clock[1] switched 20 times at t = 0 s (counting).\n"
         f"  in {HERE}:{{backwards}} `yield when(clock(-self.T), {{self.n: pre(self.n) + 1}})`\n"
         "Modes still switch after 20 rounds at one instant.\n"
-        "Give the switching a hysteresis (a peak above 1 in friction), or smooth what drives it.",
+        "Give the switching a hysteresis (a peak above 1 in friction), or smooth what drives it. "
+        'Or go on: on_chattering = "slide" along the border of two modes, "rest" in contact after ever faster impacts.',
     ),
     PreOfVariable: (
         LanguageError,

@@ -13,7 +13,7 @@ from modelica_like.initialize import Point, StartKind, initialize
 from modelica_like.initialize.slopes import columns_of, nodes_of, slopes
 from modelica_like.simulation import Model, build, simulate
 from modelica_like.solve.solution import Solution
-from modelica_like.units import parse_unit, to_si
+from modelica_like.units import ONE, parse_unit, to_si
 
 Drive = Model | Solution
 """What can be analysed: a component, a netlist file, a compiled model, or a solution of one."""
@@ -101,5 +101,5 @@ def linearize(
 
 
 def _unit(model: CompiledDae, name: str) -> str:
-    """Return the unit of a variable, or of the derivative `der(x)` of one."""
-    return str(model.units[name]) if name in model.units else f"{_unit(model, name[4:-1])}/s"
+    """Return the unit of a variable, of a state that follows the motion, or of the derivative `der(x)` of one."""
+    return f"{_unit(model, name[4:-1])}/s" if name.startswith("der(") else str(model.units.get(name, ONE))

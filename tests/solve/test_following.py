@@ -1,0 +1,179 @@
+"""States that follow the motion: mechanisms in coordinates, against their angles and independent solvers."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import quad, solve_ivp
+
+from modelica_like import linearize, sensitivities, simulate
+from modelica_like.language import guess
+from modelica_like.netlist.registry import find_type
+
+PARTS = Path(__file__).parents[2] / "examples" / "elements"
+L, G = 1.5, 9.81
+CRANK, ROD, M_PIN, M_SLIDER = 0.1, 0.3, 0.5, 0.8
+BARS = {"crank": 0.1, "coupler": 0.25, "rocker": 0.2, "ground": 0.28}
+J, J_COUPLER, J_ROCKER = 0.01, 0.002, 0.02
+
+
+def part(name, **values):
+    return find_type(f"full_turns:{name}", PARTS)(**values)
+
+
+def pendulum(speed=9.5, **values):
+    """Hanging, with a speed; from 2·sqrt(g·L) = 7.67 m/s on it turns over."""
+    return part("Pendulum", **{"m": 2.0, "L": L, "g": G, "x": 0.0, "vx": speed, "y": guess(-L), **values})
+
+
+def swing(speed, until, g=G):
+    """The angle of the pendulum by an explicit solver of order eight, from the lowest point on."""
+    return solve_ivp(
+        lambda _, y: [y[1], -g / L * np.sin(y[0])], (0, until), [0, speed / L],
+        method="DOP853", rtol=1e-13, atol=1e-13, dense_output=True,
+    ).sol  # fmt: skip
+
+
+@pytest.mark.parametrize("solver", ["idas", "native"])
+@pytest.mark.parametrize("speed", [9.5, 7.0])
+def test_the_pendulum_turns_over_as_its_angle_says(solver, speed):
+    run = simulate(pendulum(speed), 3.0, solver=solver, rtol=1e-12, atol=1e-13)
+    angle, rate = swing(speed, 3.0)(run.time)
+    assert run["x"] == pytest.approx(L * np.sin(angle), abs=1e-8)
+    assert run["y"] == pytest.approx(-L * np.cos(angle), abs=1e-8)
+    assert run["vx"] == pytest.approx(L * rate * np.cos(angle), abs=1e-7)
+    assert len(run.events) >= 5
+
+
+@pytest.mark.parametrize("solver", ["idas", "native"])
+def test_the_pendulum_does_not_drift_in_a_hundred_seconds(solver):
+    run = simulate(pendulum(), 100.0, points=1000, solver=solver, rtol=1e-9, atol=1e-10)
+    turns = np.sum(np.diff(np.sign(run["x"])) != 0) / 2
+    assert turns > 60
+    assert np.max(np.abs(run["x"] ** 2 + run["y"] ** 2 - L**2)) < 1e-10
+    assert np.max(np.abs(run["x"] * run["vx"] + run["y"] * run["vy"])) < 1e-10
+    energy = run.energy()
+    assert energy.closure < 1e-10 * energy.throughput
+    assert np.ptp((run["vx"] ** 2 + run["vy"] ** 2) / 2 + G * run["y"]) < 5e-4 * 9.5**2 / 2
+
+
+def test_it_starts_where_each_coordinate_alone_would_be_singular():
+    """Horizontal with y given, hanging with x given."""
+    horizontal = simulate(pendulum(0.0, x=guess(L), y=0.0, vx=guess(0.0), vy=0.0), 1.0, rtol=1e-10, atol=1e-12)
+    speed = np.hypot(horizontal["vx"], horizontal["vy"])
+    assert speed == pytest.approx(np.sqrt(np.maximum(-2 * G * horizontal["y"], 0)), abs=1e-7)
+    assert simulate(pendulum(), 0.01).segments[0].start.t == 0.0
+
+
+def test_each_choice_is_told_with_its_reason():
+    run = simulate(pendulum(), 1.0)
+    assert {event.mode for event in run.events} == {"state[1].choice"}
+    because = run.model.transitions[run.events[0].transition].because
+    assert because == "the states of x and y would become singular"
+
+
+def test_no_variable_jumps_at_a_choice():
+    run = simulate(pendulum(), 2.0, rtol=1e-10, atol=1e-12)
+    for event in run.events:
+        sides = np.flatnonzero(np.isclose(run.time, event.time, rtol=0, atol=1e-13))
+        assert len(sides) == 2
+        for name in ("x", "y", "vx", "vy", "pull"):
+            assert np.ptp(run[name][sides]) < 1e-9
+
+
+def test_sensitivities_go_through_choices():
+    run = simulate(pendulum(), 2.0, rtol=1e-10, atol=1e-12)
+    assert len(run.events) > 5
+    found = sensitivities(run, ["x", "y"], ["g"]).derivatives[:, 0]
+    step = 1e-4
+    after, before = (swing(9.5, 2.0, G + side)(2.0)[0] for side in (step, -step))
+    slope = (after - before) / (2 * step)
+    angle = swing(9.5, 2.0)(2.0)[0]
+    assert found == pytest.approx([L * np.cos(angle) * slope, L * np.sin(angle) * slope], rel=1e-5)
+
+
+def test_it_linearizes():
+    hanging = linearize(pendulum(0.0), "given")
+    assert hanging.states == ("state[1]", "der(state[1])")
+    assert np.linalg.eigvals(hanging.A).imag.max() == pytest.approx(np.sqrt(G / L), rel=1e-9)
+
+
+@pytest.mark.parametrize("near", [(0.3, -1.4), (1.45, -0.3)])
+def test_it_finds_its_rest(near):
+    """From the second guess on, the first weights do not fit the rest: they are chosen again at the start."""
+    drive = pendulum(0.0, x=guess(near[0]), vx=guess(0.0), y=guess(near[1]))
+    rest = simulate(drive, 1.0, start="steady")
+    assert len(rest.events) == (near[0] > 1)
+    assert rest["x"] == pytest.approx(0.0, abs=1e-9)
+    assert rest["y"] == pytest.approx(-L, rel=1e-12)
+
+
+def engine():
+    return part(
+        "SliderCrank", crank=CRANK, rod=ROD, m_pin=M_PIN, m_slider=M_SLIDER,
+        x=guess(CRANK), y=0.0, s=guess(CRANK + ROD), vy=2.0,
+    )  # fmt: skip
+
+
+def engine_inertia(phi):
+    """Moment of inertia of the whole at the crank."""
+    slope = -CRANK * np.sin(phi) * (1 + CRANK * np.cos(phi) / np.sqrt(ROD**2 - (CRANK * np.sin(phi)) ** 2))
+    return M_PIN * CRANK**2 + M_SLIDER * slope**2
+
+
+@pytest.mark.parametrize("solver", ["idas", "native"])
+def test_the_slider_crank_passes_its_dead_centres(solver):
+    run = simulate(engine(), 3.0, points=1000, solver=solver, rtol=1e-10, atol=1e-12)
+    x, y, s = run["x"], run["y"], run["s"]
+    phi = np.unwrap(np.arctan2(y, x))
+    assert phi[-1] > 12 * np.pi
+    assert np.max(np.abs(x**2 + y**2 - CRANK**2)) < 1e-10
+    assert np.max(np.abs((s - x) ** 2 + y**2 - ROD**2)) < 1e-10
+    assert s == pytest.approx(CRANK * np.cos(phi) + np.sqrt(ROD**2 - (CRANK * np.sin(phi)) ** 2), abs=1e-10)
+    # Without forces from outside, the inertia times the square of the speed stays: time is an integral over the angle.
+    speed = (x * run["vy"] - y * run["vx"]) / CRANK**2
+    start = engine_inertia(0.0) * (2.0 / CRANK) ** 2
+    assert engine_inertia(phi) * speed**2 == pytest.approx(start, rel=1e-6)
+    needed = quad(lambda a: np.sqrt(engine_inertia(a) / start), 0, phi[-1], limit=500, epsabs=1e-11)[0]
+    assert needed == pytest.approx(3.0, abs=1e-6)
+
+
+def rocker_of(phi):
+    """Angles of coupler and rocker of the linkage that is not crossed, and their speeds over that of the crank."""
+    a, b, c, d = BARS.values()
+    px, py = a * np.cos(phi), a * np.sin(phi)
+    far = np.hypot(d - px, py)
+    psi = np.pi + np.arctan2(-py, d - px) - np.arccos((far**2 + c**2 - b**2) / (2 * far * c))
+    beta = np.arctan2(c * np.sin(psi) - py, d + c * np.cos(psi) - px)
+    return (
+        beta,
+        psi,
+        a * np.sin(psi - phi) / (b * np.sin(beta - psi)),
+        a * np.sin(beta - phi) / (c * np.sin(beta - psi)),
+    )
+
+
+def linkage_inertia(phi):
+    _, _, of_coupler, of_rocker = rocker_of(phi)
+    return J + J_COUPLER * of_coupler**2 + J_ROCKER * of_rocker**2
+
+
+@pytest.mark.parametrize("solver", ["idas", "native"])
+def test_the_four_bar_linkage_turns_round(solver):
+    beta, psi, *_ = rocker_of(0.0)
+    drive = part(
+        "FourBar", **BARS, J=J, J_coupler=J_COUPLER, J_rocker=J_ROCKER,
+        phi=0.0, w=20.0, beta=guess(beta + 0.1), psi=guess(psi - 0.1),
+    )  # fmt: skip
+    run = simulate(drive, 3.0, solver=solver, rtol=1e-10, atol=1e-12)
+    phi, turned = run["phi"], (run["beta"], run["psi"])
+    assert phi[-1] > 8 * np.pi
+    a, b, c, d = BARS.values()
+    closes = a * np.exp(1j * phi) + b * np.exp(1j * turned[0]) - c * np.exp(1j * turned[1]) - d
+    assert np.max(np.abs(closes)) < 1e-10
+    for angle, expected in zip(turned, rocker_of(phi), strict=False):
+        assert np.exp(1j * angle) == pytest.approx(np.exp(1j * expected), abs=1e-9)
+    start = linkage_inertia(0.0) * 20.0**2
+    assert linkage_inertia(phi) * run["w"] ** 2 == pytest.approx(start, rel=1e-6)
+    needed = quad(lambda angle: np.sqrt(linkage_inertia(angle) / start), 0, phi[-1], limit=500, epsabs=1e-11)[0]
+    assert needed == pytest.approx(3.0, abs=1e-6)
