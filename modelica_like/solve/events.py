@@ -153,14 +153,17 @@ class EventLoop:
         point.d = self.now.d
         self.now = point
 
-    def _keep(self, looks: Looks, end: float, last: int) -> bool:
+    def _keep(self, looks: Looks, end: float, last: int, *, event: bool = False) -> bool:
         """Record the results up to a time, and fire the ticks before it; `last` is the last valid look.
+
+        At an event, results that are closer to it than they can be told apart are left out.
 
         Returns:
             Whether the run can go there: a tick that changes what moves takes it back to its time.
         """
         first = max(float(looks.times[0]), self.now.t)
-        times = self.pace.results(first, end)
+        until = self.pace.before(end) if event else end
+        times = self.pace.results(first, until)
         if self.pace.on_grid:
             numbers = np.rint((times - looks.times[0]) / looks.width).astype(int)
             piece = Piece(looks, times, last, looks.x[:, numbers], looks.z[:, numbers])
@@ -174,7 +177,7 @@ class EventLoop:
             if self._event(self.instants.due(self.now)):
                 return False
             first = tick
-        self._add(piece, first, end)
+        self._add(piece, first, until)
         return True
 
     def _add(self, piece: Piece, first: float, end: float) -> None:
@@ -326,7 +329,7 @@ class EventLoop:
 
     def _reach(self, looks: Looks, k: int, point: Point, wanting: list[CompiledTransition]) -> None:
         """Go to a point between look k and the next and fire its transitions."""
-        if not self._keep(looks, self.pace.before(point.t), k + 1):
+        if not self._keep(looks, point.t, k + 1, event=True):
             return
         self._move(point)
         if wanting:

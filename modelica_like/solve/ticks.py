@@ -40,11 +40,17 @@ class Ticks:
         return min((t + _TRUST * self._quiet[id(one)] * (t - now.t) for one, t in ahead), default=np.inf)
 
     def moved(self, before: Point, after: Point, fired: Sequence[CompiledTransition]) -> bool:
-        """Return whether an event has changed anything that moves: a state, or what continuous equations read."""
+        """Return whether an event has changed anything that moves: a state, or what continuous equations read.
+
+        Of ticks that fall together, those count as its cause that have been one before.
+        """
         moved = bool((before.x != after.x).any() or (before.d[self._felt] != after.d[self._felt]).any())
-        for one in fired:
-            self._quiet[id(one)] = 0 if moved else self._quiet[id(one)] + 1
-        return moved or not all(one.timed for one in fired)
+        ticks, quiet = [id(one) for one in fired if one.timed], self._quiet
+        if len(ticks) < len(fired):
+            return True
+        for one in [tick for tick in ticks if not (moved and quiet[tick])] or ticks:
+            quiet[one] = 0 if moved else quiet[one] + 1
+        return moved
 
     def point(self, looks: Looks, t: float, last: int, closer: Callable[[Looks, int], Looks], depth: int = 0) -> Point:
         """Return the point at a time between looks, by closer ones where interpolation is not precise.

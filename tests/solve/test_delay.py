@@ -188,3 +188,49 @@ def test_a_chain_of_delays_and_the_rate_of_its_end():
     clear = np.abs(found.time - 0.65) > 1e-9
     rate = np.where(found.time > 0.65, 3.0 * np.cos(3.0 * late), 0.0)
     assert found["source.speed"][clear] == pytest.approx(rate[clear], abs=1e-6)
+
+
+class Rod(Component):
+    """A rod without losses, by the waves in both directions: one end is moved from 0.25 s on, the other is free."""
+
+    T: Parameter = param("s", "time of a wave from end to end", default=1.0)
+    Z: Parameter = param("N.s/m", "impedance", default=2.0)
+    speed: Parameter = param("m/s", "of the moved end", default=1.0)
+    begin: Parameter = param("s", "when it moves", default=0.25)
+    v_a: Variable = var("m/s", "speed of the moved end")
+    v_b: Variable = var("m/s", "speed of the free end")
+    F_a: Variable = var("N", "force at the moved end")
+    F_b: Variable = var("N", "force at the free end")
+
+    def equations(self) -> Equations:
+        yield self.v_a == if_(self.time > self.begin, self.speed, 0)
+        yield self.F_b == 0
+        yield self.F_b + self.Z * self.v_b == delay(self.F_a + self.Z * self.v_a, self.T)
+        yield self.F_a - self.Z * self.v_a == delay(self.F_b - self.Z * self.v_b, self.T)
+
+
+def test_waves_run_to_and_fro_in_a_rod():
+    found = run(Rod(), 9.0)
+    clear = np.abs(np.mod(found.time + 0.25, 1.0) - 0.5) > 1e-6
+    time = found.time[clear]
+    moves = (time > 1.25) & (np.mod(time - 1.25, 4.0) < 2.0)
+    assert found["v_b"][clear] == pytest.approx(2.0 * moves, abs=1e-12)
+
+
+class Neutral(Component):
+    """y' = -y'(t - 1) / 2 - y: the rate itself is delayed, and at the start it depends on itself."""
+
+    T: Parameter = param("s", "delay", default=1.0)
+    tau: Parameter = param("s", "time constant", default=1.0)
+    y: Variable = var("1", "value")
+
+    def equations(self) -> Equations:
+        yield der(self.y) == -0.5 * delay(der(self.y), self.T) - self.y / self.tau
+
+
+def test_a_delayed_rate():
+    found = run(Neutral(y=1.0), 2.0)
+    early, late = found.time <= 1.0, found.time - 1.0
+    first = 1 / 3 + 2 / 3 * np.exp(-1.0)
+    exact = np.where(early, (1 + 2 * np.exp(-found.time)) / 3, np.exp(-late) * (first + late / 3))
+    assert found["y"] == pytest.approx(exact, abs=1e-8)

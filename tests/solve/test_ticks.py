@@ -139,3 +139,50 @@ def test_a_tick_that_sets_a_state_takes_the_run_back():
     back = 99 * 0.005
     assert found.final["x"] == pytest.approx(np.cos(20 * (1.0 - back)), abs=1e-8)
     assert found.final["n"] == 201
+
+
+class Near(Component):
+    """A state event close to the sixth tick notes the number of ticks."""
+
+    period: Parameter = param("s", "time between two ticks", default=0.1)
+    gap: Parameter = param("s", "from the tick to the event", default=0.0)
+    x: Variable = var("s", "time passed", default=0.0)
+    n: Discrete = integer("ticks")
+    seen: Discrete = integer("ticks at the event")
+
+    def equations(self) -> Equations:
+        yield der(self.x) == 1
+
+    def events(self) -> Events:
+        yield when(clock(self.period), {self.n: pre(self.n) + 1})
+        yield when(self.x > 5 * self.period + self.gap, {self.seen: self.n})
+
+
+@pytest.mark.parametrize(("gap", "seen"), [(5e-10, 6), (3e-9, 6), (-5e-10, 5), (-3e-9, 5)])
+def test_the_order_of_a_tick_and_an_event_close_to_it(gap: float, seen: int):
+    found = run(Near(gap=gap), 1.05)
+    assert (found.final["seen"], found.final["n"]) == (seen, 11)
+
+
+class Controlled(Component):
+    """A controller ticks every 50 ms, and a counter every 10 ms."""
+
+    period: Parameter = param("s", "time between two ticks of the controller", default=0.05)
+    tau: Parameter = param("s", "time constant", default=0.2)
+    x: Variable = var("1", "value")
+    u: Discrete = discrete("1", "held input")
+    n: Discrete = integer("ticks of the counter")
+
+    def equations(self) -> Equations:
+        yield self.tau * der(self.x) == self.u
+
+    def events(self) -> Events:
+        yield when(clock(self.period), {self.u: -self.x})
+        yield when(clock(self.period / 5), {self.n: pre(self.n) + 1})
+
+
+def test_quiet_ticks_between_those_of_a_controller_cost_nothing():
+    found = run(Controlled(x=1.0), 2.0)
+    assert found.final["n"] == 201
+    assert found.final["x"] == pytest.approx(0.75**40, abs=1e-9)
+    assert found.statistics.integrations <= 42  # 41 ticks of the controller
