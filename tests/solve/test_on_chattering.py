@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from modelica_like import Solution, build, run_fmu, sensitivities, simulate
+from modelica_like import Solution, build, run_fmu, sensitivities, simulate, sweep
 from modelica_like.errors import Chattering, UnknownName
 from modelica_like.fmi.export import export_fmu
 from modelica_like.language import (
@@ -82,7 +82,7 @@ def test_a_reference_that_is_too_fast_is_not_followed():
 
 def test_the_slope_of_what_slides():
     """x = 0.3 + slope t."""
-    model = build(Relay(x=0.0)).twin(settings={"on_chattering": "slide"})
+    model = build(Relay(x=0.0), on_chattering="slide")
     assert sensitivities(model, of="x", to="slope", until=2.0).derivatives[0, 0] == pytest.approx(2.0, rel=1e-9)
 
 
@@ -238,13 +238,23 @@ def test_implicit_equations_follow_the_mix(solver):
 
 @pytest.mark.parametrize("kind", ["me", "cs"])
 @pytest.mark.parametrize("asked", ["slide", "rest"])
-def test_an_fmu_does_the_same(kind: Any, asked: str, tmp_path):
+def test_an_fmu_does_the_same(kind: Any, asked: Any, tmp_path):
     part: Component = Sweep(x=-0.3, size=0.4, jump=1.0) if asked == "slide" else Ball(h=1.0, v=0.0)
-    model = build(part).twin(settings={"on_chattering": asked, "until": 6.0})
+    model = build(part, on_chattering=asked)
     export_fmu(model, tmp_path / "a.fmu", kind=(kind,), check=False)
     names = [*model.states]
-    run, expected = run_fmu(tmp_path / "a.fmu", stop=6.0, kind=kind, outputs=names), simulate(model)
+    run, expected = run_fmu(tmp_path / "a.fmu", stop=6.0, kind=kind, outputs=names), simulate(model, 6.0)
     np.testing.assert_allclose([run.final[n] for n in names], [expected.final[n] for n in names], atol=1e-5)
+
+
+def test_a_sweep_does_the_same():
+    """x = 0.3 + 2·slope."""
+    for solver in ("native", "idas"):
+        found = sweep(
+            Relay(x=0.0), {"slope": [0.1, 0.5]}, ["x"], until=2.0, solver=solver, on_chattering="slide", processes=1
+        )
+        np.testing.assert_allclose(found["x"], [0.5, 1.3], rtol=1e-8)
+        assert not found["failure"].values.any()
 
 
 # -- rest ------------------------------------------------------------------------------------------------------------
