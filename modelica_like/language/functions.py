@@ -47,8 +47,9 @@ def der(expression: Expr) -> Expr:
 def random(before: Expr) -> Expr:
     """Return the pseudo-random number between 0 and 1 that follows another one.
 
-    It belongs in a `when`, as in {self.u: random(pre(self.u))}. Numbers are k / (2^31 - 1) with k from the generator 48271 k mod (2^31 - 1) of S. K. Park, K. W. Miller and P. K.
-    Stockmeyer, `minstd_rand` of C++, which is exact in floating point: they are the same in every run and every FMU.
+    It belongs in a `when`, as in {self.u: random(pre(self.u))}. Numbers are k / (2^31 - 1) with k from the generator
+    48271 k mod (2^31 - 1) of S. K. Park, K. W. Miller and P. K. Stockmeyer, `minstd_rand` of C++, which is exact in
+    floating point: they are the same in every run and every FMU.
 
     Args:
         before: the number before. The start value of its variable, from 0 to below 1, is the seed.
