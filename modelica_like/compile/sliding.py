@@ -6,6 +6,7 @@ mode of its own with a number behind the others, so events, FMUs and results kno
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import combinations
@@ -56,6 +57,10 @@ class Pair:
     number: int
 
 
+Border = list[Pair]
+"""Pairs with the same guards, which switch and slide together."""
+
+
 def as_asked(model: CompiledDae) -> CompiledDae:
     """Return the model with modes of sliding if its settings ask for them."""
     return sliding(model) if model.settings.get("on_chattering") == "slide" else model
@@ -72,10 +77,10 @@ def sliding(model: CompiledDae) -> CompiledDae:
 
 
 def _sliding(model: CompiledDae) -> CompiledDae:
-    pairs = list(_pairs(model))
-    if not pairs:
+    borders = _borders(model)
+    if not borders:
         return model
-    made = _Mix(model, pairs).model()
+    made = _Mix(model, borders).model()
     made.once("sliding", lambda: made)
     return made
 
@@ -83,18 +88,35 @@ def _sliding(model: CompiledDae) -> CompiledDae:
 # -- which modes -----------------------------------------------------------------------------------------------------
 
 
-def _pairs(model: CompiledDae) -> Iterator[Pair]:
+def _borders(model: CompiledDae) -> list[Border]:
+    samples, found = _samples(model), list[tuple[Any, Border]]()
+    for pair in _pairs(model, samples):
+        guard = samples[:, model.transitions[pair.there].index]
+        turned = replace(pair, first=pair.second, second=pair.first, there=pair.back, back=pair.there)
+        for values, border in found:
+            for one, sign in ((pair, 1.0), (turned, -1.0)):
+                if _same(sign * guard, values):
+                    border.append(one)
+        if not any(_same(sign * guard, values) for values, _ in found for sign in (1.0, -1.0)):
+            found.append((guard, [pair]))
+    return [border for _, border in found]
+
+
+def _same(values: Any, others: Any) -> bool:
+    """Whether samples are equal but for rounding; false where one is no number."""
+    return bool((np.abs(values - others) <= _ROUNDING * np.abs(values)).all())
+
+
+def _pairs(model: CompiledDae, samples: Any) -> Iterator[Pair]:
     held = {(one.mode, one.number) for one in model.holds}
     numbers = {k: len(one.names) for k, one in enumerate(model.flat_discretes)}
     plain = [k for k, one in enumerate(model.transitions) if not (one.timed or one.resets or one.fails or one.notice)]
-    samples = _samples(model)
     for there, back in combinations(plain, 2):
         one, other = model.transitions[there], model.transitions[back]
         mode, first, second = one.mode, other.target, one.target
         if mode != other.mode or first not in one.sources or second not in other.sources or first == second:
             continue
-        left, right = samples[:, one.index], samples[:, other.index]
-        opposite = bool((np.abs(left + right) <= _ROUNDING * np.abs(left)).all())  # false where one is no number
+        opposite = _same(samples[:, one.index], -samples[:, other.index])
         if opposite and held.isdisjoint(((mode, first), (mode, second))) and _decides(model, mode, one.index):
             yield Pair(mode, first, second, there, back, numbers[mode])
             numbers[mode] += 1
@@ -140,31 +162,32 @@ class _Mix:
 
     Args:
         model: without them.
-        pairs: at least one.
+        borders: at least one.
     """
 
-    def __init__(self, model: CompiledDae, pairs: list[Pair]) -> None:
-        self.base, self.pairs = model, pairs
+    def __init__(self, model: CompiledDae, borders: list[Border]) -> None:
+        self.base = model
+        self.pairs = [(one, k) for k, border in enumerate(borders) for one in border]
         self.arguments = list(model.arguments.values())
         self.t, self.x, self.z, *_, self.d = self.arguments
-        self.slides = [self.d[one.mode] == one.number for one in pairs]
+        self.slides = [functools.reduce(ca.logic_or, [self._slides(one) for one in border]) for border in borders]
         modes = ca.SX(self.d)
-        for one, slides in zip(pairs, self.slides, strict=True):
-            modes[one.mode] = ca.if_else(slides, one.first, modes[one.mode])
+        for one, _ in self.pairs:
+            modes[one.mode] = ca.if_else(self._slides(one), one.first, modes[one.mode])
         self.first = [*self.arguments[:-1], modes]
         # Only where it slides: a branch that is not taken may be undefined.
         self.seconds = [
-            self._with(one, ca.if_else(slides, one.second, modes[one.mode]))
-            for one, slides in zip(pairs, self.slides, strict=True)
+            self._with({one.mode: ca.if_else(self._slides(one), one.second, modes[one.mode]) for one in border})
+            for border in borders
         ]
         self.alg = model.alg(*self.first)
         ode = model.ode(*self.first)
         guards = ca.vertsplit(model.guards(*self.first))
-        self.borders = [guards[model.transitions[one.there].index] for one in pairs]
+        self.borders = [guards[model.transitions[border[0].there].index] for border in borders]
         self.rates = self._motion(ode).rate(ca.vertcat(*self.borders))
         self.shares = self._shares()
         self.motion = self._motion(self._mixed(model.ode))
-        others = [self._with(one, self._other(one)) for one in pairs]
+        others = [self._with({one.mode: self._other(one) for one in border}) for border in borders]
         self.across = [
             (self._motion(self.motion.ode + model.ode(*other) - ode)).rate(border)
             for other, border in zip(others, self.borders, strict=True)
@@ -173,15 +196,19 @@ class _Mix:
     def _motion(self, ode: Any) -> Motion:
         return Motion(self.t, self.x, self.z, ode, self.alg)
 
+    def _slides(self, one: Pair) -> Any:
+        return self.d[one.mode] == one.number
+
     def _other(self, one: Pair) -> Any:
         mode = self.first[-1][one.mode]
         return ca.if_else(mode == one.first, one.second, ca.if_else(mode == one.second, one.first, mode))
 
-    def _with(self, one: Pair, mode: Any) -> list[Any]:
-        """Return the arguments in another mode; implicit unknowns, which are linear if it matters, follow."""
+    def _with(self, modes: dict[int, Any]) -> list[Any]:
+        """Return the arguments in other modes; implicit unknowns, which are linear if it matters, follow."""
         t, x, z, p, u, d = (ca.SX(argument) for argument in self.first)
-        d[one.mode] = mode
-        if any(column == one.mode for _, column in _uses(self.base.alg, "d")):
+        for mode, number in modes.items():
+            d[mode] = number
+        if any(column in modes for _, column in _uses(self.base.alg, "d")):
             residual, jacobian = (function(t, x, z, p, u, d) for function in (self.base.alg, self.base.alg_jacobian))
             z = z - ca.solve(ca.densify(jacobian), residual)
         return [t, x, z, p, u, d]
@@ -223,7 +250,7 @@ class _Mix:
     def _crossing(self, now: list[Any], soon: list[Any]) -> tuple[Any, Any]:
         """Replace the guards of the pairs, and add those of sliding."""
         later, rates = ahead(self.t), self.motion.rate
-        for k, one in enumerate(self.pairs):
+        for one, k in self.pairs:
             border, rate, across, share = self.borders[k], rates(self.borders[k]), self.across[k], self.shares[k]
             size = ca.fabs(across)
             near = _NEAR * later * (ca.fabs(rate) + ca.if_else(size < _LARGE, size, 0))
@@ -264,7 +291,7 @@ class _Mix:
 
     def _discretes(self) -> Any:
         found = list(self.base.flat_discretes)
-        for one in self.pairs:
+        for one, _ in self.pairs:
             names = found[one.mode].names
             found[one.mode] = replace(found[one.mode], names=(*names, f"{names[one.first]}{SLIDES}{names[one.second]}"))
         return tuple(found)
@@ -273,7 +300,7 @@ class _Mix:
         """First comes what has jumped across a border, then what begins to slide, then what passes the border."""
         begin, end, count = list[CompiledTransition](), list[CompiledTransition](), self.base.guards.size1_out(0)
         others = list(self.base.transitions)
-        for k, one in enumerate(self.pairs):
+        for k, (one, _) in enumerate(self.pairs):
             there, back = others[one.there], others[one.back]
             both, at = {one.first, one.second}, count + _MORE * k
             slides: Any = {"target": one.number, "because": _ALONG}

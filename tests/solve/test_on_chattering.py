@@ -14,13 +14,18 @@ from modelica_like.language import (
     Equations,
     Events,
     Hold,
+    Input,
     Mode,
+    Output,
     Parameter,
     Variable,
     all_of,
+    connect,
     der,
     if_,
     param,
+    signal_in,
+    signal_out,
     sin,
     var,
 )
@@ -173,6 +178,64 @@ def test_two_borders_at_once(solver):
     assert [event.after for event in run.events] == 2 * ["false ⇄ true"]
     final = [run.final[name] for name in "vwfg"]
     np.testing.assert_allclose(final, [0, 0, 0.5, 0.3], atol=1e-12)
+
+
+class Pushed(Component):
+    """Dry friction in three branches, with two relations of one border, under a force that swings."""
+
+    v: Variable = var("m/s", "speed")
+    f: Variable = var("N", "friction")
+    m: Parameter = param("kg", "mass", default=1.0)
+    F: Parameter = param("N", "friction", default=1.0)
+    D: Parameter = param("N", "amplitude of the force", default=1.7)
+    w: Parameter = param("rad/s", "its frequency", default=1.0)
+
+    def equations(self) -> Equations:
+        yield self.f == if_(self.v > 0, self.F, if_(self.v < 0, -self.F, 0))
+        yield self.m * der(self.v) == self.D * sin(self.w * self.time) - self.f
+
+
+@SOLVERS
+@pytest.mark.parametrize("v", [0.5, 0.0, -0.5])
+def test_friction_in_three_branches_sticks(solver, v):
+    """It breaks away where 1.7 sin(t) = 1: not before."""
+    stuck = simulate(Pushed(v=v, D=0.6), 6.0, on_chattering="slide", solver=solver)
+    assert [stuck.final["v"], stuck.final["f"]] == pytest.approx([0.0, 0.6 * math.sin(6.0)], abs=1e-9)
+    run = simulate(Pushed(v=v), 6.0, on_chattering="slide", solver=solver)
+    left = [time for time, before, after in changes(run) if "⇄" in before]
+    away = math.asin(1 / 1.7)
+    assert left[-1] == pytest.approx(math.pi + away, rel=1e-7)
+    # From there on: v' = 1.7 sin(t) + 1.
+    speed = 1.7 * (math.cos(left[-1]) - math.cos(6.0)) + 6.0 - left[-1]
+    assert [run.final["v"], run.final["f"]] == pytest.approx([speed, -1.0], abs=1e-6)
+
+
+class Part(Component):
+    """One of several that switch together."""
+
+    x: Input = signal_in("1", "what they share")
+    y: Output = signal_out("1", "direction")
+
+    def equations(self) -> Equations:
+        yield self.y == if_(self.x > 0, -1, 1)
+
+
+class Together(Component):
+    a, b = Part(), Part()
+    x: Output = signal_out("1", "value")
+    T: Parameter = param("s", "time", default=1.0)
+
+    def equations(self) -> Equations:
+        yield connect(self.x, self.a.x, self.b.x)
+        yield self.T * der(self.x) == self.a.y + self.b.y + 0.5
+
+
+@SOLVERS
+def test_parts_with_the_same_border_slide_together(solver):
+    run = simulate(Together(x=1.0), 2.0, on_chattering="slide", solver=solver)
+    assert [event.time for event in run.events] == pytest.approx([1 / 1.5, 1 / 1.5])
+    final = [run.final[name] for name in ("x", "a.y", "b.y")]
+    np.testing.assert_allclose(final, [0, -0.25, -0.25], atol=1e-12)
 
 
 class Steps(Component):
