@@ -7,7 +7,7 @@ mode of its own with a number behind the others, so events, FMUs and results kno
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any
@@ -21,7 +21,7 @@ from modelica_like.structure.motion import Motion
 
 SLIDES = " ⇄ "
 """Between the names of two modes: the name of sliding along their border."""
-_MIXED = ("ode", "variables", "moments", "resets", "updates", "hold_terms")
+_MIXED = ("ode", "variables", "moments", "resets", "hold_terms")
 _PLAIN = ("alg", "alg_jacobian", "start_conditions", "start_values", "discrete_starts", "determinants")
 _NEAR = 10.0
 """Distance from the border that a mode may jump and still slide, in changes within the time resolution."""
@@ -135,18 +135,25 @@ def _samples(model: CompiledDae) -> Any:
 
 
 def _decides(model: CompiledDae, mode: int, guard: int) -> bool:
-    """Whether a mode has an effect on the rate of a guard, but none on the guard itself nor on discrete equations."""
-    implicitly = any(column == mode for _, column in _uses(model.alg, "d"))
-    if any(column == mode for _, column in _uses(model.updates, "d")) or (
-        implicitly and _uses(model.alg_jacobian, "z")
-    ):
+    """Whether a mode has an effect on the rate of a guard, but none on the guard itself, and resets nothing."""
+    follow = _followers(model, mode)
+    if any(model.update_rows[row].reset.kind != "discrete" for row in follow):
+        return False
+    modes = {mode, *(model.update_rows[row].reset.index for row in follow)}
+    implicitly = any(column in modes for _, column in _uses(model.alg, "d"))
+    if implicitly and _uses(model.alg_jacobian, "z"):
         return False
     value, rate = (
-        any(row == guard and column == mode for row, column in _uses(function, "d"))
+        any(row == guard and column in modes for row, column in _uses(function, "d"))
         or (implicitly and any(row == guard for row, _ in _uses(function, "z")))
         for function in (model.guards, model.guard_rates)
     )
     return rate and not value
+
+
+def _followers(model: CompiledDae, mode: int) -> list[int]:
+    """Rows of the discrete equations on which a mode has an effect."""
+    return sorted({row for row, column in _uses(model.updates, "d") if column == mode})
 
 
 def _uses(function: ca.Function, argument: str) -> set[tuple[int, int]]:
@@ -174,6 +181,9 @@ class _Mix:
         modes = ca.SX(self.d)
         for one, _ in self.pairs:
             modes[one.mode] = ca.if_else(self._slides(one), one.first, modes[one.mode])
+        slides = functools.reduce(ca.logic_or, self.slides)
+        for mode, value in self._following([*self.arguments[:-1], modes], [one.mode for one, _ in self.pairs]):
+            modes[mode] = ca.if_else(slides, value, modes[mode])
         self.first = [*self.arguments[:-1], modes]
         # Only where it slides: a branch that is not taken may be undefined.
         self.seconds = [
@@ -203,12 +213,21 @@ class _Mix:
         mode = self.first[-1][one.mode]
         return ca.if_else(mode == one.first, one.second, ca.if_else(mode == one.second, one.first, mode))
 
+    def _following(self, arguments: list[Any], modes: Iterable[int]) -> list[tuple[int, Any]]:
+        """Return positions in d and values of the discrete variables on which modes have an effect."""
+        values, rows = self.base.updates(*arguments), self.base.update_rows
+        return [(rows[row].reset.index, values[row]) for mode in modes for row in _followers(self.base, mode)]
+
     def _with(self, modes: dict[int, Any]) -> list[Any]:
-        """Return the arguments in other modes; implicit unknowns, which are linear if it matters, follow."""
+        """Return the arguments in other modes; discrete equations and implicit unknowns follow."""
         t, x, z, p, u, d = (ca.SX(argument) for argument in self.first)
         for mode, number in modes.items():
             d[mode] = number
-        if any(column in modes for _, column in _uses(self.base.alg, "d")):
+        following = self._following([t, x, z, p, u, d], modes)
+        for mode, value in following:
+            d[mode] = value
+        changed = {*modes, *(mode for mode, _ in following)}
+        if any(column in changed for _, column in _uses(self.base.alg, "d")):
             residual, jacobian = (function(t, x, z, p, u, d) for function in (self.base.alg, self.base.alg_jacobian))
             z = z - ca.solve(ca.densify(jacobian), residual)
         return [t, x, z, p, u, d]
@@ -232,15 +251,20 @@ class _Mix:
 
     def _guards(self) -> tuple[Any, Any]:
         """Return all guards, and what they are one time resolution later."""
-        model = self.base
+        # What depends on discrete values alone is true or false, and not in between.
+        moving = {row for name in ("t", "x", "z") for row, _ in _uses(self.base.guards, name)}
+        plain, mixed = self.base.guards(*self.first), self._joined()
+        values = ca.vertcat(*((mixed if row in moving else plain)[row] for row in range(plain.numel())))
+        now, soon = (ca.vertsplit(one) for one in (values, guards_soon(self.t, self.motion.rate, values)))
+        return self._crossing(now, soon)
+
+    def _joined(self) -> Any:
         first, *others = (self._relations(arguments) for arguments in (self.first, *self.seconds))
         mixed = iter(
             one + sum(share * (other - one) for share, other in zip(self.shares, those, strict=True))
             for one, *those in zip(first, *others, strict=True)
         )
-        values = joined(model.guards(*self.first), lambda _: next(mixed))
-        now, soon = (ca.vertsplit(one) for one in (values, guards_soon(self.t, self.motion.rate, values)))
-        return self._crossing(now, soon)
+        return joined(self.base.guards(*self.first), lambda _: next(mixed))
 
     def _relations(self, arguments: list[Any]) -> list[Any]:
         found: list[Any] = []
@@ -264,6 +288,15 @@ class _Mix:
                 guards += [s - far, -s - far, _enters(s, v, w), _enters(-s, -v, -w), -a, a - 1]
         return ca.vertcat(*now), ca.vertcat(*soon)
 
+    def _updates(self) -> Any:
+        """Booleans and counts that follow a sliding mode have the values of the first one; samples are mixed."""
+        plain, mixed, found = self.base.updates(*self.first), self._mixed(self.base.updates), list[Any]()
+        for row, update in enumerate(self.base.update_rows):
+            one = self.base.flat_discretes[update.reset.index] if update.reset.kind == "discrete" else None
+            whole = one is not None and (one.hidden or one.kind != "number")
+            found.append((plain if whole else mixed)[row])
+        return ca.vertcat(*found)
+
     # -- the model --
 
     def model(self) -> CompiledDae:
@@ -275,7 +308,7 @@ class _Mix:
         places = {index: place for place, index in enumerate(order)}
         transitions = tuple(one if one.timed else replace(one, index=places[one.index]) for one in transitions)
         guards, soon = (one[order] for one in self._guards())
-        written = {name: self._mixed(getattr(base, name)) for name in _MIXED}
+        written = {name: self._mixed(getattr(base, name)) for name in _MIXED} | {"updates": self._updates()}
         written |= {name: getattr(base, name)(*self.first) for name in _PLAIN}
         written |= {"guards": guards, "guard_rates": rate(guards), "guards_soon": soon}
         functions = {name: self._function(name, expression) for name, expression in written.items()}

@@ -11,6 +11,7 @@ from modelica_like.errors import Chattering, UnknownName
 from modelica_like.fmi.export import export_fmu
 from modelica_like.language import (
     Component,
+    Discrete,
     Equations,
     Events,
     Hold,
@@ -20,14 +21,18 @@ from modelica_like.language import (
     Parameter,
     Variable,
     all_of,
+    boolean,
+    clock,
     connect,
     der,
+    discrete,
     if_,
     param,
     signal_in,
     signal_out,
     sin,
     var,
+    when,
 )
 
 SOLVERS = pytest.mark.parametrize("solver", ["idas", "native"])
@@ -208,6 +213,38 @@ def test_friction_in_three_branches_sticks(solver, v):
     # From there on: v' = 1.7 sin(t) + 1.
     speed = 1.7 * (math.cos(left[-1]) - math.cos(6.0)) + 6.0 - left[-1]
     assert [run.final["v"], run.final["f"]] == pytest.approx([speed, -1.0], abs=1e-6)
+
+
+class Room(Component):
+    """A thermostat without hysteresis, by a Boolean variable; it counts starts, and a meter reads its power."""
+
+    C: Parameter = param("J/K", "heat capacity", default=1e3)
+    G: Parameter = param("W/K", "loss", default=10.0)
+    P: Parameter = param("W", "power of the heater", default=500.0)
+    wish: Parameter = param("K", "wished temperature", default=300.0)
+    outside: Parameter = param("K", "temperature outside", default=280.0)
+    period: Parameter = param("s", "of the meter", default=40.0)
+    inside: Variable = var("K", "temperature")
+    power: Variable = var("W", "power")
+    heating: Discrete = boolean("whether the heater is on")
+    read: Discrete = discrete("W", "power that was read")
+
+    def equations(self) -> Equations:
+        yield self.heating == (self.inside < self.wish)
+        yield self.power == if_(self.heating, self.P, 0)
+        yield self.C * der(self.inside) == self.power - self.G * (self.inside - self.outside)
+
+    def events(self) -> Events:
+        yield when(clock(self.period), {self.read: self.power})
+
+
+@SOLVERS
+@pytest.mark.parametrize("start", [285.0, 310.0, 300.0])
+def test_a_boolean_variable_slides_with_its_relation(solver, start):
+    """On the border the mean power is the loss, 10·20 W, also where it is sampled."""
+    run = simulate(Room(inside=start), 600.0, on_chattering="slide", solver=solver)
+    final = [run.final[name] for name in ("inside", "power", "read", "heating")]
+    assert final == pytest.approx([300.0, 200.0, 200.0, 0.0], rel=1e-9)
 
 
 class Part(Component):
