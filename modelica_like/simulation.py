@@ -45,7 +45,9 @@ Solver = Literal["idas", "native"]
 Model = Component | CompiledDae | str | Path
 
 
-def build(drive: Model, free: Iterable[str] = (), *, tables: Iterable[str] = ()) -> CompiledDae:
+def build(
+    drive: Model, free: Iterable[str] = (), *, tables: Iterable[str] = (), on_chattering: OnChattering | None = None
+) -> CompiledDae:
     """Compile a component tree or a netlist file; a compiled model is returned unchanged.
 
     Args:
@@ -54,11 +56,15 @@ def build(drive: Model, free: Iterable[str] = (), *, tables: Iterable[str] = ())
             Not possible in a compiled model.
         tables: patterns of tables whose numbers become parameters, such as `clutch.mu_pos`: see
             `with_tunable_tables`. Not possible in a compiled model.
+        on_chattering: as of `simulate`, for runs, FMUs and compiled runs of the model; by default that of the netlist.
 
     Raises:
         LanguageError: `tables` is given for a compiled model.
         ModelicaLikeError: the model has an error; the message says what, where and what to do.
     """
+    if on_chattering is not None:
+        model = build(drive, free, tables=tables)
+        return model.twin(settings={**model.settings, "on_chattering": on_chattering})
     if isinstance(drive, CompiledDae):
         if tables:
             raise LanguageError("Tables of a compiled model cannot change.", advice="Build it with `tables`.")

@@ -6,7 +6,8 @@ mode of its own with a number behind the others, so events, FMUs and results kno
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import functools
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any
@@ -20,7 +21,7 @@ from modelica_like.structure.motion import Motion
 
 SLIDES = " ⇄ "
 """Between the names of two modes: the name of sliding along their border."""
-_MIXED = ("ode", "variables", "moments", "resets", "updates", "hold_terms")
+_MIXED = ("ode", "variables", "moments", "resets", "hold_terms")
 _PLAIN = ("alg", "alg_jacobian", "start_conditions", "start_values", "discrete_starts", "determinants")
 _NEAR = 10.0
 """Distance from the border that a mode may jump and still slide, in changes within the time resolution."""
@@ -56,6 +57,10 @@ class Pair:
     number: int
 
 
+Border = list[Pair]
+"""Pairs with the same guards, which switch and slide together."""
+
+
 def as_asked(model: CompiledDae) -> CompiledDae:
     """Return the model with modes of sliding if its settings ask for them."""
     return sliding(model) if model.settings.get("on_chattering") == "slide" else model
@@ -72,10 +77,10 @@ def sliding(model: CompiledDae) -> CompiledDae:
 
 
 def _sliding(model: CompiledDae) -> CompiledDae:
-    pairs = list(_pairs(model))
-    if not pairs:
+    borders = _borders(model)
+    if not borders:
         return model
-    made = _Mix(model, pairs).model()
+    made = _Mix(model, borders).model()
     made.once("sliding", lambda: made)
     return made
 
@@ -83,18 +88,35 @@ def _sliding(model: CompiledDae) -> CompiledDae:
 # -- which modes -----------------------------------------------------------------------------------------------------
 
 
-def _pairs(model: CompiledDae) -> Iterator[Pair]:
+def _borders(model: CompiledDae) -> list[Border]:
+    samples, found = _samples(model), list[tuple[Any, Border]]()
+    for pair in _pairs(model, samples):
+        guard = samples[:, model.transitions[pair.there].index]
+        turned = replace(pair, first=pair.second, second=pair.first, there=pair.back, back=pair.there)
+        for values, border in found:
+            for one, sign in ((pair, 1.0), (turned, -1.0)):
+                if _same(sign * guard, values):
+                    border.append(one)
+        if not any(_same(sign * guard, values) for values, _ in found for sign in (1.0, -1.0)):
+            found.append((guard, [pair]))
+    return [border for _, border in found]
+
+
+def _same(values: Any, others: Any) -> bool:
+    """Whether samples are equal but for rounding; false where one is no number."""
+    return bool((np.abs(values - others) <= _ROUNDING * np.abs(values)).all())
+
+
+def _pairs(model: CompiledDae, samples: Any) -> Iterator[Pair]:
     held = {(one.mode, one.number) for one in model.holds}
     numbers = {k: len(one.names) for k, one in enumerate(model.flat_discretes)}
     plain = [k for k, one in enumerate(model.transitions) if not (one.timed or one.resets or one.fails or one.notice)]
-    samples = _samples(model)
     for there, back in combinations(plain, 2):
         one, other = model.transitions[there], model.transitions[back]
         mode, first, second = one.mode, other.target, one.target
         if mode != other.mode or first not in one.sources or second not in other.sources or first == second:
             continue
-        left, right = samples[:, one.index], samples[:, other.index]
-        opposite = bool((np.abs(left + right) <= _ROUNDING * np.abs(left)).all())  # false where one is no number
+        opposite = _same(samples[:, one.index], -samples[:, other.index])
         if opposite and held.isdisjoint(((mode, first), (mode, second))) and _decides(model, mode, one.index):
             yield Pair(mode, first, second, there, back, numbers[mode])
             numbers[mode] += 1
@@ -113,18 +135,25 @@ def _samples(model: CompiledDae) -> Any:
 
 
 def _decides(model: CompiledDae, mode: int, guard: int) -> bool:
-    """Whether a mode has an effect on the rate of a guard, but none on the guard itself nor on discrete equations."""
-    implicitly = any(column == mode for _, column in _uses(model.alg, "d"))
-    if any(column == mode for _, column in _uses(model.updates, "d")) or (
-        implicitly and _uses(model.alg_jacobian, "z")
-    ):
+    """Whether a mode has an effect on the rate of a guard, but none on the guard itself, and resets nothing."""
+    follow = _followers(model, mode)
+    if any(model.update_rows[row].reset.kind != "discrete" for row in follow):
+        return False
+    modes = {mode, *(model.update_rows[row].reset.index for row in follow)}
+    implicitly = any(column in modes for _, column in _uses(model.alg, "d"))
+    if implicitly and _uses(model.alg_jacobian, "z"):
         return False
     value, rate = (
-        any(row == guard and column == mode for row, column in _uses(function, "d"))
+        any(row == guard and column in modes for row, column in _uses(function, "d"))
         or (implicitly and any(row == guard for row, _ in _uses(function, "z")))
         for function in (model.guards, model.guard_rates)
     )
     return rate and not value
+
+
+def _followers(model: CompiledDae, mode: int) -> list[int]:
+    """Rows of the discrete equations on which a mode has an effect."""
+    return sorted({row for row, column in _uses(model.updates, "d") if column == mode})
 
 
 def _uses(function: ca.Function, argument: str) -> set[tuple[int, int]]:
@@ -140,31 +169,35 @@ class _Mix:
 
     Args:
         model: without them.
-        pairs: at least one.
+        borders: at least one.
     """
 
-    def __init__(self, model: CompiledDae, pairs: list[Pair]) -> None:
-        self.base, self.pairs = model, pairs
+    def __init__(self, model: CompiledDae, borders: list[Border]) -> None:
+        self.base = model
+        self.pairs = [(one, k) for k, border in enumerate(borders) for one in border]
         self.arguments = list(model.arguments.values())
         self.t, self.x, self.z, *_, self.d = self.arguments
-        self.slides = [self.d[one.mode] == one.number for one in pairs]
+        self.slides = [functools.reduce(ca.logic_or, [self._slides(one) for one in border]) for border in borders]
         modes = ca.SX(self.d)
-        for one, slides in zip(pairs, self.slides, strict=True):
-            modes[one.mode] = ca.if_else(slides, one.first, modes[one.mode])
+        for one, _ in self.pairs:
+            modes[one.mode] = ca.if_else(self._slides(one), one.first, modes[one.mode])
+        slides = functools.reduce(ca.logic_or, self.slides)
+        for mode, value in self._following([*self.arguments[:-1], modes], [one.mode for one, _ in self.pairs]):
+            modes[mode] = ca.if_else(slides, value, modes[mode])
         self.first = [*self.arguments[:-1], modes]
         # Only where it slides: a branch that is not taken may be undefined.
         self.seconds = [
-            self._with(one, ca.if_else(slides, one.second, modes[one.mode]))
-            for one, slides in zip(pairs, self.slides, strict=True)
+            self._with({one.mode: ca.if_else(self._slides(one), one.second, modes[one.mode]) for one in border})
+            for border in borders
         ]
         self.alg = model.alg(*self.first)
         ode = model.ode(*self.first)
         guards = ca.vertsplit(model.guards(*self.first))
-        self.borders = [guards[model.transitions[one.there].index] for one in pairs]
+        self.borders = [guards[model.transitions[border[0].there].index] for border in borders]
         self.rates = self._motion(ode).rate(ca.vertcat(*self.borders))
         self.shares = self._shares()
         self.motion = self._motion(self._mixed(model.ode))
-        others = [self._with(one, self._other(one)) for one in pairs]
+        others = [self._with({one.mode: self._other(one) for one in border}) for border in borders]
         self.across = [
             (self._motion(self.motion.ode + model.ode(*other) - ode)).rate(border)
             for other, border in zip(others, self.borders, strict=True)
@@ -173,15 +206,28 @@ class _Mix:
     def _motion(self, ode: Any) -> Motion:
         return Motion(self.t, self.x, self.z, ode, self.alg)
 
+    def _slides(self, one: Pair) -> Any:
+        return self.d[one.mode] == one.number
+
     def _other(self, one: Pair) -> Any:
         mode = self.first[-1][one.mode]
         return ca.if_else(mode == one.first, one.second, ca.if_else(mode == one.second, one.first, mode))
 
-    def _with(self, one: Pair, mode: Any) -> list[Any]:
-        """Return the arguments in another mode; implicit unknowns, which are linear if it matters, follow."""
+    def _following(self, arguments: list[Any], modes: Iterable[int]) -> list[tuple[int, Any]]:
+        """Return positions in d and values of the discrete variables on which modes have an effect."""
+        values, rows = self.base.updates(*arguments), self.base.update_rows
+        return [(rows[row].reset.index, values[row]) for mode in modes for row in _followers(self.base, mode)]
+
+    def _with(self, modes: dict[int, Any]) -> list[Any]:
+        """Return the arguments in other modes; discrete equations and implicit unknowns follow."""
         t, x, z, p, u, d = (ca.SX(argument) for argument in self.first)
-        d[one.mode] = mode
-        if any(column == one.mode for _, column in _uses(self.base.alg, "d")):
+        for mode, number in modes.items():
+            d[mode] = number
+        following = self._following([t, x, z, p, u, d], modes)
+        for mode, value in following:
+            d[mode] = value
+        changed = {*modes, *(mode for mode, _ in following)}
+        if any(column in changed for _, column in _uses(self.base.alg, "d")):
             residual, jacobian = (function(t, x, z, p, u, d) for function in (self.base.alg, self.base.alg_jacobian))
             z = z - ca.solve(ca.densify(jacobian), residual)
         return [t, x, z, p, u, d]
@@ -205,15 +251,20 @@ class _Mix:
 
     def _guards(self) -> tuple[Any, Any]:
         """Return all guards, and what they are one time resolution later."""
-        model = self.base
+        # What depends on discrete values alone is true or false, and not in between.
+        moving = {row for name in ("t", "x", "z") for row, _ in _uses(self.base.guards, name)}
+        plain, mixed = self.base.guards(*self.first), self._joined()
+        values = ca.vertcat(*((mixed if row in moving else plain)[row] for row in range(plain.numel())))
+        now, soon = (ca.vertsplit(one) for one in (values, guards_soon(self.t, self.motion.rate, values)))
+        return self._crossing(now, soon)
+
+    def _joined(self) -> Any:
         first, *others = (self._relations(arguments) for arguments in (self.first, *self.seconds))
         mixed = iter(
             one + sum(share * (other - one) for share, other in zip(self.shares, those, strict=True))
             for one, *those in zip(first, *others, strict=True)
         )
-        values = joined(model.guards(*self.first), lambda _: next(mixed))
-        now, soon = (ca.vertsplit(one) for one in (values, guards_soon(self.t, self.motion.rate, values)))
-        return self._crossing(now, soon)
+        return joined(self.base.guards(*self.first), lambda _: next(mixed))
 
     def _relations(self, arguments: list[Any]) -> list[Any]:
         found: list[Any] = []
@@ -223,7 +274,7 @@ class _Mix:
     def _crossing(self, now: list[Any], soon: list[Any]) -> tuple[Any, Any]:
         """Replace the guards of the pairs, and add those of sliding."""
         later, rates = ahead(self.t), self.motion.rate
-        for k, one in enumerate(self.pairs):
+        for one, k in self.pairs:
             border, rate, across, share = self.borders[k], rates(self.borders[k]), self.across[k], self.shares[k]
             size = ca.fabs(across)
             near = _NEAR * later * (ca.fabs(rate) + ca.if_else(size < _LARGE, size, 0))
@@ -237,6 +288,15 @@ class _Mix:
                 guards += [s - far, -s - far, _enters(s, v, w), _enters(-s, -v, -w), -a, a - 1]
         return ca.vertcat(*now), ca.vertcat(*soon)
 
+    def _updates(self) -> Any:
+        """Booleans and counts that follow a sliding mode have the values of the first one; samples are mixed."""
+        plain, mixed, found = self.base.updates(*self.first), self._mixed(self.base.updates), list[Any]()
+        for row, update in enumerate(self.base.update_rows):
+            one = self.base.flat_discretes[update.reset.index] if update.reset.kind == "discrete" else None
+            whole = one is not None and (one.hidden or one.kind != "number")
+            found.append((plain if whole else mixed)[row])
+        return ca.vertcat(*found)
+
     # -- the model --
 
     def model(self) -> CompiledDae:
@@ -248,7 +308,7 @@ class _Mix:
         places = {index: place for place, index in enumerate(order)}
         transitions = tuple(one if one.timed else replace(one, index=places[one.index]) for one in transitions)
         guards, soon = (one[order] for one in self._guards())
-        written = {name: self._mixed(getattr(base, name)) for name in _MIXED}
+        written = {name: self._mixed(getattr(base, name)) for name in _MIXED} | {"updates": self._updates()}
         written |= {name: getattr(base, name)(*self.first) for name in _PLAIN}
         written |= {"guards": guards, "guard_rates": rate(guards), "guards_soon": soon}
         functions = {name: self._function(name, expression) for name, expression in written.items()}
@@ -264,7 +324,7 @@ class _Mix:
 
     def _discretes(self) -> Any:
         found = list(self.base.flat_discretes)
-        for one in self.pairs:
+        for one, _ in self.pairs:
             names = found[one.mode].names
             found[one.mode] = replace(found[one.mode], names=(*names, f"{names[one.first]}{SLIDES}{names[one.second]}"))
         return tuple(found)
@@ -273,7 +333,7 @@ class _Mix:
         """First comes what has jumped across a border, then what begins to slide, then what passes the border."""
         begin, end, count = list[CompiledTransition](), list[CompiledTransition](), self.base.guards.size1_out(0)
         others = list(self.base.transitions)
-        for k, one in enumerate(self.pairs):
+        for k, (one, _) in enumerate(self.pairs):
             there, back = others[one.there], others[one.back]
             both, at = {one.first, one.second}, count + _MORE * k
             slides: Any = {"target": one.number, "because": _ALONG}

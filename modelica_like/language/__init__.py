@@ -55,6 +55,7 @@ from modelica_like.language.functions import minimum as minimum
 from modelica_like.language.functions import mod as mod
 from modelica_like.language.functions import negate as negate
 from modelica_like.language.functions import prescribed as prescribed
+from modelica_like.language.functions import random as random
 from modelica_like.language.functions import sign as sign
 from modelica_like.language.functions import sin as sin
 from modelica_like.language.functions import sqrt as sqrt

@@ -42,7 +42,7 @@ _CANNOT = {
     "stop": "",
     "slide": (
         " It cannot slide: that takes two values of a mode that change into each other under opposite conditions, "
-        "without resets or discrete equations, and that decide how what is compared changes."
+        "without resets, and that decide how what is compared changes."
     ),
     "rest": " Nothing comes to rest: that takes impacts of a mode that holds a motion, with a restitution.",
 }

@@ -41,6 +41,7 @@ from modelica_like.language import (
     pre,
     previous,
     sample,
+    random,
     sign,
     signal_in,
     signal_out,
@@ -601,3 +602,24 @@ def test_words_of_sampled_parts_and_several_rates(solver):
     assert found.final["total"] == pytest.approx(samples.sum(), abs=CLOSE)
     assert found.final["taken"] == pytest.approx(samples[:19].sum(), abs=CLOSE)
     assert found.final["y"] == pytest.approx(2 * samples[16:19].sum(), abs=CLOSE)
+
+
+class Dice(Component):
+    """Thrown at every tick."""
+
+    T: Parameter = param("s", "period", default=0.1)
+    u: Discrete = discrete("1", "chance", start=2147483646 / 2147483647)
+    points: Discrete = integer("of the last throw")
+
+    def events(self) -> Events:
+        yield when(clock(self.T, self.T), {self.u: random(pre(self.u)), self.points: floor(6 * self.u) + 1})
+
+
+def test_random_numbers_are_the_published_ones(solver):
+    """`minstd_rand` (ISO/IEC 14882) from its largest seed, to the last bit; zero counts as the first seed."""
+    found, k = simulate(Dice(), 10.0, solver=solver), 2147483646
+    for tick in range(1, 100):
+        k = 48271 * k % 2147483647
+        assert found.at(0.1 * tick + 0.05)["u"] == k / 2147483647
+        assert found.at(0.1 * tick + 0.05)["points"] == 1 + 6 * k // 2147483647
+    assert simulate(Dice(u=0.0), 0.15, solver=solver).final["u"] == 48271 / 2147483647

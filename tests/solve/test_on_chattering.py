@@ -6,23 +6,33 @@ from typing import Any
 import numpy as np
 import pytest
 
-from modelica_like import Solution, build, run_fmu, sensitivities, simulate
+from modelica_like import Solution, build, run_fmu, sensitivities, simulate, sweep
 from modelica_like.errors import Chattering, UnknownName
 from modelica_like.fmi.export import export_fmu
 from modelica_like.language import (
     Component,
+    Discrete,
     Equations,
     Events,
     Hold,
+    Input,
     Mode,
+    Output,
     Parameter,
     Variable,
     all_of,
+    boolean,
+    clock,
+    connect,
     der,
+    discrete,
     if_,
     param,
+    signal_in,
+    signal_out,
     sin,
     var,
+    when,
 )
 
 SOLVERS = pytest.mark.parametrize("solver", ["idas", "native"])
@@ -82,7 +92,7 @@ def test_a_reference_that_is_too_fast_is_not_followed():
 
 def test_the_slope_of_what_slides():
     """x = 0.3 + slope t."""
-    model = build(Relay(x=0.0)).twin(settings={"on_chattering": "slide"})
+    model = build(Relay(x=0.0), on_chattering="slide")
     assert sensitivities(model, of="x", to="slope", until=2.0).derivatives[0, 0] == pytest.approx(2.0, rel=1e-9)
 
 
@@ -175,6 +185,96 @@ def test_two_borders_at_once(solver):
     np.testing.assert_allclose(final, [0, 0, 0.5, 0.3], atol=1e-12)
 
 
+class Pushed(Component):
+    """Dry friction in three branches, with two relations of one border, under a force that swings."""
+
+    v: Variable = var("m/s", "speed")
+    f: Variable = var("N", "friction")
+    m: Parameter = param("kg", "mass", default=1.0)
+    F: Parameter = param("N", "friction", default=1.0)
+    D: Parameter = param("N", "amplitude of the force", default=1.7)
+    w: Parameter = param("rad/s", "its frequency", default=1.0)
+
+    def equations(self) -> Equations:
+        yield self.f == if_(self.v > 0, self.F, if_(self.v < 0, -self.F, 0))
+        yield self.m * der(self.v) == self.D * sin(self.w * self.time) - self.f
+
+
+@SOLVERS
+@pytest.mark.parametrize("v", [0.5, 0.0, -0.5])
+def test_friction_in_three_branches_sticks(solver, v):
+    """It breaks away where 1.7 sin(t) = 1: not before."""
+    stuck = simulate(Pushed(v=v, D=0.6), 6.0, on_chattering="slide", solver=solver)
+    assert [stuck.final["v"], stuck.final["f"]] == pytest.approx([0.0, 0.6 * math.sin(6.0)], abs=1e-9)
+    run = simulate(Pushed(v=v), 6.0, on_chattering="slide", solver=solver)
+    left = [time for time, before, after in changes(run) if "⇄" in before]
+    away = math.asin(1 / 1.7)
+    assert left[-1] == pytest.approx(math.pi + away, rel=1e-7)
+    # From there on: v' = 1.7 sin(t) + 1.
+    speed = 1.7 * (math.cos(left[-1]) - math.cos(6.0)) + 6.0 - left[-1]
+    assert [run.final["v"], run.final["f"]] == pytest.approx([speed, -1.0], abs=1e-6)
+
+
+class Room(Component):
+    """A thermostat without hysteresis, by a Boolean variable; it counts starts, and a meter reads its power."""
+
+    C: Parameter = param("J/K", "heat capacity", default=1e3)
+    G: Parameter = param("W/K", "loss", default=10.0)
+    P: Parameter = param("W", "power of the heater", default=500.0)
+    wish: Parameter = param("K", "wished temperature", default=300.0)
+    outside: Parameter = param("K", "temperature outside", default=280.0)
+    period: Parameter = param("s", "of the meter", default=40.0)
+    inside: Variable = var("K", "temperature")
+    power: Variable = var("W", "power")
+    heating: Discrete = boolean("whether the heater is on")
+    read: Discrete = discrete("W", "power that was read")
+
+    def equations(self) -> Equations:
+        yield self.heating == (self.inside < self.wish)
+        yield self.power == if_(self.heating, self.P, 0)
+        yield self.C * der(self.inside) == self.power - self.G * (self.inside - self.outside)
+
+    def events(self) -> Events:
+        yield when(clock(self.period), {self.read: self.power})
+
+
+@SOLVERS
+@pytest.mark.parametrize("start", [285.0, 310.0, 300.0])
+def test_a_boolean_variable_slides_with_its_relation(solver, start):
+    """On the border the mean power is the loss, 10·20 W, also where it is sampled."""
+    run = simulate(Room(inside=start), 600.0, on_chattering="slide", solver=solver)
+    final = [run.final[name] for name in ("inside", "power", "read", "heating")]
+    assert final == pytest.approx([300.0, 200.0, 200.0, 0.0], rel=1e-9)
+
+
+class Part(Component):
+    """One of several that switch together."""
+
+    x: Input = signal_in("1", "what they share")
+    y: Output = signal_out("1", "direction")
+
+    def equations(self) -> Equations:
+        yield self.y == if_(self.x > 0, -1, 1)
+
+
+class Together(Component):
+    a, b = Part(), Part()
+    x: Output = signal_out("1", "value")
+    T: Parameter = param("s", "time", default=1.0)
+
+    def equations(self) -> Equations:
+        yield connect(self.x, self.a.x, self.b.x)
+        yield self.T * der(self.x) == self.a.y + self.b.y + 0.5
+
+
+@SOLVERS
+def test_parts_with_the_same_border_slide_together(solver):
+    run = simulate(Together(x=1.0), 2.0, on_chattering="slide", solver=solver)
+    assert [event.time for event in run.events] == pytest.approx([1 / 1.5, 1 / 1.5])
+    final = [run.final[name] for name in ("x", "a.y", "b.y")]
+    np.testing.assert_allclose(final, [0, -0.25, -0.25], atol=1e-12)
+
+
 class Steps(Component):
     """Three values, and two borders of one mode."""
 
@@ -238,13 +338,23 @@ def test_implicit_equations_follow_the_mix(solver):
 
 @pytest.mark.parametrize("kind", ["me", "cs"])
 @pytest.mark.parametrize("asked", ["slide", "rest"])
-def test_an_fmu_does_the_same(kind: Any, asked: str, tmp_path):
+def test_an_fmu_does_the_same(kind: Any, asked: Any, tmp_path):
     part: Component = Sweep(x=-0.3, size=0.4, jump=1.0) if asked == "slide" else Ball(h=1.0, v=0.0)
-    model = build(part).twin(settings={"on_chattering": asked, "until": 6.0})
+    model = build(part, on_chattering=asked)
     export_fmu(model, tmp_path / "a.fmu", kind=(kind,), check=False)
     names = [*model.states]
-    run, expected = run_fmu(tmp_path / "a.fmu", stop=6.0, kind=kind, outputs=names), simulate(model)
+    run, expected = run_fmu(tmp_path / "a.fmu", stop=6.0, kind=kind, outputs=names), simulate(model, 6.0)
     np.testing.assert_allclose([run.final[n] for n in names], [expected.final[n] for n in names], atol=1e-5)
+
+
+def test_a_sweep_does_the_same():
+    """x = 0.3 + 2·slope."""
+    for solver in ("native", "idas"):
+        found = sweep(
+            Relay(x=0.0), {"slope": [0.1, 0.5]}, ["x"], until=2.0, solver=solver, on_chattering="slide", processes=1
+        )
+        np.testing.assert_allclose(found["x"], [0.5, 1.3], rtol=1e-8)
+        assert not found["failure"].values.any()
 
 
 # -- rest ------------------------------------------------------------------------------------------------------------
