@@ -58,7 +58,7 @@ def class_of_equations(
             f"{component.label} is a {type(component).__name__}, for which the Modelica Standard Library has no class, "
             f"and it has {what}.",
             where=component.place_of(),
-            advice="Impacts, shared loads and states that modes take away are no equations: Modelica text cannot say them.",
+            advice="Impacts, shared loads and states that modes take away are no equations of Modelica text.",
         )
     lines = [f"model {name}", *_declarations(component, write_formula, driven), "equation"]
     for item, source in located(component.equations()):
