@@ -9,6 +9,7 @@ from scipy.integrate import quad, solve_ivp
 from modelica_like import linearize, sensitivities, simulate
 from modelica_like.language import Component, Equations, Parameter, Variable, der, guess, param, var
 from modelica_like.netlist.registry import find_type
+from modelica_like.report.run import statistics_line
 
 PARTS = Path(__file__).parents[2] / "examples" / "elements"
 L, G = 1.5, 9.81
@@ -74,6 +75,29 @@ def test_each_choice_is_told_with_its_reason():
     assert {event.mode for event in run.events} == {"state[1].choice"}
     because = run.model.transitions[run.events[0].transition].because
     assert because == "the states of x and y would become singular"
+    assert f"{len(run.events)} mode changes ({len(run.events)} of them choices of states)" in statistics_line(run)
+
+
+def test_a_pendulum_in_modelica_text_turns_over(tmp_path):
+    """The start value of y is not fixed: it is a guess."""
+    (tmp_path / "pendulum.mo").write_text("""
+model Pendulum
+  parameter Real L = 1.5;
+  Real x(start = 0, fixed = true);
+  Real y(start = -1.5);
+  Real vx(start = 9.5, fixed = true);
+  Real vy;
+  Real pull;
+equation
+  der(x) = vx;
+  der(y) = vy;
+  der(vx) = -pull*x;
+  der(vy) = -pull*y - 9.81;
+  x^2 + y^2 = L^2;
+end Pendulum;
+""")
+    run = simulate(tmp_path / "pendulum.mo", 2.0, rtol=1e-11, atol=1e-12)
+    assert run["x"] == pytest.approx(L * np.sin(swing(9.5, 2.0)(run.time)[0]), abs=1e-8)
 
 
 def test_no_variable_jumps_at_a_choice():
