@@ -268,3 +268,8 @@ class _Choice:
 def start_name(model: CompiledDae, entry: StartEntry) -> str:
     """Path of the variable of a start value."""
     return model.flat_variables[entry.node].path
+
+
+def is_near(model: CompiledDae, entry: StartEntry) -> bool:
+    """Whether a start value is the first guess of a variable that is no state; a default, if there is no guess."""
+    return entry.state is None and (entry.strength != "default" or not model.flat_variables[entry.node].guess)

@@ -129,10 +129,11 @@ def _energy(value: float) -> Shown:
 
 def statistics_line(solution: Trajectories) -> str:
     """Return steps, evaluations, events and seconds in one sentence."""
-    counts = solution.statistics
+    counts, chosen = solution.statistics, sum(one.mode.endswith("].choice") for one in solution.events)
+    choices = f" ({chosen} of them choices of states)" if chosen else ""
     return (
         f"{counts.steps} steps, {counts.evaluations} evaluations, {counts.integrations} integrations, "
-        f"{_mode_changes(counts.events)} in {counts.seconds:.3f} s"
+        f"{_mode_changes(counts.events)}{choices} in {counts.seconds:.3f} s"
     )
 
 

@@ -7,8 +7,9 @@ import pytest
 from scipy.integrate import quad, solve_ivp
 
 from modelica_like import linearize, sensitivities, simulate
-from modelica_like.language import guess
+from modelica_like.language import Component, Equations, Parameter, Variable, der, guess, param, var
 from modelica_like.netlist.registry import find_type
+from modelica_like.report.run import statistics_line
 
 PARTS = Path(__file__).parents[2] / "examples" / "elements"
 L, G = 1.5, 9.81
@@ -58,11 +59,15 @@ def test_the_pendulum_does_not_drift_in_a_hundred_seconds(solver):
 
 
 def test_it_starts_where_each_coordinate_alone_would_be_singular():
-    """Horizontal with y given, hanging with x given."""
+    """Horizontal with y given; hanging with x given, as in the other tests."""
     horizontal = simulate(pendulum(0.0, x=guess(L), y=0.0, vx=guess(0.0), vy=0.0), 1.0, rtol=1e-10, atol=1e-12)
     speed = np.hypot(horizontal["vx"], horizontal["vy"])
     assert speed == pytest.approx(np.sqrt(np.maximum(-2 * G * horizontal["y"], 0)), abs=1e-7)
-    assert simulate(pendulum(), 0.01).segments[0].start.t == 0.0
+    # It stores nothing in all; its energies are judged by their sizes.
+    energy = horizontal.energy()
+    assert energy.throughput > 0.1 * 2.0 * G * L
+    assert energy.closure < 1e-9
+    assert energy.drift < 1e-6
 
 
 def test_each_choice_is_told_with_its_reason():
@@ -70,6 +75,29 @@ def test_each_choice_is_told_with_its_reason():
     assert {event.mode for event in run.events} == {"state[1].choice"}
     because = run.model.transitions[run.events[0].transition].because
     assert because == "the states of x and y would become singular"
+    assert f"{len(run.events)} mode changes ({len(run.events)} of them choices of states)" in statistics_line(run)
+
+
+def test_a_pendulum_in_modelica_text_turns_over(tmp_path):
+    """The start value of y is not fixed: it is a guess."""
+    (tmp_path / "pendulum.mo").write_text("""
+model Pendulum
+  parameter Real L = 1.5;
+  Real x(start = 0, fixed = true);
+  Real y(start = -1.5);
+  Real vx(start = 9.5, fixed = true);
+  Real vy;
+  Real pull;
+equation
+  der(x) = vx;
+  der(y) = vy;
+  der(vx) = -pull*x;
+  der(vy) = -pull*y - 9.81;
+  x^2 + y^2 = L^2;
+end Pendulum;
+""")
+    run = simulate(tmp_path / "pendulum.mo", 2.0, rtol=1e-11, atol=1e-12)
+    assert run["x"] == pytest.approx(L * np.sin(swing(9.5, 2.0)(run.time)[0]), abs=1e-8)
 
 
 def test_no_variable_jumps_at_a_choice():
@@ -106,6 +134,54 @@ def test_it_finds_its_rest(near):
     assert len(rest.events) == (near[0] > 1)
     assert rest["x"] == pytest.approx(0.0, abs=1e-9)
     assert rest["y"] == pytest.approx(-L, rel=1e-12)
+
+
+class DoublePendulum(Component):
+    """Two equal masses on two equal rods: two constraints that share variables, four states."""
+
+    m: Parameter = param("kg", "masses", default=1)
+    g: Parameter = param("m/s2", "gravity", default=G)
+    L: Parameter = param("m", "lengths of the rods", default=1)
+    x: Variable = var("m", "first mass")
+    y: Variable = var("m", "first mass")
+    vx: Variable = var("m/s", "first mass")
+    vy: Variable = var("m/s", "first mass")
+    pull: Variable = var("N/m", "force of the first rod over its length")
+    u: Variable = var("m", "second mass")
+    v: Variable = var("m", "second mass")
+    vu: Variable = var("m/s", "second mass")
+    vv: Variable = var("m/s", "second mass")
+    hold: Variable = var("N/m", "force of the second rod over its length")
+
+    def equations(self) -> Equations:
+        x, y, u, v = self.x, self.y, self.u, self.v
+        for place, speed in ((x, self.vx), (y, self.vy), (u, self.vu), (v, self.vv)):
+            yield der(place) == speed
+        yield self.m * der(self.vx) == self.hold * (u - x) - self.pull * x
+        yield self.m * der(self.vy) == self.hold * (v - y) - self.pull * y - self.m * self.g
+        yield self.m * der(self.vu) == -self.hold * (u - x)
+        yield self.m * der(self.vv) == -self.hold * (v - y) - self.m * self.g
+        yield x**2 + y**2 == self.L**2
+        yield (u - x) ** 2 + (v - y) ** 2 == self.L**2
+
+
+def test_a_double_pendulum_falls_as_its_angles_say():
+    def rates(_, state):
+        a, b, p, q = state
+        mass = [[2, np.cos(a - b)], [np.cos(a - b), 1]]
+        force = [-np.sin(a - b) * q**2 - 2 * G * np.sin(a), np.sin(a - b) * p**2 - G * np.sin(b)]
+        return [p, q, *np.linalg.solve(mass, force)]
+
+    drive = DoublePendulum(x=guess(1), y=0, vx=guess(0), vy=0, u=guess(2), v=0, vu=guess(0), vv=0)
+    run = simulate(drive, 2.0, rtol=1e-11, atol=1e-13)
+    expected = solve_ivp(
+        rates, (0, 2), [np.pi / 2, np.pi / 2, 0, 0], "DOP853", rtol=1e-13, atol=1e-13, dense_output=True
+    )
+    a, b, *_ = expected.sol(run.time)
+    assert len(run.events) >= 4
+    assert run["x"] == pytest.approx(np.sin(a), abs=1e-8)
+    assert run["u"] == pytest.approx(np.sin(a) + np.sin(b), abs=1e-8)
+    assert np.max(np.abs((run["u"] - run["x"]) ** 2 + (run["v"] - run["y"]) ** 2 - 1)) < 1e-10
 
 
 def engine():
