@@ -21,6 +21,7 @@ from modelica_like.structure.holds import (
     held_rates,
     share_reactions,
 )
+from modelica_like.structure.ideal import IdealNetwork, complete, find_ideals
 from modelica_like.structure.index import Pantelides, prefer_relative_states
 from modelica_like.structure.motion import Motion
 from modelica_like.structure.prescribed import Flags
@@ -52,6 +53,7 @@ class ReducedDae:
         holds: motions that modes hold.
         circuits: held motions that depend on each other.
         choices: of states that follow the motion.
+        ideal: the ideal elements, if there are any.
     """
 
     flat: FlatModel
@@ -78,6 +80,7 @@ class ReducedDae:
     holds: tuple[HeldMotion, ...] = ()
     circuits: tuple[Circuit, ...] = ()
     choices: tuple[Choice, ...] = ()
+    ideal: IdealNetwork | None = None
 
     def rate(self, variable: int) -> Any:
         """Return the time derivative of a flat variable, in x, z, inputs, p, d and t."""
@@ -137,18 +140,21 @@ def reduce(flat: FlatModel) -> ReducedDae:
         residual, origins = _differentiate(system, counts)
     derivatives = {system.derivative(state) for state in states}
     rates = [k for k, unknown in enumerate(unknowns) if unknown in derivatives]
-    solved = BlockSolver(residual, system.column(unknowns), _volatile(system), rates).run()
+    ideals = find_ideals(flat)
+    kept = [one.row for one in ideals]
+    solved = BlockSolver(residual, system.column(unknowns), _volatile(system), rates, kept).run()
     order = [(system.symbols[unknowns[k]], expression) for k, expression in solved.order]
     circuits = find_circuits(system, holds, order, states)
     if circuits:
         residual = share_reactions(system, holds, circuits, residual)
-        solved = BlockSolver(residual, system.column(unknowns), _volatile(system), rates).run()
+        solved = BlockSolver(residual, system.column(unknowns), _volatile(system), rates, kept).run()
     own = len(counts) - sum(len(one.chains) for one in chosen.following)
     reduced = _assemble(system, counts[:own], states, unknowns, origins, solved)
     held = tuple(replace(one, state=reduced.node_states[one.motion]) for one in holds)
     ode = held_rates(reduced.flat, reduced.ode, reduced.values, held, circuits)
     choices = tuple(write_choice(one, system, states, reduced.level_values) for one in chosen.following)
-    return replace(reduced, ode=ode, holds=held, circuits=tuple(circuits), choices=choices)
+    reduced = replace(reduced, ode=ode, holds=held, circuits=tuple(circuits), choices=choices)
+    return complete(reduced, ideals, solved.rows) if ideals else reduced
 
 
 @dataclass

@@ -205,6 +205,19 @@ def linkages(run: Solution) -> None:
 
 
 @numbers
+def press(run: Solution) -> None:
+    # A trapezoid of 20 kN, 20 mm wide below and 12 mm above, and the velocity of the slide over the speed of the crank.
+    phi = run.final["flywheel.phi"]
+    rod = sqrt(0.3**2 - (0.06 * sin(phi)) ** 2)
+    slope = -0.06 * sin(phi) * (1 + 0.06 * cos(phi) / rod)
+    assert 0.355 < run.final["slide.s"] == close(0.06 * cos(phi) + rod)
+    left = 0.5 * 20 * 12**2 - 20e3 * 0.5 * (20e-3 + 12e-3)
+    assert run.final["flywheel.w"] == close(sqrt(2 * left / (20 + 80 * slope**2)))
+    drag = 8 * pi * 0.04 * (0.09**4 - 0.06**4) / (2 * 0.2e-3)
+    assert run.final["wheel.w"] == close(50 * exp(-drag / 0.4 * 0.25))
+
+
+@numbers
 def variable_drives(run: Solution) -> None:
     ratio = 1 + exp(-0.4 / 0.2)
     at, slower = run.at(0.5), -(1 - ratio) / 0.2
@@ -217,6 +230,15 @@ def variable_drives(run: Solution) -> None:
         teeth = round(angle * z / (2 * pi))
         ways.append(0.0127 * (teeth + sin(angle - 2 * pi / z * teeth) / (2 * sin(pi / z))))
     assert run.at(0.33)["chain.f"] == close(100e3 * (ways[0] - ways[1]))
+
+
+@numbers
+def converters(run: Solution) -> None:
+    speed, rate = 12 / 0.05, 0.05**2 / (0.6 * 1e-4)
+    assert run.at(0.03)["rotor.w"] == close(speed * (1 - exp(-0.03 * rate)))
+    assert run.at(0.03)["armature.i"] == close(12 / 0.6 * exp(-0.03 * rate))
+    assert run.final["slide.s"] == close(10 * 2 / 200 * (1 - cos(20 * 0.1)))
+    assert run.final["coil.v"] == close(10 * 10 * 2 / 200 * 20 * sin(20 * 0.1))
 
 
 @numbers

@@ -1,6 +1,4 @@
 /* Events at one instant: which transitions want to fire, and firing them until nothing does. */
-#include <math.h>
-#include <string.h>
 #include "core.h"
 
 #define ROUNDS 20
@@ -45,13 +43,12 @@ double next_moment(Instance *c) {
 /* Adds time events that are due and, unless they were found already, state events that are positive or about to be. */
 int find_wanting(Instance *c, unsigned char *wanting, int guards_too) {
     const Model *m = c->model;
-    State *s = &c->state;
     double *values = c->work.guards;
     int any = 0;
     if (m->n_moments > 0) {
         evaluate_now(c, &m->tapes.moments, values);
         for (int k = 0; k < m->n_transitions; k++)
-            if (m->transitions[k].timed && values[m->transitions[k].index] <= just_after(s)) wanting[k] = 1;
+            if (m->transitions[k].timed && values[m->transitions[k].index] <= just_after(&c->state)) wanting[k] = 1;
     }
     if (m->n_guards > 0 && guards_too) {
         evaluate_now(c, &m->tapes.guards_soon, values);
@@ -171,13 +168,21 @@ static Result update_once(Instance *c, Impacts *impacts, int *changes) {
     return check_singular(c);
 }
 
-/* Notes an instant; an error where the last ones came ever faster. */
+/* Notes an instant. Where the last ones came ever faster, impacts end in contact if the model asks for it; an error
+   otherwise, and if that does not help. */
 static Result crowded(Instance *c) {
     State *s = &c->state;
     double span = s->stop_time_defined ? s->stop_time - s->start_time : 1;
     double first = s->instants[s->n_instants % CROWD]; /* CROWD instants ago, once there were so many */
+    double last = s->n_instants > 0 ? s->instants[(s->n_instants - 1) % CROWD] : s->t;
+    if (s->t - last >= CROWDED * span) s->resting = 0;
     s->instants[s->n_instants % CROWD] = s->t;
     if (++s->n_instants <= CROWD || s->t - first >= CROWDED * span) return RESULT_OK;
+    if (c->model->settings->rests && !s->resting) {
+        s->resting = 1;
+        s->n_instants = 0;
+        return RESULT_OK;
+    }
     return fail(
         c, "Events follow each other ever faster at t = %.12g s. Give the switching a hysteresis, or smooth it.", s->t);
 }
@@ -206,14 +211,19 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
     State *s = &c->state;
     Impacts *impacts = &c->work.impacts;
     double *before = c->work.d_before;
-    int changes = m->n_updates > 0;
+    int changes = m->n_updates > 0, met;
     impacts->struck = 0;
     memset(impacts->entered, 0, (size_t)m->n_holds);
     if (find_wanting(c, wanting, !located)) {
+        if (m->n_ideals > 0 && !pushed(c) && meet(c, &met) != RESULT_OK) return RESULT_ERROR;
         if (crowded(c) != RESULT_OK || share_anew(c, wanting) != RESULT_OK) return RESULT_ERROR;
     }
-    for (int round = 0; round < ROUNDS + ALONE * m->n_holds; round++) {
+    for (int round = 0; round < ROUNDS + ALONE * (m->n_holds + m->n_ideals); round++) {
         int any = 0;
+        if (!changes && (round > 0 || pushed(c)) && !any_of(wanting, m->n_transitions)) {
+            if (meet(c, &met) != RESULT_OK) return RESULT_ERROR;
+            if (met) find_wanting(c, wanting, 1);
+        }
         for (int k = 0; k < m->n_transitions; k++) {
             if (any && round >= TOGETHER) wanting[k] = 0;
             any |= wanting[k];
@@ -242,7 +252,7 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
     if (changes) return fail(c, "Discrete variables do not settle at t = %.12g s.", s->t);
     return fail(c,
         "Modes still switch after %d rounds at t = %.12g s. Give the switching a hysteresis, or smooth what drives it.",
-        ROUNDS + ALONE * m->n_holds, s->t);
+        ROUNDS + ALONE * (m->n_holds + m->n_ideals), s->t);
 }
 
 /* One event iteration for an importer's event mode. Where anything fired or was set, its solver must begin anew even if

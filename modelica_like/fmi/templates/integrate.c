@@ -1,8 +1,6 @@
 /* Co-Simulation: steps that run as far as accuracy allows, events located inside them, results interpolated. A step
  * does not end where a communication step ends: the importer's points are read from the dense output. Only where inputs
  * move does a step end there, so that their jumps fall between steps. */
-#include <math.h>
-#include <string.h>
 #include "core.h"
 
 #define MAX_REJECTIONS 60
