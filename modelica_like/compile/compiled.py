@@ -253,6 +253,13 @@ class CompiledDae:
             )
 
     @cached_property
+    def following(self) -> dict[str, tuple[str, ...]]:
+        """Variables of every state that follows the motion, by its name."""
+        weights = [one.path for one in self.flat_discretes if one.hidden and not one.names]
+        names = [name for name in self.states if not name.startswith("der(") and name not in self.position]
+        return {name: tuple(w[len(name) + 1 :] for w in weights if w.startswith(f"{name}.")) for name in names}
+
+    @cached_property
     def rising(self) -> tuple[tuple[int, int], ...]:
         """Positions of pairs of parameters of which the second must exceed the first: columns of tables that rise."""
         return tuple((k - one.above, k) for k, one in enumerate(self.flat_parameters) if one.above)

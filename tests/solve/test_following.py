@@ -6,8 +6,11 @@ import numpy as np
 import pytest
 from scipy.integrate import quad, solve_ivp
 
-from modelica_like import linearize, sensitivities, simulate
-from modelica_like.language import Component, Equations, Parameter, Variable, der, guess, param, var
+from components import Brake, ConstantTorque, IdealGear, Inertia, Step
+from components.linkages import TwoFlanges
+from modelica_like import Assembly, linearize, sensitivities, simulate
+from modelica_like.language import Component, Equations, Parameter, Variable, cos, der, guess, param, sin, var
+from modelica_like.language.expr import TIME
 from modelica_like.netlist.registry import find_type
 from modelica_like.report.run import statistics_line
 
@@ -182,6 +185,113 @@ def test_a_double_pendulum_falls_as_its_angles_say():
     assert run["x"] == pytest.approx(np.sin(a), abs=1e-8)
     assert run["u"] == pytest.approx(np.sin(a) + np.sin(b), abs=1e-8)
     assert np.max(np.abs((run["u"] - run["x"]) ** 2 + (run["v"] - run["y"]) ** 2 - 1)) < 1e-10
+
+
+class Swung(Component):
+    """A pendulum whose pivot moves to and fro: the constraint depends on time."""
+
+    m: Parameter = param("kg", "mass", default=1)
+    g: Parameter = param("m/s2", "gravity", default=G)
+    L: Parameter = param("m", "length", default=L)
+    A: Parameter = param("m", "amplitude of the pivot", default=0.3)
+    W: Parameter = param("rad/s", "frequency of the pivot", default=7)
+    x: Variable = var("m", "to the right")
+    y: Variable = var("m", "upwards")
+    vx: Variable = var("m/s", "to the right")
+    vy: Variable = var("m/s", "upwards")
+    pull: Variable = var("N/m", "force of the rod over its length")
+
+    def equations(self) -> Equations:
+        across = self.x - self.A * sin(self.W * TIME)
+        yield der(self.x) == self.vx
+        yield der(self.y) == self.vy
+        yield self.m * der(self.vx) == -self.pull * across
+        yield self.m * der(self.vy) == -self.pull * self.y - self.m * self.g
+        yield across**2 + self.y**2 == self.L**2
+
+
+def test_the_pivot_may_move():
+    run = simulate(Swung(x=0, y=guess(-L), vx=9.0), 3.0, rtol=1e-12, atol=1e-13)
+
+    def rates(t, state):
+        pivot = 0.3 * 7**2 * np.sin(7 * t)
+        return [state[1], (pivot * np.cos(state[0]) - G * np.sin(state[0])) / L]
+
+    expected = solve_ivp(rates, (0, 3), [0, (9 - 0.3 * 7) / L], "DOP853", rtol=1e-13, atol=1e-13, dense_output=True)
+    assert len(run.events) >= 4
+    found = L * np.sin(expected.sol(run.time)[0]) + 0.3 * np.sin(7 * run.time)
+    assert run["x"] == pytest.approx(found, abs=1e-8)
+
+
+class Skate(Component):
+    """A skate that turns evenly on a slope: its constraint is between speeds. S. A. Chaplygin."""
+
+    m: Parameter = param("kg", "mass", default=1)
+    g: Parameter = param("m/s2", "gravity along the slope", default=G)
+    w: Parameter = param("rad/s", "speed of turning", default=2)
+    x: Variable = var("m", "downwards")
+    y: Variable = var("m", "across")
+    vx: Variable = var("m/s", "downwards")
+    vy: Variable = var("m/s", "across")
+    side: Variable = var("N", "force across the blade")
+
+    def equations(self) -> Equations:
+        angle = self.w * TIME
+        yield der(self.x) == self.vx
+        yield der(self.y) == self.vy
+        yield self.m * der(self.vx) == self.side * sin(angle) + self.m * self.g
+        yield self.m * der(self.vy) == -self.side * cos(angle)
+        yield self.vx * sin(angle) == self.vy * cos(angle)
+
+
+def test_a_constraint_may_be_between_speeds():
+    run = simulate(Skate(x=0, y=0, vx=0), 5.0, rtol=1e-10, atol=1e-12)
+    assert run.model.states == ("x", "y", "state[1]")
+    w, angle = 2.0, 2.0 * run.time
+    assert len(run.events) >= 4
+    assert run["x"] == pytest.approx(G / (2 * w**2) * np.sin(angle) ** 2, abs=1e-7)
+    assert run["y"] == pytest.approx(G / (2 * w**2) * (angle - np.sin(angle) * np.cos(angle)), abs=1e-7)
+
+
+class Loop(TwoFlanges):
+    """A four-bar linkage without masses between two shafts; a linkage of the library has a closed form instead."""
+
+    beta: Variable = var("rad", "angle of the coupler")
+    fx: Variable = var("N", "force of the coupler")
+    fy: Variable = var("N", "force of the coupler")
+    crank: Parameter = param("m", "length", default=0.1)
+    coupler: Parameter = param("m", "length", default=0.25)
+    rocker: Parameter = param("m", "length", default=0.2)
+    ground: Parameter = param("m", "length", default=0.28)
+
+    def equations(self) -> Equations:
+        a, b = self.flange_a, self.flange_b
+        yield self.crank * cos(a.phi) + self.coupler * cos(self.beta) == self.ground + self.rocker * cos(b.phi)
+        yield self.crank * sin(a.phi) + self.coupler * sin(self.beta) == self.rocker * sin(b.phi)
+        yield self.fy * cos(self.beta) == self.fx * sin(self.beta)
+        yield a.tau + self.crank * (self.fy * cos(a.phi) - self.fx * sin(a.phi)) == 0
+        yield b.tau == self.rocker * (self.fy * cos(b.phi) - self.fx * sin(b.phi))
+
+
+@pytest.mark.parametrize("solver", ["idas", "native"])
+@pytest.mark.parametrize("order", [("brake", "loop", "rocker"), ("loop", "rocker", "brake")])
+def test_a_brake_holds_a_linkage_in_a_drive(solver, order):
+    """Behind a gear; the brake's speed is no state, and it stays stuck all the same."""
+    parts = {
+        "motor": ConstantTorque(tau_constant=0.05), "rotor": Inertia(J=1e-3, phi=0.0, w=100.0),
+        "loop": Loop(beta=guess(1.0)), "rocker": Inertia(J=0.02, phi=guess(1.5)), "brake": Brake(fn_max=50.0),
+        "step": Step(height=1.0, start_time=0.5), "gear": IdealGear(ratio=5),
+    }  # fmt: skip
+    series = {"shaft": ["motor", "rotor", "gear", *order]}
+    drive = Assembly("drive", parts=parts, series=series, connect={"acts": ["step.y", "brake.f_normalized"]})
+    run = simulate(drive, 2.0, solver=solver, rtol=1e-9)
+    assert "loop.state[1]" in run.model.states
+    assert run.events[-1].after == "stuck"
+    held = run.time > run.events[-1].time + 1e-9
+    assert np.ptp(run["rotor.phi"][held]) < 1e-12
+    closes = 0.1 * np.exp(1j * run["gear.flange_b.phi"]) + 0.25 * np.exp(1j * run["loop.beta"])
+    assert closes == pytest.approx(0.28 + 0.2 * np.exp(1j * run["rocker.phi"]), abs=1e-10)
+    assert run.energy().closure < 1e-9 * run.energy().throughput
 
 
 def engine():
