@@ -14,8 +14,8 @@ from modelica_like.initialize.slopes import variable_slopes
 from modelica_like.structure.ideal import HEAD, IdealElement, IdealNetwork
 
 _DEPENDENT = 1e-9
-_SLOW = 1e-6
-"""Rate in 1/s, over the equation itself, below which its derivative says nothing about an unknown."""
+_SLOW = 1e3
+"""Rate in 1/s, over the equation itself, of which a part of `_DEPENDENT` is rounding of faster ones."""
 _IMPULSE = 1e12
 """Impulse over what contradicts its being zero: larger than all finite terms."""
 _MET, _LOST, _GIVEN_BACK = 1e-9, 1e-6, 1e-3

@@ -5,7 +5,7 @@
 
 #define HEAD 3
 #define DEPENDENT_ROW 1e-9
-#define SLOW 1e-6
+#define SLOW 1e3
 #define IMPULSE 1e12
 #define MET 1e-9
 #define LOST 1e-6
