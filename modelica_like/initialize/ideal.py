@@ -14,12 +14,12 @@ from modelica_like.initialize.slopes import variable_slopes
 from modelica_like.structure.ideal import HEAD, IdealElement, IdealNetwork
 
 _DEPENDENT = 1e-9
-_SLOW = 1e-6
-"""Rate in 1/s, over the equation itself, below which its derivative says nothing about an unknown."""
+_SLOW = 1e3
+"""Rate in 1/s, over the equation itself, of which a part of `_DEPENDENT` is rounding of faster ones."""
 _IMPULSE = 1e12
 """Impulse over what contradicts its being zero: larger than all finite terms."""
-_MET, _LOST, _GIVEN_BACK = 1e-9, 1e-6, 1e-3
-"""Current or voltage, over the largest one: rounding, what an event may remove, and what nothing takes over."""
+_MET, _LOST = 1e-9, 1e-6
+"""Current or voltage, over the largest one, that is rounding, and that an event may remove."""
 
 
 def replace_dependent(model: CompiledDae, point: Point) -> None:
@@ -125,13 +125,14 @@ def _largest(model: CompiledDae, sizes: Vector, node: int) -> float:
     return max(own.nominal, *(float(sizes[k]) for k, one in enumerate(model.flat_variables) if one.unit == own.unit))
 
 
-def meet(model: CompiledDae, point: Point, *, given_back: bool = False) -> bool:
+def meet(model: CompiledDae, point: Point, *, keep: float | None = None) -> bool:
     """Move the states so that they meet the conditions of the modes exactly, and end impulses.
 
     Args:
         model: the compiled model.
         point: with the present modes.
-        given_back: modes have changed and returned, because a current ends within the time resolution: it is none.
+        keep: currents and voltages that are missed by more, over the largest one, keep their impulses; without it they
+            are an error.
 
     Returns:
         Whether there are such conditions.
@@ -147,13 +148,13 @@ def meet(model: CompiledDae, point: Point, *, given_back: bool = False) -> bool:
     if not moved:
         return False
     values, nodes = call(model, model.variables, point), list[int]()
-    limit = _GIVEN_BACK if given_back else _LOST
+    limit = _LOST if keep is None else keep
     for k in moved:
         node = _zero(network.elements[k], point.d)
         if not rows[k, 1] or abs(values[node]) <= limit * _largest(model, np.abs(values), node):
             rows[k, 1] = 0.0
             nodes.append(node)
-        elif not given_back:
+        elif keep is None:
             raise _no_valid(model, point, network, rows[k], float(values[node]), node)
     point.d[network.entries] = rows.ravel()
     slopes = variable_slopes(model, point, nodes)

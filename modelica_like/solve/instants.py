@@ -46,6 +46,8 @@ _CANNOT = {
     ),
     "rest": " Nothing comes to rest: that takes impacts of a mode that holds a motion, with a restitution.",
 }
+_GIVEN_BACK = 1e-3
+"""Current, over the largest one, that is none where modes return: it ends within the time resolution."""
 SAME_TIME = 1e-12
 """Relative distance of two equal times."""
 
@@ -137,9 +139,10 @@ class Instants:
                 self._fire(now, wanting if number < _TOGETHER else [min(wanting, key=self._number)])
                 self._solve(now)
                 self._stop_motions(now, before)
-                if ideal and number and np.array_equal(now.d[ideal], earlier[ideal]):
-                    meet(self.model, now, given_back=True)
-                earlier = before
+                if ideal:
+                    back = number and np.array_equal(now.d[ideal], earlier[ideal])
+                    meet(self.model, now, keep=_GIVEN_BACK if back else 0.0)
+                    earlier = before
             changes = self._update(now)
             wanting = [*self.due(now), *self.guards.wanting(now)]
         else:

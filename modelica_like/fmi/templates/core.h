@@ -220,7 +220,8 @@ void rest_rates(Instance *c, double *rates);
 /* ideal.c */
 void replace_dependent(Instance *c);
 int pushed(Instance *c);
-Result meet(Instance *c, int given_back, int *any);
+#define GIVEN_BACK 1e-3 /* of the largest current: none where modes return, as it ends within the time resolution */
+Result meet(Instance *c, double keep, int *any);
 Result renew(Instance *c);
 int same_modes(const Instance *c, const double *before);
 /* impacts.c */

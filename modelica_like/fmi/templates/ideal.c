@@ -5,11 +5,10 @@
 
 #define HEAD 3
 #define DEPENDENT_ROW 1e-9
-#define SLOW 1e-6
+#define SLOW 1e3
 #define IMPULSE 1e12
 #define MET 1e-9
 #define LOST 1e-6
-#define GIVEN_BACK 1e-3
 
 /* Whether it is replaced, an impulse, whether by the norm or a derivative, the combination of equations. */
 static double *row_of(Instance *c, int element) {
@@ -139,12 +138,12 @@ int pushed(Instance *c) {
     return any;
 }
 
-/* Move the states so that they meet the conditions of the modes, and end impulses; an error where they cannot. Where
- * what took over a current has given it back, only small ones are none. */
-Result meet(Instance *c, int given_back, int *any) {
+/* Move the states so that they meet the conditions of the modes, and end impulses. What is missed by more than `keep`
+ * keeps its impulse; if that is negative, it is an error. */
+Result meet(Instance *c, double keep, int *any) {
     const Model *m = c->model;
     const double *values = variables_now(c);
-    double limit = given_back ? GIVEN_BACK : LOST;
+    double limit = keep < 0 ? LOST : keep;
     int *nodes = c->work.places;
     *any = 0;
     for (int k = 0; k < m->n_ideals; k++) {
@@ -152,7 +151,7 @@ Result meet(Instance *c, int given_back, int *any) {
         if (!moved(c, k)) continue;
         met = row_of(c, k)[1] == 0 ||
               fabs(values[node]) <= limit * fmax(m->ideals[k].nominal, largest_like(m, values, node));
-        if (!met && !given_back)
+        if (!met && keep < 0)
             return fail(c,
                 "At t = %.9g s no combination of modes is valid: %s would take %.4g at once. Give the current another "
                 "path (a freewheeling diode), or put a resistance in series with a capacitor.",
@@ -172,7 +171,7 @@ Result renew(Instance *c) {
     int any;
     if (c->model->n_ideals == 0) return RESULT_OK;
     replace_dependent(c);
-    return meet(c, 1, &any);
+    return meet(c, GIVEN_BACK, &any);
 }
 
 /* Whether ideal elements have the modes that they had before. */
