@@ -20,9 +20,10 @@ _NAMES = {
     "commutated_machines": "CommutatedDCMachine",
     "contacts": "DogClutch RigidBacklash",
     "control": "PI PID ClutchActuator Feedback FirstOrder Gain Integrator Limiter P Sum",
+    "converters": "RotationalEMF TranslationalEMF",
     "couplings": "ArcSpring DualMassFlywheel ElasticCoupling HystereticCoupling OldhamCoupling RuptureCoupling",
     "dc_machines": "PermanentMagnetDCMachine SeparatelyExcitedDCMachine SeriesDCMachine ShuntDCMachine",
-    "drag_losses": "ChurningGear DeepGrooveBearing",
+    "drag_losses": "ChurningGear DeepGrooveBearing OpenPlates",
     "drivers": "Driver",
     "eddy_current_brakes": "EddyCurrentForce EddyCurrentTorque",
     "electrical": (
@@ -76,7 +77,7 @@ _NAMES = {
         "TranslationalSpringDamper"
     ),
     "stepped_signals": "BooleanPulse BooleanStep BooleanTable StepTable",
-    "switching": "Contactor Diode",
+    "switching": "Contactor Diode IdealDiode IdealSwitch IdealThyristor",
     "synchronisers": "Synchroniser",
     "synchronous_machines": "MappedDrive PMSynchronousDrive PMSynchronousMachine",
     "thermal": (

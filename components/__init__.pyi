@@ -42,6 +42,7 @@ from components.dc_machines import SeriesDCMachine as SeriesDCMachine
 from components.dc_machines import ShuntDCMachine as ShuntDCMachine
 from components.drag_losses import ChurningGear as ChurningGear
 from components.drag_losses import DeepGrooveBearing as DeepGrooveBearing
+from components.drag_losses import OpenPlates as OpenPlates
 from components.drivers import Driver as Driver
 from components.eddy_current_brakes import EddyCurrentForce as EddyCurrentForce
 from components.eddy_current_brakes import EddyCurrentTorque as EddyCurrentTorque
@@ -189,6 +190,9 @@ from components.stepped_signals import BooleanTable as BooleanTable
 from components.stepped_signals import StepTable as StepTable
 from components.switching import Contactor as Contactor
 from components.switching import Diode as Diode
+from components.switching import IdealDiode as IdealDiode
+from components.switching import IdealSwitch as IdealSwitch
+from components.switching import IdealThyristor as IdealThyristor
 from components.synchronisers import Synchroniser as Synchroniser
 from components.synchronous_machines import MappedDrive as MappedDrive
 from components.synchronous_machines import PMSynchronousDrive as PMSynchronousDrive

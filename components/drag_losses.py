@@ -1,4 +1,4 @@
-"""Losses of rolling bearings and of gears in oil."""
+"""Losses of rolling bearings, and drag of gears and plates in oil."""
 
 from __future__ import annotations
 
@@ -7,17 +7,19 @@ from math import pi
 from components import icons
 from components.feasible import Feasible
 from components.friction import ShaftFriction
-from components.interfaces import ShaftInHousing
+from components.interfaces import CompliantWithRelativeStates, ShaftInHousing
 from components.thermal import Lossy
 from modelica_like.language import (
     Equations,
     Expr,
+    Input,
     Parameter,
     Variable,
     absolute,
     exp,
     maximum,
     param,
+    signal_in,
     sin,
     sqrt,
     var,
@@ -105,7 +107,7 @@ class DeepGrooveBearing(Feasible, ShaftFriction, ShaftInHousing):
 
 
 class ChurningGear(Lossy, ShaftInHousing):
-    """Gear that dips into oil: torque rho·w²·R³·S/2 times C_0·Fr^-p_Fr·Re^-p_Re, against the rotation.
+    """Drag of a gear that dips into oil: torque rho·w²·R³·S/2 times C_0·Fr^-p_Fr·Re^-p_Re, against the rotation.
 
     S is the wetted surface R²·(2·theta - sin(2·theta)) + 2·R·b·theta of a disc that dips to the depth h, with
     cos(theta) = 1 - h/R, the Froude number is w²·R/g, the Reynolds number w·R·b/nu (R. J. Boness: Churning losses of
@@ -135,3 +137,33 @@ class ChurningGear(Lossy, ShaftInHousing):
 
     def dissipation(self) -> Expr:
         return self.tau * self.w
+
+
+class OpenPlates(Feasible, Lossy, CompliantWithRelativeStates):
+    """Drag of an open wet clutch or brake: oil is sheared in n gaps, beside the `Clutch` that closes them.
+
+    The torque is n·pi·eta·(r_o^4 - r_i^4)/(2·h)·fill times the slip, for laminar flow; oil that is thrown out at speed
+    counts as a fill below 1.
+    """
+
+    icon = icons.OPEN_PLATES
+    fill: Input = signal_in("1", "part of the gaps that is full of oil, 0 to 1", default=1.0)
+    n: Parameter = param("1", "number of gaps", default=1.0, min=0)
+    r_o: Parameter = param("m", "outer radius of the plates", min=1e-12)
+    r_i: Parameter = param("m", "inner radius of the plates", default=0.0, min=0)
+    h: Parameter = param("m", "width of a gap", min=1e-12)
+    eta: Parameter = param("Pa.s", "dynamic viscosity of the oil at its temperature", min=0)
+    # No torque depends on the angle of open plates.
+    phi_rel: Variable = var("rad", "relative angle, flange_b.phi - flange_a.phi", state="prefer", default=0)
+    misfit = "has no plates: their inner radius r_i is not below their outer radius r_o"
+
+    def fits(self) -> Expr:
+        return self.r_i < self.r_o
+
+    def equations(self) -> Equations:
+        yield from super().equations()
+        drag = self.n * pi * self.eta * (self.r_o**4 - self.r_i**4) / (2 * self.h)
+        yield self.tau == drag * self.fill * self.w_rel
+
+    def dissipation(self) -> Expr:
+        return self.tau * self.w_rel

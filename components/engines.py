@@ -114,7 +114,6 @@ class CombustionEngine(MappedEngine):
 
     def events(self) -> Events:
         fuel, w = self.fuel, self.w
-        yield fuel.initially("out", when=w < self.w_stall)
         yield fuel.go("given", "cut", when=w > self.w_max, because="the rev limit is reached")
         yield fuel.go("cut", "given", when=w < self.w_max - self.w_band, because="the speed is below the rev limit")
         yield fuel.go(("given", "cut"), "out", when=w < self.w_stall, notice="stalls")

@@ -51,7 +51,8 @@ class AngleToWay(Feasible, Supported, partial=True):
 class SliderCrank(AngleToWay):
     """Slider-crank: s = r·cos(phi) + sqrt(l² - (r·sin(phi) - e)²), the far dead centre at phi = 0 without offset.
 
-    Masses of crank, rod and slide stand beside it; the rod's may be split between both ends. VDI 2156.
+    It drives presses, pistons and pumps. Masses of crank, rod and slide stand beside it; the rod's may be split between
+    both ends. VDI 2156.
     """
 
     icon = icons.SLIDER_CRANK

@@ -46,6 +46,7 @@ class MeshWithFriction(ShaftSticking, TwoFlanges, partial=True):
 
     icon = icons.GEAR
     ratio: Parameter = param("1", "transmission ratio, speed of flange_a over speed of flange_b")
+    faint: Parameter = param("N.m", "torque at flange_a beyond what holds that counts as rounding", default=1e-9, min=0)
     mode = Mode(
         "free", "stuck", "start_forward", "start_backward", "forward", "backward",
         description="friction mode", holds=HOLDS,
@@ -85,10 +86,10 @@ class MeshWithFriction(ShaftSticking, TwoFlanges, partial=True):
         return (1 / eta_a - 1) * passed + direction * bearing_a, (eta_b - 1) * passed + direction * bearing_b
 
     def holds_forward(self) -> Expr:
-        return self.forward_loss(0)
+        return self.forward_loss(0) + self.faint
 
     def holds_backward(self) -> Expr:
-        return self.backward_loss(0)
+        return self.backward_loss(0) - self.faint
 
     def equations(self) -> Equations:
         yield from super().equations()

@@ -19,6 +19,7 @@ from modelica_like.language import (
     der,
     floor,
     maximum,
+    minimum,
     param,
     signal_in,
     signal_out,
@@ -30,17 +31,26 @@ from modelica_like.language import (
 
 
 class VariableGear(Lossy, TwoFlanges):
-    """Continuously variable transmission: its ratio follows a signal with a lag, and it loses a share of the torque.
+    """Continuously variable transmission (CVT): its ratio follows a signal with a lag; it loses a share of the torque.
 
-    It does not slip; without loss ratio·tau_a + tau_b = 0. Of what enters on the driving side efficiency arrives.
+    Without loss ratio·tau_a + tau_b = 0; of what enters on the driving side efficiency arrives. It does not slip: for
+    a chain or belt that does, put a `Clutch` of the torque that the clamping transmits in series.
     """
 
     icon = icons.VARIABLE_GEAR
-    u: Input = signal_in("1", "wanted ratio, speed of flange_a over speed of flange_b; above zero")
+    u: Input = signal_in("1", "wanted ratio, speed of flange_a over speed of flange_b")
     T: Parameter = param("s", "time constant of the adjustment", min=1e-6)
     efficiency: Parameter = param("1", "power out over power in", default=1.0, min=1e-3, max=1)
+    ratio_min: Parameter = param("1", "smallest ratio that it is set to", default=1e-3, min=1e-6)
+    ratio_max: Parameter = param("1", "largest ratio that it is set to", default=1e3, min=1e-6)
     w_smooth: Parameter = param("rad/s", "speed at which 76 % of the loss are reached", default=0.1, min=1e-12)
-    ratio: Variable = var("1", "speed of flange_a over speed of flange_b", state="always", default="u", guess=1.0)
+    ratio: Variable = var(
+        "1",
+        "speed of flange_a over speed of flange_b",
+        state="always",
+        default="min(max(u, ratio_min), ratio_max)",
+        guess=1.0,
+    )
     w_a: Variable = var("rad/s", "speed of flange_a relative to the housing")
     w_b: Variable = var("rad/s", "speed of flange_b relative to the housing")
     tau_loss: Variable = var("N.m", "lost torque at flange_a")
@@ -50,7 +60,7 @@ class VariableGear(Lossy, TwoFlanges):
         a, b = self.flange_a, self.flange_b
         yield self.w_a == der(a.phi - self.phi_support)
         yield self.w_b == der(b.phi - self.phi_support)
-        yield self.T * der(self.ratio) == self.u - self.ratio
+        yield self.T * der(self.ratio) == minimum(maximum(self.u, self.ratio_min), self.ratio_max) - self.ratio
         yield self.w_a == self.ratio * self.w_b
         yield self.ratio * (a.tau - self.tau_loss) + b.tau == 0
         passed, forward = -b.tau / self.ratio, tanh(self.w_a / self.w_smooth)

@@ -60,15 +60,15 @@ def check(
     with told(debug, json=json) as page:
         assembly = load_netlist(netlist, assignments)
         from modelica_like.report.plausible import drive_notes
+        from modelica_like.report.start import start_notes, start_report
         from modelica_like.report.structure import structure_report
+        from modelica_like.simulation import build
 
         page.print(structure_report(assembly))
-        note(*drive_notes(assembly))
+        model = build(assembly)
+        note(*drive_notes(assembly), *(start_notes(model) if not start_values else ()))
         if start_values:
-            from modelica_like.report.start import start_report
-            from modelica_like.simulation import build
-
-            page.print("", start_report(assembly, build(assembly)))
+            page.print("", start_report(assembly, model))
 
 
 def simulate(

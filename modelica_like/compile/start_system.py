@@ -22,11 +22,13 @@ class StartSystem:
             values by (x, y, z), and the values of [y - expression, alg, variables of `nodes`].
         nodes: variables (nodes) at its end.
         rest: variables at rest if not given, in order of priority: node, and the state if it is one.
+        rates: positions in (x, y) of derivatives of others, which are all zero at rest.
     """
 
     function: ca.Function
     nodes: tuple[int, ...]
     rest: tuple[tuple[int, int | None], ...] = ()
+    rates: tuple[int, ...] = ()
 
 
 def start_system(reduced: ReducedDae, rest: bool = False) -> StartSystem:
@@ -54,7 +56,14 @@ def start_system(reduced: ReducedDae, rest: bool = False) -> StartSystem:
     results = [y, ca.jacobian(values, unknowns), values]
     names = ["t", "x", "y", "z", "p", "u", "d"]
     function = ca.Function("start_system", arguments, results, names, ["variables", "jacobian", "values"])
-    return StartSystem(function, nodes, order)
+    return StartSystem(function, nodes, order, _rates(reduced, [level for level, _ in needed]) if rest else ())
+
+
+def _rates(reduced: ReducedDae, needed: list[int]) -> tuple[int, ...]:
+    """Positions of derivatives of others among the states and the needed unknowns."""
+    levels, placed = reduced.system.levels, zip(reduced.node_states, reduced.system.node_level, strict=True)
+    states = {state[0] for state, place in placed if state and place and levels[place[0]].order}
+    return *sorted(states), *(reduced.x.numel() + k for k, level in enumerate(needed) if levels[level].order)
 
 
 def rest_order(reduced: ReducedDae) -> list[int]:

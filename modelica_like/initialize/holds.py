@@ -12,9 +12,10 @@ from modelica_like.compile.compiled import Circuit, CompiledDae, Vector
 from modelica_like.compile.functions import ROUNDING
 from modelica_like.compile.soon import time_resolution
 from modelica_like.flatten.holds import TERMS
+from modelica_like.initialize.ideal import replace_dependent
 from modelica_like.initialize.point import Point, call, solve_implicit
 from modelica_like.initialize.slopes import variable_slopes
-from modelica_like.language.hold import UNLIMITED
+from modelica_like.language.holding import UNLIMITED
 
 _DEPENDENT = 1e-9
 INSTANT = 1e-9
@@ -97,6 +98,7 @@ def share(model: CompiledDae, point: Point) -> None:
     but the split follows from the other equations. If one element exceeds its capacity, the others take more, as far as
     they can.
     """
+    replace_dependent(model, point)
     if not model.circuits:
         return
     active = set(holding(model, point))

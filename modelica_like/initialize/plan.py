@@ -99,11 +99,12 @@ def start_plan(model: CompiledDae, kind: StartKind, point: Point) -> StartPlan:
 
 
 def _is_regular(model: CompiledDae, plan: StartPlan, point: Point) -> bool:
-    """Return whether the plan's matrix is far from singular; a positive answer is cached."""
+    """Return whether the plan's matrix is far from singular, without motion from rest; a positive answer is cached."""
     function = plan.system.function
     fast = model.fast(("start matrix", plan.kind), lambda: function, (1,))
-    y = np.zeros(function.size1_out(0))
-    entries = fast(point.t, point.x, y, point.z, model.p, model.u, point.d)[0]
+    x, y = point.x.copy(), np.zeros(function.size1_out(0))
+    x[[k for k in plan.system.rates if k < len(x)]] = 0.0
+    entries = fast(point.t, x, y, point.z, model.p, model.u, point.d)[0]
     entries = plan.entries(entries)
     known: dict[str, Any] = model.once(("regular start", plan.kind), dict)
     if np.array_equal(known.get("entries", ()), entries):
@@ -145,12 +146,18 @@ def _regular(matrix: Any, entries: Vector) -> bool:
 
 
 def _generic_matrix(model: CompiledDae, system: StartSystem, point: Point) -> Any:
-    """Jacobian of the start system at a generic point nearby; None if it is not finite."""
+    """Jacobian of the start system at a generic point nearby, None if it is not finite.
+
+    Where the start is from rest, nothing moves there: speeds that are zero do not determine positions.
+    """
     chance = np.random.default_rng(1)
     moved = point.copy()
     for part in (moved.x, moved.z):
         part += 0.1 * (1.0 + np.abs(part)) * chance.uniform(0.5, 1.0, part.shape)
     y = chance.uniform(0.5, 1.0, system.function.size1_out(0))
+    for k in system.rates:
+        part, place = (moved.x, k) if k < len(moved.x) else (y, k - len(moved.x))
+        part[place] = 0.0
     matrix, _ = matrix_and_values(model, system, moved, y)
     return matrix if np.all(np.isfinite(matrix.nonzeros())) else None
 
@@ -261,3 +268,8 @@ class _Choice:
 def start_name(model: CompiledDae, entry: StartEntry) -> str:
     """Path of the variable of a start value."""
     return model.flat_variables[entry.node].path
+
+
+def is_near(model: CompiledDae, entry: StartEntry) -> bool:
+    """Whether a start value is the first guess of a variable that is no state; a default, if there is no guess."""
+    return entry.state is None and (entry.strength != "default" or not model.flat_variables[entry.node].guess)

@@ -339,7 +339,8 @@ class Component(Declared):
     def _adopt(self, name: str, value: Component | list[Component]) -> None:
         taken = (self.fields, self._connectors, self._structural, self._class_modes)
         if any(name in names for names in taken) or hasattr(Component, name):
-            raise DuplicateName(f"{self.label}: '{name}' is already in use.", where=caller())
+            own = ": every component has something of this name" * hasattr(Component, name)
+            raise DuplicateName(f"{self.label}: '{name}' is already in use{own}.", where=caller())
         require_identifier(name, type(self).__name__)
         if isinstance(value, list):
             adopted: Any = [self._owned(f"{name}[{k}]", part) for k, part in enumerate(value, 1)]

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, Vector
+from modelica_like.errors import UnknownName, did_you_mean
 from modelica_like.initialize import INSTANT, Impact, Point, call, solve_implicit
 from modelica_like.solve.options import Options
 from modelica_like.solve.powers import POWERS, Powers, Results, results
@@ -86,7 +87,16 @@ class EnergyBalance(Shown):
     tolerance: float = 0.0
 
     def __getitem__(self, component: str) -> EnergyRow:
-        return next(row for row in self.rows if row.component == component)
+        """Return the energies of a component.
+
+        Raises:
+            UnknownName: there is no such component.
+        """
+        rows = {row.component: row for row in self.rows}
+        if component not in rows:
+            near = did_you_mean(component, rows) or "."
+            raise UnknownName(f"The energy balance has no component '{component}'{near}")
+        return rows[component]
 
     def __iter__(self) -> Iterator[EnergyRow]:
         return iter(self.rows)
@@ -227,7 +237,7 @@ def energy_balance(
     )  # fmt: skip
     rows = tuple(EnergyRow(path, *map(float, values)) for path, *values in zip(model.components, *columns, strict=True))
     exchanged = (inflow, source + work, lost + impact)
-    throughput = max([powers.stored, *(float(np.sum(np.abs(part))) for part in exchanged)])
+    throughput = max([powers.stored, powers.cancelled, *(float(np.sum(np.abs(part))) for part in exchanged)])
     reset = [event.time for event in events if event.transition >= 0 and model.transitions[event.transition].resets]
     told = [(one.time, one.energy - float(np.sum(work))) for one, work in zip(impacts, given, strict=True)]
     at_events = _unexplained(np.concatenate(audit.times), np.sum(jumps, axis=0), reset, told)

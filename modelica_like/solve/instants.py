@@ -16,6 +16,7 @@ from modelica_like.initialize import (
     check_singular,
     chosen_modes,
     holding,
+    meet,
     share,
     sharing,
     solve_implicit,
@@ -77,24 +78,28 @@ class Instants:
         self._instants: deque[float] = deque(maxlen=_CHATTER_INSTANTS)
         self._resting = False
         self._round = 0
-        self._timed = [t for t in model.transitions if t.timed]
+        self._modes = [one.mode for one in model.ideal.elements] if model.ideal else []
+        self.timed = [t for t in model.transitions if t.timed]
         self._numbers = {id(transition): k for k, transition in enumerate(model.transitions)}
 
     def next_moment(self, now: Point) -> float:
         """Time of the next time event, or infinity."""
-        if not self._timed:
-            return np.inf
-        moments = call(self.model, self.model.moments, now)
+        return min((t for _, t in self.ahead(now)), default=np.inf)
+
+    def ahead(self, now: Point) -> list[tuple[CompiledTransition, float]]:
+        """Time events that come, with their times."""
+        if not self.timed:
+            return []
+        moments = call(self.model, self.model.moments, now).tolist()
         here = just_after(now.t)
-        ahead = [moments[t.index] for t in self._timed if _is_source(now, t) and moments[t.index] > here]
-        return float(min(ahead, default=np.inf))
+        return [(t, moments[t.index]) for t in self.timed if moments[t.index] > here and _is_source(now, t)]
 
     def due(self, now: Point) -> list[CompiledTransition]:
         """Time events whose time is reached."""
-        if not self._timed:
+        if not self.timed:
             return []
         moments = call(self.model, self.model.moments, now)
-        return [t for t in self._timed if _is_source(now, t) and moments[t.index] <= just_after(now.t)]
+        return [t for t in self.timed if _is_source(now, t) and moments[t.index] <= just_after(now.t)]
 
     def settle(self, now: Point, wanting: list[CompiledTransition], *, begins: bool = False) -> None:
         """Fire transitions until none is left and no discrete variable changes; `now` becomes the point after.
@@ -106,19 +111,25 @@ class Instants:
         Raises:
             Chattering: transitions do not end, or events follow each other ever faster.
             LimitPassed: a transition ends the run.
+            NoValidModes: ideal elements have no valid combination of modes.
             SingularAtStart: the equations have no unique solution after it.
         """
         changes = bool(self.model.update_rows)
-        if not (wanting or (begins and changes)):
+        ideal, earlier = self._modes, now.d
+        if not (wanting or (begins and (changes or ideal))):
             return
         noted = len(self.record.events)
+        if not begins:
+            meet(self.model, now)  # the integration leaves the conditions of ideal elements within its tolerances
         if self._instants and now.t - self._instants[-1] >= _CHATTER_WINDOW * self.span:
             self._resting = False
         self._struck, self._entered = None, set()
         wanting = self._share_anew(now, wanting)
-        alone = self.options.iterations + _ALONE * len(self.model.holds)
+        alone = self.options.iterations + _ALONE * (len(self.model.holds) + len(ideal))
         for number in range(alone):
             self._round = number
+            if ideal and not (wanting or changes) and meet(self.model, now):
+                wanting = self.guards.wanting(now)
             if not (wanting or changes):
                 break
             before = now.d
@@ -126,6 +137,9 @@ class Instants:
                 self._fire(now, wanting if number < _TOGETHER else [min(wanting, key=self._number)])
                 self._solve(now)
                 self._stop_motions(now, before)
+                if ideal and number and np.array_equal(now.d[ideal], earlier[ideal]):
+                    meet(self.model, now, given_back=True)
+                earlier = before
             changes = self._update(now)
             wanting = [*self.due(now), *self.guards.wanting(now)]
         else:

@@ -8,7 +8,7 @@ import casadi as ca
 
 from modelica_like.errors import Overdetermined, Source, Underdetermined
 from modelica_like.flatten.model import FlatModel, Origin
-from modelica_like.language.declared import Domain
+from modelica_like.language.declared import Connector, Domain
 from modelica_like.structure.system import System
 
 _SHOWN = 6
@@ -114,7 +114,7 @@ def doubly_fixed(model: FlatModel, origins: Sequence[Origin], what: str, why: st
     words = {"potential": domain.potential, "flow": domain.flow}
     where = _places(origins)
     advice = f"Remove one, or put {domain.separator} between."
-    if domain.reference and network and not any(_kind(model, path) == domain.reference for path in network):
+    if _has_no_reference(model, domain, network):
         where = [model.components[path].place_of() for path in network][:_SHOWN]
         what = f"The network of {_list(network)} has no {domain.reference}."
         why = f"Every {domain.potential} in it is relative to another one; none is zero."
@@ -130,18 +130,33 @@ def _kind(model: FlatModel, path: str) -> str:
     return type(model.components[path]).__name__
 
 
+def _has_no_reference(model: FlatModel, domain: Domain, network: list[str]) -> bool:
+    return bool(domain.reference and network and all(_kind(model, path) != domain.reference for path in network))
+
+
 def _domain(model: FlatModel, origins: Sequence[Origin]) -> tuple[Domain, list[str]]:
-    """Return the domain of the equations, and the parts that its connections join, in order."""
+    """Return the domain of the equations, and the parts that its connections join, in order.
+
+    Of the domains of a part, that whose network lacks its reference is to blame, otherwise the first one.
+    """
     ends = {f"{path}.{name}" if path else name: (path, connector)
             for path, part in model.components.items() for name, connector in part.connectors.items()}  # fmt: skip
     named = {path for origin in origins for path in origin.path.split(" – ")}
     found = [one for end, one in ends.items() if not named.isdisjoint((end, one[0]))]
     if not found:
         return Domain(), []
-    domain = found[0][1].domain
+    domains = {id(connector.domain): connector.domain for _, connector in found}.values()
+    networks = [(domain, _network(model, ends, found, domain)) for domain in domains]
+    return next((one for one in networks if _has_no_reference(model, *one)), networks[0])
+
+
+def _network(
+    model: FlatModel, ends: dict[str, tuple[str, Connector]], found: list[tuple[str, Connector]], domain: Domain
+) -> list[str]:
+    """Return the parts that the connections of a domain join with those found."""
     sets = [origin.path.split(" – ") for one in model.linear if (origin := one.origin).kind == "connection"]
     joined = [{ends[end][0] for end in one} for one in sets if one[0] in ends and ends[one[0]][1].domain is domain]
     network = {path for path, connector in found if connector.domain is domain}
     while larger := [one for one in joined if not (one <= network or one.isdisjoint(network))]:
         network = network.union(*larger)
-    return domain, [path for path in model.components if path in network]
+    return [path for path in model.components if path in network]

@@ -147,7 +147,7 @@ def test_a_part_cannot_take_the_name_of_a_declaration(name):
 
 @pytest.mark.parametrize("name", ["equations", "find", "path", "fields"])
 def test_a_part_cannot_take_the_name_of_a_method(name):
-    with pytest.raises(DuplicateName, match="already in use"):
+    with pytest.raises(DuplicateName, match="already in use: every component has something of this name"):
         setattr(Resistor(), name, Resistor())
 
 

@@ -60,6 +60,7 @@ from components import (
     Trapezoid,
 )
 from modelica_like import Assembly, Component, Solution, load, simulate
+from modelica_like.errors import UnknownName
 
 CLOSES = 1e-8
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -324,3 +325,8 @@ def test_the_balance_would_notice_a_wrong_sign() -> None:
 
     result = simulate(through(WrongSpring(c=30.0)), 1.0)
     assert result.energy().closure > 1e-5
+
+
+def test_a_component_that_is_not_there() -> None:
+    with pytest.raises(UnknownName, match=r"no component 'sip'; did you mean 'slip'\?"):
+        simulate(through(Spring(c=30.0)), 0.1).energy()["sip"]

@@ -80,6 +80,8 @@ def test_an_engine_stalls_and_is_started_again() -> None:
     given = [event.time for event in run.events if event.after == "given"]
     assert len(given) == 1
     assert run.at(given[0])["engine.w"] == pytest.approx(48.0, rel=1e-7)
+    slow = CombustionEngine(**values, pedal=0.5, w_stall=40.0, phi=0.0, w=30.0)
+    assert notices(alone(slow, 0.1)) == ["At 0 s engine stalls."]
 
 
 def test_the_firing_orders() -> None:

@@ -22,6 +22,7 @@ from components import (
     TorqueStep,
 )
 from modelica_like import Assembly, Component, simulate
+from modelica_like.netlist import loads
 
 TABLE = ((0.0, 0.9, 0.8, 0.1, 0.2), (10.0, 0.8, 0.6, 0.3, 0.5))
 
@@ -174,3 +175,45 @@ def test_one_row_with_a_loss_is_not_free() -> None:
     parts = {"motor": ConstantSpeed(w_fixed=10.0), "gear": gear, "load": ConstantTorque(tau_constant=-9.0)}
     run = simulate(Assembly("d", parts=parts, series={"s": list(parts)}), 1.0)
     assert run.final["gear.flange_a.tau"] == pytest.approx(10.0, rel=1e-12)
+
+
+@pytest.mark.parametrize(("slope", "rolls"), [("0 deg", False), ("3 deg", True)])
+def test_gears_without_bearing_friction_rest_without_torque(slope: str, rolls: bool) -> None:
+    """A car stands, and the torque in its gears is zero but for rounding; each could bear none at all and toggled."""
+    car = f"""
+    [parts]
+    clutch = {{ is = "Clutch", capacity = 1400, f_normalized = 0 }}
+    input = {{ is = "Inertia", J = 0.05 }}
+    box = {{ is = "ConstantEfficiencyGear", ratio = 6, efficiency = 0.96 }}
+    final = {{ is = "ConstantEfficiencyGear", ratio = 3.9, efficiency = 0.95 }}
+    shaft = {{ is = "SpringDamper", c = "40 kN.m/rad", d = 300 }}
+    wheels = {{ is = "Inertia", J = 20 }}
+    tyre = {{ is = "Tyre", R = 0.42, F_z = "40 kN", sigma = 0.3 }}
+    car = {{ is = "Mass", m = 7500, angle = "{slope}" }}
+    road = {{ is = "RoadLoad", F_0 = 500, F_2 = 3 }}
+    [parts.engine]
+    is = "CombustionEngine"
+    pedal = 0
+    speeds = [0, 300]
+    pedals = [0, 1]
+    torque = [[0, 450], [0, 500]]
+    drag = [[0, 40], [300, 120]]
+    J = 0.9
+    w_idle = 70
+    w_max = 260
+    w_stall = 30
+    [series]
+    drive = ["engine", "clutch", "input", "box", "final", "shaft", "wheels", "tyre", "car", "road"]
+    [start]
+    "engine.w" = 70
+    [simulate]
+    start = "rest"
+    """
+    run = simulate(loads(car), 8.0)
+    modes = [event.after for event in run.events]
+    assert sorted(modes) == (["backward", "backward", "start_backward", "start_backward"] if rolls else [])
+    # What the gears turn, each with the efficiency 2 - 1/eta against its drive: this mass at the tyre.
+    turned = 7500 + (20 + 0.05 * (6 * 3.9) ** 2 / ((2 - 1 / 0.96) * (2 - 1 / 0.95))) / 0.42**2
+    pull = 7500 * 9.80665 * np.sin(np.radians(3)) - 500 if rolls else 0.0
+    v = np.sqrt(pull / 3) * np.tanh(np.sqrt(3 * pull) / turned * 8) if rolls else 0.0
+    assert run.final["car.v"] == pytest.approx(-v, rel=2e-3, abs=1e-9)

@@ -40,7 +40,7 @@ from modelica_like.language import (
     where,
 )
 from modelica_like.netlist import loads
-from modelica_like.report.run import reasons
+from modelica_like.report.changes import reasons
 from modelica_like.units import parse_unit
 
 CIRCUIT = """
@@ -50,6 +50,16 @@ r = { is = "Resistor", R = "1 Ohm" }
 [connect]
 plus = ["u.p", "r.p"]
 minus = ["u.n", "r.n"]
+"""
+ON_SUPPLY = """
+[parts]
+pack = { is = "ConstantVoltage", V = "48 V" }
+motor = { is = "MappedDrive", limit = [[0, 10]], tau_ref = 1, Jr = 0.1 }
+wheel = { is = "Inertia", J = 1 }
+[connect]
+plus = ["pack.p", "motor.p_dc"]
+minus = ["pack.n", "motor.n_dc"]
+shaft = ["motor.flange", "wheel.flange_a"]
 """
 GEARED = """
 [parts]
@@ -137,6 +147,16 @@ CASES: dict[str, tuple[type[ModelicaLikeError], Callable[[], object], str]] = {
 The network of u, r has no Ground.
   in circuit.toml:3 `u = { is = "ConstantVoltage", V = "10 V" }`
   in circuit.toml:4 `r = { is = "Resistor", R = "1 Ohm" }`
+Every voltage in it is relative to another one; none is zero.
+Connect a part that is = "Ground" to it.""",
+    ),
+    "a drive on a circuit without ground": (
+        Overdetermined,
+        lambda: build(loads(ON_SUPPLY, "drive.toml")),
+        """\
+The network of pack, motor has no Ground.
+  in drive.toml:3 `pack = { is = "ConstantVoltage", V = "48 V" }`
+  in drive.toml:4 `motor = { is = "MappedDrive", limit = [[0, 10]], tau_ref = 1, Jr = 0.1 }`
 Every voltage in it is relative to another one; none is zero.
 Connect a part that is = "Ground" to it.""",
     ),

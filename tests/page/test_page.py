@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from modelica_like import build, export_html, simulate
 from modelica_like.cli import app
-from modelica_like.errors import ExportError, UnknownName, ValueOutOfRange
+from modelica_like.errors import ExportError, UnitError, UnknownName, ValueOutOfRange
 from modelica_like.native.page import _span, _spelled
 from modelica_like.units import parse_unit
 
@@ -150,6 +150,11 @@ def test_mistakes_are_told(tmp_path: Path) -> None:
         export_html(drive, tmp_path / "x.htm")
     with pytest.raises(UnknownName, match=r"two_mass has no variable 'J9\.w'"):
         export_html(drive, tmp_path / "x.html", show=["J9.w"])
+    with pytest.raises(UnknownName, match=r"^A page with sliders cannot show 'J1\.stored_energy': it has variables, "
+                                          r"parameters and modes\.$"):  # fmt: skip
+        export_html(drive, tmp_path / "x.html", show=["2*J1.stored_energy"])
+    with pytest.raises(UnitError, match=r"^'J1.w \+ J1.phi' mixes rad/s and rad\.$"):
+        export_html(drive, tmp_path / "x.html", show=["J1.w + J1.phi"])
 
     endless = tmp_path / "endless.toml"
     endless.write_text(re.sub(r"(?m)^until = .*$", "", drive.read_text(encoding="utf-8")), encoding="utf-8")

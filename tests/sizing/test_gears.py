@@ -58,6 +58,32 @@ def test_spur_pair_by_hand() -> None:
     assert made.pinion_root_safety == pytest.approx(1000 / root, rel=3e-3)
 
 
+def test_worked_example_of_another_program() -> None:
+    """19 and 104 teeth of 4 mm, 535.93 N.m after DIN 3990 (test_1 of the Python package din3990, github.com).
+
+    It stops the search for the 30° tangent earlier (Y_Fa differs by 1e-4), and has Z_E = 189.8 sqrt(N)/mm.
+    """
+    pair = GearPair(19, 104, 4e-3, 48.64e-3, 0.5, 0.15, root_radius=0.25)
+    assert np.degrees(pair.working_angle) == pytest.approx(21.531902292465457, rel=1e-9)
+    made = gear_strength(pair, 535.9299104114843, STEEL)
+    assert made.contact_ratio == pytest.approx(1.5363235945832296, rel=1e-12)
+    assert made.zone_factor == pytest.approx(2.3959406670899934, rel=1e-9)
+    assert made.contact_ratio_factor == pytest.approx(0.906214912960638, rel=1e-12)
+    assert made.single_contact == pytest.approx(1.00554704549864, rel=1e-9)
+    assert made.contact_stress / 1e6 == pytest.approx(1.00554704549864 * 875.3827378988153, rel=1e-4)
+    assert tooth_form(pair, 19, 0.5) == pytest.approx((2.246336378902072, 1.9147262565947287), rel=2e-4)
+    assert tooth_form(pair, 104, 0.15) == pytest.approx((2.1616566798058514, 2.008781657562889), rel=2e-4)
+    assert made.pinion_root_stress / 1e6 == pytest.approx(230.15142071941582, rel=1e-4)
+    assert made.wheel_root_stress / 1e6 == pytest.approx(232.3547901900354, rel=1e-4)
+    # Its safeties with K_A·K_V·K_Hbeta = 1.990; for the root it has a smaller K_Fbeta of its own.
+    loaded = gear_strength(pair, 535.9299104114843, STEEL, 1.75, 1.0278576187783273, 1.1064272863295082)
+    assert loaded.pitting_safety == pytest.approx(1.2079360526264216, rel=1e-4)
+    rooted = gear_strength(
+        pair, 535.9299104114843, GearMaterial(1500e6, 430e6), 1.75, 1.0278576187783273, 1.0864854433487987
+    )
+    assert rooted.pinion_root_safety == pytest.approx(1.9120087306681766, rel=1e-4)
+
+
 def test_helical_gears() -> None:
     """From an overlap of one on: Z_eps = 1/sqrt(eps), no single contact, Z_beta = 1/sqrt(cos beta)."""
     pair = GearPair(20, 30, 4e-3, 0.08, helix=radians(15))

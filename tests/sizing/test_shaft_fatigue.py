@@ -1,5 +1,6 @@
 """Fatigue of shafts after DIN 743, written out formula by formula."""
 
+from dataclasses import replace
 from math import hypot, log10, pi, sqrt
 
 import pytest
@@ -63,3 +64,29 @@ def test_deep_shoulders() -> None:
     made = shaft_fatigue(10.0, 20.0, 0.02, S275, 0.04, 2e-3, 2.0, 1.8)
     assert made.bending_notch == pytest.approx(2.0 / (1 + sqrt(2.3 / 2) * support))
     assert made.torsion_notch == pytest.approx(1.8 / (1 + sqrt(1.15 / 2) * support))
+
+
+def test_worked_example_of_another_program() -> None:
+    """D = 50, d = 42, r = 5 mm of 34CrMo4, Rz = 5 µm (Q. Huss, N. Schulz: Wellennachweis, github.com, 2023).
+
+    The strengths of its notebooks hold for 50 mm, and the yield strength of the second one counts as that of a notched
+    section: 838.4 N/mm².
+    """
+    K1, S_d = 0.8713389943631755, 665.4007941030145e6
+    steel = ShaftMaterial(871.3389943631755e6, S_d, K1 * 500e6, K1 * 300e6)
+    assert shaft_fatigue(1.0, 0.0, 0.042, steel).size_factor == pytest.approx(0.884985276358004, rel=1e-12)
+    made = shaft_fatigue(1.0, 0.0, 0.042, steel, 0.05, 5e-3, 1.5572817574523055, 1.2828771540477546, roughness=5e-6)
+    assert made.bending_notch == pytest.approx(1.4973097887328213, rel=1e-12)
+    assert made.torsion_notch == pytest.approx(1.2502697690565296, rel=1e-12)
+    assert made.roughness_factor == pytest.approx(0.9017146306159467, rel=1e-12)
+    assert steel.bending_fatigue / made.bending_strength == pytest.approx(1.800901923884255, rel=1e-12)
+    assert steel.torsion_fatigue / made.torsion_strength == pytest.approx(1.4726569443864075, rel=1e-12)
+    notched = replace(steel, yield_strength=838.4050005697983e6)
+    mean, swing, section = 305.5050463303894e6, 30e6, pi * 0.042**3 / 16
+    made = shaft_fatigue(
+        50e6 * section / 2, (mean + swing) * section, 0.042, notched, bending_factor=1.5179405596067481,
+        torsion_factor=1.2615866715165054, alternating=swing / (mean + swing), roughness=5e-6,
+    )  # fmt: skip
+    assert made.bending_strength == pytest.approx(154.79183517414634e6, rel=1e-12)
+    assert made.torsion_strength == pytest.approx(141.66041042128347e6, rel=1e-12)
+    assert made.safety == pytest.approx(2.589018228890791, rel=1e-12)

@@ -165,3 +165,20 @@ def test_a_pendulum_at_rest_hangs_still(start):
     found = start(Pendulum(x=0.6, y=guess(-1.0)), "rest")
     assert (found["u"], found["v"]) == (0.0, 0.0)
     assert found["y"] == pytest.approx(-0.8, rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    "joint",
+    [
+        'is = "UniversalJoint", beta = "20 deg"',
+        'is = "FourBar", crank = 0.03, coupler = 0.09, rocker = 0.07, ground = 0.1',
+    ],
+)
+@pytest.mark.parametrize("speed", [None, 3.0])
+def test_speeds_at_rest_determine_no_angle(start, joint, speed):
+    """A speed ratio that depends on the angle is none where nothing turns: the angle is free, and zero."""
+    w = "" if speed is None else f", w = {speed}"
+    parts = [f'a = {{ is = "Inertia", J = 0.1{w} }}', f"joint = {{ {joint} }}", 'b = { is = "Inertia", J = 0.2 }']
+    point = started(start, parts, ("a", "joint", "b"))
+    assert point["a.phi"] == 0.0
+    assert (point["b.w"] == 0.0) == (point["a.w"] == 0.0) == (speed is None)

@@ -1,9 +1,6 @@
 /* Many runs of one model that leave nothing but numbers behind: sweeps. Every run has its own parameters and inputs,
  * begins where these start it, and is read by `Reading`s. Results are at equal distances and on both sides of every
  * event; what happens between them is read off the dense output of the steps. */
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
 #include "core.h"
 
 typedef enum {
@@ -154,18 +151,10 @@ static void set_numbers(Batch *b, int64_t run) {
 }
 
 static int start_run(Batch *b, int64_t run) {
-    Instance *c = b->c;
     const NativeBatch *a = b->asked;
-    instance_reset(c);
-    if (set_experiment(c, 1, a->rtol, a->start, 1, a->end) != RESULT_OK) return 0;
-    c->state.absolute = a->atol;
+    if (instance_prepare(b->c, a->start, a->end, a->rtol, a->atol) != RESULT_OK) return 0;
     set_numbers(b, run);
-    c->state.phase = PHASE_INITIALIZATION;
-    if (start_solve(c) != RESULT_OK) return 0;
-    c->state.phase = PHASE_STEP;
-    c->state.inputs_changed = 0;
-    c->state.at_event = 1; /* events at the start come first */
-    return 1;
+    return start_solve(b->c) == RESULT_OK && instance_begin(b->c) == RESULT_OK;
 }
 
 /* Returns 0 if the run cannot go on. */

@@ -115,11 +115,12 @@ typedef struct {
     double *variables, *guards, *guards_before, *looks, *seen_rates, *seen_indicators, *seen_derived;
     double *start_unknowns, *start_values, *start_residual;
     double *begun; /* motions that may be held, where the search for a steady state began */
-    double *d_before, *d_fired, *reset_values, *target_values, *respond_d, *respond_z, *rates, *x_kept;
+    double *d_before, *d_earlier, *d_fired, *reset_values, *target_values, *respond_d, *respond_z, *rates, *x_kept;
     double *weights, *base_weights, *use, *best, *kept_z, *reactions, *sizes, *zeros;
     int *order; /* pivots of the implicit equations */
     int *targets, *standing, *places, *member, *pivots, *same, *places_of_slots, *special_outputs;
     unsigned char *known, *decided, *wanting, *changed, *kinds, *held, *other, *known_slots, *needed_slots;
+    unsigned char *open_rows;     /* implicit equations that depend on others */
     unsigned char *asked, *tuned; /* variables that somebody reads; parameters that have changed in a run */
     Piece *whole;
     Terms *terms, *strike_terms;
@@ -181,7 +182,7 @@ int lu_factor(int n, double *matrix, int *order);
 void lu_solve(int n, const double *matrix, const int *order, double *x);
 void lu_solve_transposed(int n, const double *matrix, const int *order, double *x);
 double dot(int n, const double *p, const double *q);
-void make_orthogonal(int rows, int columns, double *a, double *turns, double *b);
+double make_orthogonal(int rows, int columns, double *a, double *turns, double *b);
 void least_squares(int rows, int columns, double *a, double *b, double *x);
 void keeping_least_squares(int n, int states, double *a, double *turns, double *b, double *x);
 /* special.c */
@@ -216,6 +217,12 @@ int anything_shared(const Instance *c);
 void share(Instance *c);
 void rest(Instance *c);
 void rest_rates(Instance *c, double *rates);
+/* ideal.c */
+void replace_dependent(Instance *c);
+int pushed(Instance *c);
+Result meet(Instance *c, int given_back, int *any);
+Result renew(Instance *c);
+int same_modes(const Instance *c, const double *before);
 /* impacts.c */
 Result stop_motions(Instance *c, const double *before, Impacts *impacts);
 /* events.c */
@@ -278,6 +285,9 @@ void tangent_of_implicit(Instance *c, const int *order);
 void read_tangents(Instance *c, const uint32_t *unknowns, size_t n, double *result, size_t stride);
 void slope_of_node(Instance *c, int node, int again, double *by_state);
 Result factor_implicit(Instance *c, int *order);
+/* native.c */
+Result instance_prepare(Instance *c, double start, double stop, double rtol, double atol);
+Result instance_begin(Instance *c);
 /* gradient.c */
 void gradient_move(Instance *c, double t);
 int gradient_round(Instance *c, int round, unsigned char *wanting, int any);

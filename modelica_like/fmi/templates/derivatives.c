@@ -1,7 +1,5 @@
 /* Derivatives inside a mode, exact: of derivatives, variables and guards by states, inputs, parameters and time, with
  * the implicit unknowns following. */
-#include <math.h>
-#include <string.h>
 #include "core.h"
 
 /* Slot of what derivatives are taken by. */
@@ -44,11 +42,10 @@ Result check_unknowns(Instance *c, const uint32_t *unknowns, size_t n) {
 
 /* Factorises the Jacobian of the implicit equations at the present point, with the slots of m->tapes.rates filled. */
 Result factor_implicit(Instance *c, int *order) {
-    State *s = &c->state;
     if (settle(c) != RESULT_OK) return RESULT_ERROR;
     evaluate_now(c, &c->model->tapes.alg_jacobian, c->work.dense_matrix);
     if (!lu_factor(c->model->n_z, c->work.dense_matrix, order))
-        return fail(c, "The implicit equations are singular at t = %.9g s.", s->t);
+        return fail(c, "The implicit equations are singular at t = %.9g s.", c->state.t);
     return RESULT_OK;
 }
 
@@ -76,11 +73,11 @@ static void seed_knowns(Instance *c, const uint32_t *knowns, size_t n, const dou
 static Result start_system_tangent(Instance *c, const double *start_dots) {
     const Model *m = c->model;
     Work *w = &c->work;
-    State *s = &c->state;
     double *step = w->start_unknowns;
     evaluate_now(c, &m->tapes.start_system, w->start_residual);
     tape_run(&m->tapes.start_jacobian, w->slots, w->jacobian);
-    if (!qr_factor(&m->start, w->jacobian, w)) return fail(c, "The start equations are singular at t = %.9g s.", s->t);
+    if (!qr_factor(&m->start, w->jacobian, w))
+        return fail(c, "The start equations are singular at t = %.9g s.", c->state.t);
     evaluate_now(c, &m->tapes.start_system, w->start_residual);
     tape_tangent(&m->tapes.start_system, w->slots, w->dots, w->start_residual);
     for (int k = 0; k < m->n_start_unknowns; k++) {
@@ -138,7 +135,6 @@ static void find_given(const Instance *c, Given *by_kind) {
 
 /* Reads derivatives off the tangents of all arguments. */
 void read_tangents(Instance *c, const uint32_t *unknowns, size_t n, double *result, size_t stride) {
-    const Model *m = c->model;
     Work *w = &c->work;
     Given given[N_KINDS];
     find_given(c, given);
@@ -149,21 +145,20 @@ void read_tangents(Instance *c, const uint32_t *unknowns, size_t n, double *resu
         tape_tangent(given[k].tape, w->slots, w->dots, given[k].room);
     }
     for (size_t k = 0; k < n; k++) {
-        const Variable *v = find_variable(m, unknowns[k]);
+        const Variable *v = find_variable(c->model, unknowns[k]);
         const double *room = given[v->kind].room;
         if (v->kind == KIND_GUARD && !guard_active(c, v->index)) result[k * stride] = 0;
-        else result[k * stride] = room == NULL ? w->dots[known_slot(m, v)] : room[v->index];
+        else result[k * stride] = room == NULL ? w->dots[known_slot(c->model, v)] : room[v->index];
     }
 }
 
 Result directional(Instance *c, const uint32_t *unknowns, size_t n_unknowns, const uint32_t *knowns, size_t n_knowns,
     const double *seed, double *result) {
-    const Model *m = c->model;
     Work *w = &c->work;
     if (check_unknowns(c, unknowns, n_unknowns) != RESULT_OK || check_knowns(c, knowns, n_knowns) != RESULT_OK)
         return RESULT_ERROR;
     if (c->state.phase != PHASE_INITIALIZATION) {
-        memset(w->dots, 0, m->slot_results * sizeof(double));
+        memset(w->dots, 0, c->model->slot_results * sizeof(double));
         seed_knowns(c, knowns, n_knowns, seed);
     } else if (start_tangent(c, knowns, n_knowns, seed) != RESULT_OK) return RESULT_ERROR;
     if (factor_implicit(c, w->order) != RESULT_OK) return RESULT_ERROR;

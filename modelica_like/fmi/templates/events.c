@@ -1,6 +1,4 @@
 /* Events at one instant: which transitions want to fire, and firing them until nothing does. */
-#include <math.h>
-#include <string.h>
 #include "core.h"
 
 #define ROUNDS 20
@@ -45,13 +43,12 @@ double next_moment(Instance *c) {
 /* Adds time events that are due and, unless they were found already, state events that are positive or about to be. */
 int find_wanting(Instance *c, unsigned char *wanting, int guards_too) {
     const Model *m = c->model;
-    State *s = &c->state;
     double *values = c->work.guards;
     int any = 0;
     if (m->n_moments > 0) {
         evaluate_now(c, &m->tapes.moments, values);
         for (int k = 0; k < m->n_transitions; k++)
-            if (m->transitions[k].timed && values[m->transitions[k].index] <= just_after(s)) wanting[k] = 1;
+            if (m->transitions[k].timed && values[m->transitions[k].index] <= just_after(&c->state)) wanting[k] = 1;
     }
     if (m->n_guards > 0 && guards_too) {
         evaluate_now(c, &m->tapes.guards_soon, values);
@@ -214,14 +211,19 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
     State *s = &c->state;
     Impacts *impacts = &c->work.impacts;
     double *before = c->work.d_before;
-    int changes = m->n_updates > 0;
+    int changes = m->n_updates > 0, met;
     impacts->struck = 0;
     memset(impacts->entered, 0, (size_t)m->n_holds);
     if (find_wanting(c, wanting, !located)) {
+        if (m->n_ideals > 0 && !pushed(c) && meet(c, 0, &met) != RESULT_OK) return RESULT_ERROR;
         if (crowded(c) != RESULT_OK || share_anew(c, wanting) != RESULT_OK) return RESULT_ERROR;
     }
-    for (int round = 0; round < ROUNDS + ALONE * m->n_holds; round++) {
+    for (int round = 0; round < ROUNDS + ALONE * (m->n_holds + m->n_ideals); round++) {
         int any = 0;
+        if (!changes && (round > 0 || pushed(c)) && !any_of(wanting, m->n_transitions)) {
+            if (meet(c, 0, &met) != RESULT_OK) return RESULT_ERROR;
+            if (met) find_wanting(c, wanting, 1);
+        }
         for (int k = 0; k < m->n_transitions; k++) {
             if (any && round >= TOGETHER) wanting[k] = 0;
             any |= wanting[k];
@@ -233,6 +235,7 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
             return RESULT_OK;
         }
         c->round = round;
+        memcpy(c->work.d_earlier, before, (size_t)m->n_d * sizeof(double));
         memcpy(before, c->d, (size_t)m->n_d * sizeof(double));
         if (any && fire(c, wanting, impacts) != RESULT_OK) return RESULT_ERROR;
         if (any) share(c);
@@ -240,6 +243,7 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
         if (any && (solve_now(c, 0) != RESULT_OK || stop_motions(c, before, impacts) != RESULT_OK ||
                        check_singular(c) != RESULT_OK))
             return RESULT_ERROR;
+        if (any && round > 0 && same_modes(c, c->work.d_earlier) && meet(c, 1, &met) != RESULT_OK) return RESULT_ERROR;
         if (update_once(c, impacts, &changes) != RESULT_OK) return RESULT_ERROR;
         memset(wanting, 0, m->n_transitions);
         if (find_wanting(c, wanting, 1) && !c->bounded) {
@@ -250,7 +254,7 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
     if (changes) return fail(c, "Discrete variables do not settle at t = %.12g s.", s->t);
     return fail(c,
         "Modes still switch after %d rounds at t = %.12g s. Give the switching a hysteresis, or smooth what drives it.",
-        ROUNDS + ALONE * m->n_holds, s->t);
+        ROUNDS + ALONE * (m->n_holds + m->n_ideals), s->t);
 }
 
 /* One event iteration for an importer's event mode. Where anything fired or was set, its solver must begin anew even if
@@ -258,7 +262,7 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
 Result update_discrete(Instance *c, int *restart, double *next) {
     double before = c->state.n_events;
     *restart = c->state.inputs_changed;
-    if (*restart && check_tables(c) != RESULT_OK) return RESULT_ERROR;
+    if (*restart && (check_tables(c) != RESULT_OK || renew(c) != RESULT_OK)) return RESULT_ERROR;
     c->state.inputs_changed = 0;
     if (handle_event(c) != RESULT_OK) return RESULT_ERROR;
     *restart |= c->state.n_events != before;

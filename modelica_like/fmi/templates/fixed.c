@@ -7,8 +7,6 @@
  * Newton iteration where they are linear, by three else (point.c), and what holds the same motion shares it by
  * capacities, without a second trial (holds.c). Nothing is allocated, and nothing outside of the run-time is called but
  * arithmetic and copies, unless logging is on or the step fails. */
-#include <math.h>
-#include <string.h>
 #include "core.h"
 
 #define BUDGET 4

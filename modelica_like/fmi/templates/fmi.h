@@ -3,7 +3,6 @@
 #ifndef FMI_H
 #define FMI_H
 
-#include <string.h>
 #include "core.h"
 
 #define JOIN_(a, b) a##b

@@ -1,6 +1,4 @@
 /* FMI 2.0: checks every call, then leaves the work to the run-time. What 3.0 has, too, stands in fmi.h. */
-#include <math.h>
-#include <stdlib.h>
 #include "fmi2Functions.h"
 
 #define VERSION fmi2

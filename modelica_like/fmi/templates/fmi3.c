@@ -1,6 +1,4 @@
 /* FMI 3.0: checks every call, then leaves the work to the run-time. What 2.0 has, too, stands in fmi.h. */
-#include <math.h>
-#include <stdlib.h>
 #include "fmi3Functions.h"
 
 #define VERSION fmi3
@@ -21,11 +19,10 @@ const char *fmi3GetVersion(void) { return fmi3Version; }
 fmi3Instance fmi3InstantiateModelExchange(fmi3String instanceName, fmi3String instantiationToken,
     fmi3String resourcePath, fmi3Boolean visible, fmi3Boolean loggingOn, fmi3InstanceEnvironment instanceEnvironment,
     fmi3LogMessageCallback logMessage) {
-    Instance bare = {.name = instanceName, .log_enabled = loggingOn, .environment = instanceEnvironment};
+    Instance bare = {.name = instanceName, .log_enabled = loggingOn, .allocate = calloc, .release = free};
+    bare.environment = instanceEnvironment;
     bare.logger = (AnyFunction)logMessage;
     bare.log = logMessage ? log_fmi3 : NULL;
-    bare.allocate = calloc;
-    bare.release = free;
     (void)visible;
     return instance_open(bare, instantiationToken, resourcePath);
 }

@@ -6,8 +6,6 @@
  * have fired: central differences. Along a tangent an event moves so that its guard stays zero, and states move on at
  * the rates before and behind it (the saltation of M. A. Aizerman, F. R. Gantmakher, 1958). What cannot be differenced
  * is lost: the run goes on, and whoever asks for derivatives is told. */
-#include <math.h>
-#include <string.h>
 #include "core.h"
 
 #define NEARBY 3e-6      /* of the sizes of states and parameters: how far instants are moved */

@@ -1,6 +1,4 @@
 /* Impacts, as in initialize/holds.py: motions that modes begin to hold are stopped by an impulse. */
-#include <math.h>
-#include <string.h>
 #include "core.h"
 
 #define INSTANT 1e-9 /* duration of an impact; finite forces cancel whatever it is */

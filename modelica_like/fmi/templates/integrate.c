@@ -1,8 +1,6 @@
 /* Co-Simulation: steps that run as far as accuracy allows, events located inside them, results interpolated. A step
  * does not end where a communication step ends: the importer's points are read from the dense output. Only where inputs
  * move does a step end there, so that their jumps fall between steps. */
-#include <math.h>
-#include <string.h>
 #include "core.h"
 
 #define MAX_REJECTIONS 60
@@ -87,8 +85,8 @@ Result take_changes(Instance *c, int *event) {
     c->state.inputs_changed = 0;
     leave_piece(c);
     c->state.z_valid = c->variables_valid = 0;
-    if (settle(c) != RESULT_OK) return RESULT_ERROR;
-    *event = find_wanting(c, nothing_wanting(c), 1);
+    if (renew(c) != RESULT_OK || settle(c) != RESULT_OK) return RESULT_ERROR;
+    *event = find_wanting(c, nothing_wanting(c), 1) || pushed(c);
     return RESULT_OK;
 }
 

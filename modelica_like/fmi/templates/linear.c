@@ -1,14 +1,11 @@
 /* Linear algebra: sparse QR with a pattern known ahead, dense LU, dense least squares. */
-#include <float.h>
-#include <math.h>
-#include <string.h>
 #include "core.h"
 
 #define SAYS_NOTHING 1e-24 /* square of the relative size of an equation that is none */
 
 /* Left-looking Householder QR (T. Davis, Direct Methods for Sparse Linear Systems, ch. 5). Returns 0 if singular. */
 int qr_factor(const QrPattern *a, const double *values, Work *work) {
-    double *x = work->qr_work, largest = 0;
+    double *x = work->qr_work;
     memset(x, 0, (size_t)a->size * sizeof(double));
     for (int column = 0; column < a->size; column++) {
         int source = a->column_order[column], r = a->r_colind[column];
@@ -30,7 +27,7 @@ int qr_factor(const QrPattern *a, const double *values, Work *work) {
         }
         for (int k = 1; k < end - first; k++) tail += v[k] * v[k];
         norm = sqrt(v[0] * v[0] + tail);
-        if (!isfinite(norm)) return 0;
+        if (!isfinite(norm) || norm == 0) return 0;
         if (tail == 0) {
             work->qr_r[r] = v[0];
             work->qr_beta[column] = 0;
@@ -40,8 +37,6 @@ int qr_factor(const QrPattern *a, const double *values, Work *work) {
             work->qr_beta[column] = 2 / (head * head + tail);
             v[0] = head;
         }
-        if (norm > largest) largest = norm;
-        if (norm == 0) return 0;
     }
     return 1;
 }
@@ -125,8 +120,9 @@ double dot(int n, const double *p, const double *q) {
 }
 
 /* Turns the rows of A until they are orthogonal, by one-sided Jacobi rotations (Hestenes); b is rotated along. `turns`,
- * if it is there, becomes the combinations of rows of A that have come out. */
-void make_orthogonal(int rows, int columns, double *a, double *turns, double *b) {
+ * if it is there, becomes the combinations of rows of A that have come out. Returns the square of the largest row. */
+double make_orthogonal(int rows, int columns, double *a, double *turns, double *b) {
+    double largest = 0;
     for (int k = 0; k < rows * rows && turns != NULL; k++) turns[k] = k % (rows + 1) == 0;
     for (int sweep = 0; sweep < 60; sweep++) {
         int rotated = 0;
@@ -145,22 +141,13 @@ void make_orthogonal(int rows, int columns, double *a, double *turns, double *b)
             }
         if (!rotated) break;
     }
-}
-
-static double largest_row(int rows, int columns, const double *a) {
-    double largest = 0;
-    for (int i = 0; i < rows; i++) {
-        const double *p = a + (size_t)i * columns;
-        largest = fmax(largest, dot(columns, p, p));
-    }
+    for (const double *p = a; p < a + (size_t)rows * columns; p += columns) largest = fmax(largest, dot(columns, p, p));
     return largest;
 }
 
 /* Shortest x that minimises |A x - b|. `a` holds the rows of A one after the other (and is destroyed), `b`, too. */
 void least_squares(int rows, int columns, double *a, double *b, double *x) {
-    double largest;
-    make_orthogonal(rows, columns, a, NULL, b);
-    largest = largest_row(rows, columns, a);
+    double largest = make_orthogonal(rows, columns, a, NULL, b);
     memset(x, 0, (size_t)columns * sizeof(double));
     for (int i = 0; i < rows; i++) {
         const double *p = a + (size_t)i * columns;
@@ -174,9 +161,7 @@ void least_squares(int rows, int columns, double *a, double *b, double *x) {
  * nothing is one of rates that are zero by themselves: the same combination of states keeps its value, such as the slip
  * of a clutch that sticks. `turns` has room for n*n. */
 void keeping_least_squares(int n, int states, double *a, double *turns, double *b, double *x) {
-    double largest;
-    make_orthogonal(n, n, a, turns, b);
-    largest = largest_row(n, n, a);
+    double largest = make_orthogonal(n, n, a, turns, b);
     for (int i = 0; i < n; i++) {
         double *p = a + (size_t)i * n;
         if (dot(n, p, p) > largest * SAYS_NOTHING) continue;

@@ -1,7 +1,5 @@
 /* Looking for events in an accepted step: guards are looked at inside of it, closer where they do not behave as looks
  * tell, and what rises above zero is located on the dense output, then by steps again up to the trial time. */
-#include <math.h>
-#include <string.h>
 #include "core.h"
 
 #define MIDDLE 0.45 /* of a step: where guards are looked at besides its end; not where a period might */
@@ -180,7 +178,6 @@ static Found look_behind(Instance *c, double end, Look *look) {
 
 /* Looks for an event between two looks; shortens the piece to it. */
 static Found check_between(Instance *c, const Look *before, const Look *after) {
-    const Model *m = c->model;
     Look found = room_for_look(c, DEPTH + 2);
     double step;
     if (!find_candidates(c, before, after)) return NOTHING;
@@ -188,9 +185,10 @@ static Found check_between(Instance *c, const Look *before, const Look *after) {
         c->state.event_pending = mark_wanting(c, &found, LOCATED * fmax(1, fabs(after->t)));
         if (c->state.event_pending) return ENDED;
         /* Positive for less than the time resolution: what the last event left is on its way down. */
-        if (memchr(c->work.kinds, CROSSING, (size_t)m->n_guards) != NULL) return look_behind(c, after->t, &found);
+        if (memchr(c->work.kinds, CROSSING, (size_t)c->model->n_guards) != NULL)
+            return look_behind(c, after->t, &found);
     } else if (newton(c, after, &step)) return TOO_LONG;
-    memcpy(c->piece, c->work.whole, piece_size(m));
+    memcpy(c->piece, c->work.whole, piece_size(c->model));
     return NOTHING;
 }
 

@@ -1,7 +1,4 @@
 /* Opens the model's file in the folder of resources, which importers name in many ways. */
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include "model.h"
 
 #define NAME "model.bin"

@@ -2,10 +2,6 @@
  * model from the bytes of its file; make a handle of it for every thread, reset it, set what is to be other than in the
  * model, begin, then step, or run into buffers. Functions return NATIVE_OK or NATIVE_FAILED (native_message tells why),
  * runs also NATIVE_MORE or NATIVE_PAUSED. Variables go by value references. Handles share nothing that changes. */
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include "core.h"
 
 enum { NATIVE_OK, NATIVE_FAILED, NATIVE_MORE, NATIVE_PAUSED };
@@ -82,13 +78,17 @@ EXPORTED void *native_instance(const Native *n) { return n->c; }
 EXPORTED const char *native_message(const Native *n) { return n->message; }
 
 /* Back to the model's values; start and end (infinite: unknown) in s, relative tolerance, absolute one in nominals. */
-EXPORTED int native_reset(Native *n, double start, double stop, double rtol, double atol) {
+Result instance_prepare(Instance *c, double start, double stop, double rtol, double atol) {
     Result result;
-    instance_reset(n->c);
-    result = set_experiment(n->c, 1, rtol, start, isfinite(stop), stop);
-    n->c->state.absolute = atol;
-    n->c->state.phase = PHASE_INITIALIZATION;
-    return code(result);
+    instance_reset(c);
+    result = set_experiment(c, 1, rtol, start, isfinite(stop), stop);
+    c->state.absolute = atol;
+    c->state.phase = PHASE_INITIALIZATION;
+    return result;
+}
+
+EXPORTED int native_reset(Native *n, double start, double stop, double rtol, double atol) {
+    return code(instance_prepare(n->c, start, stop, rtol, atol));
 }
 
 /* ---- values ----------------------------------------------------------------------------------------------------- */
@@ -123,15 +123,18 @@ EXPORTED int native_get(Native *n, int64_t count, const uint32_t *references, do
 
 /* ---- start, steps, copies --------------------------------------------------------------------------------------- */
 
-static int begun(Native *n) {
-    n->c->state.phase = PHASE_STEP;
-    n->c->state.inputs_changed = 0;
-    n->c->state.at_event = 1; /* events at the start come first, whatever is asked for next */
-    return n->c->model->settings->fixed_step > 0 ? code(handle_event(n->c)) : NATIVE_OK;
+/* Events at the start come first, whatever is asked for next. */
+Result instance_begin(Instance *c) {
+    c->state.phase = PHASE_STEP;
+    c->state.inputs_changed = 0;
+    c->state.at_event = 1;
+    return c->model->settings->fixed_step > 0 ? handle_event(c) : RESULT_OK;
 }
 
 /* Finds the start from the model's start values and from those that were set. */
-EXPORTED int native_begin(Native *n) { return start_solve(n->c) == RESULT_OK ? begun(n) : NATIVE_FAILED; }
+EXPORTED int native_begin(Native *n) {
+    return code(start_solve(n->c) != RESULT_OK ? RESULT_ERROR : instance_begin(n->c));
+}
 
 /* Begins at states, implicit unknowns and d that are given; events there have not happened yet. */
 EXPORTED int native_begin_at(Native *n, const double *x, const double *z, const double *d) {
@@ -141,7 +144,7 @@ EXPORTED int native_begin_at(Native *n, const double *x, const double *z, const 
     memcpy(c->d, d, (size_t)c->model->n_d * sizeof(double));
     c->state.solved = 1;
     c->state.z_valid = c->variables_valid = 0;
-    return begun(n);
+    return code(instance_begin(c));
 }
 
 /* A control loop's step: sets, goes to a time through all events, gets. */

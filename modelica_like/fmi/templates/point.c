@@ -1,6 +1,4 @@
 /* A point of the solution: evaluate tapes there, solve the implicit equations, check that all blocks are regular. */
-#include <math.h>
-#include <string.h>
 #include "core.h"
 
 #define MAX_NEWTON 50

@@ -1,12 +1,9 @@
 /* Tapes for the present modes and parameters: what these decide is worked out once, and what nothing asks for is left
  * out. A model is one set of equations for all modes, of which few matter at a time, so little is left of a tape. The
  * operations that are left are the same, in the same order, so values are the same; only x + 0 and x * 1 are x. */
-#include <string.h>
 #include "core.h"
 
 #define WORTH_IT 6 /* runs of a tape in the same modes from which on it is worth it */
-
-enum { MOVING, KNOWN };
 
 const Tape *full_tape(const Model *m, SpecialTape which) {
     const Tape *const tapes[] = {&m->tapes.rates, &m->tapes.jacobian, &m->tapes.alg, &m->tapes.alg_jacobian,
@@ -22,7 +19,7 @@ static int is_wanted(const Instance *c, SpecialTape which, int output) {
 
 /* The operand that the result of an operation is, -1 where it is known to be `*value`, or -2: it must be computed. */
 static int result_of(int operation, Operands one, const double *slots, const unsigned char *known, double *value) {
-    int a = known[one.left] == KNOWN, b = known[one.right] == KNOWN;
+    int a = known[one.left], b = known[one.right];
     double left = slots[one.left], right = slots[one.right];
     if (a && b) return -1;
     switch (operation) {
@@ -45,10 +42,10 @@ static void work_out(Instance *c, const Tape *tape, int *same, unsigned char *kn
     double *slots = c->work.slots;
     const Operands *operand = tape->operands;
     int slot = tape->first_result;
-    memset(known, MOVING, (size_t)m->n_slots);
-    for (int k = 0; k < m->n_p; k++) known[m->slot_p + k] = c->work.tuned[k] ? MOVING : KNOWN;
-    memset(known + m->slot_d, KNOWN, (size_t)m->n_d);
-    memset(known + m->slot_constants, KNOWN, (size_t)m->n_constants);
+    memset(known, 0, (size_t)m->n_slots);
+    for (int k = 0; k < m->n_p; k++) known[m->slot_p + k] = !c->work.tuned[k];
+    memset(known + m->slot_d, 1, (size_t)m->n_d);
+    memset(known + m->slot_constants, 1, (size_t)m->n_constants);
     for (int k = 0; k < slot; k++) same[k] = k;
     for (int r = 0; r < tape->n_runs; r++)
         for (int k = 0; k < tape->runs[r].count; k++, operand++, slot++) {
@@ -56,7 +53,7 @@ static void work_out(Instance *c, const Tape *tape, int *same, unsigned char *kn
             double value = slots[slot];
             int found = result_of(tape->runs[r].operation, one, slots, known, &value);
             same[slot] = found >= 0 ? found : slot;
-            known[slot] = found == -1 ? KNOWN : MOVING;
+            known[slot] = found == -1;
             if (found == -1) slots[slot] = value;
         }
 }
@@ -68,7 +65,7 @@ static void mark_needed(Instance *c, SpecialTape which, const Tape *tape, const 
         if (is_wanted(c, which, k)) needed[same[tape->outputs[k]]] = 1;
     for (int k = tape->n_operations - 1; k >= 0; k--) {
         int slot = tape->first_result + k;
-        if (!needed[slot] || c->work.known_slots[slot] == KNOWN) continue;
+        if (!needed[slot] || c->work.known_slots[slot]) continue;
         needed[same[tape->operands[k].left]] = 1;
         needed[same[tape->operands[k].right]] = 1;
     }
@@ -86,7 +83,7 @@ static void write_special(Instance *c, SpecialTape which, const Tape *tape, cons
             int slot = tape->first_result + k, same = w->same[slot], operation = tape->runs[r].operation;
             if (same != slot) place[slot] = place[same];
             if (same != slot || !needed[slot]) continue;
-            if (w->known_slots[slot] == KNOWN) {
+            if (w->known_slots[slot]) {
                 w->slots[values] = w->slots[slot];
                 place[slot] = values++;
                 continue;

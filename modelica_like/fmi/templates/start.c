@@ -1,6 +1,4 @@
 /* Consistent start values and modes: tables say which start values determine what, Newton's method does the rest. */
-#include <math.h>
-#include <string.h>
 #include "core.h"
 
 #define MODE_ROUNDS 5
@@ -202,14 +200,13 @@ static Result find_steady(Instance *c, double *begun) {
 /* Surfaces that stick against too large a torque are not in equilibrium. */
 static Result check_modes_hold(Instance *c) {
     const Model *m = c->model;
-    const State *s = &c->state;
     double *guards = c->work.guards;
     if (m->n_guards == 0) return RESULT_OK;
     evaluate_now(c, &m->tapes.guards, guards);
     for (int k = 0; k < m->n_guards; k++) {
         const Transition *one = &m->transitions[m->guard_transition[k]];
-        if (guard_active(c, k) && guards[k] > 0)
-            return fail(c, "No steady state was found at t = %.9g s: %s does not stay in its mode.", s->t,
+        if (guard_active(c, k) && guards[k] > 0 && one->target != (int)c->d[one->mode])
+            return fail(c, "No steady state was found at t = %.9g s: %s does not stay in its mode.", c->state.t,
                 text_of(m, one->name));
     }
     return RESULT_OK;
@@ -240,6 +237,7 @@ static Result pass_start(Instance *c) {
     if (round == MODE_ROUNDS)
         return fail(c, "The modes at the start do not settle: they and the start values keep changing each other.");
     rest(c);
+    replace_dependent(c);
     if (solve_now(c, 0) != RESULT_OK || check_singular(c) != RESULT_OK) return RESULT_ERROR;
     if (m->settings->steady && check_modes_hold(c) != RESULT_OK) return RESULT_ERROR;
     c->state.z_valid = c->state.solved = 1;

@@ -1,6 +1,4 @@
 /* Runs tapes: values, derivatives in one direction (tangent), derivatives of one combination of results (adjoint). */
-#include <math.h>
-#include <string.h>
 #include "core.h"
 
 static double sign(double a) { return a < 0 ? -1 : a > 0 ? 1 : a; }

@@ -1,7 +1,5 @@
 /* Derivatives of variables by time along the solution, to any order below ORDERS: Taylor series instead of numbers run
  * through the tapes (A. Griewank, A. Walther: Evaluating Derivatives, ch. 13). They are exact up to rounding. */
-#include <math.h>
-#include <string.h>
 #include "core.h"
 
 #define ORDERS 4
@@ -153,12 +151,11 @@ Result output_rate(Instance *c, uint32_t reference, int order, double *value) {
     const Variable *v = known_variable(c, reference, TYPE_FLOAT64);
     Work *w = &c->work;
     double *terms = w->dots, factorial = 1;
-    int *pivots = w->order;
     if (v == NULL) return RESULT_ERROR;
     if (order < 1 || order >= ORDERS) return fail(c, "Outputs have derivatives of order 1 to %d only.", ORDERS - 1);
     if (v->kind != KIND_VARIABLE && v->kind != KIND_STATE)
         return fail(c, "%s has no time derivative: it is not a variable.", text_of(m, v->name));
-    if (factor_implicit(c, pivots) != RESULT_OK) return RESULT_ERROR;
+    if (factor_implicit(c, w->order) != RESULT_OK) return RESULT_ERROR;
     for (int n = 1; n < ORDERS; n++) memset(terms + (n - 1) * m->n_slots, 0, m->slot_results * sizeof(double));
     terms[0] = 1;
     memcpy(terms + m->slot_u, c->u_rate, m->n_u * sizeof(double));
@@ -168,7 +165,7 @@ Result output_rate(Instance *c, uint32_t reference, int order, double *value) {
         factorial *= n;
         if (m->n_z == 0) continue;
         run_series(c, &m->tapes.alg, n, w->vector); /* without the unknowns' own terms, in which it is linear */
-        lu_solve(m->n_z, w->dense_matrix, pivots, w->vector);
+        lu_solve(m->n_z, w->dense_matrix, w->order, w->vector);
         for (int k = 0; k < m->n_z; k++) terms[(n - 1) * m->n_slots + m->slot_z + k] = -w->vector[k];
     }
     c->variables_valid = 0;

@@ -1,6 +1,4 @@
 /* Values of variables by their references. */
-#include <math.h>
-#include <string.h>
 #include "core.h"
 
 #define OFFSET 1e-12
@@ -155,8 +153,7 @@ Result check_tables(Instance *c) {
 }
 
 static Result set_start(Instance *c, const Variable *v, double value) {
-    State *s = &c->state;
-    if (!before_start(s))
+    if (!before_start(&c->state))
         return refuse_value(c, v, "start values are settable before the end of the initialization only.");
     if (v->kind == KIND_DISCRETE) {
         c->d[v->index] = value;
