@@ -21,7 +21,7 @@ from modelica_like.structure.motion import Motion
 
 SLIDES = " ⇄ "
 """Between the names of two modes: the name of sliding along their border."""
-_MIXED = ("ode", "variables", "moments", "resets", "hold_terms")
+_MIXED = ("ode", "variables", "moments", "resets", "hold_terms", "delays")
 _PLAIN = ("alg", "alg_jacobian", "start_conditions", "start_values", "discrete_starts", "determinants")
 _NEAR = 10.0
 """Distance from the border that a mode may jump and still slide, in changes within the time resolution."""
