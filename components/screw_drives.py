@@ -8,8 +8,7 @@ from components.interfaces import Flange, LinearFlange
 from components.lossy_gears import ConstantEfficiencyGear
 from components.spindles import BallScrew
 from components.springs import ElastoBacklash, SpringDamper
-from modelica_like.errors import LanguageError
-from modelica_like.language import Component, Equations, Parameter, connect, param, series
+from modelica_like.language import Component, Equations, LanguageError, Parameter, connect, param, series
 
 
 class BallScrewDrive(Component):
