@@ -30,6 +30,8 @@ from components.control import Integrator as Integrator
 from components.control import Limiter as Limiter
 from components.control import P as P
 from components.control import Sum as Sum
+from components.converters import RotationalEMF as RotationalEMF
+from components.converters import TranslationalEMF as TranslationalEMF
 from components.couplings import ArcSpring as ArcSpring
 from components.couplings import DualMassFlywheel as DualMassFlywheel
 from components.couplings import ElasticCoupling as ElasticCoupling
