@@ -1,5 +1,6 @@
 """States that follow the motion: mechanisms in coordinates, against their angles and independent solvers."""
 
+import inspect
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,8 @@ from scipy.integrate import quad, solve_ivp
 
 from components import Brake, ConstantTorque, IdealGear, Inertia, Step
 from components.linkages import TwoFlanges
-from modelica_like import Assembly, linearize, sensitivities, simulate
+from modelica_like import Assembly, linearize, load, sensitivities, simulate
+from modelica_like.cosimulation.split import split
 from modelica_like.language import Component, Equations, Parameter, Variable, cos, der, guess, param, sin, var
 from modelica_like.language.expr import TIME
 from modelica_like.netlist.registry import find_type
@@ -363,3 +365,30 @@ def test_the_four_bar_linkage_turns_round(solver):
     assert linkage_inertia(phi) * run["w"] ** 2 == pytest.approx(start, rel=1e-6)
     needed = quad(lambda angle: np.sqrt(linkage_inertia(angle) / start), 0, phi[-1], limit=500, epsabs=1e-11)[0]
     assert needed == pytest.approx(3.0, abs=1e-6)
+
+
+def test_a_cut_drive_starts_like_the_whole(tmp_path):
+    head = "from components.linkages import TwoFlanges\nfrom modelica_like.language import *\n\n"
+    (tmp_path / "loop_of_test.py").write_text(head + inspect.getsource(Loop))
+    (tmp_path / "drive.toml").write_text("""
+[parts]
+rotor = { is = "Inertia", J = "0.05 kg.m2", phi = 0, w = 10 }
+shaft = { is = "SpringDamper", c = "200 N.m/rad", d = "0.5 N.m.s/rad" }
+crank = { is = "Inertia", J = "0.01 kg.m2", phi = 0, w = 8 }
+loop = { is = "loop_of_test:Loop" }
+rocker = { is = "Inertia", J = "0.02 kg.m2" }
+[series]
+drive = ["rotor", "shaft", "crank", "loop", "rocker"]
+[guess]
+"loop.beta" = "1 rad"
+"rocker.phi" = "1.5 rad"
+[simulate]
+until = "1 s"
+""")
+    split(tmp_path / "drive.toml", "shaft", tmp_path / "parts", names=("motor", "machine"), check=False)
+    machine = load(tmp_path / "parts" / "machine.toml")
+    machine.set("crank_flange_a.tau", 0.0)
+    whole, part = simulate(tmp_path / "drive.toml", 1e-3), simulate(machine, 1e-3)
+    assert "loop.state[1]" in part.model.states
+    for name in ("crank.phi", "crank.w", "loop.beta", "rocker.phi", "rocker.w"):
+        assert part[name][0] == pytest.approx(whole[name][0], rel=1e-12, abs=1e-15)
