@@ -266,8 +266,9 @@ class MultiPlateClutch(Clutch):
     """Wet multi-plate clutch with a measured friction law.
 
     The coefficient of sliding friction falls with the cube of the distance to its minimum, and rises linearly above it.
-    The coefficient of static friction is a separate value (M. Pajor, M. Hoffman: Dynamika rozruchu układu ze sprzęgłem,
-    Politechnika Szczecińska, after K. Marchelek: Dynamika obrabiarek, 4.4.2).
+    The coefficient of static friction is a separate value, no less than that of sliding at standstill (M. Pajor,
+    M. Hoffman: Dynamika rozruchu układu ze sprzęgłem, Politechnika Szczecińska, after K. Marchelek: Dynamika
+    obrabiarek, 4.4.2).
     """
 
     icon = icons.MULTI_PLATE
@@ -285,7 +286,7 @@ class MultiPlateClutch(Clutch):
         return iter(())
 
     def static_friction(self) -> Expr:
-        return self.cgeo * self.mu_static * (self.fn_max * self.f_normalized) + self.tau_drag
+        return self.cgeo * maximum(self.mu_static, self.mu(0)) * (self.fn_max * self.f_normalized) + self.tau_drag
 
 
 class Brake(PressedFriction, ShaftInHousing):

@@ -23,6 +23,11 @@ class CentrifugalClutch(SlippingCoupling):
     R: Parameter = param("m", "radius of the drum", min=0)
     mu: Parameter = param("1", "coefficient of friction", default=0.3, min=0)
     f_spring: Parameter = param("N", "force that holds a shoe back", default=0.0, min=0)
+    faint: Parameter = param("N.m", "sliding torque below which the shoes count as free", default=1e-9, min=0)
+
+    def pressed(self) -> Expr:
+        # Without springs the torque leaves zero with the square of the speed: when that happens no solver can tell.
+        return self.static_friction() > self.faint
 
     def sliding_friction(self, speed: Expr | float) -> Expr:
         press = self.m * self.r_m * der(self.flange_a.phi) ** 2 - self.f_spring

@@ -70,7 +70,7 @@ class Backlash(Lossy, CompliantWithRelativeStates, partial=True):
     """
 
     icon = icons.BACKLASH
-    c: Parameter = param("N.m/rad", "stiffness in contact", min=0)
+    c: Parameter = param("N.m/rad", "stiffness in contact", min=1e-12)
     d: Parameter = param("N.m.s/rad", "damping coefficient in contact", default=0.0, min=0)
     b: Parameter = param("rad", "total backlash", min=1e-10)
     phi_rel0: Parameter = param("rad", "relative angle in the middle of the backlash", default=0.0)

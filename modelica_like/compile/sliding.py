@@ -21,7 +21,7 @@ from modelica_like.structure.motion import Motion
 
 SLIDES = " ⇄ "
 """Between the names of two modes: the name of sliding along their border."""
-_MIXED = ("ode", "variables", "moments", "resets", "hold_terms")
+_MIXED = ("ode", "variables", "moments", "resets", "hold_terms", "delays")
 _PLAIN = ("alg", "alg_jacobian", "start_conditions", "start_values", "discrete_starts", "determinants")
 _NEAR = 10.0
 """Distance from the border that a mode may jump and still slide, in changes within the time resolution."""
@@ -32,8 +32,8 @@ _RETURN = 0.1
 _MORE = 6
 """Further guards of a pair."""
 _SAMPLES, _ROUNDING, _LARGE = 5, 1e-12, 1e300
-_ALONG = "both modes lead back to their border: it slides along it"
-_AWAY = "it no longer leads back to the border"
+_ALONG = "both modes lead back to this border, so it slides"
+_AWAY = "one mode leads away from the border, so it slides no longer"
 
 
 @dataclass(frozen=True)
@@ -336,11 +336,11 @@ class _Mix:
         for k, (one, _) in enumerate(self.pairs):
             there, back = others[one.there], others[one.back]
             both, at = {one.first, one.second}, count + _MORE * k
-            slides: Any = {"target": one.number, "because": _ALONG}
             begin += [replace(there, sources=(one.first, one.number), index=at)]
             begin += [replace(back, sources=(one.second, one.number), index=at + 1)]
-            begin += [replace(there, sources=(one.first,), index=at + 2, **slides)]
-            begin += [replace(back, sources=(one.second,), index=at + 3, **slides)]
+            for side, (source, way) in enumerate(((one.first, there), (one.second, back))):
+                why = ": ".join(filter(None, (way.because, _ALONG)))
+                begin.append(replace(way, sources=(source,), target=one.number, index=at + 2 + side, because=why))
             end += [replace(back, sources=(one.number,), index=at + 4, because=_AWAY)]
             end += [replace(there, sources=(one.number,), index=at + 5, because=_AWAY)]
             for number, other in enumerate(others):

@@ -14,12 +14,12 @@ from modelica_like.initialize.slopes import variable_slopes
 from modelica_like.structure.ideal import HEAD, IdealElement, IdealNetwork
 
 _DEPENDENT = 1e-9
-_SLOW = 1e-6
-"""Rate in 1/s, over the equation itself, below which its derivative says nothing about an unknown."""
+_SLOW = 1e3
+"""Rate in 1/s, over the equation itself, of which a part of `_DEPENDENT` is rounding of faster ones."""
 _IMPULSE = 1e12
 """Impulse over what contradicts its being zero: larger than all finite terms."""
 _MET, _LOST = 1e-9, 1e-6
-"""Current or voltage, over the largest one, that is rounding, and that events may remove."""
+"""Current or voltage, over the largest one, that is rounding, and that an event may remove."""
 
 
 def replace_dependent(model: CompiledDae, point: Point) -> None:
@@ -125,8 +125,14 @@ def _largest(model: CompiledDae, sizes: Vector, node: int) -> float:
     return max(own.nominal, *(float(sizes[k]) for k, one in enumerate(model.flat_variables) if one.unit == own.unit))
 
 
-def meet(model: CompiledDae, point: Point) -> bool:
+def meet(model: CompiledDae, point: Point, *, keep: float | None = None) -> bool:
     """Move the states so that they meet the conditions of the modes exactly, and end impulses.
+
+    Args:
+        model: the compiled model.
+        point: with the present modes.
+        keep: currents and voltages that are missed by more, over the largest one, keep their impulses; without it they
+            are an error.
 
     Returns:
         Whether there are such conditions.
@@ -141,12 +147,15 @@ def meet(model: CompiledDae, point: Point) -> bool:
     moved = _moved(rows)
     if not moved:
         return False
-    values = call(model, model.variables, point)
-    nodes = [_zero(network.elements[k], point.d) for k in moved]
-    for k, node in zip(moved, nodes, strict=True):
-        if rows[k, 1] and abs(values[node]) > _LOST * _largest(model, np.abs(values), node):
+    values, nodes = call(model, model.variables, point), list[int]()
+    limit = _LOST if keep is None else keep
+    for k in moved:
+        node = _zero(network.elements[k], point.d)
+        if not rows[k, 1] or abs(values[node]) <= limit * _largest(model, np.abs(values), node):
+            rows[k, 1] = 0.0
+            nodes.append(node)
+        elif keep is None:
             raise _no_valid(model, point, network, rows[k], float(values[node]), node)
-    rows[:, 1] = 0.0
     point.d[network.entries] = rows.ravel()
     slopes = variable_slopes(model, point, nodes)
     point.x = point.x - np.linalg.lstsq(slopes, values[nodes], rcond=None)[0]

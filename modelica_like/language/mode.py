@@ -12,7 +12,7 @@ from modelica_like.errors import LanguageError, Source, UnknownName, did_you_mea
 from modelica_like.language.discrete import eventful, marker
 from modelica_like.language.expr import Expr, Scalar, Symbol, symbol_of
 from modelica_like.language.holding import Hold
-from modelica_like.language.places import NOWHERE
+from modelica_like.language.places import NOWHERE, caller
 
 
 class Mode:
@@ -109,6 +109,15 @@ class BoundMode:
     def __init__(self, mode: Mode, symbol: Symbol) -> None:
         self.mode = mode
         self.symbol = symbol
+
+    def __eq__(self, other: object) -> bool:
+        """Refuse `mode == "stuck"`, which Python would answer with False, once and for all."""
+        if isinstance(other, str):
+            what = f'{self.mode.label} == "{other}" is no condition: the mode changes while the model runs.'
+            raise LanguageError(what, where=caller(), advice=f'Write self.{self.mode.name}.is_("{other}").')
+        return self is other
+
+    __hash__ = object.__hash__
 
     def is_(self, *names: str) -> Expr:
         """Return a condition that is true in some modes.

@@ -19,6 +19,7 @@ from modelica_like.errors import (
     LimitPassed,
     ModelicaLikeError,
     NoGradient,
+    NoValidModes,
     SingularAtStart,
     StepFailed,
     UnknownName,
@@ -35,6 +36,7 @@ from modelica_like.solve.options import Options
 _ERRORS: tuple[tuple[str, type[ModelicaLikeError]], ...] = (
     ("The integrator gave up|The step from", StepFailed),
     ("Modes still switch|Discrete variables do not|Events follow each other", Chattering),
+    (r"At t = \S+ s no combination", NoValidModes),
     ("The Jacobian is singular|The derivative of .* is not finite", SingularAtStart),
     (r"t = \S+ s: ", LimitPassed),
     ("Two start values|A start value of", ContradictingStart),

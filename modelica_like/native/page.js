@@ -68,7 +68,7 @@ function values(result, variable) {
   if (columns.includes(-1)) return []; // nobody asked for it then
   const unit = PAGE.units[variable.unit], at = (k, n) => n < 0 ? result.times[k] : result.outputs[k * width + columns[n]];
   const own = variable.tree ? (_, k) => valueOf(variable.tree, (n) => at(k, n)) : (_, k) => at(k, 0);
-  return result.times.map(own).map((value) => (value - unit.offset) / unit.factor);
+  return result.times.map(own).map((value) => variable.driving * (value - unit.offset) / unit.factor);
 }
 
 function range(curves) {
@@ -131,7 +131,7 @@ class Picture {
       this.readers.push((n) => value.textContent = n === null ? "" : `\u2002${short(curves[k][n])}`);
       const about = { title: `${one.description || one.name}; a click takes it away` };
       about.onclick = () => (shown.delete(one), ask());
-      return element("button", about, mark, one.name, value);
+      return element("button", about, mark, one.driving < 0 ? `\u2212${one.name}` : one.name, value);
     });
     const title = element("span", {}, [unit.quantity, unit.text].filter(Boolean).join(" in "));
     const made = element("figure", { innerHTML: this.svg(HEIGHT, grid.join("") + paths.join("")) });

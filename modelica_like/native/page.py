@@ -166,7 +166,7 @@ def page_content(model: CompiledDae, signals: Sequence[Signal], until: float, op
         "modes": [
             {
                 "name": one.path, "reference": variables.by_name[one.path].reference, "names": one.names or None,
-                "unit": units.number(ONE),
+                "unit": units.number(ONE), "driving": 1,
             }
             for one in model.flat_discretes
             if not one.hidden
@@ -225,13 +225,14 @@ def _variables(
             yield {
                 "name": one.path, "reference": known[one.path].reference, "description": one.description,
                 "unit": units.number(parse_unit(display.of(one.path))), "shown": one.path in names,
+                "driving": one.driving,
             }  # fmt: skip
     for one in signals:
         if one.name not in variables:
             references: list[int] = []
             yield {
                 "name": one.name, "tree": _tree(one.formula, known, references), "references": references,
-                "unit": units.number(parse_unit(one.shown_in(display))), "shown": True,
+                "unit": units.number(parse_unit(one.shown_in(display))), "shown": True, "driving": 1,
             }  # fmt: skip
 
 

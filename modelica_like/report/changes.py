@@ -94,7 +94,8 @@ def _visible(run: Trajectories, behind: Sequence[Change], *, timed: bool) -> lis
             (numbers if one.kind == "number" else found).append(told)
     if timed or found:  # numbers change at every tick
         return found
-    return numbers or [Change(at, one.owner or run.model.name, "", "", one.because, one.source) for one in behind]
+    owners = (Change(at, one.owner or run.model.name, "", "", one.because, one.source) for one in behind)
+    return numbers or list(dict.fromkeys(owners))  # several relations of one line say the same
 
 
 def _value(kind: str, value: float) -> str:

@@ -46,6 +46,8 @@ _CANNOT = {
     ),
     "rest": " Nothing comes to rest: that takes impacts of a mode that holds a motion, with a restitution.",
 }
+_GIVEN_BACK = 1e-3
+"""Current, over the largest one, that is none where modes return: it ends within the time resolution."""
 SAME_TIME = 1e-12
 """Relative distance of two equal times."""
 
@@ -78,6 +80,7 @@ class Instants:
         self._instants: deque[float] = deque(maxlen=_CHATTER_INSTANTS)
         self._resting = False
         self._round = 0
+        self._modes = [one.mode for one in model.ideal.elements] if model.ideal else []
         self.timed = [t for t in model.transitions if t.timed]
         self._numbers = {id(transition): k for k, transition in enumerate(model.transitions)}
 
@@ -114,7 +117,7 @@ class Instants:
             SingularAtStart: the equations have no unique solution after it.
         """
         changes = bool(self.model.update_rows)
-        ideal = self.model.ideal.elements if self.model.ideal else ()
+        ideal, earlier = self._modes, now.d
         if not (wanting or (begins and (changes or ideal))):
             return
         noted = len(self.record.events)
@@ -136,6 +139,10 @@ class Instants:
                 self._fire(now, wanting if number < _TOGETHER else [min(wanting, key=self._number)])
                 self._solve(now)
                 self._stop_motions(now, before)
+                if ideal:
+                    back = number and np.array_equal(now.d[ideal], earlier[ideal])
+                    meet(self.model, now, keep=_GIVEN_BACK if back else 0.0)
+                    earlier = before
             changes = self._update(now)
             wanting = [*self.due(now), *self.guards.wanting(now)]
         else:

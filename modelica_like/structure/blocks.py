@@ -73,14 +73,23 @@ class BlockSolver:
     def __init__(
         self, residual: Any, unknowns: Any, volatile: Any, rates: Sequence[int], kept: Collection[int] = ()
     ) -> None:
-        self.residual = ca.vertsplit(residual) if residual.numel() else []
         self.unknowns = ca.vertsplit(unknowns) if unknowns.numel() else []
         self.jacobian = ca.jacobian(residual, unknowns)
+        self.residual = self._without_cancelled(residual)
         self.rows = _places_by_row(self.jacobian.sparsity())
         self.safe = self._safe_entries(volatile)
         self.rates, self.kept = set(rates), set(kept)
         self.first = self.rates - {c for r, row in enumerate(self.rows) for c in row if (r, c) not in self.safe}
         self.solved = Solved()
+
+    def _without_cancelled(self, residual: Any) -> list[Any]:
+        """Take out unknowns that cancel: the current of a loop that hangs at one node enters and leaves it."""
+        rows = ca.vertsplit(residual) if residual.numel() else []
+        for row, column, slope in zip(*self.jacobian.sparsity().get_triplet(), self.jacobian.nonzeros(), strict=True):
+            if slope.is_zero():
+                rows[row] = ca.substitute(rows[row], self.unknowns[column], ca.SX(0))
+        self.jacobian = ca.sparsify(self.jacobian)
+        return rows
 
     def _safe_entries(self, volatile: Any) -> set[tuple[int, int]]:
         """Entries of the Jacobian that depend on parameters only: they cannot become zero during a run."""

@@ -23,6 +23,8 @@ from modelica_like.flatten.model import FlatModel
 
 HEAD = 3
 """Values before the combination."""
+_BACK = 1e4
+"""Rate in 1/s at which states come back to the condition: unknowns that are known within tolerances let them drift."""
 _CONDUCTANCE = 1e6
 """Reaction over what contradicts its being zero, where nothing else determines the reaction."""
 
@@ -95,6 +97,7 @@ def complete(reduced: ReducedDae, ideals: list[IdealElement], rows: list[int]) -
     network = IdealNetwork(elements, flat.d.numel(), HEAD + size)
     table = ca.SX.sym("ideal", network.width, len(elements))
     rates = ca.jtimes(reduced.alg, reduced.x, reduced.ode) + ca.jtimes(reduced.alg, flat.time, ca.SX(1))
+    rates += _BACK * reduced.alg
     missed = ca.substitute(reduced.alg, reduced.z, ca.SX.zeros(size))  # linear: what is left of it is the condition
     zeros = [reduced.values[list(one.zeros)] for one in elements]
     reactions = [ca.if_else(flat.d[one.mode] == 0, pair[1], pair[0]) for one, pair in zip(elements, zeros, strict=True)]

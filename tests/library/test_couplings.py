@@ -8,6 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from components import (
+    CentrifugalClutch,
     ConstantSpeed,
     ConstantTorque,
     Damper,
@@ -155,3 +156,18 @@ def test_break_away_with_bristles_against_an_independent_solver() -> None:
         assert np.max(np.abs(run[name] - theirs)) <= 1e-5 * np.ptp(theirs)
     assert np.min(run["part.loss_power"]) >= -1e-9
     assert run.energy().closure <= 1e-8
+
+
+def test_a_centrifugal_clutch_without_springs_starts_softly() -> None:
+    """The torque grows with the fourth power of the time. Of the momentum 1/2·100·t² all is in the two wheels."""
+    parts = {
+        "ramp": Ramp(height="100 N.m", duration="1 s"), "motor": Torque(), "J1": Inertia(J=0.1),
+        "clutch": CentrifugalClutch(m=0.05, r_m=0.05, R=0.1), "J2": Inertia(J=0.3),
+    }  # fmt: skip
+    shaft = {"shaft": ["motor", "J1", "clutch", "J2"]}
+    run = simulate(Assembly("d", parts=parts, series=shaft, connect={"c": ["ramp.y", "motor.tau"]}), 1.0, start="rest")
+    assert [event.after for event in run.events if event.mode == "clutch.mode"] == ["backward"]
+    assert 0.1 * run.final["J1.w"] + 0.3 * run.final["J2.w"] == pytest.approx(50.0, rel=1e-7)
+    # J2 follows the torque n·mu·R·m·r_m·w².
+    work = np.trapezoid(0.6 * 0.1 * 0.05 * 0.05 * run["J1.w"] ** 2, run.time)
+    assert 0.3 * run.final["J2.w"] == pytest.approx(work, rel=1e-5)

@@ -88,11 +88,12 @@ def test_law_of_the_multi_plate_clutch() -> None:
             "1 ms",
         )
         assert -run["clutch.tau"][0] == pytest.approx(2000.0 * mu + 2.5, rel=1e-12)
-    hold = 2000.0 * 0.133
-    for factor, moves in ((0.999, False), (1.001, True)):
+    # What sticks bears no less than what slips.
+    for factor, static, mu in ((0.999, 0.133, 0.133), (1.001, 0.133, 0.133), (0.999, 0.0, 0.04 + 3.023e-5 * 12.57**3)):
+        moves, clutch["mu_static"] = factor > 1, static
         run = simulate(
             shaft(
-                torque=ConstantTorque(tau_constant=factor * hold),
+                torque=ConstantTorque(tau_constant=factor * 2000.0 * mu),
                 mass=still(),
                 clutch=MultiPlateClutch(**clutch),
                 wall=ConstantSpeed(w_fixed=0.0),

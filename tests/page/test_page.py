@@ -60,9 +60,10 @@ def said(browser: Any) -> str:
 
 
 def curves(browser: Any) -> dict[str, np.ndarray]:
-    """What the page shows, in its units; and times."""
+    """What the page shows, in its units and with the signs of variables; and times."""
     script = """({time: [...picture.times], events: [...picture.result.events],
-      ...Object.fromEntries([...shown, ...MODES].map((one) => [one.name, [...values(picture.result, one)]]))})"""
+      ...Object.fromEntries([...shown, ...MODES].map((one) =>
+        [one.name, [...values(picture.result, one)].map((value) => one.driving * value)]))})"""
     return {name: np.array(values) for name, values in browser.run(script).items()}
 
 
@@ -245,7 +246,9 @@ def test_curves_come_and_go_and_tell_their_values(browser: Any, pages: dict[str,
     assert re.fullmatch(r"t = (0\.2|0\.19\d+|0\.20\d+) s · clutch\.mode \w+.*", read)
     values = browser.run("[...document.querySelectorAll('figcaption button')].map((one) => one.textContent)")
     names = [one.partition("\u2002")[0] for one in values]
-    assert names == ["motor.w", "clutch.w_rel", "hub.w", "clutch.tau", "table.v", "table.s"]
+    assert names == ["motor.w", "clutch.w_rel", "hub.w", "\u2212clutch.tau", "table.v", "table.s"], (
+        "what drives is positive"
+    )
     assert float(values[0].partition("\u2002")[2]) == pytest.approx(200 * np.pi, abs=0.01)
     browser.run(f"([...document.querySelectorAll('figcaption button')].at(-1).click(), {wait})")
     assert "position" not in browser.run("document.getElementById('curves').textContent")

@@ -25,6 +25,7 @@ from components import (
     Torque,
 )
 from modelica_like import Assembly, Component, Solution, build, sensitivities, simulate
+from modelica_like.errors import NoValidModes
 
 Solver = Literal["idas", "native"]
 TIGHT: dict[str, Any] = {"rtol": 1e-10, "atol": 1e-12}
@@ -140,6 +141,34 @@ def test_current_at_the_start_finds_its_diode(solver: Solver, i: float) -> None:
     run = simulate(freewheeling(i), 1e-3, solver=solver, **TIGHT)
     assert switched(run, "D") == [(0.0, "on")]
     assert run.final["L.i"] == pytest.approx(i * exp(-5), rel=1e-7, abs=1e-11)
+
+
+@pytest.mark.parametrize("solver", ["idas", "native"])
+def test_current_that_ends_within_the_time_resolution_is_none(solver: Solver) -> None:
+    """Where an importer stops late, a diode takes the rest over and would give it back at once."""
+    left = circuit(
+        {"x": ["L.n", "D.p"], "in": ["U.p", "D.n"], "minus": ["U.n", "L.p", "earth.p"]},
+        U=ConstantVoltage(V=24.0), D=IdealDiode(), L=Inductor(L=1e-3, i=1.2e-6),
+    )  # fmt: skip
+    run = simulate(left, 1e-3, solver=solver)
+    assert switched(run, "D") == [(0.0, "on"), (0.0, "off")]
+    assert run.final["L.i"] == pytest.approx(0, abs=1e-15)
+
+
+def test_inputs_may_not_move_what_modes_fix() -> None:
+    """A step of the voltage behind the diode: it blocks; one beyond the capacitor's voltage would take all at once."""
+    model = circuit(
+        {"a": ["U.p", "D.p"], "b": ["D.n", "C.p", "R.p"], "minus": ["U.n", "C.n", "R.n", "earth.p"]},
+        U=SignalVoltage(v_ref=1.0), D=IdealDiode(), C=Capacitor(C=1e-3, v=1.0), R=Resistor(R=10.0),
+    )  # fmt: skip
+    handle = build(model).native(["U.v_ref"], ["C.v", "D.i"])
+    handle.reset(until=1.0)
+    assert handle.step(0.001).tolist() == pytest.approx([1.0, 0.1])
+    handle.inputs[0] = 0.5
+    assert handle.step(0.002).tolist() == pytest.approx([exp(-0.1), 0.0])
+    handle.inputs[0] = 2.0
+    with pytest.raises(NoValidModes, match="is valid: D would take 1"):
+        handle.step(0.003)
 
 
 def test_parallel_elements_share_the_current() -> None:

@@ -24,6 +24,7 @@ from modelica_like.language import (
     boolean,
     clock,
     connect,
+    delay,
     der,
     discrete,
     if_,
@@ -73,7 +74,7 @@ def test_a_relay_tracks_a_ramp(solver):
     after = run.time > 0.6 + 1e-9
     np.testing.assert_allclose(run["x"][after], run["r"][after], rtol=1e-14)
     np.testing.assert_allclose(run["u"][after], 0.5, rtol=1e-12)
-    assert "slides along it" in run.model.transitions[run.events[0].transition].because
+    assert "so it slides" in run.model.transitions[run.events[0].transition].because
 
 
 def test_a_start_on_the_border_slides_at_once():
@@ -245,6 +246,27 @@ def test_a_boolean_variable_slides_with_its_relation(solver, start):
     run = simulate(Room(inside=start), 600.0, on_chattering="slide", solver=solver)
     final = [run.final[name] for name in ("inside", "power", "read", "heating")]
     assert final == pytest.approx([300.0, 200.0, 200.0, 0.0], rel=1e-9)
+
+
+class Late(Component):
+    """What slides, seen later."""
+
+    x: Variable = var("1", "what follows")
+    u: Variable = var("1/s", "speed")
+    seen: Variable = var("1/s", "speed before")
+    T: Parameter = param("s", "time", default=1.0)
+    lag: Parameter = param("s", "delay", default=0.3)
+
+    def equations(self) -> Equations:
+        yield self.u == if_(self.x > 0.5 * sin(self.time / self.T), -1, 1) / self.T
+        yield der(self.x) == self.u
+        yield self.seen == delay(self.u, self.lag)
+
+
+def test_a_delay_sees_the_mean():
+    """x = sin(t) / 2 from the meeting on, and u = cos(t) / 2."""
+    run = simulate(Late(x=-0.1), 3.0, on_chattering="slide", rtol=1e-9)
+    assert [run.final["u"], run.final["seen"]] == pytest.approx([math.cos(3.0) / 2, math.cos(2.7) / 2], abs=1e-7)
 
 
 class Part(Component):

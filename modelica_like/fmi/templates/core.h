@@ -115,7 +115,7 @@ typedef struct {
     double *variables, *guards, *guards_before, *looks, *seen_rates, *seen_indicators, *seen_derived;
     double *start_unknowns, *start_values, *start_residual;
     double *begun; /* motions that may be held, where the search for a steady state began */
-    double *d_before, *d_fired, *reset_values, *target_values, *respond_d, *respond_z, *rates, *x_kept;
+    double *d_before, *d_earlier, *d_fired, *reset_values, *target_values, *respond_d, *respond_z, *rates, *x_kept;
     double *weights, *base_weights, *use, *best, *kept_z, *reactions, *sizes, *zeros;
     int *order; /* pivots of the implicit equations */
     int *targets, *standing, *places, *member, *pivots, *same, *places_of_slots, *special_outputs;
@@ -220,7 +220,10 @@ void rest_rates(Instance *c, double *rates);
 /* ideal.c */
 void replace_dependent(Instance *c);
 int pushed(Instance *c);
-Result meet(Instance *c, int *any);
+#define GIVEN_BACK 1e-3 /* of the largest current: none where modes return, as it ends within the time resolution */
+Result meet(Instance *c, double keep, int *any);
+Result renew(Instance *c);
+int same_modes(const Instance *c, const double *before);
 /* impacts.c */
 Result stop_motions(Instance *c, const double *before, Impacts *impacts);
 /* events.c */

@@ -215,13 +215,13 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
     impacts->struck = 0;
     memset(impacts->entered, 0, (size_t)m->n_holds);
     if (find_wanting(c, wanting, !located)) {
-        if (m->n_ideals > 0 && !pushed(c) && meet(c, &met) != RESULT_OK) return RESULT_ERROR;
+        if (m->n_ideals > 0 && !pushed(c) && meet(c, -1, &met) != RESULT_OK) return RESULT_ERROR;
         if (crowded(c) != RESULT_OK || share_anew(c, wanting) != RESULT_OK) return RESULT_ERROR;
     }
     for (int round = 0; round < ROUNDS + ALONE * (m->n_holds + m->n_ideals); round++) {
         int any = 0;
         if (!changes && (round > 0 || pushed(c)) && !any_of(wanting, m->n_transitions)) {
-            if (meet(c, &met) != RESULT_OK) return RESULT_ERROR;
+            if (meet(c, -1, &met) != RESULT_OK) return RESULT_ERROR;
             if (met) find_wanting(c, wanting, 1);
         }
         for (int k = 0; k < m->n_transitions; k++) {
@@ -235,6 +235,7 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
             return RESULT_OK;
         }
         c->round = round;
+        memcpy(c->work.d_earlier, before, (size_t)m->n_d * sizeof(double));
         memcpy(before, c->d, (size_t)m->n_d * sizeof(double));
         if (any && fire(c, wanting, impacts) != RESULT_OK) return RESULT_ERROR;
         if (any) share(c);
@@ -242,6 +243,10 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
         if (any && (solve_now(c, 0) != RESULT_OK || stop_motions(c, before, impacts) != RESULT_OK ||
                        check_singular(c) != RESULT_OK))
             return RESULT_ERROR;
+        if (any && m->n_ideals > 0) {
+            double keep = round > 0 && same_modes(c, c->work.d_earlier) ? GIVEN_BACK : 0;
+            if (meet(c, keep, &met) != RESULT_OK) return RESULT_ERROR;
+        }
         if (update_once(c, impacts, &changes) != RESULT_OK) return RESULT_ERROR;
         memset(wanting, 0, m->n_transitions);
         if (find_wanting(c, wanting, 1) && !c->bounded) {
@@ -260,7 +265,7 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
 Result update_discrete(Instance *c, int *restart, double *next) {
     double before = c->state.n_events;
     *restart = c->state.inputs_changed;
-    if (*restart && check_tables(c) != RESULT_OK) return RESULT_ERROR;
+    if (*restart && (check_tables(c) != RESULT_OK || renew(c) != RESULT_OK)) return RESULT_ERROR;
     c->state.inputs_changed = 0;
     if (handle_event(c) != RESULT_OK) return RESULT_ERROR;
     *restart |= c->state.n_events != before;

@@ -5,7 +5,7 @@
 
 #define HEAD 3
 #define DEPENDENT_ROW 1e-9
-#define SLOW 1e-6
+#define SLOW 1e3
 #define IMPULSE 1e12
 #define MET 1e-9
 #define LOST 1e-6
@@ -138,26 +138,48 @@ int pushed(Instance *c) {
     return any;
 }
 
-/* Move the states so that they meet the conditions of the modes, and end impulses; an error where they cannot. */
-Result meet(Instance *c, int *any) {
+/* Move the states so that they meet the conditions of the modes, and end impulses. What is missed by more than `keep`
+ * keeps its impulse; if that is negative, it is an error. */
+Result meet(Instance *c, double keep, int *any) {
     const Model *m = c->model;
     const double *values = variables_now(c);
+    double limit = keep < 0 ? LOST : keep;
     int *nodes = c->work.places;
     *any = 0;
     for (int k = 0; k < m->n_ideals; k++) {
-        int node = zero_of(c, k);
+        int node = zero_of(c, k), met;
         if (!moved(c, k)) continue;
-        nodes[(*any)++] = node;
-        if (row_of(c, k)[1] != 0 &&
-            fabs(values[node]) > LOST * fmax(m->ideals[k].nominal, largest_like(m, values, node)))
+        met = row_of(c, k)[1] == 0 ||
+              fabs(values[node]) <= limit * fmax(m->ideals[k].nominal, largest_like(m, values, node));
+        if (!met && keep < 0)
             return fail(c,
                 "At t = %.9g s no combination of modes is valid: %s would take %.4g at once. Give the current another "
                 "path (a freewheeling diode), or put a resistance in series with a capacitor.",
                 c->state.t, text_of(m, m->ideals[k].name), fabs(values[node]));
+        if (!met) continue;
+        nodes[(*any)++] = node;
         row_of(c, k)[1] = 0;
     }
     if (*any == 0) return RESULT_OK;
     move_states(c, nodes, NULL, *any);
     c->variables_valid = 0;
     return solve_now(c, 0);
+}
+
+/* Inputs or parameters have changed, and the conditions with them. */
+Result renew(Instance *c) {
+    int any;
+    if (c->model->n_ideals == 0) return RESULT_OK;
+    replace_dependent(c);
+    return meet(c, GIVEN_BACK, &any);
+}
+
+/* Whether ideal elements have the modes that they had before. */
+int same_modes(const Instance *c, const double *before) {
+    int same = c->model->n_ideals > 0;
+    for (int k = 0; k < c->model->n_ideals; k++) {
+        int mode = c->model->ideals[k].mode;
+        same &= c->d[mode] == before[mode];
+    }
+    return same;
 }

@@ -131,8 +131,9 @@ static uint64_t place_work(const Model *m, Work *w, double *memory) {
 static uint64_t place_events(const Model *m, Work *w, double *memory) {
     uint64_t n_x = m->n_x, n_d = m->n_d, n_holds = m->n_holds, members = m->most_members + 1;
     const Room rooms[] = {{n_x, 8, {&w->strike.jump, &w->impacts.x, &w->rates, &w->x_kept}}, {n_x, 1, {&w->known}},
-        {n_d, 8, {&w->d_before, &w->d_fired, &w->best, &w->respond_d}}, {n_d, 1, {&w->decided, &w->changed}},
-        {m->n_transitions, 1, {&w->wanting}}, {n_holds, sizeof(Terms), {&w->terms, &w->strike_terms}},
+        {n_d, 8, {&w->d_before, &w->d_earlier, &w->d_fired, &w->best, &w->respond_d}},
+        {n_d, 1, {&w->decided, &w->changed}}, {m->n_transitions, 1, {&w->wanting}},
+        {n_holds, sizeof(Terms), {&w->terms, &w->strike_terms}},
         {n_holds, 8, {&w->weights, &w->base_weights, &w->use, &w->strike.before, &w->strike.approach}},
         {n_holds, 8, {&w->strike.impulse, &w->strike.reaction, &w->begun}}, {n_holds, sizeof(int), {&w->standing}},
         {n_holds, 1, {&w->held, &w->impacts.entered}},

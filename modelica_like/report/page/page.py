@@ -68,7 +68,8 @@ def report(drive: Component | None, run: Trajectories, *, show: Sequence[str] = 
     # Of the parts that are not inside of others, the last one is closest to the load.
     paths = ([one["path"] for one in panel["curves"] if one["path"]] for panel in drawn["panels"])
     ends = [min(reversed(some), key=lambda path: path.count(".")) for some in paths if some]
-    hint = f"{_READ} {escape(drawn.pop('left'))}" if drawn["panels"] else _NO_CURVES
+    left = escape(drawn.pop("left")).replace("--show", "<code>--show</code>")
+    hint = f"{_READ} {left}" if drawn["panels"] else _NO_CURVES
     sections = [
         ("Schematic", f'<div class="wide">{schematic(drive, background=False)}</div>' if drive else ""),
         ("What happens", _happens(drive, run)),
