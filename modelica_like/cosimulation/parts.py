@@ -14,7 +14,7 @@ from modelica_like.errors import ModelicaLikeError, NetlistError, StructureError
 from modelica_like.flatten import flatten
 from modelica_like.fmi.dependencies import Following
 from modelica_like.fmi.terminals import adaptor_for, connector_at
-from modelica_like.language import Assembly, Component
+from modelica_like.language import Assembly, Component, guess
 from modelica_like.language.fields import Input, Output
 from modelica_like.language.formula import Formula
 from modelica_like.netlist.convert import value_text
@@ -104,18 +104,24 @@ class Maker:
         """Return a group that starts like the whole drive; `values` are those of the drive, in SI units."""
         made = self.bare(group, ends)
         model = compile(reduce(flatten(made, open_inputs=True)))
-        given: set[int] = set()
+        given, kept = set[int](), dict[str, float]()
         for entry in model.starts:
             if entry.strength != "fixed":
                 continue
-            owner, _, name = model.flat_variables[entry.node].path.rpartition(".")
+            path = model.flat_variables[entry.node].path
+            owner, _, name = path.rpartition(".")
             if entry.state is not None and entry.state[0] not in given:
                 given.add(entry.state[0])
+            elif entry.state is None and path in values and model.following:
+                kept[path] = values[path]  # states that follow the motion have no start values of their own
             else:  # other variables follow, and two start values of one motion could contradict each other
                 made.find(owner)._starts.pop(name, None)
         for place, path in enumerate(model.states):
             if place not in given and path in values:
                 made.set(path, values[path])
+        moved = (path for some in model.following.values() for path in some if path in values)
+        for path, value in ({path: guess(values[path]) for path in moved} | kept).items():
+            made.set(path, value)
         return made
 
     def _parameters(self, group: int, parts: Iterable[Component | list[Component]]) -> dict[str, Any]:

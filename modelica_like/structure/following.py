@@ -29,6 +29,8 @@ from modelica_like.units import ONE
 
 _LEAST = 0.25
 _SAMPLES = 200
+_TIMES = -3, 6
+"""Powers of ten of the times of samples, in s."""
 _VANISHES = 1e-3
 """Smallest determinant, relative to the largest one among samples, that is no sign of a singular choice."""
 _OFF = 0.2
@@ -55,9 +57,10 @@ class Group:
 
 @dataclass(frozen=True, eq=False)
 class Following:
-    """States that follow the motion of a group of constraints.
+    """States that follow the motion.
 
     Attributes:
+        group: the constraints.
         moved: names of the variables.
         mode: position in d of a mode with one name, which every choice enters again; the weights follow it, those of
             each state together.
@@ -165,14 +168,12 @@ def _vanishes(system: System, rows: list[int], dependent: list[int]) -> bool:
     function = ca.Function("slopes", [system.everything, model.p, model.d, model.time], [slopes])
     nominal = np.array([level.nominal for level in system.levels])[:, None]
     points = nominal * chance.uniform(-np.pi, np.pi, (len(nominal), _SAMPLES))
-    values = function.map(_SAMPLES)(points, *_constants(system), chance.uniform(0, 1, (1, _SAMPLES))).full()
-    sizes = np.linalg.det(values.T.reshape(_SAMPLES, len(rows), -1))
-    sizes = sizes[np.isfinite(sizes)]
-    return bool(len(sizes)) and bool(sizes.min() < 0 < sizes.max() or _near_zero(np.abs(sizes)))
-
-
-def _near_zero(sizes: Any) -> bool:
-    return bool(sizes.min() < _VANISHES * sizes.max())
+    times = 10.0 ** chance.uniform(*_TIMES, (1, _SAMPLES))
+    values = function.map(_SAMPLES)(points, *_constants(system), times).full()
+    found = np.linalg.det(values.T.reshape(_SAMPLES, len(rows), -1))
+    found = found[np.isfinite(found)]
+    sizes = np.abs(found)
+    return bool(len(found) and (found.min() < 0 < found.max() or sizes.min() < _VANISHES * sizes.max()))
 
 
 def _constants(system: System) -> tuple[list[float], list[float]]:
@@ -204,7 +205,7 @@ def follow(system: System, groups: tuple[Group, ...]) -> tuple[Following, ...]:
         groups: found after the index reduction of the same system.
     """
     numbers: Counter[str] = Counter()
-    return tuple(_follow(system, group, numbers) for group in groups if group.rows)
+    return tuple(_follow(system, group, numbers) for group in groups if 0 < len(group.rows) < len(group.levels))
 
 
 def _follow(system: System, group: Group, numbers: Counter[str]) -> Following:
