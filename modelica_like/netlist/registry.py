@@ -144,6 +144,8 @@ def find_type(name: str, folder: Path | None = None) -> type[Component]:
         types = library_types()
         hint = did_you_mean(name, types) or "."
         advice = "`modelica-like library` lists all types." if types else "No component library is installed."
+        module, _, last = name.rpartition(".")
+        advice += f" A class of a module is written '{module}:{last}'." if module else ""
         raise UnknownName(f"There is no component type '{name}'{hint}", advice=advice)
     return kind
 

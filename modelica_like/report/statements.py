@@ -65,6 +65,8 @@ class _Reader:
             match one:
                 case ast.Expr(value=ast.Constant()) | ast.Return(value=None) | ast.Raise():
                     pass
+                case ast.Return(value=ast.Call(func=ast.Name(id="iter"))):  # nothing is yielded
+                    pass
                 case ast.Expr(value=ast.Yield(value=ast.expr() as value)):
                     yield self.text(of, value, names)
                 case ast.Expr(value=ast.YieldFrom(value=ast.Call() as call)):
@@ -144,6 +146,13 @@ class _Replace(ast.NodeTransformer):
 
     def __init__(self, reader: _Reader, of: Function, names: Names) -> None:
         self._reader, self._of, self._names = reader, of, names
+
+    def visit_UnaryOp(self, node: ast.UnaryOp) -> ast.AST:
+        match self.generic_visit(node):
+            case ast.UnaryOp(op=ast.USub(), operand=ast.UnaryOp(op=ast.USub(), operand=twice)):
+                return twice
+            case found:
+                return found
 
     def visit_Name(self, node: ast.Name) -> ast.expr:
         if node.id in self._names:

@@ -54,6 +54,8 @@ def test_every_type_can_be_described(run: CliRunner, name: str) -> None:
     for field in library_types()[name]._class_fields.values():
         assert field.name in result.stdout
         assert field.unit_text in result.stdout
+    assert "iter(" not in result.stdout
+    assert "--" not in result.stdout
 
 
 def test_a_description_has_declarations_equations_and_events(run: CliRunner) -> None:

@@ -14,6 +14,12 @@ MESSAGES = {
         '  in bad.toml:2 `k = { is = "Cluch" }`\n'
         "`modelica-like library` lists all types.",
     ),
+    "class of a module with a dot": (
+        '[parts]\nk = { is = "mine.Hub" }\n',
+        "There is no component type 'mine.Hub'.\n"
+        '  in bad.toml:2 `k = { is = "mine.Hub" }`\n'
+        "`modelica-like library` lists all types. A class of a module is written 'mine:Hub'.",
+    ),
     "unknown parameter": (
         '[parts]\nm = { is = "Mass", n = 3 }\n',
         "Mass has no parameter or variable 'n'. It has m, angle, g, s, v, L.\n"
