@@ -20,6 +20,7 @@ _NAMES = {
     "commutated_machines": "CommutatedDCMachine",
     "contacts": "DogClutch RigidBacklash",
     "control": "PI PID ClutchActuator Feedback FirstOrder Gain Integrator Limiter P Sum",
+    "converters": "RotationalEMF TranslationalEMF",
     "couplings": "ArcSpring DualMassFlywheel ElasticCoupling HystereticCoupling OldhamCoupling RuptureCoupling",
     "dc_machines": "PermanentMagnetDCMachine SeparatelyExcitedDCMachine SeriesDCMachine ShuntDCMachine",
     "drag_losses": "ChurningGear DeepGrooveBearing OpenPlates",
@@ -76,7 +77,7 @@ _NAMES = {
         "TranslationalSpringDamper"
     ),
     "stepped_signals": "BooleanPulse BooleanStep BooleanTable StepTable",
-    "switching": "Contactor Diode",
+    "switching": "Contactor Diode IdealDiode IdealSwitch IdealThyristor",
     "synchronisers": "Synchroniser",
     "synchronous_machines": "MappedDrive PMSynchronousDrive PMSynchronousMachine",
     "thermal": (

@@ -190,6 +190,9 @@ from components.stepped_signals import BooleanTable as BooleanTable
 from components.stepped_signals import StepTable as StepTable
 from components.switching import Contactor as Contactor
 from components.switching import Diode as Diode
+from components.switching import IdealDiode as IdealDiode
+from components.switching import IdealSwitch as IdealSwitch
+from components.switching import IdealThyristor as IdealThyristor
 from components.synchronisers import Synchroniser as Synchroniser
 from components.synchronous_machines import MappedDrive as MappedDrive
 from components.synchronous_machines import PMSynchronousDrive as PMSynchronousDrive

@@ -213,6 +213,8 @@ CURRENT = Icon(44, 44, paper=_circle(0, 0, 18), lines="M22 -16 h-22 v-2 M22 16 h
 SWITCH = Icon(48, 24, lines="M-24 0 h12 L10 -11 M12 0 h12", solid=f"{_circle(-12, 0, 2.5)} {_circle(12, 0, 2.5)}",
               ports={"closed": "N"})  # fmt: skip
 DIODE = Icon(40, 22, lines="M-20 0 h12 M8 0 h12", solid="M-8 -9 L8 0 L-8 9 Z", heavy="M8 -10 v20")
+THYRISTOR = Icon(40, 26, lines="M-20 0 h12 M8 0 h12 M8 0 L14 -12", solid="M-8 -9 L8 0 L-8 9 Z", heavy="M8 -10 v20",
+                 ports={"fire": "N"})  # fmt: skip
 CONTACTOR = Icon(
     52, 44, paper=_rect(14, 8, 0, -11), lines="M-26 12 h14 L8 2 M12 12 h14 M-2 6 v-8",
     solid=f"{_circle(-12, 12, 2.5)} {_circle(12, 12, 2.5)}",
@@ -225,6 +227,7 @@ BRIDGE = Icon(56, 52, paper=_rect(28, 26), lines="M-10 -14 v28 M10 -14 v28 M-10 
 MOTOR = Icon(52, 50, paper=_circle(0, 0, 24), lines="M-26 -14 h6.5 M-26 14 h6.5 M24 0 h2", text="M", ports={
     "ap": ("W", -14), "an": ("W", 14), "ep": "N", "en": "S", "flange": "E",
 })  # fmt: skip
+EMF = replace(MOTOR, key=("k",), ports={"p": ("W", -14), "n": ("W", 14), "flange": "E"})
 VOLTMETER = Icon(36, 36, paper=_circle(0, 0, 17), text="V", ports={"v": "S"})
 AMMETER = Icon(40, 36, paper=_circle(0, 0, 17), lines="M-20 0 h3 M17 0 h3", text="A", ports={"i": "S"})
 

@@ -37,7 +37,7 @@ class OnSlope(Component, partial=True):
     m: Parameter = param("kg", "mass", min=0)
     angle: Parameter = param(
         "rad", "slope of the path, 90° is upwards: m·g·sin(angle) acts against motion; no value: no weight",
-        default=None,
+        default=None, min=-1.6, max=1.6,
     )  # fmt: skip
     g: Parameter = param("m/s2", "gravity", default=9.80665)
     s: Variable = var("m", "position")

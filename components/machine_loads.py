@@ -188,7 +188,7 @@ class Conveyor(ShaftLoad):
     m_R: Parameter = param("kg/m", "mass of the rollers per length, at their circumference", default=0.0, min=0)
     f: Parameter = param("1", "coefficient of friction", default=0.02, min=0)
     C: Parameter = param("1", "factor for the other resistances", default=1.0, min=0)
-    slope: Parameter = param("rad", "slope upwards", default=0.0)
+    slope: Parameter = param("rad", "slope upwards", default=0.0, min=-1.6, max=1.6)
     g: Parameter = param("m/s2", "gravity", default=9.80665)
 
     def sliding_friction(self, speed: Expr | float) -> Expr:

@@ -17,19 +17,17 @@ from modelica_like.language import (
     clock,
     cos,
     discrete,
-    floor,
     integer,
     log,
     param,
     pre,
+    random,
     signal_in,
     signal_out,
     sqrt,
     when,
     where,
 )
-
-_MODULUS, _FACTOR = 2147483647.0, 48271.0
 
 
 class Sampled(Component, partial=True):
@@ -90,17 +88,12 @@ class Noise(Sampled, partial=True):
     """Random numbers that are the same in every run with the same seed.
 
     They come from the generator x = 48271·x mod (2^31 - 1) of S. K. Park, K. W. Miller and P. K. Stockmeyer
-    (Communications of the ACM 36, 1993), `minstd_rand` of C++, which is exact in floating point.
+    (Communications of the ACM 36, 1993), `minstd_rand` of C++.
     """
 
     icon = icons.NOISE
-    seed: Parameter = param("1", "whole number that begins the sequence", default=1.0, min=1, max=_MODULUS - 1)
-    state: Discrete = discrete("1", "state of the generator", start="seed")
-
-    def next_state(self, state: Expr) -> Expr:
-        """Return the next state of the generator."""
-        product = _FACTOR * state
-        return product - _MODULUS * floor(product / _MODULUS)
+    seed: Parameter = param("1", "whole number that begins the sequence", default=1.0, min=1, max=2147483646.0)
+    uniform: Discrete = discrete("1", "random number between 0 and 1", start="seed / 2147483647")
 
 
 class UniformNoise(Noise):
@@ -110,10 +103,10 @@ class UniformNoise(Noise):
     y_min: Parameter = param("*", "lower limit", default=0.0)
 
     def held(self) -> Expr:
-        return self.y_min + (self.y_max - self.y_min) * self.state / _MODULUS
+        return self.y_min + (self.y_max - self.y_min) * self.uniform
 
     def sample(self) -> dict[Expr, Expr]:
-        return {self.state: self.next_state(pre(self.state))}
+        return {self.uniform: random(pre(self.uniform))}
 
 
 class NormalNoise(Noise):
@@ -123,8 +116,8 @@ class NormalNoise(Noise):
     mu: Parameter = param("*", "mean", default=0.0)
 
     def held(self) -> Expr:
-        radius = sqrt(-2 * log(self.state / _MODULUS))
-        return self.mu + self.sigma * radius * cos(2 * pi * self.next_state(self.state) / _MODULUS)
+        radius = sqrt(-2 * log(self.uniform))
+        return self.mu + self.sigma * radius * cos(2 * pi * random(self.uniform))
 
     def sample(self) -> dict[Expr, Expr]:
-        return {self.state: self.next_state(self.next_state(pre(self.state)))}
+        return {self.uniform: random(random(pre(self.uniform)))}

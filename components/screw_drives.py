@@ -8,7 +8,7 @@ from components.interfaces import Flange, LinearFlange
 from components.lossy_gears import ConstantEfficiencyGear
 from components.spindles import BallScrew
 from components.springs import ElastoBacklash, SpringDamper
-from modelica_like.language import Component, Equations, Parameter, connect, param, series
+from modelica_like.language import Component, Equations, LanguageError, Parameter, connect, param, series
 
 
 class BallScrewDrive(Component):
@@ -31,7 +31,7 @@ class BallScrewDrive(Component):
     tau_friction: Parameter = param("N.m", "friction torque of seals and preload", default=0.0, min=0)
     c: Parameter = param("N/m", "axial stiffness", min=0)
     d: Parameter = param("N.s/m", "axial damping", default=0.0, min=0)
-    backlash: Parameter = param("m", "axial backlash", default=1e-5, min=1e-12)
+    backlash: Parameter = param("m", "axial backlash", default=None, min=1e-12)
     spindle = Inertia(J="J")
     mesh = ConstantEfficiencyGear(
         ratio=1, efficiency="efficiency", efficiency_back="efficiency_back", tau_friction="tau_friction"
@@ -43,6 +43,9 @@ class BallScrewDrive(Component):
         self.nut = ElastoBacklash(c=c, d=d, b="2*pi * backlash / lead") if self.has_backlash else SpringDamper(c=c, d=d)
 
     def equations(self) -> Equations:
+        if self.given("backlash") and not self.has_backlash:
+            raise LanguageError("BallScrewDrive: backlash has a value, but the nut has none.",
+                                advice="Add has_backlash = true, or leave backlash out.")  # fmt: skip
         yield connect(self.flange_r, self.spindle.flange_a)
         yield from series(self.spindle, self.mesh, self.nut, self.screw)
         yield connect(self.flange_t, self.screw.flange_t)

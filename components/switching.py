@@ -6,7 +6,20 @@ from components import icons
 from components.electrical import Pin, TwoPins
 from components.feasible import Feasible
 from components.thermal import Lossy
-from modelica_like.language import Equations, Events, Expr, Mode, Parameter, Variable, der, param, var
+from modelica_like.language import (
+    Equations,
+    Events,
+    Expr,
+    Input,
+    Mode,
+    Parameter,
+    Variable,
+    all_of,
+    der,
+    param,
+    signal_in,
+    var,
+)
 
 
 class Diode(Lossy, TwoPins):
@@ -30,6 +43,59 @@ class Diode(Lossy, TwoPins):
 
     def dissipation(self) -> Expr:
         return self.v * self.i
+
+
+class Ideal(Lossy, TwoPins, partial=True):
+    """Element without resistance and leakage: nothing flows while it blocks, and conducting it takes no voltage.
+
+    Of several ideal elements the combination of modes is found that is possible with the present currents of inductors
+    and voltages of capacitors, which cannot jump.
+    """
+
+    v_0: Parameter = param("V", "voltage that counts as rounding", default=1e-9, min=0)
+    i_0: Parameter = param("A", "current that counts as rounding", default=1e-9, min=0)
+    state = Mode("off", "on", description="state of the element", ideal={"off": "i", "on": "v"})
+
+    def equations(self) -> Equations:
+        yield from super().equations()
+        yield self.state.choose(off=self.i, on=self.v) == 0
+
+    def dissipation(self) -> Expr:
+        return self.v * self.i
+
+
+class IdealDiode(Ideal):
+    """Ideal diode: no voltage while it conducts from p to n, and no current while it blocks."""
+
+    icon = icons.DIODE
+
+    def events(self) -> Events:
+        yield self.state.go("off", "on", when=self.v > self.v_0, because="the voltage turns forward")
+        yield self.state.go("on", "off", when=self.i < -self.i_0, because="the current would reverse")
+
+
+class IdealThyristor(Ideal):
+    """Ideal thyristor: fired at forward voltage, it conducts from p to n until its current reaches zero."""
+
+    icon = icons.THYRISTOR
+    fire: Input = signal_in("1", "the thyristor is fired above 0.5")
+
+    def events(self) -> Events:
+        forward = all_of(self.fire > 0.5, self.v > self.v_0)
+        yield self.state.go("off", "on", when=forward, because="it is fired at forward voltage")
+        yield self.state.go("on", "off", when=self.i < -self.i_0, because="the current would reverse")
+
+
+class IdealSwitch(Ideal):
+    """Ideal switch, closed while its signal is above one half."""
+
+    icon = icons.SWITCH
+    closed: Input = signal_in("1", "the switch is closed above 0.5")
+
+    def events(self) -> Events:
+        yield self.state.initially("on", when=self.closed > 0.5)
+        yield self.state.go("off", "on", when=self.closed > 0.5)
+        yield self.state.go("on", "off", when=self.closed < 0.5)
 
 
 class Contactor(Feasible, Lossy, TwoPins):

@@ -95,8 +95,8 @@ class PMSynchronousMachine(PMSynchronous):
 class OnSupply(Component, partial=True):
     """Drive on a DC supply, from which it takes its power, and to which it gives it back while it brakes.
 
-    A battery cannot give more than E²/(4·R): where the drive asks for more, there is no solution, and the run ends. A
-    V_min a little above half of its open-circuit voltage E tells so.
+    A battery cannot give more than E²/(4·R): where the drive asks for more, there is no solution, and the run ends.
+    With V_min a little above half of its open-circuit voltage E, a sentence says so.
     """
 
     p_dc = Pin("positive terminal of the supply")

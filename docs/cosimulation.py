@@ -80,7 +80,7 @@ def main(folder: Path) -> None:
     lines = [table(results)]
     lines += [f"{name}: {1e3 * step_that_keeps(errors):.2g} ms keep {WANTED:g}" for name, errors in results.items()]
     held = {f"{master}, inputs held": measure(system, whole, master, "hold") for master in MASTERS}
-    save_plot(draw({**results, **held}), HERE / "pictures" / "cosimulation.png", dpi=100)
+    save_plot(draw({**results, **held}), HERE / "pictures" / "cosimulation.png", dpi=150)
     for tolerance in (1e-3, 1e-4, 1e-5):
         run = cosim(system, tolerance=tolerance, master="gauss-seidel", outputs=tuple(SIGNALS))
         worst = max(error(run, whole, signal) for signal in SIGNALS)

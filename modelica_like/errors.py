@@ -11,6 +11,8 @@ from pathlib import Path
 from typing import Any
 
 _SHOWN = 160
+_SHORT = 3
+"""A part of a name that is not longer does not suggest the name."""
 _ENDLESS = re.compile(r"\S{500,}")
 """A word of this length is not repeated in a message."""
 
@@ -189,6 +191,10 @@ class Chattering(SolveError):
     """Modes switch without end."""
 
 
+class NoValidModes(SolveError):
+    """No combination of the modes of ideal elements is possible."""
+
+
 class LimitPassed(SolveError):
     """A component has ended the run, because a limit was passed."""
 
@@ -257,6 +263,7 @@ def extra_module(module: str, extra: str, package: str = "") -> Any:
 def did_you_mean(name: object, known: Iterable[str]) -> str:
     """Return `; did you mean 'sun'?` for the known name nearest to `name` (of any type), or an empty string."""
     name, names = str(name), list(known)
-    near = difflib.get_close_matches(name, names, n=1, cutoff=0.58)
-    near = near or [one for one in names if one in name.split("_")]
+    within = sorted((one for one in names if len(name) > _SHORT and name.lower() in one.lower()), key=len)
+    near = difflib.get_close_matches(name, names, n=1, cutoff=0.58 if not within else 0.8)
+    near = near or within or [one for one in names if one in name.split("_")]
     return f"; did you mean '{near[0]}'?" if near else ""

@@ -14,6 +14,7 @@ from typing import Any, Literal, get_args
 
 from modelica_like.compile import compile
 from modelica_like.compile.compiled import CompiledDae
+from modelica_like.compile.sliding import as_asked
 from modelica_like.errors import (
     ExportError,
     LanguageError,
@@ -30,7 +31,7 @@ from modelica_like.initialize import StartKind, initialize
 from modelica_like.language import Component
 from modelica_like.language.tunable import with_tunable_tables
 from modelica_like.solve.events import EventLoop, Progress
-from modelica_like.solve.options import Options
+from modelica_like.solve.options import OnChattering, Options
 from modelica_like.solve.solution import Solution
 from modelica_like.solve.trajectories import Statistics, Trajectories, needs_equations
 from modelica_like.structure import reduce
@@ -44,7 +45,9 @@ Solver = Literal["idas", "native"]
 Model = Component | CompiledDae | str | Path
 
 
-def build(drive: Model, free: Iterable[str] = (), *, tables: Iterable[str] = ()) -> CompiledDae:
+def build(
+    drive: Model, free: Iterable[str] = (), *, tables: Iterable[str] = (), on_chattering: OnChattering | None = None
+) -> CompiledDae:
     """Compile a component tree or a netlist file; a compiled model is returned unchanged.
 
     Args:
@@ -53,11 +56,15 @@ def build(drive: Model, free: Iterable[str] = (), *, tables: Iterable[str] = ())
             Not possible in a compiled model.
         tables: patterns of tables whose numbers become parameters, such as `clutch.mu_pos`: see
             `with_tunable_tables`. Not possible in a compiled model.
+        on_chattering: as of `simulate`, for runs, FMUs and compiled runs of the model; by default that of the netlist.
 
     Raises:
         LanguageError: `tables` is given for a compiled model.
         ModelicaLikeError: the model has an error; the message says what, where and what to do.
     """
+    if on_chattering is not None:
+        model = build(drive, free, tables=tables)
+        return model.twin(settings={**model.settings, "on_chattering": on_chattering})
     if isinstance(drive, CompiledDae):
         if tables:
             raise LanguageError("Tables of a compiled model cannot change.", advice="Build it with `tables`.")
@@ -102,7 +109,7 @@ def simulate(
     drive: Model, until: float | str | None = None, *, parameters: Mapping[str, Any] | None = None,
     start: StartKind | None = None, t0: float = 0.0, rtol: float | None = None, atol: float | None = None,
     points: int | None = None, options: Options | None = None, progress: Progress | None = None,
-    solver: Solver | None = None,
+    solver: Solver | None = None, on_chattering: OnChattering | None = None,
 ) -> Solution:  # fmt: skip
     """Simulate a drive.
 
@@ -119,6 +126,7 @@ def simulate(
         progress: called with the time reached.
         solver: `idas`, the reference, or `native`: the compiled run-time of FMUs, several times as fast. By default
             IDAS; if IDAS gives up, the run-time if there is one and it succeeds, with a notice.
+        on_chattering: what to do where events follow each other without end, see `Options`: `stop`, `slide` or `rest`.
 
     Raises:
         ModelicaLikeError: the model or a value is wrong, or the simulation cannot continue.
@@ -127,10 +135,13 @@ def simulate(
     model = build(drive)
     if parameters:
         model = model.with_parameters(dict(parameters))
-    end, chosen = plan(model, until, t0=t0, rtol=rtol, atol=atol, points=points, options=options)
+    asked: dict[str, Any] = {"rtol": rtol, "atol": atol, "points": points, "on_chattering": on_chattering}
+    end, chosen = plan(model, until, t0=t0, options=options, **asked)
     make = _loop(solver or "idas")
     begin = time.perf_counter()
     kind: StartKind = start or model.settings.get("start", "given")
+    settings = {**model.settings, "start": kind, "on_chattering": chosen.on_chattering}
+    model = as_asked(model if settings == model.settings else model.twin(settings=settings))
     first = initialize(model, t0, kind)
     loop = make(model, chosen, first, end, progress)
     try:
@@ -149,7 +160,7 @@ def simulate(
 
 def plan(
     model: CompiledDae, until: float | str | None = None, *, t0: float = 0.0, options: Options | None = None,
-    **given: float | None,
+    **given: Any,
 ) -> tuple[float, Options]:  # fmt: skip
     """Return the end time in s and the options of a run; the arguments are those of `simulate`.
 
@@ -214,8 +225,8 @@ def positive_step(asked: float | str | None) -> float:
     return step
 
 
-def _options(base: Options, settings: Mapping[str, Any], **given: float | None) -> Options:
+def _options(base: Options, settings: Mapping[str, Any], **given: Any) -> Options:
     values = {name: getattr(base, name) for name in Options.__dataclass_fields__}
-    values.update({name: settings[name] for name in ("rtol", "atol", "points") if name in settings})
+    values.update({name: settings[name] for name in ("rtol", "atol", "points", "on_chattering") if name in settings})
     values.update({name: value for name, value in given.items() if value is not None})
     return Options(**values)

@@ -41,6 +41,11 @@ Solver = Annotated[
     Option(help="IDAS only, or the compiled run-time of FMUs; by default that run-time if IDAS fails."),
 ]
 
+OnChattering = Annotated[
+    Literal["stop", "slide", "rest"] | None,
+    Option(help="Where events never end: an error (stop), sliding between two modes, rest after ever faster impacts."),
+]
+
 
 def check(
     netlist: Netlist, assignments: Assignments = None, *,
@@ -55,21 +60,21 @@ def check(
     with told(debug, json=json) as page:
         assembly = load_netlist(netlist, assignments)
         from modelica_like.report.plausible import drive_notes
+        from modelica_like.report.start import start_notes, start_report
         from modelica_like.report.structure import structure_report
+        from modelica_like.simulation import build
 
         page.print(structure_report(assembly))
-        note(*drive_notes(assembly))
+        model = build(assembly)
+        note(*drive_notes(assembly), *(start_notes(model) if not start_values else ()))
         if start_values:
-            from modelica_like.report.start import start_report
-            from modelica_like.simulation import build
-
-            page.print("", start_report(assembly, build(assembly)))
+            page.print("", start_report(assembly, model))
 
 
 def simulate(
     netlist: Netlist, assignments: Assignments = None, *,
     until: Until = None, start: Start = None, solver: Solver = None, rtol: Tolerance = None, points: Points = None,
-    csv: Csv = None, units: Units = False, plot: Plot = None, show: Curves = None,
+    on_chattering: OnChattering = None, csv: Csv = None, units: Units = False, plot: Plot = None, show: Curves = None,
     compare: Annotated[
         list[str] | None, Option(metavar="WHAT", help="In the picture, too: a file, or runs, e.g. 'gear.ratio=2,3'.")
     ] = None,
@@ -102,15 +107,16 @@ def simulate(
         read_signals(model, show or ())
         shown = assigned(display, "--display")
         Display(model, shown)
+        how: dict[str, Any] = {"start": start, "rtol": rtol, "points": points, "on_chattering": on_chattering}
         with Bar(until or model.settings.get("until")) as bar:
             made = Outcome(
-                lambda: run(model, until, start=start, rtol=rtol, points=points, progress=bar, solver=solver),
+                lambda: run(model, until, progress=bar, solver=solver, **how),
                 debug=debug,
             )
         energy = energy and made.stopped is None and made.attempt("The energy balance", made.solution.energy)
         made.tell(lambda one: run_report(one, energy=energy, debug=debug, display=shown, show=show or ()), page)
         made.attempt("The notes", lambda: note(*notes(assembly, made.solution, energy=energy)))
-        again = partial(run, model, until, start=start, rtol=rtol, points=points)
+        again = partial(run, model, until, **how)
         curves = (plot, lambda one: _drawn(one, variants, files, again, show or (), shown))
         pictures = curves, (sankey, lambda one: one.energy().sankey(model.name))
         made.write(csv, units=units or bool(display), display=shown, pictures=pictures, show=show or ())

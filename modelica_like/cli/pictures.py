@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Annotated
 
 from modelica_like.cli.declare import Argument, Option
-from modelica_like.cli.shared import Assignments, Curves, Debug, Netlist, Show, Until, load_netlist, say, told
+from modelica_like.cli.shared import Assignments, Curves, Debug, Netlist, Until, load_netlist, say, told
 from modelica_like.errors import NetlistError
 
 
@@ -67,7 +67,7 @@ def report(
 
 def explore(
     netlist: Netlist, assignments: Assignments = None, *,
-    until: Until = None, show: Show = None,
+    until: Until = None, show: Curves = None,
     output: Annotated[Path, Option("--output", "-o", metavar="FOLDER", help="Where the page saves files.")] = Path(),
     browser: Annotated[bool, Option(help="Open the browser.")] = True,
     debug: Debug = False,

@@ -39,7 +39,6 @@ TABLE = "Write a table: .csv, .parquet, .nc, or - for the screen."
 Csv = Annotated[Path | None, Option(metavar="FILE", help=TABLE)]
 Units = Annotated[bool, Option("--units", help="Write the units of [display], named in a second header line.")]
 Plot = Annotated[Path | None, Option(metavar="FILE", help="Draw a picture: .png, .svg or .pdf.")]
-Show = Annotated[list[str] | None, Option(metavar="PATTERN", help="Variables to show, e.g. '*.w'.")]
 Curves = Annotated[
     list[str] | None, Option("--show", metavar="PATTERN", help="Curves, also formulas: '*.w', '2*pi*motor.w'.")
 ]

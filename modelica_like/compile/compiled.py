@@ -13,11 +13,12 @@ import casadi as ca
 from modelica_like.compile.buffers import Along, BufferedFunction
 from modelica_like.compile.buffers import Vector as Vector
 from modelica_like.compile.start_system import StartSystem as StartSystem
-from modelica_like.errors import LanguageError, Source, UnknownName, ValueOutOfRange, did_you_mean
+from modelica_like.errors import LanguageError, ModelicaLikeError, Source, UnknownName, ValueOutOfRange, did_you_mean
 from modelica_like.flatten.model import FlatDiscrete, FlatParameter, FlatVariable, Origin
 from modelica_like.flatten.template import TransitionForm
 from modelica_like.structure.holds import Circuit as Circuit
 from modelica_like.structure.holds import HeldMotion as HeldMotion
+from modelica_like.structure.ideal import IdealNetwork as IdealNetwork
 from modelica_like.structure.motion import Motion
 from modelica_like.units import Unit, to_si
 from modelica_like.upper import upper
@@ -87,12 +88,14 @@ class CompiledDae:
         resets: new values at events.
         updates: what discrete variables, and variables in a `when`, become in one iteration of an event; as many as
             `update_rows`.
+        delays: value and time of each delay, one after the other.
+        delay_parts: places of the numbers of each delay in d: terms of its series, beginning, 2 over the length.
         reset_nodes: variables with a reset that are neither states nor discrete.
         start_conditions: one per choice of a start mode.
         hold_terms: gain (zero where nothing is held), capacities forward and backward, and restitution of every held
             motion, one row each, row by row.
         start_values: as many as `starts`.
-        discrete_starts: start of d: modes and discrete values, then the entries of `holds` and `circuits`.
+        discrete_starts: start of d: modes and discrete values, then the entries of `holds`, `circuits` and `ideal`.
         derived: parameters that follow from others, of p only.
         determinants: relative determinants; zero where a block is singular.
         p: parameter values.
@@ -103,6 +106,7 @@ class CompiledDae:
         implicit_blocks: names and origins of the blocks of `alg`.
         holds: motions that modes hold.
         circuits: held motions that depend on each other.
+        ideal: the ideal elements, if there are any.
         motion_sources: paths of the components that prescribe a motion, whatever torque or force it takes.
     """
 
@@ -125,6 +129,8 @@ class CompiledDae:
     resets: ca.Function
     updates: ca.Function
     update_rows: tuple[CompiledUpdate, ...]
+    delays: ca.Function
+    delay_parts: tuple[tuple[int, ...], ...]
     reset_nodes: tuple[int, ...]
     start_conditions: ca.Function
     hold_terms: ca.Function
@@ -137,6 +143,7 @@ class CompiledDae:
     starts: tuple[StartEntry, ...]
     holds: tuple[HeldMotion, ...]
     circuits: tuple[Circuit, ...]
+    ideal: IdealNetwork | None
     singular: tuple[tuple[tuple[str, ...], tuple[Origin, ...]], ...]
     differentiated: tuple[Origin, ...]
     guesses: Vector
@@ -163,7 +170,7 @@ class CompiledDae:
 
     @property
     def discrete_size(self) -> int:
-        """Length of d: modes and discrete values, approaches, switches and shares."""
+        """Length of d: modes and discrete values, approaches, switches and shares, rows of ideal elements."""
         return self.ode.size1_in("d")
 
     @cached_property
@@ -235,6 +242,22 @@ class CompiledDae:
         given = self.arguments
         ode, alg = (function(*given.values()) for function in (self.ode, self.alg))
         return Motion(given["t"], given["x"], given["z"], ode, alg)
+
+    def refuse_delays(self, error: type[ModelicaLikeError], what: str) -> None:
+        """Raise an error where something is not possible with delays, because they need the past of a run."""
+        if self.delay_parts:
+            owner = self.flat_discretes[self.delay_parts[0][0]].path.rpartition(".")[0] or "it"
+            raise error(
+                f"{what}: {owner} has a delay(…), which needs the past of a run.",
+                advice="Simulate it with IDAS, or approximate the delay there, by a lag or a Padé approximation.",
+            )
+
+    @cached_property
+    def following(self) -> dict[str, tuple[str, ...]]:
+        """Variables of every state that follows the motion, by its name."""
+        weights = [one.path for one in self.flat_discretes if one.hidden and not one.names]
+        names = [name for name in self.states if not name.startswith("der(") and name not in self.position]
+        return {name: tuple(w[len(name) + 1 :] for w in weights if w.startswith(f"{name}.")) for name in names}
 
     @cached_property
     def rising(self) -> tuple[tuple[int, int], ...]:

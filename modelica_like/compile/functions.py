@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import casadi as ca
@@ -55,6 +56,7 @@ def compile(reduced: ReducedDae) -> CompiledDae:
         starts=tuple(StartEntry(s.node, reduced.node_states[s.node], s.strength) for s in flat.starts),
         holds=reduced.holds,
         circuits=reduced.circuits,
+        ideal=reduced.ideal,
         singular=tuple((names, origins) for names, origins, _ in reduced.determinants),
         differentiated=reduced.differentiated,
         guesses=np.array(reduced.guesses, float),
@@ -143,7 +145,9 @@ class _Builder:
         """Return the functions of (t, x, z, p, u, d) by name, and the tables of events."""
         reduced, flat = self.reduced, self.reduced.flat
         guards, moments, transitions, resets, targets = self.transitions()
-        news, update_rows = updates(reduced, lambda path, number: self._reset(path, number, targets))
+        delays, delay_parts = self.delays()
+        reset = partial(self._reset, targets=targets)
+        news, update_rows = updates(reduced, reset, [one[0] for one in delay_parts])
         conditions, start_modes = self.start_modes()
         expressions = {
             "ode": reduced.ode,
@@ -152,10 +156,11 @@ class _Builder:
             "variables": reduced.values[: len(flat.variables)],
             "guards": guards,
             "guard_rates": reduced.total_derivative(guards),
-            "guards_soon": guards_soon(reduced, guards),
+            "guards_soon": guards_soon(flat.time, reduced.total_derivative, guards),
             "moments": moments,
             "resets": resets,
             "updates": news,
+            "delays": delays,
             "start_conditions": conditions,
             "hold_terms": ca.vec(hold_terms(flat, reduced.values).T),
             "start_values": ca.vertcat(*(ca.SX(s.value) for s in flat.starts)),
@@ -164,6 +169,7 @@ class _Builder:
         }
         functions = {name: self.function(name, expression) for name, expression in expressions.items()}
         tables = {"transitions": transitions, "update_rows": update_rows, "reset_nodes": tuple(targets)}
+        tables["delay_parts"] = delay_parts
         return functions, tables | {"start_modes": start_modes}
 
     def transitions(self) -> tuple[Any, Any, tuple[CompiledTransition, ...], Any, list[int]]:
@@ -186,7 +192,25 @@ class _Builder:
                     resets.append(columns["resets"][number][position])
                 numbers = {"mode": self.place[prefix + form.mode], "index": len(store) - 1, "resets": tuple(changes)}
                 found.append(CompiledTransition(**{**vars(form), **numbers}))
+        for one in reduced.choices:
+            changes = [Reset(kind, place, 1.0, k, 0) for k, (kind, place, _) in enumerate(one.resets, len(resets))]
+            resets += [value for *_, value in one.resets]
+            why, source = f"the states of {one.told} would become singular", one.origin.source
+            found.append(
+                CompiledTransition(one.mode, (0,), 0, False, len(guards), tuple(changes), source, "", why, fails=False)
+            )
+            guards.append(one.guard)
         return ca.vertcat(*guards), ca.vertcat(*moments), tuple(found), ca.vertcat(*resets), targets
+
+    def delays(self) -> tuple[Any, tuple[tuple[int, ...], ...]]:
+        """Return values and times of the delays of all instances, and the places of their numbers in d."""
+        flat = self.reduced.flat
+        columns = evaluate(flat, "delays", self.reduced.values)
+        found: list[tuple[int, ...]] = []
+        for instance in flat.instances:
+            prefix = f"{instance.path}." if instance.path else ""
+            found += [tuple(self.place[prefix + name] for name in one) for one in instance.template.delay_parts]
+        return ca.vertcat(*(columns[k] for k in sorted(columns))), tuple(found)
 
     def _reset(self, path: str, value: int, targets: list[int]) -> Reset:
         if path in self.place:

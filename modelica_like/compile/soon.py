@@ -7,8 +7,6 @@ from typing import Any
 
 import casadi as ca
 
-from modelica_like.structure.reduce import ReducedDae
-
 TIME_RESOLUTION = 1e-10
 """Time resolution of events relative to max(1 s, |t|).
 
@@ -23,23 +21,32 @@ def time_resolution(t: float) -> float:
     return TIME_RESOLUTION * max(1.0, abs(t))
 
 
-def guards_soon(reduced: ReducedDae, guards: Any) -> Any:
+def ahead(t: Any) -> Any:
+    """Return the time resolution at a time, both expressions in s."""
+    return TIME_RESOLUTION * ca.fmax(1.0, ca.fabs(t))
+
+
+def guards_soon(t: Any, rate: Callable[[Any], Any], guards: Any) -> Any:
     """Follow guards for one time resolution.
 
     Joined relations are followed one by one: a relation that stays at zero never counts as true.
+
+    Args:
+        t: time.
+        rate: returns time derivatives of expressions.
+        guards: a column.
     """
     if not guards.numel():
         return guards
     relations: list[Any] = []
-    _joined(guards, lambda relation: relations.append(relation) or relation)
+    joined(guards, lambda relation: relations.append(relation) or relation)
     stacked = ca.vertcat(*relations)
-    ahead = TIME_RESOLUTION * ca.fmax(1.0, ca.fabs(reduced.flat.time))
-    later = iter(ca.vertsplit(stacked + ahead * reduced.total_derivative(stacked)))
-    return _joined(guards, lambda _: next(later))
+    later = iter(ca.vertsplit(stacked + ahead(t) * rate(stacked)))
+    return joined(guards, lambda _: next(later))
 
 
-def _joined(guards: Any, relation: Callable[[Any], Any]) -> Any:
-    """Rebuild guards with another expression for every relation."""
+def joined(guards: Any, relation: Callable[[Any], Any]) -> Any:
+    """Rebuild a column of guards with another expression for every relation."""
 
     def rebuilt(guard: Any) -> Any:
         join = _JOINS.get(guard.op())

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 import casadi as ca
 import numpy as np
 
 from modelica_like.compile.compiled import CompiledUpdate, Reset
 from modelica_like.errors import Source, StructureError
-from modelica_like.flatten.model import evaluate
+from modelica_like.flatten.model import FlatModel, evaluate
 from modelica_like.structure.reduce import ReducedDae
 
 
@@ -27,7 +27,9 @@ class _Row:
     entry: int | None
 
 
-def updates(reduced: ReducedDae, reset: Callable[[str, int], Reset]) -> tuple[Any, tuple[CompiledUpdate, ...]]:
+def updates(
+    reduced: ReducedDae, reset: Callable[[str, int], Reset], delayed: Sequence[int] = ()
+) -> tuple[Any, tuple[CompiledUpdate, ...]]:
     """Return what discrete variables, and variables set by a `when`, become in one iteration of an event.
 
     Discrete variables in it are the new ones, except in `pre(…)`. What is not set keeps its value; for variables that
@@ -36,6 +38,7 @@ def updates(reduced: ReducedDae, reset: Callable[[str, int], Reset]) -> tuple[An
     Args:
         reduced: the reduced system.
         reset: gives the target for its path and the number of the update.
+        delayed: entries of d that are delayed values at the start.
 
     Raises:
         StructureError: discrete variables depend on each other in a loop.
@@ -48,11 +51,23 @@ def updates(reduced: ReducedDae, reset: Callable[[str, int], Reset]) -> tuple[An
     values = _replaced([ca.if_else(row.active, row.value, row.kept) for row in (*own, *rows)], before)
     values, results = values[: len(own)], values[len(own) :]
     symbols = [flat.d[row.entry] for row in own]
-    order = _order(own, symbols, values)
+    _solve_delays([k for k, row in enumerate(own) if row.entry in delayed], symbols, values)
+    order = _order(flat, own, symbols, values)
     if order:
         _, results = ca.substitute_inplace([symbols[k] for k in order], [values[k] for k in order], results, False)
     results = _replaced(results, [(symbol, flat.d[entry]) for entry, symbol in old.items()])
     return ca.vertcat(*results), tuple(row.update for row in rows)
+
+
+def _solve_delays(those: list[int], symbols: list[Any], values: list[Any]) -> None:
+    """Solve for delayed values at the start that depend on each other linearly, as in z == u + a * delay(z, T)."""
+    own, new = ca.vertcat(*(symbols[k] for k in those)), ca.vertcat(*(values[k] for k in those))
+    if not those or not ca.depends_on(new, own) or any(ca.which_depends(new, own, 2, True)):
+        return
+    others = ca.substitute(new, own, ca.SX.zeros(own.shape))
+    solved = ca.solve(ca.SX.eye(len(those)) - ca.jacobian(new, own), others)
+    for k, one in zip(those, ca.vertsplit(solved), strict=True):
+        values[k] = one
 
 
 def _rows(reduced: ReducedDae, reset: Callable[[str, int], Reset]) -> list[_Row]:
@@ -86,7 +101,7 @@ def _replaced(expressions: Sequence[Any], pairs: Sequence[tuple[Any, Any]]) -> l
     return ca.vertsplit(ca.substitute(ca.vertcat(*expressions), ca.vertcat(*olds), ca.vertcat(*news)))
 
 
-def _order(rows: list[_Row], symbols: list[Any], values: list[Any]) -> list[int]:
+def _order(flat: FlatModel, rows: list[_Row], symbols: list[Any], values: list[Any]) -> list[int]:
     """Return an order in which every row comes after those that it depends on.
 
     Raises:
@@ -102,23 +117,27 @@ def _order(rows: list[_Row], symbols: list[Any], values: list[Any]) -> list[int]
     while left:
         ready = sorted(k for k in left if not needs[k] & left)
         if not ready:
-            raise _loop(rows, needs, left)
+            raise _loop(flat, rows, needs, left)
         order += ready
         left -= {*ready}
     return order
 
 
-def _loop(rows: list[_Row], needs: list[set[int]], left: set[int]) -> StructureError:
+def _loop(flat: FlatModel, rows: list[_Row], needs: list[set[int]], left: set[int]) -> StructureError:
     """Return the error of discrete variables that depend on each other."""
     way = [min(left)]
     while way[-1] not in way[:-1]:
         way.append(min(needs[way[-1]] & left))
     way = way[way.index(way[-1]) :]
-    names = " → ".join(rows[k].path for k in reversed(way))
-    alone = len(way) == 2
+    where = [*dict.fromkeys(rows[k].update.source for k in way if rows[k].update.source.file)]
+    if any("delay[" in rows[k].path for k in way):
+        what = "Before the start, a delayed value is the one at the start, which depends on itself here."
+        advice = "Delay a state, or what follows from the delayed value linearly."
+        return StructureError(what, where=where, advice=advice)
+    own = [rows[k].path for k in reversed(way[1:]) if not flat.discretes[cast(int, rows[k].entry)].hidden]
     return StructureError(
-        f"{rows[way[0]].path} determines itself at an event." if alone
-        else f"Discrete variables determine each other in a loop: {names}.",
-        where=[rows[k].update.source for k in dict.fromkeys(way) if rows[k].update.source.file],
+        f"{own[0]} determines itself at an event." if len(own) == 1
+        else f"Discrete variables determine each other in a loop: {' → '.join([*own, own[0]])}.",
+        where=where,
         advice="Use a value from before the event, pre(…), at one place of the loop.",
     )  # fmt: skip

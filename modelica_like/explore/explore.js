@@ -77,7 +77,7 @@ function bars() {
   }
   const later = () => {
     clearTimeout(timer);
-    const names = [...shown].map((one) => one.name), chosen = select.value;
+    const names = [...shown].filter((one) => !one.tree).map((one) => one.name), chosen = select.value;
     if (names.join() !== [...select.options].map((one) => one.value).join()) {
       select.replaceChildren(...names.map((name) => element("option", { value: name }, name)));
       if (names.includes(chosen)) select.value = chosen;

@@ -22,7 +22,7 @@ from modelica_like.language import Assembly
 from modelica_like.native.page import page, page_content
 from modelica_like.netlist import load
 from modelica_like.simulation import build, seconds, simulate
-from modelica_like.solve.plot import chosen
+from modelica_like.solve.plot import for_page
 
 _LARGEST = 1_000_000
 """Bytes of a request."""
@@ -37,7 +37,8 @@ def explore(
     Args:
         drive: an assembly or a netlist file.
         until: end time, a number in s or a quantity; by default that of the netlist.
-        show: patterns of the first curves, such as `*.w`; by default speeds, torques and forces of the parts.
+        show: names, patterns or formulas of the first curves; by default speeds, torques and forces of the parts, or
+            what a circuit has.
         folder: for netlists, FMUs and reports saved by the page.
 
     Raises:
@@ -72,7 +73,7 @@ class Explorer(ThreadingHTTPServer):
         end = until if until is not None else model.settings.get("until")
         run = simulate(model, end)
         self.runs, self.folder, self.token = Runs(assembly, model, run.options), Path(folder), secrets.token_urlsafe(16)
-        content = page_content(model, chosen(run, show), seconds(end), run.options) | {"token": self.token}
+        content = page_content(model, for_page(run, show)[0], seconds(end), run.options) | {"token": self.token}
         self.page = page(
             model.name, str(assembly.description), content, Path(__file__).parent / "explore.js", connect="'self'",
             schematic=f'<div id="schematic">{schematic(assembly, background=False)}</div>', more=_BELOW,

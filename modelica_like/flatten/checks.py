@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
 from typing import Any, cast
 
 import casadi as ca
 
-from modelica_like.errors import ComponentUnbalanced, ModelicaLikeError, raise_together_or_one
+from modelica_like.errors import ComponentUnbalanced, ModelicaLikeError, UnitMismatch, raise_together_or_one
 from modelica_like.flatten.dimensions import Dimensions, check_equation, check_expression
 from modelica_like.language.component import Component
 from modelica_like.language.declared import Declared
+from modelica_like.language.delay import Part
 from modelica_like.language.discrete import Pre
 from modelica_like.language.equation import Equation
 from modelica_like.language.expr import TIME, symbols_in
@@ -19,6 +19,8 @@ from modelica_like.language.fields import Field, Input, Parameter, Variable
 from modelica_like.units import ANY, ONE, Unit, parse_unit
 
 _SECOND = parse_unit("s")
+_PAIR = 2
+"""Fewer values cannot disagree."""
 _WATT, _JOULE = parse_unit("W"), parse_unit("J")
 
 
@@ -84,8 +86,9 @@ def _driven_input(component: Component, equations: list[Equation]) -> str:
 
 
 def check_units(
-    component: Component, equations: list[Equation], events: Sequence[Any], updates: Sequence[Any]
-) -> dict[str, Unit]:
+    component: Component, equations: list[Equation], events: Sequence[Any], updates: Sequence[Any],
+    delays: Sequence[Any],
+) -> dict[str, Unit]:  # fmt: skip
     """Check every equation; return the units that `*` outputs take from their equations.
 
     Args:
@@ -93,13 +96,14 @@ def check_units(
         equations: its own.
         events: its transitions and start modes.
         updates: new values at events.
+        delays: delayed values, with their places.
 
     Raises:
         UnitMismatch, LanguageError: all errors, reported together.
     """
     inferred: dict[str, Unit] = {}
 
-    dimensions = Dimensions(partial(_unit_of_leaf, component, inferred))
+    dimensions = Dimensions(lambda leaf: _unit_of_leaf(component, inferred, leaf, dimensions))
     kind = type(component).__name__
     errors: list[ModelicaLikeError] = []
 
@@ -123,6 +127,8 @@ def check_units(
     for one in updates:
         attempt(check_expression, one.active, ONE, dimensions, f"{kind}, condition", one.source)
         attempt(check_equation, ca.SX(one.target), ca.SX(one.value), dimensions, kind, one.source)
+    for one, source in delays:
+        attempt(check_expression, one.offset, _SECOND, dimensions, f"{kind}, delay", source)
     for label, term, unit in (
         ("stored_energy", component.stored_energy(), _JOULE),
         ("loss_power", component.loss_power(), _WATT),
@@ -130,15 +136,28 @@ def check_units(
     ):
         attempt(check_expression, term, unit, dimensions, f"{kind}.{label}")
     if errors:
-        raise raise_together_or_one(errors)
+        raise _by_any_units(component, errors) or raise_together_or_one(errors)
     return inferred
 
 
-def _unit_of_leaf(component: Component, inferred: dict[str, Unit], leaf: Any) -> Unit:
+def _by_any_units(component: Component, errors: Sequence[ModelicaLikeError]) -> UnitMismatch | None:
+    """Say which units of `*` parameters do not fit together; the equations of a library do not tell that."""
+    given = [(name, unit_of_field(component, name)) for name, field in component.fields.items()
+             if isinstance(field, Parameter) and field.unit_text == "*" and name in component._values]  # fmt: skip
+    if len(given) < _PAIR or not all(isinstance(one, UnitMismatch) for one in errors):
+        return None
+    told = ", ".join(f"{name} in {unit}" for name, unit in given)
+    return UnitMismatch(f"{component.label} ({type(component).__name__}): its units do not fit together: {told}.",
+                        where=component.place_of(), why=errors[0].what)  # fmt: skip
+
+
+def _unit_of_leaf(component: Component, inferred: dict[str, Unit], leaf: Any, dimensions: Dimensions) -> Unit:
     symbol = symbols_in(leaf)[0]
     symbol = symbol.of if isinstance(symbol, Pre) else symbol
     if symbol is TIME:
         return _SECOND
+    if isinstance(symbol, Part):
+        return dimensions.unit_or_any(symbol.of)
     if symbol.owner is None or not isinstance(symbol.owner.fields.get(symbol.name), Field):
         return ONE
     unit = unit_of_field(symbol.owner, symbol.name)

@@ -187,7 +187,8 @@ def check_expression(
     with _told(label, where, label, source):
         unit = dimensions.unit(expression)
     if not same_dimension(unit, expected):
-        raise UnitMismatch(f"{label} expects {expected}; the expression is {unit}.", where=where)
+        found = "has no unit" if unit == ONE else f"is {unit}"
+        raise UnitMismatch(f"{label} expects {expected}; the expression {found}.", where=where)
 
 
 @contextmanager

@@ -10,6 +10,7 @@ import casadi as ca
 
 from modelica_like.errors import LanguageError, Source, did_you_mean
 from modelica_like.language.component import Component
+from modelica_like.language.delay import Part, parts
 from modelica_like.language.discrete import INITIAL, Assertion, Marker, Pre, When, edge, eventful, is_a, moves
 from modelica_like.language.equation import Equation
 from modelica_like.language.expr import TIME, Expr, Symbol, is_expression, symbols_in
@@ -19,6 +20,7 @@ from modelica_like.language.transition import NAME_IN_NOTICE
 
 Located = tuple[Any, Source]
 _ONE: Any = ca.SX(1)
+_PLAIN = {"sample": "{} itself", "previous": "pre({}), the value before an event"}
 
 
 @dataclass(frozen=True)
@@ -70,6 +72,7 @@ class DiscreteEquations:
         updates: new values at events.
         events: transitions and start modes, with those of relations.
         hidden: discrete values that these need.
+        delays: delayed values, with their places.
 
     Raises:
         LanguageError: an equation of a discrete variable changes between events, or `pre(…)` is in the wrong place.
@@ -82,6 +85,7 @@ class DiscreteEquations:
         self.updates = [self._of_equation(one) for one in equations]
         self.events: list[Transition | StartMode] = [one for one in events if isinstance(one, Transition | StartMode)]
         self.hidden: list[Hidden] = []
+        self.delays: list[tuple[Marker, Source]] = []
         self._kept: list[Symbol] = []
         for number, one in enumerate(events, 1):
             if isinstance(one, When):
@@ -172,6 +176,14 @@ class DiscreteEquations:
                 one = symbol.of if isinstance(symbol, Pre) else symbol
                 if not isinstance(one, Marker) or id(one) in seen:
                     continue
+                if isinstance(one, Part):
+                    seen.update(map(id, parts(one.whole)))
+                    pending += self._write_delay(one.whole, source)
+                    continue
+                if one.kind in ("sample", "previous"):
+                    what = f"{self._kind}: {one.kind}({one.of}) is outside of the new values of a when(clock(…), …)."
+                    advice = f"Elsewhere write {_PLAIN[one.kind].format(one.of)}."
+                    raise LanguageError(what, where=source, advice=advice)
                 seen.add(id(one))
                 counts[one.kind] = counts.get(one.kind, 0) + 1
                 counts_up = one.kind in ("floor", "clock")
@@ -191,6 +203,15 @@ class DiscreteEquations:
         value = own if one.kind == "was" else edge(own)
         self.updates.append(Update(one, _ONE, value, source, at_start=one.kind == "was"))
         return (value,)
+
+    def _write_delay(self, one: Marker, source: Source) -> list[Located]:
+        """Name the numbers of a delay; return further expressions. Before the start, it is the value at the start."""
+        self.delays.append((one, source))
+        for k, part in enumerate(parts(one)):
+            part.name = f"delay[{len(self.delays)}][{k}]"
+            self.hidden.append(Hidden(part.name, f"delay {one.of}"))
+        self.updates.append(Update(parts(one)[0], INITIAL, one.of, source, at_start=True))
+        return [(one.of, source), (one.offset, source), (INITIAL, source)]
 
     def _write_relation(self, one: Marker, source: Source) -> None:
         mode, opposite = self._mode(one.name, str(one.of), one, ("false", "true")), cast(Expr, ca.logic_not(one.of))

@@ -12,7 +12,7 @@ from modelica_like.errors import LanguageError
 from modelica_like.language.component import Component
 from modelica_like.language.expr import TIME, Symbol, flagged_motion, is_expression, symbol_of, symbols_in
 from modelica_like.language.fields import Variable
-from modelica_like.language.hold import UNLIMITED, Hold
+from modelica_like.language.holding import UNLIMITED, Hold
 from modelica_like.language.mode import Mode
 
 TERMS = 4
@@ -40,6 +40,45 @@ class HoldForm:
     reaction: str
     row: int
     rigid: bool
+
+
+@dataclass(frozen=True)
+class IdealForm:
+    """An ideal element: its mode, the paths of the variables that are zero in mode 0 and 1, and their equation."""
+
+    mode: str
+    zeros: tuple[str, str]
+    row: int
+
+
+def ideal_forms(component: Component, residuals: list[Any]) -> tuple[IdealForm, ...]:
+    """Find the equation of every ideal element.
+
+    Raises:
+        LanguageError: a declaration names no variable, or no equation sets it to zero.
+    """
+    forms: list[IdealForm] = []
+    for mode in component.modes.values():
+        if not mode.ideal:
+            continue
+        symbol = symbol_of(component, mode.name)
+        zeros = [_variable(component, mode, mode.ideal[name], "variable") for name in mode.names]
+        for row, residual in enumerate(residuals):
+            own = [ca.substitute(residual, symbol, ca.SX(k)) for k in range(2)] if is_expression(residual) else []
+            if own and all(_only(one, zero) and _depends(one, zero) for one, zero in zip(own, zeros, strict=True)):
+                forms.append(IdealForm(mode.name, (zeros[0].name, zeros[1].name), row))
+                break
+        else:
+            written = ", ".join(f"{name}=self.{mode.ideal[name]}" for name in mode.names)
+            raise LanguageError(
+                f"{mode.label} is ideal, but no equation sets {' and '.join(z.name for z in zeros)} to zero.",
+                advice=f"Write {mode.name}.choose({written}) == 0.",
+            )
+    return tuple(forms)
+
+
+def _depends(residual: Any, symbol: Symbol) -> bool:
+    return _number(ca.jacobian(residual, symbol)) != 0.0
 
 
 def hold_forms(component: Component, residuals: list[Any]) -> tuple[tuple[HoldForm, ...], list[Any]]:

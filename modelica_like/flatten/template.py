@@ -12,11 +12,12 @@ from modelica_like.errors import LanguageError, Source
 from modelica_like.flatten.checks import check_balance, check_units, unit_of_field
 from modelica_like.flatten.conditions import guard_of
 from modelica_like.flatten.discrete import DiscreteEquations, Hidden, UpdateForm, between_events, is_discrete
-from modelica_like.flatten.holds import HoldForm, hold_forms
+from modelica_like.flatten.holds import HoldForm, IdealForm, hold_forms, ideal_forms
 from modelica_like.flatten.reasons import reason
 from modelica_like.flatten.wiring import taken
 from modelica_like.language.component import Component
 from modelica_like.language.declared import Declared
+from modelica_like.language.delay import parts
 from modelica_like.language.discrete import INITIAL, TERMINAL, Marker, Pre
 from modelica_like.language.equation import Connection, Equation, FreeEnd, as_equation, as_statement
 from modelica_like.language.expr import TIME, Symbol, flagged_motion, is_expression, symbol_of, symbols_in
@@ -93,7 +94,7 @@ class Template:
     """The equations of a component, as CasADi functions of (v, p, d, t).
 
     v are the slots, p the parameters, d modes and discrete values, t time. `updates` has two rows per update: whether
-    its target gets a new value, and the value.
+    its target gets a new value, and the value. `delays` has two rows per delay: the value, and the time of the delay.
     """
 
     component: str
@@ -115,8 +116,11 @@ class Template:
     hidden: tuple[Hidden, ...]
     updates: ca.Function
     update_forms: tuple[UpdateForm, ...]
+    delays: ca.Function
+    delay_parts: tuple[tuple[str, ...], ...]
     holds: tuple[HoldForm, ...]
     hold_terms: ca.Function
+    ideals: tuple[IdealForm, ...]
     energy_slots: tuple[Slot, ...]
     energy: ca.Function
     connections: tuple[Connection | FreeEnd, ...] = field(compare=False)
@@ -234,7 +238,7 @@ def _build(component: Component) -> Template:
     energy, energy_terms = Names(component), _energy_terms(component, wiring)
     others = [*zip(residuals, sources, strict=True), *((term, NOWHERE) for term in energy_terms)]
     discrete = DiscreteEquations(component, determined, events, others)
-    checked = [*equations, *initial], discrete.events, discrete.updates
+    checked = [*equations, *initial], discrete.events, discrete.updates, discrete.delays
     inferred = check_units(component, *checked) if component.units_checked else {}
     changes = _Changes(component, discrete)
     names = Names(component)
@@ -261,8 +265,10 @@ def _build(component: Component) -> Template:
         start_modes=changes.start_modes(),
         hidden=tuple(discrete.hidden),
         update_forms=discrete.forms(lambda symbol: path_of(symbol, component)),
+        delay_parts=tuple(tuple(part.name for part in parts(one)) for one, _ in discrete.delays),
         holds=holds,
         hold_terms=names.function("hold_terms", hold_terms),
+        ideals=ideal_forms(component, residuals),
         energy_slots=tuple(energy.variables),
         energy=energy.function("energy", energy_terms),
         connections=wiring,
@@ -304,11 +310,12 @@ class _Changes:
         self.targets = [one.target for one in discrete.updates]
         self.guards = [ca.SX(0) if t.when is None else guard_of(t.when, t.source) for t in self.transitions]
         self.moments = [ca.SX(0) if t.at is None else t.at for t in self.transitions]
+        self.delays = [part for one, _ in discrete.delays for part in (one.of, one.offset)]
         self.resets = [pair for t in self.transitions for pair in t.reset.items()]
 
     def expressions(self) -> Iterator[Any]:
         """Yield all expressions, and the symbols of the modes."""
-        yield from (*self.guards, *self.moments, *self.updates, *(ca.SX(one) for one in self.targets))
+        yield from (*self.guards, *self.moments, *self.updates, *self.delays, *(ca.SX(one) for one in self.targets))
         for pair in self.resets:
             yield from pair
         yield from (s.when for s in self.starts)
@@ -322,6 +329,7 @@ class _Changes:
             "resets": [value for _, value in self.resets],
             "start_conditions": [s.when for s in self.starts],
             "updates": self.updates,
+            "delays": self.delays,
         }
         return {name: names.function(name, output) for name, output in outputs.items()}
 

@@ -101,6 +101,9 @@ class Dependencies(Following):
         for circuit in self.model.circuits:
             count = len(circuit.members)
             rows[circuit.first : circuit.first + count * (1 + count)] = [self._everything] * (count * (1 + count))
+        if self.model.ideal:
+            entries = self.model.ideal.entries
+            rows[entries] = [self._everything] * (entries.stop - entries.start)
         starts = sparsity_rows(self.model.discrete_starts)
         for k, one in enumerate(self.model.flat_discretes):
             rows[k] = {("discrete", k)} if not one.names else {d for d in starts[k] if d[0] in "tpu"}

@@ -13,6 +13,7 @@ from typing import get_args
 
 from modelica_like.compile import compile
 from modelica_like.compile.compiled import CompiledDae
+from modelica_like.compile.sliding import as_asked
 from modelica_like.errors import ExportError, UnknownName
 from modelica_like.flatten import flatten
 from modelica_like.flatten.model import FlatModel
@@ -175,11 +176,11 @@ def compiled_open(
         if ends or tables:
             what = "ends that could be opened" if ends else "tables whose numbers could become parameters"
             raise ExportError(f"A compiled model has no {what}.", advice="Export its netlist instead.")
-        return drive, "", ()
+        return as_asked(drive), "", ()
     if tables:
         drive = with_tunable_tables(drive, tables)
     flat = flatten(with_open_ends(drive, ends, takes), open_inputs=True)
-    return compile(reduce(flat)), str(getattr(drive, "_description", "") or ""), _equations(flat)
+    return as_asked(compile(reduce(flat))), str(getattr(drive, "_description", "") or ""), _equations(flat)
 
 
 def _loaded(drive: Model) -> CompiledDae | Component:

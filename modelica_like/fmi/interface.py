@@ -186,11 +186,14 @@ class _Builder:
                 self.add(one.path, ("variable", k), causality, variability, **start, **about)
 
     def rates(self) -> None:
-        """Derivatives of all states; states that are themselves derivatives and have no other name come first."""
+        """Derivatives of all states; states that are no variables, and derivatives without another name, come first."""
         model, names = self.model, self.model.states
-        units = {name: model.flat_variables[model.position[name]].unit for name in names if name in model.position}
+        units = {name: model.units.get(name, ONE) for name in names if not name.startswith("der(")}
         unnamed = [k for k in range(len(names)) if k not in self.states]
         for k in sorted(unnamed, key=lambda k: names[k].count("der(")):
+            if names[k] in units:
+                self.states[k] = self.add(names[k], ("state", k), description="state that follows the motion")
+                continue
             base = names[k].removeprefix("der(").removesuffix(")")
             units[names[k]] = units[base] / _SECOND
             below = names.index(base)

@@ -29,7 +29,7 @@ ABSOLUTE_TO_RELATIVE = 1e-2
 DEFAULT_TOLERANCE = 1e-7
 MODEL = "resources/model.bin"
 """Path of the file in an FMU."""
-FORMAT = 3
+FORMAT = 4
 _MAGIC = b"MLMODEL\0"
 _HEADER = struct.Struct("<8siiII")
 _ENTRY = struct.Struct("<4i")
@@ -53,7 +53,7 @@ _TAPES = (
 )  # fmt: skip
 SECTIONS: dict[str, Any] = {
     "settings": _record(
-        "n_d n_y steady rates_depend_on_time implicit_linear terminal",
+        "n_d n_y steady rates_depend_on_time implicit_linear terminal ideal rests",
         "absolute_to_relative default_tolerance fixed_step",
     ),
     "text": _TEXT,
@@ -76,6 +76,7 @@ SECTIONS: dict[str, Any] = {
     "holds": _record("mode number loose motion state reaction approach moved name unused", "factor nominal"),
     "circuits": _record("first_member n_members first"),
     "members": _INTEGER,
+    "ideals": _record("row mode zero other name unused", "nominal"),
     "units": _INTEGER,
     "start_modes": _record("mode target"),
     **dict.fromkeys(("start_direct", "start_default", "start_guess"), _START_OF),
@@ -182,6 +183,8 @@ def _contents(
                 sizes["y"],
                 *flags,
                 model.discrete_position.get(TERMINAL, -1),
+                model.ideal.first if model.ideal else 0,
+                int(model.settings.get("on_chattering") == "rest"),
                 ABSOLUTE_TO_RELATIVE,
                 tolerance,
                 fixed_step,
@@ -259,7 +262,11 @@ def _holds(model: CompiledDae, text: _Text) -> dict[str, Any]:
         "holds": holds,
         "circuits": [(*place, one.first) for place, one in zip(first, model.circuits, strict=True)],
         "members": [k for circuit in model.circuits for k in circuit.members],
-        "units": [units[str(one.unit)] for one in model.flat_variables] if holds else [],
+        "ideals": [
+            (one.row, one.mode, *one.zeros, text(one.component), 0, abs(model.flat_variables[one.zeros[0]].nominal))
+            for one in (model.ideal.elements if model.ideal else ())
+        ],
+        "units": [units[str(one.unit)] for one in model.flat_variables] if holds or model.ideal else [],
     }
 
 

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from modelica_like.compile.compiled import CompiledDae, StartEntry
+from modelica_like.compile.compiled import CompiledDae
 from modelica_like.initialize import Point, call, share, start_plan
-from modelica_like.initialize.plan import start_name
+from modelica_like.initialize.plan import is_near, start_name
 from modelica_like.initialize.start import StartProblem
 from modelica_like.initialize.steady import moving_states
 
@@ -74,7 +74,7 @@ def start_tables(model: CompiledDae) -> StartTables:
 
     resting = ((AT_REST, node, row_of[node]) for node in plan.resting)
     names = {name: k for k, name in enumerate(model.implicit)}
-    near = [(names.get(start_name(model, e)), k) for k, e in enumerate(model.starts) if _is_near(e)]
+    near = [(names.get(start_name(model, e)), k) for k, e in enumerate(model.starts) if is_near(model, e)]
     return StartTables(
         direct=of_states("fixed"),
         defaults=of_states("default"),
@@ -88,8 +88,3 @@ def start_tables(model: CompiledDae) -> StartTables:
         wanted=plan.wanted,
         steady=tuple(moving_states(model)) if plan.kind == "steady" else None,
     )
-
-
-def _is_near(entry: StartEntry) -> bool:
-    """Whether a start value is the first guess of an implicit unknown."""
-    return entry.strength != "default" and entry.state is None

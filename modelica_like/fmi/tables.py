@@ -8,6 +8,7 @@ from typing import Any
 import casadi as ca
 
 from modelica_like.compile.compiled import CompiledDae
+from modelica_like.errors import ExportError
 from modelica_like.fmi.start_tables import StartTables, start_tables
 from modelica_like.fmi.tape import ARGUMENTS, Slots, Tape, write_tapes
 
@@ -59,7 +60,9 @@ def make_tables(model: CompiledDae, start: StartTables | None = None) -> Tables:
     Raises:
         MissingStart, ContradictingStart: the start values do not determine all states.
         LanguageError: a function has no counterpart in C.
+        ExportError: a value is delayed.
     """
+    model.refuse_delays(ExportError, f"The compiled run-time cannot have {model.name}")
     start = start or start_tables(model)
     functions, jacobian, start_pattern = _functions(model, start)
     states = len(model.states)

@@ -15,6 +15,8 @@ from modelica_like.initialize.holds import holding as holding
 from modelica_like.initialize.holds import rest as rest
 from modelica_like.initialize.holds import share as share
 from modelica_like.initialize.holds import sharing as sharing
+from modelica_like.initialize.ideal import meet as meet
+from modelica_like.initialize.ideal import replace_dependent
 from modelica_like.initialize.plan import StartKind as StartKind
 from modelica_like.initialize.plan import StartPlan as StartPlan
 from modelica_like.initialize.plan import start_plan as start_plan
@@ -57,6 +59,8 @@ def initialize(model: CompiledDae, t0: float = 0.0, start: StartKind = "given") 
             f"There is no start '{start}'{did_you_mean(start, get_args(StartKind)) or '.'}",
             advice="A run can start as given, at rest or in the steady state: given, rest, steady.",
         )
+    if start == "steady":
+        model.refuse_delays(InitializationError, f"{model.name} cannot start in the steady state")
     point = Point(t0, model.guesses.copy(), model.z_guesses.copy(), np.zeros(model.discrete_size))
     point.d = call(model, model.discrete_starts, point)
     share(model, point)
@@ -67,6 +71,7 @@ def initialize(model: CompiledDae, t0: float = 0.0, start: StartKind = "given") 
         share(model, point)
     _settle(model, point, problem, start)
     rest(model, point)
+    replace_dependent(model, point)
     solve_implicit(model, point)
     check_singular(model, point)
     if start == "steady":

@@ -12,9 +12,10 @@ from modelica_like.compile.compiled import Circuit, CompiledDae, Vector
 from modelica_like.compile.functions import ROUNDING
 from modelica_like.compile.soon import time_resolution
 from modelica_like.flatten.holds import TERMS
+from modelica_like.initialize.ideal import replace_dependent
 from modelica_like.initialize.point import Point, call, solve_implicit
 from modelica_like.initialize.slopes import variable_slopes
-from modelica_like.language.hold import UNLIMITED
+from modelica_like.language.holding import UNLIMITED
 
 _DEPENDENT = 1e-9
 INSTANT = 1e-9
@@ -97,6 +98,7 @@ def share(model: CompiledDae, point: Point) -> None:
     but the split follows from the other equations. If one element exceeds its capacity, the others take more, as far as
     they can.
     """
+    replace_dependent(model, point)
     if not model.circuits:
         return
     active = set(holding(model, point))
@@ -246,9 +248,10 @@ class Strike:
         model: the compiled model.
         point: the point with the new modes and the speeds before; it becomes the point after the impact.
         entering: positions of the held motions whose modes have just begun.
+        resting: whether nothing rebounds, whatever its restitution; nor does a motion that is rounding.
     """
 
-    def __init__(self, model: CompiledDae, point: Point, entering: Collection[int]) -> None:
+    def __init__(self, model: CompiledDae, point: Point, entering: Collection[int], *, resting: bool = False) -> None:
         self.model = model
         self.point = point
         self.entering = set(entering)
@@ -259,6 +262,7 @@ class Strike:
         limits = capacities(model, point)
         moving = [k for k in self.entering if before[k] != 0.0 and max(limits[k]) >= UNLIMITED]
         self.hard = self._stops(before, moving)
+        self._rebound = 1.0 if self.hard and not resting else 0.0
         self.knocked: list[int] = []
 
     def run(self) -> None:
@@ -269,7 +273,7 @@ class Strike:
         model, point = self.model, self.point
         before = self._motions()
         moving = [k for k in sorted(self.entering) if before[k] != 0.0]
-        limits, restitution = capacities(model, point), terms(model, point)[:, -1]
+        limits, restitution = capacities(model, point), self._rebound * terms(model, point)[:, -1]
         trials = 0
         while True:
             approaches = {k: -(1.0 + restitution[k]) * before[k] / INSTANT for k in moving if k not in self.loose}

@@ -251,13 +251,14 @@ class _Choice:
     def _missing(self) -> MissingStart:
         model, count = self.model, len(self.columns) - self.choice.size
         names = [model.states[self.free[k]] for k in self.choice.undetermined() if k < len(self.free)]
+        parts = dict.fromkeys(name.removeprefix("der(").rstrip(")").rpartition(".")[0] for name in names)
+        names = [_to_give(model, name) for name in names]
         if count == 1:
             what = f"one equation: give {' or '.join(names[:4]) + (' …' if len(names) > 4 else '')} a start value"
         else:
             shown = ", ".join(names[:8]) + (", …" if len(names) > 8 else "")
             which = "" if count == len(names) else f"{count} of "
             what = f"{count} equations: give {which}{shown} start values"
-        parts = dict.fromkeys(name.removeprefix("der(").rstrip(")").rpartition(".")[0] for name in names)
         return MissingStart(
             f"Initialization (not the model) lacks {what}.",
             where=[model.places[part] for part in parts if part in model.places][:3],
@@ -265,6 +266,19 @@ class _Choice:
         )
 
 
+def _to_give(model: CompiledDae, name: str) -> str:
+    """Return what can get a start value: a state, or a variable of one that follows the motion."""
+    base = name.removeprefix("der(").removesuffix(")")
+    if base not in model.following:
+        return name
+    return f"{'' if name == base else 'a rate of '}{' or '.join(model.following[base])}"
+
+
 def start_name(model: CompiledDae, entry: StartEntry) -> str:
     """Path of the variable of a start value."""
     return model.flat_variables[entry.node].path
+
+
+def is_near(model: CompiledDae, entry: StartEntry) -> bool:
+    """Whether a start value is the first guess of a variable that is no state; a default, if there is no guess."""
+    return entry.state is None and (entry.strength != "default" or not model.flat_variables[entry.node].guess)

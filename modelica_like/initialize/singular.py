@@ -73,6 +73,11 @@ def _singular(
     if zeros := [] if len(holding) > 1 else _zeros(model, owners, regular):
         why = f"{_and(zeros)} {'is' if len(zeros) == 1 else 'are'} zero, so these unknowns are undetermined."
         advice = f"Give {'it' if len(zeros) == 1 else 'one of them'} another value."
+    elif moved := [name for some in model.following.values() for name in some if name in told]:
+        advice = (
+            f"At the start, give guesses of {_and(dict.fromkeys(moved))} near the motion, and start values to what "
+            "moves there. On the way, the mechanism can go on in two ways from here."
+        )
     shown = ", ".join(told[:6]) + (", …" if len(told) > 6 else "")
     return SingularAtStart(
         f"The Jacobian is singular at t = {point.t:.9g} s in block {number + 1} ({shown}).",

@@ -11,7 +11,7 @@ import numpy as np
 from modelica_like.compile.compiled import CompiledDae, StartEntry, Vector
 from modelica_like.errors import ContradictingStart, InitializationError
 from modelica_like.flatten.model import INITIAL_EQUATION
-from modelica_like.initialize.plan import StartKind, StartPlan, direct_starts, start_name, start_plan
+from modelica_like.initialize.plan import StartKind, StartPlan, direct_starts, is_near, start_name, start_plan
 from modelica_like.initialize.point import Point, call, check_singular, solve_implicit
 
 _CONSISTENT = 1e-8
@@ -39,7 +39,7 @@ class _Sorted:
     Attributes:
         fixed, guesses, defaults: of states; only the first of several fixed ones of a state.
         again: the other fixed ones, each with the first.
-        implicit: guesses and fixed ones of implicit unknowns, used as first guesses.
+        implicit: of implicit unknowns, used as first guesses.
     """
 
     def __init__(self, model: CompiledDae) -> None:
@@ -50,7 +50,7 @@ class _Sorted:
         self.fixed = _Places(one for one in of["fixed"] if direct[one[1]] == one[0])
         self.guesses, self.defaults = _Places(of["guess"]), _Places(of["default"])
         position = {name: k for k, name in enumerate(model.implicit)}
-        near = [k for k, one in enumerate(model.starts) if one.state is None and one.strength != "default"]
+        near = [k for k, one in enumerate(model.starts) if is_near(model, one)]
         begins = [(k, start_name(model, model.starts[k])) for k in near]
         self.implicit = _Places((k, position[name], 1.0) for k, name in begins if name in position)
 

@@ -119,7 +119,7 @@ def check_modes_hold(model: CompiledDae, point: Point) -> None:
     guards = call(model, model.guards, point)
     for one in model.transitions:
         mode, present = model.flat_discretes[one.mode], int(point.d[one.mode])
-        if not one.timed and present in one.sources and guards[one.index] > 0:
+        if not one.timed and present in one.sources and one.target != present and guards[one.index] > 0:
             raise InitializationError(
                 f"No steady state was found at t = {point.t:g} s: {mode.path} does not stay {mode.names[present]}.",
                 where=one.source,

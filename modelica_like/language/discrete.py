@@ -14,7 +14,7 @@ from modelica_like.language.expr import TIME, Expr, Scalar, Symbol, symbols_in
 from modelica_like.language.fields import Discrete, Variable
 from modelica_like.language.places import NOWHERE, caller
 
-MarkerKind = Literal["relation", "floor", "was", "once", "clock"]
+MarkerKind = Literal["relation", "floor", "was", "once", "clock", "delay", "sample", "previous"]
 
 
 class Marker(Symbol):
@@ -23,9 +23,10 @@ class Marker(Symbol):
     Attributes:
         kind: `relation`: whether `of` is true, changed by events; `floor`: the whole number below `of`, changed by
             events; `was`: the condition `of` at the present instant; `once`: 1 where `of` has just become true;
-            `clock`: number of ticks, `of` is their period.
+            `clock`: number of ticks, `of` is their period; `delay`: see `delay.Part`; `sample` and
+            `previous`: their arguments, until a `when` of a clock has replaced them.
         of: the condition or value.
-        offset: time of the first tick of a clock.
+        offset: time of the first tick of a clock, or a delay, in s.
         name: path from the component, given when its template is made.
     """
 
@@ -197,6 +198,43 @@ def clock(period: Expr, offset: Scalar = 0.0) -> Expr:
     return change(marker("clock", ca.SX(cast(Any, period)), offset))
 
 
+def sample(value: Expr) -> Expr:
+    """Return a value as it is at a tick: in new values of a `when` of a clock, and nowhere else.
+
+    Args:
+        value: any expression. There, the expression itself means the same.
+    """
+    return marker("sample", ca.SX(cast(Any, value)))
+
+
+def previous(value: Expr) -> Expr:
+    """Return a discrete value as the tick before has left it: `pre(value)`, in a `when` of a clock and nowhere else.
+
+    Args:
+        value: a discrete, Boolean or integer variable.
+
+    Raises:
+        LanguageError: it is something else.
+    """
+    return marker("previous", cast(Pre, pre(value)).of)
+
+
+def hold(value: Expr) -> Expr:
+    """Return what ticks have set, for equations of variables: it is held until the next one.
+
+    Args:
+        value: an expression of discrete variables and parameters, which means the same itself.
+
+    Raises:
+        LanguageError: it changes between ticks.
+    """
+    if moves(value):
+        what = f"hold({value}): this changes between ticks, so it is not held."
+        advice = "Take it at the ticks: when(clock(…), {self.held: sample(…)})."
+        raise LanguageError(what, where=caller(), advice=advice)
+    return value
+
+
 def initial() -> Expr:
     """Return a condition that is true at the start of a run."""
     return INITIAL
@@ -251,15 +289,28 @@ def when(condition: Expr | tuple[Expr, ...], values: Mapping[Expr, Scalar]) -> W
     """
     conditions = condition if isinstance(condition, tuple) else (condition,)
     edges: list[Any] = []
+    clocked = False
     for one in conditions:
         symbols = symbols_in(one)
-        if not any(symbol is TIME or symbol.owner is None or not _is_fixed(symbol) for symbol in symbols):
+        if not any(symbol is TIME or symbol.owner is None or not is_fixed(symbol) for symbol in symbols):
             what = f"when({one}, …) has no edge: its condition is the same during the whole run."
             raise LanguageError(what, where=caller(), advice="Compare what changes, such as a variable or time.")
         ticks = any(isinstance(symbol, Marker) and symbol.kind == "clock" for symbol in symbols)
+        clocked |= ticks
         edges.append(one if one is INITIAL or (ticks and cast(Any, one).op() == ca.OP_NE) else edge(one))
     active = cast(Expr, functools.reduce(ca.logic_or, edges))
-    return When(((active, dict(values)),), conditions)
+    new = {key: _at_tick(value) for key, value in values.items()} if clocked else dict(values)
+    return When(((active, new),), conditions)
+
+
+def _at_tick(value: Scalar) -> Expr:
+    """Return a new value with what `sample` and `previous` mean at a tick."""
+    whole: Any = ca.SX(cast(Any, value))
+    marked = [one for one in symbols_in(whole) if isinstance(one, Marker) and one.kind in ("sample", "previous")]
+    if not marked:
+        return whole
+    meant = (pre(one.of) if one.kind == "previous" else _at_tick(one.of) for one in marked)
+    return ca.substitute(whole, ca.vertcat(*marked), ca.vertcat(*meant))
 
 
 @dataclass(frozen=True, eq=False)
@@ -282,5 +333,6 @@ def assert_(condition: Expr, text: str) -> Assertion:
     return Assertion(condition, text)
 
 
-def _is_fixed(symbol: Symbol) -> bool:
+def is_fixed(symbol: Symbol) -> bool:
+    """Return whether the symbol of a field keeps its value during a run."""
     return symbol.order == 0 and not is_a(symbol, (Variable, Discrete)) and symbol.name in symbol.owner.fields

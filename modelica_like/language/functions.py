@@ -22,6 +22,8 @@ from modelica_like.language.expr import (
     symbols_in,
 )
 
+RANDOM_NUMBERS = 2147483647.0
+
 
 def _sx(value: Scalar) -> Any:
     return ca.SX(cast(Any, value))
@@ -40,6 +42,20 @@ def der(expression: Expr) -> Expr:
         rate: Any = 1.0 if symbol is TIME else _rate(symbol)
         total = total + ca.jacobian(_sx(expression), symbol) * rate
     return total
+
+
+def random(before: Expr) -> Expr:
+    """Return the pseudo-random number between 0 and 1 that follows another one.
+
+    It belongs in a `when`, as in {self.u: random(pre(self.u))}. Numbers are k / (2^31 - 1) with k from the generator
+    48271 k mod (2^31 - 1) of S. K. Park, K. W. Miller and P. K. Stockmeyer, `minstd_rand` of C++, which is exact in
+    floating point: they are the same in every run and every FMU.
+
+    Args:
+        before: the number before. The start value of its variable, from 0 to below 1, is the seed.
+    """
+    product = 48271.0 * ca.fmax(ca.floor(_sx(before) * RANDOM_NUMBERS + 0.5), 1.0)
+    return cast(Expr, (product - RANDOM_NUMBERS * ca.floor(product / RANDOM_NUMBERS)) / RANDOM_NUMBERS)
 
 
 def prescribed(motion: Expr) -> Expr:

@@ -11,8 +11,8 @@ import casadi as ca
 from modelica_like.errors import LanguageError, Source, UnknownName, did_you_mean
 from modelica_like.language.discrete import eventful, marker
 from modelica_like.language.expr import Expr, Scalar, Symbol, symbol_of
-from modelica_like.language.hold import Hold
-from modelica_like.language.places import NOWHERE
+from modelica_like.language.holding import Hold
+from modelica_like.language.places import NOWHERE, caller
 
 
 class Mode:
@@ -25,6 +25,9 @@ class Mode:
         holds: motion that a mode holds, by the name of the mode; a name is short for `Hold(motion)`. In such a mode
             the component's equations set the derivative of the motion to zero. The motion itself is zero, too: a
             component that enters the mode with a motion stops by an impact.
+        ideal: for one of two modes each, the variable that its equation sets to zero: the current of a blocking diode,
+            the voltage of a conducting one. Where such equations do not determine all unknowns, those for the
+            derivatives of states that the modes fix, or the least norm of what they leave open, do.
     """
 
     name: str = ""
@@ -36,11 +39,13 @@ class Mode:
         start: str | None = None,
         description: str = "",
         holds: Mapping[str, str | Hold] | None = None,
+        ideal: Mapping[str, str] | None = None,
     ) -> None:
         self.names = names
         self.start = names[0] if start is None else start
         self.description = description
         self.holds = {name: Hold(one) if isinstance(one, str) else one for name, one in (holds or {}).items()}
+        self.ideal = dict(ideal or {})
 
     def __set_name__(self, owner: type, name: str) -> None:
         self.owner = owner.__name__
@@ -50,13 +55,15 @@ class Mode:
         """Check the declaration; not in `__set_name__`, because Python 3.11 wraps exceptions there.
 
         Raises:
-            LanguageError: no names, or a duplicate name.
-            UnknownName: the start, or a mode in `holds`, does not exist.
+            LanguageError: no names, a duplicate name, or an ideal element without two modes.
+            UnknownName: the start, or a mode in `holds` or `ideal`, does not exist.
         """
         if len(set(self.names)) != len(self.names) or not self.names:
             raise LanguageError(f"{self.label} needs distinct names, not {self.names}.")
-        for name in (self.start, *self.holds):
+        for name in (self.start, *self.holds, *self.ideal):
             self.number(name)
+        if self.ideal and not len(self.ideal) == len(self.names) == 2:
+            raise LanguageError(f"{self.label} needs two modes with one zero variable each to be ideal.")
 
     @property
     def label(self) -> str:
@@ -102,6 +109,15 @@ class BoundMode:
     def __init__(self, mode: Mode, symbol: Symbol) -> None:
         self.mode = mode
         self.symbol = symbol
+
+    def __eq__(self, other: object) -> bool:
+        """Refuse `mode == "stuck"`, which Python would answer with False, once and for all."""
+        if isinstance(other, str):
+            what = f'{self.mode.label} == "{other}" is no condition: the mode changes while the model runs.'
+            raise LanguageError(what, where=caller(), advice=f'Write self.{self.mode.name}.is_("{other}").')
+        return self is other
+
+    __hash__ = object.__hash__
 
     def is_(self, *names: str) -> Expr:
         """Return a condition that is true in some modes.

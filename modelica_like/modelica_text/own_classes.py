@@ -47,16 +47,18 @@ def class_of_equations(
         driven: names of the connected signals; other inputs become parameters.
 
     Raises:
-        ModelicaTextError: it has parts, or a mode that holds a motion.
+        ModelicaTextError: it has parts, or a mode that is ideal or holds a motion.
     """
-    held = [key for key, mode in component.modes.items() if mode.holds]
+    held = [(key, mode) for key, mode in component.modes.items() if mode.holds or mode.ideal]
     if component.parts or held:
-        what = "parts of its own" if component.parts else f"the mode {held[0]}, which holds a motion"
+        what = "parts of its own"
+        if not component.parts:
+            what = f"the mode {held[0][0]}, which {'is ideal' if held[0][1].ideal else 'holds a motion'}"
         raise ModelicaTextError(
             f"{component.label} is a {type(component).__name__}, for which the Modelica Standard Library has no class, "
             f"and it has {what}.",
             where=component.place_of(),
-            advice="Impacts and shared loads are not equations, so Modelica text cannot say them.",
+            advice="Impacts, shared loads and states that modes take away are no equations of Modelica text.",
         )
     lines = [f"model {name}", *_declarations(component, write_formula, driven), "equation"]
     for item, source in located(component.equations()):

@@ -19,12 +19,17 @@ ELEMENTARY = {
     "sign", "floor", "ceil", "integer", "mod", "rem", "div", "min", "max",
 }  # fmt: skip
 """Functions of numbers."""
-KEPT = {"der", "pre", "noEvent", "smooth", "initial", "sample", "edge", "change", "reinit", "terminal"}
+KEPT = {
+    "der", "pre", "noEvent", "smooth", "initial", "sample", "edge", "change", "reinit", "terminal", "delay",
+    "Clock", "previous", "hold",
+}  # fmt: skip
 _REFUSED = {
-    "delay": "a delay", "spatialDistribution": "spatialDistribution", "cardinality": "cardinality(…)",
+    "spatialDistribution": "spatialDistribution", "cardinality": "cardinality(…)",
     "terminal": "terminal()",
     "inStream": "a stream connector", "actualStream": "a stream connector",
-    "previous": "a clocked partition", "hold": "a clocked partition", "Clock": "a clocked partition",
+    "subSample": "a clock that follows another",
+    "superSample": "a clock that follows another", "shiftSample": "a clock that follows another",
+    "backSample": "a clock that follows another",
     "transition": "a state machine", "initialState": "a state machine",
 }  # fmt: skip
 _LONGEST = 100_000

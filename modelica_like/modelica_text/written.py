@@ -19,13 +19,17 @@ from modelica_like.language import (
     assert_,
     change,
     clock,
+    delay,
     der,
     edge,
     floor,
+    hold,
     if_,
     initial,
     mod,
     pre,
+    previous,
+    sample,
     when,
     where,
 )
@@ -179,7 +183,9 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {
     **{name: getattr(ca, name) for name in ("tanh", "exp", "log", "log10", "sqrt", "sign")},
     "abs": ca.fabs, "min": ca.fmin, "max": ca.fmax, "noEvent": lambda x: x,
     "der": der, "pre": pre, "edge": edge, "change": change, "initial": initial,
-    "sample": lambda start, period: clock(period, start),
+    "delay": lambda value, time, most=None: delay(value, time),
+    "sample": lambda value, period=None: sample(value) if period is None else clock(period, value),
+    "Clock": lambda period, parts=1: clock(period / parts), "previous": previous, "hold": hold,
 }  # fmt: skip
 _STEPPED: dict[str, Callable[..., Any]] = {
     "floor": lambda x, events: floor(x, events=events), "integer": lambda x, events: floor(x, events=events),

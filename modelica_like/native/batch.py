@@ -60,7 +60,8 @@ class Batch:
         self, model: CompiledDae, readings: Sequence[Reading], options: Options, span: tuple[float, float],
         start: StartKind | None = None,
     ) -> None:  # fmt: skip
-        self._native = NativeModel.of(model, start)
+        asked = {**model.settings, "on_chattering": options.on_chattering}
+        self._native = NativeModel.of(model.twin(settings=asked), start)
         self._options, self._span = options, span
         rows = [(_KINDS.index(one.kind), one.place, *one.change, 0, one.moment) for one in readings]
         self._readings = np.array(rows, _RECORD)

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from modelica_like.compile.compiled import CompiledDae, Vector
+from modelica_like.compile.sliding import as_asked
 from modelica_like.errors import (
     Chattering,
     ContradictingStart,
@@ -18,6 +19,7 @@ from modelica_like.errors import (
     LimitPassed,
     ModelicaLikeError,
     NoGradient,
+    NoValidModes,
     SingularAtStart,
     StepFailed,
     UnknownName,
@@ -34,6 +36,7 @@ from modelica_like.solve.options import Options
 _ERRORS: tuple[tuple[str, type[ModelicaLikeError]], ...] = (
     ("The integrator gave up|The step from", StepFailed),
     ("Modes still switch|Discrete variables do not|Events follow each other", Chattering),
+    (r"At t = \S+ s no combination", NoValidModes),
     ("The Jacobian is singular|The derivative of .* is not finite", SingularAtStart),
     (r"t = \S+ s: ", LimitPassed),
     ("Two start values|A start value of", ContradictingStart),
@@ -80,8 +83,9 @@ class NativeModel:
     @staticmethod
     def of(model: CompiledDae, start: StartKind | None = None, fixed_step: float = 0.0) -> NativeModel:
         """Return the cached one of the same model, for any parameter values."""
-        key = "native", start or model.settings.get("start", "given"), fixed_step
-        return model.once(key, lambda: NativeModel(model, *key[1:]))
+        model, kind = as_asked(model), start or model.settings.get("start", "given")
+        key = "native", kind, fixed_step, model.settings.get("on_chattering") == "rest"
+        return model.once(key, lambda: NativeModel(model, kind, fixed_step))
 
     def references(self, names: Iterable[str]) -> np.ndarray[Any, np.dtype[np.uint32]]:
         """Return the value references of variables.

@@ -50,12 +50,25 @@ function controls() {
 
 const LEFT = 58, RIGHT = 14, TOP = 6, BOTTOM = 20, HEIGHT = 165, ROW = 36, COLOURS = 7;
 
-/* What a run has for a variable, in its shown unit. */
+const OPERATIONS = { "+": (a, b) => a + b, "-": (a, b) => a - b, "*": (a, b) => a * b, "/": (a, b) => a / b,
+  "**": (a, b) => a ** b, neg: (a) => -a };
+const used = (one) => one.references ?? [one.reference];
+
+/* The value of a formula, as page.py writes it; `read` returns what stands at a place. */
+function valueOf(tree, read) {
+  if (typeof tree === "number") return tree;
+  const [first, ...operands] = tree;
+  if (operands.length === 0) return read(first);
+  return (OPERATIONS[first] ?? Math[first])(...operands.map((one) => valueOf(one, read)));
+}
+
+/* What a run has for a variable or a formula, in its shown unit. */
 function values(result, variable) {
-  const width = result.references.length, column = result.references.indexOf(variable.reference);
-  if (column < 0) return []; // nobody asked for it then
-  const unit = PAGE.units[variable.unit];
-  return result.times.map((_, k) => (result.outputs[k * width + column] - unit.offset) / unit.factor);
+  const width = result.references.length, columns = used(variable).map((one) => result.references.indexOf(one));
+  if (columns.includes(-1)) return []; // nobody asked for it then
+  const unit = PAGE.units[variable.unit], at = (k, n) => n < 0 ? result.times[k] : result.outputs[k * width + columns[n]];
+  const own = variable.tree ? (_, k) => valueOf(variable.tree, (n) => at(k, n)) : (_, k) => at(k, 0);
+  return result.times.map(own).map((value) => variable.driving * (value - unit.offset) / unit.factor);
 }
 
 function range(curves) {
@@ -118,7 +131,7 @@ class Picture {
       this.readers.push((n) => value.textContent = n === null ? "" : `\u2002${short(curves[k][n])}`);
       const about = { title: `${one.description || one.name}; a click takes it away` };
       about.onclick = () => (shown.delete(one), ask());
-      return element("button", about, mark, one.name, value);
+      return element("button", about, mark, one.driving < 0 ? `\u2212${one.name}` : one.name, value);
     });
     const title = element("span", {}, [unit.quantity, unit.text].filter(Boolean).join(" in "));
     const made = element("figure", { innerHTML: this.svg(HEIGHT, grid.join("") + paths.join("")) });
@@ -184,7 +197,7 @@ const tell = (error) => at("said").textContent = `The page has failed: ${error.m
 
 async function update() {
   const mine = turn, wanted = () => mine === turn, begin = performance.now();
-  const references = [...shown, ...MODES].map((one) => one.reference);
+  const references = [...new Set([...shown, ...MODES].flatMap(used))];
   const changed = PAGE.sliders.filter((one) => one.reference !== null && one.now !== one.value);
   if (references.join() !== original?.references.join()) original = null;
   const given = changed.map((one) => [one.reference, one.now * one.factor + one.offset]);
@@ -209,6 +222,7 @@ async function begin() {
 }
 
 function listen() {
+  at("add").placeholder = `add one of ${PAGE.variables.length - shown.size} more curves …`;
   at("names").append(...PAGE.variables.map((one) => element("option", { value: one.name })));
   at("add").onchange = () => {
     const found = PAGE.variables.find((one) => one.name === at("add").value);

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from modelica_like.compile.compiled import CompiledDae
+from modelica_like.errors import UnknownName
 from modelica_like.flatten.model import FlatParameter
 from modelica_like.fmi.build import BROWSER
 from modelica_like.fmi.export import Report, compiled_open, silent, tool
@@ -23,12 +24,14 @@ from modelica_like.fmi.model_file import model_file
 from modelica_like.fmi.package import target_file
 from modelica_like.fmi.runtime import runtime_library
 from modelica_like.fmi.tables import make_tables
+from modelica_like.language.formula import Formula
 from modelica_like.native.library import MESSAGE_LENGTH, Run
 from modelica_like.simulation import Model, seconds, simulate, without_garbage_search
 from modelica_like.solve.display import Display
 from modelica_like.solve.options import Options
-from modelica_like.solve.plot import chosen
+from modelica_like.solve.plot import for_page
 from modelica_like.solve.plot import quantity as quantity_of
+from modelica_like.solve.signals import Signal, si_value
 from modelica_like.units import ANY, ONE, Unit, coherent, parse_unit
 from modelica_like.writing import write_bytes
 
@@ -78,7 +81,8 @@ def export_html(
         drive: a component, a netlist file, or a compiled model.
         path: the page to write, with the ending .html.
         until: end time, a number in s or a quantity; by default that of the netlist.
-        show: patterns of the first curves, such as `*.w`; by default speeds, torques and forces of the parts.
+        show: names, patterns or formulas of the first curves; by default speeds, torques and forces of the parts, or
+            what a circuit has.
         report: called with the present activity.
 
     Raises:
@@ -94,7 +98,7 @@ def export_html(
     report("simulating")
     end = seconds(until if until is not None else model.settings.get("until"))
     solution = simulate(model, end)
-    content = page_content(model, chosen(solution, show), end, solution.options)
+    content = page_content(model, for_page(solution, show)[0], end, solution.options)
     report("writing the page")
     variables = interface(model)
     data = model_file(make_tables(model, variables.start), variables.variables, "{page}", solution.options.rtol)
@@ -136,14 +140,17 @@ def page(
     return re.sub(r"\{\{(\w+)\}\}", lambda found: parts[found[1]], text)
 
 
-def page_content(model: CompiledDae, names: Sequence[str], until: float, options: Options) -> dict[str, Any]:
+def page_content(model: CompiledDae, signals: Sequence[Signal], until: float, options: Options) -> dict[str, Any]:
     """Return what the script of a page reads: sliders, variables, modes and units.
 
     Args:
         model: the compiled model.
-        names: variables that are drawn at first.
+        signals: curves that are drawn at first.
         until: end time in s.
         options: of the runs.
+
+    Raises:
+        UnknownName: a formula has an energy in it.
     """
     variables = interface(model)
     end = {
@@ -155,11 +162,11 @@ def page_content(model: CompiledDae, names: Sequence[str], until: float, options
         "tool": tool(), "until": until,
         "rtol": options.rtol, "atol": options.atol, "points": options.points, "most_events": options.max_events,
         "sliders": [end, *_sliders(model, variables.by_name, display)],
-        "variables": list(_variables(model, variables.by_name, set(names), units, display)),
+        "variables": list(_variables(model, variables.by_name, signals, units, display)),
         "modes": [
             {
                 "name": one.path, "reference": variables.by_name[one.path].reference, "names": one.names or None,
-                "unit": units.number(ONE),
+                "unit": units.number(ONE), "driving": 1,
             }
             for one in model.flat_discretes
             if not one.hidden
@@ -209,14 +216,38 @@ def _spelled(unit: Unit) -> str:
 
 
 def _variables(
-    model: CompiledDae, known: dict[str, FmuVariable], names: set[str], units: _Units, display: Display
+    model: CompiledDae, known: dict[str, FmuVariable], signals: Sequence[Signal], units: _Units, display: Display
 ) -> Iterator[dict[str, Any]]:
+    """Variables, each with its value reference; formulas as trees over several references."""
+    names, variables = {one.name for one in signals}, {one.path for one in model.flat_variables} & known.keys()
     for one in model.flat_variables:
         if one.path in known and (one.path in names or one.kind in ("local", "output")):
             yield {
                 "name": one.path, "reference": known[one.path].reference, "description": one.description,
                 "unit": units.number(parse_unit(display.of(one.path))), "shown": one.path in names,
+                "driving": one.driving,
             }  # fmt: skip
+    for one in signals:
+        if one.name not in variables:
+            references: list[int] = []
+            yield {
+                "name": one.name, "tree": _tree(one.formula, known, references), "references": references,
+                "unit": units.number(parse_unit(one.shown_in(display))), "shown": True, "driving": 1,
+            }  # fmt: skip
+
+
+def _tree(formula: Formula, known: Mapping[str, FmuVariable], references: list[int]) -> Any:
+    """A number; `[place]` for the value of a reference, -1 for time; or `[operation, operands…]`."""
+    kind, operands = formula.operation, formula.operands
+    if kind in ("number", "quantity"):
+        return operands[0] if kind == "number" else si_value(operands[0])
+    if kind != "name":
+        return [kind, *(_tree(one, known, references) for one in operands)]
+    if operands[0] != "time" and operands[0] not in known:
+        raise UnknownName(f"A page with sliders cannot show '{operands[0]}': it has variables, parameters and modes.")
+    if operands[0] != "time":
+        references.append(known[operands[0]].reference)
+    return [len(references) - 1 if operands[0] != "time" else -1]
 
 
 def _sliders(model: CompiledDae, known: dict[str, FmuVariable], display: Display) -> Iterator[dict[str, Any]]:

@@ -12,7 +12,7 @@ from modelica_like.initialize import Impact, Point
 from modelica_like.native.buffers import Buffers
 from modelica_like.native.model import Instance
 from modelica_like.solve.events import Progress
-from modelica_like.solve.instants import chattering, note_sharing
+from modelica_like.solve.instants import chattering, note_rest, note_sharing
 from modelica_like.solve.options import Options
 from modelica_like.solve.recorder import Recorder, Segment
 
@@ -32,7 +32,7 @@ class NativeLoop:
         self, model: CompiledDae, options: Options, start: Point, end: float, progress: Progress | None = None
     ) -> None:
         self.model, self.options, self.progress = model, options, progress
-        self.record = Recorder()
+        self.record, self._span = Recorder(), end - start.t
         self._instance = Instance(model)
         self._instance.reset(start.t, end, options.rtol, options.atol)
         self._instance.begin_at(start)
@@ -59,14 +59,18 @@ class NativeLoop:
         finally:
             self._read()
         if self._crowded:
-            raise chattering(self.record.events, f"There were more than {self.options.max_events} events")
+            raise self._chattering(f"There were more than {self.options.max_events} events")
         try:
             self._instance.check(code)
         except Chattering as error:
             if not self.record.events:
                 raise
-            raise chattering(self.record.events, error.what.partition(" at t = ")[0]) from None
+            raise self._chattering(error.what.partition(" at t = ")[0]) from None
+        note_rest(self.record, self.options, self._span)
         return self.record
+
+    def _chattering(self, why: str) -> Chattering:
+        return chattering(self.record.events, why, self.options.on_chattering)
 
     @property
     def _crowded(self) -> bool:

@@ -26,6 +26,8 @@ _ENDLESS = re.compile(r"[0-9]{4301}")
 MAX_BYTES = 2_000_000
 StartKind = Literal["given", "rest", "steady"]
 """Replacement of missing start values."""
+OnChattering = Literal["stop", "slide", "rest"]
+"""What happens where events follow each other without end."""
 Check = Callable[[str, Any], Any]
 """Returns an entry with the key `section.name`, if it has the right form."""
 Reader = Callable[[str, Any, Lines, list[ModelicaLikeError]], Any]
@@ -311,10 +313,15 @@ def duration(key: str, value: Any) -> Any:
     return value
 
 
-def _start_kind(key: str, value: Any) -> str:
-    if value not in get_args(StartKind):
-        raise NetlistError(f"{key} = {value!r} must be {' or '.join(get_args(StartKind))}.")
-    return value
+def _one_of(kind: Any) -> Check:
+    """Return the check of a word."""
+
+    def check(key: str, value: Any) -> str:
+        if value not in get_args(kind):
+            raise NetlistError(f"{key} = {value!r} must be {' or '.join(get_args(kind))}.")
+        return value
+
+    return check
 
 
 def _rtol(key: str, value: Any) -> float:
@@ -342,7 +349,8 @@ def _unit_text(key: str, value: Any) -> str:
 
 
 _OPTIONS: Mapping[str, Check] = {
-    "until": duration, "start": _start_kind, "rtol": _rtol, "points": _whole(1_000_000),
+    "until": duration, "start": _one_of(StartKind), "rtol": _rtol, "points": _whole(1_000_000),
+    "on_chattering": _one_of(OnChattering),
 }  # fmt: skip
 _READERS: Mapping[str, Reader] = {
     "name": whole(as_text),

@@ -10,7 +10,7 @@ from modelica_like.language import Component, Input, Parameter, Variable
 from modelica_like.language.fields import Discrete, Field
 from modelica_like.language.places import texts_of_fields
 from modelica_like.language.tables import REQUIRED, Column, Rows
-from modelica_like.netlist.document import StartKind
+from modelica_like.netlist.document import OnChattering, StartKind
 from modelica_like.netlist.json_units import Quantities
 from modelica_like.netlist.read import FMU_PART
 from modelica_like.netlist.registry import library_types
@@ -95,6 +95,11 @@ def _simulate() -> dict[str, Any]:
         "start": {"enum": list(get_args(StartKind)), "description": start},
         "rtol": rtol,
         "points": {**_COUNT, "maximum": 1_000_000, "description": "number of output intervals", "default": 500},
+        "on_chattering": {
+            "enum": list(get_args(OnChattering)),
+            "default": "stop",
+            "description": "where events never end: an error, sliding between two modes, rest in contact",
+        },
     }
     return {"type": "object", "description": _RUN, "additionalProperties": False, "properties": properties}
 

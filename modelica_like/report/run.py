@@ -10,6 +10,7 @@ from rich.console import Group, RenderableType
 from rich.markup import escape
 
 from modelica_like.language.transition import NAME_IN_NOTICE
+from modelica_like.report.changes import changes
 from modelica_like.report.tables import Listed, Shown, table
 from modelica_like.solve.display import Display
 from modelica_like.solve.signals import evaluated, read_signals
@@ -54,13 +55,12 @@ def _head(solution: Trajectories, notices: Iterable[str], *, debug: bool = False
 def events_table(solution: Trajectories, *, debug: bool = False) -> Listed:
     """Return the mode changes; of many only the first and the last. `debug` shows the lines of their transitions."""
     columns = 6 if debug else 5
-    told = reasons(solution)
     rows = [
-        (float(one.time), one.mode, one.before, one.after, why, f"{one.source}".partition(" `")[0])[:columns]
-        for one, why in zip(solution.events, told, strict=True)
+        (float(one.time), one.path, one.before, one.after, one.because, f"{one.source}".partition(" `")[0])[:columns]
+        for one in changes(solution)
     ]
     heads = ("time in s>.9g", "mode", "from", "to", "because", "declared in")[:columns]
-    return table(_mode_changes(len(solution.events)), *heads, rows=rows, name="events", most=_SHOWN, ends=True)
+    return table(_mode_changes(len(rows)), *heads, rows=rows, name="events", most=_SHOWN, ends=True)
 
 
 def values_table(solution: Trajectories, words: Sequence[str], display: Mapping[str, str] | None = None) -> Listed:
@@ -78,23 +78,6 @@ def values_table(solution: Trajectories, words: Sequence[str], display: Mapping[
         rows.append((one.name, "" if unit in ("1", "*") else unit, float(curve[0]), float(curve[-1]), *told))
     heads = "first>.6g", "last>.6g", "smallest>.6g", "smallest at s>.6g", "largest>.6g", "largest at s>.6g"
     return table("values", "name", "unit", *heads, rows=rows, most=_SHOWN, rest=", which --csv writes")
-
-
-def reasons(solution: Trajectories) -> list[str]:
-    """Return in words why each of the events happened, parameters with their values; nothing where nobody knows."""
-    known: dict[tuple[str, int], str] = {}
-
-    def valued(path: str) -> str:
-        unit = str(solution.model.units[path])
-        return f"{path.rpartition('.')[2]} = {solution[path][0]:g}{'' if unit == '1' else f' {unit}'}"
-
-    for event in solution.events:
-        key, (component, dot, _) = (event.mode, event.transition), event.mode.rpartition(".")
-        if key not in known:
-            by_itself = "an impact" if event.source.file else ""  # FMUs do not tell why
-            because = by_itself if event.transition < 0 else solution.model.transitions[event.transition].because
-            known[key] = NAME_IN_NOTICE.sub(lambda name, owner=component + dot: valued(owner + name[1]), because)
-    return [known[event.mode, event.transition] for event in solution.events]
 
 
 def notices(solution: Trajectories) -> list[str]:
@@ -146,10 +129,11 @@ def _energy(value: float) -> Shown:
 
 def statistics_line(solution: Trajectories) -> str:
     """Return steps, evaluations, events and seconds in one sentence."""
-    counts = solution.statistics
+    counts, chosen = solution.statistics, sum(one.mode.endswith("].choice") for one in solution.events)
+    choices = f" ({chosen} of them choices of states)" if chosen else ""
     return (
         f"{counts.steps} steps, {counts.evaluations} evaluations, {counts.integrations} integrations, "
-        f"{_mode_changes(counts.events)} in {counts.seconds:.3f} s"
+        f"{_mode_changes(counts.events)}{choices} in {counts.seconds:.3f} s"
     )
 
 

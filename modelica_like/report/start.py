@@ -11,6 +11,7 @@ import numpy as np
 from rich.console import RenderableType
 
 from modelica_like.compile import CompiledDae
+from modelica_like.errors import MissingStart
 from modelica_like.initialize import Point, StartKind, StartPlan, call, initialize, start_plan
 from modelica_like.initialize.plan import matrix_and_values, start_name
 from modelica_like.language import Component
@@ -38,6 +39,16 @@ def start_report(drive: Component, model: CompiledDae) -> RenderableType:
     return table(
         f"start values ({kind})", "variable", "value>.9g", "unit", "where from", rows=rows, name="start values"
     )
+
+
+def start_notes(model: CompiledDae) -> list[str]:
+    """Return what a run would say about missing start values, in a list; of a drive with open inputs nothing."""
+    try:
+        if not model.inputs:
+            initialize(model, start=model.settings.get("start", "given"))
+    except MissingStart as error:
+        return [f"{error.what} {error.advice}"]
+    return []
 
 
 def start_values(drive: Component, model: CompiledDae, kind: StartKind = "given") -> list[StartValueRow]:

@@ -8,6 +8,7 @@ from collections.abc import Iterable
 from rich.console import Group, RenderableType
 from rich.markup import escape
 
+from modelica_like.compile import compile
 from modelica_like.flatten import FlatModel, flatten
 from modelica_like.language import Component, Expr
 from modelica_like.report.tables import Listed, table
@@ -20,6 +21,8 @@ def structure_report(component: Component) -> RenderableType:
     """Flatten and reduce a model and report the result."""
     flat = flatten(component)
     reduced = reduce(flat)
+    if any(instance.template.update_forms for instance in flat.instances):
+        compile(reduced)  # finds loops among discrete variables
     parts: list[RenderableType] = [_sizes(flat, reduced), "", _energy(flat)]
     parts += ["", *(f"[dim]{escape(notice)}[/]" for notice in reduced.notices)] if reduced.notices else []
     return Group(*parts)

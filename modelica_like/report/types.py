@@ -36,7 +36,7 @@ def library_table(types: Mapping[str, type[Component]], words: Sequence[str] = (
 
     Args:
         types: by name.
-        words: that the name or the text of a type must have, in any case of letters.
+        words: that the name, the group or the text of a type must have, in any case of letters.
         group: name of a module; all by default.
 
     Raises:
@@ -48,8 +48,9 @@ def library_table(types: Mapping[str, type[Component]], words: Sequence[str] = (
         raise UnknownName(
             f"There is no group '{group}'{did_you_mean(group, known) or '.'}", advice=f"There are {', '.join(known)}."
         )
-    chosen = sorted((groups[name], name) for name, kind in types.items() if group in (None, groups[name])
-                    and all(word.lower() in f"{name} {kind.__doc__}".lower() for word in words))  # fmt: skip
+    texts = {name: f"{name} {groups[name]} {kind.__doc__}".lower() for name, kind in types.items()}
+    chosen = sorted((groups[name], name) for name, text in texts.items() if group in (None, groups[name])
+                    and all(word.lower() in text for word in words))  # fmt: skip
     if words and not chosen:
         where = f" of the group {group}" if group else ""
         raise UnknownName(
@@ -62,7 +63,8 @@ def library_table(types: Mapping[str, type[Component]], words: Sequence[str] = (
     # One line per type, so that the list can be searched; `describe` has the whole text.
     for column in made.columns:
         column.no_wrap = True
-        column.min_width = max((len(name) for _, name in chosen), default=0) if column is made.columns[0] else None
+    for column, k in zip(made.columns, (1, 0), strict=False):
+        column.min_width = max((len(one[k]) for one in chosen), default=0)
     return made
 
 

@@ -59,6 +59,13 @@ class Between:
         self._pieces.append(Piece(looks, times, last, x, z))
         return self._pieces[-1]
 
+    def now(self, looks: Looks, times: Vector, last: int) -> Piece:
+        """Return results at times between looks at once."""
+        x, z = (np.empty((len(part), len(times))) for part in (looks.x, looks.z))
+        piece = Piece(looks, times, last, x, z)
+        self._fill([piece], 0, precisely=True)
+        return piece
+
     def fill(self, *, precisely: bool = True) -> None:
         """Fill in all results; without `precisely`, those that IDAS does not reach a second time become nan.
 

@@ -237,7 +237,7 @@ def energy_balance(
     )  # fmt: skip
     rows = tuple(EnergyRow(path, *map(float, values)) for path, *values in zip(model.components, *columns, strict=True))
     exchanged = (inflow, source + work, lost + impact)
-    throughput = max([powers.stored, *(float(np.sum(np.abs(part))) for part in exchanged)])
+    throughput = max([powers.stored, powers.cancelled, *(float(np.sum(np.abs(part))) for part in exchanged)])
     reset = [event.time for event in events if event.transition >= 0 and model.transitions[event.transition].resets]
     told = [(one.time, one.energy - float(np.sum(work))) for one, work in zip(impacts, given, strict=True)]
     at_events = _unexplained(np.concatenate(audit.times), np.sum(jumps, axis=0), reset, told)

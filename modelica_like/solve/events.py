@@ -10,14 +10,16 @@ from modelica_like.compile.compiled import TERMINAL, CompiledDae, CompiledTransi
 from modelica_like.compile.soon import time_resolution
 from modelica_like.errors import StepFailed
 from modelica_like.initialize import Point
-from modelica_like.solve.between import Between
+from modelica_like.solve.between import Between, Piece
+from modelica_like.solve.delays import Delays
 from modelica_like.solve.guards import Candidate, Ends, Guards, Located, candidates, locate
 from modelica_like.solve.idas import Integrator
-from modelica_like.solve.instants import Instants, just_after, note_sharing
+from modelica_like.solve.instants import Instants, just_after, note_rest, note_sharing
 from modelica_like.solve.looks import Cell, Looks
 from modelica_like.solve.options import Options
 from modelica_like.solve.pace import Pace
 from modelica_like.solve.recorder import Recorder
+from modelica_like.solve.ticks import Ticks
 
 _NEVER = 1e-12
 """Rates, relative to the value and per second, that do not count as rising."""
@@ -56,11 +58,13 @@ class EventLoop:
         self.progress = progress
         self.guards = Guards(model)
         self.record = Recorder()
-        timed = len(model.transitions) > self.guards.count
+        timed = len(model.transitions) > self.guards.count or bool(model.delay_parts)
         self.pace = Pace(start.t, end, options, guarded=bool(self.guards.count), timed=timed)
         self.integrator = Integrator(model, options, whole=self.pace.on_grid)
         self.between = Between(self.integrator, self._closer)
         self.instants = Instants(model, options, self.guards, self.record, end - start.t)
+        self.ticks = Ticks(model, self.instants)
+        self.delays = Delays(model, options, start, self.between)
 
     @property
     def counts(self) -> tuple[int, int, int]:
@@ -87,7 +91,8 @@ class EventLoop:
         note_sharing(self.record, self.model, self.now)
         self.record.begin(self.now)
         while self.now.t < self.end:
-            self._advance(min(self.instants.next_moment(self.now), self.end))
+            known = self._known()
+            self._advance(min(self.ticks.stop(self.now), known, self.end))
             if self.between.many:
                 self._write()
             if self.progress is not None:
@@ -100,12 +105,23 @@ class EventLoop:
             self.instants.settle(self.now, [], begins=True)
             self.record.begin(self.now)
         self.record.end(self.now.d)
+        note_rest(self.record, self.options, self.instants.span)
         self._write()
 
     def _write(self, *, precisely: bool = True) -> None:
         """Interpolate results, and build the finished segments."""
         self.between.fill(precisely=precisely)
         self.record.build()
+
+    def _known(self) -> float:
+        """Return the time up to which delayed values are known, renewed where they end."""
+        if just_after(self.now.t) >= self.delays.until:
+            self._close()
+            self.now, again = self.delays.renewed(self.now, self.end)
+            self.record.begin(self.now)
+            if again and (wanting := self.guards.wanting(self.now)):
+                self._event(wanting)
+        return self.delays.until
 
     # -- smooth pieces -----------------------------------------------------------------------------------------------
 
@@ -115,32 +131,61 @@ class EventLoop:
         if not self.guards.count:
             self.pace.longer(looks.span, np.inf)
         if not self.guards.count or not self._search(looks):
-            self._keep(looks, float(looks.times[-1]), looks.count)
             self._arrive(looks)
-        if just_after(self.now.t) >= stop:
+        ends, due = just_after(self.now.t) >= stop, self.instants.due(self.now)
+        if ends:
             self.now.t = stop
-            if self.record.last != stop:
-                self.record.add(np.array([stop]), self.now.x[:, None], self.now.z[:, None])
-            if self.instants.due(self.now):
-                self._event(self._wanting())
+        if (ends or due) and self.record.last != self.now.t:
+            self.record.add(np.array([self.now.t]), self.now.x[:, None], self.now.z[:, None])
+        if due:
+            self._event(self._wanting())
 
     def _arrive(self, looks: Looks) -> None:
-        """Go to the last look."""
-        self.now = looks.point(looks.count)
+        """Go to the last look, unless a tick before it changes what moves."""
+        if not self._keep(looks, float(looks.times[-1]), looks.count):
+            return
+        self._move(looks.point(looks.count))
         if self.now.t >= self._failed_before:
             self._failures = 0
 
-    def _keep(self, looks: Looks, end: float, last: int) -> None:
-        """Record the results up to a time; `last` is the last valid look."""
-        times = self.pace.results(float(looks.times[0]), end)
-        if not len(times):
-            return
+    def _move(self, point: Point) -> None:
+        """Go to a point of a panel; ticks in the panel may have changed discrete values that it does not use."""
+        point.d = self.now.d
+        self.now = point
+
+    def _keep(self, looks: Looks, end: float, last: int, *, event: bool = False) -> bool:
+        """Record the results up to a time, and fire the ticks before it; `last` is the last valid look.
+
+        At an event, results that are closer to it than they can be told apart are left out.
+
+        Returns:
+            Whether the run can go there: a tick that changes what moves takes it back to its time.
+        """
+        first = max(float(looks.times[0]), self.now.t)
+        until = self.pace.before(end) if event else end
+        times = self.pace.results(first, until)
         if self.pace.on_grid:
             numbers = np.rint((times - looks.times[0]) / looks.width).astype(int)
-            self.record.add(times, looks.x[:, numbers], looks.z[:, numbers])
+            piece = Piece(looks, times, last, looks.x[:, numbers], looks.z[:, numbers])
         else:
             piece = self.between.ask(looks, times, last)
-            self.record.add(times, piece.x, piece.z)
+        self.delays.keep(first, looks, last, self.now.d)
+        while just_after(tick := self.instants.next_moment(self.now)) < end:
+            self._add(piece, first, self.pace.before(tick))
+            self._move(self.ticks.point(looks, tick, last, self._closer))
+            self.record.add(np.array([tick]), self.now.x[:, None], self.now.z[:, None])
+            if self._event(self.instants.due(self.now)):
+                return False
+            first = tick
+        self._add(piece, first, until)
+        return True
+
+    def _add(self, piece: Piece, first: float, end: float) -> None:
+        """Record the results of a piece between two times."""
+        times = self.pace.results(first, end)
+        if len(times):
+            some = slice(begin := int(np.searchsorted(piece.times, times[0])), begin + len(times))
+            self.record.add(times, piece.x[:, some], piece.z[:, some])
 
     def _closer(self, looks: Looks, k: int) -> Looks:
         """Look into an interval between two looks.
@@ -274,18 +319,19 @@ class EventLoop:
 
     def _search_closer(self, looks: Looks, k: int, depth: int, *, begins: bool) -> bool:
         """Search between two looks again, with closer ones; the run continues from there in any case."""
-        self._keep(looks, float(looks.times[k]), k + 1)
+        if not self._keep(looks, float(looks.times[k]), k + 1):
+            return True
         closer = self._closer(looks, k)
         closer.times[-1] = looks.times[k + 1]
         if not self._search(closer, depth + 1, begins=begins):
-            self._keep(closer, float(closer.times[-1]), closer.count)
             self._arrive(closer)
         return True
 
     def _reach(self, looks: Looks, k: int, point: Point, wanting: list[CompiledTransition]) -> None:
         """Go to a point between look k and the next and fire its transitions."""
-        self._keep(looks, self.pace.before(point.t), k + 1)
-        self.now = point
+        if not self._keep(looks, point.t, k + 1, event=True):
+            return
+        self._move(point)
         if wanting:
             self.record.add(np.array([point.t]), point.x[:, None], point.z[:, None])
             self._event([*wanting, *self.instants.due(point)])
@@ -299,15 +345,28 @@ class EventLoop:
     def _wanting(self) -> list[CompiledTransition]:
         return [*self.instants.due(self.now), *self.guards.wanting(self.now)]
 
-    def _event(self, wanting: list[CompiledTransition]) -> None:
-        """Handle an event: close the segment, change modes until nothing fires, begin the next segment."""
-        self.record.end(self.now.d)
-        self._failures, self._failed_before = 0, self.now.t
-        lasted, self._since = self.now.t - self._since, self.now.t
-        before, self.now = self.now.d, self.now.copy()
+    def _close(self) -> None:
+        """Close the segment, unless it has just begun: two things happen at one instant."""
+        if not self.record.fresh:
+            self.record.end(self.now.d)
+
+    def _event(self, wanting: list[CompiledTransition]) -> bool:
+        """Handle an event: close the segment, change modes until nothing fires, begin the next segment.
+
+        Returns:
+            Whether anything that moves has changed.
+        """
+        self._close()
+        before, self.now = self.now, self.now.copy()
         self.instants.settle(self.now, wanting)
-        self.pace.anew(before, lasted, self.now.d)
+        moved = self.ticks.moved(before, self.now, wanting)
+        if moved:
+            self.delays.broken(self.now.t)
+            self._failures, self._failed_before = 0, self.now.t
+            lasted, self._since = self.now.t - self._since, self.now.t
+            self.pace.anew(before.d, lasted, self.now.d)
         self.record.begin(self.now)
+        return moved
 
 
 def _foreseen(values: Vector, rates: Vector) -> float:

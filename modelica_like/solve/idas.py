@@ -241,10 +241,9 @@ class Integrator:
             return z
         for _ in range(_POLISHING):
             new = self._newton(times, x, z, d)
-            step = new - z
-            if not np.isfinite(step).all():
-                return z
-            z = new
+            # Behind an event, the equations of the old mode may have no solution.
+            new = np.where(np.isfinite(new).all(axis=0), new, z)
+            step, z = new - z, new
             # The error after a step of Newton's method is about the square of the step.
             if is_linear(self.model) or not np.max(np.abs(step) - POLISHED * np.abs(z)) > POLISHED:
                 break
@@ -256,6 +255,7 @@ class Integrator:
             everywhere = model.along("newton", lambda: newton_at(model, look=False))
             return everywhere(times, x, z, model.p, model.u, d)[0]
         fast = model.fast(("newton", count), lambda: along(newton_at(model, look=False), count))
+        fast.forget()  # where a Jacobian is singular, CasADi ends without results
         return fast(times, x.ravel("F"), z.ravel("F"), model.p, model.u, d)[0].reshape(count, -1).T
 
     def _count(self, statistics: dict[str, Any]) -> None:

@@ -16,6 +16,7 @@ from modelica_like.initialize import (
     check_singular,
     chosen_modes,
     holding,
+    meet,
     share,
     sharing,
     solve_implicit,
@@ -23,7 +24,7 @@ from modelica_like.initialize import (
 )
 from modelica_like.language.transition import NAME_IN_NOTICE
 from modelica_like.solve.guards import Guards
-from modelica_like.solve.options import Options
+from modelica_like.solve.options import OnChattering, Options
 from modelica_like.solve.recorder import IMPACT, Event, Recorder
 
 _CHATTER_EVENTS = 50
@@ -33,6 +34,20 @@ _TOGETHER = 6
 _ALONE = 6
 """Further rounds per holdable motion, in which only one fires."""
 _CHATTER_WINDOW = 1e-6
+_HINT = "Give the switching a hysteresis (a peak above 1 in friction), or smooth what drives it."
+_GO_ON = (
+    ' Or go on: on_chattering = "slide" along the border of two modes, "rest" in contact after ever faster impacts.'
+)
+_CANNOT = {
+    "stop": "",
+    "slide": (
+        " It cannot slide: that takes two values of a mode that change into each other under opposite conditions, "
+        "without resets, and that decide how what is compared changes."
+    ),
+    "rest": " Nothing comes to rest: that takes impacts of a mode that holds a motion, with a restitution.",
+}
+_GIVEN_BACK = 1e-3
+"""Current, over the largest one, that is none where modes return: it ends within the time resolution."""
 SAME_TIME = 1e-12
 """Relative distance of two equal times."""
 
@@ -63,25 +78,30 @@ class Instants:
         self._entered: set[int] = set()
         self._impacts = 0
         self._instants: deque[float] = deque(maxlen=_CHATTER_INSTANTS)
+        self._resting = False
         self._round = 0
-        self._timed = [t for t in model.transitions if t.timed]
+        self._modes = [one.mode for one in model.ideal.elements] if model.ideal else []
+        self.timed = [t for t in model.transitions if t.timed]
         self._numbers = {id(transition): k for k, transition in enumerate(model.transitions)}
 
     def next_moment(self, now: Point) -> float:
         """Time of the next time event, or infinity."""
-        if not self._timed:
-            return np.inf
-        moments = call(self.model, self.model.moments, now)
+        return min((t for _, t in self.ahead(now)), default=np.inf)
+
+    def ahead(self, now: Point) -> list[tuple[CompiledTransition, float]]:
+        """Time events that come, with their times."""
+        if not self.timed:
+            return []
+        moments = call(self.model, self.model.moments, now).tolist()
         here = just_after(now.t)
-        ahead = [moments[t.index] for t in self._timed if _is_source(now, t) and moments[t.index] > here]
-        return float(min(ahead, default=np.inf))
+        return [(t, moments[t.index]) for t in self.timed if moments[t.index] > here and _is_source(now, t)]
 
     def due(self, now: Point) -> list[CompiledTransition]:
         """Time events whose time is reached."""
-        if not self._timed:
+        if not self.timed:
             return []
         moments = call(self.model, self.model.moments, now)
-        return [t for t in self._timed if _is_source(now, t) and moments[t.index] <= just_after(now.t)]
+        return [t for t in self.timed if _is_source(now, t) and moments[t.index] <= just_after(now.t)]
 
     def settle(self, now: Point, wanting: list[CompiledTransition], *, begins: bool = False) -> None:
         """Fire transitions until none is left and no discrete variable changes; `now` becomes the point after.
@@ -93,17 +113,25 @@ class Instants:
         Raises:
             Chattering: transitions do not end, or events follow each other ever faster.
             LimitPassed: a transition ends the run.
+            NoValidModes: ideal elements have no valid combination of modes.
             SingularAtStart: the equations have no unique solution after it.
         """
         changes = bool(self.model.update_rows)
-        if not (wanting or (begins and changes)):
+        ideal, earlier = self._modes, now.d
+        if not (wanting or (begins and (changes or ideal))):
             return
         noted = len(self.record.events)
+        if not begins:
+            meet(self.model, now)  # the integration leaves the conditions of ideal elements within its tolerances
+        if self._instants and now.t - self._instants[-1] >= _CHATTER_WINDOW * self.span:
+            self._resting = False
         self._struck, self._entered = None, set()
         wanting = self._share_anew(now, wanting)
-        alone = self.options.iterations + _ALONE * len(self.model.holds)
+        alone = self.options.iterations + _ALONE * (len(self.model.holds) + len(ideal))
         for number in range(alone):
             self._round = number
+            if ideal and not (wanting or changes) and meet(self.model, now):
+                wanting = self.guards.wanting(now)
             if not (wanting or changes):
                 break
             before = now.d
@@ -111,6 +139,10 @@ class Instants:
                 self._fire(now, wanting if number < _TOGETHER else [min(wanting, key=self._number)])
                 self._solve(now)
                 self._stop_motions(now, before)
+                if ideal:
+                    back = number and np.array_equal(now.d[ideal], earlier[ideal])
+                    meet(self.model, now, keep=_GIVEN_BACK if back else 0.0)
+                    earlier = before
             changes = self._update(now)
             wanting = [*self.due(now), *self.guards.wanting(now)]
         else:
@@ -119,7 +151,10 @@ class Instants:
         if len(self.record.events) > noted:
             self._instants.append(now.t)
         if len(self._instants) == _CHATTER_INSTANTS and now.t - self._instants[0] < _CHATTER_WINDOW * self.span:
-            raise self._chattering("Events follow each other ever faster")
+            if self._resting or self.options.on_chattering != "rest":
+                raise self._chattering("Events follow each other ever faster")
+            self._resting = True
+            self._instants.clear()
         if len(self.record.events) > self.options.max_events:
             raise self._chattering(f"There were more than {self.options.max_events} events")
 
@@ -228,7 +263,7 @@ class Instants:
         entering = [k for k in holding(self.model, now) if k in begun] if begun else []
         if not entering:
             return
-        strike = Strike(self.model, now, entering)
+        strike = Strike(self.model, now, entering, resting=self._resting)
         if strike.hard:
             # All impacts at this instant are solved together, from the speeds before the first.
             self._entered.update(entering)
@@ -236,7 +271,7 @@ class Instants:
                 self._struck, self._impacts = now.x.copy(), len(self.record.impacts)
             now.x = self._struck.copy()
             self._hold_again(now)
-            strike = Strike(self.model, now, self._entered)
+            strike = Strike(self.model, now, self._entered, resting=self._resting)
         strike.run()
         self._entered.difference_update(strike.knocked)
         if strike.impacts:
@@ -281,11 +316,11 @@ class Instants:
         self.record.note(self.model, float(now.t), number, (int(now.d[number]), target), transition, self._round)
 
     def _chattering(self, why: str) -> Chattering:
-        return chattering(self.record.events, why)
+        return chattering(self.record.events, why, self.options.on_chattering)
 
 
-def chattering(events: Sequence[Event], why: str) -> Chattering:
-    """Return the error of a run whose last events switch without end."""
+def chattering(events: Sequence[Event], why: str, asked: OnChattering) -> Chattering:
+    """Return the error of a run whose last events switch without end, whatever was `asked` to prevent that."""
     counts: dict[str, list[Event]] = {}
     for event in events[-_CHATTER_EVENTS:]:
         counts.setdefault(event.mode, []).append(event)
@@ -295,9 +330,24 @@ def chattering(events: Sequence[Event], why: str) -> Chattering:
     when = f"at t = {last} s" if first == last else f"in t = {first}…{last} s"
     return Chattering(
         f"{mode} switched {len(those)} times {when} ({names}).",
-        where=list(dict.fromkeys(event.source for event in those))[:3], why=f"{why}.",
-        advice="Give the switching a hysteresis (a peak above 1 in friction), or smooth what drives it.",
+        where=list(dict.fromkeys(event.source for event in those))[:3],
+        why=f"{why}.{_CANNOT[asked]}",
+        advice=_HINT + (_GO_ON if asked == "stop" else ""),
     )  # fmt: skip
+
+
+def note_rest(record: Recorder, options: Options, span: float) -> None:
+    """Add a notice for every time from which on impacts that followed each other ever faster ended in contact."""
+    if options.on_chattering != "rest":
+        return
+    times = list(dict.fromkeys(event.time for event in record.events))
+    rested = -np.inf
+    for first, last in zip(times, times[_CHATTER_INSTANTS - 1 :], strict=False):
+        if last - first < _CHATTER_WINDOW * span and first > rested + _CHATTER_WINDOW * span:
+            rested = last
+            parts = dict.fromkeys(one.component for one in record.impacts if first <= one.time <= last)
+            told = f"{last:.9g} s on, {', '.join(parts) or 'the model'}"
+            record.notices.append(f"From {told} rests in contact: impacts followed each other ever faster.")
 
 
 def note_sharing(record: Recorder, model: CompiledDae, now: Point) -> None:

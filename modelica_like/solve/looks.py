@@ -185,17 +185,22 @@ class Looks:
         begin, end = self.z[:, cell.k], self.z[:, cell.k + 1]
         return begin + (t - cell.t) / cell.width * (end - begin) if len(begin) else begin
 
+    def is_precise(self, cell: Cell) -> bool:
+        """Whether interpolated states in the middle of an interval are within the tolerances."""
+        precise, coarse = cell.both(cell.t + 0.5 * cell.width)
+        return bool((np.abs(precise - coarse) <= PRECISE * self.integrator.weights(precise)).all())
+
     def is_sharp(self, cell: Cell, ends: Ends, *, fresh: bool) -> bool:
         """Whether interpolated states in the middle are precise, and precise enough for guards with these values.
 
         A guard may depend on states that are small compared with their tolerances: it is trusted only if the
         integrator has just started (`fresh`).
         """
+        if not self.is_precise(cell):
+            return False
         t = cell.t + 0.5 * cell.width
         precise, coarse = cell.both(t)
         weights = self.integrator.weights(precise)
-        if not (np.abs(precise - coarse) <= PRECISE * weights).all():
-            return False
         near = self.guards.near(t, np.array([precise, coarse, precise + weights]), self._guess(t, cell), self.d)
         rough, moved = np.abs(near[1:] - near[0]).tolist()
         sizes = [(g, abs(g0) + abs(g1)) for g, (g0, g1, *_) in ends.items()]

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal, get_args
 
-from modelica_like.errors import ValueOutOfRange
+from modelica_like.errors import UnknownName, ValueOutOfRange, did_you_mean
+
+OnChattering = Literal["stop", "slide", "rest"]
 
 
 @dataclass(frozen=True)
@@ -18,6 +21,9 @@ class Options:
         max_steps: largest number of integrator steps between two results.
         max_events: largest number of events in a run.
         iterations: largest number of event rounds at one instant.
+        on_chattering: what happens where events follow each other without end: `stop` with an error; `slide`: two modes
+            that lead back to their border are mixed such that the run stays on it; `rest`: impacts that follow each
+            other ever faster end in contact.
     """
 
     rtol: float = 1e-7
@@ -26,9 +32,14 @@ class Options:
     max_steps: int = 100_000
     max_events: int = 100_000
     iterations: int = 20
+    on_chattering: OnChattering = "stop"
 
     def __post_init__(self) -> None:
         for name, low, high in (("rtol", 1e-14, 0.1), ("atol", 1e-20, 1.0), ("points", 1, 10_000_000)):
             value = getattr(self, name)
             if not low <= value <= high:
                 raise ValueOutOfRange(f"{name} = {value:g} is out of range: it must be between {low:g} and {high:g}.")
+        kinds = get_args(OnChattering)
+        if self.on_chattering not in kinds:
+            what = f"There is no on_chattering '{self.on_chattering}'{did_you_mean(self.on_chattering, kinds) or '.'}"
+            raise UnknownName(what, advice=f"There are {', '.join(kinds)}.")

@@ -14,14 +14,17 @@ from modelica_like.solve.display import QUANTITIES, Display
 from modelica_like.solve.panels import Panel, bands_of, draw_panels, listed, marks_of
 from modelica_like.solve.signals import Signal, evaluated, named, read_signals
 from modelica_like.solve.style import COLOURS
-from modelica_like.solve.trajectories import Trajectories, matching
+from modelica_like.solve.trajectories import Trajectories
 from modelica_like.writing import check_writable, write_bytes
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_ON_PAGES = ("rad/s", "N.m", "m/s", "N")
-_USUAL = ("rad/s", "m/s", "m", "N.m", "N", "A", "W")
+_USUAL = ("rad/s", "m/s", "m", "N.m", "N", "V", "A", "W", "K", "1")
+"""Units of the curves that nobody has asked for, in the order of their panels."""
+_ON_PAGES = ("rad/s", "N.m", "m/s", "N"), ("V", "A", "K"), ("1",)
+"""Those on a page: of a drive, of a circuit, of signals alone. A picture adds `_BESIDE`."""
+_BESIDE = ("m", "A", "W")
 _MOST = 6
 _MOST_PANELS = 2, 24
 """Panels of one quantity that nobody has asked for, and panels of a picture."""
@@ -49,7 +52,8 @@ def plot(
     shown = Display(solution.model, display)
     modes = {one.path for one in solution.model.flat_discretes if one.names}
     asked = read_signals(solution.model, patterns)
-    curves = [one for one in asked if one.name not in modes] if asked else usual(solution, _USUAL)
+    units = [one for one in _USUAL if one in (*_on_page(solution), *_BESIDE)]
+    curves = [one for one in asked if one.name not in modes] if asked else usual(solution, units)
     values = evaluated(solution, curves)
     groups: dict[tuple[str, str], list[Signal]] = {}
     for one in curves:
@@ -57,7 +61,7 @@ def plot(
     panels, left = _panels(groups, 0 if asked else _MOST_PANELS[0])
     bands, unbanded = bands_of(solution, [one.name for one in asked if one.name in modes])
     marks, unmarked = marks_of(solution, [band.mode for band in bands])
-    left += [] if asked else _quantities_left(solution)
+    left += [] if asked else _quantities_left(solution, units)
     notes = [f"Not drawn: {', '.join(left)}; name them to draw them."] if left else []
 
     def draw(axes: Any, signals: Sequence[Signal]) -> None:
@@ -133,15 +137,36 @@ def picture_bytes(figure: Figure, kind: str, **options: Any) -> bytes:
     return content.getvalue()
 
 
-def chosen(solution: Trajectories, patterns: Sequence[str] = ()) -> list[str]:
-    """Return the names that match the patterns, or without patterns a choice of a few for a page.
+def for_page(solution: Trajectories, words: Sequence[str] = ()) -> tuple[list[Signal], str]:
+    """Return the curves of a page without modes, which are bands there, and a sentence about those it leaves out.
+
+    Args:
+        solution: the run.
+        words: names, patterns or formulas; by default speeds, torques and forces of the parts, six of each. A circuit
+            has voltages, currents and temperatures.
 
     Raises:
         UnknownName: nothing matches a pattern.
+        UnitError: the units in a formula do not fit together.
     """
-    if patterns:
-        return matching(solution.model, patterns)
-    return [one.name for unit in _ON_PAGES for one in usual(solution, [unit], slips=True)[:_MOST]]
+    if words:
+        modes = {one.path for one in solution.model.flat_discretes if one.names}
+        return [one for one in read_signals(solution.model, words) if one.name not in modes], ""
+    units = _on_page(solution)
+    found = {unit: usual(solution, [unit], slips=True) for unit in units}
+    left = [
+        f"{len(some) - _MOST} of {len(some)} {_plural(quantity(unit))} ({listed([one.name for one in some[_MOST:]])})"
+        for unit, some in found.items()
+        if len(some) > _MOST
+    ]
+    left += _quantities_left(solution, units)
+    told = f"Not drawn: {', '.join(left)}; --show draws them." if left else ""
+    return [one for some in found.values() for one in some[:_MOST]], told
+
+
+def _on_page(solution: Trajectories) -> tuple[str, ...]:
+    known = {str(one.unit) for one in _of_parts(solution)}
+    return next((units for units in _ON_PAGES if known.intersection(units)), ())
 
 
 def usual(solution: Trajectories, units: Sequence[str], *, slips: bool = False) -> list[Signal]:
@@ -184,10 +209,10 @@ def _of_parts(solution: Trajectories) -> list[Any]:
     return [one for one in solution.model.flat_variables if one.kind in ("local", "output") and not one.hidden]
 
 
-def _quantities_left(solution: Trajectories) -> list[str]:
-    """Count the variables of parts with a unit that is not among the usual ones."""
+def _quantities_left(solution: Trajectories, drawn: Sequence[str]) -> list[str]:
+    """Count the variables of parts with a unit that is not drawn."""
     units = [str(one.unit) for one in _of_parts(solution)]
-    names = [QUANTITIES.get(unit, "signal") for unit in units if unit not in _USUAL]
+    names = [QUANTITIES.get(unit, "signal") for unit in units if unit not in drawn]
     counts = {name: names.count(name) for name in names}
     return [f"{count} {name if count == 1 else _plural(name)}" for name, count in counts.items()]
 

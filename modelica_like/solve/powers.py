@@ -35,6 +35,8 @@ _DIGITS = 4e-16
 """Relative change of states that shows what in the energies is rounding."""
 _ROUNDING = 10.0
 """Errors that are left, in such changes."""
+_CANCELLED = 0.1
+"""Share of the sizes of stored energies below which these cancel."""
 _MORE, _LEAST, _DEEPEST = 4, 4, 12
 """Finer results per interval, the smallest number of intervals for this, and the number of repetitions."""
 _FAILURES = 20
@@ -188,6 +190,11 @@ class Powers:
         states, implicit = (np.column_stack(pair) for pair in ((start.x, x), (start.z, z)))
         return Segment(times, states, implicit, start.d)
 
+    @property
+    def cancelled(self) -> float:
+        """Size in J of stored energies that cancel: a pendulum falling from the height of its pivot stores nothing."""
+        return _CANCELLED * float(self._noise[0]) / (_ROUNDING * _DIGITS)
+
     def _move(self, stored: Vector, powers: Vector, steps: Vector) -> None:
         """Update the energies that results store and exchange."""
         self.stored = max(self.stored, float(np.max(np.sum(np.abs(stored), axis=0))))
@@ -198,13 +205,13 @@ class Powers:
         self.moved = max(self.moved, self.stored, float(least), float(most))
 
     def _hear(self, every: Results) -> None:
-        """Estimate the rounding of stored energies in J and of powers in W: what the last digits of states change."""
+        """Estimate the rounding of stored energies in J and of powers in W: what the last digits of unknowns change."""
         places = np.unique([0, len(every.times) // 2, len(every.times) - 1])
-        x = every.x[:, places]
+        unknowns = np.concatenate([every.x, every.z])[:, places]
         function = self.model.along("energy terms", lambda: _terms(self.model))
-        signs = np.where(np.add.outer(np.arange(len(x)), np.arange(len(places))) % 2, 1.0, -1.0)
-        others = every.z[:, places], self.model.p, self.model.u, every.d[:, places]
-        changed = function(every.times[places], x * (1.0 + _DIGITS * signs), *others)[0]
+        signs = np.where(np.add.outer(np.arange(len(unknowns)), np.arange(len(places))) % 2, 1.0, -1.0)
+        x, z = np.split(unknowns * (1.0 + _DIGITS * signs), [len(every.x)])
+        changed = function(every.times[places], x, z, self.model.p, self.model.u, every.d[:, places])[0]
         changes = np.abs(changed.reshape(-1, len(self.model.components), len(places)) - every.terms[..., places])
         found = _ROUNDING * np.array([np.max(np.sum(one, axis=0)) for one in (changes[0], changes[1:].sum(axis=0))])
         self._noise = np.maximum(self._noise, found)
@@ -241,7 +248,7 @@ class Powers:
         smooth = np.maximum(*near[2:])
         gain = np.maximum(_ratio(near[:2], far[:2]), _ratio(known, smooth))
         errors = np.maximum(np.maximum(*(near[:2] * gain)), np.minimum(known, smooth))
-        allowed = self.options.rtol * self.moved
+        allowed = self.options.rtol * max(self.moved, self.cancelled)
         # A weight that exactly balances a motion leaves nothing but rounding, which no finer result makes smaller.
         noise = self._noise[0] + self._noise[1] * np.abs(weights[:, 0].sum(axis=1))
         return ~((errors <= np.maximum(self._share * allowed, noise)) & (known <= np.maximum(_ASTRAY * allowed, noise)))

@@ -97,6 +97,11 @@ class Recorder:
         """Time of the latest point of the open segment in s."""
         return float(self._open[-1][0][-1])
 
+    @property
+    def fresh(self) -> bool:
+        """Whether the open segment has no more than its first point."""
+        return len(self._open) < 2 and sum(len(times) for times, *_ in self._open) < 2
+
     def note(
         self, model: CompiledDae, time: float, number: int, change: tuple[int, int], transition: int, round: int
     ) -> None:

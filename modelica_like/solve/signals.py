@@ -60,7 +60,7 @@ class Signal:
             return run[self.name]
         names = list(dict.fromkeys(self.formula.names()))
         symbols = {name: ca.SX.sym(name) for name in names}
-        value = self.formula.evaluate(symbols.__getitem__, lambda text: ca.SX(_si(text)))
+        value = self.formula.evaluate(symbols.__getitem__, lambda text: ca.SX(si_value(text)))
         columns = run.together(*names)
         made: Any = ca.Function("shown", list(symbols.values()), [value])(*(columns[name][None] for name in names))
         return np.asarray(made.full())[0]
@@ -147,7 +147,12 @@ def _unit(formula: Formula, units: dict[str, str], model: str) -> str:
     return next((one for one in QUANTITIES if one not in _KEPT and same_dimension(parse_unit(one), found)), str(found))
 
 
-def _si(text: str) -> float:
+def si_value(text: str) -> float:
+    """Return the SI value of a quantity in a formula.
+
+    Raises:
+        UnitError: it is a temperature of a scale with a zero of its own.
+    """
     number, unit = read_quantity(text) or (np.nan, ONE)
     if unit.offset:
         raise UnitError(f"'{text}' in a formula: give differences of temperature in K.")

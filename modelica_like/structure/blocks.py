@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import operator
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from functools import reduce
 from typing import Any
@@ -46,6 +46,7 @@ class Solved:
         order: unknowns with their expressions in earlier ones, states and z.
         z: unknowns that stay implicit.
         alg: their residuals.
+        rows: positions of their equations.
         determinants: (block number, expression) of relative determinants: a block is singular where one is zero.
     """
 
@@ -53,6 +54,7 @@ class Solved:
     order: list[tuple[int, Any]] = field(default_factory=list)
     z: list[int] = field(default_factory=list)
     alg: list[Any] = field(default_factory=list)
+    rows: list[int] = field(default_factory=list)
     determinants: list[tuple[int, Any]] = field(default_factory=list)
 
 
@@ -65,17 +67,29 @@ class BlockSolver:
         volatile: column of the symbols that change during a run (states, unknowns, modes, time); a coefficient
             without them, of parameters only, is a safe divisor.
         rates: positions of the derivatives of states among the unknowns.
+        kept: positions of equations whose blocks stay implicit.
     """
 
-    def __init__(self, residual: Any, unknowns: Any, volatile: Any, rates: Sequence[int]) -> None:
-        self.residual = ca.vertsplit(residual) if residual.numel() else []
+    def __init__(
+        self, residual: Any, unknowns: Any, volatile: Any, rates: Sequence[int], kept: Collection[int] = ()
+    ) -> None:
         self.unknowns = ca.vertsplit(unknowns) if unknowns.numel() else []
         self.jacobian = ca.jacobian(residual, unknowns)
+        self.residual = self._without_cancelled(residual)
         self.rows = _places_by_row(self.jacobian.sparsity())
         self.safe = self._safe_entries(volatile)
-        self.rates = set(rates)
+        self.rates, self.kept = set(rates), set(kept)
         self.first = self.rates - {c for r, row in enumerate(self.rows) for c in row if (r, c) not in self.safe}
         self.solved = Solved()
+
+    def _without_cancelled(self, residual: Any) -> list[Any]:
+        """Take out unknowns that cancel: the current of a loop that hangs at one node enters and leaves it."""
+        rows = ca.vertsplit(residual) if residual.numel() else []
+        for row, column, slope in zip(*self.jacobian.sparsity().get_triplet(), self.jacobian.nonzeros(), strict=True):
+            if slope.is_zero():
+                rows[row] = ca.substitute(rows[row], self.unknowns[column], ca.SX(0))
+        self.jacobian = ca.sparsify(self.jacobian)
+        return rows
 
     def _safe_entries(self, volatile: Any) -> set[tuple[int, int]]:
         """Entries of the Jacobian that depend on parameters only: they cannot become zero during a run."""
@@ -200,7 +214,7 @@ class BlockSolver:
         slopes = ca.jacobian(ca.vertcat(*remaining), guesses)
         linear = not any(ca.which_depends(ca.vertcat(*slopes.nonzeros()), guesses, 1, True)) if slopes.nnz() else False
         number = len(self.solved.blocks)
-        if linear and len(tears) <= SMALL:
+        if linear and len(tears) <= SMALL and self.kept.isdisjoint(rest):
             constants = ca.substitute(ca.vertcat(*remaining), guesses, ca.SX.zeros(len(tears)))
             matrix = ca.densify(slopes)
             solution, determinant = cramer(matrix, -constants)
@@ -213,6 +227,7 @@ class BlockSolver:
         else:
             self.solved.z += tears
             self.solved.alg += remaining
+            self.solved.rows += rest
             kind = "implicit"
         self.solved.order += inner
         self.solved.blocks.append(Block(rows, columns, tuple(tears), kind))

@@ -9,9 +9,10 @@ import casadi as ca
 
 from modelica_like.errors import StructureError
 from modelica_like.flatten.model import FlatModel, Origin
-from modelica_like.structure.alias import find_aliases
+from modelica_like.structure.alias import Aliases, find_aliases
 from modelica_like.structure.blocks import Block, BlockSolver, Solved
 from modelica_like.structure.diagnose import check_solvable
+from modelica_like.structure.following import Choice, Following, Group, follow, prefer, singular_groups, write_choice
 from modelica_like.structure.holds import (
     Circuit,
     HeldMotion,
@@ -20,6 +21,7 @@ from modelica_like.structure.holds import (
     held_rates,
     share_reactions,
 )
+from modelica_like.structure.ideal import IdealNetwork, complete, find_ideals
 from modelica_like.structure.index import Pantelides, prefer_relative_states
 from modelica_like.structure.motion import Motion
 from modelica_like.structure.prescribed import Flags
@@ -50,6 +52,8 @@ class ReducedDae:
         differentiated: origins of the differentiated equations.
         holds: motions that modes hold.
         circuits: held motions that depend on each other.
+        choices: of states that follow the motion.
+        ideal: the ideal elements, if there are any.
     """
 
     flat: FlatModel
@@ -75,6 +79,8 @@ class ReducedDae:
     explicit: tuple[tuple[int, Any], ...] = field(repr=False)
     holds: tuple[HeldMotion, ...] = ()
     circuits: tuple[Circuit, ...] = ()
+    choices: tuple[Choice, ...] = ()
+    ideal: IdealNetwork | None = None
 
     def rate(self, variable: int) -> Any:
         """Return the time derivative of a flat variable, in x, z, inputs, p, d and t."""
@@ -110,7 +116,12 @@ class ReducedDae:
         places, count = list(dict.fromkeys(o.path or o.kind for o in self.differentiated)), len(self.differentiated)
         named = f"{' and '.join(places[:4])}{' …' if len(places) > 4 else ''} couple{'s' if len(places) == 1 else ''}"
         text = f"{count} constraint{'s' if count > 1 else ''} differentiated; states kept: {', '.join(self.states)}."
-        return (f"Index {self.index}: {named} motions. {text}",)
+        index = f"Index {self.index}: {named} motions. {text}"
+        return index, *(
+            f"No fixed choice of states fits {one.told} everywhere: {self.flat.discretes[one.mode].path} makes it anew "
+            "at events."
+            for one in self.choices
+        )
 
 
 def reduce(flat: FlatModel) -> ReducedDae:
@@ -119,8 +130,49 @@ def reduce(flat: FlatModel) -> ReducedDae:
     Raises:
         Underdetermined, Overdetermined: the equations cannot determine the unknowns.
     """
-    aliases = find_aliases(flat)
+    chosen = _choose(flat, find_aliases(flat), ())
+    if groups := singular_groups(chosen.system, chosen.counts, chosen.states):
+        chosen = _choose(flat, find_aliases(flat), groups)
+    system, counts, states, holds, flags = chosen.system, chosen.counts, chosen.states, chosen.holds, chosen.flags
+    residual, origins = _differentiate(system, counts)
+    unknowns = _unknowns(system, states)
+    if flags.settle(residual, unknowns):
+        residual, origins = _differentiate(system, counts)
+    derivatives = {system.derivative(state) for state in states}
+    rates = [k for k, unknown in enumerate(unknowns) if unknown in derivatives]
+    ideals = find_ideals(flat)
+    kept = [one.row for one in ideals]
+    solved = BlockSolver(residual, system.column(unknowns), _volatile(system), rates, kept).run()
+    order = [(system.symbols[unknowns[k]], expression) for k, expression in solved.order]
+    circuits = find_circuits(system, holds, order, states)
+    if circuits:
+        residual = share_reactions(system, holds, circuits, residual)
+        solved = BlockSolver(residual, system.column(unknowns), _volatile(system), rates, kept).run()
+    own = len(counts) - sum(len(one.chains) for one in chosen.following)
+    reduced = _assemble(system, counts[:own], states, unknowns, origins, solved)
+    held = tuple(replace(one, state=reduced.node_states[one.motion]) for one in holds)
+    ode = held_rates(reduced.flat, reduced.ode, reduced.values, held, circuits)
+    choices = tuple(write_choice(one, system, states, reduced.level_values) for one in chosen.following)
+    reduced = replace(reduced, ode=ode, holds=held, circuits=tuple(circuits), choices=choices)
+    return complete(reduced, ideals, solved.rows) if ideals else reduced
+
+
+@dataclass
+class _Chosen:
+    """The equations with chosen states."""
+
+    system: System
+    counts: list[int]
+    states: list[int]
+    holds: tuple[HeldMotion, ...]
+    flags: Flags
+    following: tuple[Following, ...]
+
+
+def _choose(flat: FlatModel, aliases: Aliases, groups: tuple[Group, ...]) -> _Chosen:
+    """Choose states; those of `groups` follow the motion."""
     system = build_system(flat, aliases)
+    following = follow(system, groups)
     holds = add_approaches(system)
     flags = Flags(system)
     _check_input_rates(system)
@@ -128,23 +180,9 @@ def reduce(flat: FlatModel) -> ReducedDae:
     contradictions = [flat.linear[k].origin for group in aliases.contradictions for k in group]
     check_solvable(system, _incidence(system), contradictions)
     counts = Pantelides(system, _incidence(system)).counts
+    prefer(system, groups, following)
     states = select_states(system, counts, _top_slopes(system, counts))
-    residual, origins = _differentiate(system, counts)
-    unknowns = _unknowns(system, states)
-    if flags.settle(residual, unknowns):
-        residual, origins = _differentiate(system, counts)
-    derivatives = {system.derivative(state) for state in states}
-    rates = [k for k, unknown in enumerate(unknowns) if unknown in derivatives]
-    solved = BlockSolver(residual, system.column(unknowns), _volatile(system), rates).run()
-    order = [(system.symbols[unknowns[k]], expression) for k, expression in solved.order]
-    circuits = find_circuits(system, holds, order, states)
-    if circuits:
-        residual = share_reactions(system, holds, circuits, residual)
-        solved = BlockSolver(residual, system.column(unknowns), _volatile(system), rates).run()
-    reduced = _assemble(system, counts, states, unknowns, origins, solved)
-    held = tuple(replace(one, state=reduced.node_states[one.motion]) for one in holds)
-    ode = held_rates(reduced.flat, reduced.ode, reduced.values, held, circuits)
-    return replace(reduced, ode=ode, holds=held, circuits=tuple(circuits))
+    return _Chosen(system, counts, states, holds, flags, following)
 
 
 def _check_input_rates(system: System) -> None:
@@ -238,7 +276,7 @@ def _assemble(
 
     Args:
         system: the equations over levels.
-        counts: number of differentiations of each.
+        counts: number of differentiations of each, without those of states that follow the motion.
         states: levels that are states.
         unknowns: solved levels; positions in `solved` are positions in this list.
         origins: of all equations, differentiated ones included; positions in blocks are positions in this list.

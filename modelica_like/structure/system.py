@@ -75,7 +75,8 @@ class System:
         """Return numbers at a point that is not special; parameters have their values, modes their starts."""
         model = self.model
         function = ca.Function("generic", [self.everything, model.p, model.d, model.time], [expressions])
-        point = [0.3 + 0.61803398875 * (k % 7 + 1) for k in range(len(self.symbols))]
+        # No two values are equal: the ends of a rod must not coincide.
+        point = [0.3 + 0.61803398875 * (k % 7 + 1) + 0.7548776662 * k % 1 / 10 for k in range(len(self.symbols))]
         starts = [one.start if isinstance(one.start, int | float) else 0.0 for one in model.discretes]
         starts += [0.0] * (model.d.numel() - len(starts))
         return function(point, [one.value for one in model.parameters], starts, 0.0)

@@ -147,6 +147,8 @@ def simplify(exponent: Fraction) -> Exponent:
 
 def _suggestion(name: str) -> str:
     parts = _split(name)
+    if name[:-1] in ATOMS and name.endswith("s"):
+        parts = name[:-1]
     return f"; did you mean '{parts}'?" if parts else did_you_mean(name, ATOMS) or "."
 
 

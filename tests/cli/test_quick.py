@@ -20,7 +20,7 @@ CALLS = [
     "check --start-values --set a.b=1 a.toml --set c=2 --debug",
     "simulate a.toml",
     "simulate a.toml --until 2s --start rest --csv=out.csv --points 7 --units --show x --show=y.*",
-    "simulate a.toml --rtol 1e-8 --json --solver native",
+    "simulate a.toml --rtol 1e-8 --json --solver native --on-chattering slide",
     "simulate --no-energy a.toml --points=250 --energy --no-energy --sankey s.svg --plot p.png",
     "simulate a.toml --plot p.png --compare measured.csv --compare gear.ratio=2,3 --show 2*pi*a.w",
     "draw a.toml -o a.svg --depth 2",

@@ -95,6 +95,13 @@ def test_check_tells_starts_that_are_missing(run: CliRunner, tmp_path: Path) -> 
     result = run.invoke(app, ["check", "--start-values", str(tmp_path / "drive.toml")])
     assert result.exit_code == 2
     assert "Initialization (not the model) lacks" in result.output
+    result = run.invoke(app, ["check", str(tmp_path / "drive.toml")])
+    assert result.exit_code == 0
+    assert re.match(
+        r"Please look at this:\n- Initialization \(not the model\) lacks \w+ equations: give ", result.stderr
+    )
+    (tmp_path / "drive.toml").write_text(STARTS)
+    assert run.invoke(app, ["check", str(tmp_path / "drive.toml")]).stderr == ""
 
 
 def test_simulate_tells_events_and_energy(run: CliRunner) -> None:

@@ -144,7 +144,7 @@ def test_the_library_is_filtered(run: CliRunner, words: list[str]) -> None:
     found = {line.split()[0] for line in run.invoke(app, ["library", *words]).stdout.splitlines()[2:]}
     asked = [one.lower() for one in words if one not in ("--group", "gears")]
     for name, kind in library_types().items():
-        wanted = all(one in f"{name} {kind.__doc__}".lower() for one in asked)
+        wanted = all(one in f"{name} {kind.__module__.partition('.')[2]} {kind.__doc__}".lower() for one in asked)
         assert (name in found) is (wanted and ("--group" not in words or kind.__module__.endswith(".gears")))
     assert found
 

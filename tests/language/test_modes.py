@@ -82,6 +82,17 @@ def test_is_compares_with_any_of_the_names():
         valve.gate.is_("closed")
 
 
+def test_a_mode_is_not_compared_with_a_text():
+    gate = Valve().gate
+    with pytest.raises(LanguageError) as caught:
+        where(gate == "open", 1, 0)
+    said, place, advice = str(caught.value).splitlines()
+    assert said == 'Valve.gate == "open" is no condition: the mode changes while the model runs.'
+    assert place.endswith('`gate == "open"`')
+    assert advice == 'Write self.gate.is_("open").'
+    assert gate != 1
+
+
 def test_go_takes_one_name_a_tuple_or_all():
     valve = Valve()
     condition = valve.x > 1

@@ -233,6 +233,15 @@ def variable_drives(run: Solution) -> None:
 
 
 @numbers
+def converters(run: Solution) -> None:
+    speed, rate = 12 / 0.05, 0.05**2 / (0.6 * 1e-4)
+    assert run.at(0.03)["rotor.w"] == close(speed * (1 - exp(-0.03 * rate)))
+    assert run.at(0.03)["armature.i"] == close(12 / 0.6 * exp(-0.03 * rate))
+    assert run.final["slide.s"] == close(10 * 2 / 200 * (1 - cos(20 * 0.1)))
+    assert run.final["coil.v"] == close(10 * 10 * 2 / 200 * 20 * sin(20 * 0.1))
+
+
+@numbers
 def machine_loads(run: Solution) -> None:
     thickness = 0.3 * sin(radians(75))
     force = 1700 * 3 / sin(radians(75)) * thickness**0.75
@@ -249,3 +258,23 @@ def machine_loads(run: Solution) -> None:
     pressing = 15 + (24 + 50) * cos(radians(10))
     torque = 3500 - 0.4 * 60 * 9.80665 * (1.6 * 0.025 * pressing + 50 * sin(radians(10)))
     assert run.final["conveyor.w"] == close(torque / (60 * (24 + 15 + 50) * 0.16) * 0.5)
+
+
+@numbers
+def full_turns(run: Solution) -> None:
+    L, v, g = 1.5, 9.5, 9.81
+    top = run.at(2 * ellipk(4 * g * L / v**2) * L / v)
+    assert [top["pendulum.y"], top["pendulum.vx"]] == close([L, -sqrt(v**2 - 4 * g * L)])
+    # Without forces from outside the moment of inertia at the crank times the square of its speed stays.
+    x, y, s = (run[f"engine.{name}"] for name in "xys")
+    slope = -y * s / (s - x)
+    inertia = 0.5 * 0.1**2 + 0.8 * slope**2
+    assert inertia * (x * run["engine.vy"] - y * run["engine.vx"]) ** 2 == close(np.full(len(x), 0.005 * 0.2**2))
+    assert [s.max(), s.min()] == pytest.approx([0.4, 0.2], rel=1e-3)
+    # The linkage closes, and keeps its energy.
+    of = {name: (run[f"linkage.{name}"], run[f"linkage.{w}"]) for name, w in
+          (("phi", "w"), ("beta", "w_beta"), ("psi", "w_psi"))}  # fmt: skip
+    point = 0.1 * np.exp(1j * of["phi"][0]) + 0.25 * np.exp(1j * of["beta"][0])
+    assert point == pytest.approx(0.28 + 0.2 * np.exp(1j * of["psi"][0]), abs=1e-12)
+    energy = sum(J * w**2 for J, (_, w) in zip((0.01, 0.002, 0.02), of.values(), strict=True))
+    assert energy == close(np.full(len(energy), energy[0]))

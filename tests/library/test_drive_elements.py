@@ -34,7 +34,8 @@ from components import (
     TimingBelt,
     Torque,
 )
-from modelica_like import Assembly, Component, simulate
+from modelica_like import Assembly, Component, build, simulate
+from modelica_like.errors import LanguageError
 from modelica_like.report.run import notices
 
 TIGHT = {"rtol": 1e-10, "atol": 1e-12}
@@ -179,6 +180,8 @@ def test_backlash_of_a_screw_is_lost_motion() -> None:
     assert abs(wanted - run.final["table.s"]) == pytest.approx(1e-4, rel=0.05)
     assert free.value("lead") is not None
     assert run.energy().closure <= 1e-8
+    with pytest.raises(LanguageError, match=r"^BallScrewDrive: backlash has a value, but the nut has none\.\nAdd has_"):
+        build(shaft(screw=BallScrewDrive(lead=0.01, J=1e-4, c=1e8, backlash=2e-4), table=Mass(m=5.0)))
 
 
 # -- shafts ------------------------------------------------------------------------------------------------------------

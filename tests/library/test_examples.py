@@ -1,5 +1,6 @@
 """The netlists of examples/components and examples/elements: each runs, keeps its energy, gives its closed forms."""
 
+import circuit_numbers as circuit_numbers
 import component_numbers as component_numbers
 import element_numbers as element_numbers
 import mover_numbers as mover_numbers

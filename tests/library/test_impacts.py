@@ -1,5 +1,7 @@
 """Impacts: momentum is conserved, and what is lost stands where it was lost."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -199,3 +201,108 @@ def test_a_prescribed_motion_works_in_an_impact(gap: float) -> None:
     assert balance["coupling"].impact == pytest.approx(12.5, rel=1e-9)
     assert balance["b"].stored == pytest.approx(12.5, rel=1e-9)
     assert balance.notices == ()
+
+
+# -- several contacts at one instant: Newton's law for each, all at once ----------------------------------------------
+
+
+SOLVERS = pytest.mark.parametrize("solver", ["idas", "native"])
+
+
+def carts(masses: list[float], gaps: list[float], speeds: list[float], e: list[float], **options: Any) -> Solution:
+    """Run carts in a row; the lines of the gaps are in the opposite order if `turned`."""
+    parts: dict[str, Component] = {}
+    places = np.concatenate([[0.0], np.cumsum(gaps)])
+    for k, (m, s, v) in enumerate(zip(masses, places, speeds, strict=True)):
+        parts[f"m{k}"] = Mass(m=m, s=float(s), v=v)
+    order = sorted(range(len(gaps)), reverse=options.pop("turned", False))
+    parts |= {f"g{k}": Buffer(e=e[k]) for k in order}
+    series = {f"s{k}": (f"m{k}", f"g{k}", f"m{k + 1}") for k in order}
+    return simulate(Assembly("carts", parts=parts, series=series), 1.0, **options)
+
+
+def finals(run: Solution, count: int) -> list[float]:
+    return [run.final[f"m{k}.v"] for k in range(count)]
+
+
+@SOLVERS
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize(("e", "f"), [(0.0, 0.0), (0.5, 0.5), (1.0, 1.0), (1.0, 0.3)])
+def test_a_cart_that_is_hit_from_both_sides_at_once(solver: str, turned: bool, e: float, f: float) -> None:
+    """2 kg and 1 kg meet 3 kg at rest: v0' - v1' = -e·4, v1' - v2' = -f·2, and 2·4 - 1·2 is conserved."""
+    run = carts([2.0, 3.0, 1.0], [2.0, 1.0], [4.0, 0.0, -2.0], [e, f], solver=solver, turned=turned)
+    expected = np.linalg.solve([[1, -1, 0], [0, 1, -1], [2, 3, 1]], [-4 * e, -2 * f, 6.0])
+    np.testing.assert_allclose(finals(run, 3), expected, atol=1e-9)
+    lost = 0.5 * (2 * 16 + 4) - 0.5 * float([2.0, 3.0, 1.0] @ expected**2)
+    assert sum(one.energy for one in run.impacts) == pytest.approx(lost, abs=1e-8)
+
+
+@SOLVERS
+@pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
+def test_carts_that_touch_are_hit_as_one_and_others_in_turn(solver: str, e: float) -> None:
+    """Touching: 1 kg at 2 m/s meets 2 kg, v = ((1 - 2 e) / 3, (1 + e) / 3)·2. Apart, the second passes it on."""
+    together = carts([1.0, 1.0, 1.0], [1.0, 0.0], [2.0, 0.0, 0.0], [e, e], solver=solver)
+    np.testing.assert_allclose(finals(together, 3), np.array([1 - 2 * e, 1 + e, 1 + e]) * 2 / 3, atol=1e-9)
+    in_turn = carts([1.0, 1.0, 1.0], [1.0, 1e-3], [2.0, 0.0, 0.0], [e, e], solver=solver)
+    if e == 1.0:  # Newton's cradle
+        np.testing.assert_allclose(finals(in_turn, 3), [0.0, 0.0, 2.0], atol=1e-8)
+    assert sum(finals(in_turn, 3)) == pytest.approx(2.0, rel=1e-9)
+    assert in_turn.final["m2.v"] >= in_turn.final["m1.v"] >= in_turn.final["m0.v"] - 1e-9
+
+
+class Bar(Component):
+    """A uniform bar above two stops, one at each end."""
+
+    y: Variable = var("m", "height of its centre")
+    a: Variable = var("rad", "angle")
+    v: Variable = var("m/s", "speed of its centre")
+    w: Variable = var("rad/s", "angular velocity")
+    left: Variable = var("m/s", "speed of the left end", state="always")
+    right: Variable = var("m/s", "speed of the right end", state="always")
+    P: Variable = var("N", "force of the left stop, against upward motion")
+    Q: Variable = var("N", "force of the right stop, against upward motion")
+    m: Parameter = param("kg", "mass", default=3.0)
+    L: Parameter = param("m", "length", default=2.0)
+    e: Parameter = param("1", "restitution of the left stop", default=0.5)
+    f: Parameter = param("1", "restitution of the right stop", default=0.2)
+    at_left = Mode("air", "stop", holds={"stop": Hold("left", reaction="P", capacity="limits", restitution="e")})
+    at_right = Mode("air", "stop", holds={"stop": Hold("right", reaction="Q", capacity="limits", restitution="f")})
+
+    def limits(self) -> tuple[float, None]:
+        return 0.0, None
+
+    def equations(self) -> Equations:
+        yield der(self.y) == self.v
+        yield der(self.a) == self.w
+        yield self.left == self.v - self.w * self.L / 2
+        yield self.right == self.v + self.w * self.L / 2
+        yield self.m * der(self.v) == -self.P - self.Q
+        yield self.m * self.L**2 / 12 * der(self.w) == (self.P - self.Q) * self.L / 2
+        yield self.at_left.choose(air=self.P, stop=der(self.left)) == 0
+        yield self.at_right.choose(air=self.Q, stop=der(self.right)) == 0
+
+    def events(self) -> Events:
+        tip = self.a * self.L / 2
+        for mode, height, speed in ((self.at_left, self.y - tip, self.left), (self.at_right, self.y + tip, self.right)):
+            yield mode.initially("air", when=speed > 0)
+            yield mode.go("air", "stop", when=all_of(height < 0, speed < 0))
+
+
+@SOLVERS
+@pytest.mark.parametrize(("e", "f"), [(0.5, 0.2), (0.0, 0.0), (1.0, 1.0)])
+def test_a_bar_lands_on_two_stops_at_once(solver: str, e: float, f: float) -> None:
+    """It falls flat at 2 m/s: its ends rise with 2 e and 2 f; the impulses are those of the two balances."""
+    run = simulate(Bar(y=1.0, a=0.0, left=-2.0, right=-2.0, e=e, f=f), 0.5 + 1e-6, solver=solver)
+    np.testing.assert_allclose([run.final["left"], run.final["right"]], [2 * e, 2 * f], atol=1e-9)
+    v, w = e + f, f - e
+    lost = 0.5 * 3 * (4 - v**2) - 0.5 * w**2  # J = 1 kg.m2
+    assert sum(one.energy for one in run.impacts) == pytest.approx(lost, abs=1e-9)
+
+
+@SOLVERS
+def test_a_bar_lands_on_one_stop(solver: str) -> None:
+    """Its left end is lower; P acts at L/2: v + P/m, w - P·(L/2)/J, and the left end rises with e times its speed."""
+    run = simulate(Bar(y=1.0, a=0.1, left=-2.0, right=-2.0), 0.45 + 1e-6, solver=solver)
+    impulse = (1 + 0.5) * 2 / (1 / 3 + 1)
+    assert run.final["right"] == pytest.approx(-2 + impulse / 3 - impulse, rel=1e-9)
+    assert run.final["left"] == pytest.approx(1.0, rel=1e-9)

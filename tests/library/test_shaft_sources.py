@@ -53,6 +53,12 @@ def test_torque_by_speed(kind: Any, values: dict[str, float], reversing: Any, fi
         assert -run.final["load.flange.tau"] == pytest.approx(-3.0 * law(w / 50.0), rel=1e-12)
 
 
+def test_a_torque_by_speed_brakes_both_ways_if_nothing_else_is_said() -> None:
+    load = LinearSpeedDependentTorque(tau_nominal=-3.0, w_nominal=50.0)
+    run = simulate(shaft(drive=ConstantSpeed(w_fixed=-20.0), load=load), "1 s", points=2)
+    assert -run.final["load.flange.tau"] == pytest.approx(3.0 * 20.0 / 50.0, rel=1e-12)
+
+
 def test_inverse_torque_stays_finite_at_standstill() -> None:
     for reverses, wanted in ((True, 0.0), (False, 6.0 * 50.0 / 2.0)):
         load = InverseSpeedDependentTorque(tau_nominal=6.0, w_nominal=50.0, w0=2.0, reverses=reverses)

@@ -345,6 +345,19 @@ state switched 20 times at t = 0.5 s (up ⇄ down).
   in test_component_messages.py:{relay up} `yield self.state.go("up", "down", when=self.x > 0)`
   in test_component_messages.py:{relay down} `yield self.state.go("down", "up", when=self.x < 0)`
 Modes still switch after 20 rounds at one instant.
+Give the switching a hysteresis (a peak above 1 in friction), or smooth what drives it. \
+Or go on: on_chattering = "slide" along the border of two modes, "rest" in contact after ever faster impacts.""",
+)
+case(
+    errors.Chattering,
+    "nothing that comes to rest",
+    lambda: simulate(Relay(x=-0.5), 1.0, on_chattering="rest"),
+    """\
+state switched 20 times at t = 0.5 s (up ⇄ down).
+  in test_component_messages.py:{relay up} `yield self.state.go("up", "down", when=self.x > 0)`
+  in test_component_messages.py:{relay down} `yield self.state.go("down", "up", when=self.x < 0)`
+Modes still switch after 20 rounds at one instant. Nothing comes to rest: that takes impacts of a mode that holds a \
+motion, with a restitution.
 Give the switching a hysteresis (a peak above 1 in friction), or smooth what drives it.""",
 )
 case(

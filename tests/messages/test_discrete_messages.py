@@ -21,10 +21,13 @@ from modelica_like.language import (
     clock,
     der,
     edge,
+    hold,
     integer,
     negate,
     param,
     pre,
+    previous,
+    sample,
     var,
     when,
 )
@@ -157,6 +160,23 @@ class PreOfVariable(Basis):
         yield when(self.x > 0.5, {self.n: pre(self.x)})  # pre
 
 
+class Held(Basis):
+    def equations(self) -> Equations:
+        yield self.T * der(self.x) == 1 - hold(self.x)  # held
+        yield self.on == (self.x > 0.5)
+
+
+class SampledOutside(Basis):
+    def events(self) -> Events:
+        yield when(self.x > 0.5, {self.n: sample(self.x)})  # sampled
+
+
+class PreviousOutside(Basis):
+    def equations(self) -> Equations:
+        yield self.T * der(self.x) == previous(self.n) - self.x  # previous
+        yield self.on == (self.x > 0.5)
+
+
 HERE = "test_discrete_messages.py"
 BASIS = "`when(self.x > 0.5, {self.n: pre(self.n) + 1})`"
 CASES: dict[type[Component], tuple[type[ModelicaLikeError], str]] = {
@@ -255,13 +275,32 @@ CASES: dict[type[Component], tuple[type[ModelicaLikeError], str]] = {
         "clock[1] switched 20 times at t = 0 s (counting).\n"
         f"  in {HERE}:{{backwards}} `yield when(clock(-self.T), {{self.n: pre(self.n) + 1}})`\n"
         "Modes still switch after 20 rounds at one instant.\n"
-        "Give the switching a hysteresis (a peak above 1 in friction), or smooth what drives it.",
+        "Give the switching a hysteresis (a peak above 1 in friction), or smooth what drives it. "
+        'Or go on: on_chattering = "slide" along the border of two modes, "rest" in contact after ever faster impacts.',
     ),
     PreOfVariable: (
         LanguageError,
         "pre(x): only a discrete, Boolean or integer variable has a value before an event.\n"
         f"  in {HERE}:{{pre}} `pre(self.x)`\n"
         "For a mode, declare boolean(…) and set it by an equation.",
+    ),
+    Held: (
+        LanguageError,
+        "hold(x): this changes between ticks, so it is not held.\n"
+        f"  in {HERE}:{{held}} `hold(self.x)`\n"
+        "Take it at the ticks: when(clock(…), {self.held: sample(…)}).",
+    ),
+    SampledOutside: (
+        LanguageError,
+        "SampledOutside: sample(x) is outside of the new values of a when(clock(…), …).\n"
+        f"  in {HERE}:{{sampled}} `yield when(self.x > 0.5, {{self.n: sample(self.x)}})`\n"
+        "Elsewhere write x itself.",
+    ),
+    PreviousOutside: (
+        LanguageError,
+        "PreviousOutside: previous(n) is outside of the new values of a when(clock(…), …).\n"
+        f"  in {HERE}:{{previous}} `yield self.T * der(self.x) == previous(self.n) - self.x`\n"
+        "Elsewhere write pre(n), the value before an event.",
     ),
 }
 

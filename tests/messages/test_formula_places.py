@@ -3,7 +3,7 @@
 import pytest
 
 from modelica_like import build
-from modelica_like.errors import ModelicaLikeError
+from modelica_like.errors import ModelicaLikeError, UnitMismatch
 from modelica_like.netlist import loads
 
 HEAD = """name = "bench"
@@ -45,3 +45,15 @@ def test_a_formula_has_its_line(wrong: dict[str, str], message: str) -> None:
     with pytest.raises(ModelicaLikeError) as caught:
         build(loads(HEAD.format(**{**RIGHT, **wrong}), file="bench.toml"))
     assert sorted(str(caught.value).split("\n\n")) == sorted(message.split("\n\n"))
+
+
+def test_units_that_a_block_leaves_open_are_told_by_its_values() -> None:
+    text = '[parts]\nway = { is = "KinematicPTP2", q_end = "100 mm", qd_max = "2 rad/s", qdd_max = "5 rad/s2" }\n'
+    with pytest.raises(UnitMismatch) as caught:
+        build(loads(text, file="bench.toml"))
+    told = str(caught.value).splitlines()
+    assert told[0] == (
+        "way (KinematicPTP2): its units do not fit together: q_end in mm, qd_max in rad/s, qdd_max in rad/s2."
+    )
+    assert told[1].startswith("  in bench.toml:2 `way = ")
+    assert told[2].startswith("KinematicPTP2, point_to_point.py:")

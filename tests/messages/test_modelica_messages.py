@@ -67,12 +67,8 @@ MESSAGES: dict[str, tuple[str, str]] = {
         "A state machine: that is not supported here.\n  in a.mo:5 `x = transition(a, b);`",
     ),
     "clock": (
-        model("Real x;", "x = previous(x);"),
-        "A clocked partition: that is not supported here.\n  in a.mo:5 `x = previous(x);`",
-    ),
-    "delay": (
-        model("Real x;", "x = delay(x, 1);"),
-        "A delay: that is not supported here.\n  in a.mo:5 `x = delay(x, 1);`",
+        model("Real x;", "x = subSample(x, 2);"),
+        "A clock that follows another: that is not supported here.\n  in a.mo:5 `x = subSample(x, 2);`",
     ),
     "algorithm": (
         "model A\n  Real x;\nalgorithm\n  x := 1;\nend A;\n",

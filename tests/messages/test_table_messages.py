@@ -53,6 +53,10 @@ ShiftSchedule.shifts, row 1, gear: 1 must be a text."""),
     "five columns": (NetlistError, lambda: LossyGear(loss_table=[(0, 1)]), """\
 LossyGear.loss_table, row 1: [0, 1] must be \
 [speed |w_a| in rad/s, eta_mf1, eta_mf2, |tau_bf1| in N.m, |tau_bf2| in N.m]."""),
+    "more out than in": (ValueOutOfRange, lambda: LossyGear(loss_table=[(0, 1.5, 0.9, 0, 0)]), """\
+LossyGear.loss_table, row 1, eta_mf1: 1.5 is above 1."""),
+    "more out than in, the other way": (ValueOutOfRange, lambda: LossyGear(loss_table=[(0, 0.9, 1.5, 0, 0)]), """\
+LossyGear.loss_table, row 1, eta_mf2: 1.5 is above 1."""),
     "quantities and a scale": (NetlistError, lambda: Clutch(mu_pos=[("1 rpm", 1)], w_scale=2), """\
 Clutch.mu_pos has quantities, but w_scale scales plain numbers.
 Write numbers and w_scale, or quantities without w_scale."""),

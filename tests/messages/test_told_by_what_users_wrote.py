@@ -40,7 +40,7 @@ from modelica_like.language import (
     where,
 )
 from modelica_like.netlist import loads
-from modelica_like.report.run import reasons
+from modelica_like.report.changes import reasons
 from modelica_like.units import parse_unit
 
 CIRCUIT = """

@@ -317,4 +317,27 @@ package Drives "Texts that use every construct that is read"
     connect(one.y, filter.u);
     connect(filter.y, gain.u);
   end Signals;
+
+  model Clocked "integral controller whose clock ticks every 0.1 s"
+    parameter Real T = 0.1;
+    Real x(start = 0, fixed = true);
+    discrete Real e, s(start = 0);
+    Integer n(start = 0);
+    Real u;
+  equation
+    when Clock(T) then
+      e = 1 - sample(x);
+      s = previous(s) + e;
+      n = previous(n) + 1;
+    end when;
+    u = hold(s);
+    der(x) = u - x;
+  end Clocked;
+
+  model Late "y' = -y(t - 1), with y = 1 before the start"
+    parameter Real T = 1;
+    Real y(start = 1, fixed = true);
+  equation
+    der(y) = -delay(y, T, 2);
+  end Late;
 end Drives;

@@ -76,6 +76,23 @@ def test_samples_branches_and_functions() -> None:
     assert result["limited"] == pytest.approx(np.minimum(3 * x, 0.75), rel=1e-8)
 
 
+def test_a_clock_samples_and_holds() -> None:
+    result = run("Clocked", 1.05)
+    x = total = 0.0
+    for k in range(11):
+        total += 1 - x
+        x = total + (x - total) * np.exp(-(0.1 if k < 10 else 0.05))
+    assert result["n"][-1] == 11
+    assert result["s"][-1] == pytest.approx(total, abs=1e-8)
+    assert result["x"][-1] == pytest.approx(x, abs=1e-8)
+
+
+def test_a_delay_by_the_method_of_steps() -> None:
+    result = run("Late", 2.0)
+    t = result.time
+    assert result["y"] == pytest.approx(1 - t + np.maximum(t - 1, 0) ** 2 / 2, abs=1e-9)
+
+
 def test_own_masses_obey_their_laws_of_drag() -> None:
     result = run("Coupled", 1.0)
     for k in (1, 2):

@@ -5,7 +5,7 @@ import http.client
 import json
 import statistics
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -38,8 +38,8 @@ BARS = """((name) => {
 
 
 @contextlib.contextmanager
-def served(name: str, folder: Path) -> Iterator[Explorer]:
-    with Explorer(EXAMPLES / f"{name}.toml", folder=folder) as explorer:
+def served(name: str, folder: Path, show: Sequence[str] = ()) -> Iterator[Explorer]:
+    with Explorer(EXAMPLES / f"{name}.toml", folder=folder, show=show) as explorer:
         thread = threading.Thread(target=explorer.serve_forever, kwargs={"poll_interval": 0.02})
         thread.start()
         try:
@@ -164,6 +164,28 @@ def test_a_slider_moves_the_curves(browser: Any, tmp_path: Path, name: str, slid
             browser.run("document.getElementById('keep').click()")
         browser.run(f"{MOVE}({json.dumps(slider)}, 0.55)")
         assert browser.run("picture.earlier.length") == 6, "five kept runs and the first one"
+
+
+@pytest.mark.browser
+def test_formulas_follow_the_sliders(browser: Any, tmp_path: Path) -> None:
+    shown = ["-clutch.tau*clutch.w_rel", "min(J4.w, 100 rpm)*J4.J + 0*time*1 N.m", "clutch.mode", "J1.w**2/sqrt(4)"]
+    with served("machine_tool_startup", tmp_path, show=shown) as explorer:
+        browser.open(explorer.address)
+        browser.run(f"{MOVE}('J4.J', 0.6)")
+        read = "[one.name, PAGE.units[one.unit].text, [...values(picture.result, one)]]"
+        found = browser.run(f"[...shown].map((one) => {read})")
+        inertia = browser.run("PAGE.sliders.find((one) => one.name === 'J4.J').now")
+        assert [one for one in browser.complaints if not one.startswith(explorer.address[:20])] == []
+    run = simulate(EXAMPLES / "machine_tool_startup.toml", parameters={"J4.J": inertia}, solver="native")
+    expected = [
+        ("W", -run["clutch.tau"] * run["clutch.w_rel"]),
+        ("rad·kg·m²/s", np.minimum(run["J4.w"], 100 * np.pi / 30) * inertia),
+        ("rad²/s²", run["J1.w"] ** 2 / 2),
+    ]
+    assert [name for name, *_ in found] == [shown[0], shown[1], shown[3]], "modes are bands"
+    for (_, unit, values), (wanted, reference) in zip(found, expected, strict=True):
+        assert unit == wanted
+        assert values == pytest.approx(reference, rel=1e-6, abs=1e-6)
 
 
 @pytest.mark.browser

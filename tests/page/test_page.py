@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from modelica_like import build, export_html, simulate
 from modelica_like.cli import app
-from modelica_like.errors import ExportError, UnknownName, ValueOutOfRange
+from modelica_like.errors import ExportError, UnitError, UnknownName, ValueOutOfRange
 from modelica_like.native.page import _span, _spelled
 from modelica_like.units import parse_unit
 
@@ -60,9 +60,10 @@ def said(browser: Any) -> str:
 
 
 def curves(browser: Any) -> dict[str, np.ndarray]:
-    """What the page shows, in its units; and times."""
+    """What the page shows, in its units and with the signs of variables; and times."""
     script = """({time: [...picture.times], events: [...picture.result.events],
-      ...Object.fromEntries([...shown, ...MODES].map((one) => [one.name, [...values(picture.result, one)]]))})"""
+      ...Object.fromEntries([...shown, ...MODES].map((one) =>
+        [one.name, [...values(picture.result, one)].map((value) => one.driving * value)]))})"""
     return {name: np.array(values) for name, values in browser.run(script).items()}
 
 
@@ -150,6 +151,11 @@ def test_mistakes_are_told(tmp_path: Path) -> None:
         export_html(drive, tmp_path / "x.htm")
     with pytest.raises(UnknownName, match=r"two_mass has no variable 'J9\.w'"):
         export_html(drive, tmp_path / "x.html", show=["J9.w"])
+    with pytest.raises(UnknownName, match=r"^A page with sliders cannot show 'J1\.stored_energy': it has variables, "
+                                          r"parameters and modes\.$"):  # fmt: skip
+        export_html(drive, tmp_path / "x.html", show=["2*J1.stored_energy"])
+    with pytest.raises(UnitError, match=r"^'J1.w \+ J1.phi' mixes rad/s and rad\.$"):
+        export_html(drive, tmp_path / "x.html", show=["J1.w + J1.phi"])
 
     endless = tmp_path / "endless.toml"
     endless.write_text(re.sub(r"(?m)^until = .*$", "", drive.read_text(encoding="utf-8")), encoding="utf-8")
@@ -240,7 +246,9 @@ def test_curves_come_and_go_and_tell_their_values(browser: Any, pages: dict[str,
     assert re.fullmatch(r"t = (0\.2|0\.19\d+|0\.20\d+) s · clutch\.mode \w+.*", read)
     values = browser.run("[...document.querySelectorAll('figcaption button')].map((one) => one.textContent)")
     names = [one.partition("\u2002")[0] for one in values]
-    assert names == ["motor.w", "clutch.w_rel", "hub.w", "clutch.tau", "table.v", "table.s"]
+    assert names == ["motor.w", "clutch.w_rel", "hub.w", "\u2212clutch.tau", "table.v", "table.s"], (
+        "what drives is positive"
+    )
     assert float(values[0].partition("\u2002")[2]) == pytest.approx(200 * np.pi, abs=0.01)
     browser.run(f"([...document.querySelectorAll('figcaption button')].at(-1).click(), {wait})")
     assert "position" not in browser.run("document.getElementById('curves').textContent")

@@ -24,6 +24,19 @@ CLUTCH_TORQUE = INERTIA * SPEED / 0.2 + 15.0
 """Of document 000, in SI units."""
 LARGEST = 1_500_000
 """Bytes of a page."""
+FILTER = """
+[parts]
+supply = { is = "ConstantVoltage", V = "24 V" }
+wire = { is = "Resistor", R = "2 Ohm" }
+store = { is = "Capacitor", C = "10 mF", v = 0 }
+earth = { is = "Ground" }
+[connect]
+a = ["supply.p", "wire.p"]
+b = ["wire.n", "store.p"]
+c = ["supply.n", "store.n", "earth.p"]
+[simulate]
+until = "0.1 s"
+"""
 INK = "getComputedStyle(document.documentElement).getPropertyValue('--ink')"
 # How many dots of a panel have a colour.
 DRAWN = """[...document.querySelectorAll("canvas")].map((one) => {
@@ -272,11 +285,22 @@ def test_results_without_equations_have_a_report(tmp_path: Path) -> None:
     assert (result.exit_code, result.stderr) == (2, "--set changes netlists; 'table.csv' is none.\n")
 
 
-def test_a_circuit_says_how_to_choose_curves() -> None:
-    drive = load(EXAMPLES / "components" / "circuits.toml")
+def test_a_circuit_shows_voltages_and_currents(tmp_path: Path) -> None:
+    path = tmp_path / "filter.toml"
+    path.write_text(FILTER, encoding="utf-8")
+    panels = {one["title"]: {curve["name"]: curve["values"] for curve in one["curves"]}
+              for one in curves(simulate(path))["panels"]}  # fmt: skip
+    assert list(panels) == ["voltage in V", "current in A"]
+    charged = 24 * (1 - np.exp(-5))  # R·C = 20 ms
+    assert panels["voltage in V"]["store.v"][-1] == pytest.approx(charged, rel=1e-4)
+    assert panels["current in A"]["wire.i"][0] == pytest.approx(12)
+
+
+def test_what_the_curves_leave_out_is_told() -> None:
+    drive = load(EXAMPLES / "machine_tool_startup.toml")
     text = report(drive, simulate(drive))
-    assert "choose curves by <code>--show</code>" in text
-    assert '"panels":[]' in text
+    assert "Not drawn: 3 of 9 speeds (shaft2.w_rel, J4.w, clutch.w_rel)," in text
+    assert "Not drawn" not in report(drive, simulate(drive), show=["J4.w"])
 
 
 def test_a_run_knows_how_it_has_started() -> None:

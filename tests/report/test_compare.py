@@ -8,9 +8,9 @@ from rich.console import Console
 
 from modelica_like import linearize, sensitivities, simulate, steady
 from modelica_like.errors import ModelicaLikeError, NetlistError
+from modelica_like.report.changes import reasons
 from modelica_like.report.compare import Comparison, compare
 from modelica_like.report.files import write_solution
-from modelica_like.report.run import reasons
 from modelica_like.report.sources import trajectories
 from modelica_like.solve.measured import read_csv
 from modelica_like.solve.recorded import RecordedModel, RecordedSolution, RecordedVariable

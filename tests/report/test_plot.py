@@ -30,7 +30,7 @@ from modelica_like.language import (
     var,
     when,
 )
-from modelica_like.solve.plot import chosen, plot, save_plot
+from modelica_like.solve.plot import for_page, plot, save_plot
 from modelica_like.solve.signals import read_signals
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -42,7 +42,7 @@ def start_up() -> Solution:
 
 
 def test_the_usual_curves_are_speeds_torques_and_forces_once_each(start_up: Solution) -> None:
-    names = chosen(start_up, ())
+    names = [one.name for one in for_page(start_up)[0]]
     assert {"motor.w", "clutch.w_rel", "clutch.tau", "table.v"} <= set(names)
     # hub and spindle turn together, so one curve shows both
     assert len({"hub.w", "spindle.w"} & set(names)) == 1
@@ -51,9 +51,11 @@ def test_the_usual_curves_are_speeds_torques_and_forces_once_each(start_up: Solu
 
 
 def test_patterns_choose(start_up: Solution) -> None:
-    assert chosen(start_up, ["table.v", "clutch.w*", "table.v"]) == ["table.v", "clutch.w_rel"]
+    curves, left = for_page(start_up, ["table.v", "clutch.w*", "clutch.mode", "2*table.s", "table.v"])
+    assert [one.name for one in curves] == ["table.v", "clutch.w_rel", "2*table.s"], "modes are bands"
+    assert left == ""
     with pytest.raises(UnknownName, match=r"has no variable 'tabel\.v'; did you mean 'table\.v'\?"):
-        chosen(start_up, ["tabel.v"])
+        for_page(start_up, ["tabel.v"])
 
 
 def test_one_panel_per_quantity_with_bands_and_events(start_up: Solution) -> None:

@@ -29,6 +29,7 @@ from modelica_like.language import (
     discrete,
     edge,
     floor,
+    hold,
     if_,
     initial,
     integer,
@@ -38,6 +39,9 @@ from modelica_like.language import (
     negate,
     param,
     pre,
+    previous,
+    random,
+    sample,
     sign,
     signal_in,
     signal_out,
@@ -570,3 +574,52 @@ def test_ticks_that_move_nothing_do_not_begin_the_steps_anew(solver):
     assert found.final["held"] == pytest.approx(found.final["machine.w"], rel=1e-12)
     if solver == "native":  # IDAS begins anew at every event
         assert found.statistics.steps < 1.2 * 301
+
+
+class Words(Component):
+    """A fast clock sums samples, one of a third of its rate takes the sum: each in its own `when`."""
+
+    fast: Parameter = param("s", "period", default=0.1)
+    x: Variable = var("1", "oscillates")
+    y: Variable = var("1", "what is held")
+    f: Parameter = param("Hz", "frequency", default=0.7)
+    total: Discrete = discrete("1", "sum of the samples")
+    taken: Discrete = discrete("1", "sum at the slow tick")
+    gained: Discrete = discrete("1", "since the slow tick before")
+
+    def equations(self) -> Equations:
+        yield self.x == sin(2 * np.pi * self.f * self.time)
+        yield self.y == hold(2 * self.gained)
+
+    def events(self) -> Events:
+        yield when(clock(self.fast), {self.total: previous(self.total) + sample(self.x)})
+        yield when(clock(3 * self.fast), {self.taken: self.total, self.gained: self.total - previous(self.taken)})
+
+
+def test_words_of_sampled_parts_and_several_rates(solver):
+    found = run(Words(), 2.05, solver)
+    samples = np.sin(2 * np.pi * 0.7 * 0.1 * np.arange(21))
+    assert found.final["total"] == pytest.approx(samples.sum(), abs=CLOSE)
+    assert found.final["taken"] == pytest.approx(samples[:19].sum(), abs=CLOSE)
+    assert found.final["y"] == pytest.approx(2 * samples[16:19].sum(), abs=CLOSE)
+
+
+class Dice(Component):
+    """Thrown at every tick."""
+
+    T: Parameter = param("s", "period", default=0.1)
+    u: Discrete = discrete("1", "chance", start=2147483646 / 2147483647)
+    points: Discrete = integer("of the last throw")
+
+    def events(self) -> Events:
+        yield when(clock(self.T, self.T), {self.u: random(pre(self.u)), self.points: floor(6 * self.u) + 1})
+
+
+def test_random_numbers_are_the_published_ones(solver):
+    """`minstd_rand` (ISO/IEC 14882) from its largest seed, to the last bit; zero counts as the first seed."""
+    found, k = simulate(Dice(), 10.0, solver=solver), 2147483646
+    for tick in range(1, 100):
+        k = 48271 * k % 2147483647
+        assert found.at(0.1 * tick + 0.05)["u"] == k / 2147483647
+        assert found.at(0.1 * tick + 0.05)["points"] == 1 + 6 * k // 2147483647
+    assert simulate(Dice(u=0.0), 0.15, solver=solver).final["u"] == 48271 / 2147483647

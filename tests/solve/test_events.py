@@ -330,6 +330,29 @@ def test_resets_are_computed_from_the_values_before_the_event():
     assert run.final["x"] == pytest.approx(5.5, rel=1e-12)
 
 
+def test_two_variables_that_are_no_states_are_reset_together():
+    """Sum and difference of two states get values that only one pair of states has, each its own."""
+
+    class Pair(Clock):
+        p: Variable = var("1", "one", state="always")
+        q: Variable = var("1", "two", state="always")
+        total: Variable = var("1", "sum", state="avoid")
+        left: Variable = var("1", "difference", state="avoid")
+
+        def equations(self) -> Equations:
+            yield from super().equations()
+            yield der(self.p) == 0 * self.p
+            yield der(self.q) == 0 * self.q
+            yield self.total == self.p + self.q
+            yield self.left == self.p - self.q
+
+        def events(self) -> Events:
+            yield self.a.go("off", "on", when=self.x > self.at, reset={self.total: 7.0, self.left: 3.0})
+
+    run = simulate(Pair(x=0.0, p=1.0, q=1.0), 1.0, points=4)
+    assert [run.final["p"], run.final["q"]] == pytest.approx([5.0, 2.0], rel=1e-12)
+
+
 def test_a_variable_that_is_no_state_is_reset_through_the_states():
     """The momentum m v is reset; v, the state, follows."""
 

@@ -10,7 +10,7 @@ from components import Clutch, Inertia
 from modelica_like import Assembly, build
 from modelica_like.initialize import initialize
 from modelica_like.initialize.holds import Strike, _capacities, rest
-from modelica_like.language.hold import UNLIMITED
+from modelica_like.language.holding import UNLIMITED
 
 
 @pytest.mark.parametrize("unit", [1.0, 1e-3, 7.0])

@@ -1,5 +1,6 @@
 """Blocks of equations: torn to few unknowns, solved by symbols, or explicit."""
 
+import casadi as ca
 import numpy as np
 import pytest
 
@@ -8,6 +9,7 @@ from modelica_like import build, simulate
 from modelica_like.flatten import flatten
 from modelica_like.language import Assembly, Component, Equations, Input, Parameter, param, signal_in, sin
 from modelica_like.structure import reduce
+from modelica_like.structure.blocks import BlockSolver
 
 
 class Coupled(Component):
@@ -104,3 +106,13 @@ def test_a_damper_to_ground_and_a_table_are_explicit():
     reduced = reduce(flatten(drive))
     assert all(block.kind == "explicit" for block in reduced.blocks)
     assert len(reduced.states) == 2
+
+
+def test_an_unknown_that_cancels_is_none():
+    """The current of a loop that hangs at one node enters and leaves it; its equation cannot give the current."""
+    b, c, mode, p = (ca.SX.sym(name) for name in ("b", "c", "mode", "p"))
+    residual = ca.vertcat((b + c) - p - c, ca.if_else(mode == 0, c - 2 * b, c - 3 * b))
+    solved = BlockSolver(residual, ca.vertcat(b, c), mode, []).run()
+    assert [block.kind for block in solved.blocks] == ["explicit", "linear"]
+    _, values = ca.substitute_inplace([b, c][:1], [solved.order[0][1]], [solved.order[1][1]], False)
+    assert [float(ca.substitute(v, ca.vertcat(mode, p), ca.DM([k, 5.0]))) for k in (0, 1) for v in values] == [10, 15]

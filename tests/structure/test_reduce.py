@@ -18,6 +18,7 @@ from modelica_like.language import (
     Input,
     Parameter,
     Variable,
+    cos,
     der,
     guess,
     param,
@@ -96,14 +97,14 @@ def test_state_counts_of_the_standard_library_examples(name, count):
 
 
 class Pendulum(Component):
-    """Point mass on a rod, in Cartesian coordinates: the textbook system of index three."""
+    """Point mass on a rod, in Cartesian coordinates: the textbook system of index three, with states of the user's."""
 
     m: Parameter = param("kg", "mass", default=2.0)
     L: Parameter = param("m", "length", default=1.5)
     g: Parameter = param("m/s2", "gravity", default=9.81)
-    x: Variable = var("m", "x")
+    x: Variable = var("m", "x", state="always")
     y: Variable = var("m", "y")
-    vx: Variable = var("m/s", "velocity")
+    vx: Variable = var("m/s", "velocity", state="always")
     vy: Variable = var("m/s", "velocity")
     T: Variable = var("N/m", "rod force over length")
 
@@ -185,28 +186,102 @@ def test_the_pendulum_does_not_drift_and_has_the_right_period():
     assert run.at(20.25 * period)["x"] == pytest.approx(0.0, abs=1e-5)
 
 
-def test_states_are_chosen_once_and_the_point_where_they_fail_is_told():
-    """With x as state the rod must not be horizontal; the selection does not change during a run."""
+def test_states_of_the_user_stay_and_the_point_where_they_fail_is_told():
+    """With x as state the rod must not be horizontal."""
     with pytest.raises(SingularAtStart, match=r"singular at t = 0 s in block 1 \(y\)") as caught:
         simulate(Pendulum(x=1.5, vx=0.0, y=guess(0.0)), 1.0)
     assert 'let other variables be states (state="always")' in caught.value.advice
 
 
-def test_always_and_avoid_steer_the_choice():
-    class Turned(Pendulum):
+class Free(Pendulum):
+    """The same without a choice by the user."""
+
+    x: Variable = var("m", "x")
+    vx: Variable = var("m/s", "velocity")
+
+
+def test_always_steers_the_choice():
+    class Turned(Free):
         y: Variable = var("m", "y", state="always")
         vy: Variable = var("m/s", "velocity", state="always")
 
-    class Avoiding(Pendulum):
-        x: Variable = var("m", "x", state="avoid")
-        vx: Variable = var("m/s", "velocity", state="avoid")
-
     assert set(reduce(flatten(Turned())).states) == {"y", "vy"}
-    assert set(reduce(flatten(Avoiding())).states) == {"y", "vy"}
     run = simulate(Turned(y=0.0, vy=0.0, x=guess(1.0)), 0.2, points=4, rtol=1e-10, atol=1e-12)
     # From the horizontal: energy gives the speed, m v² / 2 = -m g y.
     speed = np.sqrt(run.final["vx"] ** 2 + run.final["vy"] ** 2)
     assert speed == pytest.approx(np.sqrt(-2 * 9.81 * run.final["y"]), rel=1e-8)
+
+
+def test_states_follow_the_motion_where_any_choice_is_singular_somewhere():
+    reduced = reduce(flatten(Free()))
+    assert reduced.states == ("state[1]", "der(state[1])")
+    assert reduced.notices == (
+        "Index 3: Free couples motions. 1 constraint differentiated; states kept: state[1], der(state[1]).",
+        "No fixed choice of states fits x and y everywhere: state[1].choice makes it anew at events.",
+    )
+
+
+class Scotch(Component):
+    """A yoke that a crank moves: x = r·cos(phi) determines x anywhere, but phi nowhere near the dead centres."""
+
+    r: Parameter = param("m", "length of the crank", default=0.1)
+    J: Parameter = param("kg.m2", "moment of inertia of the crank", default=1.0)
+    m: Parameter = param("kg", "mass of the yoke", default=1.0)
+    phi: Variable = var("rad", "angle", state="avoid")
+    w: Variable = var("rad/s", "speed", state="avoid")
+    x: Variable = var("m", "position of the yoke")
+    v: Variable = var("m/s", "velocity of the yoke")
+    f: Variable = var("N", "force")
+
+    def equations(self) -> Equations:
+        yield der(self.phi) == self.w
+        yield der(self.x) == self.v
+        yield self.J * der(self.w) == -self.r * sin(self.phi) * self.f
+        yield self.m * der(self.v) == -self.f
+        yield self.x == self.r * cos(self.phi)
+
+
+def test_what_one_equation_determines_anywhere_is_no_state():
+    """Even if it is preferred: the other variable is a state everywhere."""
+    reduced = reduce(flatten(Scotch()))
+    assert set(reduced.states) == {"phi", "w"}
+    assert reduced.choices == ()
+    run = simulate(Scotch(phi=0.0, w=5.0), 4.0, rtol=1e-10, atol=1e-12)
+    assert run["x"] == pytest.approx(0.1 * np.cos(run["phi"]), abs=1e-12)
+    energy = (1 + (0.1 * np.sin(run["phi"])) ** 2) * run["w"] ** 2
+    assert energy == pytest.approx(25.0, rel=1e-8)
+
+
+class PrescribedLoop(Component):
+    """A four-bar linkage at a constant speed of the crank: its loop is closed twice, its speed given once."""
+
+    speed: Parameter = param("rad/s", "speed of the crank", default=3.0)
+    phi: Variable = var("rad", "crank")
+    beta: Variable = var("rad", "coupler")
+    psi: Variable = var("rad", "rocker")
+    w_psi: Variable = var("rad/s", "speed of the rocker")
+    a_psi: Variable = var("rad/s2", "acceleration of the rocker")
+
+    def equations(self) -> Equations:
+        yield der(self.phi) == self.speed
+        yield der(self.psi) == self.w_psi
+        yield der(self.w_psi) == self.a_psi
+        yield 0.1 * cos(self.phi) + 0.25 * cos(self.beta) - 0.2 * cos(self.psi) == 0.28
+        yield 0.1 * sin(self.phi) + 0.25 * sin(self.beta) - 0.2 * sin(self.psi) == 0
+
+
+def test_a_loop_whose_speed_is_given_has_one_state():
+    reduced = reduce(flatten(PrescribedLoop()))
+    assert len(reduced.states) == 1
+    run = simulate(PrescribedLoop(phi=0.0, beta=guess(1.0), psi=guess(1.5)), 4.0, rtol=1e-10, atol=1e-12)
+    assert run["phi"] == pytest.approx(3.0 * run.time, rel=1e-8, abs=1e-12)
+    slope = 0.1 * np.sin(run["beta"] - run["phi"]) / (0.2 * np.sin(run["beta"] - run["psi"]))
+    assert run["w_psi"] == pytest.approx(3.0 * slope, abs=1e-9)
+
+
+@pytest.mark.parametrize("example", ["components/universal_joint", "elements/variable_drives", "elements/linkages"])
+def test_drives_with_regular_choices_keep_them(example):
+    assert reduce(flatten(load(EXAMPLES.parents[1] / f"{example}.toml"))).choices == ()
 
 
 def test_relative_angles_become_states():

@@ -8,11 +8,12 @@ from typing import get_args
 from modelica_like.analyse.linear.held import free_motions
 from modelica_like.analyse.linear.model import LinearModel
 from modelica_like.compile.compiled import CompiledDae
+from modelica_like.errors import LanguageError
 from modelica_like.initialize import Point, StartKind, initialize
 from modelica_like.initialize.slopes import columns_of, nodes_of, slopes
 from modelica_like.simulation import Model, build, simulate
 from modelica_like.solve.solution import Solution
-from modelica_like.units import parse_unit, to_si
+from modelica_like.units import ONE, parse_unit, to_si
 
 Drive = Model | Solution
 """What can be analysed: a component, a netlist file, a compiled model, or a solution of one."""
@@ -75,9 +76,11 @@ def linearize(
 
     Raises:
         UnknownName: a name is not known.
+        LanguageError: a value is delayed.
         ModelicaLikeError: the drive cannot be built, started or simulated.
     """
     model, point = point_of(drive, at)
+    model.refuse_delays(LanguageError, f"{model.name} cannot be linearized")
     u_names = tuple(model.flat_variables[k].path for k in model.inputs) if inputs is None else tuple(inputs)
     top = (one.path for one in model.flat_variables if one.kind == "output" and "." not in one.path)
     # A state such as der(spring.phi_rel) is the rate of a variable, and no variable itself.
@@ -98,5 +101,5 @@ def linearize(
 
 
 def _unit(model: CompiledDae, name: str) -> str:
-    """Return the unit of a variable, or of the derivative `der(x)` of one."""
-    return str(model.units[name]) if name in model.units else f"{_unit(model, name[4:-1])}/s"
+    """Return the unit of a variable, of a state that follows the motion, or of the derivative `der(x)` of one."""
+    return f"{_unit(model, name[4:-1])}/s" if name.startswith("der(") else str(model.units.get(name, ONE))

@@ -224,6 +224,7 @@ def replay(
         )
     if TERMINAL in model.discrete_position:
         raise NoGradient(f"No gradient: {model.name} changes at the end of a run, by terminal().")
+    model.refuse_delays(NoGradient, f"No gradient of {model.name}")
     integrands = ca.SX(0, 1) if quadratures is None else quadratures
     chain = Replay(StepFunctions(model, integrands, name, tolerances or Tolerances()))
     maker = _Maker(solution, chain, stops)

@@ -13,7 +13,7 @@ from modelica_like.compile.compiled import Circuit, CompiledDae
 from modelica_like.flatten.holds import TERMS
 from modelica_like.initialize import Point, variable_slopes
 from modelica_like.initialize.holds import capacities
-from modelica_like.language.hold import UNLIMITED
+from modelica_like.language.holding import UNLIMITED
 
 Total = Callable[..., tuple[Vector, Vector]]
 """Value of a function at a point, and its derivatives by (x, theta) before an event; arguments as for `slopes`."""

@@ -56,9 +56,9 @@ typedef struct { /* what changes; arrays of the model's sizes stand behind it, s
     int looked;                                        /* the guards are known from the end of the last fixed step */
     double tolerance, absolute, start_time, stop_time; /* absolute: in nominal values */
     int stop_time_defined;
-    double step;            /* next step size, 0: choose one */
-    double instants[CROWD]; /* of the last events, in a circle */
-    int n_instants;
+    double step;             /* next step size, 0: choose one */
+    double instants[CROWD];  /* of the last events, in a circle */
+    int n_instants, resting; /* resting: impacts end in contact */
     double n_steps, n_rejected, n_evaluations, n_events;
 } State;
 
@@ -115,11 +115,12 @@ typedef struct {
     double *variables, *guards, *guards_before, *looks, *seen_rates, *seen_indicators, *seen_derived;
     double *start_unknowns, *start_values, *start_residual;
     double *begun; /* motions that may be held, where the search for a steady state began */
-    double *d_before, *d_fired, *reset_values, *target_values, *respond_d, *respond_z, *rates, *x_kept;
+    double *d_before, *d_earlier, *d_fired, *reset_values, *target_values, *respond_d, *respond_z, *rates, *x_kept;
     double *weights, *base_weights, *use, *best, *kept_z, *reactions, *sizes, *zeros;
     int *order; /* pivots of the implicit equations */
     int *targets, *standing, *places, *member, *pivots, *same, *places_of_slots, *special_outputs;
     unsigned char *known, *decided, *wanting, *changed, *kinds, *held, *other, *known_slots, *needed_slots;
+    unsigned char *open_rows;     /* implicit equations that depend on others */
     unsigned char *asked, *tuned; /* variables that somebody reads; parameters that have changed in a run */
     Piece *whole;
     Terms *terms, *strike_terms;
@@ -216,6 +217,13 @@ int anything_shared(const Instance *c);
 void share(Instance *c);
 void rest(Instance *c);
 void rest_rates(Instance *c, double *rates);
+/* ideal.c */
+void replace_dependent(Instance *c);
+int pushed(Instance *c);
+#define GIVEN_BACK 1e-3 /* of the largest current: none where modes return, as it ends within the time resolution */
+Result meet(Instance *c, double keep, int *any);
+Result renew(Instance *c);
+int same_modes(const Instance *c, const double *before);
 /* impacts.c */
 Result stop_motions(Instance *c, const double *before, Impacts *impacts);
 /* events.c */

@@ -168,13 +168,21 @@ static Result update_once(Instance *c, Impacts *impacts, int *changes) {
     return check_singular(c);
 }
 
-/* Notes an instant; an error where the last ones came ever faster. */
+/* Notes an instant. Where the last ones came ever faster, impacts end in contact if the model asks for it; an error
+   otherwise, and if that does not help. */
 static Result crowded(Instance *c) {
     State *s = &c->state;
     double span = s->stop_time_defined ? s->stop_time - s->start_time : 1;
     double first = s->instants[s->n_instants % CROWD]; /* CROWD instants ago, once there were so many */
+    double last = s->n_instants > 0 ? s->instants[(s->n_instants - 1) % CROWD] : s->t;
+    if (s->t - last >= CROWDED * span) s->resting = 0;
     s->instants[s->n_instants % CROWD] = s->t;
     if (++s->n_instants <= CROWD || s->t - first >= CROWDED * span) return RESULT_OK;
+    if (c->model->settings->rests && !s->resting) {
+        s->resting = 1;
+        s->n_instants = 0;
+        return RESULT_OK;
+    }
     return fail(
         c, "Events follow each other ever faster at t = %.12g s. Give the switching a hysteresis, or smooth it.", s->t);
 }
@@ -203,14 +211,19 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
     State *s = &c->state;
     Impacts *impacts = &c->work.impacts;
     double *before = c->work.d_before;
-    int changes = m->n_updates > 0;
+    int changes = m->n_updates > 0, met;
     impacts->struck = 0;
     memset(impacts->entered, 0, (size_t)m->n_holds);
     if (find_wanting(c, wanting, !located)) {
+        if (m->n_ideals > 0 && !pushed(c) && meet(c, -1, &met) != RESULT_OK) return RESULT_ERROR;
         if (crowded(c) != RESULT_OK || share_anew(c, wanting) != RESULT_OK) return RESULT_ERROR;
     }
-    for (int round = 0; round < ROUNDS + ALONE * m->n_holds; round++) {
+    for (int round = 0; round < ROUNDS + ALONE * (m->n_holds + m->n_ideals); round++) {
         int any = 0;
+        if (!changes && (round > 0 || pushed(c)) && !any_of(wanting, m->n_transitions)) {
+            if (meet(c, -1, &met) != RESULT_OK) return RESULT_ERROR;
+            if (met) find_wanting(c, wanting, 1);
+        }
         for (int k = 0; k < m->n_transitions; k++) {
             if (any && round >= TOGETHER) wanting[k] = 0;
             any |= wanting[k];
@@ -222,6 +235,7 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
             return RESULT_OK;
         }
         c->round = round;
+        memcpy(c->work.d_earlier, before, (size_t)m->n_d * sizeof(double));
         memcpy(before, c->d, (size_t)m->n_d * sizeof(double));
         if (any && fire(c, wanting, impacts) != RESULT_OK) return RESULT_ERROR;
         if (any) share(c);
@@ -229,6 +243,10 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
         if (any && (solve_now(c, 0) != RESULT_OK || stop_motions(c, before, impacts) != RESULT_OK ||
                        check_singular(c) != RESULT_OK))
             return RESULT_ERROR;
+        if (any && m->n_ideals > 0) {
+            double keep = round > 0 && same_modes(c, c->work.d_earlier) ? GIVEN_BACK : 0;
+            if (meet(c, keep, &met) != RESULT_OK) return RESULT_ERROR;
+        }
         if (update_once(c, impacts, &changes) != RESULT_OK) return RESULT_ERROR;
         memset(wanting, 0, m->n_transitions);
         if (find_wanting(c, wanting, 1) && !c->bounded) {
@@ -239,7 +257,7 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
     if (changes) return fail(c, "Discrete variables do not settle at t = %.12g s.", s->t);
     return fail(c,
         "Modes still switch after %d rounds at t = %.12g s. Give the switching a hysteresis, or smooth what drives it.",
-        ROUNDS + ALONE * m->n_holds, s->t);
+        ROUNDS + ALONE * (m->n_holds + m->n_ideals), s->t);
 }
 
 /* One event iteration for an importer's event mode. Where anything fired or was set, its solver must begin anew even if
@@ -247,7 +265,7 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
 Result update_discrete(Instance *c, int *restart, double *next) {
     double before = c->state.n_events;
     *restart = c->state.inputs_changed;
-    if (*restart && check_tables(c) != RESULT_OK) return RESULT_ERROR;
+    if (*restart && (check_tables(c) != RESULT_OK || renew(c) != RESULT_OK)) return RESULT_ERROR;
     c->state.inputs_changed = 0;
     if (handle_event(c) != RESULT_OK) return RESULT_ERROR;
     *restart |= c->state.n_events != before;

@@ -17,6 +17,7 @@ void mark_held(const Instance *c, const Terms *terms, unsigned char *held) {
 /* Terms of all motions that modes may hold at the present point; marks those that are held. */
 void find_held(Instance *c, Terms *terms, unsigned char *held) {
     evaluate_now(c, &c->model->tapes.hold_terms, (double *)terms);
+    for (int k = 0; k < c->model->n_holds && c->state.resting; k++) terms[k].restitution = 0;
     mark_held(c, terms, held);
 }
 
@@ -212,6 +213,7 @@ void share(Instance *c) {
     Terms *terms = c->work.terms;
     double *weights = c->work.weights, *base = c->work.base_weights, *use = c->work.use;
     double *best = c->work.best, least = INFINITY;
+    replace_dependent(c);
     if (m->n_circuits == 0) return;
     find_held(c, terms, c->work.held);
     weigh(m, terms, base);

@@ -114,6 +114,7 @@ static Result carry_out(Instance *c, Strike *strike, int first) {
     const Model *m = c->model;
     Terms *terms = c->work.strike_terms;
     if (strike->hard) find_held(c, terms, c->work.held);
+    for (int k = 0; k < m->n_holds && !strike->hard; k++) terms[k].restitution = 0; /* rounding does not rebound */
     for (int trial = 0; trial < TRIALS && !(trial > 0 && c->bounded && c->budget < 1); trial++) {
         c->budget--;
         for (int k = 0; k < m->n_holds; k++)

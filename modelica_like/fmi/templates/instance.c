@@ -102,11 +102,12 @@ static void share_out_specials(Instance *c) {
 static uint64_t place_work(const Model *m, Work *w, double *memory) {
     uint64_t n = m->n_unknowns, n_z = m->n_z, steady = m->n_steady;
     uint64_t members = m->most_members, n_guards = m->n_guards, n_x = m->n_x;
-    uint64_t resets = larger(larger(m->n_resets, m->n_reset_values), larger(m->n_updates, m->n_holds));
+    uint64_t resets = larger(larger(m->n_resets, m->n_reset_values), larger(m->n_updates, m->n_holds + m->n_ideals));
     uint64_t small = larger(larger(n_guards, m->n_moments), larger(larger(m->n_start_modes, m->n_d), m->n_derived));
     uint64_t left = special_size(m, N_SPECIALS, 0);
     uint64_t square =
         larger(larger(m->settings->steady ? 2 * steady * steady : 0, resets * n_x), members * (n_x + 3 * members));
+    square = larger(square, m->n_ideals > 0 ? n_z * (n_z + 2) : 0);
     const Room rooms[] = {{m->n_slots + left, 8, {&w->slots}}, {3 * (uint64_t)m->n_slots, 8, {&w->dots}},
         {larger(m->n_jacobian, m->n_start_jacobian), 8, {&w->jacobian}}, {m->step.n_nonzeros, 8, {&w->matrix}},
         {larger(m->step.n_v, m->start.n_v), 8, {&w->qr_v}}, {larger(m->step.n_r, m->start.n_r), 8, {&w->qr_r}},
@@ -115,8 +116,8 @@ static uint64_t place_work(const Model *m, Work *w, double *memory) {
         {larger(n, m->n_determinants), 8, {&w->rhs}}, {m->n_nodes, 8, {&w->variables}}, {small, 8, {&w->guards}},
         {2 * n_guards, 8, {&w->guards_before}}, {3 * n_guards * MOST_LOOKS, 8, {&w->looks}}, {n_guards, 1, {&w->kinds}},
         {n_z * n_z, 8, {&w->dense_matrix}}, {n_z, 8, {&w->residual, &w->kept_z, &w->respond_z}},
-        {n_z, sizeof(int), {&w->order}}, {square, 8, {&w->square}}, {m->n_starts, 8, {&w->start_values}},
-        {larger(m->n_start_values, resets), 8, {&w->start_residual}},
+        {n_z, sizeof(int), {&w->order}}, {n_z, 1, {&w->open_rows}}, {square, 8, {&w->square}},
+        {m->n_starts, 8, {&w->start_values}}, {larger(m->n_start_values, resets), 8, {&w->start_residual}},
         {resets, 8, {&w->reset_values, &w->target_values}}, {resets, sizeof(int), {&w->targets}},
         {n, 8, {&w->seen_rates, &w->first_rates}}, {n_guards, 8, {&w->seen_indicators}},
         {m->n_derived, 8, {&w->seen_derived}}, {m->n_slots, sizeof(int), {&w->same, &w->places_of_slots}},
@@ -130,14 +131,15 @@ static uint64_t place_work(const Model *m, Work *w, double *memory) {
 static uint64_t place_events(const Model *m, Work *w, double *memory) {
     uint64_t n_x = m->n_x, n_d = m->n_d, n_holds = m->n_holds, members = m->most_members + 1;
     const Room rooms[] = {{n_x, 8, {&w->strike.jump, &w->impacts.x, &w->rates, &w->x_kept}}, {n_x, 1, {&w->known}},
-        {n_d, 8, {&w->d_before, &w->d_fired, &w->best, &w->respond_d}}, {n_d, 1, {&w->decided, &w->changed}},
-        {m->n_transitions, 1, {&w->wanting}}, {n_holds, sizeof(Terms), {&w->terms, &w->strike_terms}},
+        {n_d, 8, {&w->d_before, &w->d_earlier, &w->d_fired, &w->best, &w->respond_d}},
+        {n_d, 1, {&w->decided, &w->changed}}, {m->n_transitions, 1, {&w->wanting}},
+        {n_holds, sizeof(Terms), {&w->terms, &w->strike_terms}},
         {n_holds, 8, {&w->weights, &w->base_weights, &w->use, &w->strike.before, &w->strike.approach}},
         {n_holds, 8, {&w->strike.impulse, &w->strike.reaction, &w->begun}}, {n_holds, sizeof(int), {&w->standing}},
         {n_holds, 1, {&w->held, &w->impacts.entered}},
         {n_holds, 1, {&w->strike.entering, &w->strike.loose, &w->strike.held, &w->strike.knocked}},
         {members, 8, {&w->reactions, &w->sizes, &w->zeros}},
-        {members, sizeof(int), {&w->places, &w->member, &w->pivots}}, {members, 1, {&w->other}}};
+        {members + m->n_ideals, sizeof(int), {&w->places, &w->member, &w->pivots}}, {members, 1, {&w->other}}};
     return PLACE(rooms, memory);
 }
 

@@ -85,8 +85,8 @@ Result take_changes(Instance *c, int *event) {
     c->state.inputs_changed = 0;
     leave_piece(c);
     c->state.z_valid = c->variables_valid = 0;
-    if (settle(c) != RESULT_OK) return RESULT_ERROR;
-    *event = find_wanting(c, nothing_wanting(c), 1);
+    if (renew(c) != RESULT_OK || settle(c) != RESULT_OK) return RESULT_ERROR;
+    *event = find_wanting(c, nothing_wanting(c), 1) || pushed(c);
     return RESULT_OK;
 }
 

@@ -93,6 +93,10 @@ typedef struct {
     int first_member, n_members, first;
 } Circuit;
 typedef struct {
+    int row, mode, zero, other, name, unused; /* variables that are zero in mode 0, and in the other one */
+    double nominal;
+} Ideal;
+typedef struct {
     int position, start;
     double factor;
 } StartOf;
@@ -103,6 +107,8 @@ typedef struct {
     int n_d, n_y, steady, rates_depend_on_time;
     int implicit_linear; /* the implicit equations are linear in z */
     int terminal;        /* entry of d that becomes 1 at the end of a run, or -1 */
+    int ideal;           /* entry of d where the rows of ideal elements begin */
+    int rests;           /* where impacts follow each other ever faster, they end in contact */
     double absolute_to_relative, default_tolerance;
     double fixed_step; /* 0: as accuracy asks for */
 } Settings;
@@ -125,10 +131,11 @@ typedef struct Model { /* tables lie in the bytes of the file; texts are offsets
     const Mode *modes;     /* by position in d */
     const int *mode_names;
 
-    int n_holds, n_circuits, n_members, n_units;
+    int n_holds, n_circuits, n_members, n_ideals, n_units;
     const Held *holds;
     const Circuit *circuits; /* those that depend on each other; in d from `first`: switches, then shares */
     const int *members;
+    const Ideal *ideals;
     const int *units; /* by node: which have the same unit; empty where nothing is held */
 
     int n_start_modes, n_start_direct, n_start_default, n_start_guess, n_start_dependent, n_guesses;

@@ -34,6 +34,8 @@ static int check_indices(const Model *m, char *message) {
         INDEX(resets, value, m->n_reset_values), INDEX(holds, mode, m->n_modes), INDEX(holds, motion, m->n_nodes),
         COLUMN(holds, state, m->n_holds, -1, m->n_x), COLUMN(holds, reaction, m->n_holds, -1, m->n_nodes),
         INDEX(holds, approach, m->n_d), INDEX(holds, name, m->n_text), ARRAY(members, m->n_members, m->n_holds),
+        INDEX(ideals, row, m->n_z), INDEX(ideals, mode, m->n_modes), INDEX(ideals, zero, m->n_nodes),
+        INDEX(ideals, other, m->n_nodes), INDEX(ideals, name, m->n_text),
         INDEX(circuits, first_member, m->n_members + 1), INDEX(circuits, n_members, m->n_members + 1),
         INDEX(circuits, first, m->n_d + 1), INDEX(start_modes, mode, m->n_modes), INDEX(start_direct, position, m->n_x),
         INDEX(start_direct, start, m->n_starts), INDEX(start_default, position, m->n_x),
@@ -80,6 +82,8 @@ static int check_events(const Model *m, char *message) {
         for (int i = 0; i < one->n_members; i++)
             if (m->holds[m->members[one->first_member + i]].reaction < 0) return damaged(message, "holds.reaction");
     }
+    if (m->settings->ideal < 0 || (int64_t)m->n_ideals * (3 + (int64_t)m->n_z) > (int64_t)m->n_d - m->settings->ideal)
+        return damaged(message, "settings.ideal");
     return 1;
 }
 

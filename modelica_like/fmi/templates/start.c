@@ -205,7 +205,7 @@ static Result check_modes_hold(Instance *c) {
     evaluate_now(c, &m->tapes.guards, guards);
     for (int k = 0; k < m->n_guards; k++) {
         const Transition *one = &m->transitions[m->guard_transition[k]];
-        if (guard_active(c, k) && guards[k] > 0)
+        if (guard_active(c, k) && guards[k] > 0 && one->target != (int)c->d[one->mode])
             return fail(c, "No steady state was found at t = %.9g s: %s does not stay in its mode.", c->state.t,
                 text_of(m, one->name));
     }
@@ -237,6 +237,7 @@ static Result pass_start(Instance *c) {
     if (round == MODE_ROUNDS)
         return fail(c, "The modes at the start do not settle: they and the start values keep changing each other.");
     rest(c);
+    replace_dependent(c);
     if (solve_now(c, 0) != RESULT_OK || check_singular(c) != RESULT_OK) return RESULT_ERROR;
     if (m->settings->steady && check_modes_hold(c) != RESULT_OK) return RESULT_ERROR;
     c->state.z_valid = c->state.solved = 1;

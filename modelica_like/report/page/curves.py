@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from modelica_like.solve.display import Display
 from modelica_like.solve.panels import mode_spans
-from modelica_like.solve.plot import chosen, quantity_of
-from modelica_like.solve.signals import evaluated, named, read_signals
+from modelica_like.solve.plot import for_page, quantity_of
+from modelica_like.solve.signals import evaluated
 from modelica_like.solve.style import with_unit
 from modelica_like.solve.trajectories import Trajectories
 
@@ -21,18 +21,17 @@ _MOST_BANDS = 400
 
 
 def curves(run: Trajectories, patterns: Sequence[str] = ()) -> dict[str, Any]:
-    """Return times, panels of curves by unit, modes as bands and events.
+    """Return times, panels of curves by unit, what is left out in words, modes as bands and events.
 
     Args:
         run: the run.
-        patterns: names, patterns or formulas of the curves; by default speeds, torques and forces of the parts.
+        patterns: names, patterns or formulas of the curves; by default as `for_page` says.
 
     Raises:
         UnknownName: nothing matches a pattern.
         UnitError: the units in a formula do not fit together.
     """
-    signals = read_signals(run.model, patterns) if patterns else named(run.model, chosen(run))
-    signals = [one for one in signals if one.name not in run.model.discrete_position]
+    signals, left = for_page(run, patterns)
     rows, shown, curve = _thinned(run), Display(run.model), evaluated(run, signals)
     panels: dict[str, dict[str, Any]] = {}
     for one in signals:
@@ -44,6 +43,7 @@ def curves(run: Trajectories, patterns: Sequence[str] = ()) -> dict[str, Any]:
     return {
         "times": [float(f"{t:.9g}") for t in run.time[rows]],
         "panels": list(panels.values()),
+        "left": left,
         "modes": _bands(run),
         "events": sorted({float(f"{event.time:.9g}") for event in run.events}),
     }
@@ -61,5 +61,6 @@ def _thinned(run: Trajectories) -> NDArray[np.intp]:
 
 def _bands(run: Trajectories) -> list[dict[str, Any]]:
     """Time spans of the values of each mode that changes."""
-    modes = dict.fromkeys(event.mode for event in run.events)
+    hidden = {one.path for one in run.model.flat_discretes if one.hidden}
+    modes = dict.fromkeys(event.mode for event in run.events if event.mode not in hidden)
     return [{"name": mode, "bands": mode_spans(run, mode)[:_MOST_BANDS]} for mode in modes]

@@ -16,13 +16,13 @@ from modelica_like.errors import ModelicaLikeError
 from modelica_like.fmi.export import tool
 from modelica_like.language import Component
 from modelica_like.native.page import HELPERS
+from modelica_like.report.changes import Change, changes
 from modelica_like.report.page.assessed import design_checks, ranking, small_motions
 from modelica_like.report.page.curves import curves
 from modelica_like.report.page.tables import details, table
 from modelica_like.report.plausible import notes as plausible
-from modelica_like.report.run import notices, reasons, statistics_line
+from modelica_like.report.run import notices, statistics_line
 from modelica_like.report.start import start_values
-from modelica_like.solve.recorder import Event
 from modelica_like.solve.solution import Solution
 from modelica_like.solve.trajectories import Trajectories
 from modelica_like.writing import write_text
@@ -30,7 +30,7 @@ from modelica_like.writing import write_text
 _FIRST, _MOST_EVENTS = 25, 400
 """Instants that are told at once, and after a click."""
 _READ = "Move over a curve to read it, drag to zoom, double-click to see all."
-_NO_CURVES = "Nothing here is a speed, a torque or a force: choose curves by <code>--show</code>, such as '*.i'."
+_NO_CURVES = "Nothing moves here: choose curves by <code>--show</code>, such as '*.i'."
 _KILO = 1e3
 _SMALL = 5e-4
 """Share of the supply below which an energy is not listed."""
@@ -43,7 +43,8 @@ def save_report(drive: Component | None, run: Trajectories, path: str | Path, *,
         drive: the drive; None if only results are known.
         run: its run.
         path: the file.
-        show: patterns of the curves, such as `*.w`; by default speeds, torques and forces of the parts.
+        show: names, patterns or formulas of the curves; by default speeds, torques and forces of the parts, or what a
+            circuit has.
 
     Raises:
         UnknownName: nothing matches a pattern.
@@ -58,7 +59,7 @@ def report(drive: Component | None, run: Trajectories, *, show: Sequence[str] = 
     Args:
         drive: the drive; None if only results are known, those of an FMU or a table.
         run: its run.
-        show: names, patterns or formulas of the curves; by default speeds, torques and forces of the parts.
+        show: as of `save_report`.
 
     Raises:
         UnknownName: nothing matches a pattern.
@@ -67,10 +68,12 @@ def report(drive: Component | None, run: Trajectories, *, show: Sequence[str] = 
     # Of the parts that are not inside of others, the last one is closest to the load.
     paths = ([one["path"] for one in panel["curves"] if one["path"]] for panel in drawn["panels"])
     ends = [min(reversed(some), key=lambda path: path.count(".")) for some in paths if some]
+    left = escape(drawn.pop("left")).replace("--show", "<code>--show</code>")
+    hint = f"{_READ} {left}" if drawn["panels"] else _NO_CURVES
     sections = [
         ("Schematic", f'<div class="wide">{schematic(drive, background=False)}</div>' if drive else ""),
         ("What happens", _happens(drive, run)),
-        ("Curves", f'<div id="curves"></div><p class="hint">{_READ if drawn["panels"] else _NO_CURVES}</p>'),
+        ("Curves", f'<div id="curves"></div><p class="hint">{hint}</p>'),
         ("Energy", _attempt(lambda: _energy(drive, run)) if run.model.components else ""),
         *(_of_equations(drive, run, ends) if drive and isinstance(run, Solution) else ()),
     ]  # fmt: skip
@@ -106,14 +109,14 @@ def _attempt(make: Callable[[], str]) -> str:
 
 def _happens(drive: Component | None, run: Trajectories) -> str:
     """Events in words, grouped by time, and the notices of the run."""
-    instants: dict[float, dict[str, list[tuple[Event, str]]]] = {}
-    for event, why in zip(run.events, reasons(run), strict=True):
-        if event.before == event.after:  # a kink of a curve
+    instants: dict[float, dict[str, list[Change]]] = {}
+    for one in changes(run):
+        if one.before == one.after and one.after:  # a kink of a curve
             continue
-        instants.setdefault(event.time, {}).setdefault(event.mode, []).append((event, why))
+        instants.setdefault(one.time, {}).setdefault(one.path, []).append(one)
     lines = [
-        f"<li><b>{time:.6g} s</b> {'; '.join(escape(_told(run, events)) for events in modes.values())}.</li>"
-        for time, modes in list(instants.items())[:_MOST_EVENTS]
+        f"<li><b>{time:.6g} s</b> {'; '.join(escape(_told(run, some)) for some in paths.values())}.</li>"
+        for time, paths in list(instants.items())[:_MOST_EVENTS]
     ]
     lines += [f"<li>… {len(instants) - _MOST_EVENTS} more instants</li>"] if len(instants) > _MOST_EVENTS else []
     told = (*notices(run), *(plausible(drive, run) if drive else ()))
@@ -124,26 +127,29 @@ def _happens(drive: Component | None, run: Trajectories) -> str:
     return said + (f"<ul>{''.join(lines)}</ul>" if lines else "<p>No mode changes.</p>")
 
 
-def _told(run: Trajectories, events: Sequence[tuple[Event, str]]) -> str:
-    """Return the change of a mode at an instant: `clutch becomes stuck (slip reached zero)`."""
-    last = events[-1][0]
-    component = last.mode.rpartition(".")[0] or run.model.name
-    told = ", ".join(dict.fromkeys(filter(None, (*(why for _, why in events), _slid(run, last)))))
-    return f"{component} becomes {last.after.replace('_', ' ')}{f' ({told})' if told else ''}"
+def _told(run: Trajectories, some: Sequence[Change]) -> str:
+    """Return the changes of one thing at an instant: `clutch becomes stuck (slip reached zero)`."""
+    last = some[-1]
+    why = ", ".join(dict.fromkeys(filter(None, (*(one.because for one in some), _slid(run, last)))))
+    if not last.after:
+        return f"{last.path}: {why}"
+    known = next((one for one in run.model.flat_discretes if one.path == last.path), None)
+    name = (last.owner if known is None or known.names else last.path) or run.model.name
+    return f"{name} becomes {last.after.replace('_', ' ')}{f' ({why})' if why else ''}"
 
 
-def _slid(run: Trajectories, event: Event) -> str:
+def _slid(run: Trajectories, change: Change) -> str:
     """Return the friction work of surfaces that begin to hold, since they held last."""
     if not isinstance(run, Solution):
         return ""
     modes = [(run.model.flat_discretes[hold.mode], hold.number) for hold in run.model.holds]
     held = {(mode.path, mode.names[number]) for mode, number in modes}
-    if (event.mode, event.after) not in held:
+    if (change.path, change.after) not in held:
         return ""
-    left = (one.time for one in run.events if one.time < event.time and (one.mode, one.before) in held and
-            one.mode == event.mode)  # fmt: skip
-    begin, owner = max(left, default=float(run.time[0])), event.mode.rpartition(".")[0]
-    lost = run.energy(begin, event.time)[owner].lost if event.time > begin else 0.0
+    left = (one.time for one in run.events if one.time < change.time and (one.mode, one.before) in held and
+            one.mode == change.path)  # fmt: skip
+    begin = max(left, default=float(run.time[0]))
+    lost = run.energy(begin, change.time)[change.owner].lost if change.time > begin else 0.0
     size, unit = (_KILO, "kJ") if lost >= 10.0 * _KILO else (1.0, "J")
     return f"{lost / size:.4g} {unit} of friction work" if lost > _SMALL * run.energy().supply else ""
 

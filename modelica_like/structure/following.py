@@ -1,0 +1,305 @@
+"""States that follow the motion, where nonlinear constraints would make any fixed choice singular somewhere.
+
+m constraints g(q) = 0 leave n - m of their n variables free. In the Cartesian pendulum, x is a state as long as the rod
+is not horizontal, y as long as it is not vertical. Here the states are sums s = N'q instead, with weights N that span
+the null space of the Jacobian G = dg/dq where they were chosen. They are constant between events. A guard watches how
+much of N is left in the null space; where it is too little, an event projects N on the null space of that place:
+
+- guard: det(N'PN) < `_LEAST`, with the projection P = 1 - G'(GG')⁻¹G; it is 1 at the choice, and 0 where singular;
+- new weights: PN, made orthonormal; new states: N'q, N'der(q), … with these. No variable of the user jumps.
+
+Gram-Schmidt on [G', N] gives both at once. q is measured in nominal values.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import prod
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from modelica_like.flatten.model import FlatDiscrete, Origin
+from modelica_like.structure.alias import PREFERENCES
+from modelica_like.structure.system import Level, System
+from modelica_like.units import ONE
+
+_LEAST = 0.25
+_SAMPLES = 200
+_VANISHES = 1e-3
+"""Smallest determinant, relative to the largest one among samples, that is no sign of a singular choice."""
+_OFF = 0.2
+"""First weights lie off the null space at the start by this much, so that they fit other start values, too."""
+_ALWAYS = PREFERENCES.index("always")
+
+
+@dataclass(frozen=True)
+class Group:
+    """Constraints whose fixed choice of states becomes singular.
+
+    Attributes:
+        rows: positions in the residual; only of those that have no variable of their own.
+        levels: variables of these rows.
+        count: number of differentiations.
+        own: variables that another of the constraints determines anywhere; they are no states.
+    """
+
+    rows: tuple[int, ...]
+    levels: tuple[int, ...]
+    count: int
+    own: tuple[int, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Following:
+    """States that follow the motion of a group of constraints.
+
+    Attributes:
+        moved: names of the variables.
+        mode: position in d of a mode with one name, which every choice enters again; the weights follow it, those of
+            each state together.
+        chains: of the states.
+        slopes: Jacobian of the constraints by the variables over their nominal values.
+        origin: of the first constraint.
+    """
+
+    group: Group
+    moved: tuple[str, ...]
+    mode: int
+    chains: tuple[int, ...]
+    slopes: Any
+    origin: Origin
+
+    @property
+    def weights(self) -> list[int]:
+        """Positions of the weights in d."""
+        return [*range(self.mode + 1, self.mode + 1 + len(self.moved) * len(self.chains))]
+
+
+@dataclass(frozen=True, eq=False)
+class Choice:
+    """A choice of states that follow the motion.
+
+    Attributes:
+        mode: position in d of the mode that its event enters again.
+        moved: names of the constrained variables.
+        guard: positive where the states must be chosen again.
+        resets: (`state` or `discrete`, position in x or d, new value).
+        origin: of a constraint.
+    """
+
+    mode: int
+    moved: tuple[str, ...]
+    guard: Any
+    resets: tuple[tuple[str, int, Any], ...]
+    origin: Origin
+
+    @property
+    def told(self) -> str:
+        """The variables in words."""
+        return f"{', '.join(self.moved[:-1])} and {self.moved[-1]}"
+
+
+def singular_groups(system: System, counts: list[int], states: list[int]) -> tuple[Group, ...]:
+    """Find constraints whose chosen states become singular somewhere, unless `always` has chosen them.
+
+    Args:
+        system: with all levels that the differentiated equations need.
+        counts: number of differentiations of each equation.
+        states: chosen levels.
+    """
+    entries, found = _entries(system, counts), list[Group]()
+    for together in _connected(system, entries):
+        count = max(counts[row] for row in together)
+        part = {row: entries[row] for row in together if counts[row] == count}
+        levels = {level for row in part.values() for level in row}
+        chosen = levels & {*states}
+        moves = any(moving for row in part.values() for level, moving in row.items() if level not in chosen)
+        always = any(system.levels[level].preference == _ALWAYS for level in chosen)
+        if moves and chosen and not always and _vanishes(system, [*part], sorted(levels - chosen)):
+            found.append(_group(system, part, count))
+    return tuple(found)
+
+
+def _entries(system: System, counts: list[int]) -> dict[int, dict[int, bool]]:
+    """Variables of every constraint, and whether its slope by them moves; of highest derivatives after all only."""
+    rows = [k for k, count in enumerate(counts) if count]
+    entries: dict[int, dict[int, bool]] = {row: {} for row in rows}
+    jacobian = ca.jacobian(system.residual[rows], system.everything) if rows else ca.SX(0, 0)
+    volatile = ca.vertcat(system.everything, system.model.d, system.model.time)
+    moving = ca.which_depends(jacobian.nz[:], volatile, 1, True) if jacobian.nnz() else ()
+    for place, column, moves in zip(*jacobian.sparsity().get_triplet(), moving, strict=True):
+        level, row = system.levels[column], rows[place]
+        if level.order + counts[row] == len(system.chains[level.chain]) - 1 and column not in system.inputs:
+            entries[row][column] = moves
+    return entries
+
+
+def _connected(system: System, entries: dict[int, dict[int, bool]]) -> list[list[int]]:
+    """Constraints that share chains."""
+    chains = {row: {system.levels[level].chain for level in levels} for row, levels in entries.items()}
+    groups: list[list[int]] = []
+    while chains:
+        group = [next(iter(chains))]
+        reached = chains.pop(group[0])
+        while near := [one for one, own in chains.items() if own & reached]:
+            for one in near:
+                reached |= chains.pop(one)
+            group += near
+        groups.append(sorted(group))
+    return groups
+
+
+def _vanishes(system: System, rows: list[int], dependent: list[int]) -> bool:
+    """Whether the determinant of constraints by the variables that are no states changes its sign, or nearly vanishes.
+
+    It is looked at in random points: whether they meet the constraints does not matter.
+    """
+    if len(rows) != len(dependent):
+        return False
+    model, chance = system.model, np.random.default_rng(1)
+    slopes = ca.densify(ca.jacobian(system.residual[rows], system.column(dependent)))
+    function = ca.Function("slopes", [system.everything, model.p, model.d, model.time], [slopes])
+    nominal = np.array([level.nominal for level in system.levels])[:, None]
+    points = nominal * chance.uniform(-np.pi, np.pi, (len(nominal), _SAMPLES))
+    values = function.map(_SAMPLES)(points, *_constants(system), chance.uniform(0, 1, (1, _SAMPLES))).full()
+    sizes = np.linalg.det(values.T.reshape(_SAMPLES, len(rows), -1))
+    sizes = sizes[np.isfinite(sizes)]
+    return bool(len(sizes)) and bool(sizes.min() < 0 < sizes.max() or _near_zero(np.abs(sizes)))
+
+
+def _near_zero(sizes: Any) -> bool:
+    return bool(sizes.min() < _VANISHES * sizes.max())
+
+
+def _constants(system: System) -> tuple[list[float], list[float]]:
+    """Parameters, and discrete values at the start."""
+    model = system.model
+    starts = [one.start if isinstance(one.start, int | float) else 0.0 for one in model.discretes]
+    return [one.value for one in model.parameters], starts + [0.0] * (model.d.numel() - len(starts))
+
+
+def _group(system: System, part: dict[int, dict[int, bool]], count: int) -> Group:
+    """Set aside constraints with a variable of their own, whose slope is constant; the others are the core."""
+    rows, own = dict(part), list[int]()
+    while True:
+        users = Counter(level for levels in rows.values() for level in levels)
+        pairs = [(row, level) for row, levels in rows.items() for level in levels
+                 if not levels[level] and users[level] == 1]  # fmt: skip
+        if not pairs:
+            return Group(tuple(rows), tuple(sorted(users)), count, tuple(own))
+        row, level = min(pairs, key=lambda pair: system.levels[pair[1]].preference)
+        del rows[row]
+        own.append(level)
+
+
+def follow(system: System, groups: tuple[Group, ...]) -> tuple[Following, ...]:
+    """Add states s and their equations s = N'q for groups of constraints, and N to the discrete values.
+
+    Args:
+        system: before index reduction.
+        groups: found after the index reduction of the same system.
+    """
+    numbers: Counter[str] = Counter()
+    return tuple(_follow(system, group, numbers) for group in groups if group.rows)
+
+
+def _follow(system: System, group: Group, numbers: Counter[str]) -> Following:
+    """Add the states of one group."""
+    model, origin = system.model, system.origins[group.rows[0]]
+    prefix = f"{origin.path}." if origin.path else ""
+    moved = tuple(system.levels[level].name for level in group.levels)
+    nominal = ca.diag(ca.DM([system.levels[level].nominal for level in group.levels]))
+    slopes = ca.mtimes(ca.jacobian(system.residual[list(group.rows)], system.column([*group.levels])), nominal)
+    first = _first_weights(system, slopes)
+    path, about = f"{prefix}state[{numbers[prefix] + 1}].choice", "choice of states that follow the motion"
+    chains, discretes = list[int](), [FlatDiscrete(path, ONE, about, 0, ("chosen",), hidden=True)]
+    for row in first:
+        numbers[prefix] += 1
+        name = f"{prefix}state[{numbers[prefix]}]"
+        chains.append(_add_chain(system, name, group.count))
+        discretes += [FlatDiscrete(f"{name}.{of}", ONE, f"weight of {of} in {name}", float(weight), hidden=True)
+                      for of, weight in zip(moved, row, strict=True)]  # fmt: skip
+    symbols = ca.vertcat(*(ca.SX.sym(one.path) for one in discretes))
+    system.model = replace(model, discretes=[*model.discretes, *discretes], d=ca.vertcat(model.d, symbols))
+    weights = ca.reshape(symbols[1:], len(moved), -1)
+    states = ca.vertcat(*(system.symbols[system.chains[chain][0]] for chain in chains))
+    sums = ca.mtimes(weights.T, _measured(system, group.levels))
+    system.residual = ca.vertcat(system.residual, states - sums)
+    system.origins += [origin] * len(chains)
+    return Following(group, moved, len(model.discretes), tuple(chains), slopes, origin)
+
+
+def _measured(system: System, levels: Sequence[int]) -> Any:
+    """Variables, or their derivatives, over nominal values."""
+    return ca.vertcat(*(system.symbols[level] / system.levels[level].nominal for level in levels))
+
+
+def _add_chain(system: System, name: str, count: int) -> int:
+    """Add a state with as many derivatives as the constraints have."""
+    chain = len(system.chains)
+    system.chains.append([len(system.levels)])
+    system.levels.append(Level(chain, 0, name, _ALWAYS, 1.0, 0.0))
+    system.symbols.append(ca.SX.sym(name))
+    for _ in range(count):
+        system.add_level(chain)
+    return chain
+
+
+def _first_weights(system: System, slopes: Any) -> Any:
+    """Weights that fit the start values, as numbers; shape (states, variables)."""
+    model = system.model
+    values = np.array([level.guess for level in system.levels])
+    for start in model.starts:
+        placed = system.node_level[start.node]
+        if placed is not None:
+            p, d = _constants(system)
+            values[placed[0]] = float(ca.Function("start", [model.p, model.d], [start.value])(p, d)) / placed[1]
+    function = ca.Function("slopes", [system.everything, model.p, model.d, model.time], [ca.densify(slopes)])
+    found = function(values, *_constants(system), 0.0).full()
+    found = np.where(np.isfinite(found), found, 0.0)
+    sizes = np.linalg.norm(found, axis=1, keepdims=True)
+    found += _OFF * np.where(sizes > 0, sizes, 1.0) * np.random.default_rng(2).uniform(-1, 1, found.shape)
+    return np.linalg.svd(found)[2][len(found) :]
+
+
+def prefer(system: System, groups: tuple[Group, ...], following: tuple[Following, ...]) -> None:
+    """Prefer the states that follow, and no variable that a constraint determines."""
+    for one in following:
+        _set_preference(system, one.chains, _ALWAYS + 1)
+    for group in groups:
+        _set_preference(system, [system.levels[level].chain for level in group.own], -1)
+
+
+def _set_preference(system: System, chains: Sequence[int], preference: int) -> None:
+    for level in (level for chain in chains for level in system.chains[chain]):
+        system.levels[level].preference = preference
+
+
+def write_choice(one: Following, system: System, states: list[int], level_values: Any) -> Choice:
+    """Write a choice out, over states and implicit unknowns.
+
+    Args:
+        one: what is chosen.
+        system: the equations.
+        states: levels that are states; of the sums and their derivatives, further constraints may determine some.
+        level_values: of all levels, over states and implicit unknowns.
+    """
+    model, levels, count = system.model, list(one.group.levels), len(one.group.rows)
+    basis, upper = ca.qr(ca.horzcat(one.slopes.T, ca.reshape(model.d[one.weights], len(levels), -1)))
+    left, weights = prod(ca.vertsplit(ca.diag(upper)[count:])), basis[:, count:]
+    targets, values = [("discrete", k) for k in one.weights], [ca.vec(weights)]
+    for order in range(one.group.count):
+        sums = [system.chains[chain][order] for chain in one.chains]
+        targets += [("state", states.index(level) if level in states else -1) for level in sums]
+        values.append(ca.mtimes(weights.T, _measured(system, levels)))
+        levels = [above for level in levels if (above := system.derivative(level)) is not None]
+    arguments = [system.everything, model.p, model.d, model.time]
+    written = ca.Function("choice", arguments, [_LEAST - left**2, ca.vertcat(*values)])
+    guard, values = written(level_values, *arguments[1:])
+    pairs = zip(targets, ca.vertsplit(values), strict=True)
+    resets = tuple((kind, place, value) for (kind, place), value in pairs if place >= 0)
+    return Choice(one.mode, one.moved, guard, resets, one.origin)
