@@ -33,6 +33,8 @@ from modelica_like.language import (
 
 _ROUNDING = 1e-6
 """Part of the travel up to which what leaves a stop may be a rounding behind it."""
+_VACUUM = 1e-6
+"""Part of the pressure of the surroundings that counts as none."""
 _AWAY = 1e-3
 """Part of the travel from which on it has left the stop."""
 
@@ -217,6 +219,11 @@ class PneumaticActuator(Actuator):
     flow: Variable = var("W", "rate of pressure times volume, by what flows in")
 
     @property
+    def supply(self) -> Expr:
+        """Pressure behind the valve; that of a vacuum has a logarithm."""
+        return maximum(self.p_in, _VACUUM * self.p_0)
+
+    @property
     def volume(self) -> Expr:
         """Volume of the air."""
         return self.V_0 + self.A * self.s
@@ -226,11 +233,11 @@ class PneumaticActuator(Actuator):
 
     def equations(self) -> Equations:
         yield from super().equations()
-        high, low = maximum(self.p_in, self.p), minimum(self.p_in, self.p)
+        high, low = maximum(self.supply, self.p), minimum(self.supply, self.p)
         ratio = low / high
         subsonic = sqrt(1 - (maximum(minimum(ratio, self.laminar) - self.b, 0) / (1 - self.b)) ** 2)
         share = subsonic * where(ratio > self.laminar, (1 - ratio) / (1 - self.laminar), 1)
-        yield self.flow == where(self.p_in > self.p, 1, -1) * self.p_N * self.C * high * share
+        yield self.flow == where(self.supply > self.p, 1, -1) * self.p_N * self.C * high * share
         yield der(self.p * self.volume) == self.flow
 
     def stored_energy(self) -> Expr:
@@ -238,7 +245,7 @@ class PneumaticActuator(Actuator):
         return self.moving_energy() + air
 
     def loss_power(self) -> Expr:
-        return self.flow * log(self.p_in / self.p)
+        return self.flow * log(self.supply / self.p)
 
     def source_power(self) -> Expr:
-        return self.flow * log(self.p_in / self.p_0)
+        return self.flow * log(self.supply / self.p_0)

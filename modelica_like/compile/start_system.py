@@ -85,7 +85,9 @@ def rest_order(reduced: ReducedDae) -> list[int]:
         one = system.levels[level]
         # Relative motions are those that prefer to be states.
         relative = -one.preference if one.order == 0 else one.preference
-        return level not in stores, one.order == 0, relative, first[level][0]
+        # A state is free to be zero; another position may be a way that no angle leads to.
+        follows = one.order == 0 and reduced.node_states[first[level][1]] is None
+        return level not in stores, one.order == 0, relative, follows, first[level][0]
 
     return [first[level][1] for level in sorted(first, key=rank) if level not in system.inputs]
 

@@ -17,6 +17,10 @@ from modelica_like.structure.isolate import isolate
 SMALL = 3
 """Torn linear blocks up to this size are solved symbolically; larger ones stay implicit."""
 
+_STEPS = {ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE, ca.OP_NOT, ca.OP_AND, ca.OP_OR, ca.OP_SIGN, ca.OP_FLOOR, ca.OP_CEIL}
+"""Operations whose slope is zero."""
+_CONSTANTS = {ca.OP_CONST, ca.OP_PARAMETER}
+
 _UNIT = 1e-150
 """Keeps the relative size of a single coefficient defined where it is zero."""
 
@@ -58,6 +62,20 @@ class Solved:
     determinants: list[tuple[int, Any]] = field(default_factory=list)
 
 
+def _decides(expression: Any, unknown: Any) -> bool:
+    """Return whether a condition or a step depends on an unknown, which no slope shows."""
+    function = ca.Function("row", [unknown], [expression], {"allow_free": True})
+    moving: set[int] = set()
+    for k in range(function.n_instructions()):
+        code, inputs = function.instruction_id(k), function.instruction_input(k)
+        moves = code == ca.OP_INPUT or (code not in _CONSTANTS and not moving.isdisjoint(inputs))
+        if moves and code in _STEPS:
+            return True
+        if code != ca.OP_OUTPUT:
+            (moving.update if moves else moving.difference_update)(function.instruction_output(k))
+    return False
+
+
 class BlockSolver:
     """Solves a square system block by block.
 
@@ -85,10 +103,16 @@ class BlockSolver:
     def _without_cancelled(self, residual: Any) -> list[Any]:
         """Take out unknowns that cancel: the current of a loop that hangs at one node enters and leaves it."""
         rows = ca.vertsplit(residual) if residual.numel() else []
-        for row, column, slope in zip(*self.jacobian.sparsity().get_triplet(), self.jacobian.nonzeros(), strict=True):
-            if slope.is_zero():
+        slopes = list(zip(*self.jacobian.sparsity().get_triplet(), self.jacobian.nonzeros(), strict=True))
+        kept: list[tuple[int, int, Any]] = []
+        for row, column, slope in slopes:
+            if slope.is_zero() and not _decides(rows[row], self.unknowns[column]):
                 rows[row] = ca.substitute(rows[row], self.unknowns[column], ca.SX(0))
-        self.jacobian = ca.sparsify(self.jacobian)
+            else:
+                kept.append((row, column, slope))
+        if len(kept) < len(slopes):
+            pattern = ca.Sparsity.triplet(*self.jacobian.shape, [k[0] for k in kept], [k[1] for k in kept])
+            self.jacobian = ca.SX(pattern, ca.vertcat(*(k[2] for k in kept)))
         return rows
 
     def _safe_entries(self, volatile: Any) -> set[tuple[int, int]]:

@@ -137,3 +137,11 @@ def test_wind_cools_a_clutch_that_turns() -> None:
     clutch = ThermalClutch(capacity=20.0, C=10.0, G=2.0, w_G=50.0)
     run = simulate(slipping(clutch), 60.0, **TIGHT)
     assert run.final["clutch.T"] == pytest.approx(293.15 + 20 * 100 / (2 * (1 + 2**0.8)), rel=1e-9)
+
+
+def test_air_into_a_vacuum() -> None:
+    """At the sonic conductance C the pressure falls as exp(-C·p_N·t/V_0)."""
+    piston = PneumaticActuator(p_in=0.0, A=3e-3, V_0=1e-4, C=1e-8, travel=2e-3, m=0.8, f_spring=300.0)
+    run = simulate(Assembly("d", parts={"piston": piston}), 0.5, **TIGHT)
+    assert run.final["piston.p"] == pytest.approx(1e5 * exp(-5.0), rel=1e-6)
+    assert run.energy().closure <= 1e-8

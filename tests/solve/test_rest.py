@@ -1,6 +1,7 @@
 """Start from rest: what nothing moves stands still, whatever the order of parts and lines."""
 
 import itertools
+from math import cos, sin, sqrt
 
 import pytest
 
@@ -182,3 +183,21 @@ def test_speeds_at_rest_determine_no_angle(start, joint, speed):
     point = started(start, parts, ("a", "joint", "b"))
     assert point["a.phi"] == 0.0
     assert (point["b.w"] == 0.0) == (point["a.w"] == 0.0) == (speed is None)
+
+
+def test_a_position_that_no_angle_leads_to_is_not_zero(start):
+    """The slide of a crank in a housing that may turn is 150 to 250 mm away: the housing's angle is zero."""
+    crank = loads("""
+        [parts]
+        wheel = { is = "Inertia", J = 0.1, phi = 1 }
+        crank = { is = "SliderCrank", r = 0.05, l = 0.2 }
+        slide = { is = "Mass", m = 1 }
+        housing = { is = "Inertia", J = 5 }
+        [series]
+        drive = ["wheel", "crank", "slide"]
+        [connect]
+        carried = ["crank.support", "housing.flange_a"]
+    """)
+    point = start(crank, "rest")
+    assert point["housing.phi"] == 0.0
+    assert point["slide.s"] == pytest.approx(0.05 * cos(1) + sqrt(0.2**2 - (0.05 * sin(1)) ** 2), rel=1e-12)

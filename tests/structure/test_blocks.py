@@ -116,3 +116,13 @@ def test_an_unknown_that_cancels_is_none():
     assert [block.kind for block in solved.blocks] == ["explicit", "linear"]
     _, values = ca.substitute_inplace([b, c][:1], [solved.order[0][1]], [solved.order[1][1]], False)
     assert [float(ca.substitute(v, ca.vertcat(mode, p), ca.DM([k, 5.0]))) for k in (0, 1) for v in values] == [10, 15]
+
+
+def test_an_unknown_in_a_condition_does_not_cancel():
+    """The slope by what only decides is zero, and yet it is needed first (the turbine that is faster than its pump)."""
+    a, b, p = (ca.SX.sym(name) for name in ("a", "b", "p"))
+    residual = ca.vertcat(a - ca.if_else(b > 1, p, -p), b - 2 * p)
+    (first, b_value), (second, a_value) = BlockSolver(residual, ca.vertcat(a, b), ca.SX(0, 1), []).run().order
+    assert (first, second) == (1, 0)
+    value = ca.substitute(a_value, b, b_value)
+    assert [float(ca.substitute(value, p, ca.DM(k))) for k in (0.4, 0.6)] == [-0.4, 0.6]
