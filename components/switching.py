@@ -45,7 +45,7 @@ class Diode(Lossy, TwoPins):
         return self.v * self.i
 
 
-class Ideal(Lossy, TwoPins, partial=True):
+class Ideal(TwoPins, partial=True):
     """Element without resistance and leakage: nothing flows while it blocks, and conducting it takes no voltage.
 
     Of several ideal elements the combination of modes is found that is possible with the present currents of inductors
@@ -59,9 +59,6 @@ class Ideal(Lossy, TwoPins, partial=True):
     def equations(self) -> Equations:
         yield from super().equations()
         yield self.state.choose(off=self.i, on=self.v) == 0
-
-    def dissipation(self) -> Expr:
-        return self.v * self.i
 
 
 class IdealDiode(Ideal):

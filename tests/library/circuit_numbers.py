@@ -32,6 +32,10 @@ def follow(x: list[float], pieces: list[tuple[list[list[float]], list[float], fl
 def diode_bridge(run: Solution) -> None:
     rectified = 10 * np.abs(np.sin(100 * pi * run.time))
     assert run["lamp_1.v"] == pytest.approx(rectified, abs=1e-8)
+    # Fired at 5, 25, 45 ms, the thyristor conducts until the half wave ends.
+    off_edge = np.abs(np.mod(run.time, 5e-3) - 2.5e-3) < 2.4e-3
+    conducts = (np.mod(run.time, 20e-3) > 5e-3) & (np.mod(run.time, 20e-3) < 10e-3)
+    assert run["lamp_3.v"][off_edge] == pytest.approx(np.where(conducts, rectified, 0)[off_edge], abs=1e-8)
     # The smoothed voltage, as far as C·v' = (|10·sin(w·t)| - v)/1 - v/100 holds; then it decays until it is overtaken.
     w, a = 100 * pi, (1 + 1 / 100) / 1e-3
 
