@@ -1,6 +1,4 @@
 /* Ideal elements, as in initialize/ideal.py: equations that replace dependent ones, impulses, conditions on states. */
-#include <math.h>
-#include <string.h>
 #include "core.h"
 
 #define HEAD 3
