@@ -38,6 +38,12 @@ def run() -> CliRunner:
     return CliRunner()
 
 
+@pytest.fixture(scope="module")
+def netlists() -> jsonschema.Draft7Validator:
+    """Validator of netlists by the schema, which is made once."""
+    return jsonschema.Draft7Validator(json.loads(json.dumps(schema())))
+
+
 def test_library_lists_every_type_with_a_sentence(run: CliRunner) -> None:
     result = run.invoke(app, ["library"])
     assert result.exit_code == 0
@@ -159,9 +165,10 @@ def test_a_group_or_a_word_that_is_not_there_is_told(run: CliRunner) -> None:
 def test_the_schema_is_a_schema(run: CliRunner) -> None:
     result = run.invoke(app, ["schema"])
     assert result.exit_code == 0
-    schema = json.loads(result.stdout)
-    jsonschema.Draft7Validator.check_schema(schema)
-    assert schema["definitions"]["Inertia"]["properties"]["J"]["anyOf"][0] == {"type": "number", "minimum": 0}
+    known = json.loads(result.stdout)
+    jsonschema.Draft7Validator.check_schema(known)
+    assert known == json.loads(json.dumps(schema()))
+    assert known["definitions"]["Inertia"]["properties"]["J"]["anyOf"][0] == {"type": "number", "minimum": 0}
 
 
 @pytest.mark.parametrize(
@@ -189,10 +196,10 @@ def test_the_schema_is_a_schema(run: CliRunner) -> None:
         ({"is": "Clutch", "smooth": 1}, False),
     ],
 )
-def test_the_schema_knows_right_from_wrong(run: CliRunner, part: dict[str, object], is_right: bool) -> None:
-    schema = json.loads(run.invoke(app, ["schema"]).stdout)
-    validator = jsonschema.Draft7Validator(schema)
-    assert validator.is_valid({"parts": {"a": part}}) is is_right
+def test_the_schema_knows_right_from_wrong(
+    netlists: jsonschema.Draft7Validator, part: dict[str, object], is_right: bool
+) -> None:
+    assert netlists.is_valid({"parts": {"a": part}}) is is_right
 
 
 def test_a_quantity_passes_the_schema_if_and_only_if_a_netlist_takes_it() -> None:

@@ -358,6 +358,7 @@ def test_implicit_equations_follow_the_mix(solver):
     np.testing.assert_allclose(final, [0, 0.1, *(5 * [-0.1 / 8])], atol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["me", "cs"])
 @pytest.mark.parametrize("asked", ["slide", "rest"])
 def test_an_fmu_does_the_same(kind: Any, asked: Any, tmp_path):
