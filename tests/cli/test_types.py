@@ -4,6 +4,7 @@ import json
 import re
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import jsonschema
 import pytest
@@ -197,7 +198,7 @@ def test_the_schema_is_a_schema(run: CliRunner) -> None:
     ],
 )
 def test_the_schema_knows_right_from_wrong(
-    netlists: jsonschema.Draft7Validator, part: dict[str, object], is_right: bool
+    netlists: jsonschema.Draft7Validator, part: dict[str, Any], is_right: bool
 ) -> None:
     assert netlists.is_valid({"parts": {"a": part}}) is is_right
 
