@@ -55,10 +55,11 @@ typedef struct { /* what changes; arrays of the model's sizes stand behind it, s
     int phase, solved, z_valid, inputs_changed, piece_valid, event_pending, at_event;
     int looked;                                        /* the guards are known from the end of the last fixed step */
     double tolerance, absolute, start_time, stop_time; /* absolute: in nominal values */
-    int stop_time_defined;
-    double step;             /* next step size, 0: choose one */
-    double instants[CROWD];  /* of the last events, in a circle */
-    int n_instants, resting; /* resting: impacts end in contact */
+    double delayed_until;                              /* when series of delayed values end */
+    int stop_time_defined, n_past, past_lost;          /* rows of the past; there were too many */
+    double step;                                       /* next step size, 0: choose one */
+    double instants[CROWD];                            /* of the last events, in a circle */
+    int n_instants, resting;                           /* resting: impacts end in contact */
     double n_steps, n_rejected, n_evaluations, n_events;
 } State;
 
@@ -114,7 +115,8 @@ typedef struct {
     double *stages, *point, *first, *first_rates; /* of the integrator: 8 stages, a point; where the step begins */
     double *variables, *guards, *guards_before, *looks, *seen_rates, *seen_indicators, *seen_derived;
     double *start_unknowns, *start_values, *start_residual;
-    double *begun; /* motions that may be held, where the search for a steady state began */
+    double *delayed, *series; /* values and delays; terms of two series per delay */
+    double *begun;            /* motions that may be held, where the search for a steady state began */
     double *d_before, *d_earlier, *d_fired, *reset_values, *target_values, *respond_d, *respond_z, *rates, *x_kept;
     double *weights, *base_weights, *use, *best, *kept_z, *reactions, *sizes, *zeros;
     int *order; /* pivots of the implicit equations */
@@ -146,7 +148,8 @@ typedef struct Instance {
     unsigned char *start_given, *mode_given;
     unsigned char *wanting; /* transitions that fire at the end of the piece */
     Piece *piece;
-    double *end_look; /* guards and their rates at the end of the last fixed step */
+    double *past, *past_sizes; /* what delayed values were, see delay.c; their sizes */
+    double *end_look;          /* guards and their rates at the end of the last fixed step */
     Work work;
     const char *name;
     void *environment;
@@ -226,7 +229,16 @@ Result renew(Instance *c);
 int same_modes(const Instance *c, const double *before);
 /* impacts.c */
 Result stop_motions(Instance *c, const double *before, Impacts *impacts);
+/* delay.c */
+#define MOST_PAST 8192 /* rows */
+void keep_past(Instance *c, double t, const double *point, double order);
+void keep_piece(Instance *c, double end);
+void keep_before_change(Instance *c);
+int delays_due(const Instance *c);
+Result reach_instant(Instance *c);
+Result leave_instant(Instance *c, int happened);
 /* events.c */
+double just_after(const State *s);
 int guard_active(const Instance *c, int guard);
 double next_moment(Instance *c);
 int find_wanting(Instance *c, unsigned char *wanting, int guards_too);

@@ -131,6 +131,7 @@ Status FMI(CompletedIntegratorStep)(void *instance, FMI(Boolean) noSetFMUStatePr
     (void)noSetFMUStatePriorToCurrentPoint;
     NEED(1, enterEventMode, terminateSimulation);
     if (settle(c) != RESULT_OK) return FMI(Error);
+    keep_past(c, c->state.t, c->x, -1);
     *enterEventMode = find_wanting(c, nothing_wanting(c), 1) != 0;
     *terminateSimulation = 0;
     return FMI(OK);

@@ -67,12 +67,13 @@ static uint64_t place(const Room *rooms, size_t count, double *memory) {
 
 static uint64_t place_state(Instance *c, double *memory) {
     const Model *m = c->model;
-    uint64_t n = m->n_unknowns, n_d = m->n_d, n_starts = m->n_starts;
+    uint64_t n = m->n_unknowns, n_d = m->n_d, n_starts = m->n_starts, n_delays = m->n_delays;
     const Room smooth[] = {{n, 8, {&c->x}}, {m->n_p, 8, {&c->p}}, {m->n_u, 8, {&c->u, &c->u_rate}}, {n_d, 8, {&c->d}},
         {n_starts, 8, {&c->start_value}}};
     const Room rest[] = {{2 + 5 * n, 8, {&c->piece}}, {n_d, 1, {&c->mode_given}}, {n_starts, 1, {&c->start_given}},
         {m->settings->fixed_step > 0 ? 2 * (uint64_t)m->n_guards : 0, 8, {&c->end_look}},
-        {m->n_transitions, 1, {&c->wanting}}};
+        {m->n_transitions, 1, {&c->wanting}}, {n_delays > 0 ? MOST_PAST * (2 + n_delays) : 0, 8, {&c->past}},
+        {n_delays, 8, {&c->past_sizes}}};
     c->n_smooth = (size_t)PLACE(smooth, memory);
     return c->n_smooth + PLACE(rest, memory == NULL ? NULL : memory + c->n_smooth);
 }
@@ -117,6 +118,7 @@ static uint64_t place_work(const Model *m, Work *w, double *memory) {
         {2 * n_guards, 8, {&w->guards_before}}, {3 * n_guards * MOST_LOOKS, 8, {&w->looks}}, {n_guards, 1, {&w->kinds}},
         {n_z * n_z, 8, {&w->dense_matrix}}, {n_z, 8, {&w->residual, &w->kept_z, &w->respond_z}},
         {n_z, sizeof(int), {&w->order}}, {n_z, 1, {&w->open_rows}}, {square, 8, {&w->square}},
+        {2 * (uint64_t)m->n_delays, 8, {&w->delayed}}, {2 * DELAY_TERMS * (uint64_t)m->n_delays, 8, {&w->series}},
         {m->n_starts, 8, {&w->start_values}}, {larger(m->n_start_values, resets), 8, {&w->start_residual}},
         {resets, 8, {&w->reset_values, &w->target_values}}, {resets, sizeof(int), {&w->targets}},
         {n, 8, {&w->seen_rates, &w->first_rates}}, {n_guards, 8, {&w->seen_indicators}},

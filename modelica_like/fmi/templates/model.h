@@ -97,6 +97,10 @@ typedef struct {
     double nominal;
 } Ideal;
 typedef struct {
+    int name, first; /* entry of d where its numbers begin: terms of a series, its begin, 2 over its length */
+} Delay;
+#define DELAY_TERMS 16 /* as in delay.py */
+typedef struct {
     int position, start;
     double factor;
 } StartOf;
@@ -138,6 +142,9 @@ typedef struct Model { /* tables lie in the bytes of the file; texts are offsets
     const Ideal *ideals;
     const int *units; /* by node: which have the same unit; empty where nothing is held */
 
+    int n_delays;
+    const Delay *delays; /* in the order of the tape's results, each with value and time */
+
     int n_start_modes, n_start_direct, n_start_default, n_start_guess, n_start_dependent, n_guesses;
     int n_start_zero, n_start_unknowns, n_steady;
     const StartMode *start_modes;
@@ -153,7 +160,7 @@ typedef struct Model { /* tables lie in the bytes of the file; texts are offsets
     struct {
         Tape rates, jacobian, alg, alg_jacobian, variables, guards, guards_soon, moments, resets, updates,
             start_conditions, start_values, discrete_starts, hold_terms, determinants, start_system, start_jacobian,
-            derived;
+            derived, delays;
     } tapes;
 
     /* What follows from the sizes of the tables. */
