@@ -34,7 +34,6 @@ from modelica_like.language import (
     when,
 )
 
-
 Run = Callable[..., Solution]
 
 
