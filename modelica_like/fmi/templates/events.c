@@ -99,7 +99,7 @@ void note_change(Instance *c, int name, int transition, int mode, int target) {
 }
 
 /* Fire transitions together; of one mode only the one declared first. An error if one of them ends the run. */
-static Result fire(Instance *c, const unsigned char *wanting, Impacts *impacts) {
+static Result fire(Instance *c, const unsigned char *wanting) {
     const Model *m = c->model;
     State *s = &c->state;
     Work *w = &c->work;
@@ -120,7 +120,7 @@ static Result fire(Instance *c, const unsigned char *wanting, Impacts *impacts) 
         for (int r = one->first_reset; r < one->first_reset + one->n_resets; r++) {
             const Reset *reset = &m->resets[r];
             if (reset->kind == RESET_STATE) {
-                impacts->struck = 0;
+                c->work.struck = 0;
                 c->x[reset->index] = values[reset->value] / reset->factor;
             } else if (reset->kind == RESET_DISCRETE) d[reset->index] = values[reset->value];
             else {
@@ -135,7 +135,7 @@ static Result fire(Instance *c, const unsigned char *wanting, Impacts *impacts) 
 }
 
 /* Evaluate the discrete equations once; tells whether something changes. */
-static Result update_once(Instance *c, Impacts *impacts, int *changes) {
+static Result update_once(Instance *c, int *changes) {
     const Model *m = c->model;
     Work *w = &c->work;
     double *values = w->reset_values;
@@ -149,7 +149,7 @@ static Result update_once(Instance *c, Impacts *impacts, int *changes) {
             one->kind == RESET_DISCRETE ? &c->d[one->index] : &c->x[one->kind == RESET_STATE ? one->index : 0];
         double value = values[k] / one->factor;
         if (one->kind != RESET_DISCRETE && isinf(value)) continue; /* nothing sets it now */
-        if (one->kind != RESET_DISCRETE) impacts->struck = 0;
+        if (one->kind != RESET_DISCRETE) c->work.struck = 0;
         if (one->kind == RESET_VALUE) {
             w->targets[count] = m->reset_nodes[one->target];
             w->target_values[count++] = value;
@@ -162,10 +162,7 @@ static Result update_once(Instance *c, Impacts *impacts, int *changes) {
     *changes = 1;
     c->state.n_events++;
     if (count > 0) move_states(c, w->targets, w->target_values, count);
-    share(c);
-    c->variables_valid = 0;
-    if (solve_now(c, 0) != RESULT_OK) return RESULT_ERROR;
-    return check_singular(c);
+    return share_and_solve(c) && check_singular(c);
 }
 
 /* Notes an instant. Where the last ones came ever faster, impacts end in contact if the model asks for it; an error
@@ -197,9 +194,7 @@ static void keep_wanting(Instance *c, const double *soon, unsigned char *wanting
 static Result share_anew(Instance *c, unsigned char *wanting) {
     double *soon = c->work.guards;
     if (!anything_shared(c)) return RESULT_OK;
-    share(c);
-    c->variables_valid = 0;
-    if (solve_now(c, 0) != RESULT_OK) return RESULT_ERROR;
+    if (!share_and_solve(c)) return RESULT_ERROR;
     evaluate_now(c, &c->model->tapes.guards_soon, soon);
     keep_wanting(c, soon, wanting);
     return RESULT_OK;
@@ -209,19 +204,18 @@ static Result share_anew(Instance *c, unsigned char *wanting) {
 Result iterate_events(Instance *c, unsigned char *wanting, int located) {
     const Model *m = c->model;
     State *s = &c->state;
-    Impacts *impacts = &c->work.impacts;
     double *before = c->work.d_before;
     int changes = m->n_updates > 0, met;
-    impacts->struck = 0;
-    memset(impacts->entered, 0, (size_t)m->n_holds);
+    c->work.struck = 0;
+    memset(c->work.entered, 0, (size_t)m->n_holds);
     if (find_wanting(c, wanting, !located)) {
-        if (m->n_ideals > 0 && !pushed(c) && meet(c, -1, &met) != RESULT_OK) return RESULT_ERROR;
-        if (crowded(c) != RESULT_OK || share_anew(c, wanting) != RESULT_OK) return RESULT_ERROR;
+        if (m->n_ideals > 0 && !pushed(c) && !meet(c, -1, &met)) return RESULT_ERROR;
+        if (!crowded(c) || !share_anew(c, wanting)) return RESULT_ERROR;
     }
     for (int round = 0; round < ROUNDS + ALONE * (m->n_holds + m->n_ideals); round++) {
         int any = 0;
         if (!changes && (round > 0 || pushed(c)) && !any_of(wanting, m->n_transitions)) {
-            if (meet(c, -1, &met) != RESULT_OK) return RESULT_ERROR;
+            if (!meet(c, -1, &met)) return RESULT_ERROR;
             if (met) find_wanting(c, wanting, 1);
         }
         for (int k = 0; k < m->n_transitions; k++) {
@@ -237,17 +231,15 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
         c->round = round;
         memcpy(c->work.d_earlier, before, (size_t)m->n_d * sizeof(double));
         memcpy(before, c->d, (size_t)m->n_d * sizeof(double));
-        if (any && fire(c, wanting, impacts) != RESULT_OK) return RESULT_ERROR;
+        if (any && !fire(c, wanting)) return RESULT_ERROR;
         if (any) share(c);
         c->variables_valid = 0;
-        if (any && (solve_now(c, 0) != RESULT_OK || stop_motions(c, before, impacts) != RESULT_OK ||
-                       check_singular(c) != RESULT_OK))
-            return RESULT_ERROR;
+        if (any && (!solve_now(c, 0) || !stop_motions(c, before) || !check_singular(c))) return RESULT_ERROR;
         if (any && m->n_ideals > 0) {
             double keep = round > 0 && same_modes(c, c->work.d_earlier) ? GIVEN_BACK : 0;
-            if (meet(c, keep, &met) != RESULT_OK) return RESULT_ERROR;
+            if (!meet(c, keep, &met)) return RESULT_ERROR;
         }
-        if (update_once(c, impacts, &changes) != RESULT_OK) return RESULT_ERROR;
+        if (!update_once(c, &changes)) return RESULT_ERROR;
         memset(wanting, 0, m->n_transitions);
         if (find_wanting(c, wanting, 1) && !c->bounded) {
             drop_balanced(c, c->work.guards);
@@ -265,9 +257,9 @@ Result iterate_events(Instance *c, unsigned char *wanting, int located) {
 Result update_discrete(Instance *c, int *restart, double *next) {
     double before = c->state.n_events;
     *restart = c->state.inputs_changed;
-    if (*restart && (check_tables(c) != RESULT_OK || renew(c) != RESULT_OK)) return RESULT_ERROR;
+    if (*restart && (!check_tables(c) || !renew(c))) return RESULT_ERROR;
     c->state.inputs_changed = 0;
-    if (handle_event(c) != RESULT_OK) return RESULT_ERROR;
+    if (!handle_event(c)) return RESULT_ERROR;
     *restart |= c->state.n_events != before;
     *next = next_moment(c);
     return RESULT_OK;

@@ -89,8 +89,7 @@ static Result go_on(Instance *c, double limit, int *fired) {
     else if (c->model->n_guards > 0) part = first_crossing(c, behind_event);
     for (double before = 0, behind = 10 * BEHIND; part < 1 && c->budget > 1; c->budget--, behind *= 10) {
         double here = part;
-        if (move_to(c, begin + part * (limit - begin)) != RESULT_OK || fire_here(c, fired) != RESULT_OK)
-            return RESULT_ERROR;
+        if (!move_to(c, begin + part * (limit - begin)) || !fire_here(c, fired)) return RESULT_ERROR;
         if (*fired) {
             c->budget--;
             return RESULT_OK;
@@ -99,7 +98,7 @@ static Result go_on(Instance *c, double limit, int *fired) {
         before = here;
     }
     /* What is not met is taken at the end. */
-    if (move_to(c, limit) != RESULT_OK) return RESULT_ERROR;
+    if (!move_to(c, limit)) return RESULT_ERROR;
     return part == QUIET ? RESULT_OK : fire_here(c, fired);
 }
 
@@ -107,14 +106,14 @@ static Result one_step(Instance *c, double end) {
     State *s = &c->state;
     int fired = 0, event;
     c->budget = BUDGET;
-    if (take_changes(c, &event) != RESULT_OK) return RESULT_ERROR;
+    if (!take_changes(c, &event)) return RESULT_ERROR;
     s->at_event |= event;
-    if (s->at_event && fire_here(c, &fired) != RESULT_OK) return RESULT_ERROR;
+    if (s->at_event && !fire_here(c, &fired)) return RESULT_ERROR;
     while (s->t < end) {
         double moment = c->budget >= 2 ? next_moment(c) : INFINITY;
-        if (go_on(c, fmin(end, moment), &fired) != RESULT_OK) return RESULT_ERROR;
+        if (!go_on(c, fmin(end, moment), &fired)) return RESULT_ERROR;
         if (fired || s->at_event || !is_due(c)) continue;
-        if (fire_here(c, &fired) != RESULT_OK) return RESULT_ERROR;
+        if (!fire_here(c, &fired)) return RESULT_ERROR;
         c->budget -= s->t < end;
     }
     s->n_steps++;
@@ -127,7 +126,7 @@ Arrival step_fixed(Instance *c, double target) {
     int n = (int)(0.5 + (target - begin) / h), done = 1;
     c->bounded = 1;
     for (int k = 1; k <= n && done && c->state.t < until; k++) {
-        done = one_step(c, k < n ? begin + k * h : target) == RESULT_OK;
+        done = one_step(c, k < n ? begin + k * h : target);
         if (done && c->step_finished != NULL) until = fmin(until, c->step_finished(c));
     }
     c->bounded = 0;

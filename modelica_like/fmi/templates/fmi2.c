@@ -74,7 +74,7 @@ fmi2Status fmi2NewDiscreteStates(fmi2Component instance, fmi2EventInfo *eventInf
     int restart;
     ENTER(NewDiscreteStates, PHASE_EVENT);
     NEED(1, eventInfo);
-    if (update_discrete(c, &restart, &next) != RESULT_OK) return failed(c);
+    if (!update_discrete(c, &restart, &next)) return failed(c);
     eventInfo->newDiscreteStatesNeeded = fmi2False;
     eventInfo->terminateSimulation = fmi2False;
     eventInfo->nominalsOfContinuousStatesChanged = fmi2False;
@@ -96,7 +96,7 @@ fmi2Status fmi2DoStep(fmi2Component instance, fmi2Real currentCommunicationPoint
     double target;
     ENTER(DoStep, PHASE_STEP);
     (void)noSetFMUStatePriorToCurrentPoint;
-    if (check_step(c, currentCommunicationPoint, communicationStepSize, &target) != RESULT_OK) return fmi2Error;
+    if (!check_step(c, currentCommunicationPoint, communicationStepSize, &target)) return fmi2Error;
     return integrate_to(c, target, 0) == FAILED ? failed(c) : fmi2OK;
 }
 

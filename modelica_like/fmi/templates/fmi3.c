@@ -70,8 +70,7 @@ fmi3Instance fmi3InstantiateScheduledExecution(fmi3String instanceName, fmi3Stri
 fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean toleranceDefined, fmi3Float64 tolerance,
     fmi3Float64 startTime, fmi3Boolean stopTimeDefined, fmi3Float64 stopTime) {
     ENTER(EnterInitializationMode, PHASE_INSTANTIATED);
-    if (set_experiment(c, toleranceDefined, tolerance, startTime, stopTimeDefined, stopTime) != RESULT_OK)
-        return fmi3Error;
+    if (!set_experiment(c, toleranceDefined, tolerance, startTime, stopTimeDefined, stopTime)) return fmi3Error;
     c->state.phase = PHASE_INITIALIZATION;
     return fmi3OK;
 }
@@ -104,7 +103,7 @@ static size_t elements(const Instance *c, fmi3ValueReference reference, fmi3Valu
         NEED(nValues, values);                                                                      \
         for (size_t k = 0; k < nValueReferences; k++)                                               \
             for (count = elements(c, valueReferences[k], &r); count > 0; count--, r++, values++)    \
-                if ((done) != RESULT_OK) return fmi3Error;                                          \
+                if (!(done)) return fmi3Error;                                                      \
         return fmi3OK;                                                                              \
     }
 
@@ -187,7 +186,7 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discrete
     ENTER(UpdateDiscreteStates, PHASE_EVENT);
     NEED(1, discreteStatesNeedUpdate, terminateSimulation, nominalsOfContinuousStatesChanged,
         valuesOfContinuousStatesChanged, nextEventTimeDefined, nextEventTime);
-    if (update_discrete(c, &restart, &next) != RESULT_OK) return failed(c);
+    if (!update_discrete(c, &restart, &next)) return failed(c);
     *discreteStatesNeedUpdate = *terminateSimulation = *nominalsOfContinuousStatesChanged = fmi3False;
     *valuesOfContinuousStatesChanged = restart != 0;
     *nextEventTimeDefined = isfinite(next);
@@ -217,7 +216,7 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
     NEED(1, eventHandlingNeeded, terminateSimulation, earlyReturn, lastSuccessfulTime);
     *eventHandlingNeeded = *terminateSimulation = *earlyReturn = fmi3False;
     *lastSuccessfulTime = c->state.t;
-    if (check_step(c, currentCommunicationPoint, communicationStepSize, &target) != RESULT_OK) return fmi3Error;
+    if (!check_step(c, currentCommunicationPoint, communicationStepSize, &target)) return fmi3Error;
     arrival = integrate_to(c, target, c->event_mode_used && c->early_return_allowed);
     *lastSuccessfulTime = c->state.t;
     *eventHandlingNeeded = arrival == AT_EVENT;

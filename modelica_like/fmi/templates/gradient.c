@@ -66,7 +66,7 @@ static void load_tangent(Instance *c, const Tangent *one, int moving) {
     memcpy(dots + m->slot_u, part_of(c, one, c->u), m->n_u * sizeof(double));
     memcpy(dots + m->slot_d, part_of(c, one, c->d), m->n_d * sizeof(double));
     if (moving) memcpy(dots + m->slot_x, part_of(c, one, c->x), m->n_x * sizeof(double));
-    if (moving) tangent_of_implicit(c, c->work.order);
+    if (moving) tangent_of_implicit(c);
 }
 
 /* Stage i of a step: (M/(h gamma) - J) s = M/(h gamma) begin + b; the matrix is factorised, the rates' tape has run. */
@@ -92,11 +92,10 @@ void gradient_move(Instance *c, double end) {
     const Model *m = c->model;
     double begin = c->state.t, h = (end - begin) / STEPS, *rates = c->work.rhs;
     if (g == NULL || g->why != NULL || h <= 0) return;
-    if (factor_implicit(c, c->work.order) != RESULT_OK) gradient_lose(c, "its equations are singular there", NULL);
+    if (!factor_implicit(c)) gradient_lose(c, "its equations are singular there", NULL);
     for (int j = 0; j < g->n; j++) {
         load_tangent(c, &g->tangents[j], 1);
-        evaluate_now(c, &m->tapes.rates, rates);
-        tape_tangent(&m->tapes.rates, c->work.slots, c->work.dots, rates);
+        tangent_now(c, &m->tapes.rates, rates);
         memcpy(g->tangents[j].stages, rates, m->n_x * sizeof(double));
     }
     for (int i = 1; i <= STEPS * (N_STAGES - 1); i++) {
@@ -131,15 +130,14 @@ static void find_shifts(Instance *c, Gradient *g) {
     const Tape *tape = cause != NULL && cause->timed ? &c->model->tapes.moments : &c->model->tapes.guards;
     double *values = tape == &c->model->tapes.moments ? c->work.guards : c->work.guards_before, speed = -1;
     for (int j = 0; j < g->n; j++) g->tangents[j].shift = 0;
-    if (cause == NULL || factor_implicit(c, c->work.order) != RESULT_OK) return;
+    if (cause == NULL || !factor_implicit(c)) return;
     evaluate_now(c, &c->model->tapes.rates, c->work.rhs);
     memcpy(g->rates, c->work.rhs, c->model->n_x * sizeof(double));
     evaluate_now(c, tape, values);
     if (!cause->timed) speed = values[c->model->n_guards + cause->index];
     for (int j = 0; j < g->n; j++) {
         load_tangent(c, &g->tangents[j], 1);
-        evaluate_now(c, tape, values);
-        tape_tangent(tape, c->work.slots, c->work.dots, values);
+        tangent_now(c, tape, values);
         g->tangents[j].shift = -values[cause->index] / speed;
     }
 }
@@ -194,7 +192,7 @@ static int difference(Instance *c, const Gradient *g, Tangent *one, Result (*pas
         state_copy_in(c, g->before);
         for (size_t k = 0; k < c->n_smooth; k++) c->numbers[k] += side * part * one->now[k];
         c->state.t += side * part * one->shift;
-        same &= pass(c) == RESULT_OK;
+        same &= pass(c);
         for (int k = 0; k < c->model->n_modes; k++) same &= c->model->modes[k].n_names == 0 || c->d[k] == modes[k];
         for (size_t k = 0; k < c->n_smooth; k++) next[k] += side * c->numbers[k] / (2 * part);
     }
@@ -246,10 +244,10 @@ Result gradient_through(Instance *c, Result (*pass)(Instance *c), int start) {
     }
     if (!start && g->why == NULL) find_shifts(c, g);
     g->n_rounds = 0;
-    if (state_copy_out(c, &g->before) != RESULT_OK) return RESULT_ERROR;
+    if (!state_copy_out(c, &g->before)) return RESULT_ERROR;
     result = pass(c);
-    if (result != RESULT_OK || g->why != NULL) return result;
-    if (state_copy_out(c, &g->behind) != RESULT_OK) return RESULT_ERROR;
+    if (!result || g->why != NULL) return result;
+    if (!state_copy_out(c, &g->behind)) return RESULT_ERROR;
     if (!start) check_shifts(c, g);
     if (g->why == NULL) pass_tangents(c, g, pass);
     return RESULT_OK;
@@ -297,11 +295,11 @@ static double *value_of(Instance *c, const Variable *v) {
 }
 
 static Result begin(Instance *c, const uint32_t by[], size_t n) {
-    if (allowed(c, "modelica_like_gradient_start", PHASE_INITIALIZATION) != RESULT_OK) return RESULT_ERROR;
+    if (!allowed(c, "modelica_like_gradient_start", PHASE_INITIALIZATION)) return RESULT_ERROR;
     if (!c->co_simulation || c->model->settings->fixed_step > 0)
         return fail(c, "Derivatives of a run need Co-Simulation with adaptive steps.");
     if (by == NULL && n > 0) return fail(c, "The argument by is a null pointer.");
-    if (check_knowns(c, by, n) != RESULT_OK) return RESULT_ERROR;
+    if (!check_knowns(c, by, n)) return RESULT_ERROR;
     gradient_end(c);
     if (n > 0 && (c->gradient = gradient_new(c, n)) == NULL) return fail(c, "There is not enough memory.");
     for (size_t j = 0; j < n; j++) {
@@ -313,18 +311,17 @@ static Result begin(Instance *c, const uint32_t by[], size_t n) {
 }
 
 int modelica_like_gradient_start(void *instance, const uint32_t by[], size_t n) {
-    return instance == NULL || begin(instance, by, n) != RESULT_OK;
+    return instance == NULL || !begin(instance, by, n);
 }
 
 static Result read_gradient(Instance *c, const uint32_t of[], size_t n, double gradient[]) {
     const Gradient *g = c->gradient;
-    if (allowed(c, "modelica_like_gradient", PHASE_EVENT | PHASE_STEP | PHASE_TERMINATED) != RESULT_OK)
-        return RESULT_ERROR;
+    if (!allowed(c, "modelica_like_gradient", PHASE_EVENT | PHASE_STEP | PHASE_TERMINATED)) return RESULT_ERROR;
     if (g == NULL || of == NULL || gradient == NULL)
         return fail(c, "An argument is a null pointer, or modelica_like_gradient_start has not been called.");
     if (g->why != NULL)
         return fail(c, "There are no derivatives with respect to %s after t = %.9g s: %s.", g->by, g->lost_at, g->why);
-    if (check_unknowns(c, of, n) != RESULT_OK || factor_implicit(c, c->work.order) != RESULT_OK) return RESULT_ERROR;
+    if (!check_unknowns(c, of, n) || !factor_implicit(c)) return RESULT_ERROR;
     for (int j = 0; j < g->n; j++) {
         load_tangent(c, &g->tangents[j], 1);
         read_tangents(c, of, n, gradient + j, (size_t)g->n);
@@ -333,5 +330,5 @@ static Result read_gradient(Instance *c, const uint32_t of[], size_t n, double g
 }
 
 int modelica_like_gradient(void *instance, const uint32_t of[], size_t n_of, double gradient[]) {
-    return instance == NULL || read_gradient(instance, of, n_of, gradient) != RESULT_OK;
+    return instance == NULL || !read_gradient(instance, of, n_of, gradient);
 }

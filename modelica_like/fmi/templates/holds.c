@@ -147,7 +147,7 @@ static void yield_to_contradiction(Instance *c, const Circuit *one) {
     for (int asked = 0; asked < 2; asked++) {
         for (int k = 0; k < one->n_members; k++)
             if (other[k]) c->d[m->holds[member[k]].approach] = asked;
-        solved = solved && solve_now(c, 1) == RESULT_OK;
+        solved = solved && solve_now(c, 1);
         variables_now(c);
         for (int k = 0; k < one->n_members; k++) {
             double now = c->work.variables[m->holds[member[k]].reaction];
@@ -190,7 +190,7 @@ static double use_of(Instance *c, const Terms *terms, double *use) {
     double *z = c->work.kept_z, worst = 0;
     memset(use, 0, m->n_holds * sizeof(double));
     memcpy(z, c->z, (size_t)m->n_z * sizeof(double));
-    if (solve_now(c, 1) != RESULT_OK) worst = INFINITY;
+    if (!solve_now(c, 1)) worst = INFINITY;
     variables_now(c);
     for (int i = 0; i < m->n_circuits; i++)
         for (int place = 0; place < m->circuits[i].n_members; place++) {
@@ -231,4 +231,10 @@ void share(Instance *c) {
             weights[k] = use[k] > 0 ? fmin(fmax(weights[k] * use[k], base[k] / TURNED), base[k] * TURNED) : base[k];
     }
     memcpy(c->d, best, (size_t)m->n_d * sizeof(double));
+}
+
+Result share_and_solve(Instance *c) {
+    share(c);
+    c->variables_valid = 0;
+    return solve_now(c, 0);
 }

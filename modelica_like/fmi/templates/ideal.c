@@ -36,10 +36,11 @@ static int place_of(Instance *c, int row, int second) {
 
 /* Gaussian elimination, row by row; `turns` becomes the combinations of rows, and `dependent` marks what vanishes. */
 static void eliminate_rows(Instance *c, int second, double *turns, double *sizes, unsigned char *dependent) {
-    int n = c->model->n_z;
+    const Model *m = c->model;
+    int n = m->n_z;
     double *a = c->work.dense_matrix;
-    evaluate_special(c, SPECIAL_ALG, c->state.t, c->x, c->work.vector);
-    run_special(c, SPECIAL_ALG_JACOBIAN, a);
+    evaluate_special(c, &m->tapes.alg, c->state.t, c->x, c->work.vector);
+    run_special(c, &m->tapes.alg_jacobian, a);
     for (int i = 0; i < n; i++)
         for (int j = 0; j < n; j++) {
             if (fabs(a[i + n * j]) > sizes[i]) sizes[i] = fabs(a[i + n * j]);

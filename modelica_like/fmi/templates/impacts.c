@@ -11,7 +11,7 @@ static Result ask(Instance *c, const Strike *strike, int approaching, int unsolv
     const Model *m = c->model;
     const double *values;
     for (int k = 0; k < m->n_holds; k++) c->d[m->holds[k].approach] = approaching ? strike->approach[k] : 0;
-    if (unsolved && solve_now(c, 0) != RESULT_OK) return RESULT_ERROR;
+    if (unsolved && !solve_now(c, 0)) return RESULT_ERROR;
     evaluate_now(c, &m->tapes.rates, c->work.rhs);
     memcpy(rates, c->work.rhs, m->n_x * sizeof(double));
     if (!strike->hard) return RESULT_OK;
@@ -34,7 +34,7 @@ static Result respond(Instance *c, Strike *strike) {
     if (strike->hard) find_held(c, c->work.terms, strike->held);
     for (int k = 0; k < m->n_holds; k++) strike->held[k] &= !strike->loose[k] && m->holds[k].reaction >= 0;
     result = ask(c, strike, 0, any || !c->bounded, rates, strike->reaction);
-    if (result == RESULT_OK) result = ask(c, strike, 1, 1, strike->jump, strike->impulse);
+    if (result) result = ask(c, strike, 1, 1, strike->jump, strike->impulse);
     for (int k = 0; k < m->n_x; k++) strike->jump[k] = INSTANT * (strike->jump[k] - rates[k]);
     for (int k = 0; k < m->n_holds; k++) strike->impulse[k] = INSTANT * (strike->impulse[k] - strike->reaction[k]);
     memcpy(c->d, d, (size_t)m->n_d * sizeof(double));
@@ -121,7 +121,7 @@ static Result carry_out(Instance *c, Strike *strike, int first) {
             strike->approach[k] = strike->entering[k] && !strike->loose[k]
                                       ? -(1 + terms[k].restitution) * strike->before[k] / INSTANT
                                       : 0;
-        if (respond(c, strike) != RESULT_OK) return RESULT_ERROR;
+        if (!respond(c, strike)) return RESULT_ERROR;
         if (strike->hard && let_go_unbearable(c, strike, terms)) continue;
         if (!put_back_approaching(c, strike, terms)) break;
     }
@@ -132,7 +132,7 @@ static Result carry_out(Instance *c, Strike *strike, int first) {
         if (strike->entering[k] && !strike->loose[k] && one->state >= 0)
             c->x[one->state] = -terms[k].restitution * strike->before[k] / one->factor;
     }
-    if (solve_now(c, 0) != RESULT_OK) return RESULT_ERROR;
+    if (!solve_now(c, 0)) return RESULT_ERROR;
     if (strike->hard && c->struck != NULL) book(c, strike, first);
     if (strike->hard) mark_moved(c, strike, terms);
     return RESULT_OK;
@@ -170,8 +170,7 @@ static Result hold_again(Instance *c, const unsigned char *entered) {
         note_change(c, one->name, -1, one->mode, one->number);
         c->d[one->mode] = one->number;
     }
-    share(c);
-    return solve_now(c, 0);
+    return share_and_solve(c);
 }
 
 /* Speeds before an impact, and whether it is one. Friction stops nothing at once; where an importer lets it overrun
@@ -191,11 +190,13 @@ static void begin_strike(Instance *c, Strike *strike, const Terms *terms) {
 
 /* Stop what modes have begun to hold since `before`, by an impulse that all other components pass on. All impacts at an
  * instant are one, from the speeds before the first. */
-Result stop_motions(Instance *c, const double *before, Impacts *impacts) {
+Result stop_motions(Instance *c, const double *before) {
     const Model *m = c->model;
     Strike *strike = &c->work.strike;
     Terms *terms = c->work.strike_terms;
-    int first = !impacts->struck;
+    unsigned char *entered = c->work.entered;
+    double *x = c->work.impact_x;
+    int first = !c->work.struck;
     if (m->n_holds == 0) return RESULT_OK;
     memset(strike->loose, 0, (size_t)m->n_holds);
     find_held(c, terms, strike->entering);
@@ -203,17 +204,16 @@ Result stop_motions(Instance *c, const double *before, Impacts *impacts) {
     if (!any_of(strike->entering, m->n_holds)) return RESULT_OK;
     begin_strike(c, strike, terms);
     if (strike->hard) {
-        for (int k = 0; k < m->n_holds; k++) strike->entering[k] = impacts->entered[k] |= strike->entering[k];
-        if (!impacts->struck) memcpy(impacts->x, c->x, (size_t)m->n_x * sizeof(double));
-        impacts->struck = 1;
-        memcpy(c->x, impacts->x, (size_t)m->n_x * sizeof(double));
-        if (hold_again(c, impacts->entered) != RESULT_OK) return RESULT_ERROR;
+        for (int k = 0; k < m->n_holds; k++) strike->entering[k] = entered[k] |= strike->entering[k];
+        if (first) memcpy(x, c->x, (size_t)m->n_x * sizeof(double));
+        c->work.struck = 1;
+        memcpy(c->x, x, (size_t)m->n_x * sizeof(double));
+        if (!hold_again(c, entered)) return RESULT_ERROR;
         begin_strike(c, strike, terms);
     }
-    if (carry_out(c, strike, first) != RESULT_OK) return RESULT_ERROR;
-    for (int k = 0; k < m->n_holds; k++) impacts->entered[k] &= !strike->knocked[k];
+    if (!carry_out(c, strike, first)) return RESULT_ERROR;
+    for (int k = 0; k < m->n_holds; k++) entered[k] &= !strike->knocked[k];
     if (!any_of(strike->loose, m->n_holds)) return RESULT_OK;
     choose_again(c, strike);
-    share(c);
-    return solve_now(c, 0);
+    return share_and_solve(c);
 }

@@ -19,8 +19,8 @@ static Look room_for_look(const Instance *c, int number) {
 }
 
 static int look_at(Instance *c, double t, double *point, Look *look) {
-    if (solve_implicit(c, t, point, 1) != RESULT_OK) return 0;
-    evaluate_special(c, SPECIAL_GUARDS, t, point, look->values);
+    if (!solve_implicit(c, t, point, 1)) return 0;
+    evaluate_special(c, &c->model->tapes.guards, t, point, look->values);
     look->t = t;
     for (int g = 0; g < c->model->n_guards; g++) {
         look->values[g] = number_or_false(look->values[g]);

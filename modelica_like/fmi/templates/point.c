@@ -62,10 +62,10 @@ Result solve_implicit(Instance *c, double t, double *point, int quiet) {
     int *order = c->work.order, rounds = !c->bounded ? MAX_NEWTON : m->settings->implicit_linear ? 1 : BOUNDED_NEWTON;
     if (m->n_z == 0) return RESULT_OK;
     for (int round = 0; round < rounds; round++) {
-        evaluate_special(c, SPECIAL_ALG, t, point, step);
+        evaluate_special(c, &m->tapes.alg, t, point, step);
         if (c->bounded && round > 0 && largest_of(m->n_z, step) <= SOLVED * residual) return RESULT_OK;
         residual = largest_of(m->n_z, step);
-        run_special(c, SPECIAL_ALG_JACOBIAN, matrix);
+        run_special(c, &m->tapes.alg_jacobian, matrix);
         for (int k = 0; k < m->n_z; k++)
             if (!isfinite(step[k])) return quiet ? RESULT_ERROR : singular(c, t, text_of(m, m->implicit_names[k]));
         if (!lu_factor(m->n_z, matrix, order))
@@ -107,9 +107,4 @@ Result check_singular(Instance *c) {
 }
 
 /* Bring the implicit unknowns up to date with time, states, parameters and inputs. */
-Result settle(Instance *c) {
-    if (c->state.z_valid) return RESULT_OK;
-    if (solve_now(c, 0) != RESULT_OK) return RESULT_ERROR;
-    c->state.z_valid = 1;
-    return RESULT_OK;
-}
+Result settle(Instance *c) { return c->state.z_valid || (c->state.z_valid = solve_now(c, 0)); }

@@ -55,8 +55,8 @@ static void linearize(Instance *c, double t, const double *y, double *slope) {
         w->dots[0] = 1;
         for (int k = 0; k < m->n_u; k++) w->dots[m->slot_u + k] = c->u_rate[k];
         tape_tangent(&m->tapes.rates, w->slots, w->dots, slope);
-    } else evaluate_special(c, SPECIAL_RATES, t, y, w->first_rates);
-    run_special(c, SPECIAL_JACOBIAN, w->jacobian);
+    } else evaluate_special(c, &c->model->tapes.rates, t, y, w->first_rates);
+    run_special(c, &c->model->tapes.jacobian, w->jacobian);
 }
 
 /* M * diagonal - J, factorised. */
@@ -99,7 +99,7 @@ int rosenbrock_step(
         for (int j = 0; j < i; j++)
             for (int k = 0; k < n; k++) y[k] += A[i][j] * w->stages[j * n + k];
         if (i == 0) memcpy(stage, w->first_rates, size);
-        else evaluate_special(c, SPECIAL_RATES, t + C_TIME[i] * h, y, stage);
+        else evaluate_special(c, &c->model->tapes.rates, t + C_TIME[i] * h, y, stage);
         for (int j = 0; j < i; j++)
             for (int k = 0; k < c->model->n_x; k++) stage[k] += C[i][j] / h * w->stages[j * n + k];
         for (int k = 0; k < n; k++) {

@@ -45,6 +45,7 @@ static void apply(Instance *c, const StartOf *starts, int count) {
 static Result solve_start_system(Instance *c, const double *values) {
     const Model *m = c->model;
     double *residual = c->work.start_residual, *step = c->work.start_unknowns, error = 0;
+    if (m->n_start_unknowns == 0) return RESULT_OK;
     memset(c->work.slots + m->slot_y, 0, m->n_y * sizeof(double));
     for (int k = 0; k < m->n_start_zero; k++) c->x[m->start_zero[k]] = 0;
     for (int round = 0; round < MAX_NEWTON; round++) {
@@ -91,10 +92,7 @@ static Result check_dependent(Instance *c, const double *values) {
 
 static Result solve_states(Instance *c) {
     const double *values = c->work.start_values;
-    if (apply_direct(c, values) != RESULT_OK) return RESULT_ERROR;
-    if (c->model->n_start_unknowns > 0 && solve_start_system(c, values) != RESULT_OK) return RESULT_ERROR;
-    if (solve_now(c, 0) != RESULT_OK) return RESULT_ERROR;
-    return check_dependent(c, values);
+    return apply_direct(c, values) && solve_start_system(c, values) && solve_now(c, 0) && check_dependent(c, values);
 }
 
 /* States with zero derivatives, the nearest to the guess; what nothing depends on and what is conserved stay. */
@@ -186,7 +184,7 @@ static Result find_steady(Instance *c, double *begun) {
     Work *w = &c->work;
     int count = 0;
     apply(c, m->start_default, m->n_start_default);
-    if (apply_direct(c, w->start_values) != RESULT_OK) return RESULT_ERROR;
+    if (!apply_direct(c, w->start_values)) return RESULT_ERROR;
     if (m->n_holds > 0) find_held(c, w->terms, w->held);
     variables_now(c);
     for (int k = 0; k < m->n_holds; k++) {
@@ -201,7 +199,7 @@ static Result find_steady(Instance *c, double *begun) {
 static Result check_modes_hold(Instance *c) {
     const Model *m = c->model;
     double *guards = c->work.guards;
-    if (m->n_guards == 0) return RESULT_OK;
+    if (m->n_guards == 0 || !m->settings->steady) return RESULT_OK;
     evaluate_now(c, &m->tapes.guards, guards);
     for (int k = 0; k < m->n_guards; k++) {
         const Transition *one = &m->transitions[m->guard_transition[k]];
@@ -216,7 +214,7 @@ static Result pass_start(Instance *c) {
     const Model *m = c->model;
     double *begun = c->work.begun;
     int round;
-    if (check_tables(c) != RESULT_OK) return RESULT_ERROR;
+    if (!check_tables(c)) return RESULT_ERROR;
     memcpy(c->x, m->guesses, m->n_unknowns * sizeof(double));
     memset(c->d, 0, m->n_d * sizeof(double));
     start_discretes(c);
@@ -225,12 +223,12 @@ static Result pass_start(Instance *c) {
     apply(c, m->start_guess, m->n_start_guess);
     if (m->settings->steady) {
         apply(c, m->start_default, m->n_start_default);
-        if (apply_direct(c, c->work.start_values) != RESULT_OK) return RESULT_ERROR;
+        if (!apply_direct(c, c->work.start_values)) return RESULT_ERROR;
         choose_start_modes(c, NULL);
         share(c);
     }
     for (round = 0; round < MODE_ROUNDS; round++) {
-        if ((m->settings->steady ? find_steady(c, begun) : solve_states(c)) != RESULT_OK) return RESULT_ERROR;
+        if (!(m->settings->steady ? find_steady(c, begun) : solve_states(c))) return RESULT_ERROR;
         if (!choose_start_modes(c, m->settings->steady ? begun : NULL)) break;
         share(c);
     }
@@ -238,8 +236,7 @@ static Result pass_start(Instance *c) {
         return fail(c, "The modes at the start do not settle: they and the start values keep changing each other.");
     rest(c);
     replace_dependent(c);
-    if (solve_now(c, 0) != RESULT_OK || check_singular(c) != RESULT_OK) return RESULT_ERROR;
-    if (m->settings->steady && check_modes_hold(c) != RESULT_OK) return RESULT_ERROR;
+    if (!solve_now(c, 0) || !check_singular(c) || !check_modes_hold(c)) return RESULT_ERROR;
     c->state.z_valid = c->state.solved = 1;
     c->state.piece_valid = c->state.event_pending = 0;
     c->variables_valid = 0;

@@ -155,7 +155,7 @@ Result output_rate(Instance *c, uint32_t reference, int order, double *value) {
     if (order < 1 || order >= ORDERS) return fail(c, "Outputs have derivatives of order 1 to %d only.", ORDERS - 1);
     if (v->kind != KIND_VARIABLE && v->kind != KIND_STATE)
         return fail(c, "%s has no time derivative: it is not a variable.", text_of(m, v->name));
-    if (factor_implicit(c, w->order) != RESULT_OK) return RESULT_ERROR;
+    if (!factor_implicit(c)) return RESULT_ERROR;
     for (int n = 1; n < ORDERS; n++) memset(terms + (n - 1) * m->n_slots, 0, m->slot_results * sizeof(double));
     terms[0] = 1;
     memcpy(terms + m->slot_u, c->u_rate, m->n_u * sizeof(double));

@@ -34,12 +34,12 @@ static const double *seen(Instance *c, const Variable *v) {
                                                         : w->variables;
     if (v->kind == KIND_VARIABLE) ask_for(c, v->index);
     if (c->variables_valid & 1 << v->kind) return values;
-    if (v->kind != KIND_DERIVED && settle(c) != RESULT_OK) return NULL;
+    if (v->kind != KIND_DERIVED && !settle(c)) return NULL;
     switch (v->kind) {
         case KIND_DERIVED: evaluate_now(c, &c->model->tapes.derived, w->seen_derived); break;
-        case KIND_DERIVATIVE: evaluate_special(c, SPECIAL_RATES, c->state.t, c->x, w->seen_rates); break;
+        case KIND_DERIVATIVE: evaluate_special(c, &c->model->tapes.rates, c->state.t, c->x, w->seen_rates); break;
         case KIND_GUARD: get_indicators(c, w->seen_indicators); break;
-        default: evaluate_special(c, SPECIAL_VARIABLES, c->state.t, c->x, w->variables);
+        default: evaluate_special(c, &c->model->tapes.variables, c->state.t, c->x, w->variables);
     }
     c->variables_valid |= 1 << v->kind;
     return values;
@@ -56,7 +56,7 @@ static Result make_ready(Instance *c, const Variable *v) {
 /* Of a variable that is known, or NULL: then its reference was wrong. */
 Result get_value(Instance *c, const Variable *v, double *value) {
     const double *values;
-    if (v == NULL || make_ready(c, v) != RESULT_OK) return RESULT_ERROR;
+    if (v == NULL || !make_ready(c, v)) return RESULT_ERROR;
     switch (v->kind) {
         case KIND_TIME: *value = c->state.t; return RESULT_OK;
         case KIND_STATE: *value = c->x[v->index]; return RESULT_OK;
@@ -71,8 +71,7 @@ Result get_value(Instance *c, const Variable *v, double *value) {
 
 /* Solves what getting a value from the present point needs. */
 Result make_consistent(Instance *c) {
-    if (c->state.phase == PHASE_INITIALIZATION && !c->state.solved && start_solve(c) != RESULT_OK) return RESULT_ERROR;
-    return settle(c);
+    return (c->state.phase != PHASE_INITIALIZATION || c->state.solved || start_solve(c)) && settle(c);
 }
 
 void get_derivatives(Instance *c, double *derivatives) {
